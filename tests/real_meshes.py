@@ -1,0 +1,43 @@
+"""Benchmark meshes from a folder beside the checkout; tests that need them skip without it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+_ROOT = Path(__file__).resolve().parent.parent
+DATA = Path(os.environ.get("SEGDEFORM_DATA", _ROOT.parent / "shared" / "data"))
+
+
+def path_of(name: str) -> Path:
+    """Return the path of a benchmark file, or skip the test that asks for it."""
+    path = DATA / name
+    if not path.is_file():
+        pytest.skip(f"{name} is not in {DATA}; set SEGDEFORM_DATA to the folder that has it")
+    return path
+
+
+def read_off(name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return (vertices, faces) of a triangle OFF file."""
+    words = path_of(name).read_text().split()
+    n, m = int(words[1]), int(words[2])
+    vertices = np.array(words[4 : 4 + 3 * n], dtype=float).reshape(n, 3)
+    faces = np.array(words[4 + 3 * n : 4 + 3 * n + 4 * m], dtype=int).reshape(m, 4)[:, 1:]
+    return vertices, faces
+
+
+def botsch_sorkine(name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return (vertices, faces, selection, matrix) of the pose "cactus" or "cylinder".
+
+    selection is 0 for fixed, 1 for free and 2 for handle vertices; matrix (4, 4) moves the handle.
+    """
+    vertices, faces = read_off(f"botsch-sorkine/{name}.off")
+    folder = "botsch-sorkine/"
+    lines = path_of(f"{folder}{name}.sel").read_text().splitlines()
+    selection = np.array([int(line) for line in lines if line and not line.startswith("#")])
+    lines = path_of(f"{folder}{name}.def").read_text().splitlines()
+    rows = [line.split() for line in lines if line and not line.startswith("#")]
+    return vertices, faces, selection, np.array(rows, dtype=float)

@@ -1,0 +1,87 @@
+"""Tiny solids whose volume, area or coordinates are known in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+
+FloatArray = np.ndarray
+TETRAHEDRON = (
+    np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]),
+    np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]),
+)
+OCTAHEDRON = (
+    np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]),
+    np.array(
+        [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]]
+    ),
+)
+CUBE = (  # side 1, corner at the origin: volume 1, area 6
+    np.array([[x, y, z] for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)]),
+    np.array(
+        [
+            [0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4],
+            [2, 6, 3], [3, 6, 7], [0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5],
+        ]
+    ),
+)  # fmt: skip
+SOLIDS = {"tetrahedron": TETRAHEDRON, "octahedron": OCTAHEDRON, "cube": CUBE}
+
+
+def icosphere(subdivisions: int = 3, radius: float = 1.0) -> tuple[FloatArray, FloatArray]:
+    """Return the octahedron, each triangle split in four *subdivisions* times, on a sphere."""
+    vertices, faces = OCTAHEDRON
+    for _ in range(subdivisions):
+        vertices, faces = _split(vertices, faces)
+        vertices = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
+    return radius * vertices, faces
+
+
+def torus(
+    around: int = 48, across: int = 24, major: float = 1.0, minor: float = 0.35
+) -> tuple[FloatArray, FloatArray]:
+    """Return a torus about z; volume tends to 2 pi^2 major minor^2."""
+    u, v = np.meshgrid(np.arange(around), np.arange(across), indexing="ij")
+    a, b = 2 * np.pi * u / around, 2 * np.pi * v / across
+    ring = major + minor * np.cos(b)
+    vertices = np.stack([ring * np.cos(a), ring * np.sin(a), minor * np.sin(b)], axis=-1)
+
+    def number(i: FloatArray, j: FloatArray) -> FloatArray:
+        return (i % around) * across + j % across
+
+    here, east, north = number(u, v), number(u + 1, v), number(u, v + 1)
+    corner = number(u + 1, v + 1)
+    faces = np.concatenate(
+        [np.stack([here, east, corner], -1), np.stack([here, corner, north], -1)]
+    )
+    return vertices.reshape(-1, 3), faces.reshape(-1, 3)
+
+
+def two_components() -> tuple[FloatArray, FloatArray]:
+    """Return two spheres apart from each other, as one mesh."""
+    vertices, faces = icosphere(2)
+    shifted = vertices * 0.7 + [2.5, 0.0, 0.0]
+    return np.concatenate([vertices, shifted]), np.concatenate([faces, faces + len(vertices)])
+
+
+def rotation(axis: FloatArray, angle: float) -> FloatArray:
+    """Return the (3, 3) turn by *angle* radians about *axis* (Rodrigues)."""
+    x, y, z = np.asarray(axis, float) / np.linalg.norm(axis)
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+
+
+def somewhere(n: int = 50, seed: int = 0, size: float = 2.0) -> FloatArray:
+    """Return *n* points, uniform in a box of half-width *size*."""
+    return np.random.default_rng(seed).uniform(-size, size, (n, 3))
+
+
+def _split(vertices: FloatArray, faces: FloatArray) -> tuple[FloatArray, FloatArray]:
+    pairs = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges, which = np.unique(pairs, axis=0, return_inverse=True)
+    middle = len(vertices) + which.reshape(-1, 3)
+    (a, b, c), (ab, bc, ca) = faces.T, middle.T
+    parts = [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
+    return (
+        np.concatenate([vertices, vertices[edges].mean(axis=1)]),
+        np.concatenate([np.stack(part, axis=-1) for part in parts]),
+    )

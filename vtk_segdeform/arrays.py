@@ -1,0 +1,72 @@
+"""Checks at the public door: every argument becomes a plain array, or an error that names it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+def as_points(points: ArrayLike, name: str) -> FloatArray:
+    """Return *points* as (n, 3) float, or raise a ValueError that says what came instead."""
+    array = _as_numbers(points, name)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"{name} must have shape (n, 3); got {array.shape}")
+    bad = np.count_nonzero(~np.isfinite(array).all(axis=1))
+    if bad:
+        raise ValueError(f"{name} holds {bad} points with NaN or infinite coordinates")
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def as_faces(faces: ArrayLike, n_points: int, name: str) -> IntArray:
+    """Return *faces* as (m, 3) int with indices in 0..n_points-1, or raise a ValueError."""
+    array = np.asarray(faces)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"{name} must have shape (m, 3), triangles; got {array.shape}")
+    if array.dtype.kind not in "iu":
+        raise ValueError(f"{name} must hold integers; got {array.dtype}")
+    if len(array) and (array.min() < 0 or array.max() >= n_points):
+        low, high = array.min(), array.max()
+        raise ValueError(f"{name} must index 0..{n_points - 1}; got {low}..{high}")
+    return np.ascontiguousarray(array, dtype=np.int64)
+
+
+def as_ids(ids: ArrayLike, n_points: int, name: str) -> IntArray:
+    """Return vertex numbers from a list of ids or from a mask of length *n_points*.
+
+    The order given is kept; a number given twice is an error.
+    """
+    array = np.asarray(ids)
+    if array.dtype == bool:
+        if array.shape != (n_points,):
+            raise ValueError(f"{name}, a mask, must have shape ({n_points},); got {array.shape}")
+        return np.flatnonzero(array).astype(np.int64)
+    if array.size == 0:
+        return np.empty(0, dtype=np.int64)
+    if array.dtype.kind not in "iu":
+        raise ValueError(f"{name} must hold vertex numbers or be a mask; got {array.dtype}")
+    array = np.atleast_1d(array).astype(np.int64)
+    if array.ndim != 1:
+        raise ValueError(f"{name} must be one row of vertex numbers; got shape {array.shape}")
+    if array.min() < 0 or array.max() >= n_points:
+        low, high = array.min(), array.max()
+        raise ValueError(f"{name} must index 0..{n_points - 1}; got {low}..{high}")
+    if len(np.unique(array)) != len(array):
+        raise ValueError(f"{name} names a vertex twice")
+    return array
+
+
+def frozen(array: NDArray[np.generic]) -> NDArray[np.generic]:
+    """Return *array* marked read-only, so that sharing it is safe."""
+    array.flags.writeable = False
+    return array
+
+
+def _as_numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must hold numbers") from None
