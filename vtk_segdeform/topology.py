@@ -1,0 +1,132 @@
+"""Which triangles touch where: edges, fans, shells and borders, without any positions.
+
+A triangle (v_0, v_1, v_2) has three *sides*, directed from each corner to the next.  Side
+``h = 3 f + c`` belongs to face f and runs from its corner c to its corner c + 1, so h also names
+that corner.  Everything here follows from sorting the 3m sides by the edge they lie on:
+
+    edge     the sides between the same two vertices, in either direction
+    open     an edge with one side; the surface ends there
+    pair     an edge with two; on a two-manifold every edge is one
+    shell    the faces that can be reached from each other across edges
+    fan      the corners at one vertex that can be reached from each other across pairs; at each
+             vertex of a two-manifold there is exactly one
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from .arrays import BoolArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """The directed sides of triangles, sorted by edge; faces (m, 3) must not repeat a vertex."""
+
+    faces: IntArray
+    n_vertices: int
+
+    @cached_property
+    def tail(self) -> IntArray:
+        """(3m,) int: the vertex where each side starts."""
+        return self.faces.ravel()
+
+    @cached_property
+    def head(self) -> IntArray:
+        """(3m,) int: the vertex where each side ends."""
+        return self.faces[:, [1, 2, 0]].ravel()
+
+    @cached_property
+    def keys(self) -> IntArray:
+        """(3m,) int: one number per pair of vertices, whatever the direction; see `edge_keys`."""
+        return edge_keys(self.tail, self.head, self.n_vertices)
+
+    @cached_property
+    def order(self) -> IntArray:
+        """(3m,) int: the sides, those of one edge next to each other, smaller number first."""
+        return np.argsort(self.keys, kind="stable")
+
+    @cached_property
+    def first(self) -> IntArray:
+        """(e,) int: where in `order` each edge begins."""
+        ordered = self.keys[self.order]
+        return np.flatnonzero(np.diff(ordered, prepend=-1))
+
+    @cached_property
+    def n_sides(self) -> IntArray:
+        """(e,) int: the number of sides on each edge."""
+        return np.diff(self.first, append=len(self.order))
+
+    @cached_property
+    def open(self) -> IntArray:
+        """(b,) int: the sides without a partner."""
+        return self.order[self.first[self.n_sides == 1]]
+
+    @cached_property
+    def pairs(self) -> IntArray:
+        """(p, 2) int: the two sides of every edge that has exactly two."""
+        start = self.first[self.n_sides == 2]
+        return np.stack([self.order[start], self.order[start + 1]], axis=1)
+
+    @cached_property
+    def crowded(self) -> list[IntArray]:
+        """The sides of every edge that has three or more, one array per edge."""
+        where = np.flatnonzero(self.n_sides > 2)
+        return [self.order[self.first[e] : self.first[e] + self.n_sides[e]] for e in where]
+
+    @cached_property
+    def turned(self) -> BoolArray:
+        """(p,) bool: pairs that run the same way, so that their faces face opposite sides."""
+        one, other = self.pairs.T
+        return self.tail[one] == self.tail[other]
+
+    @cached_property
+    def shells(self) -> IntArray:
+        """(m,) int: the shell of each face, numbered from 0 in the order of first faces."""
+        same_edge = np.diff(self.keys[self.order]) == 0
+        one, other = self.order[:-1][same_edge] // 3, self.order[1:][same_edge] // 3
+        return connected(len(self.faces), one, other)
+
+    def fans(self, pairs: IntArray) -> IntArray:
+        """Return the fan of each corner, (3m,) int, where only *pairs* (p, 2) hold together."""
+        one, other = pairs.T
+        start, end = one, following(one)  # the corners at both ends of the first side
+        turned = self.tail[one] == self.tail[other]
+        partner_of_start = np.where(turned, other, following(other))
+        partner_of_end = np.where(turned, following(other), other)
+        return connected(
+            3 * len(self.faces),
+            np.concatenate([start, end]),
+            np.concatenate([partner_of_start, partner_of_end]),
+        )
+
+
+def edge_keys(one: IntArray, other: IntArray, n_vertices: int) -> IntArray:
+    """Return a number for each pair of vertices that is the same for (a, b) and (b, a)."""
+    return np.minimum(one, other) * n_vertices + np.maximum(one, other)
+
+
+def following(sides: IntArray) -> IntArray:
+    """Return the next side of the same face, or the next corner."""
+    return np.where(sides % 3 == 2, sides - 2, sides + 1)
+
+
+def connected(n: int, one: IntArray, other: IntArray) -> IntArray:
+    """Return the group of each of *n* things, (n,) int, when one[i] and other[i] belong together.
+
+    Groups are numbered from 0 in the order of their first members.
+
+    >>> connected(5, np.array([3]), np.array([1]))
+    array([0, 1, 2, 1, 3])
+    """
+    links = sparse.coo_array((np.ones(len(one), np.int8), (one, other)), shape=(n, n))
+    _, label = csgraph.connected_components(links, directed=False)
+    _, first, label = np.unique(label, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return rank[label]
