@@ -1,0 +1,72 @@
+# One command each, on a fresh clone as well as on an old one:
+#
+#   make demo       bend the cactus; mesh and pictures land in demo-output/
+#   make test       the whole suite            make campaign   the minutes-long runs
+#   make lint       ruff, nothing changed      make format     ruff, files rewritten
+#   make types      mypy --strict              make bench      the table of timings
+#
+# The first call makes a virtual environment in .venv; choose its Python with
+# `make PYTHON=python3.12 test`.
+
+PYTHON ?= python3
+VENV   ?= .venv
+BIN    := $(VENV)/bin
+PIP    := $(BIN)/python -m pip --quiet --disable-pip-version-check
+
+# Draw without a window.  On a Linux machine without a screen, say so to VTK at once: it would
+# try X first and warn about it once for every picture.
+export PYVISTA_OFF_SCREEN ?= true
+ifeq ($(shell uname -s)$(DISPLAY)$(WAYLAND_DISPLAY),Linux)
+export VTK_DEFAULT_OPENGL_WINDOW ?= vtkEGLRenderWindow
+endif
+
+.PHONY: help demo test campaign lint format types bench clean
+help:
+	@sed -n '3,9s/^# *//p' Makefile
+
+demo: $(VENV)/installed
+	$(BIN)/segdeform demo -o demo-output
+
+bench: $(VENV)/installed
+	$(BIN)/segdeform bench
+
+test: $(VENV)/installed-test
+	$(BIN)/python -m pytest -n 2
+
+campaign: $(VENV)/installed-test
+	$(BIN)/python -m pytest -m campaign
+
+lint: $(VENV)/installed-test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+format: $(VENV)/installed-test
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+types: $(VENV)/installed-test
+	$(BIN)/mypy
+
+clean:
+	rm -rf $(VENV) build dist demo-output *.egg-info .mypy_cache .pytest_cache .ruff_cache
+
+# A stamp is older than setup.cfg when a dependency may have changed; then, and only then, pip runs.
+$(VENV)/installed: setup.cfg pyproject.toml | $(BIN)/python
+	$(PIP) install --editable .
+	@touch $@
+
+$(VENV)/installed-test: setup.cfg pyproject.toml | $(BIN)/python
+	$(PIP) install --editable '.[test,meshlab]'
+	@touch $@ $(VENV)/installed
+
+$(BIN)/python:
+	@command -v $(PYTHON) >/dev/null || { \
+	  echo "There is no '$(PYTHON)' here. Install Python 3.10 or newer, or name one:" \
+	       "make PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || { \
+	  echo "$(PYTHON) is `$(PYTHON) --version 2>&1`; vtk_segdeform needs 3.10 or newer:" \
+	       "make PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+	  echo "$(PYTHON) cannot make a virtual environment. On Debian and Ubuntu:" \
+	       "apt-get install python3-venv" >&2; exit 1; }
+	$(PYTHON) -m venv --clear $(VENV)

@@ -1,0 +1,126 @@
+"""The arrows of the house, enforced by reading the source.
+
+Each chapter may import the ones before it in the story, and only the libraries it is granted.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "vtk_segdeform"
+
+# One line per part of the story; a new file takes its place here.
+STORY = [
+    "arrays", "errors", "progress",
+    "faults", "mesh", "repair",
+    "volume", "differential", "rotations",
+    "regions", "segmentation",
+    "mean_value", "intersections", "cages", "cage_fit",
+    "subspace", "constraints", "solver", "deformer",
+    "models", "convert", "meshlab", "pictures",
+    "selection", "motion", "bench", "demo", "commands", "cli", "__main__",
+]  # fmt: skip
+
+NUMERIC = {"numpy", "scipy"}
+GRANTED = {
+    "cage_fit": {"vtkmodules", "vtk"},
+    "models": {"vtkmodules", "vtk"},
+    "convert": {"vtkmodules", "vtk", "pyvista"},
+    "meshlab": {"pymeshlab"},
+    "pictures": {"vtkmodules", "vtk", "pyvista"},
+    "commands": {"pyvista"},
+}
+
+MAY_PRINT_AND_EXIT = {"cli", "__main__"}
+LONGEST = 250
+FILES = sorted(PACKAGE.glob("*.py"))
+NAMES = [path.stem for path in FILES]
+CHAPTERS = [name for name in STORY if name in NAMES]
+
+
+def imports(path: Path) -> Iterator[tuple[str, bool]]:
+    """Yield (module, is ours) for every import anywhere in the file, inside functions too."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name.partition(".")[0], False) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level:
+            if node.module:
+                yield node.module.partition(".")[0], True
+            else:
+                yield from ((alias.name, True) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield str(node.module).partition(".")[0], False
+
+
+def test_every_file_has_its_place_in_the_story():
+    assert sorted({*STORY, "__init__"}) == NAMES
+    assert len(set(STORY)) == len(STORY)
+
+
+@pytest.mark.parametrize("name", CHAPTERS)
+def test_a_chapter_imports_only_earlier_ones(name):
+    earlier = set(STORY[: STORY.index(name)]) | {"__version__"}
+    later = {module for module, ours in imports(PACKAGE / f"{name}.py") if ours} - earlier
+    assert not later, f"{name} imports {sorted(later)}, which the story tells later"
+
+
+@pytest.mark.parametrize("name", CHAPTERS)
+def test_a_chapter_imports_only_the_libraries_it_is_granted(name):
+    allowed = NUMERIC | GRANTED.get(name, set()) | set(sys.stdlib_module_names)
+    foreign = {module for module, ours in imports(PACKAGE / f"{name}.py") if not ours} - allowed
+    assert not foreign, f"{name} imports {sorted(foreign)}"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_chapter_is_short_enough_to_read_at_once(name):
+    text = (PACKAGE / f"{name}.py").read_text()
+    lines = text.count("\n")
+    reason = "Long because" in (ast.get_docstring(ast.parse(text)) or "")
+    assert lines <= LONGEST or reason, f"{lines} lines; say 'Long because ...' or split it"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_chapter_begins_by_saying_what_it_is(name):
+    assert ast.get_docstring(ast.parse((PACKAGE / f"{name}.py").read_text()))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_only_the_command_line_prints_or_exits(name):
+    if name in MAY_PRINT_AND_EXIT:
+        return
+    tree = ast.parse((PACKAGE / f"{name}.py").read_text())
+    calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    named = {call.id for call in calls if isinstance(call, ast.Name)}
+    raised = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    dotted = {ast.unparse(call) for call in calls if isinstance(call, ast.Attribute)}
+    assert not named & {"print", "exit", "quit", "input"}
+    assert "SystemExit" not in raised
+    assert not dotted & {"sys.exit", "os._exit", "sys.stdout.write", "sys.stderr.write"}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_chapter_changes_no_global_state_and_evaluates_no_text(name):
+    tree = ast.parse((PACKAGE / f"{name}.py").read_text())
+    calls = {ast.unparse(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    forbidden = {
+        "eval", "exec", "compile", "np.random.seed", "np.seterr", "warnings.filterwarnings",
+        "warnings.simplefilter", "logging.basicConfig", "pickle.load", "pickle.loads",
+    }  # fmt: skip
+    assert not calls & forbidden
+    assert not any(isinstance(node, ast.Global) for node in ast.walk(tree))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_public_functions_take_at_most_four_positional_arguments(name):
+    for node in ast.walk(ast.parse((PACKAGE / f"{name}.py").read_text())):
+        if isinstance(node, ast.FunctionDef) and not re.match("_[^_]", node.name):
+            positional = [a.arg for a in node.args.posonlyargs + node.args.args]
+            positional = [arg for arg in positional if arg not in ("self", "cls")]
+            assert len(positional) <= 4, f"{node.name}({', '.join(positional)}): use keywords"
