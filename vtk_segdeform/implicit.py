@@ -1,0 +1,219 @@
+"""A closed mesh with exactly n vertices on the surface f(x) = 0, and f for bodies with limbs.
+
+f is a signed distance, or nearly: negative inside, with a slope near 1.  The mesh is made thus:
+
+    contour     f on a grid, cut at 0; the spacing is chosen so that just under n vertices come out
+    split       the longest edges, until there are n
+    relax       flip edges, even out the vertices, put them back on the surface; repeat
+    refine      for large n: make a mesh of n / 4, cut each triangle in four, put back
+
+A `Limb` is a tube about a curve c(s), with radius r(s) and k ribs of relative height a,
+
+    f(x) = |x - c(s)| - r(s) (1 - a + a (1 + cos k phi))
+
+where c(s) is the point of the curve nearest to x and phi the angle about the curve.  Several
+become one body by the smooth minimum, which is rounded off where two distances are nearly equal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.interpolate import PchipInterpolator, make_interp_spline
+from scipy.sparse import csgraph
+from scipy.spatial import cKDTree
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
+
+from .arrays import FloatArray, IntArray
+from .mesh import Mesh
+from .remeshing import Field, flip, refine, relax, split_to, vertex_normals
+
+_FAR = 0.1  # a limb's distances beyond are all the same, which saves looking them up
+_LARGEST_CONTOUR = 20_000  # vertices; above, refining is faster and as good
+_ROUNDS = 12  # of relaxing; the least angle stops improving there
+
+
+@dataclass(frozen=True)
+class Limb:
+    """A round, ribbed, tapering tube along a smooth curve; calling it gives the distance.
+
+    Parameters
+    ----------
+    points : sequence of (x, y, z)
+        Where the curve goes through.  Ribs are counted from the y axis about it.
+    radii : sequence of float
+        The tube's radius at each point.
+    ribs : int
+        How many; none if 0.
+    height : float
+        Of the ribs, as a share of the radius.
+    """
+
+    points: Sequence[tuple[float, float, float]]
+    radii: Sequence[float]
+    ribs: int = 0
+    height: float = 0.0
+
+    def __call__(self, x: FloatArray) -> FloatArray:
+        """Return the signed distance, about, of the (n, 3) points *x*; at most 0.1."""
+        centre, tangent, radius = self._curve()
+        reach = _FAR + 1.3 * max(self.radii)
+        distance, nearest = cKDTree(centre).query(x, distance_upper_bound=reach)
+        near = np.isfinite(distance)
+        k = np.asarray(nearest)[near]
+        t, offset = tangent[k], x[near] - centre[k]
+        along = np.einsum("ij,ij->i", offset, t)
+        between = (k > 0) & (k < len(centre) - 1)  # else beyond an end: a round cap
+        offset -= np.where(between, along, 0.0)[:, None] * t
+        d = np.linalg.norm(offset, axis=1)
+        r = radius[k]
+        if self.ribs:
+            side = np.cross([0.0, 1.0, 0.0], t)
+            phi = np.arctan2(offset[:, 1], np.einsum("ij,ij->i", offset, side))
+            fade = np.where(between, 1.0, 1.0 - (along / np.maximum(d, 1e-12)) ** 2)
+            r = r * (1.0 - self.height + self.height * fade * (1.0 + np.cos(self.ribs * phi)))
+        value = np.full(len(x), _FAR)
+        value[near] = np.minimum(d - r, _FAR)
+        return value
+
+    def _curve(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return 400 points of the curve, its unit tangents and its radii there."""
+        points = np.asarray(self.points, dtype=float)
+        knots = np.insert(np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)), 0, 0.0)
+        s = np.linspace(0.0, knots[-1], 400)
+        spline = make_interp_spline(knots, points, k=min(3, len(points) - 1))
+        tangent = spline(s, nu=1)
+        tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+        return spline(s), tangent, PchipInterpolator(knots, self.radii)(s)
+
+
+def standing_body(limbs: Sequence[Limb], n_vertices: int, *, blend: float) -> Mesh:
+    """Return the *limbs* as one body, cut flat at z = 0 and scaled to height 1.
+
+    *blend* is the width, in the limbs' unit, over which two of them run into each other.
+    """
+
+    def field(x: FloatArray) -> FloatArray:
+        value = limbs[0](x)
+        for limb in limbs[1:]:
+            value = _smooth_minimum(value, limb(x), blend)
+        return -_smooth_minimum(-value, x[:, 2], 0.02)
+
+    points = np.concatenate([np.asarray(limb.points, dtype=float) for limb in limbs])
+    reach = 1.2 * max(max(limb.radii) for limb in limbs)
+    box = np.stack([points.min(axis=0) - reach, points.max(axis=0) + reach])
+    box[0, 2] = 0.0
+    mesh = implicit_surface(field, box, n_vertices)
+    low, high = mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()
+    return mesh.with_vertices((mesh.vertices - [0.0, 0.0, low]) / (high - low))
+
+
+def implicit_surface(field: Field, box: FloatArray, n_vertices: int) -> Mesh:
+    """Return a mesh of *n_vertices* vertices on the surface where *field* is 0.
+
+    Parameters
+    ----------
+    field : function of (n, 3) float points, returning (n,) float
+        Nearly a signed distance, negative inside.  Of several parts the largest is taken.
+    box : (2, 3) float
+        Lower and upper corner of a box around the surface.
+    n_vertices : int
+        How many vertices; enough of them that the thinnest part is a few edges around.
+
+    Returns
+    -------
+    mesh : Mesh
+
+    Raises
+    ------
+    ValueError
+        If so few vertices cannot hold the shape.
+    """
+    if n_vertices > _LARGEST_CONTOUR:
+        coarse = implicit_surface(field, box, n_vertices // 4)
+        vertices, faces = split_to(*refine(coarse.vertices, coarse.faces), n_vertices)
+        return Mesh(_put_back(vertices, faces, field), faces)
+    vertices, faces = split_to(*_contour_below(field, box, n_vertices), n_vertices)
+    for _ in range(_ROUNDS):
+        faces = flip(vertices, faces)
+        vertices = _put_back(relax(vertices, faces), faces, field)
+    return Mesh(vertices, flip(vertices, faces, field))
+
+
+def _contour_below(field: Field, box: FloatArray, n: int) -> tuple[FloatArray, IntArray]:
+    """Contour with at most *n* vertices, and nearly so many; they grow as 1 / spacing^2."""
+    spacing = float(np.ptp(box, axis=0).max()) / 24
+    best: tuple[FloatArray, IntArray] | None = None
+    for _ in range(12):
+        vertices, faces = _contour(field, box, spacing)
+        if len(vertices) <= n and (best is None or len(vertices) > len(best[0])):
+            best = vertices, faces
+        if 0.97 * n <= len(vertices) <= n:
+            break
+        spacing *= float(np.sqrt(max(len(vertices), 8) / (0.985 * n)))
+    if best is None or not len(best[0]):
+        raise ValueError(f"n_vertices = {n} is too few for this shape; ask for more")
+    return best
+
+
+def _contour(field: Field, box: FloatArray, spacing: float) -> tuple[FloatArray, IntArray]:
+    low, high = box[0] - 1.5 * spacing, box[1] + 1.5 * spacing
+    x, y, z = (np.arange(low[k], high[k] + spacing, spacing) for k in range(3))
+    grid = np.stack(np.meshgrid(z, y, x, indexing="ij")[::-1], axis=-1)
+    values = field(grid.reshape(-1, 3))
+    # A surface that grazes a grid point makes needles there; keep it a little away.
+    values = np.copysign(np.maximum(np.abs(values), 0.15 * spacing), values)
+    image = vtkImageData()
+    image.SetDimensions(len(x), len(y), len(z))
+    image.SetOrigin(*low)
+    image.SetSpacing(spacing, spacing, spacing)
+    # VTK turns its triangles towards lower values, so outward needs the sign changed.
+    image.GetPointData().SetScalars(numpy_to_vtk(-values, deep=True))
+    contour = vtkFlyingEdges3D()
+    contour.SetInputData(image)
+    contour.SetValue(0, 0.0)
+    contour.ComputeNormalsOff()
+    contour.ComputeGradientsOff()
+    contour.Update()
+    output = contour.GetOutput()
+    if not output.GetNumberOfPolys():
+        return np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
+    faces = vtk_to_numpy(output.GetPolys().GetConnectivityArray()).reshape(-1, 3)
+    vertices = vtk_to_numpy(output.GetPoints().GetData()).astype(float)
+    return _largest_part(vertices, faces.astype(np.int64))
+
+
+def _largest_part(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    """Drop the crumbs that a grid too coarse for a thin part leaves beside it."""
+    links = np.ones(faces.size), (faces.ravel(), np.roll(faces, 1, axis=1).ravel())
+    graph = sparse.coo_array(links, shape=(len(vertices),) * 2)
+    part = csgraph.connected_components(graph, directed=False)[1]
+    kept = part == np.bincount(part).argmax()
+    number = np.cumsum(kept) - 1
+    return vertices[kept], number[faces[kept[faces[:, 0]]]]
+
+
+def _put_back(vertices: FloatArray, faces: IntArray, field: Field) -> FloatArray:
+    """Move each vertex along its normal onto the surface: two secant steps."""
+    normals = vertex_normals(vertices, faces)
+    before, value = np.zeros(len(vertices)), field(vertices)
+    step = -value
+    for _ in range(2):
+        after = field(vertices + step[:, None] * normals)
+        run = step - before
+        slope = np.divide(after - value, run, out=np.ones_like(run), where=run != 0.0)
+        before, value, step = step, after, step - after / np.clip(slope, 0.3, 3.0)
+    moved: FloatArray = vertices + step[:, None] * normals
+    return moved
+
+
+def _smooth_minimum(a: FloatArray, b: FloatArray, width: float) -> FloatArray:
+    """Return the lesser of a and b, rounded off where they differ by less than *width*."""
+    gap = np.maximum(1.0 - np.abs(a - b) / width, 0.0)
+    lesser: FloatArray = np.minimum(a, b) - 0.25 * width * gap**2
+    return lesser
