@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from .arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
 from .errors import CageError
 from .intersections import self_intersections
-from .topology import components, connectivity_faults, counted
-from .winding import distance_to_surface, winding_number
+from .manifold import components, connectivity_faults, counted
+from .inside import distance_to_surface, winding_number
 
 __all__ = ["Cage", "cage_faults", "self_intersections", "winding_number"]
 
