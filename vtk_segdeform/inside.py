@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import FloatArray, IntArray, as_faces, as_points
-from .topology import face_edges
+from .manifold import face_edges
 
 _BLOCK = 1 << 17  # numbers per temporary: a megabyte, stays in the cache
 

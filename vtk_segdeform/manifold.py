@@ -49,3 +49,10 @@ def components(n_points: int, faces: IntArray) -> IntArray:
 def counted(number: int, one: str, many: str) -> str:
     """Return "1 edge is", "2 edges are": *number* with the words that fit it."""
     return f"{number} {one if number == 1 else many}"
+
+
+def face_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the edges (e, 2), and for each face (m, 3) the edges opposite its three corners."""
+    opposite = np.sort(faces[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2), axis=1)
+    edges, which = np.unique(opposite, axis=0, return_inverse=True)
+    return edges, which.reshape(-1, 3)
