@@ -1,0 +1,121 @@
+"""Equality constraints, held exactly: the volume of the whole mesh, or of each of its regions.
+
+    g_c(x) = V_c(x) - V_c(rest) = 0                                                     (9)
+
+A region is not closed, but its border can be: all border edges that hang together are spanned by
+a fan around their common centre, seen from both sides.  Region volumes then are volumes of closed
+surfaces, do not depend on an origin, and add up to the volume of the mesh.  The fans' centres are
+means of mesh vertices, so each V_c is the volume (8) of a few more triangles over
+``extension @ x`` instead of x.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from .arrays import FloatArray, IntArray
+from .mesh import Mesh
+from .volume import signed_volume, step_to_volume, volume_along, volume_gradient
+
+
+@dataclass(frozen=True, eq=False)
+class VolumeConstraint:
+    """The volume inside closed *faces* over the points ``extension @ x`` stays at *target*."""
+
+    faces: IntArray
+    target: float
+    extension: sparse.csr_array | None = None  # None: the mesh's own vertices
+
+    def violation(self, x: FloatArray) -> float:
+        """Return g(x), in units of volume."""
+        return signed_volume(self._extended(x), self.faces) - self.target
+
+    def gradient(self, x: FloatArray) -> FloatArray:
+        """Return J_g, (n, 3): the derivative of g by each vertex."""
+        gradient = volume_gradient(self._extended(x), self.faces)
+        return gradient if self.extension is None else self.extension.T @ gradient
+
+    def exact_step(self, x: FloatArray, direction: FloatArray) -> float:
+        """Return the smallest t with g(x + t direction) = 0, to rounding."""
+        x, direction = self._extended(x), self._extended(direction)
+        return step_to_volume(volume_along(x, direction, self.faces), self.target)
+
+    def _extended(self, x: FloatArray) -> FloatArray:
+        return x if self.extension is None else self.extension @ x
+
+
+def total_volume(mesh: Mesh) -> VolumeConstraint:
+    """Return the constraint that *mesh* keeps its enclosed volume."""
+    return VolumeConstraint(mesh.faces, signed_volume(mesh.vertices, mesh.faces))
+
+
+def region_volumes(mesh: Mesh, labels: IntArray) -> tuple[VolumeConstraint, ...]:
+    """Return one constraint for each region 0..r-1 of vertex *labels* (n,).
+
+    A face belongs to the region of two of its corners, or to its first corner's.  A region that
+    owns no face has no constraint.
+    """
+    face_labels = _face_labels(labels[mesh.faces])
+    halves = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)  # directed edges, 3 a face
+    owner = np.repeat(face_labels, 3)
+    n = mesh.n_vertices
+    key, opposite = halves[:, 0] * n + halves[:, 1], halves[:, 1] * n + halves[:, 0]
+    order = np.argsort(key)
+    across = owner[order[np.searchsorted(key, opposite, sorter=order)]]
+    border = across != owner
+
+    extension, centre = _with_centres(halves[border], n)
+    constraints = []
+    for label in np.unique(face_labels):
+        u, v = halves[border & (owner == label)].T
+        faces = np.concatenate([mesh.faces[face_labels == label], np.stack([v, u, centre[u]], 1)])
+        target = signed_volume(extension @ mesh.vertices, faces)
+        constraints.append(VolumeConstraint(faces, target, extension))
+    return tuple(constraints)
+
+
+def restore(
+    constraints: Sequence[VolumeConstraint], x: FloatArray, directions: Sequence[FloatArray]
+) -> FloatArray:
+    """Return the step t (c,) along *directions*, c fields (n, 3), that meets all constraints.
+
+    One constraint: the exact root of its cubic.  Several: Newton's method on t.
+    """
+    if len(constraints) == 1:
+        return np.array([constraints[0].exact_step(x, directions[0])])
+    t = np.zeros(len(constraints))
+    here = x
+    for _ in range(_NEWTON_STEPS):
+        g = np.array([c.violation(here) for c in constraints])
+        gradients = [c.gradient(here) for c in constraints]
+        jacobian = np.array([[np.vdot(j, d) for d in directions] for j in gradients])
+        step = np.linalg.lstsq(jacobian, -g, rcond=1e-12)[0]
+        t += step
+        here = x + sum(tk * d for tk, d in zip(t, directions, strict=True))
+        if np.abs(g).max() <= 1e-15 * sum(abs(c.target) for c in constraints):
+            break
+    return t
+
+
+_NEWTON_STEPS = 6
+
+
+def _face_labels(corners: IntArray) -> IntArray:
+    return np.where(corners[:, 1] == corners[:, 2], corners[:, 1], corners[:, 0])
+
+
+def _with_centres(edges: IntArray, n: int) -> tuple[sparse.csr_array, IntArray]:
+    """Return the map from x to x and the borders' centres, and each border vertex's centre."""
+    graph = sparse.coo_array((np.ones(len(edges)), edges.T), (n, n))
+    _, part = csgraph.connected_components(graph, directed=False)
+    on_border = np.unique(edges)
+    parts, local = np.unique(part[on_border], return_inverse=True)
+    mean = sparse.coo_array((1.0 / np.bincount(local)[local], (local, on_border)), (len(parts), n))
+    centre = np.zeros(n, dtype=np.int64)
+    centre[on_border] = n + local
+    return sparse.vstack([sparse.eye_array(n), mean]).tocsr(), centre

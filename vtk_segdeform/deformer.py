@@ -1,0 +1,265 @@
+"""The main algorithm, bound to one mesh: cages, subspace, energy, solver.
+
+    mesh, regions, cages  ->  W~            `subspace.bind`, once
+                          ->  E(p)          `energy.shape_energy`, once
+    fixed, handle         ->  H = L L^T     `solver.GaussNewton`, once
+    targets               ->  p, x = W~ p   `Deformer.solve`, at every move of the mouse
+
+All of it happens in a frame of the mesh's own, its box centred and its diagonal 1, so that
+neither the unit nor the place of the scene matters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arrays import FloatArray, IntArray, as_ids, as_points
+from .cages import Cage
+from .constraints import VolumeConstraint, region_volumes, total_volume
+from .energy import shape_energy
+from .errors import CageError, ConstraintError
+from .mesh import Mesh
+from .progress import Progress, part
+from .regions import Regions
+from .rotations import group_by_position
+from .solver import GaussNewton, Iteration, PositionTerm, SolverOptions, Status
+from .subspace import bind
+from .targets import connected_sets, waypoints
+from .volume import signed_volume
+
+_LEG_TOLERANCE, _LEG_STEPS = 1e-3, 12  # for the targets on the way to a far one
+_POSITION_WEIGHT = 1e2  # of the shape energy's trace, shared out over each handle's vertices
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A pose, and how it was reached."""
+
+    vertices: FloatArray  # (n, 3)
+    cage_vertices: tuple[FloatArray, ...]  # one (m_r, 3) per region
+    volume_change: float  # (V - V0) / V0, signed
+    region_volume_change: FloatArray  # the same for each region
+    handle_error: float  # farthest handle vertex from its target, in units of the mesh's diagonal
+    fixed_error: float  # farthest fixed vertex from its place, likewise
+    steps: int
+    status: Status
+    merits: tuple[float, ...]  # objective after each step of the last leg; never rises
+
+
+class Deformer:
+    """Deform one mesh by its handles, again and again; warm-started from the last solution.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        n vertices.
+    regions : Regions
+        r overlapping regions of *mesh*.
+    cages : sequence of r Cage
+        One around each region.
+    fixed, handle : (k,) int or (n,) bool
+        Vertices held in place, and vertices that follow *targets*.  Sets of handle vertices not
+        joined by an edge are handles of their own, moved and turned independently.
+    preserve_volume : bool
+        Hold the enclosed volume exactly, eq. (9).
+    preserve_region_volumes : bool
+        Hold the volume of every region as well.
+    stretch : float
+        Strength of the stretch term relative to the detail term; 0 is the paper's energy.
+    rotation_groups : int or None
+        How many rotations the detail turns by; None is one per vertex, as in the paper.
+    tolerance, max_steps : float, int
+        When to stop: the surface moves less than *tolerance* diagonals in a step.
+    window : int
+        Steps the acceleration remembers; 0 is the paper's plain iteration.
+    exact_volume : bool
+        False leaves the paper's linearised multiplier, for comparison.
+    progress : Progress, optional
+        Called while binding; may cancel.
+
+    Raises
+    ------
+    ConstraintError
+        If fixed or handle name no vertex of the mesh, or share one.
+    CageError
+        If there is not one cage per region, or a cage leaves out part of its region.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        regions: Regions,
+        cages: Sequence[Cage],
+        *,
+        fixed: ArrayLike = (),
+        handle: ArrayLike = (),
+        preserve_volume: bool = True,
+        preserve_region_volumes: bool = False,
+        stretch: float = 10.0,
+        rotation_groups: int | None = 300,
+        tolerance: float = 1e-6,
+        max_steps: int = 200,
+        window: int = 8,
+        exact_volume: bool = True,
+        progress: Progress | None = None,
+    ) -> None:
+        _check_cages(regions, cages)
+        self.mesh, self.regions, self.cages = mesh, regions, tuple(cages)
+        self.fixed = _checked_ids(fixed, mesh, "fixed")
+        self.handle = _checked_ids(handle, mesh, "handle")
+        both = np.intersect1d(self.fixed, self.handle)
+        if len(both):
+            raise ConstraintError(
+                f"{len(both)} vertices are both fixed and handle (the first is {both[0]}); "
+                "take them out of one of the two"
+            )
+        low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+        self._centre, self._size = 0.5 * (low + high), mesh.diagonal
+        self._rest = mesh.with_vertices(self._inward(mesh.vertices))
+        self._options = SolverOptions(tolerance, max_steps, window, exact_volume)
+
+        subspace = bind(regions, cages, progress=part(progress, 0.0, 0.8))
+        if progress:
+            progress(0.8, "factoring")
+        groups = _rotation_groups(self._rest, regions, rotation_groups)
+        energy = shape_energy(self._rest, subspace, stretch, groups)
+        self._volumes = region_volumes(self._rest, regions.labels)
+        constraints: list[VolumeConstraint] = []
+        if preserve_region_volumes:
+            constraints = list(self._volumes)
+        elif preserve_volume:
+            constraints = [total_volume(self._rest)]
+        self._handles = connected_sets(mesh, self.handle)
+        positions = self._position_term(subspace.at(self._held), np.trace(energy.quadratic))
+        self._solver = GaussNewton(energy, positions, constraints)
+        self._rest_cages = np.concatenate([self._inward(cage.vertices) for cage in cages])
+        self.reset()
+        if progress:
+            progress(1.0, "ready")
+
+    def reset(self) -> None:
+        """Forget the last pose: the next solve starts from rest."""
+        self._p = self._rest_cages
+        self._targets = self._rest.vertices[self.handle]
+
+    def solve(self, targets: ArrayLike, *, max_steps: int | None = None) -> Solution:
+        """Return the pose whose handle vertices are at *targets*.
+
+        Parameters
+        ----------
+        targets : (k, 3) float
+            One for each vertex of `handle`, in its order.  A far jump goes through targets in
+            between, so that nothing folds over.
+        max_steps : int, optional
+            Instead of the deformer's own limit, for the last leg: a drag may stop early and go
+            on with the next event.
+
+        Raises
+        ------
+        ConstraintError
+            If *targets* has the wrong shape or holds NaN or infinite coordinates.
+        """
+        goal = self._inward(self._checked_targets(targets))
+        options = self._options
+        if max_steps is not None:
+            options = replace(options, max_steps=max_steps)
+        held = self._rest.vertices[self.fixed]
+        steps = 0
+        *way, _ = waypoints(self._targets, goal, self._handles)
+        for leg in way:
+            on_the_way = replace(options, tolerance=_LEG_TOLERANCE, max_steps=_LEG_STEPS)
+            result = self._solver.minimise(self._p, np.concatenate([leg, held]), on_the_way)
+            self._p, self._targets = result.p, leg
+            steps += result.steps
+        result = self._solver.minimise(self._p, np.concatenate([goal, held]), options)
+        self._p, self._targets = result.p, goal
+        return self._solution(result, steps + result.steps)
+
+    @property
+    def _held(self) -> IntArray:
+        return np.concatenate([self.handle, self.fixed])
+
+    def _solution(self, result: Iteration, steps: int) -> Solution:
+        x, rest = result.x, self._rest
+        handle = np.linalg.norm(x[self.handle] - self._targets, axis=1)
+        fixed = np.linalg.norm(x[self.fixed] - rest.vertices[self.fixed], axis=1)
+        before = signed_volume(rest.vertices, rest.faces)
+        p = self._outward(result.p)
+        columns = self._solver.energy.subspace.columns
+        return Solution(
+            vertices=self._outward(x),
+            cage_vertices=tuple(p[c] for c in columns),
+            volume_change=signed_volume(x, rest.faces) / before - 1.0,
+            region_volume_change=np.array([v.violation(x) / v.target for v in self._volumes]),
+            handle_error=float(handle.max(initial=0.0)),
+            fixed_error=float(fixed.max(initial=0.0)),
+            steps=steps,
+            status=result.status,
+            merits=result.merits,
+        )
+
+    def _position_term(self, rows: FloatArray, trace: float) -> PositionTerm:
+        """Return the term of eqs. (6), (7); every handle and fixed patch weighs the same."""
+        sets = [
+            *self._handles,
+            *(len(self.handle) + s for s in connected_sets(self.mesh, self.fixed)),
+        ]
+        weights = np.empty(len(rows))
+        for members in sets:
+            weights[members] = _POSITION_WEIGHT * trace / len(members)
+        return PositionTerm(rows, weights)
+
+    def _checked_targets(self, targets: ArrayLike) -> FloatArray:
+        try:
+            array = as_points(targets, "targets") if len(self.handle) else np.empty((0, 3))
+        except ValueError as fault:
+            raise ConstraintError(str(fault)) from None
+        if array.shape != (len(self.handle), 3):
+            raise ConstraintError(
+                f"targets must give one point for each of the {len(self.handle)} handle vertices; "
+                f"got shape {array.shape}"
+            )
+        return array
+
+    def _inward(self, points: FloatArray) -> FloatArray:
+        return (points - self._centre) / self._size
+
+    def _outward(self, points: FloatArray) -> FloatArray:
+        return points * self._size + self._centre
+
+
+def _checked_ids(ids: ArrayLike, mesh: Mesh, name: str) -> IntArray:
+    try:
+        return as_ids(ids, mesh.n_vertices, name)
+    except ValueError as fault:
+        raise ConstraintError(str(fault)) from None
+
+
+def _check_cages(regions: Regions, cages: Sequence[Cage]) -> None:
+    if len(cages) != regions.n_regions:
+        raise CageError(f"{regions.n_regions} regions need as many cages; got {len(cages)}")
+    for r, cage in enumerate(cages):
+        members = regions.mesh.vertices[regions.membership[r]]
+        cage.require_encloses(members, f"region {r}")
+
+
+def _rotation_groups(mesh: Mesh, regions: Regions, count: int | None) -> IntArray | None:
+    """Return (n,) int: k-means clusters of position within each region's own part, or None."""
+    if count is None or count >= mesh.n_vertices:
+        return None
+    part_of = np.unique(np.stack([regions.labels, mesh.components]), axis=1, return_inverse=True)[1]
+    part_of = part_of.ravel()
+    sizes = np.bincount(part_of)
+    groups = np.empty(mesh.n_vertices, dtype=np.int64)
+    used = 0
+    for k, size in enumerate(sizes):
+        here = part_of == k
+        share = max(1, round(count * size / mesh.n_vertices))
+        local = group_by_position(mesh.vertices[here], share)
+        groups[here] = used + local
+        used += int(local.max()) + 1
+    return groups

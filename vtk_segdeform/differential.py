@@ -1,0 +1,89 @@
+"""Mean-curvature normals, eq. (5): the detail that a deformation keeps.
+
+    kappa_i n_i = 1/(4 A_i) sum_j (cot alpha_ij + cot beta_ij) (x_i - x_j) = delta_i      (5)
+
+alpha_ij, beta_ij are the angles opposite edge (i, j) in its two triangles, A_i is the mixed
+Voronoi area of vertex i, kappa_i the mean curvature and n_i the outward normal.  With the
+cotangent Laplacian C, (C x)_i = 1/2 sum_j (cot alpha_ij + cot beta_ij) (x_i - x_j), the left
+side reads (C x)_i / (2 A_i).
+
+Needles have cotangents without bound; they are cut at `_MAX_COTANGENT` (an angle of 1e-3
+radians), so that one bad triangle cannot outweigh all others.
+
+Source
+------
+M. Meyer, M. Desbrun, P. Schroeder, A. H. Barr, "Discrete differential-geometry operators for
+triangulated 2-manifolds", Visualization and Mathematics III, 35-57, 2003.  Eqs. (7), (8), Fig. 4.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from .arrays import FloatArray, IntArray
+
+_MAX_COTANGENT = 1e3
+_MIN_AREA = 1e-6  # share of the mean vertex area; keeps 1/A finite beside degenerate triangles
+
+
+def corner_cotangents(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return (m, 3): the cotangent of the angle at each corner of each face."""
+    x = vertices[faces]
+    cotangents = np.empty(faces.shape)
+    for corner in range(3):
+        u = x[:, (corner + 1) % 3] - x[:, corner]
+        v = x[:, (corner + 2) % 3] - x[:, corner]
+        cosine = np.einsum("ij,ij->i", u, v)
+        sine = np.linalg.norm(np.cross(u, v), axis=1)
+        bound = np.maximum(sine, np.abs(cosine) / _MAX_COTANGENT)
+        cotangents[:, corner] = np.divide(cosine, bound, where=bound > 0, out=np.zeros(len(faces)))
+    return cotangents
+
+
+def cotangent_laplacian(vertices: FloatArray, faces: IntArray) -> sparse.csr_array:
+    """Return the (n, n) symmetric positive semi-definite C; x^T C x is twice Dirichlet's energy."""
+    half = 0.5 * corner_cotangents(vertices, faces).ravel()
+    i, j = faces[:, [1, 2, 0]].ravel(), faces[:, [2, 0, 1]].ravel()
+    n = len(vertices)
+    weights = sparse.coo_array((half, (i, j)), shape=(n, n)).tocsr()
+    weights = weights + weights.T
+    return (sparse.diags_array(weights.sum(axis=1)) - weights).tocsr()
+
+
+def mixed_voronoi_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return (n,): each vertex's mixed Voronoi area; they sum to the mesh's area."""
+    x = vertices[faces]
+    cotangents = corner_cotangents(vertices, faces)
+    edges = x[:, [2, 0, 1]] - x[:, [1, 2, 0]]  # edge opposite each corner
+    square = np.einsum("ijk,ijk->ij", edges, edges)
+    area = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)[:, None]
+    # Voronoi part of corner a: (|ab|^2 cot c + |ac|^2 cot b) / 8.
+    share = square * cotangents / 8.0
+    voronoi = share.sum(axis=1, keepdims=True) - share
+    # An obtuse triangle's circumcentre lies outside it: half to its obtuse corner, a quarter each.
+    obtuse = cotangents < 0.0
+    parts = np.where(obtuse.any(axis=1, keepdims=True), np.where(obtuse, 0.5, 0.25) * area, voronoi)
+    areas = np.bincount(faces.ravel(), parts.ravel(), minlength=len(vertices))
+    return np.maximum(areas, _MIN_AREA * areas.mean())
+
+
+def mean_curvature_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return delta of eq. (5), (n, 3), in 1/length: outward and of length 1/r on a sphere."""
+    areas = mixed_voronoi_areas(vertices, faces)
+    return (cotangent_laplacian(vertices, faces) @ vertices) / (2.0 * areas)[:, None]
+
+
+def area_gradients(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return (m, 3, 3): for each face and corner k, face area times the gradient of k's hat.
+
+    With J the gradient over a face of a map x of the mesh, area J^T = sum_k g_k x_k^T.
+    """
+    half = 0.5 * corner_cotangents(vertices, faces)
+    x = vertices[faces]
+    gradients = np.empty((len(faces), 3, 3))
+    for corner in range(3):
+        after, last = (corner + 1) % 3, (corner + 2) % 3
+        gradients[:, corner] = half[:, [last]] * (x[:, corner] - x[:, after])
+        gradients[:, corner] += half[:, [after]] * (x[:, corner] - x[:, last])
+    return gradients

@@ -1,0 +1,152 @@
+"""What a deformation should keep, as an energy of the cage vertices p: detail, and stretch.
+
+    E(p) = min_R  sum_i A_i |delta_i(x) - R_i delta_i|^2              detail, eq. (5)
+                + s sum_T (A_T / 3) sum_{i in T} |J_T - R_i|^2        stretch,      x = W~ p
+
+delta_i(x) is the mean-curvature normal at x, delta_i that of the rest shape, R_i the local
+rotation of vertex i (or of the group it belongs to), J_T the gradient over triangle T of the map
+from rest to x.  The paper has the first line only, and lets its rows count alike; weighting by
+the vertex area A_i makes the energy independent of how finely the surface is meshed.  The second
+line is ours: with bending alone limbs swing freely and triangles shear (area-weighted
+distortion 0.16 on a 70 degree bend against 0.09).  It measures each triangle against the
+rotations of its three corners ("spokes and rims"), which is never negative, however bad the
+triangle; the edge form sum cot_ij |x_ij - R_i v_ij|^2 is not.
+
+For given R the energy is quadratic.  Both lines see R through one 3 x 3 matrix per group:
+
+    E(p) = min_R  tr(p^T Q p) - 2 sum_g tr(R_g S_g) + c,        S_g = K_g p  (linear in p)
+
+Q (m, m) and K (3 G, m) are computed once, so a step costs nothing that grows with the mesh.
+
+Source
+------
+Eqs. (5), (10), (20) of the paper.  I. Chao, U. Pinkall, P. Sanan, P. Schroeder, "A simple
+geometric model for elastic deformations", SIGGRAPH 2010 (spokes and rims).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from .arrays import FloatArray, IntArray
+from .differential import (
+    area_gradients,
+    cotangent_laplacian,
+    mean_curvature_normals,
+    mixed_voronoi_areas,
+)
+from .mesh import Mesh
+from .rotations import closest_rotations
+from .subspace import Subspace
+
+
+@dataclass(frozen=True, eq=False)
+class Energy:
+    """E(p) in the subspace; made by `shape_energy`.
+
+    `fit` and `pull` are K in two roles: what the rotations are fitted to, and what they pull on.
+    With a stretch term the two are the same and E is a true minimum over R (`exact`).  Without
+    one the rotations still come from the one-ring, as the paper's frames do, and only the detail
+    is pulled.
+    """
+
+    quadratic: FloatArray  # Q, (m, m)
+    constant: float
+    mass: FloatArray  # W~^T diag(A) W~, (m, m), A summing to 1: mean square over the surface
+    fit: sparse.csr_array | FloatArray  # (3n, n) acting on x, or (3G, m) acting on p
+    pull: sparse.csr_array | FloatArray
+    subspace: Subspace
+
+    @property
+    def exact(self) -> bool:
+        """Whether E is a minimum over the rotations, so that its gradient is the one returned."""
+        return self.fit is self.pull
+
+    def local_step(self, p: FloatArray, x: FloatArray) -> tuple[float, FloatArray]:
+        """Return E(p) and half its gradient (m, 3), with the local rotations at x = W~ p."""
+        per_vertex = sparse.issparse(self.fit)
+        argument = x if per_vertex else p
+        stacked = self.fit @ argument
+        turned = np.swapaxes(closest_rotations(stacked.reshape(-1, 3, 3)), 1, 2).reshape(-1, 3)
+        reduced = self.pull.T @ turned
+        if per_vertex:
+            reduced = self.subspace.adjoint(reduced)
+        product = self.quadratic @ p
+        value = np.vdot(p, product) - 2.0 * np.vdot(p, reduced) + self.constant
+        return float(value), product - reduced
+
+
+def shape_energy(mesh: Mesh, subspace: Subspace, stretch: float, groups: IntArray | None) -> Energy:
+    """Return the energy of *mesh*, whose size should be about 1, in *subspace*.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The rest shape.
+    subspace : Subspace
+        W~.
+    stretch : float
+        Trace of the stretch term in the subspace, as a multiple of that of the detail term.
+    groups : (n,) int or None
+        The rotation group of each vertex; None gives each vertex its own rotation.
+    """
+    vertices, faces, n = mesh.vertices, mesh.faces, mesh.n_vertices
+    areas = mixed_voronoi_areas(vertices, faces)
+    laplacian = cotangent_laplacian(vertices, faces)
+    delta = mean_curvature_normals(vertices, faces)
+    curvature = sparse.diags_array(0.5 / areas) @ laplacian  # left side of (5)
+
+    bending = subspace.gram((curvature.T @ sparse.diags_array(areas) @ curvature).tocsr())
+    stretching = subspace.gram(laplacian)
+    unit = np.trace(bending) / np.trace(stretching)
+
+    detail = _stack([sparse.diags_array(areas * d) @ curvature for d in delta.T], groups)
+    fans = _stack(_fans(mesh), groups)
+    pull = detail + (stretch * unit) * fans
+    fit = pull if stretch > 0.0 else detail + unit * fans
+    if groups is not None:
+        fit, pull = (
+            (reduced := subspace.left(pull), reduced)
+            if fit is pull
+            else (subspace.left(fit), subspace.left(pull))
+        )
+    return Energy(
+        quadratic=bending + stretch * unit * stretching,
+        constant=float(areas @ (delta**2).sum(axis=1) + 2 * stretch * unit * mesh.face_areas.sum()),
+        mass=subspace.gram(sparse.diags_array(areas / areas.sum()).tocsr()),
+        fit=fit,
+        pull=pull,
+        subspace=subspace,
+    )
+
+
+def _fans(mesh: Mesh) -> list[sparse.csr_array]:
+    """Return, for each axis, the (n, n) operator of sum_{T at i} A_T / 3 J_T^T: row i, axis."""
+    corners = mesh.faces.ravel()
+    count = np.arange(len(corners))
+    shape = (len(corners), mesh.n_vertices)
+    at_vertex = sparse.coo_array((np.full(len(corners), 1.0 / 3.0), (corners, count)), shape[::-1])
+    # Every corner of a face sees the whole face: row 3 T + k holds face T's three gradients.
+    rows, columns = np.repeat(count, 3), np.repeat(mesh.faces, 3, axis=0).ravel()
+    gradients = area_gradients(mesh.vertices, mesh.faces)
+    fans = []
+    for axis in range(3):
+        values = np.repeat(gradients[:, :, axis], 3, axis=0).ravel()
+        on_face = sparse.coo_array((values, (rows, columns)), shape)
+        fans.append(at_vertex.tocsr() @ on_face.tocsr())
+    return fans
+
+
+def _stack(axes: list[sparse.csr_array], groups: IntArray | None) -> sparse.csr_array:
+    """Return (3 G, n): row 3 g + a is row g of axis a, summed over the vertices of group g."""
+    n = axes[0].shape[0]
+    groups = np.arange(n) if groups is None else groups
+    count = int(groups.max()) + 1
+    parts = []
+    for a, operator in enumerate(axes):
+        place = sparse.coo_array((np.ones(n), (3 * groups + a, np.arange(n))), (3 * count, n))
+        parts.append(place.tocsr() @ operator)
+    return (parts[0] + parts[1] + parts[2]).tocsr()

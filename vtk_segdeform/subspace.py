@@ -1,0 +1,120 @@
+"""The subspace of the cages, x = W~ p: the block matrix of the paper's figure 6, blended.
+
+Vertex i of the mesh is a blend of what the cages of its regions say, eqs. (2), (3):
+
+    x_i = sum_r  alpha_ri  sum_j w_ij(r) p_j(r)
+
+alpha are the blend weights of `Regions`, w the mean value coordinates in the cage of region r.
+W~ is zero wherever a vertex is outside a region, so it is kept as one dense block per region,
+blend included; nothing below ever forms the zeros.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from .arrays import FloatArray, IntArray
+from .cages import Cage
+from .mean_value import mean_value_coordinates
+from .progress import Progress, part
+from .regions import Regions
+
+
+@dataclass(frozen=True, eq=False)
+class Subspace:
+    """W~ as blocks: rows[r] (n_r,) mesh vertices, blocks[r] (n_r, m_r), columns in cage order."""
+
+    n_vertices: int
+    rows: tuple[IntArray, ...]
+    blocks: tuple[FloatArray, ...]
+
+    @property
+    def n_columns(self) -> int:
+        """Number of cage vertices in all cages, m."""
+        return sum(block.shape[1] for block in self.blocks)
+
+    @cached_property
+    def columns(self) -> tuple[slice, ...]:
+        """For each region, its cage's place among all m cage vertices."""
+        ends = np.cumsum([0, *(block.shape[1] for block in self.blocks)])
+        return tuple(slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
+
+    def map(self, p: FloatArray) -> FloatArray:
+        """Return x = W~ p, (n, 3), for stacked cage vertices *p* (m, 3)."""
+        x = np.zeros((self.n_vertices, p.shape[1]))
+        for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
+            x[rows] += block @ p[columns]
+        return x
+
+    def adjoint(self, y: FloatArray) -> FloatArray:
+        """Return W~^T y, (m, 3), for *y* (n, 3) on the mesh."""
+        p = np.empty((self.n_columns, y.shape[1]))
+        for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
+            p[columns] = block.T @ y[rows]
+        return p
+
+    def at(self, vertices: IntArray) -> FloatArray:
+        """Return the rows of W~ for some mesh *vertices*, dense (k, m)."""
+        place = np.full(self.n_vertices, -1)
+        out = np.zeros((len(vertices), self.n_columns))
+        for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
+            place[:] = -1
+            place[rows] = np.arange(len(rows))
+            found = place[vertices]
+            out[found >= 0, columns] = block[found[found >= 0]]
+        return out
+
+    def left(self, operator: sparse.csr_array) -> FloatArray:
+        """Return operator @ W~, dense (k, m), for a sparse *operator* (k, n) with few rows."""
+        by_column = operator.tocsc()
+        out = np.empty((operator.shape[0], self.n_columns))
+        for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
+            out[:, columns] = by_column[:, rows] @ block
+        return out
+
+    def gram(self, operator: sparse.csr_array) -> FloatArray:
+        """Return W~^T operator W~, (m, m), for a sparse symmetric *operator* (n, n).
+
+        Regions whose vertices share no entry of the operator have a zero block: this is where
+        several cages beat one.
+        """
+        gram = np.zeros((self.n_columns, self.n_columns))
+        blocks = list(zip(self.rows, self.blocks, self.columns, strict=True))
+        for r, (rows_r, block_r, columns_r) in enumerate(blocks):
+            slab = operator[rows_r]
+            for rows_s, block_s, columns_s in blocks[: r + 1]:
+                coupling = slab[:, rows_s]
+                if coupling.nnz:
+                    product = block_r.T @ (coupling @ block_s)
+                    gram[columns_r, columns_s] = product
+                    gram[columns_s, columns_r] = product.T
+        return 0.5 * (gram + gram.T)
+
+
+def bind(regions: Regions, cages: Sequence[Cage], *, progress: Progress | None = None) -> Subspace:
+    """Express every mesh vertex by the cages of its regions.
+
+    Parameters
+    ----------
+    regions : Regions
+        r regions over a mesh of n vertices.
+    cages : sequence of r Cage
+        The cage of each region, in the same order.
+    progress : Progress, optional
+        Called as the coordinates of each region are computed.
+    """
+    rows, blocks = [], []
+    for r, cage in enumerate(cages):
+        share = part(progress, r / len(cages), (r + 1) / len(cages))
+        members = np.flatnonzero(regions.weights[r] > 0.0)
+        points = regions.mesh.vertices[members]
+        block = mean_value_coordinates(points, cage.vertices, cage.faces, progress=share)
+        block *= regions.weights[r, members][:, None]
+        rows.append(members)
+        blocks.append(block)
+    return Subspace(regions.mesh.n_vertices, tuple(rows), tuple(blocks))
