@@ -1,7 +1,7 @@
 """The mesh that is deformed: triangles that close, on a two-manifold, seen from outside.
 
 Volume, and with it the whole method, only means something on such a mesh (section 3.2 of the
-paper), so a `Mesh` cannot be made from anything else.
+paper), so a `Mesh` cannot be made from anything else: `find_faults` looks, `repair` mends.
 """
 
 from __future__ import annotations
@@ -14,7 +14,10 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from .arrays import FloatArray, IntArray, as_faces, as_points
+from .arrays import FloatArray, IntArray, as_points
+from .errors import MeshError
+from .faults import as_soup, find_faults
+from .topology import edge_keys
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -34,17 +37,41 @@ class Mesh:
         If an array has the wrong shape or type.
     MeshError
         If the mesh is not a closed oriented two-manifold; names and counts every fault.
+
+    Examples
+    --------
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> mesh = Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> mesh.n_faces, len(mesh.edges), mesh.components
+    (4, 6, array([0, 0, 0, 0]))
+    >>> Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]])
+    Traceback (most recent call last):
+    ...
+    vtk_segdeform.errors.MeshError: not a closed, outward oriented two-manifold: 3 open edges
+    (1-2, 1-3, 2-3), 1 hole (at vertex 1); see find_faults and repair
     """
 
     vertices: FloatArray
     faces: IntArray
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
-        points = as_points(vertices, "vertices").copy()
-        triangles = as_faces(faces, len(points), "faces").copy()
-        points.flags.writeable = triangles.flags.writeable = False
-        object.__setattr__(self, "vertices", points)
-        object.__setattr__(self, "faces", triangles)
+        report = find_faults(vertices, faces)
+        if not report.ok:
+            faults = ", ".join(map(str, report.faults))
+            raise MeshError(
+                f"not a closed, outward oriented two-manifold: {faults}; see find_faults and repair"
+            )
+        points, triangles = as_soup(vertices, faces)
+        self.__setstate__((points.copy(), triangles.copy()))
+
+    def __getstate__(self) -> tuple[FloatArray, IntArray]:
+        return self.vertices, self.faces
+
+    def __setstate__(self, state: tuple[FloatArray, IntArray]) -> None:
+        for array in state:
+            array.flags.writeable = False
+        object.__setattr__(self, "vertices", state[0])
+        object.__setattr__(self, "faces", state[1])
 
     @property
     def n_vertices(self) -> int:
@@ -64,8 +91,8 @@ class Mesh:
     @cached_property
     def edges(self) -> IntArray:
         """(e, 2) int: each edge once, smaller vertex first, in lexicographic order."""
-        pairs = np.sort(self.faces[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2), axis=1)
-        return np.unique(pairs, axis=0)
+        keys = edge_keys(self.faces, self.faces[:, [1, 2, 0]], self.n_vertices)
+        return np.stack(np.divmod(np.unique(keys), self.n_vertices), axis=1)
 
     @cached_property
     def adjacency(self) -> sparse.csr_array:
@@ -86,8 +113,20 @@ class Mesh:
     def face_areas(self) -> FloatArray:
         """(m,) float: the triangles' areas."""
         a, b, c = self.vertices[self.faces.T]
-        return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        areas: FloatArray = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        return areas
 
     def with_vertices(self, vertices: ArrayLike) -> Mesh:
-        """Return the same triangles over other positions (n, 3)."""
-        return Mesh(vertices, self.faces)
+        """Return the same triangles over other positions (n, 3), finite but otherwise unchecked.
+
+        The triangles were checked already; a pose that crosses or inverts itself is still a pose.
+        """
+        points = as_points(vertices, "vertices")
+        if points.shape != self.vertices.shape:
+            raise ValueError(f"vertices must have shape {self.vertices.shape}; got {points.shape}")
+        posed = object.__new__(Mesh)
+        posed.__setstate__((points.copy(), self.faces))
+        for name in ("edges", "components"):  # the same at every pose: hand on what is known
+            if name in self.__dict__:
+                posed.__dict__[name] = self.__dict__[name]
+        return posed

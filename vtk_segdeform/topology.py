@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
@@ -54,24 +55,26 @@ class Sides:
     @cached_property
     def first(self) -> IntArray:
         """(e,) int: where in `order` each edge begins."""
-        ordered = self.keys[self.order]
-        return np.flatnonzero(np.diff(ordered, prepend=-1))
+        return np.flatnonzero(np.diff(self.keys[self.order], prepend=-1))
 
     @cached_property
     def n_sides(self) -> IntArray:
         """(e,) int: the number of sides on each edge."""
-        return np.diff(self.first, append=len(self.order))
+        n_sides: IntArray = np.diff(self.first, append=len(self.order))
+        return n_sides
 
     @cached_property
     def open(self) -> IntArray:
         """(b,) int: the sides without a partner."""
-        return self.order[self.first[self.n_sides == 1]]
+        alone: IntArray = self.order[self.first[self.n_sides == 1]]
+        return alone
 
     @cached_property
     def pairs(self) -> IntArray:
         """(p, 2) int: the two sides of every edge that has exactly two."""
         start = self.first[self.n_sides == 2]
-        return np.stack([self.order[start], self.order[start + 1]], axis=1)
+        pairs: IntArray = self.order[start[:, None] + [0, 1]]
+        return pairs
 
     @cached_property
     def crowded(self) -> list[IntArray]:
@@ -83,7 +86,8 @@ class Sides:
     def turned(self) -> BoolArray:
         """(p,) bool: pairs that run the same way, so that their faces face opposite sides."""
         one, other = self.pairs.T
-        return self.tail[one] == self.tail[other]
+        turned: BoolArray = self.tail[one] == self.tail[other]
+        return turned
 
     @cached_property
     def shells(self) -> IntArray:
@@ -105,6 +109,15 @@ class Sides:
             np.concatenate([partner_of_start, partner_of_end]),
         )
 
+    @cached_property
+    def pinched(self) -> IntArray:
+        """Vertices with several fans, for no other reason than that; crowded edges apart."""
+        _, corner = np.unique(self.fans(self.pairs), return_index=True)
+        several = np.bincount(self.tail[corner], minlength=self.n_vertices) > 1
+        crowded = self.order[self.first[self.n_sides > 2]]
+        several[self.tail[crowded]] = several[self.head[crowded]] = False
+        return np.flatnonzero(several)
+
 
 def edge_keys(one: IntArray, other: IntArray, n_vertices: int) -> IntArray:
     """Return a number for each pair of vertices that is the same for (a, b) and (b, a)."""
@@ -124,9 +137,41 @@ def connected(n: int, one: IntArray, other: IntArray) -> IntArray:
     >>> connected(5, np.array([3]), np.array([1]))
     array([0, 1, 2, 1, 3])
     """
-    links = sparse.coo_array((np.ones(len(one), np.int8), (one, other)), shape=(n, n))
-    _, label = csgraph.connected_components(links, directed=False)
-    _, first, label = np.unique(label, return_index=True, return_inverse=True)
+    if n == 0:
+        return np.empty(0, dtype=np.int64)
+    links = sparse.coo_array((np.ones(len(one), bool), (one, other)), shape=(n, n))
+    _, found = csgraph.connected_components(links, directed=False)
+    _, first, label = np.unique(found, return_index=True, return_inverse=True)
     rank = np.empty(len(first), np.int64)
     rank[np.argsort(first)] = np.arange(len(first))
     return rank[label]
+
+
+def first_equal_row(rows: NDArray[np.generic]) -> IntArray:
+    """Return for each row the number of the first row equal to it, (n,) int; NaN equals nothing.
+
+    >>> first_equal_row(np.array([[0, 1], [2, 3], [0, 1]]))
+    array([0, 1, 0])
+    """
+    order = (
+        np.lexsort(rows.T) if len(rows) else np.empty(0, np.int64)
+    )  # stable: equal rows stay in their order
+    ordered = rows[order]
+    new = np.ones(len(rows), dtype=bool)
+    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    first = np.empty(len(rows), dtype=np.int64)
+    first[order] = order[np.flatnonzero(new)][np.cumsum(new) - 1]
+    return first
+
+
+def repeats_vertex(faces: IntArray) -> BoolArray:
+    """Return which faces name a vertex twice, (m,) bool."""
+    a, b, c = faces.T
+    repeats: BoolArray = (a == b) | (b == c) | (c == a)
+    return repeats
+
+
+def repeats_face(faces: IntArray) -> BoolArray:
+    """Return which faces stand on the same three vertices as an earlier one, (m,) bool."""
+    repeats: BoolArray = first_equal_row(np.sort(faces, axis=1)) != np.arange(len(faces))
+    return repeats
