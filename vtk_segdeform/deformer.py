@@ -23,12 +23,13 @@ from .constraints import VolumeConstraint, region_volumes, total_volume
 from .energy import shape_energy
 from .errors import CageError, ConstraintError
 from .mesh import Mesh
+from .positions import connected_sets, position_term
 from .progress import Progress, part
 from .regions import Regions
-from .rotations import group_by_position
-from .solver import GaussNewton, Iteration, PositionTerm, SolverOptions, Status
+from .rotations import rotation_groups as group_by_part
+from .solver import GaussNewton, Iteration, SolverOptions, Status
 from .subspace import bind
-from .targets import connected_sets, waypoints
+from .targets import waypoints
 from .volume import signed_volume
 
 _LEG_TOLERANCE, _LEG_STEPS = 1e-3, 12  # for the targets on the way to a far one
@@ -78,6 +79,8 @@ class Deformer:
         Steps the acceleration remembers; 0 is the paper's plain iteration.
     exact_volume : bool
         False leaves the paper's linearised multiplier, for comparison.
+    hold_tolerance : float
+        Diagonals by which a handle or fixed vertex may miss its place before its weight is raised.
     progress : Progress, optional
         Called while binding; may cancel.
 
@@ -105,6 +108,7 @@ class Deformer:
         max_steps: int = 200,
         window: int = 8,
         exact_volume: bool = True,
+        hold_tolerance: float = 7e-4,
         progress: Progress | None = None,
     ) -> None:
         _check_cages(regions, cages)
@@ -120,12 +124,17 @@ class Deformer:
         low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
         self._centre, self._size = 0.5 * (low + high), mesh.diagonal
         self._rest = mesh.with_vertices(self._inward(mesh.vertices))
+        self._hold_tolerance = hold_tolerance
         self._options = SolverOptions(tolerance, max_steps, window, exact_volume)
 
         subspace = bind(regions, cages, progress=part(progress, 0.0, 0.8))
         if progress:
             progress(0.8, "factoring")
-        groups = _rotation_groups(self._rest, regions, rotation_groups)
+        groups = None
+        if rotation_groups is not None and rotation_groups < mesh.n_vertices:
+            pairs = np.stack([regions.labels, mesh.components])
+            parts = np.unique(pairs, axis=1, return_inverse=True)[1].ravel()
+            groups = group_by_part(self._rest.vertices, parts, rotation_groups)
         energy = shape_energy(self._rest, subspace, stretch, groups)
         self._volumes = region_volumes(self._rest, regions.labels)
         constraints: list[VolumeConstraint] = []
@@ -134,8 +143,11 @@ class Deformer:
         elif preserve_volume:
             constraints = [total_volume(self._rest)]
         self._handles = connected_sets(mesh, self.handle)
-        positions = self._position_term(subspace.at(self._held), np.trace(energy.quadratic))
-        self._solver = GaussNewton(energy, positions, constraints)
+        self._held = np.concatenate([self.handle, self.fixed])
+        patches = [len(self.handle) + patch for patch in connected_sets(mesh, self.fixed)]
+        weight = _POSITION_WEIGHT * float(np.trace(energy.quadratic))
+        positions = position_term(subspace.at(self._held), [*self._handles, *patches], weight)
+        self._at_rest = GaussNewton(energy, positions, constraints)
         self._rest_cages = np.concatenate([self._inward(cage.vertices) for cage in cages])
         self.reset()
         if progress:
@@ -143,6 +155,7 @@ class Deformer:
 
     def reset(self) -> None:
         """Forget the last pose: the next solve starts from rest."""
+        self._solver = self._at_rest
         self._p = self._rest_cages
         self._targets = self._rest.vertices[self.handle]
 
@@ -167,21 +180,25 @@ class Deformer:
         options = self._options
         if max_steps is not None:
             options = replace(options, max_steps=max_steps)
-        held = self._rest.vertices[self.fixed]
-        steps = 0
         *way, _ = waypoints(self._targets, goal, self._handles)
-        for leg in way:
-            on_the_way = replace(options, tolerance=_LEG_TOLERANCE, max_steps=_LEG_STEPS)
-            result = self._solver.minimise(self._p, np.concatenate([leg, held]), on_the_way)
-            self._p, self._targets = result.p, leg
+        on_the_way = replace(options, tolerance=_LEG_TOLERANCE, max_steps=_LEG_STEPS)
+        steps = sum(self._move(leg, on_the_way).steps for leg in way)
+        while True:
+            result = self._move(goal, options)
             steps += result.steps
-        result = self._solver.minimise(self._p, np.concatenate([goal, held]), options)
-        self._p, self._targets = result.p, goal
-        return self._solution(result, steps + result.steps)
+            errors = np.linalg.norm(result.x[self._held] - self._places(goal), axis=1)
+            stiffer = self._solver.positions.stiffened(errors, self._hold_tolerance)
+            if stiffer is None or result.status is Status.STEP_LIMIT:
+                return self._solution(result, steps)
+            self._solver = replace(self._solver, positions=stiffer)
 
-    @property
-    def _held(self) -> IntArray:
-        return np.concatenate([self.handle, self.fixed])
+    def _move(self, targets: FloatArray, options: SolverOptions) -> Iteration:
+        result = self._solver.minimise(self._p, self._places(targets), options)
+        self._p, self._targets = result.p, targets
+        return result
+
+    def _places(self, targets: FloatArray) -> FloatArray:
+        return np.concatenate([targets, self._rest.vertices[self.fixed]])
 
     def _solution(self, result: Iteration, steps: int) -> Solution:
         x, rest = result.x, self._rest
@@ -201,17 +218,6 @@ class Deformer:
             status=result.status,
             merits=result.merits,
         )
-
-    def _position_term(self, rows: FloatArray, trace: float) -> PositionTerm:
-        """Return the term of eqs. (6), (7); every handle and fixed patch weighs the same."""
-        sets = [
-            *self._handles,
-            *(len(self.handle) + s for s in connected_sets(self.mesh, self.fixed)),
-        ]
-        weights = np.empty(len(rows))
-        for members in sets:
-            weights[members] = _POSITION_WEIGHT * trace / len(members)
-        return PositionTerm(rows, weights)
 
     def _checked_targets(self, targets: ArrayLike) -> FloatArray:
         try:
@@ -245,21 +251,3 @@ def _check_cages(regions: Regions, cages: Sequence[Cage]) -> None:
     for r, cage in enumerate(cages):
         members = regions.mesh.vertices[regions.membership[r]]
         cage.require_encloses(members, f"region {r}")
-
-
-def _rotation_groups(mesh: Mesh, regions: Regions, count: int | None) -> IntArray | None:
-    """Return (n,) int: k-means clusters of position within each region's own part, or None."""
-    if count is None or count >= mesh.n_vertices:
-        return None
-    part_of = np.unique(np.stack([regions.labels, mesh.components]), axis=1, return_inverse=True)[1]
-    part_of = part_of.ravel()
-    sizes = np.bincount(part_of)
-    groups = np.empty(mesh.n_vertices, dtype=np.int64)
-    used = 0
-    for k, size in enumerate(sizes):
-        here = part_of == k
-        share = max(1, round(count * size / mesh.n_vertices))
-        local = group_by_position(mesh.vertices[here], share)
-        groups[here] = used + local
-        used += int(local.max()) + 1
-    return groups

@@ -93,7 +93,7 @@ def shape_energy(mesh: Mesh, subspace: Subspace, stretch: float, groups: IntArra
     groups : (n,) int or None
         The rotation group of each vertex; None gives each vertex its own rotation.
     """
-    vertices, faces, n = mesh.vertices, mesh.faces, mesh.n_vertices
+    vertices, faces = mesh.vertices, mesh.faces
     areas = mixed_voronoi_areas(vertices, faces)
     laplacian = cotangent_laplacian(vertices, faces)
     delta = mean_curvature_normals(vertices, faces)

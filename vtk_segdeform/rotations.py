@@ -71,6 +71,19 @@ def group_by_position(positions: FloatArray, n_groups: int, *, rounds: int = 5) 
     return labels
 
 
+def rotation_groups(positions: FloatArray, parts: IntArray, n_groups: int) -> IntArray:
+    """Return (n,) int: about *n_groups* clusters of position, none of which spans two *parts*."""
+    groups = np.empty(len(positions), dtype=np.int64)
+    used = 0
+    for k in range(int(parts.max()) + 1):
+        here = parts == k
+        share = max(1, round(n_groups * np.count_nonzero(here) / len(positions)))
+        local = group_by_position(positions[here], share)
+        groups[here] = used + local
+        used += int(local.max()) + 1
+    return groups
+
+
 def _farthest_points(positions: FloatArray, count: int) -> IntArray:
     chosen = np.empty(count, dtype=np.int64)
     distance = np.linalg.norm(positions - positions.mean(axis=0), axis=1)

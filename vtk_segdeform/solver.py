@@ -33,6 +33,7 @@ acceleration for geometry optimization and physics simulation", SIGGRAPH 2018 (t
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -42,6 +43,7 @@ from scipy import linalg
 from .arrays import FloatArray
 from .constraints import VolumeConstraint, restore
 from .energy import Energy
+from .positions import PositionTerm
 
 _RISE = 1e-13  # relative rise of the merit that counts as rounding
 _DAMPING = 1e-8  # of the mean diagonal of H
@@ -67,24 +69,6 @@ class SolverOptions:
     max_steps: int = 200
     window: int = 8  # Anderson's memory; 0 is the plain iteration of the paper
     exact_volume: bool = True  # False leaves the linearised multiplier of (21), for comparison
-
-
-@dataclass(frozen=True, eq=False)
-class PositionTerm:
-    """sum_i omega_i |x_i - u_i|^2 over fixed vertices and handles, eqs. (6), (7)."""
-
-    rows: FloatArray  # W~ at those vertices, (k, m)
-    weights: FloatArray  # omega, (k,)
-
-    def quadratic(self) -> FloatArray:
-        """Return rows^T omega rows, (m, m)."""
-        return (self.rows.T * self.weights) @ self.rows
-
-    def value_and_slope(self, p: FloatArray, u: FloatArray) -> tuple[float, FloatArray]:
-        """Return the term at *p* and half its gradient (m, 3), for targets *u* (k, 3)."""
-        away = self.rows @ p - u
-        pull = away * self.weights[:, None]
-        return float(np.vdot(away, pull)), self.rows.T @ pull
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,13 +104,11 @@ class GaussNewton:
     def __post_init__(self) -> None:
         hessian = self.energy.quadratic + self.positions.quadratic()
         # Cage vertices that move nothing (a region without fixed vertices or handles, weights
-        # near zero) leave H singular.  A share of the mass and of the identity damps the step
-        # there; d is untouched, and with it every point where the iteration can rest.
+        # near zero) leave H singular.  A share of the identity damps the step there; d is
+        # untouched, and with it every point where the iteration can rest.
         trace = np.trace(hessian) / len(hessian)
-        mass = self.energy.mass
-        damping = _DAMPING * trace * (mass / (np.trace(mass) / len(mass)))
-        damping[np.diag_indices_from(damping)] += _DAMPING * trace
-        self._factor = linalg.cho_factor(hessian + damping)
+        damping = np.full(len(hessian), _DAMPING * trace)
+        self._factor = linalg.cho_factor(hessian + np.diag(damping))
 
     def minimise(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> Iteration:
         """Iterate from cage vertices *p* (m, 3) for positions *targets* (k, 3)."""
@@ -136,7 +118,7 @@ class GaussNewton:
         merits = [here.merit]
         size, status = np.inf, Status.STEP_LIMIT
         for _ in range(options.max_steps):
-            step, multipliers, directions = self._step(here, options)
+            step, multipliers, directions = self._step(here)
             size = self._size(step)
             if size <= options.tolerance:
                 status = Status.CONVERGED
@@ -157,9 +139,7 @@ class GaussNewton:
         steps = len(merits) - 1
         return Iteration(here.p, here.x, multipliers, status, steps, size, tuple(merits))
 
-    def _step(
-        self, here: _Point, options: SolverOptions
-    ) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
+    def _step(self, here: _Point) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
         """Return h and lambda of (21), and the directions Z in which the volume is restored."""
         h = -linalg.cho_solve(self._factor, here.slope, check_finite=False)
         if not self.constraints:
@@ -182,16 +162,20 @@ class GaussNewton:
         options: SolverOptions,
     ) -> _Point:
         """Return *p* moved along *directions* onto the constraints, and the objective there."""
-        x = self.energy.subspace.map(p)
-        if directions and options.exact_volume and np.isfinite(p).all():
-            fields = [self.energy.subspace.map(z) for z in directions]
-            for t, z, move in zip(restore(self.constraints, x, fields), directions, fields):
-                p, x = p + t * z, x + t * move
+        if not np.isfinite(p).all():
+            return _Point(p, p, np.inf, p)
+        if not directions or not options.exact_volume:
+            return self._evaluate(p, self.energy.subspace.map(p), targets)
+        x, *fields = np.split(
+            self.energy.subspace.map(np.hstack([p, *directions])), len(directions) + 1, axis=1
+        )
+        for t, z, move in zip(
+            restore(self.constraints, x, fields), directions, fields, strict=True
+        ):
+            p, x = p + t * z, x + t * move
         return self._evaluate(p, x, targets)
 
     def _evaluate(self, p: FloatArray, x: FloatArray, targets: FloatArray) -> _Point:
-        if not np.isfinite(x).all():
-            return _Point(p, x, np.inf, p)
         shape, shape_slope = self.energy.local_step(p, x)
         pull, pull_slope = self.positions.value_and_slope(p, targets)
         return _Point(p, x, shape + pull, shape_slope + pull_slope)
@@ -218,7 +202,7 @@ class GaussNewton:
         return ahead.merit <= here.merit + _RISE * (self.energy.constant + abs(here.merit))
 
     def _size(self, step: FloatArray) -> float:
-        return float(np.sqrt(max(0.0, np.vdot(step, self.energy.mass @ step))))
+        return math.sqrt(max(0.0, float(np.vdot(step, self.energy.mass @ step))))
 
 
 class _Anderson:

@@ -11,6 +11,7 @@ blend included; nothing below ever forms the zeros.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -42,10 +43,10 @@ class Subspace:
     def columns(self) -> tuple[slice, ...]:
         """For each region, its cage's place among all m cage vertices."""
         ends = np.cumsum([0, *(block.shape[1] for block in self.blocks)])
-        return tuple(slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
+        return tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(ends))
 
     def map(self, p: FloatArray) -> FloatArray:
-        """Return x = W~ p, (n, 3), for stacked cage vertices *p* (m, 3)."""
+        """Return x = W~ p, (n, k), for stacked cage vertices *p* (m, k), k usually 3."""
         x = np.zeros((self.n_vertices, p.shape[1]))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
             x[rows] += block @ p[columns]

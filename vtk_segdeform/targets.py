@@ -13,26 +13,14 @@ handle's motion is added in proportion to s, turned along.
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 from scipy.spatial.transform import Rotation
 
 from .arrays import FloatArray, IntArray
-from .mesh import Mesh
 from .rotations import rigid_fit
 
 _LONGEST_TURN = np.radians(30.0)
 _LONGEST_MOVE = 0.2  # of the mesh's diagonal
 _HALF_TURN = 1e-6  # radians short of 180 degrees that count as 180
-
-
-def connected_sets(mesh: Mesh, ids: IntArray) -> list[IntArray]:
-    """Return places in *ids* (k,), one array for each set of vertices joined by mesh edges."""
-    if not len(ids):
-        return []
-    among = sparse.csr_array(mesh.adjacency[ids][:, ids])
-    count, label = csgraph.connected_components(among, directed=False)
-    return [np.flatnonzero(label == k) for k in range(count)]
 
 
 def waypoints(start: FloatArray, end: FloatArray, handles: list[IntArray]) -> list[FloatArray]:
@@ -74,8 +62,12 @@ class _Screw:
         screw = self._angle > 1e-9
         self._centre = 0.5 * (across + np.cross(self._axis, across) / half) if screw else None
         # The longest way of any of its points decides how many legs it takes.
-        longest = float(np.linalg.norm(end - start, axis=1).max())
-        self.legs = int(np.ceil(max(self._angle / _LONGEST_TURN, longest / _LONGEST_MOVE) - 1e-6))
+        way = np.linalg.norm(end - start, axis=1)
+        if self._centre is not None:
+            arms = np.cross(start - self._centre, self._axis)
+            way = np.maximum(way, self._angle * np.linalg.norm(arms, axis=1))
+        ratio = max(self._angle / _LONGEST_TURN, float(way.max()) / _LONGEST_MOVE)
+        self.legs = int(np.ceil(ratio - 1e-6))
 
     def at(self, s: float) -> FloatArray:
         points = self._start + s * self._rest

@@ -10,8 +10,8 @@ V is a cubic polynomial of the positions, so along any direction d it is a cubic
 with all four coefficients from one pass over the triangles.  A step that lands *exactly* on a
 wanted volume is then a root of a scalar cubic; the linearised multiplier of (14) leaves 1e-4.
 
-Every sum is taken about a point near the mesh: for a closed mesh the volume does not depend on
-it, and a mesh far from the origin keeps its digits.
+Every sum is taken about a vertex of the mesh: for a closed mesh the volume does not depend on the
+origin, and a mesh far from it keeps its digits.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .arrays import FloatArray, IntArray
 
 def signed_volume(vertices: FloatArray, faces: IntArray) -> float:
     """Return the enclosed volume (8) of (n, 3) *vertices*, (m, 3) *faces*; outward is positive."""
-    a, b, c = _corners(vertices - vertices.mean(axis=0), faces)
+    a, b, c = _corners(vertices - vertices[0], faces)
     return float(_det(a, b, c).sum() / 6.0)
 
 
@@ -32,7 +32,7 @@ def volume_gradient(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
     The rows of J_g in eq. (12), one per vertex.
     """
-    a, b, c = _corners(vertices - vertices.mean(axis=0), faces)
+    a, b, c = _corners(vertices - vertices[0], faces)
     normals = np.cross(b - a, c - a) / 6.0  # on a closed mesh the same sum as b x c, c x a, a x b
     gradient = np.empty_like(vertices)
     for axis in range(3):
@@ -43,8 +43,8 @@ def volume_gradient(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 def volume_along(vertices: FloatArray, direction: FloatArray, faces: IntArray) -> FloatArray:
     """Return (c0, c1, c2, c3) with V(vertices + t direction) = c0 + c1 t + c2 t^2 + c3 t^3."""
-    a, b, c = _corners(vertices - vertices.mean(axis=0), faces)
-    u, v, w = _corners(direction - direction.mean(axis=0), faces)
+    a, b, c = _corners(vertices - vertices[0], faces)
+    u, v, w = _corners(direction - direction[0], faces)
     bc, vw = np.cross(b, c), np.cross(v, w)
     mixed = np.cross(v, c) + np.cross(b, w)
     c0 = np.einsum("ij,ij", a, bc)
@@ -82,7 +82,8 @@ def step_to_volume(coefficients: FloatArray, target: float) -> float:
 
 
 def _corners(points: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    return points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
+    a, b, c = (np.take(points, corner, axis=0) for corner in faces.T)
+    return a, b, c
 
 
 def _det(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:

@@ -1,0 +1,179 @@
+"""What a caller sees: motion, scale, many handles, far jumps, too little or wrong input."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scenes import sausage
+from solids import icosphere, rotation
+
+from vtk_segdeform.cages import Cage
+from vtk_segdeform.deformer import Deformer
+from vtk_segdeform.errors import CageError, Cancelled, ConstraintError
+from vtk_segdeform.solver import Status
+
+SCENE = sausage(2)
+VERTICES = SCENE.mesh.vertices
+REST = SCENE.mesh.vertices[SCENE.handle]
+
+
+def test_nothing_asked_is_nothing_done():
+    solution = SCENE.deformer().solve(REST)
+    assert_allclose(solution.vertices, VERTICES, atol=1e-9)
+    assert solution.steps == 0
+
+
+def test_moving_every_handle_rigidly_and_fixing_nothing_moves_the_mesh_rigidly():
+    scene = replace(SCENE, fixed=np.array([], dtype=int))
+    turn = rotation([1, 2, 0], 0.4)
+    solution = scene.deformer(tolerance=1e-9, max_steps=2000).solve(REST @ turn.T + [0.5, 0, 0])
+    assert_allclose(solution.vertices, VERTICES @ turn.T + [0.5, 0, 0], atol=1e-4)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_turning_and_scaling_the_scene_turns_and_scales_the_answer(scale):
+    turn = rotation([1, 2, 3], 1.2)
+    targets = SCENE.turned(50)
+    plain = SCENE.deformer().solve(targets)
+    moved = SCENE.transformed(turn, scale).deformer().solve(scale * targets @ turn.T)
+    error = moved.vertices / scale - plain.vertices @ turn.T
+    assert np.abs(error).max() < 1e-6 * SCENE.mesh.diagonal
+    assert moved.steps == plain.steps
+
+
+def test_far_from_the_origin_only_the_digits_of_the_coordinates_are_lost():
+    shift = 1e4 * SCENE.mesh.diagonal * np.array([0.6, -0.8, 0.0])
+    targets = SCENE.turned(50)
+    plain = SCENE.deformer().solve(targets)
+    moved = SCENE.transformed(shift=shift).deformer().solve(targets + shift)
+    error = np.abs(moved.vertices - shift - plain.vertices).max() / SCENE.mesh.diagonal
+    assert error < 1e-6
+    assert abs(moved.volume_change) < 1e-12
+
+
+@pytest.mark.parametrize("degrees", [30, 70, 120, 180])
+def test_far_jumps_arrive_with_exact_volume_and_no_fold(degrees):
+    scene = sausage(3)
+    solution = scene.deformer().solve(scene.turned(degrees, about=(0.0, 0.0, 1.2)))
+    assert abs(solution.volume_change) < 1e-12
+    assert solution.handle_error < 1e-3
+    assert solution.fixed_error < 1e-3
+    x, faces = solution.vertices, scene.mesh.faces
+    a, b, c = x[faces.T]
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    assert (area > 0.02 * scene.mesh.face_areas).all()
+
+
+def test_a_jump_and_a_drag_end_in_the_same_place():
+    jump = SCENE.deformer(tolerance=1e-8, max_steps=2000).solve(SCENE.turned(45))
+    drag = SCENE.deformer(tolerance=1e-8, max_steps=2000)
+    for degrees in range(5, 50, 5):
+        solution = drag.solve(SCENE.turned(degrees))
+        assert abs(solution.volume_change) < 1e-13
+    assert_allclose(solution.vertices, jump.vertices, atol=1e-4 * SCENE.mesh.diagonal)
+
+
+def test_there_and_back_is_at_rest_again_and_reset_is_at_once():
+    deformer = SCENE.deformer(tolerance=1e-8, max_steps=2000)
+    deformer.solve(SCENE.turned(45))
+    back = deformer.solve(REST)
+    assert np.abs(back.vertices - VERTICES).max() < 1e-4 * SCENE.mesh.diagonal
+    deformer.solve(SCENE.turned(45))
+    deformer.reset()
+    assert_allclose(deformer.solve(REST).vertices, VERTICES, atol=1e-9)
+
+
+def test_two_handles_are_moved_and_turned_on_their_own():
+    x = VERTICES[:, 0]
+    left, right = np.flatnonzero(x < -2.4), np.flatnonzero(x > 2.4)
+    scene = replace(
+        SCENE, fixed=np.flatnonzero(np.abs(x) < 0.3), handle=np.concatenate([left, right])
+    )
+    targets = VERTICES[scene.handle].copy()
+    targets[: len(left)] = targets[: len(left)] @ rotation([1, 0, 0], 0.5).T
+    targets[len(left) :] += [0.0, 0.5, 0.2]
+    solution = scene.deformer().solve(targets)
+    assert solution.handle_error < 1e-3
+    assert solution.fixed_error < 1e-3
+    assert abs(solution.volume_change) < 1e-13
+
+
+def test_one_free_handle_vertex_just_carries_the_mesh_along():
+    scene = replace(SCENE, fixed=np.array([], dtype=int), handle=np.array([7]))
+    solution = scene.deformer().solve(VERTICES[[7]] + [0.4, 0.1, 0.0])
+    assert_allclose(solution.vertices, VERTICES + [0.4, 0.1, 0.0], atol=1e-5)
+
+
+def test_without_any_constraint_the_mesh_stays_at_rest():
+    nothing = np.array([], dtype=int)
+    scene = replace(SCENE, fixed=nothing, handle=nothing)
+    solution = scene.deformer().solve(np.empty((0, 3)))
+    assert_allclose(solution.vertices, VERTICES, atol=1e-9)
+
+
+def test_one_cage_around_everything_works_as_well():
+    scene = sausage(1)
+    solution = scene.deformer().solve(scene.turned(40))
+    assert abs(solution.volume_change) < 1e-13
+    assert solution.handle_error < 1e-3
+
+
+def test_stopping_early_says_so_and_goes_on_next_time():
+    deformer = SCENE.deformer()
+    first = deformer.solve(SCENE.turned(20), max_steps=2)
+    assert first.status is Status.STEP_LIMIT
+    assert "solve again" in str(first.status)
+    assert deformer.solve(SCENE.turned(20)).status is Status.CONVERGED
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"fixed": np.array([3]), "handle": np.array([3, 4])}, "1 vertices are both fixed and"),
+        ({"handle": np.array([1026])}, r"handle must index 0..1025"),
+        ({"fixed": np.array([5, 5])}, "fixed names a vertex twice"),
+    ],
+)
+def test_wrong_constraints_are_named(change, says):
+    with pytest.raises(ConstraintError, match=says):
+        replace(SCENE, **change).deformer()
+
+
+@pytest.mark.parametrize(
+    ("targets", "says"),
+    [
+        (REST[:-1], "one point for each of the"),
+        (np.where(REST > 2.5, np.nan, REST), "NaN or infinite"),
+        (REST[:, :2], r"shape \(n, 3\)"),
+    ],
+)
+def test_wrong_targets_are_named_and_leave_the_pose_as_it_was(targets, says):
+    deformer = SCENE.deformer()
+    with pytest.raises(ConstraintError, match=says):
+        deformer.solve(targets)
+    assert_allclose(deformer.solve(REST).vertices, VERTICES, atol=1e-9)
+
+
+def test_cages_that_do_not_fit_are_refused():
+    with pytest.raises(CageError, match="2 regions need as many cages; got 1"):
+        Deformer(SCENE.mesh, SCENE.regions, SCENE.cages[:1])
+    small = Cage(*icosphere(1))
+    with pytest.raises(CageError, match=r"region 0 .*outside the cage"):
+        Deformer(SCENE.mesh, SCENE.regions, [small, small])
+
+
+def test_binding_reports_its_progress_and_can_be_cancelled():
+    seen = []
+    SCENE.deformer(progress=lambda fraction, _: seen.append(fraction))
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0
+
+    def stop(fraction, _):
+        if fraction > 0.2:
+            raise Cancelled("enough")
+
+    with pytest.raises(Cancelled, match="enough"):
+        SCENE.deformer(progress=stop)

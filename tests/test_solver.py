@@ -1,0 +1,167 @@
+"""The solver's own promises, on a sausage of 1026 vertices in two overlapping cages."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scenes import sausage
+
+from vtk_segdeform.energy import shape_energy
+from vtk_segdeform.solver import Status
+from vtk_segdeform.subspace import bind
+
+SCENE = sausage(2)
+SUBSPACE = bind(SCENE.regions, SCENE.cages)
+P0 = np.concatenate([cage.vertices for cage in SCENE.cages])
+
+
+def distance(a, b):
+    """Return the farthest vertex's way, in diagonals of the mesh."""
+    return np.linalg.norm(a.vertices - b.vertices, axis=1).max() / SCENE.mesh.diagonal
+
+
+def wobble(seed=0, size=0.05):
+    return P0 + size * np.random.default_rng(seed).normal(size=P0.shape)
+
+
+class TestSubspace:
+    def test_the_cages_at_rest_give_back_the_mesh(self):
+        assert_allclose(SUBSPACE.map(P0), SCENE.mesh.vertices, atol=1e-11)
+
+    def test_moving_all_cages_by_an_affine_map_moves_the_mesh_by_it(self):
+        matrix, shift = np.random.default_rng(0).normal(size=(3, 3)), [1.0, 2.0, 3.0]
+        moved = SUBSPACE.map(P0 @ matrix.T + shift)
+        assert_allclose(moved, SCENE.mesh.vertices @ matrix.T + shift, atol=1e-10)
+
+    def test_the_adjoint_is_the_adjoint(self):
+        rng = np.random.default_rng(1)
+        p, y = rng.normal(size=P0.shape), rng.normal(size=SCENE.mesh.vertices.shape)
+        assert_allclose(np.vdot(SUBSPACE.map(p), y), np.vdot(p, SUBSPACE.adjoint(y)), rtol=1e-12)
+
+    def test_single_rows_agree_with_the_map(self):
+        ids = np.array([5, 900, 17])
+        assert_allclose(SUBSPACE.at(ids) @ wobble(), SUBSPACE.map(wobble())[ids], atol=1e-12)
+
+    def test_cages_that_share_no_vertex_do_not_couple(self):
+        scene = sausage(3)
+        subspace = bind(scene.regions, scene.cages)
+        energy = shape_energy(scene.mesh, subspace, 10.0, None)
+        first, last = subspace.columns[0], subspace.columns[2]
+        assert (energy.quadratic[first, last] == 0.0).all()
+        assert np.abs(energy.quadratic[first, subspace.columns[1]]).max() > 0.0
+
+
+@pytest.mark.parametrize("groups", [None, 40], ids=["per vertex", "grouped"])
+@pytest.mark.parametrize("stretch", [0.0, 1.0, 10.0])
+class TestEnergy:
+    def make(self, stretch, groups):
+        n = SCENE.mesh.n_vertices
+        return shape_energy(
+            SCENE.mesh, SUBSPACE, stretch, None if groups is None else np.arange(n) % groups
+        )
+
+    def test_a_rigid_motion_costs_nothing_and_pulls_nowhere(self, stretch, groups):
+        energy = self.make(stretch, groups)
+        cos, sin = np.cos(2.0), np.sin(2.0)
+        turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        for p in (P0, P0 @ turn.T + [3.0, 2.0, 1.0]):
+            value, slope = energy.local_step(p, SUBSPACE.map(p))
+            assert abs(value) < 1e-9 * energy.constant
+            assert np.abs(slope).max() < 1e-9 * np.abs(energy.quadratic).max()
+
+    def test_bending_costs(self, stretch, groups):
+        energy = self.make(stretch, groups)
+        value, _ = energy.local_step(wobble(), SUBSPACE.map(wobble()))
+        assert value > 1e-5 * energy.constant
+
+    def test_the_slope_is_half_the_gradient(self, stretch, groups):
+        if stretch == 0.0:
+            pytest.skip("without stretch the rotations do not minimise the energy")
+        energy = self.make(stretch, groups)
+        p, direction = wobble(), wobble(1, 1.0) - P0
+        value, slope = energy.local_step(p, SUBSPACE.map(p))
+        errors = []
+        for t in (2e-4, 1e-4):
+            ahead, _ = energy.local_step(p + t * direction, SUBSPACE.map(p + t * direction))
+            errors.append(abs(ahead - value - 2.0 * t * np.vdot(slope, direction)))
+        assert 3.5 < errors[0] / errors[1] < 4.5
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"window": 0, "max_steps": 1000}, {"rotation_groups": None}]
+)
+def test_volume_is_exact_and_the_merit_never_rises(options):
+    deformer = SCENE.deformer(**options)
+    solution = deformer.solve(SCENE.turned(60))
+    assert solution.status is Status.CONVERGED
+    assert abs(solution.volume_change) < 1e-13
+    merits = np.array(solution.merits)
+    assert (np.diff(merits) <= 1e-9 * merits[0]).all()
+    assert merits[-1] < merits[0]
+
+
+def test_volume_is_exact_after_every_single_step():
+    deformer = SCENE.deformer()
+    for _ in range(12):
+        assert abs(deformer.solve(SCENE.turned(90), max_steps=1).volume_change) < 1e-13
+
+
+def test_without_the_constraint_the_volume_does_change():
+    solution = SCENE.deformer(preserve_volume=False).solve(SCENE.turned(90))
+    assert abs(solution.volume_change) > 1e-3
+
+
+def test_the_papers_linearised_multiplier_leaves_a_small_error():
+    exact = SCENE.deformer(max_steps=3)
+    linear = SCENE.deformer(exact_volume=False, max_steps=3)
+    targets = SCENE.turned(25)
+    assert abs(exact.solve(targets).volume_change) < 1e-13
+    assert 1e-9 < abs(linear.solve(targets).volume_change) < 1e-1
+
+
+def test_region_volumes_hold_each():
+    scene = sausage(3)
+    solution = scene.deformer(preserve_region_volumes=True).solve(scene.turned(60))
+    assert np.abs(solution.region_volume_change).max() < 1e-12
+    assert abs(solution.volume_change) < 1e-12
+    free = scene.deformer().solve(scene.turned(60))
+    assert np.abs(free.region_volume_change).max() > 1e-4
+
+
+def test_acceleration_finds_the_plain_iterations_answer_in_fewer_steps():
+    options = {"rotation_groups": None, "tolerance": 1e-8, "max_steps": 5000}
+    targets = SCENE.turned(30)
+    plain = SCENE.deformer(window=0, **options).solve(targets)
+    fast = SCENE.deformer(**options).solve(targets)
+    assert plain.status is fast.status is Status.CONVERGED
+    assert distance(plain, fast) < 1e-4
+    assert fast.steps < 0.5 * plain.steps
+
+
+def test_groups_stay_close_to_one_rotation_per_vertex():
+    targets = SCENE.turned(30)
+    fine = SCENE.deformer(rotation_groups=None).solve(targets)
+    assert distance(SCENE.deformer().solve(targets), fine) < 0.01
+
+
+def test_at_the_end_the_slope_is_a_multiple_of_the_volume_gradient():
+    # Karush-Kuhn-Tucker: what is left of the slope can only push against the volume.
+    deformer = SCENE.deformer(tolerance=1e-10, max_steps=2000, rotation_groups=50)
+    deformer.solve(SCENE.turned(40))
+    solver, targets = deformer._solver, deformer._places(deformer._targets)
+    x = solver.energy.subspace.map(deformer._p)
+    _, slope = solver.energy.local_step(deformer._p, x)
+    slope = slope + solver.positions.value_and_slope(deformer._p, targets)[1]
+    gradient = solver.energy.subspace.adjoint(solver.constraints[0].gradient(x))
+    factor = np.vdot(slope, gradient) / np.vdot(gradient, gradient)
+    assert np.linalg.norm(slope - factor * gradient) < 1e-5 * np.linalg.norm(slope)
+
+
+def test_a_strong_pull_against_the_volume_neither_diverges_nor_breaks():
+    # Every vertex is a handle and is told to shrink to half: impossible at constant volume.
+    everything = np.arange(SCENE.mesh.n_vertices)
+    scene = type(SCENE)(SCENE.mesh, SCENE.regions, SCENE.cages, everything[:0], everything)
+    solution = scene.deformer().solve(0.5 * SCENE.mesh.vertices)
+    assert np.isfinite(solution.vertices).all()
+    assert abs(solution.volume_change) < 1e-12

@@ -1,0 +1,78 @@
+"""Vertices with a place to be: fixed ones (6) and handles (7), as weighted squares.
+
+    sum_i omega_i |x_i - u_i|^2,    x_i = W~_i p
+
+Vertices joined by mesh edges form a *set*: a fixed patch, or a handle that moves on its own.
+Every set weighs the same, shared out evenly over its vertices, so that a handle of one vertex
+holds as well as a patch of a thousand.  A coarse cage cannot put every vertex of a set in place;
+`PositionTerm.stiffened` raises the weight of the sets that are off by too much.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from .arrays import FloatArray, IntArray
+from .mesh import Mesh
+
+_STIFFER = 10.0
+_STIFFEST = 1e4  # times the weight it started with
+
+
+@dataclass(frozen=True, eq=False)
+class PositionTerm:
+    """The term for k vertices in sets; `strength` (s,) multiplies the weight of each set."""
+
+    rows: FloatArray  # W~ at the vertices, (k, m)
+    set_of: IntArray  # (k,)
+    base: FloatArray  # omega before strength, (k,)
+    strength: FloatArray
+
+    @property
+    def weights(self) -> FloatArray:
+        """omega, (k,)."""
+        return self.base * self.strength[self.set_of]
+
+    def quadratic(self) -> FloatArray:
+        """Return rows^T omega rows, (m, m)."""
+        return (self.rows.T * self.weights) @ self.rows
+
+    def value_and_slope(self, p: FloatArray, u: FloatArray) -> tuple[float, FloatArray]:
+        """Return the term at *p* and half its gradient (m, 3), for targets *u* (k, 3)."""
+        away = self.rows @ p - u
+        pull = away * self.weights[:, None]
+        return float(np.vdot(away, pull)), self.rows.T @ pull
+
+    def stiffened(self, errors: FloatArray, tolerance: float) -> PositionTerm | None:
+        """Return the term with more weight where *errors* (k,) pass *tolerance*, or None.
+
+        None means that nothing is off, or that what is off already has all the weight allowed.
+        """
+        worst = np.zeros(len(self.strength))
+        np.maximum.at(worst, self.set_of, errors)
+        raised = (worst > tolerance) & (self.strength < _STIFFEST)
+        if not raised.any():
+            return None
+        return replace(self, strength=np.where(raised, self.strength * _STIFFER, self.strength))
+
+
+def position_term(rows: FloatArray, sets: list[IntArray], weight: float) -> PositionTerm:
+    """Return the term for vertices with W~ *rows* (k, m) in *sets*, each of total *weight*."""
+    set_of = np.zeros(len(rows), dtype=np.int64)
+    for number, members in enumerate(sets):
+        set_of[members] = number
+    size = np.bincount(set_of, minlength=len(sets))
+    return PositionTerm(rows, set_of, weight / size[set_of], np.ones(len(sets)))
+
+
+def connected_sets(mesh: Mesh, ids: IntArray) -> list[IntArray]:
+    """Return places in *ids* (k,), one array for each set of vertices joined by mesh edges."""
+    if not len(ids):
+        return []
+    among = sparse.csr_array(mesh.adjacency[ids][:, ids])
+    count, label = csgraph.connected_components(among, directed=False)
+    return [np.flatnonzero(label == k) for k in range(count)]
