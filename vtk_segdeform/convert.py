@@ -1,0 +1,244 @@
+"""Meshes from and to files and pyvista, so that nothing is lost that a deformation leaves valid.
+
+    file  --read_polydata-->  PolyData  --from_polydata-->  Mesh
+    file  <---write_mesh----  PolyData  <--with_vertices--  new positions (n, 3)
+
+Vertices and faces keep their order and number all the way, coordinates their digits: OBJ, OFF
+and PLY are read and written by this package, because VTK's readers round to seven digits (PLY),
+split vertices at texture seams (OBJ) or do not exist (OFF).  STL is the exception: a soup of
+triangles in single precision, whose equal corners are merged on reading.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import ArrayLike
+
+from . import meshlab
+from .arrays import as_points
+from .errors import MeshError
+from .mesh import Mesh
+from .off import read_off, write_off
+from .ply import read_ply, write_ply
+from .polygons import polydata_of, triangles_of
+from .wavefront import read_obj, write_obj
+
+_log = logging.getLogger(__name__)
+
+_READERS: dict[str, Callable[[Path], pv.PolyData]] = {
+    ".obj": read_obj, ".off": read_off, ".ply": read_ply,
+}  # fmt: skip
+_WRITERS: dict[str, Callable[[Path, pv.PolyData], None]] = {
+    ".obj": write_obj, ".off": write_off, ".ply": write_ply,
+}  # fmt: skip
+_VTK_READS = frozenset({".stl", ".vtk", ".vtp", ".vtu", ".vtkhdf", ".glb", ".gltf"})
+_VTK_WRITES = frozenset({".stl", ".vtk", ".vtp", ".vtkhdf"})
+_SURFACE_CELLS = frozenset({5, 7, 9})  # VTK's numbers of triangle, polygon, quadrangle
+
+
+def read_mesh(path: str | Path) -> Mesh:
+    """Return the closed mesh in a file.
+
+    Parameters
+    ----------
+    path : str or Path
+        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .vtkhdf, .glb, .gltf; with PyMeshLab also .3ds,
+        .dae, .x3d, .wrl and others.
+
+    Returns
+    -------
+    mesh : Mesh
+        Vertices and faces in the file's order; polygons cut into triangles.
+
+    Raises
+    ------
+    MeshError
+        If there is no such file, it cannot be read, or holds no closed outward two-manifold.
+    MissingDependencyError
+        If only PyMeshLab reads such files, and it is not installed.
+    """
+    surface = read_polydata(path)
+    try:
+        return from_polydata(surface)
+    except ValueError as error:
+        raise MeshError(f"{path}: {error}") from None
+
+
+def read_polydata(path: str | Path) -> pv.PolyData:
+    """Return the surface in a file with all that comes with it; open or faulty ones too.
+
+    Quadrangles and polygons stay what they are (`from_polydata` cuts them), so that `write_mesh`
+    can write them back.  Point, cell and field arrays and texture coordinates are kept.
+
+    Raises
+    ------
+    MeshError
+        If there is no such file, its suffix is not known, or it holds no readable surface.
+    MissingDependencyError
+        If only PyMeshLab reads such files, and it is not installed.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise MeshError(f"{path}: there is no such file")
+    suffix = path.suffix.lower()
+    known = {*_READERS, *_VTK_READS, *meshlab.READS}
+    if suffix not in known:
+        raise MeshError(f"{path}: cannot read {suffix or 'no suffix'}; can {_listed(known)}")
+    try:
+        if suffix in _READERS:
+            surface = _READERS[suffix](path)
+        elif suffix in _VTK_READS:
+            surface = _read_with_vtk(path)
+        else:
+            vertices, faces = meshlab.read_faces(path)
+            surface = polydata_of(vertices, np.full(len(faces), 3), faces.ravel())
+    except MeshError as error:
+        raise MeshError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
+    except (ValueError, IndexError, KeyError, OverflowError, OSError) as error:
+        raise MeshError(f"{path}: is no readable {suffix} file ({error})") from None
+    if not surface.n_points or not surface.n_cells:
+        raise MeshError(f"{path}: holds no surface")
+    return surface
+
+
+def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
+    """Write a mesh; the file appears whole or, if anything fails, not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        .obj, .off, .ply, .stl, .vtk, .vtp, .vtkhdf; with PyMeshLab .3ds, .dae, .x3d, .wrl, .ctm.
+        All but .stl and PyMeshLab's keep every digit; .vtk, .vtp and .vtkhdf every array.
+    mesh : Mesh or pyvista.PolyData
+        What to write.
+
+    Raises
+    ------
+    MeshError
+        If the suffix is not known or the folder is not there.
+    """
+    path = Path(path)
+    surface = to_polydata(mesh) if isinstance(mesh, Mesh) else mesh
+    suffix = path.suffix.lower()
+    known = {*_WRITERS, *_VTK_WRITES, *meshlab.WRITES}
+    if suffix not in known:
+        raise MeshError(f"{path}: cannot write {suffix or 'no suffix'}; can {_listed(known)}")
+    if not path.parent.is_dir():
+        raise MeshError(f"{path}: there is no folder {path.parent}")
+    # Beside the target, so that os.replace is a rename on one file system.
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".segdeform-") as folder:
+        draft = Path(folder) / path.name
+        if suffix in _WRITERS:
+            _WRITERS[suffix](draft, surface)
+        elif suffix in _VTK_WRITES:
+            surface.save(draft)
+        else:
+            meshlab.write(draft, mesh if isinstance(mesh, Mesh) else from_polydata(mesh))
+        os.replace(draft, path)
+
+
+def to_polydata(mesh: Mesh) -> pv.PolyData:
+    """Return *mesh* as pyvista's PolyData: float64 points, same vertices, same triangles."""
+    return polydata_of(mesh.vertices.copy(), np.full(mesh.n_faces, 3), mesh.faces.ravel())
+
+
+def from_polydata(polydata: pv.PolyData) -> Mesh:
+    """Return the closed mesh of a PolyData; quads, polygons and strips are cut into triangles.
+
+    No vertex is added, dropped or renumbered, so `with_vertices` fits new positions back.
+
+    Raises
+    ------
+    MeshError
+        If the surface is not a closed, outward oriented two-manifold.
+    """
+    faces = triangles_of(polydata)
+    if len(faces) != polydata.n_cells:
+        _log.info("%d cells were cut into %d triangles", polydata.n_cells, len(faces))
+    return Mesh(np.asarray(polydata.points, dtype=np.float64), faces)
+
+
+def with_vertices(polydata: pv.PolyData, vertices: ArrayLike) -> pv.PolyData:
+    """Return a copy of *polydata* with other positions and everything else as it was.
+
+    Cells, point, cell and field arrays and texture coordinates stay; points become float64.
+    Arrays of normals are computed anew, since the old ones would shade the old shape.
+
+    Parameters
+    ----------
+    polydata : pyvista.PolyData
+        Left as it is.
+    vertices : (n, 3) float
+        One position per point, in the order of ``polydata.points``.
+    """
+    points = as_points(vertices, "vertices")
+    if len(points) != polydata.n_points:
+        raise ValueError(f"vertices must have {polydata.n_points} rows; got {len(points)}")
+    moved = polydata.copy(deep=True)
+    moved.points = points.copy()
+    for attributes, of_points in ((moved.point_data, True), (moved.cell_data, False)):
+        stale = {"Normals", attributes.active_normals_name} & set(attributes.keys())
+        if not stale:
+            continue
+        # VTK hands back normals that are already there, so it gets the bare shape.
+        bare = pv.PolyData()
+        bare.copy_structure(moved)
+        bare = bare.compute_normals(
+            point_normals=of_points,
+            cell_normals=not of_points,
+            split_vertices=False,
+            consistent_normals=False,
+        )
+        fresh = (bare.point_data if of_points else bare.cell_data)["Normals"]
+        for name in stale:
+            attributes[name] = np.asarray(fresh, dtype=attributes[name].dtype)
+    return moved
+
+
+def _read_with_vtk(path: Path) -> pv.PolyData:
+    """Return the surface that one of VTK's readers finds; its complaints become a MeshError."""
+    try:
+        with pv.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
+            data = pv.get_reader(path).read()
+    except RuntimeError as error:
+        raise MeshError(f"is no readable {path.suffix} file ({_last_line(error)})") from None
+    if isinstance(data, pv.MultiBlock):
+        parts = [part for part in data.recursive_iterator(skip_none=True) if part.n_cells]
+        surfaces = [_surface(part) for part in parts]
+        return surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
+    return _surface(data)
+
+
+def _surface(data: pv.DataSet) -> pv.PolyData:
+    if isinstance(data, pv.PolyData):
+        return data
+    if not isinstance(data, pv.UnstructuredGrid):
+        raise MeshError(f"holds a {type(data).__name__}, not a surface")
+    if not set(data.celltypes.tolist()) <= _SURFACE_CELLS:
+        raise MeshError("holds cells other than triangles and polygons; extract its surface first")
+    counts = np.diff(pv.convert_array(data.GetCells().GetOffsetsArray()))
+    surface = polydata_of(np.asarray(data.points, dtype=float), counts, data.cell_connectivity)
+    for mine, theirs in (
+        (surface.point_data, data.point_data),
+        (surface.cell_data, data.cell_data),
+        (surface.field_data, data.field_data),
+    ):
+        for name, values in theirs.items():
+            mine[name] = values
+    return surface
+
+
+def _last_line(error: Exception) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return lines[-1] if lines else type(error).__name__
+
+
+def _listed(suffixes: set[str]) -> str:
+    return ", ".join(sorted(suffixes))

@@ -1,0 +1,70 @@
+"""Polygons of any length in two flat arrays, and pyvista's PolyData made from them and read back.
+
+counts[k] is the number of corners of polygon k; corners lists their vertex numbers one polygon
+after another.  Triangles are (m, 3) faces with all counts 3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pyvista as pv
+
+from .arrays import FloatArray, IntArray, as_points
+from .errors import MeshError
+
+
+def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.PolyData:
+    """Return a surface with float64 *points* (n, 3) and these polygons, both in the order given.
+
+    Raises
+    ------
+    ValueError
+        If a coordinate is not finite.
+    MeshError
+        If a polygon has fewer than three corners or names a vertex that is not there.
+    """
+    points = as_points(points, "points")
+    if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
+        raise MeshError(
+            f"a face names vertex {corners.min()} to {corners.max()}; there are {len(points)}"
+        )
+    if len(counts) and counts.min() < 3:
+        raise MeshError(f"{np.count_nonzero(counts < 3)} faces have fewer than three corners")
+    surface = pv.PolyData()
+    surface.points = points
+    starts = np.insert(np.cumsum(counts), 0, 0)
+    surface.faces = np.insert(corners, starts[:-1], counts)
+    return surface
+
+
+def polygons_of(polydata: pv.PolyData) -> tuple[IntArray, IntArray]:
+    """Return (counts, corners) of the polygons, in order, and then of the strips' triangles."""
+    cells = polydata.GetPolys()
+    starts = pv.convert_array(cells.GetOffsetsArray()).astype(np.int64)
+    counts, corners = [np.diff(starts)], [pv.convert_array(cells.GetConnectivityArray())]
+    strips = polydata.strips
+    while len(strips):
+        strip, strips = strips[1 : strips[0] + 1], strips[strips[0] + 1 :]
+        triangles = np.stack([strip[:-2], strip[1:-1], strip[2:]], axis=-1)
+        triangles[1::2] = triangles[1::2, [1, 0, 2]]  # every other one is turned round
+        counts.append(np.full(len(triangles), 3))
+        corners.append(triangles.ravel())
+    return np.concatenate(counts).astype(np.int64), np.concatenate(corners).astype(np.int64)
+
+
+def triangles_of(polydata: pv.PolyData) -> IntArray:
+    """Return (m, 3) faces over the same points; polygons are cut by ear clipping, in order."""
+    counts, corners = polygons_of(polydata)
+    if (counts == 3).all():
+        return corners.reshape(-1, 3)
+    cut = polydata_of(np.asarray(polydata.points, dtype=float), counts, corners).triangulate()
+    faces: IntArray = cut.regular_faces.astype(np.int64)
+    return faces
+
+
+def rows(counts: IntArray, corners: IntArray) -> list[list[int]]:
+    """Return the polygons one by one, for a writer."""
+    if len(counts) and (counts == counts[0]).all():
+        equal: list[list[int]] = corners.reshape(len(counts), -1).tolist()
+        return equal
+    return [part.tolist() for part in np.split(corners, np.cumsum(counts)[:-1])]
