@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,7 +57,7 @@ def sausage(n_regions: int = 2) -> Scene:
     edges = np.linspace(x.min(), x.max(), n_regions + 1)
     ball, ball_faces = icosphere(2)
     masks, cages = [], []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in itertools.pairwise(edges):
         mask = (x >= low - 0.5) & (x <= high + 0.5)
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         radii = np.array([1.75 * (half + 0.5), 1.45, 1.45])
