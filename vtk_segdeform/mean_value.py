@@ -58,7 +58,7 @@ from .progress import Progress
 # Lengths are shares of the cage's diagonal.
 _ON = 1e-14  # as near as this, a point is on the vertex or edge
 _OFF = 1e-30  # added to h: no point is in a plane to the last digit
-_NEAR = 1e-3  # of max |a|: where S is summed as psi
+_NEAR = 1e-3  # of max |a|, for |h|: where S is summed as psi
 _NEEDLE = 1e-10  # height of a face over its longest edge: below it has no plane
 _BLOCK = 1 << 15  # numbers per temporary: a quarter of a megabyte, so that they stay in the cache
 
@@ -136,7 +136,6 @@ class _Cage(NamedTuple):
     length: FloatArray  # (3, k)
     cosine: FloatArray  # (3, k, 1) of gamma_i
     halved: FloatArray  # (3, k, 1): 1 / (2 H_i)
-    near: FloatArray  # (k, 1): |h| / max |a| below which S is summed as psi
     by_vertex: IntArray  # (3 k,) rows in the order of their vertices
     begins: IntArray  # (m,) where each vertex begins in it
 
@@ -168,7 +167,6 @@ def _prepare(p: FloatArray, faces: IntArray) -> _Cage:
         length=length,
         cosine=-np.einsum("ikx,ikx->ik", along[[1, 2, 0]], along[[2, 0, 1]])[..., None],
         halved=(length / (2.0 * twice_area))[..., None],
-        near=_NEAR * (length.max(axis=0) ** 2 / twice_area)[:, None],
         by_vertex=by_vertex,
         begins=np.searchsorted(corner[by_vertex], np.arange(len(p))),
     )
@@ -189,7 +187,7 @@ def _weights(cage: _Cage, x: FloatArray) -> FloatArray:
     b = theta[cage.edge_of] / A
 
     S = np.einsum("ikn,ikn->kn", a, b)
-    cancels = (np.abs(h) < cage.near * np.abs(a).max(axis=0)) & (a.min(axis=0) < 0.0)
+    cancels = (np.abs(h) < _NEAR * np.abs(a).max(axis=0)) & (a.min(axis=0) < 0.0)
     face, k = np.nonzero(cancels)
     S[face, k] = _sum_near_plane(cage, face, x[:, k], distances[:, face, k])
     S /= h
