@@ -118,4 +118,4 @@ def _with_centres(edges: IntArray, n: int) -> tuple[sparse.csr_array, IntArray]:
     mean = sparse.coo_array((1.0 / np.bincount(local)[local], (local, on_border)), (len(parts), n))
     centre = np.zeros(n, dtype=np.int64)
     centre[on_border] = n + local
-    return sparse.vstack([sparse.eye_array(n), mean]).tocsr(), centre
+    return sparse.csr_array(sparse.vstack([sparse.eye_array(n), mean])), centre

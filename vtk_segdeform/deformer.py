@@ -12,7 +12,7 @@ neither the unit nor the place of the scene matters.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +27,7 @@ from .positions import connected_sets, position_term
 from .progress import Progress, part
 from .regions import Regions
 from .rotations import rotation_groups as group_by_part
+from .solution import Solution
 from .solver import GaussNewton, Iteration, SolverOptions, Status
 from .subspace import bind
 from .targets import waypoints
@@ -34,21 +35,6 @@ from .volume import signed_volume
 
 _LEG_TOLERANCE, _LEG_STEPS = 1e-3, 12  # for the targets on the way to a far one
 _POSITION_WEIGHT = 1e2  # of the shape energy's trace, shared out over each handle's vertices
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """A pose, and how it was reached."""
-
-    vertices: FloatArray  # (n, 3)
-    cage_vertices: tuple[FloatArray, ...]  # one (m_r, 3) per region
-    volume_change: float  # (V - V0) / V0, signed
-    region_volume_change: FloatArray  # the same for each region
-    handle_error: float  # farthest handle vertex from its target, in units of the mesh's diagonal
-    fixed_error: float  # farthest fixed vertex from its place, likewise
-    steps: int
-    status: Status
-    merits: tuple[float, ...]  # objective after each step of the last leg; never rises
 
 
 class Deformer:
@@ -232,10 +218,10 @@ class Deformer:
         return array
 
     def _inward(self, points: FloatArray) -> FloatArray:
-        return (points - self._centre) / self._size
+        return np.asarray((points - self._centre) / self._size)
 
     def _outward(self, points: FloatArray) -> FloatArray:
-        return points * self._size + self._centre
+        return np.asarray(points * self._size + self._centre)
 
 
 def _checked_ids(ids: ArrayLike, mesh: Mesh, name: str) -> IntArray:

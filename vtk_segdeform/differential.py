@@ -65,7 +65,7 @@ def mixed_voronoi_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
     obtuse = cotangents < 0.0
     parts = np.where(obtuse.any(axis=1, keepdims=True), np.where(obtuse, 0.5, 0.25) * area, voronoi)
     areas = np.bincount(faces.ravel(), parts.ravel(), minlength=len(vertices))
-    return np.maximum(areas, _MIN_AREA * areas.mean())
+    return np.asarray(np.maximum(areas, _MIN_AREA * areas.mean()))
 
 
 def mean_curvature_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:

@@ -149,4 +149,4 @@ def _stack(axes: list[sparse.csr_array], groups: IntArray | None) -> sparse.csr_
     for a, operator in enumerate(axes):
         place = sparse.coo_array((np.ones(n), (3 * groups + a, np.arange(n))), (3 * count, n))
         parts.append(place.tocsr() @ operator)
-    return (parts[0] + parts[1] + parts[2]).tocsr()
+    return sparse.csr_array(parts[0] + parts[1] + parts[2])

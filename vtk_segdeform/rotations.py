@@ -111,6 +111,6 @@ def _turn_onto(a: FloatArray, b: FloatArray) -> FloatArray:
     if cosine < -1.0 + 1e-12:  # opposite: half a turn about any axis across
         across = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
         across /= np.linalg.norm(across)
-        return 2.0 * np.outer(across, across) - np.eye(3)
+        return np.asarray(2.0 * np.outer(across, across) - np.eye(3))
     k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return np.eye(3) + k + k @ k / (1.0 + cosine)
+    return np.asarray(np.eye(3) + k + k @ k / (1.0 + cosine))

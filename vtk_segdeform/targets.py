@@ -75,7 +75,7 @@ class _Screw:
             return points + s * self._shift
         turn = Rotation.from_rotvec(s * self._angle * self._axis)
         slide = s * (self._axis @ self._shift) * self._axis
-        return self._centre + turn.apply(points - self._centre) + slide
+        return np.asarray(self._centre + turn.apply(points - self._centre) + slide)
 
 
 def _side(axis: FloatArray, points: FloatArray) -> float:

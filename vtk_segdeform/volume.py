@@ -87,4 +87,4 @@ def _corners(points: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArra
 
 
 def _det(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
-    return np.einsum("ij,ij->i", a, np.cross(b, c))
+    return np.asarray(np.einsum("ij,ij->i", a, np.cross(b, c)))

@@ -1,0 +1,32 @@
+"""The answer of a solve: the pose, and how well and by which way it was reached."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .arrays import FloatArray
+from .solver import Status
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A pose of the mesh, in the mesh's own unit and place."""
+
+    vertices: FloatArray
+    """(n, 3) float: the deformed mesh."""
+    cage_vertices: tuple[FloatArray, ...]
+    """One (m_r, 3) float per region: the cages that move it there."""
+    volume_change: float
+    """(V - V0) / V0, signed."""
+    region_volume_change: FloatArray
+    """The same for each region that owns a face, closed at its border."""
+    handle_error: float
+    """Distance of the farthest handle vertex from its target, in diagonals of the mesh."""
+    fixed_error: float
+    """Distance of the farthest fixed vertex from its place, likewise."""
+    steps: int
+    """Gauss-Newton steps, those on the way to a far target included."""
+    status: Status
+    """Why the iteration ended; ``str(status)`` is advice."""
+    merits: tuple[float, ...]
+    """The objective at the start of the last leg and after each of its steps; it never rises."""
