@@ -147,6 +147,16 @@ def connected(n: int, one: IntArray, other: IntArray) -> IntArray:
     return rank[label]
 
 
+def first_of_group(group: IntArray) -> IntArray:
+    """Return for each thing the number of the first in the same group, (n,) int.
+
+    >>> first_of_group(np.array([7, 4, 7, 4]))
+    array([0, 1, 0, 1])
+    """
+    _, first, which = np.unique(group, return_index=True, return_inverse=True)
+    return first[which]
+
+
 def first_equal_row(rows: NDArray[np.generic]) -> IntArray:
     """Return for each row the number of the first row equal to it, (n,) int; NaN equals nothing.
 

@@ -1,0 +1,112 @@
+"""Mend triangles into a closed, outward oriented two-manifold, step by step and said aloud.
+
+Each step does only what is needed, in an order where the next can stand on the one before: first
+what is no triangle goes, then borders that coincide are welded, then every vertex gets one fan,
+every shell one orientation, every small hole a lid, and at last every closed shell faces outward.
+Turning comes after filling, because an open shell has no inside.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import repair_steps as steps
+from .arrays import FloatArray, IntArray
+from .errors import MeshError
+from .faults import as_soup, find_faults
+from .report import Kind, MeshReport
+
+
+@dataclass(frozen=True)
+class Repair:
+    """A mended mesh and how it came about; *report* says what could not be mended.
+
+    What is kept keeps its order; what is created comes after.
+
+    Attributes
+    ----------
+    vertices, faces : (n, 3) float, (m, 3) int
+        The result.  A `Mesh` takes it if ``report.ok``.
+    steps : tuple of str
+        What was done, one sentence each; empty if nothing was wrong.
+    vertex_map, face_map : (n,) int, (m,) int
+        The original number of each vertex and face, -1 for one that fills a hole.
+    report : MeshReport
+        What `find_faults` says of the result.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    steps: tuple[str, ...]
+    vertex_map: IntArray
+    face_map: IntArray
+    report: MeshReport
+
+
+def repair(
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    *,
+    weld_distance: float = 0.0,
+    largest_hole: int = 100,
+) -> Repair:
+    """Return the triangles mended as far as that needs no guessing.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float
+        NaN and infinite coordinates are dropped with their faces.
+    faces : (m, 3) int
+        Triangles in any state, but with valid indices.
+    weld_distance : float
+        How far apart two vertices may lie and still count as one, in the unit of *vertices*.
+        Only vertices whose welding closes open edges are welded at all.
+    largest_hole : int
+        Holes with more edges than this stay open.
+
+    Raises
+    ------
+    MeshError
+        If there are no faces, none worth keeping, or faces with bad indices.
+    ValueError
+        If an array has the wrong shape or type.
+
+    Examples
+    --------
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> mended = repair(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]])
+    >>> mended.steps
+    ('fill 1 hole of 3 edges with 1 triangle',)
+    >>> mended.face_map, mended.report.ok
+    (array([ 0,  1,  2, -1]), True)
+    """
+    points, triangles = as_soup(vertices, faces)
+    report = find_faults(points, triangles)
+    if report.count(Kind.EMPTY) or report.count(Kind.BAD_INDEX):
+        raise MeshError(f"nothing to repair: {', '.join(map(str, report.faults))}")
+    draft = steps.Draft(points, triangles, np.arange(len(points)), np.arange(len(triangles)))
+    done: list[str] = []
+    if not report.ok:
+        for step in (
+            steps.drop_non_finite,
+            steps.drop_degenerate,
+            lambda draft: steps.weld(draft, weld_distance),
+            steps.drop_duplicates,
+            steps.drop_unreferenced,
+            steps.split,
+            steps.orient,
+            lambda draft: steps.fill(draft, largest_hole),
+            steps.split,
+            steps.turn_outward,
+        ):
+            draft, sentence = step(draft)
+            done += [sentence] if sentence else []
+            if not len(draft.faces):
+                raise MeshError(f"nothing is left of the mesh after: {'; '.join(done)}")
+        report = find_faults(draft.vertices, draft.faces)
+    return Repair(
+        draft.vertices, draft.faces, tuple(done), draft.vertex_map, draft.face_map, report
+    )
