@@ -14,13 +14,11 @@ from numpy.typing import ArrayLike
 
 from .arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
 from .errors import CageError
-from .intersections import self_intersections
-from .manifold import components, connectivity_faults, counted
 from .inside import distance_to_surface, winding_number
+from .intersections import flat_faces, self_intersections
+from .manifold import components, connectivity_faults, counted
 
 __all__ = ["Cage", "cage_faults", "self_intersections", "winding_number"]
-
-_NEEDLE = 1e-10  # a face whose height is this share of its longest edge has no plane
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -105,8 +103,8 @@ def cage_faults(vertices: ArrayLike, faces: ArrayLike) -> tuple[str, ...]:
     Examples
     --------
     >>> corners = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
-    >>> cage_faults(corners, [[0, 1, 2], [0, 2, 3], [0, 3, 1]])
-    ('3 edges border one face only: the cage is open',)
+    >>> cage_faults(corners, [[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]])
+    ('it is inside-out, volume -2.67: reverse its faces',)
     """
     points = as_points(vertices, "vertices")
     triangles = as_faces(faces, len(points), "faces")
@@ -115,10 +113,7 @@ def cage_faults(vertices: ArrayLike, faces: ArrayLike) -> tuple[str, ...]:
 
 
 def _flat_faults(points: FloatArray, faces: IntArray) -> list[str]:
-    a, b, c = points[faces.T]
-    twice_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    longest = np.max([((b - a) ** 2).sum(1), ((c - b) ** 2).sum(1), ((a - c) ** 2).sum(1)], axis=0)
-    flat = np.count_nonzero(twice_area <= _NEEDLE * longest)
+    flat = len(flat_faces(points, faces))
     return [f"{counted(flat, 'face has', 'faces have')} no area"] if flat else []
 
 

@@ -29,6 +29,7 @@ from .arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
 
 _TOUCH = 1e-12  # of a pair's extent: closer than this, triangles touch and planes are one
 _FOLD = 1e-9  # radians between two faces folded over their common edge
+_NEEDLE = 1e-10  # height of a face over its longest edge: below it has no plane
 _BATCH = 200_000  # pairs of boxes looked at together
 
 _EDGES = ((0, 1), (1, 2), (2, 0))
@@ -65,6 +66,14 @@ def self_intersections(vertices: ArrayLike, faces: ArrayLike) -> IntArray:
         found.append(pairs[_meet(points, triangles[pairs[:, 0]], triangles[pairs[:, 1]])])
     hits = np.sort(np.concatenate(found), axis=1)
     return hits[np.lexsort((hits[:, 1], hits[:, 0]))]
+
+
+def flat_faces(vertices: FloatArray, faces: IntArray) -> IntArray:
+    """Return the numbers of the faces that have no area to speak of, and so no plane."""
+    a, b, c = vertices[faces.T]
+    twice_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    longest = np.max([((b - a) ** 2).sum(1), ((c - b) ** 2).sum(1), ((a - c) ** 2).sum(1)], axis=0)
+    return np.flatnonzero(twice_area <= _NEEDLE * longest)
 
 
 def _overlapping_boxes(low: FloatArray, high: FloatArray) -> Iterator[IntArray]:

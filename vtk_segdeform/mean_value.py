@@ -52,6 +52,7 @@ from numpy.typing import ArrayLike
 
 from .arrays import FloatArray, IntArray, as_faces, as_points
 from .errors import CageError
+from .intersections import flat_faces
 from .manifold import connectivity_faults, counted, face_edges
 from .progress import Progress
 
@@ -59,7 +60,6 @@ from .progress import Progress
 _ON = 1e-14  # as near as this, a point is on the vertex or edge
 _OFF = 1e-30  # added to h: no point is in a plane to the last digit
 _NEAR = 1e-3  # of max |a|, for |h|: where S is summed as psi
-_NEEDLE = 1e-10  # height of a face over its longest edge: below it has no plane
 _BLOCK = 1 << 15  # numbers per temporary: a quarter of a megabyte, so that they stay in the cache
 
 
@@ -227,11 +227,7 @@ def _sum_near_plane(
 
 def _require_closed(p: FloatArray, faces: IntArray) -> None:
     faults = connectivity_faults(len(p), faces)
-    if not faults:
-        a, b, c = p[faces.T]
-        twice_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-        longest = np.max([((b - a) ** 2).sum(1), ((c - b) ** 2).sum(1), ((a - c) ** 2).sum(1)], 0)
-        flat = int(np.count_nonzero(twice_area <= _NEEDLE * longest))
-        faults = [f"{counted(flat, 'face has', 'faces have')} no area"] if flat else []
+    if not faults and len(flat := flat_faces(p, faces)):
+        faults = [f"{counted(len(flat), 'face has', 'faces have')} no area"]
     if faults:
         raise CageError("cage_faces do not close a cage: " + "; ".join(faults))
