@@ -18,24 +18,38 @@ PACKAGE = ROOT / "vtk_segdeform"
 
 # One line per part of the story; a new file takes its place here.
 STORY = [
-    "arrays", "errors", "progress",
-    "faults", "mesh", "repair",
-    "volume", "differential", "rotations",
-    "regions", "segmentation",
-    "mean_value", "intersections", "cages", "cage_fit",
-    "subspace", "constraints", "solver", "deformer",
-    "models", "convert", "meshlab", "pictures",
-    "selection", "motion", "bench", "demo", "commands", "cli", "__main__",
+    # a checked mesh
+    "arrays", "errors", "progress", "topology", "manifold", "inside", "intersections",
+    "report", "shells", "faults", "mesh", "holes", "splitting", "repair_steps", "repair",
+    # what a deformation keeps
+    "volume", "local_volume", "differential", "rotations",
+    # regions and their cages
+    "blending", "regions", "segmentation", "mean_value", "cages",
+    "columns", "region_solid", "cage_simplify", "cage_fit",
+    # the solver
+    "subspace", "energy", "constraints", "positions", "solver", "solution", "targets", "deformer",
+    "pipeline",
+    # meshes from code, from files, and as pictures
+    "remeshing", "implicit", "models",
+    "polygons", "off", "ply", "wavefront", "meshlab", "convert", "canvas", "pictures",
+    # the command line
+    "selection", "motion", "outputs", "demo", "bench", "commands", "cli", "__main__",
 ]  # fmt: skip
 
 NUMERIC = {"numpy", "scipy"}
+VTK = {"vtkmodules"}
 GRANTED = {
-    "cage_fit": {"vtkmodules", "vtk"},
-    "models": {"vtkmodules", "vtk"},
-    "convert": {"vtkmodules", "vtk", "pyvista"},
+    "cage_fit": VTK,
+    "implicit": VTK,
+    "polygons": VTK | {"pyvista"},
+    "off": {"pyvista"},
+    "ply": {"pyvista"},
+    "wavefront": {"pyvista"},
     "meshlab": {"pymeshlab"},
-    "pictures": {"vtkmodules", "vtk", "pyvista"},
-    "commands": {"pyvista"},
+    "convert": VTK | {"pyvista"},
+    "canvas": VTK | {"pyvista"},
+    "pictures": VTK | {"pyvista"},
+    "outputs": {"pyvista"},
 }
 
 MAY_PRINT_AND_EXIT = {"cli", "__main__"}

@@ -1,0 +1,240 @@
+"""The command line, ``segdeform``: the only place that prints, and that decides an exit code.
+
+    0   done
+    1   a fault was found, or the work could not be done: the line on stderr says why
+    2   the command was not understood: unknown option, bad selection, bad motion
+
+What the commands do is told in `commands`; here is how they are called.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TextIO
+
+from . import __version__, commands
+from .errors import ConstraintError, SegDeformError
+
+_TAKE_VECTORS = ("--rotate", "--pivot", "--translate")
+DONE, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
+
+_SELECTION = """\
+selections (SEL):
+  z>80%            half-space; per cent of the bounding box along x, y or z
+  x<=0.25          half-space in the mesh's own unit
+  ids.txt          a file of vertex numbers, from 0
+  pose.sel         one number per vertex: 0 fixed, 1 free, 2 handle
+  name, name=2     a point array: not zero, or equal to 2
+  z>80%&x<10%      both
+"""
+
+_EXAMPLES = """\
+examples:
+  segdeform demo -o demo-output
+  segdeform check scan.ply --repair -o closed.ply
+  segdeform deform horse.ply -o bent.ply --fixed 'z<10%' --handle 'z>90%' --rotate y,45
+  segdeform deform a.off -o b.off --fixed a.sel --handle a.sel --matrix a.def --regions auto
+  segdeform deform in.vtp -o out.vtp --fixed 'z<5%' \\
+      --handle left.txt --translate 0,0,0.2   --handle right.txt --rotate x,30 --pivot 0,0,1
+  segdeform regions horse.ply -o regions.vtp --regions 6
+  segdeform cages horse.ply -o cages.vtp --regions 6 --cage-vertices 300
+
+exit codes: 0 done; 1 a fault was found or the work failed; 2 the command was not understood
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; return its exit code."""
+    words = sys.argv[1:] if arguments is None else arguments
+    try:
+        options = _parser().parse_args(_with_signed_vectors(words))
+    except SystemExit as end:  # argparse has printed its usage, help or version
+        return int(end.code or 0)
+    bar = ProgressBar(sys.stderr)
+
+    def say(line: str) -> None:
+        bar.clear()
+        print(line, flush=True)
+
+    try:
+        return DONE if options.run(options, say, bar) else FAILED
+    except KeyboardInterrupt:
+        bar.clear()
+        return INTERRUPTED
+    except BrokenPipeError:  # the reader, head or less, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+    except (SegDeformError, OSError, ValueError, RuntimeError) as error:
+        bar.clear()
+        if options.debug:
+            raise
+        print(f"segdeform {options.command}: {_told(error)}", file=sys.stderr)
+        return MISUSED if isinstance(error, ConstraintError) else FAILED
+
+
+class ProgressBar:
+    """One line, rewritten in place, when a person is watching and has waited for a second."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._start = time.monotonic()
+        self._shown = False
+
+    def __call__(self, fraction: float, message: str) -> None:
+        """Show that *fraction* of the work is done, and what is going on."""
+        if self._stream.isatty() and time.monotonic() - self._start > 1.0:
+            filled = "#" * round(30 * min(max(fraction, 0.0), 1.0))
+            self._stream.write(f"\r[{filled:.<30}] {fraction:4.0%} {message:<40.40}")
+            self._stream.flush()
+            self._shown = True
+
+    def clear(self) -> None:
+        """Wipe the line, so that text can be written there."""
+        if self._shown:
+            self._stream.write("\r\x1b[K")
+            self._stream.flush()
+            self._shown = False
+
+
+def _told(error: Exception) -> str:
+    """Return the error in one line."""
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _with_signed_vectors(words: Sequence[str]) -> list[str]:
+    """Return *words* with "--pivot -1,0,0" joined by "=": argparse takes -1,0,0 for an option."""
+    joined: list[str] = []
+    for word in words:
+        if joined and joined[-1] in _TAKE_VECTORS and re.match(r"-[\d.]", word):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
+
+
+class _OfHandle(argparse.Action):
+    """--handle begins a handle; a motion option after it belongs to that handle."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        handles = list(getattr(namespace, "handles", None) or [])
+        if self.dest == "handle":
+            handles.append({"select": values})
+        elif not handles:
+            parser.error(f"{option_string} says how a handle moves; write it after its --handle")
+        elif self.dest in handles[-1]:
+            parser.error(f"{option_string} is given twice for one handle")
+        else:
+            handles[-1] = {**handles[-1], self.dest: values}
+        namespace.handles = handles
+
+
+def _parser() -> argparse.ArgumentParser:
+    form = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(
+        prog="segdeform",
+        description="Bend a dense closed mesh while its detail and its exact volume stay.",
+        epilog=_EXAMPLES,
+        formatter_class=form,
+    )
+    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
+    parser.add_argument("--debug", action="store_true", help="show where an error came from")
+    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+
+    def command(name: str, run: Any, text: str, epilog: str = "") -> argparse.ArgumentParser:
+        sub = subparsers.add_parser(
+            name, help=text, description=f"{text[0].upper()}{text[1:]}.", epilog=epilog,
+            formatter_class=form, allow_abbrev=False,
+        )  # fmt: skip
+        sub.set_defaults(run=run)
+        return sub
+
+    sub = command("demo", commands.demo, "bend the cactus over; write meshes and pictures")
+    sub.add_argument("-o", "--output", type=Path, default=Path("demo-output"), metavar="FOLDER")
+    sub.add_argument("--size", type=_count, default=5430, metavar="N", help="mesh vertices (5430)")
+    sub.add_argument("--no-pictures", action="store_true", help="only meshes and numbers")
+
+    sub = command("deform", commands.deform, "move handles of a mesh", _SELECTION)
+    _input_output(sub, required=True)
+    _subspace(sub)
+    _motion(sub)
+
+    sub = command("check", commands.check, "report the faults of a mesh, and repair them")
+    _input_output(sub, required=False)
+    sub.add_argument("--repair", action="store_true", help="write the repaired mesh to -o OUT")
+
+    sub = command("regions", commands.regions, "cut a mesh into regions; write them as an array")
+    _input_output(sub, required=False)
+    _number_of_regions(sub)
+
+    sub = command("cages", commands.cages, "make the cages of a mesh; write them coloured")
+    _input_output(sub, required=False)
+    _subspace(sub)
+
+    sub = command("bench", commands.bench, "time set-up and solving, as a Markdown table")
+    sub.add_argument("--size", type=_count, default=5430, metavar="N", help="mesh vertices (5430)")
+    sub.add_argument("--cage-vertices", type=_count, default=155, metavar="N", help="in all (155)")
+    return parser
+
+
+def _input_output(parser: argparse.ArgumentParser, *, required: bool) -> None:
+    parser.add_argument("input", type=Path, metavar="IN", help="a closed mesh: ply, stl, obj, vtp")
+    parser.add_argument("-o", "--output", type=Path, metavar="OUT", required=required)
+
+
+def _number_of_regions(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--regions", default="3", metavar="N",
+        help="how many regions: a number (3), auto, or the name of a point array of labels",
+    )  # fmt: skip
+    parser.add_argument(
+        "--overlap", type=_count, default=4, metavar="RINGS",
+        help="edge rings that regions from an array grow into each other (4)",
+    )  # fmt: skip
+
+
+def _subspace(parser: argparse.ArgumentParser) -> None:
+    _number_of_regions(parser)
+    parser.add_argument(
+        "--cage-vertices", type=_count, default=155, metavar="N", help="of all cages together (155)"
+    )
+
+
+def _motion(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("--fixed", required=True, metavar="SEL", help="vertices held in place")
+    one = parser.add_argument_group("for each handle, after its --handle")
+    for name, metavar, text in [
+        ("handle", "SEL", "vertices that move; give it again for another handle"),
+        ("matrix", "FILE", "4x4 matrix, applied first"),
+        ("rotate", "AXIS,DEGREES", "then a turn: z,60 or 1,0,1,60"),
+        ("pivot", "X,Y,Z", "of the turn; 'fixed' or 'handle' for a centre (handle)"),
+        ("translate", "X,Y,Z", "then a shift"),
+    ]:
+        required = name == "handle"
+        one.add_argument(
+            f"--{name}", action=_OfHandle, metavar=metavar, help=text, required=required
+        )
+    add("--no-volume", action="store_true", help="let the volume change")
+    add("--stretch", type=float, default=None, metavar="S", help="resistance to stretching")
+    add("--rotation-groups", type=_count, default=None, metavar="N", help="0: one per vertex")
+    add("--picture", type=Path, metavar="PNG", help="write before and after as a picture")
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"must be a whole number, 0 or more; got {text!r}")
+    return int(text)
