@@ -113,7 +113,7 @@ def mean_value_coordinates(
     centre, size = (low + high) / 2.0, np.linalg.norm(high - low)
     cage = _prepare((p - centre) / size, faces)
     weights = np.empty((len(x), len(p)))
-    rows = max(1, _BLOCK // faces.size)
+    rows = max(16, _BLOCK // faces.size)  # fewer than 16 cost more calls than they save memory
     for start in range(0, len(x), rows):
         stop = min(start + rows, len(x))
         weights[start:stop] = _weights(cage, ((x[start:stop] - centre) / size).T).T
