@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -61,11 +62,12 @@ class Limb:
 
     def __call__(self, x: FloatArray) -> FloatArray:
         """Return the signed distance, about, of the (n, 3) points *x*; at most 0.1."""
-        centre, tangent, radius = self._curve()
+        centre, tangent, radius, tree = self._curve
         reach = _FAR + 1.3 * max(self.radii)
-        distance, nearest = cKDTree(centre).query(x, distance_upper_bound=reach)
-        near = np.isfinite(distance)
-        k = np.asarray(nearest)[near]
+        low, high = centre.min(axis=0) - reach, centre.max(axis=0) + reach
+        near = np.flatnonzero(((x > low) & (x < high)).all(axis=1))
+        distance, k = tree.query(x[near], distance_upper_bound=reach)
+        near, k = near[np.isfinite(distance)], np.asarray(k)[np.isfinite(distance)]
         t, offset = tangent[k], x[near] - centre[k]
         along = np.einsum("ij,ij->i", offset, t)
         between = (k > 0) & (k < len(centre) - 1)  # else beyond an end: a round cap
@@ -81,15 +83,17 @@ class Limb:
         value[near] = np.minimum(d - r, _FAR)
         return value
 
-    def _curve(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return 400 points of the curve, its unit tangents and its radii there."""
+    @cached_property
+    def _curve(self) -> tuple[FloatArray, FloatArray, FloatArray, cKDTree]:
+        """400 points of the curve, the unit tangents and radii there, and a search tree."""
         points = np.asarray(self.points, dtype=float)
         knots = np.insert(np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)), 0, 0.0)
         s = np.linspace(0.0, knots[-1], 400)
         spline = make_interp_spline(knots, points, k=min(3, len(points) - 1))
         tangent = spline(s, nu=1)
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-        return spline(s), tangent, PchipInterpolator(knots, self.radii)(s)
+        centre = spline(s)
+        return centre, tangent, PchipInterpolator(knots, self.radii)(s), cKDTree(centre)
 
 
 def standing_body(limbs: Sequence[Limb], n_vertices: int, *, blend: float) -> Mesh:

@@ -50,6 +50,7 @@ def cactus(n_vertices: int = 5430) -> Mesh:
         ribs=7,
         height=0.075,
     )
+    _require(n_vertices, 500)
     return standing_body([trunk, left, right], n_vertices, blend=0.035)
 
 
@@ -88,6 +89,7 @@ def dinosaur(n_vertices: int = 8000) -> Mesh:
             (0.37, 0.66, 0.07),
         ]
     ]  # fmt: skip
+    _require(n_vertices, 1000)
     return standing_body([spine, head, *legs, *plates], n_vertices, blend=0.035)
 
 
@@ -152,8 +154,7 @@ def torus(n_vertices: int = 3000, *, major: float = 1.0, minor: float = 0.35) ->
 
 def sphere(n_vertices: int = 2562, *, radius: float = 1.0) -> Mesh:
     """Return a sphere about the origin: points along a spiral of golden angles, their hull."""
-    if n_vertices < 4:
-        raise ValueError(f"n_vertices must be 4 or more; got {n_vertices}")
+    _require(n_vertices, 4)
     k = np.arange(n_vertices)
     z = 1.0 - (2.0 * k + 1.0) / n_vertices
     ring = np.sqrt(1.0 - z**2)
@@ -163,6 +164,11 @@ def sphere(n_vertices: int = 2562, *, radius: float = 1.0) -> Mesh:
     inward = np.einsum("ij,ij->i", a, np.cross(b, c)) < 0
     faces[inward] = faces[inward, ::-1]
     return Mesh(radius * vertices, faces)
+
+
+def _require(n_vertices: int, least: int) -> None:
+    if n_vertices < least:
+        raise ValueError(f"n_vertices must be {least} or more; got {n_vertices}")
 
 
 def _chequered(p: int, q: int) -> IntArray:

@@ -1,0 +1,191 @@
+"""Panels side by side, one camera for all, rendered without a window and written as a PNG file.
+
+The camera looks along the direction in which the model extends and moves least, so that a bend is
+seen from its side; then a little from aside and above, for depth.  It projects in parallel, so
+all panels have one scale.  Everything is drawn at twice the size and averaged down, which smooths
+edges on any renderer.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkIOImage import vtkPNGWriter
+
+from .arrays import FloatArray
+from .errors import MeshError, MissingDependencyError
+
+Draw = Callable[[pv.Plotter], None]
+
+INK, PAPER = "#333333", "#FFFFFF"
+_HEIGHT = 800  # pixels of a picture
+_TITLE, _MARGIN = 0.1, 0.04  # shares of the height: for the words on top, and around
+_ASIDE, _ABOVE = np.radians(14.0), np.radians(10.0)
+_PROBE = "import pyvista; pyvista.Plotter(off_screen=True).show()"
+
+
+@functools.lru_cache(maxsize=1)
+def require_offscreen() -> None:
+    """Make sure that pictures can be rendered here; tried once, in a process of its own.
+
+    Without a GL library VTK ends the whole process on its first picture, which no ``try`` can
+    catch.
+
+    Raises
+    ------
+    MissingDependencyError
+        If rendering fails; names the Debian packages that make it work.
+    """
+    tried = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, check=False)
+    if tried.returncode != 0:
+        raise MissingDependencyError(
+            "cannot render pictures here: VTK finds no OpenGL to draw with. On Debian or Ubuntu: "
+            "apt-get install --no-install-recommends libegl1 libgl1"
+        )
+
+
+def view_of(rest: FloatArray, deformed: FloatArray) -> FloatArray:
+    """Return the camera's (3, 3) axes: rows to the right, up, and towards the viewer.
+
+    Parameters
+    ----------
+    rest, deformed : (n, 3) float
+        What is to be seen.  z stays up, unless that is where it extends least.
+    """
+    extent = np.ptp(np.concatenate([rest, deformed]), axis=0)
+    towards = -np.eye(3)[int(np.argmin(extent))]
+    up = np.eye(3)[2] if towards[2] == 0.0 else np.eye(3)[1]
+    towards = abs(towards) if towards[2] else towards
+    right = np.cross(up, towards)
+    towards = np.cos(_ASIDE) * towards + np.sin(_ASIDE) * right
+    right = np.cross(up, towards)
+    towards = np.cos(_ABOVE) * towards + np.sin(_ABOVE) * up
+    return np.stack([right, np.cross(towards, right), towards])
+
+
+def write_panels(
+    path: str | Path,
+    panels: Sequence[tuple[str, Draw]],
+    points: FloatArray,
+    view: FloatArray,
+    *,
+    foot: float = 0.0,
+) -> None:
+    """Render *panels* and write them side by side.
+
+    Parameters
+    ----------
+    path : str or Path
+        A PNG file, which appears whole or not at all.
+    panels : sequence of (title, draw)
+        Each ``draw(plotter)`` adds what is to be seen; the camera stands already.
+    points : (k, 3) float
+        What every panel has room for.
+    view : (3, 3) float
+        From `view_of`.
+    foot : float
+        Share of the height kept free at the bottom.
+
+    Raises
+    ------
+    MissingDependencyError
+        If nothing can be rendered here.
+    MeshError
+        If the file is no .png or its folder is not there.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".png" or not path.parent.is_dir():
+        raise MeshError(f"{path}: must be a .png file in a folder that exists")
+    require_offscreen()
+    seen = points @ view.T
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    width, height, _ = np.maximum(high - low, 1e-9 * np.ptp(seen))
+    head = _TITLE if any(title for title, _ in panels) else _MARGIN
+    room = 1.0 - head - max(foot, _MARGIN)  # of the panel's height, for the model
+    aspect = float(np.clip(room * width / height + 2 * _MARGIN, 0.6, 2.0))
+    visible = max(height / room, width / (aspect - 2 * _MARGIN))  # height of a panel, model units
+    middle = 0.5 * (low + high)
+    middle[1] += 0.5 * visible * (head - max(foot, _MARGIN))
+    size = (int(2 * _HEIGHT * aspect) // 2 * 2 * len(panels), 2 * _HEIGHT)
+    plotter = pv.Plotter(off_screen=True, shape=(1, len(panels)), window_size=size, border=False)
+    try:
+        plotter.disable_anti_aliasing()
+        plotter.set_background(PAPER)
+        for k, (title, draw) in enumerate(panels):
+            plotter.subplot(0, k)
+            plotter.disable_anti_aliasing()
+            centre = middle @ view
+            away = float(np.ptp(seen, axis=0).max()) * 3.0
+            plotter.camera.position = centre + away * view[2]
+            plotter.camera.focal_point = centre
+            plotter.camera.up = view[1]
+            plotter.enable_parallel_projection()
+            plotter.camera.parallel_scale = 0.5 * visible
+            draw(plotter)
+            plotter.reset_camera_clipping_range()
+            if title:
+                place = (0.5, 1.0 - 0.5 * _TITLE)
+                words = plotter.add_text(
+                    title, position=place, viewport=True, color=INK, font_size=20
+                )
+                words.prop.justification_horizontal = "center"
+                words.prop.justification_vertical = "center"
+        image = np.asarray(plotter.screenshot(return_img=True))
+    finally:
+        plotter.close()
+    _write_png(path, image)
+
+
+def add_surface(plotter: pv.Plotter, surface: pv.PolyData, **colouring: Any) -> Any:
+    """Add a surface, softly shaded, with its outline; returns its actor.
+
+    Parameters
+    ----------
+    plotter : pyvista.Plotter
+        Its camera stands already; the outline depends on it.
+    surface : pyvista.PolyData
+        Triangles.
+    **colouring
+        Of pyvista's ``add_mesh``: color, scalars, cmap, ...
+    """
+    actor = plotter.add_mesh(
+        surface,
+        smooth_shading=True,
+        split_sharp_edges=True,
+        feature_angle=50.0,
+        ambient=0.35,
+        diffuse=0.8,
+        specular=0.05,
+        show_scalar_bar=False,
+        **colouring,
+    )
+    plotter.add_silhouette(surface, color=INK, line_width=3.0, feature_angle=None)
+    return actor
+
+
+def _write_png(path: Path, image: Any) -> None:
+    """Average 2 by 2 pixels of *image* (h, w, 3) and write the rest."""
+    h, w = (side // 2 for side in image.shape[:2])
+    small = image[: 2 * h, : 2 * w].reshape(h, 2, w, 2, 3).mean(axis=(1, 3))
+    data = vtkImageData()
+    data.SetDimensions(w, h, 1)
+    pixels = np.ascontiguousarray(np.round(small[::-1]).astype(np.uint8).reshape(-1, 3))
+    data.GetPointData().SetScalars(numpy_to_vtk(pixels, deep=True))
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".segdeform-") as folder:
+        draft = Path(folder) / path.name
+        writer = vtkPNGWriter()
+        writer.SetFileName(str(draft))
+        writer.SetInputData(data)
+        writer.Write()
+        os.replace(draft, path)
