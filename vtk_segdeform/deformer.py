@@ -34,7 +34,7 @@ from .targets import waypoints
 from .volume import signed_volume
 
 _LEG_TOLERANCE, _LEG_STEPS = 1e-3, 12  # for the targets on the way to a far one
-_POSITION_WEIGHT = 1e2  # of the shape energy's trace, shared out over each handle's vertices
+_POSITION_WEIGHT = 1e3  # of the shape energy's trace, shared out over each handle's vertices
 
 
 class Deformer:
@@ -92,7 +92,7 @@ class Deformer:
         rotation_groups: int | None = 300,
         tolerance: float = 1e-6,
         max_steps: int = 200,
-        window: int = 8,
+        window: int = 5,
         exact_volume: bool = True,
         hold_tolerance: float = 7e-4,
         progress: Progress | None = None,

@@ -18,7 +18,7 @@ def connectivity_faults(n_points: int, faces: IntArray) -> list[str]:
     a, b, c = faces.T
     repeated = np.count_nonzero((a == b) | (b == c) | (c == a))
     if repeated:
-        return [f"{counted(repeated, 'face repeats', 'faces repeat')} a vertex"]
+        return [f"{counted(int(repeated), 'face repeats', 'faces repeat')} a vertex"]
     sides = Sides(faces, n_points)
     faults = []
     if len(sides.open):

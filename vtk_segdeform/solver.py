@@ -67,7 +67,7 @@ class SolverOptions:
 
     tolerance: float = 1e-6  # root-mean-square move of the surface in a step, mesh size 1
     max_steps: int = 200
-    window: int = 8  # Anderson's memory; 0 is the plain iteration of the paper
+    window: int = 5  # Anderson's memory; 0 is the plain iteration of the paper
     exact_volume: bool = True  # False leaves the linearised multiplier of (21), for comparison
 
 
@@ -125,7 +125,7 @@ class GaussNewton:
                 break
             ahead = None
             if options.window:
-                guess = memory.extrapolate(here.p, step)
+                guess = memory.extrapolate(here.p, step, np.triu(self._factor[0]) @ step)
                 ahead = self._retract(guess, directions, targets, options)
                 if not self._improves(ahead, here):
                     memory.forget()
@@ -206,7 +206,11 @@ class GaussNewton:
 
 
 class _Anderson:
-    """The last few (p, h) and the combination of them whose residual is smallest."""
+    """The last few (p, h) and the combination of them whose residual is smallest.
+
+    Residuals are measured by H: plain distances between cage vertices count what moves nothing,
+    and take a sixth more steps.
+    """
 
     def __init__(self, window: int) -> None:
         self._window = window
@@ -216,16 +220,17 @@ class _Anderson:
         """Start again from the next step."""
         self._last: tuple[FloatArray, FloatArray] | None = None
         self._moves: list[FloatArray] = []  # differences of q = p + h
-        self._changes: list[FloatArray] = []  # differences of h
+        self._changes: list[FloatArray] = []  # differences of the residual
 
-    def extrapolate(self, p: FloatArray, h: FloatArray) -> FloatArray:
+    def extrapolate(self, p: FloatArray, h: FloatArray, residual: FloatArray) -> FloatArray:
         """Return the accelerated successor of *p*, whose plain successor is p + h."""
         q = p + h
         if self._last is not None:
             self._moves = [*self._moves, (q - self._last[0]).ravel()][-self._window :]
-            self._changes = [*self._changes, (h - self._last[1]).ravel()][-self._window :]
-        self._last = q, h
+            changes = [*self._changes, (residual - self._last[1]).ravel()]
+            self._changes = changes[-self._window :]
+        self._last = q, residual
         if not self._changes:
             return q
-        gamma = np.linalg.lstsq(np.array(self._changes).T, h.ravel(), rcond=1e-10)[0]
+        gamma = np.linalg.lstsq(np.array(self._changes).T, residual.ravel(), rcond=1e-10)[0]
         return q - (gamma @ np.array(self._moves)).reshape(p.shape)
