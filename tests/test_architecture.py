@@ -6,7 +6,6 @@ Each chapter may import the ones before it in the story, and only the libraries 
 from __future__ import annotations
 
 import ast
-import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -134,7 +133,7 @@ def test_a_chapter_changes_no_global_state_and_evaluates_no_text(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_public_functions_take_at_most_four_positional_arguments(name):
     for node in ast.walk(ast.parse((PACKAGE / f"{name}.py").read_text())):
-        if isinstance(node, ast.FunctionDef) and not re.match("_[^_]", node.name):
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
             positional = [a.arg for a in node.args.posonlyargs + node.args.args]
             positional = [arg for arg in positional if arg not in ("self", "cls")]
             assert len(positional) <= 4, f"{node.name}({', '.join(positional)}): use keywords"

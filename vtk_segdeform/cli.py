@@ -191,7 +191,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _input_output(parser: argparse.ArgumentParser, *, required: bool) -> None:
-    parser.add_argument("input", type=Path, metavar="IN", help="a closed mesh: ply, stl, obj, vtp")
+    parser.add_argument("input", type=Path, metavar="IN", help="ply, obj, off, stl, vtp, ...")
     parser.add_argument("-o", "--output", type=Path, metavar="OUT", required=required)
 
 

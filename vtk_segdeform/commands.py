@@ -63,6 +63,8 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     fixed = parse_selection(options.fixed, mesh, point_arrays=surface.point_data, role="fixed")
     handle, targets = _handles(options.handles, surface, mesh, fixed)
     regions, cages = _subspace(options, surface, mesh, part(progress, 0.0, 0.6))
+    tell_regions(regions, say)
+    tell_cages(cages, say)
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, progress=part(progress, 0.6, 0.9),
         **_settings(options),
@@ -95,8 +97,10 @@ def check(options: Namespace, say: Say, progress: Progress) -> bool:
     mended = repair(vertices, faces)
     progress(1.0, "done")
     did, then = ("repaired", "result") if options.repair else ("--repair would", "it would be")
-    for step in mended.steps or ("change nothing",):
+    for step in mended.steps:
         say(f"{did}: {step}")
+    if not mended.steps:
+        say("nothing to repair")
     say(f"{then}: {mended.report}")
     if not options.repair:
         return False
