@@ -279,8 +279,9 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypat
     write_mesh(path, shuffled())
     before = path.read_bytes()
 
-    def full(_path, _surface):
-        _path.write_text("half")
+    def full(draft, _surface):
+        assert tmp_path in draft.parents  # on the same disk, so that the rename is one step
+        draft.write_text("half")
         raise OSError("no space left on device")
 
     monkeypatch.setitem(pytest.importorskip("vtk_segdeform.convert")._WRITERS, ".off", full)

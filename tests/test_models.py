@@ -114,6 +114,7 @@ def test_a_torus_of_any_number_of_vertices_has_one_hole_and_six_neighbours_every
     mesh = models.torus(n)
     assert (mesh.n_vertices, euler(mesh)) == (n, 0)
     assert (np.bincount(mesh.edges.ravel()) == 6).all()
+    assert least_angles(mesh).min() > 20.0  # at the seam too
 
 
 @pytest.mark.parametrize("divisions", [(1, 1, 1), (8, 8, 40), (3, 5, 7)])
@@ -132,6 +133,16 @@ def test_vertices_of_an_implicit_surface_lie_on_it():
     )
     assert mesh.n_vertices == 777
     np.testing.assert_allclose(np.linalg.norm(mesh.vertices, axis=1), 1.0, atol=1e-12)
+
+
+def test_of_several_parts_the_largest_is_taken():
+    def ball_and_crumb(x):
+        ball = np.linalg.norm(x, axis=1) - 1.0
+        return np.minimum(ball, np.linalg.norm(x - [1.6, 0.0, 0.0], axis=1) - 0.3)
+
+    mesh = implicit_surface(ball_and_crumb, np.array([[-1.0] * 3, [2.0, 1.0, 1.0]]), 600)
+    assert mesh.n_vertices == 600
+    assert mesh.vertices[:, 0].max() < 1.01
 
 
 def test_a_straight_limb_is_a_capsule():
