@@ -127,6 +127,7 @@ def test_a_vertex_without_a_place_goes_and_the_hole_is_closed():
 def test_turned_faces_are_turned_back_and_the_majority_wins():
     vertices, faces = SPHERE
     some = np.random.default_rng(1).random(M) < 0.3
+    some[0] = True  # the first face has no say of its own
     broken = np.where(some[:, None], faces[:, [0, 2, 1]], faces)
     result = mended(vertices, broken)
     assert result.steps == (f"turn {some.sum()} faces round to agree with the neighbours",)
@@ -212,6 +213,33 @@ def test_the_lid_of_a_loop_has_the_least_area():
     normals = np.cross(b - a, c - a)
     assert np.linalg.norm(normals, axis=1).sum() / 2 == pytest.approx(2.5)  # nothing twice
     assert (normals[:, 2] > 0).all()  # all in the direction of the loop
+
+
+def test_no_other_lid_of_a_bent_loop_has_less_area():
+    def least(points, i, j):
+        if j - i < 2:
+            return 0.0
+        return min(
+            least(points, i, k) + least(points, k, j) + area(points[i], points[k], points[j])
+            for k in range(i + 1, j)
+        )
+
+    def area(a, b, c):
+        return np.linalg.norm(np.cross(b - a, c - a)) / 2.0
+
+    rng = np.random.default_rng(8)
+    for n in (4, 5, 6, 7) * 5:
+        corners = rng.normal(size=(n, 3))
+        lid = corners[triangulate_loop(corners, np.zeros((n, n), bool))]
+        found = sum(area(*triangle) for triangle in lid)
+        assert found == pytest.approx(least(corners, 0, n - 1), rel=0.02)
+
+
+def test_two_lids_over_the_same_corners_do_not_share_a_diagonal():
+    vertices, faces = SOLIDS["octahedron"]
+    flat = vertices * [0.2, 1.0, 1.0]  # so that both lids would like the short diagonal
+    result = mended(flat, faces[[2, 3, 4, 5]])
+    assert result.steps == ("fill 2 holes of 4 edges with 4 triangles",)
 
 
 def test_what_would_need_guessing_stays_in_the_report():
