@@ -23,7 +23,7 @@ STORY = [
     # what a deformation keeps
     "volume", "local_volume", "differential", "rotations",
     # regions and their cages
-    "blending", "regions", "segmentation", "mean_value", "cages",
+    "blending", "regions", "coarse", "necks", "segmentation", "mean_value", "cages",
     "columns", "region_solid", "cage_simplify", "cage_fit",
     # the solver
     "subspace", "energy", "constraints", "positions", "solver", "solution", "targets", "deformer",

@@ -15,6 +15,7 @@ import re
 import sys
 import time
 from collections.abc import Sequence
+from ctypes.util import find_library
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -56,6 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = _parser().parse_args(_with_signed_vectors(words))
     except SystemExit as end:  # argparse has printed its usage, help or version
         return int(end.code or 0)
+    _draw_without_a_screen()
     bar = ProgressBar(sys.stderr)
 
     def say(line: str) -> None:
@@ -100,6 +102,12 @@ class ProgressBar:
             self._stream.write("\r\x1b[K")
             self._stream.flush()
             self._shown = False
+
+
+def _draw_without_a_screen() -> None:
+    """Lead VTK to EGL where there is no X server: it would warn of that with every picture."""
+    if sys.platform == "linux" and not os.environ.get("DISPLAY") and find_library("EGL"):
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 
 def _told(error: Exception) -> str:
