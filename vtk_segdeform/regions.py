@@ -154,7 +154,7 @@ class Regions:
     @property
     def labels(self) -> IntArray:
         """(n,) int: the region that weighs most at each vertex; the first of equals."""
-        return np.argmax(self.weights, axis=0)
+        return np.asarray(np.argmax(self.weights, axis=0), dtype=np.int64)
 
     def members(self, region: int) -> IntArray:
         """Return the numbers of the vertices in *region*, in order."""

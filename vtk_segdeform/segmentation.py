@@ -1,0 +1,232 @@
+"""Automatic regions: limbs apart from the trunk, and the trunk in fair shares.
+
+The shape is cut in two at its best neck (`necks`), then whichever part has the best neck left, and
+so on, until there are as many parts as asked or no neck is left.  If more parts are asked than
+there are limbs, the largest are cut into slices of about equal area (`slices`).
+All this happens on a coarse copy (`coarse`), so that it costs about the same for every mesh, and
+the parts hardly depend on how finely the shape is meshed.
+
+On the mesh itself the parts' borders are then shortened, as the borders of soap films are, by
+spreading each part's indicator and giving every vertex to the part with the most [MBO].  It spreads
+slowly across concave edges, so that a border near a crease stays in the crease.
+
+Source
+------
+[MBO] B. Merriman, J. Bence, S. Osher, "Diffusion generated motion by mean curvature",
+      Computational Crystal Growers Workshop, 73-83, 1992.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from .arrays import FloatArray, IntArray
+from .coarse import Surface, coarsen, nearest_of, symmetric
+from .errors import RegionError
+from .mesh import Mesh
+from .necks import Neck, best_neck
+from .progress import Progress
+from .regions import Regions
+from .slices import fair_slice, quotas
+
+_POINTS = 1800  # of the coarse copy, about
+_POINTS_PER_REGION = 16  # at least
+_TYPICAL = 6  # where the number is open, a region's share is the whole over this
+_OVERLAP = 0.1  # of a region's width, counted in edges
+_CREASE = 0.06  # of the square root of the area: a concave edge as sharp as this radius halves
+_ROUNDS = 3  # of spreading
+_MOST_STEPS = 60  # in a round
+
+
+def segment(
+    mesh: Mesh,
+    n_regions: int | None = None,
+    *,
+    overlap: int | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Regions:
+    """Return overlapping regions of sensible shape.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        n vertices, one or several components.
+    n_regions : int, optional
+        How many, 1 to n.  None cuts off every limb (`necks.NECK`) and nothing else: 1 for a sphere,
+        3 for a cactus with two arms.
+    overlap : int, optional
+        Rings of edges by which each region grows over its neighbours.  None takes a tenth of a
+        region's width in edges, sqrt(n / regions) / 10, at least 2: the same width in space on a
+        coarse and on a fine mesh.
+    seed : int
+        Of the order in which vertices are thinned out for the coarse copy.
+    progress : Progress, optional
+        Told how far it is; may raise `errors.Cancelled`.
+
+    Returns
+    -------
+    regions : Regions
+        Each is connected before it is grown, and no region spans two components of the mesh, unless
+        *n_regions* is less than the number of components: then each of the largest components is a
+        region, and every other one belongs to the region nearest to it.
+
+    Raises
+    ------
+    RegionError
+        If *n_regions* is not a whole number in 1..n.
+
+    Notes
+    -----
+    The same for the same arguments, and for a mesh moved, turned or scaled, up to rounding.
+    """
+    n = mesh.n_vertices
+    if n_regions is not None and not (n_regions == int(n_regions) and 1 <= n_regions <= n):
+        raise RegionError(f"n_regions must be a whole number in 1..{n}; got {n_regions}")
+    _tell(progress, 0.0, "thinning out vertices")
+    if n_regions is not None and n_regions <= mesh.components.max() + 1:
+        labels = _merged_components(mesh, int(n_regions))
+    else:
+        points = max(_POINTS, _POINTS_PER_REGION * (n_regions or 1))
+        cell, surface = coarsen(mesh, points, np.random.default_rng(seed))
+        labels = _parts(surface, n_regions, progress)[cell]
+        _tell(progress, 0.8, "smoothing borders")
+        labels = _connected(mesh, _smooth(mesh, labels))
+    _tell(progress, 0.95, "growing regions")
+    if overlap is None:
+        overlap = max(2, round(_OVERLAP * np.sqrt(n / (labels.max() + 1))))
+    regions = Regions.from_labels(mesh, labels, overlap)
+    _tell(progress, 1.0, "regions found")
+    return regions
+
+
+def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -> IntArray:
+    """Return (k,) int: the part of each point; limbs first, then slices of what is large."""
+    everything = np.ones(len(surface.areas), dtype=bool)
+    labels = np.empty(len(everything), dtype=np.int64)
+    share = surface.areas.sum() / (n_regions or _TYPICAL)
+    wanted = n_regions or np.inf
+
+    def alone(label: int) -> tuple[IntArray, Surface, FloatArray]:
+        ids = np.flatnonzero(labels == label)
+        part = surface.part(ids)
+        rim = surface.contact[ids].sum(axis=1) - part.contact.sum(axis=1)
+        return ids, part, np.where(rim > 1e-9 * np.sqrt(share), rim, 0.0)
+
+    necks: list[Neck | None] = []
+    for label, ids in enumerate(surface.pieces(everything)):
+        labels[ids] = label
+        necks.append(best_neck(*alone(label)[1:], share))
+    while len(necks) < wanted:
+        ranks = [np.inf if neck is None else neck.rank for neck in necks]
+        label = int(np.argmin(ranks))
+        neck = necks[label]
+        if neck is None:
+            break
+        labels[np.flatnonzero(labels == label)[neck.inside]] = len(necks)
+        necks[label] = best_neck(*alone(label)[1:], share)
+        necks.append(best_neck(*alone(len(necks))[1:], share))
+        _tell(progress, 0.1 + 0.4 * min(1.0, len(necks) / min(wanted, 20)), "cutting off limbs")
+
+    count = len(necks)
+    areas = np.bincount(labels, surface.areas).astype(float)
+    waiting = list(enumerate(quotas(areas, n_regions or count)))
+    while waiting:
+        label, quota = waiting.pop()
+        ids, part, rim = alone(label)
+        if quota > 1 and len(ids) > 1:
+            inside = fair_slice(part, rim, (quota // 2) / quota)
+            labels[ids[inside]] = count
+            waiting += [(label, quota - quota // 2), (count, quota // 2)]
+            count += 1
+            _tell(progress, 0.5 + 0.3 * count / (n_regions or count), "slicing the rest")
+    return labels
+
+
+def _merged_components(mesh: Mesh, n_regions: int) -> IntArray:
+    """Return one label per large component; the others join the nearest, centre to centre."""
+    component, size = mesh.components, np.bincount(mesh.components)
+    sums = [np.bincount(component, mesh.vertices[:, axis]) for axis in range(3)]
+    centres = np.stack(sums, axis=1) / size[:, None]
+    large = np.sort(np.argsort(-size, kind="stable")[:n_regions])
+    nearest = np.linalg.norm(centres[:, None] - centres[large], axis=2).argmin(axis=1)
+    nearest[large] = np.arange(n_regions)
+    return np.asarray(nearest[component])
+
+
+def _smooth(mesh: Mesh, labels: IntArray) -> IntArray:
+    """Return labels with short borders that keep to creases; none shrinks by half in a round."""
+    spread = _spreading(mesh)
+    area = mesh.face_areas.sum()
+    edge = np.median(mesh.adjacency.data)
+    steps = int(np.clip(np.ceil(4.0 * area / _POINTS / edge**2), 4, _MOST_STEPS))
+    rings = int(np.ceil(np.sqrt(steps))) + 1
+    for _ in range(_ROUNDS):
+        most, smooth = np.zeros(len(labels)), labels.copy()
+        for part in range(labels.max() + 1):
+            near = _within(spread, np.flatnonzero(labels == part), rings)
+            here = spread[near][:, near]
+            amount = (labels[near] == part).astype(float)
+            for _ in range(steps):
+                amount = here @ amount
+            more = amount > most[near]
+            most[near[more]] = amount[more]
+            smooth[near[more]] = part
+        before = np.bincount(labels)
+        shrunk = np.bincount(smooth, minlength=len(before)) < before / 2
+        labels = np.where(shrunk[labels], labels, smooth)
+    return labels
+
+
+def _within(graph: sparse.csr_array, ids: IntArray, rings: int) -> IntArray:
+    """Return the vertices up to *rings* edges away from *ids*, in order."""
+    reached = np.zeros(graph.shape[0], dtype=bool)
+    reached[ids] = True
+    for _ in range(rings):
+        others = graph[ids].indices
+        ids = np.unique(others[~reached[others]])
+        reached[ids] = True
+    return np.flatnonzero(reached)
+
+
+def _spreading(mesh: Mesh) -> sparse.csr_array:
+    """Return the (n, n) matrix of one step: half stays, half goes to neighbours, less over creases.
+
+    An edge's bend is its normal curvature, (n_j - n_i).(x_j - x_i) / |x_j - x_i|^2, negative where
+    the surface is concave.
+    """
+    a, b, c = mesh.vertices[mesh.faces.T]
+    cross = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+    n, corner = mesh.n_vertices, mesh.faces.ravel()
+    normal = np.stack([np.bincount(corner, axis, minlength=n) for axis in cross.T], axis=1)
+    normal = normal / np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
+    i, j = mesh.edges.T
+    along = mesh.vertices[j] - mesh.vertices[i]
+    size = np.maximum(np.einsum("ij,ij->i", along, along), np.finfo(float).tiny)
+    bend = np.einsum("ij,ij->i", normal[j] - normal[i], along) / size
+    hollow = _CREASE * np.sqrt(mesh.face_areas.sum()) * np.maximum(-bend, 0.0)
+    usual = np.median(size)  # longer edges carry less, so that it spreads evenly in space
+    share = symmetric(mesh.edges, np.minimum(1.0, usual / size) / (1.0 + hollow**2), n)
+    degree = np.diff(share.indptr)
+    moves = sparse.diags_array(0.5 / degree) @ share
+    return sparse.csr_array(moves + sparse.diags_array(1.0 - moves.sum(axis=1)))
+
+
+def _connected(mesh: Mesh, labels: IntArray) -> IntArray:
+    """Return labels of which each is connected: stray pieces go to the nearest other vertex."""
+    i, j = mesh.edges.T
+    same = mesh.edges[labels[i] == labels[j]]
+    graph = symmetric(same, np.ones(len(same)), len(labels))
+    _, piece = csgraph.connected_components(graph, directed=False)
+    size = np.bincount(piece)
+    order = np.argsort(-size[piece], kind="stable")
+    _, first = np.unique(labels[order], return_index=True)
+    settled = np.flatnonzero(np.isin(piece, piece[order[first]]))
+    return np.asarray(labels[nearest_of(mesh, settled)])
+
+
+def _tell(progress: Progress | None, fraction: float, message: str) -> None:
+    if progress is not None:
+        progress(fraction, message)

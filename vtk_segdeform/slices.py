@@ -1,0 +1,74 @@
+"""A surface in parts of equal area with short borders, where it has no limbs to tell them apart.
+
+A surface for q parts is cut into two, for q // 2 parts and the rest, along the shortest level set
+that leaves the right area on each side, and each side likewise.  Level sets of the distance from
+the ends of a surface run across it, so a tube comes apart in rings.
+"""
+
+from __future__ import annotations
+
+import heapq
+
+import numpy as np
+
+from .arrays import BoolArray, FloatArray, IntArray
+from .coarse import Surface
+
+_TOLERANCE = 0.15  # by which a side may miss its area
+
+
+def quotas(areas: FloatArray, count: int) -> IntArray:
+    """Return how many of *count* parts each surface is cut into: in proportion, at least one each.
+
+    The next part goes to the surface whose parts are largest so far.
+    """
+    quota = np.ones(len(areas), dtype=np.int64)
+    heap = [(-area, k) for k, area in enumerate(areas)]
+    heapq.heapify(heap)
+    for _ in range(count - len(areas)):
+        _, k = heapq.heappop(heap)
+        quota[k] += 1
+        heapq.heappush(heap, (-areas[k] / quota[k], k))
+    return quota
+
+
+def fair_slice(part: Surface, rim: FloatArray, fraction: float) -> BoolArray:
+    """Return (k,) bool: a side of the surface with about *fraction* of its area.
+
+    Parameters
+    ----------
+    part : Surface
+        Connected, two points or more.
+    rim : (k,) float
+        Length of older cuts at each point.
+    fraction : float
+        Between 0 and 1.
+
+    Returns
+    -------
+    inside : (k,) bool
+        Both sides are connected and not empty.
+    """
+    total = part.areas.sum()
+    found = []
+    for d in part.distances_from_ends(rim):
+        order = np.argsort(d, kind="stable")
+        below = np.cumsum(part.areas[order]) / total
+        for wanted in {fraction, 1.0 - fraction}:
+            count = int(np.clip(np.searchsorted(below, wanted), 1, len(d) - 1))
+            t = (d[order[count - 1]] + d[order[count]]) / 2.0
+            length = part.level_lengths(part.faces, d, np.array([t]))[0]
+            found.append((length, wanted, order[:count]))
+    found.sort(key=lambda candidate: candidate[0])
+
+    best, least = np.zeros(len(rim), dtype=bool), np.inf
+    for _, wanted, ids in found:
+        inside = np.zeros(len(rim), dtype=bool)
+        inside[ids] = True
+        inside = part.two_pieces(inside)
+        miss = abs(part.areas[inside].sum() / total - wanted) / min(fraction, 1.0 - fraction)
+        if miss < least and not inside.all():
+            best, least = inside if wanted == fraction else ~inside, miss
+        if least <= _TOLERANCE:
+            break
+    return best
