@@ -1,8 +1,21 @@
-"""Bend a dense closed mesh by hand while its detail and its volume stay."""
+"""Bend a dense closed mesh by hand while its detail and its volume stay.
+
+    import vtk_segdeform as sd
+
+    mesh = sd.models.cactus()
+    regions = sd.segment(mesh, n_regions=3)
+    cages = sd.fit_cages(mesh, regions, n_vertices=155)
+    deformer = sd.Deformer(mesh, regions, cages, fixed=..., handle=...)
+    solution = deformer.solve(targets)
+
+The story of the method, in the order of its files: `mesh`, `differential` (detail), `volume`,
+`regions`, `cages`, `mean_value`, `subspace`, `energy`, `constraints`, `solver`, `deformer`.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path as _Path
+from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 # Source checkout: the folder ``widgets/`` beside this package is the subpackage
 # ``vtk_segdeform.widgets`` (package_dir in setup.cfg).  An installed package has it inside.
@@ -12,3 +25,51 @@ if not (_root / "vtk_segdeform" / "widgets").exists() and (_root / "setup.cfg").
 del _Path, _root
 
 __version__ = "0.1.0"
+
+from . import errors, models
+from .cage_fit import fit_cages
+from .cages import Cage
+from .deformer import Deformer
+from .faults import find_faults
+from .local_volume import local_volume_change
+from .mean_value import mean_value_coordinates
+from .mesh import Mesh
+from .pipeline import deform
+from .regions import Regions
+from .repair import repair
+from .segmentation import segment
+from .solution import Solution
+from .solver import Status
+
+if _TYPE_CHECKING:
+    from .convert import read_mesh, write_mesh
+
+_NEED_PYVISTA = ("read_mesh", "write_mesh")  # imported when first asked for
+
+__all__ = [
+    "Cage",
+    "Deformer",
+    "Mesh",
+    "Regions",
+    "Solution",
+    "Status",
+    "deform",
+    "errors",
+    "find_faults",
+    "fit_cages",
+    "local_volume_change",
+    "mean_value_coordinates",
+    "models",
+    "read_mesh",
+    "repair",
+    "segment",
+    "write_mesh",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name in _NEED_PYVISTA:
+        from . import convert
+
+        return getattr(convert, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

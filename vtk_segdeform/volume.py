@@ -60,12 +60,16 @@ def step_to_volume(coefficients: FloatArray, target: float) -> float:
     The root is polished by Newton's method to the last digit.  Where the cubic never reaches
     *target* (its leading coefficients vanish), the step that comes closest is returned.
     """
-    c0, c1, c2, c3 = coefficients
-    # The root of the tangent sets the scale, so that no coefficient over- or underflows.
-    scale = abs((target - c0) / c1) if c1 != 0.0 else 1.0
-    if scale == 0.0 or not np.isfinite(scale):
+    missing = target - coefficients[0]
+    if missing == 0.0 or not coefficients[1:].any():
         return 0.0
-    polynomial = np.array([c3 * scale**3, c2 * scale**2, c1 * scale, c0 - target])
+    powers = np.arange(1, 4)
+    # The smallest step at which one term alone would do sets the unit: nothing over- or underflows.
+    with np.errstate(divide="ignore", over="ignore"):
+        alone = np.abs(missing / coefficients[1:]) ** (1.0 / powers)
+    unit = float(alone.min())
+    terms = coefficients[1:] / missing * unit**powers  # the cubic over what is missing, ends at 1
+    polynomial = np.array([*terms[::-1], -1.0])
     roots = np.roots(np.trim_zeros(polynomial, "f"))
     real = roots[np.abs(roots.imag) <= 1e-9 * np.abs(roots).max(initial=0.0)].real
     if not len(real):
@@ -78,7 +82,7 @@ def step_to_volume(coefficients: FloatArray, target: float) -> float:
         if slope == 0.0:
             break
         t -= float(np.polyval(polynomial, t) / slope)
-    return t * scale
+    return t * unit
 
 
 def _corners(points: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
