@@ -127,7 +127,7 @@ def coarsen(mesh: Mesh, n_points: int, rng: np.random.Generator) -> tuple[IntArr
         edges = _unique_edges(cell[mesh.edges])
         length = np.linalg.norm(np.subtract(*x[kept[edges.T]]), axis=1)
         short = edges[length < spacing]
-        if len(short) <= 0.01 * len(kept):
+        if mesh.n_vertices <= n_points or len(short) <= 0.01 * len(kept):
             break
         kept = kept[_independent(short, len(kept), rng)]
         number = np.empty(mesh.n_vertices, dtype=np.int64)

@@ -37,7 +37,7 @@ from .coarse import Surface
 
 NECK = 0.1  # s below which a cut is a neck
 _SHARPNESS = 3  # power of c
-_LEVELS = 80  # level sets of each distance, all judged roughly;
+_LEVELS = 100  # level sets of each distance, all judged roughly;
 _PER_END, _MEASURED = 5, 24  # so many of each, and of all, are measured
 _LEAST = 0.2  # the smallest limb, in fair shares
 _PARALLELS = np.array([0.5, 0.75, 1.0])  # distances of the parallel curves, in L / 2 pi

@@ -31,7 +31,7 @@ from .progress import Progress
 from .regions import Regions
 from .slices import fair_slice, quotas
 
-_POINTS = 1800  # of the coarse copy, about
+_POINTS = 3000  # of the coarse copy, about
 _POINTS_PER_REGION = 16  # at least
 _TYPICAL = 6  # where the number is open, a region's share is the whole over this
 _OVERLAP = 0.1  # of a region's width, counted in edges
@@ -115,10 +115,11 @@ def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -
         rim = surface.contact[ids].sum(axis=1) - part.contact.sum(axis=1)
         return ids, part, np.where(rim > 1e-9 * np.sqrt(share), rim, 0.0)
 
-    necks: list[Neck | None] = []
-    for label, ids in enumerate(surface.pieces(everything)):
+    components = surface.pieces(everything)
+    for label, ids in enumerate(components):
         labels[ids] = label
-        necks.append(best_neck(*alone(label)[1:], share))
+    necks: list[Neck | None]
+    necks = [best_neck(*alone(label)[1:], share) for label in range(len(components))]
     while len(necks) < wanted:
         ranks = [np.inf if neck is None else neck.rank for neck in necks]
         label = int(np.argmin(ranks))
@@ -132,14 +133,16 @@ def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -
 
     count = len(necks)
     areas = np.bincount(labels, surface.areas).astype(float)
-    waiting = list(enumerate(quotas(areas, n_regions or count)))
+    waiting = list(enumerate(quotas(areas, np.bincount(labels), n_regions or count)))
     while waiting:
         label, quota = waiting.pop()
         ids, part, rim = alone(label)
-        if quota > 1 and len(ids) > 1:
+        if quota > 1:
             inside = fair_slice(part, rim, (quota // 2) / quota)
             labels[ids[inside]] = count
-            waiting += [(label, quota - quota // 2), (count, quota // 2)]
+            size = int(inside.sum())  # no side gets more parts than it has points
+            there = int(np.clip(quota // 2, quota - (len(ids) - size), size))
+            waiting += [(label, quota - there), (count, there)]
             count += 1
             _tell(progress, 0.5 + 0.3 * count / (n_regions or count), "slicing the rest")
     return labels

@@ -17,18 +17,19 @@ from .coarse import Surface
 _TOLERANCE = 0.15  # by which a side may miss its area
 
 
-def quotas(areas: FloatArray, count: int) -> IntArray:
+def quotas(areas: FloatArray, points: IntArray, count: int) -> IntArray:
     """Return how many of *count* parts each surface is cut into: in proportion, at least one each.
 
-    The next part goes to the surface whose parts are largest so far.
+    The next part goes to the surface whose parts are largest so far, if it has *points* enough.
     """
     quota = np.ones(len(areas), dtype=np.int64)
-    heap = [(-area, k) for k, area in enumerate(areas)]
+    heap = [(-area, k) for k, area in enumerate(areas) if points[k] > 1]
     heapq.heapify(heap)
     for _ in range(count - len(areas)):
         _, k = heapq.heappop(heap)
         quota[k] += 1
-        heapq.heappush(heap, (-areas[k] / quota[k], k))
+        if quota[k] < points[k]:
+            heapq.heappush(heap, (-areas[k] / quota[k], k))
     return quota
 
 
