@@ -21,9 +21,9 @@ STORY = [
     "arrays", "errors", "progress", "topology", "manifold", "inside", "intersections",
     "report", "shells", "faults", "mesh", "holes", "splitting", "repair_steps", "repair",
     # what a deformation keeps
-    "volume", "local_volume", "differential", "rotations",
+    "volume", "local_volume", "distortion", "differential", "rotations",
     # regions and their cages
-    "blending", "regions", "coarse", "necks", "segmentation", "mean_value", "cages",
+    "blending", "regions", "coarse", "necks", "slices", "segmentation", "mean_value", "cages",
     "columns", "region_solid", "cage_simplify", "cage_fit",
     # the solver
     "subspace", "energy", "constraints", "positions", "solver", "solution", "targets", "deformer",
