@@ -1,0 +1,256 @@
+"""A cage for every region, made automatically: solid, offset, contour, simplify, clear.
+
+    solid       the region as a solid, and the distance g to it on a grid       `region_solid`
+    contour     the surface g = offset: closed and around the region by construction
+    simplify    to the wanted number of vertices, topology kept                 `cage_simplify`
+    clear       faces that came too near to the solid are pushed away from it
+    check       closed, outward, free of self-intersections, around every vertex of the region
+
+A larger offset is an easier cage: slits close, limbs fuse, holes fill, until the offset surface
+is a ball.  So a cage that fails a check is made again with a larger offset, and the last
+resort, an ellipsoid around the region, cannot fail.
+
+n vertices of a cage with area A are about ``sqrt(A / n)`` apart.  That length sets the offset,
+where none is asked for: mean value coordinates are at their best when skin and cage are a
+fair part of the cage's own edge apart.
+"""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import ndimage
+from scipy.spatial import ConvexHull
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
+
+from .arrays import FloatArray, IntArray, as_ids
+from .cage_simplify import roundness, simplify
+from .cages import Cage, cage_faults
+from .columns import inside_points
+from .errors import CageError, RegionError
+from .mesh import Mesh
+from .progress import Progress, part
+from .region_solid import Patch, Skin, SolidField, solid_field
+from .regions import Regions
+
+_OFFSET = 0.4  # of sqrt(area of the region / vertices of its cage)
+_STEP = 0.27  # of the same: about thirty contour vertices for one of the cage
+_LARGER = 1.3  # the offset of the next attempt
+_ATTEMPTS = 11  # 1.3^10 = 14
+_ROUND = 0.2  # or more is the worst face of a good cage
+_NEAR = 0.2  # of the offset, or more, is the skin from a good cage
+_FEWEST = 8  # vertices of a cage
+_FLOOR = 12  # vertices that every region gets before the rest is shared out
+_CLEARANCE = 0.5  # of the offset: the least distance from the skin that faces are pushed to
+_PUSHES = 30  # rounds
+_DENSITY = 6  # samples along the edge of a face when it is pushed
+
+_log = logging.getLogger(__name__)
+
+
+def fit_cages(
+    mesh: Mesh,
+    regions: Regions,
+    n_vertices: int = 155,
+    *,
+    offset: float | None = None,
+    progress: Progress | None = None,
+) -> tuple[Cage, ...]:
+    """Return one cage for each region.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        What will be deformed.
+    regions : Regions
+        Of that mesh, r of them.
+    n_vertices : int
+        Of all cages together, met exactly; at least 8 for each region.  Shared out by area and
+        shape: large and long regions get more.
+    offset : float, optional
+        How far the cages stay from the skin, about, in the mesh's unit.  By default, for each
+        region, 0.4 sqrt(area / vertices of its cage).  It is raised where no valid cage is
+        found so near.
+    progress : callable, optional
+        Called with the fraction done and what is going on; may raise `Cancelled`.
+
+    Returns
+    -------
+    cages : tuple of r Cage
+        Each strictly around every vertex of its region.
+
+    Raises
+    ------
+    CageError
+        If *n_vertices* is too small or *offset* is not positive.
+    """
+    skin = Skin.of(mesh)
+    patches = [Patch.of(skin, members) for members in regions.membership]
+    numbers = _share_out(patches, n_vertices)
+    cages = []
+    for r, (patch, number) in enumerate(zip(patches, numbers, strict=True)):
+        piece = part(progress, r / len(patches), (r + 1) / len(patches))
+        if piece is not None:
+            piece(0.0, f"cage {r + 1} of {len(patches)}")
+        cages.append(_fit(patch, int(number), offset, piece))
+    if progress is not None:
+        progress(1.0, "cages ready")
+    return tuple(cages)
+
+
+def fit_cage(
+    mesh: Mesh,
+    members: ArrayLike,
+    n_vertices: int,
+    *,
+    offset: float | None = None,
+    progress: Progress | None = None,
+) -> Cage:
+    """Return a cage of *n_vertices* around the vertices *members*: a mask (n,), or their numbers.
+
+    As `fit_cages`, which see, for a single region.
+    """
+    mask = np.zeros(mesh.n_vertices, dtype=bool)
+    mask[as_ids(members, mesh.n_vertices, "members")] = True
+    if not mask.any():
+        raise RegionError("members is empty: a cage needs at least one vertex to hold")
+    patch = Patch.of(Skin.of(mesh), mask)
+    _share_out([patch], n_vertices)
+    return _fit(patch, n_vertices, offset, progress)
+
+
+def _share_out(patches: list[Patch], n_vertices: int) -> IntArray:
+    """Return how many vertices each cage gets: *n_vertices* together.
+
+    A fixed edge length would ask for vertices in proportion to the area, a fixed number of edges
+    around a limb for as many on a small one as on a large one: the root of the area is between.
+    The root of length over width gives long regions, which bend, their share.
+    """
+    if n_vertices < _FEWEST * len(patches):
+        raise CageError(
+            f"n_vertices must be at least {_FEWEST} for each of {len(patches)} regions, "
+            f"{_FEWEST * len(patches)}; got {n_vertices}"
+        )
+    area = np.array([patch.area for patch in patches])
+    spread = np.array([patch.spread for patch in patches])
+    need = np.sqrt(area * spread.sum(axis=1) / spread[:, 1:].sum(axis=1))
+    share = np.round(need / need.sum(), 9)  # equal regions, equal numbers
+    floor = min(_FLOOR, n_vertices // len(patches))
+    ends = np.rint((n_vertices - floor * len(patches)) * np.cumsum(share) / share.sum())
+    return np.asarray(floor + np.diff(ends, prepend=0.0).astype(np.int64))
+
+
+def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) -> Cage:
+    """Return the first good cage, or the better of the first two that are merely valid."""
+    if offset is not None and not 0.0 < offset < np.inf:
+        raise CageError(f"offset must be a positive length; got {offset}")
+    length = float(np.sqrt(patch.area / n))
+    offset = _OFFSET * length if offset is None else offset
+    valid: list[tuple[float, FloatArray, IntArray]] = []
+    for attempt in range(_ATTEMPTS):
+        if progress is not None:
+            progress(attempt / _ATTEMPTS, f"attempt {attempt + 1} at a cage")
+        field = solid_field(patch, offset * _LARGER**attempt, _STEP * length)
+        vertices, faces = simplify(*_contour(field.smooth, field.offset), n)
+        vertices, nearest = _cleared(vertices, faces, field)
+        fault = _fault(vertices, faces, field, n)
+        if fault:
+            continue
+        quality = min(roundness(vertices, faces).min() / _ROUND, nearest / _NEAR)
+        valid.append((quality, field.grid.to_points(vertices) + patch.skin.centre, faces))
+        if quality >= 1.0 or len(valid) == 2:
+            break
+    if valid:
+        return Cage(*max(valid, key=lambda cage: cage[0])[1:])
+    _log.warning("no cage of %d vertices fits a region (%s); an ellipsoid holds it", n, fault)
+    return _ellipsoid(patch, n)
+
+
+def _fault(vertices: FloatArray, faces: IntArray, field: SolidField, n: int) -> str:
+    """Tell what keeps the surface from being a cage of the region with *n* vertices."""
+    if len(vertices) != n:
+        return f"it has {len(vertices)} vertices, not {n}"
+    faults = cage_faults(vertices, faces)
+    if not faults and not inside_points(field.members, vertices, faces).all():
+        return "part of the region is outside"
+    return "; ".join(faults)
+
+
+def _contour(values: FloatArray, level: float) -> tuple[FloatArray, IntArray]:
+    """Return the outward surface values = level on the unit grid."""
+    image = vtkImageData()
+    image.SetDimensions(*values.shape)
+    image.GetPointData().SetScalars(numpy_to_vtk(values.ravel(order="F")))
+    contour = vtkFlyingEdges3D()
+    contour.SetInputData(image)
+    contour.SetValue(0, level)
+    contour.ComputeNormalsOff()
+    contour.ComputeScalarsOff()
+    contour.Update()
+    surface = contour.GetOutput()
+    points = vtk_to_numpy(surface.GetPoints().GetData()).astype(np.float64)
+    faces = vtk_to_numpy(surface.GetPolys().GetConnectivityArray()).reshape(-1, 3)
+
+    # VTK rounds to float32.  Each point is on an edge of the grid: cut that again in float64.
+    rows, axis = np.arange(len(points)), np.abs(points - np.rint(points)).argmax(axis=1)
+    low = np.rint(points).astype(np.int64)
+    low[rows, axis] = np.floor(points[rows, axis]).astype(np.int64)
+    high = low.copy()
+    high[rows, axis] += 1
+    at_low, at_high = values[tuple(low.T)] - level, values[tuple(high.T)] - level
+    points = low.astype(np.float64)
+    points[rows, axis] += at_low / (at_low - at_high)
+    a, b, c = (points - points.mean(axis=0))[faces.T]
+    outward = np.einsum("fi,fi", a, np.cross(b, c)) > 0.0
+    return points, (faces if outward else faces[:, ::-1]).astype(np.int64)
+
+
+def _cleared(vertices: FloatArray, faces: IntArray, field: SolidField) -> tuple[FloatArray, float]:
+    """Return *vertices* moved until faces keep clear of the solid, and how near one still is.
+
+    Samples of the faces that are too near ask for a move away from the solid; a vertex makes the
+    mean of the moves that its faces ask for.  The nearness is a share of the offset.
+    """
+    steps = range(_DENSITY + 1)
+    share = np.array([(i, j, _DENSITY - i - j) for i in steps for j in steps[: _DENSITY + 1 - i]])
+    share = share / _DENSITY
+    slope = [np.gradient(field.smooth, axis=axis) for axis in range(3)]
+    least = _CLEARANCE * field.offset
+    vertices = vertices.copy()
+    for _ in range(_PUSHES):
+        at = np.einsum("sc,fci->ifs", share, vertices[faces]).reshape(3, -1)
+        distance = ndimage.map_coordinates(field.distance, at, order=1)
+        near = np.flatnonzero(distance < least)
+        if not len(near):
+            break
+        away = np.stack([ndimage.map_coordinates(s, at[:, near], order=1) for s in slope])
+        away *= (1.1 * least - distance[near]) / np.maximum(np.linalg.norm(away, axis=0), 1e-9)
+        face, sample = np.divmod(near, len(share))
+        corner, weight = faces[face].ravel(), share[sample].ravel()
+        total = np.bincount(corner, weight, minlength=len(vertices))
+        for axis in range(3):
+            asked = weight * np.repeat(away[axis], 3)
+            moves = np.bincount(corner, asked, minlength=len(vertices))
+            vertices[:, axis] += moves / np.maximum(total, 1e-9)
+    return vertices, float(distance.min() / field.offset)
+
+
+def _ellipsoid(patch: Patch, n: int) -> Cage:
+    """Return a cage whose *n* vertices are spread over an ellipsoid around the region."""
+    k = np.arange(n) + 0.5
+    height, turn = 1.0 - 2.0 * k / n, np.pi * (1.0 + np.sqrt(5.0)) * k
+    ring = np.sqrt(1.0 - height**2)
+    ball = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
+    hull = ConvexHull(ball)
+    a, b, c = ball[hull.simplices.T]
+    inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
+    faces = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
+    free = -hull.equations[:, 3].max()  # radius of the ball that no face enters
+    low, high = patch.box
+    half = np.maximum(high - low, 0.1 * (high - low).max()) / 2.0
+    local = ball * (1.1 * np.sqrt(3.0) / free * half) + (low + high) / 2.0
+    return Cage(local @ patch.axes + patch.skin.centre, faces)

@@ -1,0 +1,114 @@
+"""What is inside a closed surface, by counting crossings along columns parallel to z.
+
+The winding number of a point is the number of faces below it, one that looks down counted +1
+and one that looks up -1.  A face is below if the column meets its projection, which means to
+pass its three edges on the same side.  The two faces at an edge compute that side from the same
+numbers in the same order, so no column slips between them, whatever the rounding.
+
+For n points or nodes this costs n times the few faces whose box a column meets, not n times all
+faces as the sum of solid angles does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .arrays import BoolArray, FloatArray, IntArray
+
+_BLOCK = 1 << 20  # pairs of face and column held at once
+
+
+def inside_nodes(vertices: FloatArray, faces: IntArray, shape: tuple[int, int, int]) -> BoolArray:
+    """Return a bool array of *shape*: which nodes of the unit grid (0, 1, ...)^3 are inside.
+
+    The surface is closed and outward oriented, *vertices* in steps of the grid; where it covers
+    itself twice is inside too.
+    """
+    nx, ny, nz = shape
+    low, high = _boxes(vertices[:, :2], faces)
+    first = np.ceil(low).clip(0).astype(np.int64)
+    last = np.floor(high).clip(max=[nx - 1, ny - 1]).astype(np.int64)
+    extent = (last - first + 1).clip(0)
+    change = np.zeros(nx * ny * (nz + 1))
+    for f, k in _pairs(extent.prod(axis=1)):
+        column = first[f] + np.stack([k // extent[f, 1], k % extent[f, 1]], axis=1)
+        met, height, turn = _crossings(vertices, faces[f], column)
+        above = np.ceil(height).clip(0, nz).astype(np.int64)
+        place = (column[met] @ [ny, 1]) * (nz + 1) + above
+        change += np.bincount(place, turn, minlength=len(change))
+    winding = change.reshape(nx, ny, nz + 1).cumsum(axis=2)[:, :, :nz]
+    return np.asarray(winding > 0.5)
+
+
+def inside_points(points: FloatArray, vertices: FloatArray, faces: IntArray) -> BoolArray:
+    """Return which of (n, 3) *points* are inside a closed, outward oriented surface."""
+    low, high = _boxes(vertices[:, :2], faces)
+    order = np.argsort(points[:, 0], kind="stable")
+    x = points[order, 0]
+    first = np.searchsorted(x, low[:, 0], side="left")
+    last = np.searchsorted(x, high[:, 0], side="right")
+    winding = np.zeros(len(points))
+    for f, k in _pairs(last - first):
+        point = order[first[f] + k]
+        y = points[point, 1]
+        near = (y >= low[f, 1]) & (y <= high[f, 1])
+        f, point = f[near], point[near]
+        met, height, turn = _crossings(vertices, faces[f], points[point, :2])
+        below = height < points[point[met], 2]
+        winding += np.bincount(point[met][below], turn[below], minlength=len(points))
+    return np.asarray(winding > 0.5)
+
+
+def count_up(counts: IntArray) -> tuple[IntArray, IntArray]:
+    """Return i and k: each i repeated counts[i] times, with k = 0, 1, ... counts[i] - 1.
+
+    Examples
+    --------
+    >>> count_up(np.array([2, 0, 3]))
+    (array([0, 0, 2, 2, 2]), array([0, 1, 0, 1, 2]))
+    """
+    i = np.repeat(np.arange(len(counts)), counts)
+    return i, np.arange(len(i)) - np.repeat(counts.cumsum() - counts, counts)
+
+
+def _boxes(xy: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]:
+    a, b, c = xy[faces[:, 0]], xy[faces[:, 1]], xy[faces[:, 2]]
+    low = np.minimum(np.minimum(a, b), c)
+    return low, np.maximum(np.maximum(a, b), c)
+
+
+def _pairs(counts: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
+    """Yield `count_up` in pieces of bounded size."""
+    some = np.flatnonzero(counts)
+    run = counts[some].cumsum() // _BLOCK
+    for piece in np.split(some, np.flatnonzero(np.diff(run)) + 1):
+        i, k = count_up(counts[piece])
+        yield piece[i], k
+
+
+def _crossings(
+    vertices: FloatArray, faces: IntArray, columns: FloatArray | IntArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return which pairs of a face (k, 3) and a column (k, 2) meet, where, and which way.
+
+    Where: the height z.  Which way: +1 if the face looks down, so that going up leads inside.
+    """
+    side = np.stack([_side(vertices, faces[:, c], faces[:, c - 2], columns) for c in range(3)])
+    met = np.flatnonzero(((side > 0) == (side[0] > 0)).all(axis=0))
+    side = side[:, met]
+    z = vertices[faces[met], 2]
+    height = (side * z[:, [2, 0, 1]].T).sum(axis=0) / side.sum(axis=0)
+    return met, height, np.where(side[0] > 0, -1.0, 1.0)
+
+
+def _side(
+    vertices: FloatArray, tail: IntArray, head: IntArray, columns: FloatArray | IntArray
+) -> FloatArray:
+    """Return twice the signed area of tail, head, column; for head, tail its exact opposite."""
+    a, b = vertices[np.minimum(tail, head)], vertices[np.maximum(tail, head)]
+    x, y = columns.T
+    area = (b[:, 0] - a[:, 0]) * (y - a[:, 1]) - (b[:, 1] - a[:, 1]) * (x - a[:, 0])
+    area[area == 0.0] = np.finfo(float).tiny
+    return np.asarray(np.where(tail < head, area, -area))
