@@ -22,7 +22,6 @@ import logging
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import ndimage
-from scipy.spatial import ConvexHull
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
@@ -39,11 +38,13 @@ from .regions import Regions
 
 _OFFSET = 0.4  # of sqrt(area of the region / vertices of its cage)
 _STEP = 0.27  # of the same: about thirty contour vertices for one of the cage
-_LARGER = 1.3  # the offset of the next attempt
-_ATTEMPTS = 11  # 1.3^10 = 14
+_LARGER = 1.25  # attempt k = 0, 1, ... is made at 1.25^(k (k + 1) / 2) times the offset:
+_ATTEMPTS = 8  # 1, 1.25, 2, 4, 9, 28, 108, 517
 _ROUND = 0.2  # or more is the worst face of a good cage
 _NEAR = 0.2  # of the offset, or more, is the skin from a good cage
+_NODES, _NODES_PER_VERTEX = 3e5, 1e3  # of the grid: the larger is the most it may have
 _FEWEST = 8  # vertices of a cage
+_SHELL = 6  # vertices, at least, of each part of a cage that is in parts
 _FLOOR = 12  # vertices that every region gets before the rest is shared out
 _CLEARANCE = 0.5  # of the offset: the least distance from the skin that faces are pushed to
 _PUSHES = 30  # rounds
@@ -154,7 +155,12 @@ def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) 
     for attempt in range(_ATTEMPTS):
         if progress is not None:
             progress(attempt / _ATTEMPTS, f"attempt {attempt + 1} at a cage")
-        field = solid_field(patch, offset * _LARGER**attempt, _STEP * length)
+        larger = _LARGER ** (attempt * (attempt + 1) / 2)
+        nodes = max(_NODES, _NODES_PER_VERTEX * n)
+        field = solid_field(patch, offset * larger, _STEP * length * larger, most_nodes=nodes)
+        if _SHELL * field.n_shells > n:
+            fault = f"it falls into {field.n_shells} parts"
+            continue
         vertices, faces = simplify(*_contour(field.smooth, field.offset), n)
         vertices, nearest = _cleared(vertices, faces, field)
         fault = _fault(vertices, faces, field, n)
@@ -167,7 +173,8 @@ def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) 
     if valid:
         return Cage(*max(valid, key=lambda cage: cage[0])[1:])
     _log.warning("no cage of %d vertices fits a region (%s); an ellipsoid holds it", n, fault)
-    return _ellipsoid(patch, n)
+    vertices, faces = patch.ellipsoid(n)
+    return Cage(vertices + patch.skin.centre, faces)
 
 
 def _fault(vertices: FloatArray, faces: IntArray, field: SolidField, n: int) -> str:
@@ -237,20 +244,3 @@ def _cleared(vertices: FloatArray, faces: IntArray, field: SolidField) -> tuple[
             moves = np.bincount(corner, asked, minlength=len(vertices))
             vertices[:, axis] += moves / np.maximum(total, 1e-9)
     return vertices, float(distance.min() / field.offset)
-
-
-def _ellipsoid(patch: Patch, n: int) -> Cage:
-    """Return a cage whose *n* vertices are spread over an ellipsoid around the region."""
-    k = np.arange(n) + 0.5
-    height, turn = 1.0 - 2.0 * k / n, np.pi * (1.0 + np.sqrt(5.0)) * k
-    ring = np.sqrt(1.0 - height**2)
-    ball = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
-    hull = ConvexHull(ball)
-    a, b, c = ball[hull.simplices.T]
-    inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
-    faces = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
-    free = -hull.equations[:, 3].max()  # radius of the ball that no face enters
-    low, high = patch.box
-    half = np.maximum(high - low, 0.1 * (high - low).max()) / 2.0
-    local = ball * (1.1 * np.sqrt(3.0) / free * half) + (low + high) / 2.0
-    return Cage(local @ patch.axes + patch.skin.centre, faces)

@@ -23,13 +23,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
-from scipy.spatial import cKDTree
+from scipy.spatial import ConvexHull, cKDTree
 
 from .arrays import BoolArray, FloatArray, IntArray
 from .columns import count_up, inside_nodes
 from .mesh import Mesh
 
-MOST_NODES = 2e6  # of a grid: 0.1 GB
 _STEPS_PER_OFFSET = 1.5  # at least: every point of S then has a node within the offset surface
 _MARGIN = 3.7183  # steps from the offset surface to the end; odd, so that no extreme is on a tie
 _BLUR = 0.5  # standard deviation, as a share of the offset
@@ -92,6 +91,22 @@ class Patch:
         x = self.skin.points[self.weights > 0.0] @ self.axes.T
         return x.min(axis=0), x.max(axis=0)
 
+    def ellipsoid(self, n: int) -> tuple[FloatArray, IntArray]:
+        """Return a convex surface around the patch: *n* points spread over an ellipsoid."""
+        k = np.arange(n) + 0.5
+        height, turn = 1.0 - 2.0 * k / n, np.pi * (1.0 + np.sqrt(5.0)) * k
+        ring = np.sqrt(1.0 - height**2)
+        ball = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
+        hull = ConvexHull(ball)
+        a, b, c = ball[hull.simplices.T]
+        inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
+        faces = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
+        free = -hull.equations[:, 3].max()  # radius of the ball that no face enters
+        low, high = self.box
+        half = np.maximum(high - low, 0.1 * (high - low).max()) / 2.0
+        local = ball * (1.1 * np.sqrt(3.0) / free * half) + (low + high) / 2.0
+        return local @ self.axes, faces.astype(np.int64)
+
 
 @dataclass(frozen=True, eq=False)
 class Grid:
@@ -120,6 +135,7 @@ class SolidField:
     smooth: FloatArray
     offset: float
     members: FloatArray  # the region's vertices
+    n_shells: int  # separate parts of the surface smooth = offset
 
 
 def principal_axes(points: FloatArray, weights: FloatArray) -> FloatArray:
@@ -137,16 +153,16 @@ def principal_axes(points: FloatArray, weights: FloatArray) -> FloatArray:
     return np.asarray(axes)
 
 
-def solid_field(patch: Patch, offset: float, step: float) -> SolidField:
+def solid_field(patch: Patch, offset: float, step: float, *, most_nodes: float) -> SolidField:
     """Return the distance to the region's solid, on a grid that reaches beyond *offset*.
 
-    *step* becomes larger where the grid would have more than `MOST_NODES` nodes, or smaller
+    *step* becomes larger where the grid would have more than *most_nodes* nodes, or smaller
     where the offset would have too few steps; if both, the offset becomes larger.
     """
     skin, members = patch.skin, patch.members
     low, high = patch.box
     step = min(step, offset / _STEPS_PER_OFFSET)
-    while np.prod((high - low + 2 * offset) / step + 2 * _MARGIN + 2) > MOST_NODES:
+    while np.prod((high - low + 2 * offset) / step + 2 * _MARGIN + 2) > most_nodes:
         step *= 1.1
         offset = max(offset, step * _STEPS_PER_OFFSET)
     pad = offset + _MARGIN * step
@@ -162,8 +178,8 @@ def solid_field(patch: Patch, offset: float, step: float) -> SolidField:
         inside = inside[members[skin.tree.query(grid.to_points(inside))[1]]]
     distance = _distance(samples, inside, grid.shape)
     smooth = ndimage.gaussian_filter(distance, _BLUR * offset / step, mode="nearest")
-    smooth = _filled(smooth, offset / step, nodes[members])
-    return SolidField(grid, distance, smooth, offset / step, nodes[members])
+    smooth, n_shells = _filled(smooth, offset / step, nodes[members])
+    return SolidField(grid, distance, smooth, offset / step, nodes[members], n_shells)
 
 
 def _distance(samples: FloatArray, inside: IntArray, shape: tuple[int, int, int]) -> FloatArray:
@@ -189,14 +205,15 @@ def _distance(samples: FloatArray, inside: IntArray, shape: tuple[int, int, int]
     return np.where(solid, -depth, outside)
 
 
-def _filled(values: FloatArray, offset: float, members: FloatArray) -> FloatArray:
-    """Return *values* < *offset* without cavities, and without islands that hold no members."""
+def _filled(values: FloatArray, offset: float, members: FloatArray) -> tuple[FloatArray, int]:
+    """Return *values* < *offset* without cavities and islands without members; count the rest."""
     solid = values < offset
     whole = ndimage.binary_fill_holes(solid)
     islands, _ = ndimage.label(whole)
     held = np.unique(islands[tuple(np.rint(members).astype(np.int64).T)])
+    held = held[held > 0]
     values = np.where(whole & ~solid, 0.0, values)
-    return np.where(whole & ~np.isin(islands, held[held > 0]), 2.0 * offset, values)
+    return np.where(whole & ~np.isin(islands, held), 2.0 * offset, values), len(held)
 
 
 def _samples(triangles: FloatArray) -> FloatArray:
