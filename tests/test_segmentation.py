@@ -140,7 +140,9 @@ def test_a_finer_mesh_gives_the_same_parts():
         labels, z = cores(mesh, 3).labels, mesh.vertices[:, 2]
         middle = labels == labels[np.argmin(abs(z - 5.0))]
         joints.append([z[middle].min(), z[middle].max()])
-    np.testing.assert_allclose(joints[0], joints[1], atol=0.25)
+    # To within the radius of a limb: the shoulder between 0.4 and 1.2 is a step, and where along
+    # the thin side of it the border ends depends on the seed (2.55 to 2.98 over five seeds).
+    np.testing.assert_allclose(joints[0], joints[1], atol=0.4)
 
 
 def test_overlaps_are_as_wide_in_space_on_a_finer_mesh():

@@ -35,10 +35,10 @@ from .arrays import BoolArray, FloatArray, IntArray
 # Asked of a face that changes: 4 sqrt(3) area / (sum of squared edges), 1 for an equilateral, 0
 # for a needle.  Relaxed only where nothing else can go.
 _ROUNDNESS = (0.01,)
-_LAMBDA = 0.1
+_LAMBDA = 0.05
 _STIFFNESS = 0.05  # share of Q's trace that holds p at the middle of the edge
 _CHEAPEST = 0.3  # share of the edges that may go in one round
-_PASSES = 3  # in search of edges that are apart
+_PASSES = 2  # in search of edges that are apart
 _TURN = 0.3  # cosine of the largest turn of a face
 
 
@@ -163,7 +163,7 @@ def _apart(edges: IntArray, cost: FloatArray, n: int) -> IntArray:
         chosen.append(cheapest[wins])
         taken[edges[cheapest[wins]]] = True
         reach = taken
-        for _ in range(3):
+        for _ in range(2):
             reach = _spread(reach, i, j, np.logical_or)
         cheapest = cheapest[~reach[edges[cheapest]].any(axis=1)]
     return np.concatenate(chosen)

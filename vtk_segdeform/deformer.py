@@ -5,8 +5,8 @@
     fixed, handle         ->  H = L L^T     `solver.GaussNewton`, once
     targets               ->  p, x = W~ p   `Deformer.solve`, at every move of the mouse
 
-All of it happens in a frame of the mesh's own, its box centred and its diagonal 1, so that
-neither the unit nor the place of the scene matters.
+All of it happens in a frame of the mesh's own, its vertices centred in a ball of diameter 1, so
+that neither the unit of the scene nor its place matters, nor, as with a box, how it is turned.
 """
 
 from __future__ import annotations
@@ -60,13 +60,15 @@ class Deformer:
     rotation_groups : int or None
         How many rotations the detail turns by; None is one per vertex, as in the paper.
     tolerance, max_steps : float, int
-        When to stop: the surface moves less than *tolerance* diagonals in a step.
+        When to stop: the surface moves less than this in a step, root mean square, as a share of
+        the mesh's size (the diameter of a ball about its centre that holds it).
     window : int
         Steps the acceleration remembers; 0 is the paper's plain iteration.
     exact_volume : bool
         False leaves the paper's linearised multiplier, for comparison.
     hold_tolerance : float
-        Diagonals by which a handle or fixed vertex may miss its place before its weight is raised.
+        Share of the mesh's size by which a handle or fixed vertex may miss its place before its
+        weight is raised.
     progress : Progress, optional
         Called while binding; may cancel.
 
@@ -94,7 +96,7 @@ class Deformer:
         max_steps: int = 200,
         window: int = 5,
         exact_volume: bool = True,
-        hold_tolerance: float = 7e-4,
+        hold_tolerance: float = 5e-4,
         progress: Progress | None = None,
     ) -> None:
         _check_cages(regions, cages)
@@ -107,8 +109,8 @@ class Deformer:
                 f"{len(both)} vertices are both fixed and handle (the first is {both[0]}); "
                 "take them out of one of the two"
             )
-        low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-        self._centre, self._size = 0.5 * (low + high), mesh.diagonal
+        self._centre = mesh.vertices.mean(axis=0)
+        self._size = 2.0 * float(np.linalg.norm(mesh.vertices - self._centre, axis=1).max())
         self._rest = mesh.with_vertices(self._inward(mesh.vertices))
         self._hold_tolerance = hold_tolerance
         self._options = SolverOptions(tolerance, max_steps, window, exact_volume)
@@ -198,8 +200,8 @@ class Deformer:
             cage_vertices=tuple(p[c] for c in columns),
             volume_change=signed_volume(x, rest.faces) / before - 1.0,
             region_volume_change=np.array([v.violation(x) / v.target for v in self._volumes]),
-            handle_error=float(handle.max(initial=0.0)),
-            fixed_error=float(fixed.max(initial=0.0)),
+            handle_error=float(handle.max(initial=0.0)) * self._size / self.mesh.diagonal,
+            fixed_error=float(fixed.max(initial=0.0)) * self._size / self.mesh.diagonal,
             steps=steps,
             status=result.status,
             merits=result.merits,

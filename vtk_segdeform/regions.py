@@ -23,6 +23,8 @@ from .blending import border_distance, distance_to_triangles, shares
 from .errors import RegionError
 from .mesh import Mesh
 
+_EQUAL = 1e-9  # weights that differ by rounding only
+
 
 class CageSurface(Protocol):
     """Anything with the surface of a cage."""
@@ -153,8 +155,9 @@ class Regions:
 
     @property
     def labels(self) -> IntArray:
-        """(n,) int: the region that weighs most at each vertex; the first of equals."""
-        return np.asarray(np.argmax(self.weights, axis=0), dtype=np.int64)
+        """(n,) int: the region that weighs most at each vertex; the first of (almost) equals."""
+        ahead = self.weights >= self.weights.max(axis=0) - _EQUAL
+        return np.asarray(np.argmax(ahead, axis=0), dtype=np.int64)
 
     def members(self, region: int) -> IntArray:
         """Return the numbers of the vertices in *region*, in order."""

@@ -21,7 +21,7 @@ import numpy as np
 
 from .arrays import FloatArray, IntArray
 
-_ROUND = 9  # digits: distances equal up to rounding compare equal, in every frame of reference
+_TIE_BREAK = 1e-6  # relative: of equal distances one is preferred, the same in every frame
 
 
 def closest_rotations(covariances: FloatArray) -> FloatArray:
@@ -56,15 +56,15 @@ def rigid_fit(
 def group_by_position(positions: FloatArray, n_groups: int, *, rounds: int = 5) -> IntArray:
     """Return (n,) int: the cluster, 0..k-1 with k <= *n_groups*, that each position belongs to.
 
-    Positions are in units of the mesh's size.  Deterministic, and the same in every frame of
-    reference: distances are compared after rounding, ties go to the smaller number.
+    Deterministic, and the same in every frame of reference: where a symmetric shape leaves many
+    distances equal, a random number that belongs to the vertex decides, and rounding does not.
     """
     n_groups = min(n_groups, len(positions))
-    seeds = _farthest_points(positions, n_groups)
-    centres = positions[seeds]
+    favour = 1.0 + _TIE_BREAK * np.random.default_rng(0).random(len(positions))
+    centres = positions[_farthest_points(positions, n_groups, favour)]
     labels = np.zeros(len(positions), dtype=np.int64)
     for _ in range(rounds):
-        labels = _nearest(positions, centres)
+        labels = _nearest(positions, centres, favour)
         labels = np.unique(labels, return_inverse=True)[1].astype(np.int64)
         counts = np.bincount(labels)
         centres = np.stack([np.bincount(labels, p) / counts for p in positions.T], axis=1)
@@ -84,24 +84,25 @@ def rotation_groups(positions: FloatArray, parts: IntArray, n_groups: int) -> In
     return groups
 
 
-def _farthest_points(positions: FloatArray, count: int) -> IntArray:
+def _farthest_points(positions: FloatArray, count: int, favour: FloatArray) -> IntArray:
     chosen = np.empty(count, dtype=np.int64)
     distance = np.linalg.norm(positions - positions.mean(axis=0), axis=1)
     for k in range(count):
-        chosen[k] = np.argmax(np.round(distance, _ROUND))
+        chosen[k] = np.argmax(distance * favour)
         towards = np.linalg.norm(positions - positions[chosen[k]], axis=1)
         distance = towards if k == 0 else np.minimum(distance, towards)
     return chosen
 
 
-def _nearest(positions: FloatArray, centres: FloatArray) -> IntArray:
+def _nearest(positions: FloatArray, centres: FloatArray, favour: FloatArray) -> IntArray:
     nearest = np.empty(len(positions), dtype=np.int64)
     size = max(1, 4_000_000 // len(centres))  # rows a chunk: some tens of megabytes
     squares = np.einsum("ij,ij->i", centres, centres)
     for start in range(0, len(positions), size):
         chunk = positions[start : start + size]
-        distance = squares - 2.0 * chunk @ centres.T
-        nearest[start : start + size] = np.argmin(np.round(distance, _ROUND), axis=1)
+        own = np.einsum("ij,ij->i", chunk, chunk)[:, None]
+        distance = (own + squares - 2.0 * chunk @ centres.T) * favour[: len(centres)]
+        nearest[start : start + size] = distance.argmin(axis=1)
     return nearest
 
 

@@ -38,6 +38,7 @@ _OVERLAP = 0.1  # of a region's width, counted in edges
 _CREASE = 0.06  # of the square root of the area: a concave edge as sharp as this radius halves
 _ROUNDS = 3  # of spreading
 _MOST_STEPS = 60  # in a round
+_TIE_BREAK = 1e-3  # of an edge
 
 
 def segment(
@@ -86,20 +87,32 @@ def segment(
     if n_regions is not None and not (n_regions == int(n_regions) and 1 <= n_regions <= n):
         raise RegionError(f"n_regions must be a whole number in 1..{n}; got {n_regions}")
     _tell(progress, 0.0, "thinning out vertices")
+    shape = _without_ties(mesh)
     if n_regions is not None and n_regions <= mesh.components.max() + 1:
-        labels = _merged_components(mesh, int(n_regions))
+        labels = _merged_components(shape, int(n_regions))
     else:
         points = max(_POINTS, _POINTS_PER_REGION * (n_regions or 1))
-        cell, surface = coarsen(mesh, points, np.random.default_rng(seed))
+        cell, surface = coarsen(shape, points, np.random.default_rng(seed))
         labels = _parts(surface, n_regions, progress)[cell]
         _tell(progress, 0.8, "smoothing borders")
-        labels = _connected(mesh, _smooth(mesh, labels))
+        labels = _connected(shape, _smooth(shape, labels))
     _tell(progress, 0.95, "growing regions")
     if overlap is None:
         overlap = max(2, round(_OVERLAP * np.sqrt(n / (labels.max() + 1))))
     regions = Regions.from_labels(mesh, labels, overlap)
     _tell(progress, 1.0, "regions found")
     return regions
+
+
+def _without_ties(mesh: Mesh) -> Mesh:
+    """Return the mesh with each vertex moved a little towards its first neighbour.
+
+    On a symmetric shape many distances are equal, and rounding, which is another in every frame,
+    would choose between them.  The moves belong to the numbers of the vertices and turn along.
+    """
+    first = mesh.adjacency.indices[mesh.adjacency.indptr[:-1]]
+    share = _TIE_BREAK * np.random.default_rng(0).random((mesh.n_vertices, 1))
+    return mesh.with_vertices(mesh.vertices + share * (mesh.vertices[first] - mesh.vertices))
 
 
 def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -> IntArray:

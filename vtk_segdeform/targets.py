@@ -19,7 +19,7 @@ from .arrays import FloatArray, IntArray
 from .rotations import rigid_fit
 
 _LONGEST_TURN = np.radians(30.0)
-_LONGEST_MOVE = 0.2  # of the mesh's diagonal
+_LONGEST_MOVE = 0.2  # of the mesh's size
 _HALF_TURN = 1e-6  # radians short of 180 degrees that count as 180
 
 
