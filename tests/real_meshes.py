@@ -21,11 +21,11 @@ def path_of(name: str) -> Path:
 
 
 def read_off(name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return (vertices, faces) of a triangle OFF file."""
-    words = path_of(name).read_text().split()
-    n, m = int(words[1]), int(words[2])
-    vertices = np.array(words[4 : 4 + 3 * n], dtype=float).reshape(n, 3)
-    faces = np.array(words[4 + 3 * n : 4 + 3 * n + 4 * m], dtype=int).reshape(m, 4)[:, 1:]
+    """Return (vertices, faces) of a triangle OFF file, with or without colours."""
+    lines = [line.split() for line in path_of(name).read_text().splitlines() if line.strip()]
+    n, m = int(lines[1][0]), int(lines[1][1])
+    vertices = np.array([line[:3] for line in lines[2 : 2 + n]], dtype=float)
+    faces = np.array([line[1:4] for line in lines[2 + n : 2 + n + m]], dtype=int)
     return vertices, faces
 
 

@@ -12,7 +12,9 @@ from solids import icosphere, rotation
 
 from vtk_segdeform.cages import Cage
 from vtk_segdeform.deformer import Deformer
-from vtk_segdeform.errors import CageError, Cancelled, ConstraintError
+from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionError
+from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.regions import cage_distance_weights
 from vtk_segdeform.solver import Status
 
 SCENE = sausage(2)
@@ -163,6 +165,22 @@ def test_cages_that_do_not_fit_are_refused():
     small = Cage(*icosphere(1))
     with pytest.raises(CageError, match=r"region 0 .*outside the cage"):
         Deformer(SCENE.mesh, SCENE.regions, [small, small])
+
+
+def test_regions_of_another_mesh_are_refused():
+    with pytest.raises(RegionError, match="belong to a mesh of 1026 vertices, this one has 258"):
+        Deformer(Mesh(*icosphere(3)), SCENE.regions, SCENE.cages)
+
+
+def test_the_printed_blend_can_be_compared_and_nonsense_is_refused():
+    printed = cage_distance_weights(SCENE.regions, SCENE.cages)
+    solution = SCENE.deformer(blend=printed).solve(SCENE.turned(30))
+    assert abs(solution.volume_change) < 1e-13
+    assert (
+        np.abs(solution.vertices - SCENE.deformer().solve(SCENE.turned(30)).vertices).max() > 1e-4
+    )
+    with pytest.raises(RegionError, match="sum to 1"):
+        SCENE.deformer(blend=0.5 * printed)
 
 
 def test_binding_reports_its_progress_and_can_be_cancelled():

@@ -21,7 +21,7 @@ from .arrays import FloatArray, IntArray, as_ids, as_points
 from .cages import Cage
 from .constraints import VolumeConstraint, region_volumes, total_volume
 from .energy import shape_energy
-from .errors import CageError, ConstraintError
+from .errors import ConstraintError, RegionError
 from .mesh import Mesh
 from .positions import connected_sets, position_term
 from .progress import Progress, part
@@ -69,6 +69,9 @@ class Deformer:
     hold_tolerance : float
         Share of the mesh's size by which a handle or fixed vertex may miss its place before its
         weight is raised.
+    blend : (r, n) float, optional
+        Blend weights instead of ``regions.weights``, for comparison; `cage_distance_weights` gives
+        those of eq. (4) as printed.
     progress : Progress, optional
         Called while binding; may cancel.
 
@@ -78,6 +81,8 @@ class Deformer:
         If fixed or handle name no vertex of the mesh, or share one.
     CageError
         If there is not one cage per region, or a cage leaves out part of its region.
+    RegionError
+        If *regions* belong to another mesh, or *blend* is no partition of unity over them.
     """
 
     def __init__(
@@ -97,9 +102,14 @@ class Deformer:
         window: int = 5,
         exact_volume: bool = True,
         hold_tolerance: float = 5e-4,
+        blend: ArrayLike | None = None,
         progress: Progress | None = None,
     ) -> None:
-        _check_cages(regions, cages)
+        if regions.mesh.n_vertices != mesh.n_vertices:
+            raise RegionError(
+                f"these regions belong to a mesh of {regions.mesh.n_vertices} vertices, "
+                f"this one has {mesh.n_vertices}; make them anew"
+            )
         self.mesh, self.regions, self.cages = mesh, regions, tuple(cages)
         self.fixed = _checked_ids(fixed, mesh, "fixed")
         self.handle = _checked_ids(handle, mesh, "handle")
@@ -115,7 +125,7 @@ class Deformer:
         self._hold_tolerance = hold_tolerance
         self._options = SolverOptions(tolerance, max_steps, window, exact_volume)
 
-        subspace = bind(regions, cages, progress=part(progress, 0.0, 0.8))
+        subspace = bind(regions, cages, blend=blend, progress=part(progress, 0.0, 0.8))
         if progress:
             progress(0.8, "factoring")
         groups = None
@@ -231,11 +241,3 @@ def _checked_ids(ids: ArrayLike, mesh: Mesh, name: str) -> IntArray:
         return as_ids(ids, mesh.n_vertices, name)
     except ValueError as fault:
         raise ConstraintError(str(fault)) from None
-
-
-def _check_cages(regions: Regions, cages: Sequence[Cage]) -> None:
-    if len(cages) != regions.n_regions:
-        raise CageError(f"{regions.n_regions} regions need as many cages; got {len(cages)}")
-    for r, cage in enumerate(cages):
-        members = regions.mesh.vertices[regions.membership[r]]
-        cage.require_encloses(members, f"region {r}")

@@ -17,10 +17,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 
 from .arrays import FloatArray, IntArray
 from .cages import Cage
+from .errors import CageError, RegionError
 from .mean_value import mean_value_coordinates
 from .progress import Progress, part
 from .regions import Regions
@@ -97,7 +99,13 @@ class Subspace:
         return 0.5 * (gram + gram.T)
 
 
-def bind(regions: Regions, cages: Sequence[Cage], *, progress: Progress | None = None) -> Subspace:
+def bind(
+    regions: Regions,
+    cages: Sequence[Cage],
+    *,
+    blend: ArrayLike | None = None,
+    progress: Progress | None = None,
+) -> Subspace:
     """Express every mesh vertex by the cages of its regions.
 
     Parameters
@@ -106,16 +114,48 @@ def bind(regions: Regions, cages: Sequence[Cage], *, progress: Progress | None =
         r regions over a mesh of n vertices.
     cages : sequence of r Cage
         The cage of each region, in the same order.
+    blend : (r, n) float, optional
+        Blend weights instead of ``regions.weights``: non-negative, columns that sum to 1, zero
+        outside each region.
     progress : Progress, optional
         Called as the coordinates of each region are computed.
+
+    Raises
+    ------
+    CageError
+        If there is not one cage per region, or a cage leaves out part of its region.
+    RegionError
+        If *blend* is not as said above.
     """
+    _check_cages(regions, cages)
+    weights = regions.weights if blend is None else _checked_blend(blend, regions)
     rows, blocks = [], []
     for r, cage in enumerate(cages):
         share = part(progress, r / len(cages), (r + 1) / len(cages))
-        members = np.flatnonzero(regions.weights[r] > 0.0)
+        members = np.flatnonzero(weights[r] > 0.0)
         points = regions.mesh.vertices[members]
         block = mean_value_coordinates(points, cage.vertices, cage.faces, progress=share)
-        block *= regions.weights[r, members][:, None]
+        block *= weights[r, members][:, None]
         rows.append(members)
         blocks.append(block)
     return Subspace(regions.mesh.n_vertices, tuple(rows), tuple(blocks))
+
+
+def _checked_blend(blend: ArrayLike, regions: Regions) -> FloatArray:
+    weights = np.asarray(blend, dtype=np.float64)
+    if weights.shape != regions.membership.shape:
+        raise RegionError(f"blend must have shape {regions.membership.shape}; got {weights.shape}")
+    unity = np.abs(weights.sum(axis=0) - 1.0).max() <= 1e-9
+    if not unity or (weights < 0.0).any() or weights[~regions.membership].any():
+        raise RegionError(
+            "blend must be non-negative, sum to 1 at every vertex and be 0 outside each region"
+        )
+    return weights
+
+
+def _check_cages(regions: Regions, cages: Sequence[Cage]) -> None:
+    if len(cages) != regions.n_regions:
+        raise CageError(f"{regions.n_regions} regions need as many cages; got {len(cages)}")
+    for r, cage in enumerate(cages):
+        members = regions.mesh.vertices[regions.membership[r]]
+        cage.require_encloses(members, f"region {r}")
