@@ -98,7 +98,7 @@ class Deformer:
         stretch: float = 10.0,
         rotation_groups: int | None = 300,
         tolerance: float = 1e-6,
-        max_steps: int = 200,
+        max_steps: int = 500,
         window: int = 5,
         exact_volume: bool = True,
         hold_tolerance: float = 5e-4,

@@ -66,7 +66,7 @@ class SolverOptions:
     """How to iterate; the defaults are what the interactive editor uses."""
 
     tolerance: float = 1e-6  # root-mean-square move of the surface in a step, mesh size 1
-    max_steps: int = 200
+    max_steps: int = 500
     window: int = 5  # Anderson's memory; 0 is the plain iteration of the paper
     exact_volume: bool = True  # False leaves the linearised multiplier of (21), for comparison
 

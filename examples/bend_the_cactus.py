@@ -1,0 +1,21 @@
+"""Bend a cactus over by 60 degrees: its ribs stay, its volume stays exactly."""
+
+import numpy as np
+
+import vtk_segdeform as sd
+
+mesh = sd.models.cactus()
+height = mesh.vertices[:, 2]
+foot, tip = np.flatnonzero(height < 0.08), np.flatnonzero(height > 0.92)
+
+regions = sd.segment(mesh, n_regions=3)  # the trunk and two arms, overlapping
+cages = sd.fit_cages(mesh, regions, n_vertices=155)  # one coarse cage around each
+deformer = sd.Deformer(mesh, regions, cages, fixed=foot, handle=tip)
+
+angle, pivot = np.radians(60), [0.0, 0.0, 0.4]
+turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+solution = deformer.solve((mesh.vertices[tip] - pivot) @ turn.T + pivot)
+
+print(f"volume changed by {solution.volume_change:.0e} of itself")
+print(f"handle within {solution.handle_error:.0e} of the mesh's diagonal")
+print(f"{solution.steps} steps: {solution.status}")

@@ -1,0 +1,23 @@
+"""The paper's figure 7: the same bend with the volume constraint and without it."""
+
+import numpy as np
+
+import vtk_segdeform as sd
+
+mesh = sd.models.bar(size=(0.2, 0.2, 1.0), divisions=(8, 8, 40))
+height = mesh.vertices[:, 2]
+foot, tip = np.flatnonzero(height < 0.05), np.flatnonzero(height > 0.95)
+regions = sd.segment(mesh, n_regions=3)
+cages = sd.fit_cages(mesh, regions, n_vertices=155)
+
+angle, pivot = np.radians(120), [0.0, 0.0, 0.5]
+turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+targets = (mesh.vertices[tip] - pivot) @ turn.T + pivot
+
+changes = {}
+for preserve in (True, False):
+    deformer = sd.Deformer(mesh, regions, cages, fixed=foot, handle=tip, preserve_volume=preserve)
+    solution = deformer.solve(targets)
+    changes[preserve] = solution.volume_change
+    name = "with" if preserve else "without"
+    print(f"{name} the constraint: volume {100 * solution.volume_change:+.2g} %")

@@ -1,0 +1,31 @@
+"""Every example runs, and one number of each is right."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+RIGHT = {
+    "bend_the_cactus": lambda names: abs(names["solution"].volume_change) < 1e-12,
+    "with_and_without_volume": lambda names: (
+        abs(names["changes"][True]) < 1e-12 and abs(names["changes"][False]) > 1e-3
+    ),
+}
+
+
+def test_every_example_has_a_number_to_hold():
+    assert sorted(RIGHT) == sorted(path.stem for path in EXAMPLES.glob("*.py"))
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_the_example_runs_and_its_number_is_right(name):
+    assert RIGHT[name](runpy.run_path(str(EXAMPLES / f"{name}.py")))
+
+
+def test_the_readme_shows_the_first_example_as_it_is():
+    readme = (EXAMPLES.parent / "README.md").read_text()
+    code = (EXAMPLES / "bend_the_cactus.py").read_text().split("\n", 2)[2].strip()
+    assert code in readme
