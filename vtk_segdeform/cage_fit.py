@@ -10,9 +10,8 @@ A larger offset is an easier cage: slits close, limbs fuse, holes fill, until th
 is a ball.  So a cage that fails a check is made again with a larger offset, and the last
 resort, an ellipsoid around the region, cannot fail.
 
-n vertices of a cage with area A are about ``sqrt(A / n)`` apart.  That length sets the offset,
-where none is asked for: mean value coordinates are at their best when skin and cage are a
-fair part of the cage's own edge apart.
+The n vertices of a cage of area A are about ``sqrt(A / n)`` apart; that length sets the offset
+where none is asked for, because mean value coordinates degrade close to large faces.
 """
 
 from __future__ import annotations
@@ -22,6 +21,7 @@ import logging
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import ndimage
+from scipy.spatial import cKDTree
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
@@ -31,6 +31,7 @@ from .cage_simplify import roundness, simplify
 from .cages import Cage, cage_faults
 from .columns import inside_points
 from .errors import CageError, RegionError
+from .inside import distance_to_surface
 from .mesh import Mesh
 from .progress import Progress, part
 from .region_solid import Patch, Skin, SolidField, solid_field
@@ -48,7 +49,8 @@ _SHELL = 6  # vertices, at least, of each part of a cage that is in parts
 _FLOOR = 12  # vertices that every region gets before the rest is shared out
 _CLEARANCE = 0.5  # of the offset: the least distance from the skin that faces are pushed to
 _PUSHES = 30  # rounds
-_DENSITY = 6  # samples along the edge of a face when it is pushed
+_NEAREST = 200  # vertices of the region whose distance from the cage is measured
+_SAMPLES = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6.0  # of a face
 
 _log = logging.getLogger(__name__)
 
@@ -95,8 +97,6 @@ def fit_cages(
     cages = []
     for r, (patch, number) in enumerate(zip(patches, numbers, strict=True)):
         piece = part(progress, r / len(patches), (r + 1) / len(patches))
-        if piece is not None:
-            piece(0.0, f"cage {r + 1} of {len(patches)}")
         cages.append(_fit(patch, int(number), offset, piece))
     if progress is not None:
         progress(1.0, "cages ready")
@@ -131,11 +131,10 @@ def _share_out(patches: list[Patch], n_vertices: int) -> IntArray:
     around a limb for as many on a small one as on a large one: the root of the area is between.
     The root of length over width gives long regions, which bend, their share.
     """
-    if n_vertices < _FEWEST * len(patches):
-        raise CageError(
-            f"n_vertices must be at least {_FEWEST} for each of {len(patches)} regions, "
-            f"{_FEWEST * len(patches)}; got {n_vertices}"
-        )
+    fewest = _FEWEST * len(patches)
+    if n_vertices < fewest:
+        each = f"{_FEWEST} for each of {len(patches)} regions"
+        raise CageError(f"n_vertices must be at least {each}, {fewest}; got {n_vertices}")
     area = np.array([patch.area for patch in patches])
     spread = np.array([patch.spread for patch in patches])
     need = np.sqrt(area * spread.sum(axis=1) / spread[:, 1:].sum(axis=1))
@@ -154,7 +153,7 @@ def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) 
     valid: list[tuple[float, FloatArray, IntArray]] = []
     for attempt in range(_ATTEMPTS):
         if progress is not None:
-            progress(attempt / _ATTEMPTS, f"attempt {attempt + 1} at a cage")
+            progress(attempt / _ATTEMPTS, f"a cage of {n} vertices, attempt {attempt + 1}")
         larger = _LARGER ** (attempt * (attempt + 1) / 2)
         nodes = max(_NODES, _NODES_PER_VERTEX * n)
         field = solid_field(patch, offset * larger, _STEP * length * larger, most_nodes=nodes)
@@ -162,11 +161,11 @@ def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) 
             fault = f"it falls into {field.n_shells} parts"
             continue
         vertices, faces = simplify(*_contour(field.smooth, field.offset), n)
-        vertices, nearest = _cleared(vertices, faces, field)
+        vertices = _cleared(vertices, faces, field)
         fault = _fault(vertices, faces, field, n)
         if fault:
             continue
-        quality = min(roundness(vertices, faces).min() / _ROUND, nearest / _NEAR)
+        quality = _quality(vertices, faces, field)
         valid.append((quality, field.grid.to_points(vertices) + patch.skin.centre, faces))
         if quality >= 1.0 or len(valid) == 2:
             break
@@ -216,31 +215,36 @@ def _contour(values: FloatArray, level: float) -> tuple[FloatArray, IntArray]:
     return points, (faces if outward else faces[:, ::-1]).astype(np.int64)
 
 
-def _cleared(vertices: FloatArray, faces: IntArray, field: SolidField) -> tuple[FloatArray, float]:
-    """Return *vertices* moved until faces keep clear of the solid, and how near one still is.
+def _cleared(vertices: FloatArray, faces: IntArray, field: SolidField) -> FloatArray:
+    """Return *vertices* moved until the faces keep clear of the solid.
 
     Samples of the faces that are too near ask for a move away from the solid; a vertex makes the
-    mean of the moves that its faces ask for.  The nearness is a share of the offset.
+    mean of the moves that its faces ask for.
     """
-    steps = range(_DENSITY + 1)
-    share = np.array([(i, j, _DENSITY - i - j) for i in steps for j in steps[: _DENSITY + 1 - i]])
-    share = share / _DENSITY
+    vertices = vertices.copy()
     slope = [np.gradient(field.smooth, axis=axis) for axis in range(3)]
     least = _CLEARANCE * field.offset
-    vertices = vertices.copy()
     for _ in range(_PUSHES):
-        at = np.einsum("sc,fci->ifs", share, vertices[faces]).reshape(3, -1)
+        at = (_SAMPLES @ vertices[faces]).reshape(-1, 3).T
         distance = ndimage.map_coordinates(field.distance, at, order=1)
         near = np.flatnonzero(distance < least)
         if not len(near):
             break
         away = np.stack([ndimage.map_coordinates(s, at[:, near], order=1) for s in slope])
         away *= (1.1 * least - distance[near]) / np.maximum(np.linalg.norm(away, axis=0), 1e-9)
-        face, sample = np.divmod(near, len(share))
-        corner, weight = faces[face].ravel(), share[sample].ravel()
+        face, sample = np.divmod(near, len(_SAMPLES))
+        corner, weight = faces[face].ravel(), _SAMPLES[sample].ravel()
         total = np.bincount(corner, weight, minlength=len(vertices))
         for axis in range(3):
             asked = weight * np.repeat(away[axis], 3)
             moves = np.bincount(corner, asked, minlength=len(vertices))
             vertices[:, axis] += moves / np.maximum(total, 1e-9)
-    return vertices, float(distance.min() / field.offset)
+    return vertices
+
+
+def _quality(vertices: FloatArray, faces: IntArray, field: SolidField) -> float:
+    """Return 1 or more for a cage without needles that nowhere comes close to the skin."""
+    gap = np.asarray(cKDTree((_SAMPLES @ vertices[faces]).reshape(-1, 3)).query(field.members)[0])
+    nearest = field.members[np.argsort(gap, kind="stable")[:_NEAREST]]
+    skin = distance_to_surface(nearest, vertices, faces).min() / field.offset
+    return float(min(roundness(vertices, faces).min() / _ROUND, skin / _NEAR))
