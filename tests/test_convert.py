@@ -231,7 +231,7 @@ RUBBISH = {
     "text": b"hello\nthis is no mesh 1 2 3\n",
     "bytes": bytes(range(256)) * 8,
     "ply": b"ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\nend_header\n1 2",
-    "off": b"OFF\n3 1 0\n0 0 0\n1 0 0\nnan 1 0\n3 0 1 2\n",
+    "off": b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n",
     "obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n",
 }
 
@@ -245,6 +245,16 @@ def test_rubbish_is_refused_in_words_that_name_the_file(tmp_path, suffix, what, 
         read_polydata(path)
     assert list(tmp_path.iterdir()) == [path]
     capfd.readouterr()
+
+
+def test_nan_comes_through_to_be_named_as_the_fault_it_is(tmp_path):
+    path = tmp_path / "nan.off"
+    path.write_text(
+        "OFF\n4 4 0\n0 0 0\n1 0 0\nnan 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
+    )
+    assert np.isnan(read_polydata(path).points).sum() == 1
+    with pytest.raises(MeshError, match=r"nan.off: .*1 vertex with NaN or infinite"):
+        read_mesh(path)
 
 
 def test_a_truncated_file_is_refused_in_every_format(tmp_path):

@@ -9,21 +9,21 @@ from __future__ import annotations
 import numpy as np
 import pyvista as pv
 
-from .arrays import FloatArray, IntArray, as_points
+from .arrays import FloatArray, IntArray
 from .errors import MeshError
 
 
 def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.PolyData:
     """Return a surface with float64 *points* (n, 3) and these polygons, both in the order given.
 
+    NaN goes through: it is for `find_faults` to name, not for a reader to trip over.
+
     Raises
     ------
-    ValueError
-        If a coordinate is not finite.
     MeshError
         If a polygon has fewer than three corners or names a vertex that is not there.
     """
-    points = as_points(points, "points")
+    points = np.ascontiguousarray(points, dtype=np.float64)
     if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
         raise MeshError(
             f"a face names vertex {corners.min()} to {corners.max()}; there are {len(points)}"
