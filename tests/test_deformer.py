@@ -183,6 +183,30 @@ def test_the_printed_blend_can_be_compared_and_nonsense_is_refused():
         SCENE.deformer(blend=0.5 * printed)
 
 
+def test_holding_elsewhere_needs_no_new_cages_and_changes_nothing_in_the_old():
+    deformer = SCENE.deformer()
+    before = deformer.solve(SCENE.turned(30))
+    other = deformer.hold(fixed=SCENE.handle, handle=SCENE.fixed)
+    fresh = replace(SCENE, fixed=SCENE.handle, handle=SCENE.fixed)
+    targets = VERTICES[SCENE.fixed] + [0.0, 0.0, 0.3]
+    assert_allclose(
+        other.solve(targets).vertices, fresh.deformer().solve(targets).vertices, atol=1e-12
+    )
+    assert_allclose(deformer.solve(SCENE.turned(30)).vertices, before.vertices, atol=1e-4)
+
+
+def test_a_pose_can_be_taken_up_again_where_it_was_left():
+    deformer = SCENE.deformer()
+    first = deformer.solve(SCENE.turned(30))
+    deformer.solve(SCENE.turned(-40))
+    deformer.resume(first.cage_vertices, SCENE.turned(30))
+    again = deformer.solve(SCENE.turned(30))
+    assert_allclose(again.vertices, first.vertices, atol=1e-4 * SCENE.mesh.diagonal)
+    assert again.steps <= 2
+    with pytest.raises(CageError, match=r"must hold \[66, 66\] points.*got \[66\]"):
+        deformer.resume(first.cage_vertices[:1], SCENE.turned(30))
+
+
 def test_binding_reports_its_progress_and_can_be_cancelled():
     seen = []
     SCENE.deformer(progress=lambda fraction, _: seen.append(fraction))

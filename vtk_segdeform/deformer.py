@@ -11,19 +11,20 @@ that neither the unit of the scene nor its place matters, nor, as with a box, ho
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import FloatArray, IntArray, as_ids, as_points
+from .arrays import FloatArray, as_points
 from .cages import Cage
 from .constraints import VolumeConstraint, region_volumes, total_volume
 from .energy import shape_energy
-from .errors import ConstraintError, RegionError
+from .errors import CageError, ConstraintError, RegionError
 from .mesh import Mesh
-from .positions import connected_sets, position_term
+from .positions import checked_constraints, connected_sets, position_term
 from .progress import Progress, part
 from .regions import Regions
 from .rotations import rotation_groups as group_by_part
@@ -111,14 +112,6 @@ class Deformer:
                 f"this one has {mesh.n_vertices}; make them anew"
             )
         self.mesh, self.regions, self.cages = mesh, regions, tuple(cages)
-        self.fixed = _checked_ids(fixed, mesh, "fixed")
-        self.handle = _checked_ids(handle, mesh, "handle")
-        both = np.intersect1d(self.fixed, self.handle)
-        if len(both):
-            raise ConstraintError(
-                f"{len(both)} vertices are both fixed and handle (the first is {both[0]}); "
-                "take them out of one of the two"
-            )
         self._centre = mesh.vertices.mean(axis=0)
         self._size = 2.0 * float(np.linalg.norm(mesh.vertices - self._centre, axis=1).max())
         self._rest = mesh.with_vertices(self._inward(mesh.vertices))
@@ -133,29 +126,42 @@ class Deformer:
             pairs = np.stack([regions.labels, mesh.components])
             parts = np.unique(pairs, axis=1, return_inverse=True)[1].ravel()
             groups = group_by_part(self._rest.vertices, parts, rotation_groups)
-        energy = shape_energy(self._rest, subspace, stretch, groups)
+        self._energy = shape_energy(self._rest, subspace, stretch, groups)
         self._volumes = region_volumes(self._rest, regions.labels)
-        constraints: list[VolumeConstraint] = []
+        self._constraints: Sequence[VolumeConstraint] = ()
         if preserve_region_volumes:
-            constraints = list(self._volumes)
+            self._constraints = self._volumes
         elif preserve_volume:
-            constraints = [total_volume(self._rest)]
-        self._handles = connected_sets(mesh, self.handle)
-        self._held = np.concatenate([self.handle, self.fixed])
-        patches = [len(self.handle) + patch for patch in connected_sets(mesh, self.fixed)]
-        weight = _POSITION_WEIGHT * float(np.trace(energy.quadratic))
-        positions = position_term(subspace.at(self._held), [*self._handles, *patches], weight)
-        self._at_rest = GaussNewton(energy, positions, constraints)
+            self._constraints = (total_volume(self._rest),)
         self._rest_cages = np.concatenate([self._inward(cage.vertices) for cage in cages])
-        self.reset()
+        self._take_hold(fixed, handle)
         if progress:
             progress(1.0, "ready")
+
+    def hold(self, *, fixed: ArrayLike = (), handle: ArrayLike = ()) -> Deformer:
+        """Return a deformer at rest with other fixed and handle vertices; cages stay bound."""
+        other = copy.copy(self)
+        other._take_hold(fixed, handle)
+        return other
 
     def reset(self) -> None:
         """Forget the last pose: the next solve starts from rest."""
         self._solver = self._at_rest
         self._p = self._rest_cages
         self._targets = self._rest.vertices[self.handle]
+
+    def resume(self, cage_vertices: Sequence[ArrayLike], targets: ArrayLike) -> None:
+        """Go on from an earlier pose: a `Solution.cage_vertices`, and the targets it was for."""
+        poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
+        expected = [cage.n_vertices for cage in self.cages]
+        if [len(pose) for pose in poses] != expected:
+            raise CageError(
+                f"cage_vertices must hold {expected} points, one array per cage; "
+                f"got {[len(pose) for pose in poses]}"
+            )
+        targets = self._inward(self._checked_targets(targets))
+        self.reset()
+        self._p, self._targets = self._inward(np.concatenate(poses)), targets
 
     def solve(self, targets: ArrayLike, *, max_steps: int | None = None) -> Solution:
         """Return the pose whose handle vertices are at *targets*.
@@ -189,6 +195,18 @@ class Deformer:
             if stiffer is None or result.status is Status.STEP_LIMIT:
                 return self._solution(result, steps)
             self._solver = replace(self._solver, positions=stiffer)
+
+    def _take_hold(self, fixed: ArrayLike, handle: ArrayLike) -> None:
+        mesh = self.mesh
+        self.fixed, self.handle = checked_constraints(mesh, fixed, handle)
+        self._handles = connected_sets(mesh, self.handle)
+        self._held = np.concatenate([self.handle, self.fixed])
+        patches = [len(self.handle) + patch for patch in connected_sets(mesh, self.fixed)]
+        weight = _POSITION_WEIGHT * float(np.trace(self._energy.quadratic))
+        rows = self._energy.subspace.at(self._held)
+        positions = position_term(rows, [*self._handles, *patches], weight)
+        self._at_rest = GaussNewton(self._energy, positions, self._constraints)
+        self.reset()
 
     def _move(self, targets: FloatArray, options: SolverOptions) -> Iteration:
         result = self._solver.minimise(self._p, self._places(targets), options)
@@ -234,10 +252,3 @@ class Deformer:
 
     def _outward(self, points: FloatArray) -> FloatArray:
         return np.asarray(points * self._size + self._centre)
-
-
-def _checked_ids(ids: ArrayLike, mesh: Mesh, name: str) -> IntArray:
-    try:
-        return as_ids(ids, mesh.n_vertices, name)
-    except ValueError as fault:
-        raise ConstraintError(str(fault)) from None

@@ -13,10 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from .arrays import FloatArray, IntArray
+from .arrays import FloatArray, IntArray, as_ids
+from .errors import ConstraintError
 from .mesh import Mesh
 
 _STIFFER = 10.0
@@ -67,6 +69,24 @@ def position_term(rows: FloatArray, sets: list[IntArray], weight: float) -> Posi
         set_of[members] = number
     size = np.bincount(set_of, minlength=len(sets))
     return PositionTerm(rows, set_of, weight / size[set_of], np.ones(len(sets)))
+
+
+def checked_constraints(
+    mesh: Mesh, fixed: ArrayLike, handle: ArrayLike
+) -> tuple[IntArray, IntArray]:
+    """Return the vertex numbers of *fixed* and *handle*, or raise a ConstraintError."""
+    try:
+        fixed = as_ids(fixed, mesh.n_vertices, "fixed")
+        handle = as_ids(handle, mesh.n_vertices, "handle")
+    except ValueError as fault:
+        raise ConstraintError(str(fault)) from None
+    both = np.intersect1d(fixed, handle)
+    if len(both):
+        raise ConstraintError(
+            f"{len(both)} vertices are both fixed and handle (the first is {both[0]}); "
+            "take them out of one of the two"
+        )
+    return fixed, handle
 
 
 def connected_sets(mesh: Mesh, ids: IntArray) -> list[IntArray]:
