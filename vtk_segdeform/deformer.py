@@ -123,8 +123,8 @@ class Deformer:
             progress(0.8, "factoring")
         groups = None
         if rotation_groups is not None and rotation_groups < mesh.n_vertices:
-            pairs = np.stack([regions.labels, mesh.components])
-            parts = np.unique(pairs, axis=1, return_inverse=True)[1].ravel()
+            parts = regions.labels * mesh.n_vertices + mesh.components
+            parts = np.unique(parts, return_inverse=True)[1]
             groups = group_by_part(self._rest.vertices, parts, rotation_groups)
         self._energy = shape_energy(self._rest, subspace, stretch, groups)
         self._volumes = region_volumes(self._rest, regions.labels)
@@ -153,12 +153,9 @@ class Deformer:
     def resume(self, cage_vertices: Sequence[ArrayLike], targets: ArrayLike) -> None:
         """Go on from an earlier pose: a `Solution.cage_vertices`, and the targets it was for."""
         poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
-        expected = [cage.n_vertices for cage in self.cages]
-        if [len(pose) for pose in poses] != expected:
-            raise CageError(
-                f"cage_vertices must hold {expected} points, one array per cage; "
-                f"got {[len(pose) for pose in poses]}"
-            )
+        expected, got = [cage.n_vertices for cage in self.cages], [len(pose) for pose in poses]
+        if got != expected:
+            raise CageError(f"cage_vertices must hold {expected} points, cage by cage; got {got}")
         targets = self._inward(self._checked_targets(targets))
         self.reset()
         self._p, self._targets = self._inward(np.concatenate(poses)), targets
