@@ -178,9 +178,8 @@ class Deformer:
             If *targets* has the wrong shape or holds NaN or infinite coordinates.
         """
         goal = self._inward(self._checked_targets(targets))
-        options = self._options
-        if max_steps is not None:
-            options = replace(options, max_steps=max_steps)
+        limit = self._options.max_steps if max_steps is None else max_steps
+        options = replace(self._options, max_steps=limit)
         *way, _ = waypoints(self._targets, goal, self._handles)
         on_the_way = replace(options, tolerance=_LEG_TOLERANCE, max_steps=_LEG_STEPS)
         steps = sum(self._move(leg, on_the_way).steps for leg in way)
