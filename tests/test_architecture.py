@@ -18,97 +18,106 @@ PACKAGE = ROOT / "vtk_segdeform"
 # One line per part of the story; a new file takes its place here.
 STORY = [
     # a checked mesh
-    "arrays", "errors", "progress", "topology", "manifold", "inside", "intersections",
-    "report", "shells", "faults", "mesh", "holes", "splitting", "repair_steps", "repair",
+    "arrays", "errors", "progress", "surface.topology", "surface.manifold", "surface.inside",
+    "surface.intersections", "surface.report", "surface.shells", "faults", "mesh", "surface.holes",
+    "surface.splitting", "surface.repair_steps", "repair",
     # what a deformation keeps
     "volume", "local_volume", "distortion", "differential", "rotations",
     # regions and their cages
-    "blending", "regions", "coarse", "necks", "slices", "segmentation", "mean_value", "cages",
-    "columns", "region_solid", "cage_simplify", "cage_fit",
+    "blending", "regions", "segmenting.coarse", "segmenting.necks", "segmenting.slices",
+    "segmentation", "mean_value", "cages", "caging.columns", "caging.region_solid",
+    "caging.cage_simplify", "cage_fit",
     # the solver
     "subspace", "energy", "constraints", "positions", "solver", "solution", "targets", "deformer",
     "pipeline",
     # meshes from code, from files, and as pictures
-    "remeshing", "implicit", "models",
-    "polygons", "off", "ply", "wavefront", "meshlab", "convert", "canvas", "pictures",
+    "modelling.remeshing", "modelling.implicit", "models", "formats.polygons", "formats.off",
+    "formats.ply", "formats.wavefront", "meshlab", "convert", "canvas", "pictures",
     # the command line
-    "selection", "motion", "outputs", "demo", "bench", "commands", "cli", "__main__",
+    "command_line.selection", "command_line.motion", "command_line.outputs", "command_line.demo",
+    "command_line.bench", "command_line.commands", "cli", "__main__",
 ]  # fmt: skip
 
 NUMERIC = {"numpy", "scipy"}
 VTK = {"vtkmodules"}
 GRANTED = {
     "cage_fit": VTK,
-    "implicit": VTK,
-    "polygons": VTK | {"pyvista"},
-    "off": {"pyvista"},
-    "ply": {"pyvista"},
-    "wavefront": {"pyvista"},
+    "modelling.implicit": VTK,
+    "formats.polygons": VTK | {"pyvista"},
+    "formats.off": {"pyvista"},
+    "formats.ply": {"pyvista"},
+    "formats.wavefront": {"pyvista"},
     "meshlab": {"pymeshlab"},
     "convert": VTK | {"pyvista"},
     "canvas": VTK | {"pyvista"},
     "pictures": VTK | {"pyvista"},
-    "outputs": {"pyvista"},
+    "command_line.outputs": {"pyvista"},
 }
 
 MAY_PRINT_AND_EXIT = {"cli", "__main__"}
 LONGEST = 250
-FILES = sorted(PACKAGE.glob("*.py"))
-NAMES = [path.stem for path in FILES]
+FILES = {
+    ".".join(path.relative_to(PACKAGE).with_suffix("").parts): path
+    for path in sorted(PACKAGE.rglob("*.py"))
+}
+NAMES = [name for name in FILES if not name.endswith("__init__")]
 CHAPTERS = [name for name in STORY if name in NAMES]
 
 
-def imports(path: Path) -> Iterator[tuple[str, bool]]:
-    """Yield (module, is ours) for every import anywhere in the file, inside functions too."""
-    for node in ast.walk(ast.parse(path.read_text())):
+def imports(name: str) -> Iterator[tuple[str, bool]]:
+    """Yield (module, is ours) for every import anywhere in a file, inside functions too."""
+    folder = name.split(".")[:-1]
+    for node in ast.walk(ast.parse(FILES[name].read_text())):
         if isinstance(node, ast.Import):
             yield from ((alias.name.partition(".")[0], False) for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.level:
-            if node.module:
-                yield node.module.partition(".")[0], True
+            named = [*folder[: len(folder) + 1 - node.level], *(node.module or "").split(".")]
+            named = [part for part in named if part]
+            if PACKAGE.joinpath(*named).is_dir():
+                yield from ((".".join([*named, alias.name]), True) for alias in node.names)
             else:
-                yield from ((alias.name, True) for alias in node.names)
+                yield ".".join(named), True
         elif isinstance(node, ast.ImportFrom):
             yield str(node.module).partition(".")[0], False
 
 
 def test_every_file_has_its_place_in_the_story():
-    assert sorted({*STORY, "__init__"}) == NAMES
+    assert sorted(STORY) == sorted(NAMES)
     assert len(set(STORY)) == len(STORY)
 
 
 @pytest.mark.parametrize("name", CHAPTERS)
 def test_a_chapter_imports_only_earlier_ones(name):
     earlier = set(STORY[: STORY.index(name)]) | {"__version__"}
-    later = {module for module, ours in imports(PACKAGE / f"{name}.py") if ours} - earlier
+    later = {module for module, ours in imports(name) if ours} - earlier
     assert not later, f"{name} imports {sorted(later)}, which the story tells later"
 
 
 @pytest.mark.parametrize("name", CHAPTERS)
 def test_a_chapter_imports_only_the_libraries_it_is_granted(name):
     allowed = NUMERIC | GRANTED.get(name, set()) | set(sys.stdlib_module_names)
-    foreign = {module for module, ours in imports(PACKAGE / f"{name}.py") if not ours} - allowed
+    foreign = {module for module, ours in imports(name) if not ours} - allowed
     assert not foreign, f"{name} imports {sorted(foreign)}"
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", FILES)
 def test_a_chapter_is_short_enough_to_read_at_once(name):
-    text = (PACKAGE / f"{name}.py").read_text()
+    text = FILES[name].read_text()
     lines = text.count("\n")
     reason = "Long because" in (ast.get_docstring(ast.parse(text)) or "")
     assert lines <= LONGEST or reason, f"{lines} lines; say 'Long because ...' or split it"
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", FILES)
 def test_a_chapter_begins_by_saying_what_it_is(name):
-    assert ast.get_docstring(ast.parse((PACKAGE / f"{name}.py").read_text()))
+    assert ast.get_docstring(ast.parse(FILES[name].read_text()))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", FILES)
 def test_only_the_command_line_prints_or_exits(name):
     if name in MAY_PRINT_AND_EXIT:
         return
-    tree = ast.parse((PACKAGE / f"{name}.py").read_text())
+    tree = ast.parse(FILES[name].read_text())
     calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
     named = {call.id for call in calls if isinstance(call, ast.Name)}
     raised = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
@@ -118,9 +127,9 @@ def test_only_the_command_line_prints_or_exits(name):
     assert not dotted & {"sys.exit", "os._exit", "sys.stdout.write", "sys.stderr.write"}
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", FILES)
 def test_a_chapter_changes_no_global_state_and_evaluates_no_text(name):
-    tree = ast.parse((PACKAGE / f"{name}.py").read_text())
+    tree = ast.parse(FILES[name].read_text())
     calls = {ast.unparse(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     forbidden = {
         "eval", "exec", "compile", "np.random.seed", "np.seterr", "warnings.filterwarnings",
@@ -130,9 +139,9 @@ def test_a_chapter_changes_no_global_state_and_evaluates_no_text(name):
     assert not any(isinstance(node, ast.Global) for node in ast.walk(tree))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", FILES)
 def test_public_functions_take_at_most_four_positional_arguments(name):
-    for node in ast.walk(ast.parse((PACKAGE / f"{name}.py").read_text())):
+    for node in ast.walk(ast.parse(FILES[name].read_text())):
         if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
             positional = [a.arg for a in node.args.posonlyargs + node.args.args]
             positional = [arg for arg in positional if arg not in ("self", "cls")]

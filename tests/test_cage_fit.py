@@ -10,14 +10,14 @@ from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
 
 from vtk_segdeform import cage_fit
 from vtk_segdeform.cage_fit import _contour, fit_cage, fit_cages
-from vtk_segdeform.cage_simplify import roundness, simplify
 from vtk_segdeform.cages import Cage, cage_faults
-from vtk_segdeform.columns import inside_nodes, inside_points
+from vtk_segdeform.caging.cage_simplify import roundness, simplify
+from vtk_segdeform.caging.columns import inside_nodes, inside_points
+from vtk_segdeform.caging.region_solid import Patch, Skin, _filled, principal_axes
 from vtk_segdeform.errors import CageError, Cancelled, RegionError
-from vtk_segdeform.inside import distance_to_surface, winding_number
 from vtk_segdeform.mesh import Mesh
-from vtk_segdeform.region_solid import Patch, Skin, _filled, principal_axes
 from vtk_segdeform.regions import Regions
+from vtk_segdeform.surface.inside import distance_to_surface, winding_number
 
 TURN = rotation([1.0, 2.0, -0.5], 1.234)
 

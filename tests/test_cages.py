@@ -12,7 +12,7 @@ from vtkmodules.vtkCommonDataModel import vtkTriangle
 
 from vtk_segdeform.cages import Cage, cage_faults, self_intersections, winding_number
 from vtk_segdeform.errors import CageError
-from vtk_segdeform.intersections import _overlapping_boxes
+from vtk_segdeform.surface.intersections import _overlapping_boxes
 
 TURN = rotation([1, 2, 3], 0.7)
 VALID = {
@@ -214,7 +214,7 @@ def test_crossings_do_not_depend_on_where_the_sweep_runs_nor_on_batches(axis, mo
     expected = self_intersections(vertices, faces)
     assert len(expected) > 20
     rolled = np.roll(vertices, axis, axis=1) * [1, 10, 1]
-    monkeypatch.setattr("vtk_segdeform.intersections._BATCH", 97)
+    monkeypatch.setattr("vtk_segdeform.surface.intersections._BATCH", 97)
     assert_array_equal(self_intersections(rolled, faces), expected)
 
 
@@ -252,7 +252,7 @@ def test_the_winding_number_is_whole_and_does_not_depend_on_chunks(monkeypatch):
     number = winding_number(x, vertices, faces)
     assert_allclose(number, number.round(), atol=1e-12)
     assert set(number.round()) == {0.0, 1.0}
-    monkeypatch.setattr("vtk_segdeform.inside._BLOCK", 1)
+    monkeypatch.setattr("vtk_segdeform.surface.inside._BLOCK", 1)
     assert_allclose(winding_number(x, vertices, faces), number, atol=1e-12)
 
 

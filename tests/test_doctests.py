@@ -9,13 +9,14 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-NUMERIC = sorted((ROOT / "vtk_segdeform").glob("*.py"))
+PACKAGE = ROOT / "vtk_segdeform"
+OURS = sorted(PACKAGE.rglob("*.py"))
 WIDGETS = sorted((ROOT / "widgets").glob("*.py"))
 
 
 def module_names() -> list[str]:
     """Return the dotted names, as an installed package has them."""
-    names = [f"vtk_segdeform.{path.stem}" for path in NUMERIC]
+    names = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in OURS]
     names += [f"vtk_segdeform.widgets.{path.stem}" for path in WIDGETS]
     return [name.removesuffix(".__init__") for name in names]
 

@@ -8,8 +8,8 @@ from real_meshes import path_of, read_off
 from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
 
 from vtk_segdeform.faults import find_faults
-from vtk_segdeform.report import Kind
-from vtk_segdeform.topology import Sides
+from vtk_segdeform.surface.report import Kind
+from vtk_segdeform.surface.topology import Sides
 
 SPHERE = icosphere(2)
 N = len(SPHERE[0])

@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from vtk_segdeform import models
-from vtk_segdeform.implicit import Limb, implicit_surface
 from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.modelling.implicit import Limb, implicit_surface
 from vtk_segdeform.volume import signed_volume
 
 BODIES = [

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from solids import rotation as turn
 from solids import somewhere
 
-from vtk_segdeform import motion
+from vtk_segdeform.command_line import motion
 from vtk_segdeform.errors import ConstraintError
 
 

@@ -7,10 +7,10 @@ from solids import CUBE, SOLIDS, icosphere, torus
 
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.faults import find_faults
-from vtk_segdeform.holes import triangulate_loop
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.repair import repair
-from vtk_segdeform.report import Kind
+from vtk_segdeform.surface.holes import triangulate_loop
+from vtk_segdeform.surface.report import Kind
 from vtk_segdeform.volume import signed_volume
 
 SPHERE = icosphere(2)

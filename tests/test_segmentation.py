@@ -6,11 +6,11 @@ from real_meshes import botsch_sorkine
 from scipy.sparse import csgraph
 from solids import OCTAHEDRON, icosphere, rotation, torus, two_components
 
-from vtk_segdeform.coarse import coarsen
 from vtk_segdeform.errors import Cancelled, RegionError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.segmentation import segment
-from vtk_segdeform.slices import quotas
+from vtk_segdeform.segmenting.coarse import coarsen
+from vtk_segdeform.segmenting.slices import quotas
 
 
 def tube(around, along, outline):

@@ -8,9 +8,9 @@ from numpy.testing import assert_array_equal
 from real_meshes import botsch_sorkine, path_of
 from solids import icosphere, rotation
 
+from vtk_segdeform.command_line.selection import parse_selection
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.mesh import Mesh
-from vtk_segdeform.selection import parse_selection
 
 
 @pytest.fixture(scope="module")

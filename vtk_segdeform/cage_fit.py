@@ -27,15 +27,15 @@ from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 
 from .arrays import FloatArray, IntArray, as_ids
-from .cage_simplify import roundness, simplify
 from .cages import Cage, cage_faults
-from .columns import inside_points
+from .caging.cage_simplify import roundness, simplify
+from .caging.columns import inside_points
+from .caging.region_solid import Patch, Skin, SolidField, solid_field
 from .errors import CageError, RegionError
-from .inside import distance_to_surface
 from .mesh import Mesh
 from .progress import Progress, part
-from .region_solid import Patch, Skin, SolidField, solid_field
 from .regions import Regions
+from .surface.inside import distance_to_surface
 
 _OFFSET = 0.4  # of sqrt(area of the region / vertices of its cage)
 _STEP = 0.27  # of the same: about thirty contour vertices for one of the cage

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 
 from .arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
 from .errors import CageError
-from .inside import distance_to_surface, winding_number
-from .intersections import flat_faces, self_intersections
-from .manifold import components, connectivity_faults, counted
+from .surface.inside import distance_to_surface, winding_number
+from .surface.intersections import flat_faces, self_intersections
+from .surface.manifold import components, connectivity_faults, counted
 
 __all__ = ["Cage", "cage_faults", "self_intersections", "winding_number"]
 

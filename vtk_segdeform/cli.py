@@ -19,7 +19,8 @@ from ctypes.util import find_library
 from pathlib import Path
 from typing import Any, TextIO
 
-from . import __version__, commands
+from . import __version__
+from .command_line import commands
 from .errors import ConstraintError, SegDeformError
 
 _TAKE_VECTORS = ("--rotate", "--pivot", "--translate")

@@ -24,11 +24,11 @@ from numpy.typing import ArrayLike
 from . import meshlab
 from .arrays import as_points
 from .errors import MeshError
+from .formats.off import read_off, write_off
+from .formats.ply import read_ply, write_ply
+from .formats.polygons import polydata_of, triangles_of
+from .formats.wavefront import read_obj, write_obj
 from .mesh import Mesh
-from .off import read_off, write_off
-from .ply import read_ply, write_ply
-from .polygons import polydata_of, triangles_of
-from .wavefront import read_obj, write_obj
 
 _log = logging.getLogger(__name__)
 

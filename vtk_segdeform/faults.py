@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import FloatArray, IntArray
-from .report import Fault, Id, Kind, MeshReport
-from .shells import wrong_way_round
-from .topology import Sides, connected, first_equal_row, repeats_face, repeats_vertex
+from .surface.report import Fault, Id, Kind, MeshReport
+from .surface.shells import wrong_way_round
+from .surface.topology import Sides, connected, first_equal_row, repeats_face, repeats_vertex
 
 _EXAMPLES = 4
 _FLAT = 1e-12  # a face of less height than this share of its longest edge has no area

@@ -52,9 +52,9 @@ from numpy.typing import ArrayLike
 
 from .arrays import FloatArray, IntArray, as_faces, as_points
 from .errors import CageError
-from .intersections import flat_faces
-from .manifold import connectivity_faults, counted, face_edges
 from .progress import Progress
+from .surface.intersections import flat_faces
+from .surface.manifold import connectivity_faults, counted, face_edges
 
 # Lengths are shares of the cage's diagonal.
 _ON = 1e-14  # as near as this, a point is on the vertex or edge

@@ -17,7 +17,7 @@ from scipy.sparse import csgraph
 from .arrays import FloatArray, IntArray, as_points
 from .errors import MeshError
 from .faults import as_soup, find_faults
-from .topology import edge_keys
+from .surface.topology import edge_keys
 
 
 @dataclass(frozen=True, init=False, eq=False)

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from .arrays import IntArray
-from .implicit import Limb, standing_body
 from .mesh import Mesh
+from .modelling.implicit import Limb, standing_body
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # the golden angle, radians
 

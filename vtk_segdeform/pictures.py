@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike
 
 from .arrays import FloatArray, IntArray, as_ids, as_points
 from .canvas import INK, add_surface, require_offscreen, view_of, write_panels
+from .formats.polygons import polydata_of
 from .mesh import Mesh
-from .polygons import polydata_of
 from .regions import CageSurface
 
 __all__ = [

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import repair_steps as steps
 from .arrays import FloatArray, IntArray
 from .errors import MeshError
 from .faults import as_soup, find_faults
-from .report import Kind, MeshReport
+from .surface import repair_steps as steps
+from .surface.report import Kind, MeshReport
 
 
 @dataclass(frozen=True)

@@ -23,13 +23,13 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from .arrays import FloatArray, IntArray
-from .coarse import Surface, coarsen, nearest_of, symmetric
 from .errors import RegionError
 from .mesh import Mesh
-from .necks import Neck, best_neck
 from .progress import Progress
 from .regions import Regions
-from .slices import fair_slice, quotas
+from .segmenting.coarse import Surface, coarsen, nearest_of, symmetric
+from .segmenting.necks import Neck, best_neck
+from .segmenting.slices import fair_slice, quotas
 
 _POINTS = 3000  # of the coarse copy, about
 _POINTS_PER_REGION = 16  # at least

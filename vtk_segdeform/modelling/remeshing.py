@@ -21,7 +21,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy import sparse
 
-from .arrays import FloatArray, IntArray
+from ..arrays import FloatArray, IntArray
 
 Field = Callable[[FloatArray], FloatArray]  # (n, 3) -> (n,), negative inside
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arrays import BoolArray, FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from .inside import winding_number
 
 _NO_VOLUME = 1e-14  # share of area times size; rounding leaves about this much of a flat shell

@@ -11,14 +11,17 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from . import convert, motion, pictures
-from .arrays import FloatArray, IntArray
-from .cage_fit import fit_cages
-from .deformer import Deformer
-from .errors import MissingDependencyError
-from .local_volume import local_volume_change
-from .mesh import Mesh
-from .models import cactus
+from .. import convert, pictures
+from ..arrays import FloatArray, IntArray
+from ..cage_fit import fit_cages
+from ..deformer import Deformer
+from ..errors import MissingDependencyError
+from ..local_volume import local_volume_change
+from ..mesh import Mesh
+from ..models import cactus
+from ..progress import Progress, part
+from ..segmentation import segment
+from . import motion
 from .outputs import (
     Say,
     coloured_cages,
@@ -27,8 +30,6 @@ from .outputs import (
     tell_regions,
     tell_solution,
 )
-from .progress import Progress, part
-from .segmentation import segment
 from .selection import parse_selection
 
 FIXED, HANDLE = "z<8%", "z>92%"

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from .arrays import FloatArray, IntArray
-from .cages import Cage
-from .pictures import COLOURS
-from .polygons import polydata_of
-from .regions import Regions
-from .repair import Repair
-from .solution import Solution
+from ..arrays import FloatArray, IntArray
+from ..cages import Cage
+from ..formats.polygons import polydata_of
+from ..pictures import COLOURS
+from ..regions import Regions
+from ..repair import Repair
+from ..solution import Solution
 
 Say = Callable[[str], None]
 

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pyvista as pv
 
-from .arrays import IntArray
-from .errors import MeshError
+from ..arrays import IntArray
+from ..errors import MeshError
 from .polygons import polydata_of, polygons_of, rows
 
 _KIND = re.compile(r"(ST)?(C)?(N)?OFF\b", re.IGNORECASE)

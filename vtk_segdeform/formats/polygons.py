@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 import pyvista as pv
 
-from .arrays import FloatArray, IntArray
-from .errors import MeshError
+from ..arrays import FloatArray, IntArray
+from ..errors import MeshError
 
 
 def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.PolyData:

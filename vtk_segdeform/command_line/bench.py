@@ -14,15 +14,15 @@ from typing import TypeVar
 
 import numpy as np
 
-from .cage_fit import fit_cages
-from .deformer import Deformer
+from ..cage_fit import fit_cages
+from ..deformer import Deformer
+from ..mesh import Mesh
+from ..models import cactus
+from ..progress import Progress, part
+from ..regions import Regions
+from ..segmentation import segment
+from ..solution import Solution
 from .demo import bent_top
-from .mesh import Mesh
-from .models import cactus
-from .progress import Progress, part
-from .regions import Regions
-from .segmentation import segment
-from .solution import Solution
 
 _T = TypeVar("_T")
 _HEAD = (

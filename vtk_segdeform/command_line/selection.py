@@ -29,9 +29,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import BoolArray, FloatArray, IntArray
-from .errors import ConstraintError
-from .mesh import Mesh
+from ..arrays import BoolArray, FloatArray, IntArray
+from ..errors import ConstraintError
+from ..mesh import Mesh
 
 Role = Literal["fixed", "handle"]
 

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .arrays import BoolArray, FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 
 _BLOCK = 1 << 20  # pairs of face and column held at once
 

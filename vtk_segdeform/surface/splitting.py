@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arrays import FloatArray, IntArray
+from ..arrays import FloatArray, IntArray
 from .topology import Sides, first_of_group, following
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from .arrays import BoolArray, IntArray
+from ..arrays import BoolArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,9 +25,9 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import ConvexHull, cKDTree
 
-from .arrays import BoolArray, FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
+from ..mesh import Mesh
 from .columns import count_up, inside_nodes
-from .mesh import Mesh
 
 _STEPS_PER_OFFSET = 1.5  # at least: every point of S then has a node within the offset surface
 _MARGIN = 3.7183  # steps from the offset surface to the end; odd, so that no extreme is on a tie

@@ -14,17 +14,24 @@ from typing import Any
 
 import numpy as np
 
-from . import convert, motion
-from .arrays import FloatArray, IntArray
+from .. import convert
+from ..arrays import FloatArray, IntArray
+from ..cage_fit import fit_cages
+from ..cages import Cage
+from ..deformer import Deformer
+from ..errors import ConstraintError, MeshError
+from ..faults import find_faults
+from ..formats.polygons import triangles_of
+from ..mesh import Mesh
+from ..pictures import picture_before_after
+from ..progress import Progress, part
+from ..regions import Regions
+from ..repair import repair
+from ..segmentation import segment
+from . import motion
 from .bench import table
-from .cage_fit import fit_cages
-from .cages import Cage
-from .deformer import Deformer
 from .demo import HANDLE_MET
 from .demo import run as run_demo
-from .errors import ConstraintError, MeshError
-from .faults import find_faults
-from .mesh import Mesh
 from .outputs import (
     Say,
     coloured_cages,
@@ -34,12 +41,6 @@ from .outputs import (
     tell_regions,
     tell_solution,
 )
-from .pictures import picture_before_after
-from .polygons import triangles_of
-from .progress import Progress, part
-from .regions import Regions
-from .repair import repair
-from .segmentation import segment
 from .selection import parse_selection
 
 

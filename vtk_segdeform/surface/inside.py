@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import FloatArray, IntArray, as_faces, as_points
+from ..arrays import FloatArray, IntArray, as_faces, as_points
 from .manifold import face_edges
 
 _BLOCK = 1 << 17  # numbers per temporary: a megabyte, stays in the cache

@@ -18,8 +18,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from .arrays import BoolArray, FloatArray, IntArray
-from .mesh import Mesh
+from ..arrays import BoolArray, FloatArray, IntArray
+from ..mesh import Mesh
 
 _LOOPS, _ENDS = 4, 12  # ends that distances are taken from
 _STRAIGHT = np.pi / 4  # mean of length over steps, for a straight line walked in steps

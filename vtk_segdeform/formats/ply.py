@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from .errors import MeshError
+from ..errors import MeshError
 from .polygons import polydata_of, polygons_of
 
 _TYPES = {

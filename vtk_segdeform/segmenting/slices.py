@@ -11,7 +11,7 @@ import heapq
 
 import numpy as np
 
-from .arrays import BoolArray, FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from .coarse import Surface
 
 _TOLERANCE = 0.15  # by which a side may miss its area

@@ -20,7 +20,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .arrays import BoolArray, FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from .topology import Sides, edge_keys
 
 _ROUNDNESS = 1e-3

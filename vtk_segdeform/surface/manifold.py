@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arrays import IntArray
+from ..arrays import IntArray
 from .topology import Sides, connected
 
 

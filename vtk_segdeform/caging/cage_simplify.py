@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import BoolArray, FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 
 # Asked of a face that changes: 4 sqrt(3) area / (sum of squared edges), 1 for an equilateral, 0
 # for a needle.  Relaxed only where nothing else can go.

@@ -30,8 +30,8 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 
-from .arrays import FloatArray, IntArray
-from .mesh import Mesh
+from ..arrays import FloatArray, IntArray
+from ..mesh import Mesh
 from .remeshing import Field, flip, refine, relax, split_to, vertex_normals
 
 _FAR = 0.1  # a limb's distances beyond are all the same, which saves looking them up

@@ -25,7 +25,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
+from ..arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
 
 _TOUCH = 1e-12  # of a pair's extent: closer than this, triangles touch and planes are one
 _FOLD = 1e-9  # radians between two faces folded over their common edge

@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 import pyvista as pv
 
-from .arrays import FloatArray, IntArray
-from .errors import MeshError
+from ..arrays import FloatArray, IntArray
+from ..errors import MeshError
 from .polygons import polydata_of, polygons_of, rows
 
 _POINT_TEXTURE, _CORNER_TEXTURE = "TextureCoordinates", "TextureCorners"

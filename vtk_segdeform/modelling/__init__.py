@@ -1,0 +1,1 @@
+"""How `models` makes bodies: implicit surfaces, and triangles relaxed on them."""
