@@ -28,11 +28,11 @@ STORY = [
     "segmentation", "mean_value", "cages", "caging.columns", "caging.region_solid",
     "caging.cage_simplify", "cage_fit",
     # the solver
-    "subspace", "energy", "constraints", "positions", "solver", "solution", "targets", "deformer",
-    "pipeline",
+    "subspace", "energy", "constraints", "positions", "acceleration", "solver",
+    "solution", "targets", "deformer", "pipeline",
     # meshes from code, from files, and as pictures
     "modelling.remeshing", "modelling.implicit", "models", "formats.polygons", "formats.off",
-    "formats.ply", "formats.wavefront", "meshlab", "convert", "canvas", "pictures",
+    "formats.ply", "formats.wavefront", "formats.vtk_readers", "meshlab", "convert", "canvas", "pictures",
     # the command line
     "command_line.selection", "command_line.motion", "command_line.outputs", "command_line.demo",
     "command_line.bench", "command_line.commands", "cli", "__main__",
@@ -47,6 +47,7 @@ GRANTED = {
     "formats.off": {"pyvista"},
     "formats.ply": {"pyvista"},
     "formats.wavefront": {"pyvista"},
+    "formats.vtk_readers": {"pyvista"},
     "meshlab": {"pymeshlab"},
     "convert": VTK | {"pyvista"},
     "canvas": VTK | {"pyvista"},

@@ -178,7 +178,7 @@ def test_the_ellipsoid_of_a_patch_is_a_cage_around_it(mesh, n):
 
 def test_what_makes_no_cage_is_refused_with_a_reason():
     mesh = Mesh(*icosphere(2))
-    with pytest.raises(CageError, match="at least 8 for each of 3 regions, 24; got 23"):
+    with pytest.raises(CageError, match=r"at least 8 .* for each of 3 regions, 24 to 6000; got 23"):
         fit_cages(mesh, thirds(mesh), 23)
     with pytest.raises(CageError, match="offset must be a positive length; got -1"):
         fit_cage(mesh, [0, 1, 2], 12, offset=-1.0)

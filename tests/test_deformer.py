@@ -14,7 +14,7 @@ from vtk_segdeform.cages import Cage
 from vtk_segdeform.deformer import Deformer
 from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionError
 from vtk_segdeform.mesh import Mesh
-from vtk_segdeform.regions import cage_distance_weights
+from vtk_segdeform.regions import Regions, cage_distance_weights
 from vtk_segdeform.solver import Status
 
 SCENE = sausage(2)
@@ -181,6 +181,51 @@ def test_the_printed_blend_can_be_compared_and_nonsense_is_refused():
     )
     with pytest.raises(RegionError, match="sum to 1"):
         SCENE.deformer(blend=0.5 * printed)
+
+
+def test_with_nothing_held_rounding_carries_nothing_off_even_over_slivers():
+    vertices, faces = icosphere(3)
+    middle = 0.5 * (vertices[faces[0, 0]] + vertices[faces[0, 1]])
+    a, b, c = faces[0]
+    d = next(v for f in faces[1:] if a in f and b in f for v in f if v not in (a, b))
+    new = len(vertices)
+    kept = [f for f in faces if not {a, b} <= set(f)]
+    fan = [[a, new, c], [new, b, c], [new, a, d], [b, new, d]]
+    almost = middle + 1e-7 * (vertices[c] - middle)
+    mesh = Mesh(np.array([*vertices, almost]), np.array([*kept, *fan]))
+    cage = Cage(1.6 * icosphere(1)[0], icosphere(1)[1])
+    solution = Deformer(mesh, Regions.single(mesh), [cage]).solve(np.empty((0, 3)))
+    assert_allclose(solution.vertices, mesh.vertices, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("option", "says"),
+    [
+        ({"stretch": -1.0}, "stretch must be a number, 0 or more; got -1"),
+        ({"stretch": np.nan}, "stretch must be a number"),
+        ({"rotation_groups": 0}, "rotation groups must be a whole number, 1 or more; got 0"),
+        ({"tolerance": np.nan}, "tolerance must be a positive number"),
+        ({"max_steps": 0}, "max_steps must be a whole number, 1 or more"),
+        ({"window": -1}, "window must be a whole number, 0 or more"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused_by_name(option, says):
+    with pytest.raises(ValueError, match=says):
+        SCENE.deformer(**option)
+
+
+def test_a_target_in_another_unit_is_asked_about():
+    with pytest.raises(ConstraintError, match="are both in the same unit"):
+        SCENE.deformer().solve(1e6 * REST)
+    with pytest.raises(ConstraintError, match="are both in the same unit"):
+        SCENE.deformer().solve(REST + 1e200)
+
+
+def test_a_cage_so_large_that_it_moves_nothing_is_refused():
+    huge = Cage(1e6 * icosphere(1)[0], icosphere(1)[1])
+    scene = replace(SCENE, regions=Regions.single(SCENE.mesh), cages=(huge,))
+    with pytest.raises(CageError, match="make them fit more tightly"):
+        scene.deformer()
 
 
 def test_holding_elsewhere_needs_no_new_cages_and_changes_nothing_in_the_old():

@@ -167,6 +167,20 @@ def test_the_accelerated_answer_is_the_plain_iterations():
     assert groups <= 1e-2
 
 
+def test_a_handle_too_near_to_what_is_fixed_is_missed_gently_and_said_so():
+    # No pose of these cages puts both in place.  More and more weight on them wins 5 % of the
+    # error and sends the top of the cactus 0.8 diagonals away.
+    mesh = sd.models.cactus(2000)
+    height = mesh.vertices[:, 2]
+    handle = np.flatnonzero((height > 0.35) & (height < 0.45))
+    targets = mesh.vertices[handle] + [0.03, 0.0, 0.0]
+    solution = sd.deform(mesh, np.flatnonzero(height < 0.3), handle, targets)
+    assert solution.status is sd.Status.MISSED
+    assert solution.handle_error > 1e-3
+    assert abs(solution.volume_change) <= 1e-12
+    assert np.abs(solution.vertices - mesh.vertices).max() < 0.1 * mesh.diagonal
+
+
 def test_no_cage_reaches_for_what_is_far_away():
     # The point of several cages: moving the cage of one arm leaves the other arm alone.
     mesh = mesh_of("cactus")

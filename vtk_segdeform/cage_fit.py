@@ -44,7 +44,7 @@ _ATTEMPTS = 8  # 1, 1.25, 2, 4, 9, 28, 108, 517
 _ROUND = 0.2  # or more is the worst face of a good cage
 _NEAR = 0.2  # of the offset, or more, is the skin from a good cage
 _NODES, _NODES_PER_VERTEX = 3e5, 1e3  # of the grid: the larger is the most it may have
-_FEWEST = 8  # vertices of a cage
+_FEWEST, _MOST = 8, 2000  # vertices of a cage
 _SHELL = 6  # vertices, at least, of each part of a cage that is in parts
 _FLOOR = 12  # vertices that every region gets before the rest is shared out
 _CLEARANCE = 0.5  # of the offset: the least distance from the skin that faces are pushed to
@@ -131,10 +131,10 @@ def _share_out(patches: list[Patch], n_vertices: int) -> IntArray:
     around a limb for as many on a small one as on a large one: the root of the area is between.
     The root of length over width gives long regions, which bend, their share.
     """
-    fewest = _FEWEST * len(patches)
-    if n_vertices < fewest:
-        each = f"{_FEWEST} for each of {len(patches)} regions"
-        raise CageError(f"n_vertices must be at least {each}, {fewest}; got {n_vertices}")
+    fewest, most = _FEWEST * len(patches), _MOST * len(patches)
+    if n_vertices != int(n_vertices) or not fewest <= n_vertices <= most:
+        each = f"at least {_FEWEST} and at most {_MOST} for each of {len(patches)} regions"
+        raise CageError(f"n_vertices must be {each}, {fewest} to {most}; got {n_vertices}")
     area = np.array([patch.area for patch in patches])
     spread = np.array([patch.spread for patch in patches])
     need = np.sqrt(area * spread.sum(axis=1) / spread[:, 1:].sum(axis=1))

@@ -26,7 +26,8 @@ from .arrays import as_points
 from .errors import MeshError
 from .formats.off import read_off, write_off
 from .formats.ply import read_ply, write_ply
-from .formats.polygons import polydata_of, triangles_of
+from .formats.polygons import triangles_of
+from .formats.vtk_readers import read_with_vtk
 from .formats.wavefront import read_obj, write_obj
 from .mesh import Mesh
 
@@ -40,7 +41,6 @@ _WRITERS: dict[str, Callable[[Path, pv.PolyData], None]] = {
 }  # fmt: skip
 _VTK_READS = frozenset({".stl", ".vtk", ".vtp", ".vtu", ".vtkhdf", ".glb", ".gltf"})
 _VTK_WRITES = frozenset({".stl", ".vtk", ".vtp", ".vtkhdf"})
-_SURFACE_CELLS = frozenset({5, 7, 9})  # VTK's numbers of triangle, polygon, quadrangle
 
 
 def read_mesh(path: str | Path) -> Mesh:
@@ -86,7 +86,9 @@ def read_polydata(path: str | Path) -> pv.PolyData:
     """
     path = Path(path)
     if not path.is_file():
-        raise MeshError(f"{path}: there is no such file")
+        raise MeshError(
+            f"{path}: {'a folder, not a' if path.is_dir() else 'there is no such'} file"
+        )
     suffix = path.suffix.lower()
     known = {*_READERS, *_VTK_READS, *meshlab.READS}
     if suffix not in known:
@@ -95,7 +97,7 @@ def read_polydata(path: str | Path) -> pv.PolyData:
         if suffix in _READERS:
             surface = _READERS[suffix](path)
         elif suffix in _VTK_READS:
-            surface = _read_with_vtk(path)
+            surface = read_with_vtk(path)
         else:
             vertices, faces = meshlab.read_faces(path)
             surface = polydata_of(vertices, np.full(len(faces), 3), faces.ravel())
@@ -125,13 +127,9 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
         If the suffix is not known or the folder is not there.
     """
     path = Path(path)
+    require_writable(path)
     surface = to_polydata(mesh) if isinstance(mesh, Mesh) else mesh
     suffix = path.suffix.lower()
-    known = {*_WRITERS, *_VTK_WRITES, *meshlab.WRITES}
-    if suffix not in known:
-        raise MeshError(f"{path}: cannot write {suffix or 'no suffix'}; can {_listed(known)}")
-    if not path.parent.is_dir():
-        raise MeshError(f"{path}: there is no folder {path.parent}")
     # Beside the target, so that os.replace is a rename on one file system.
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=".segdeform-") as folder:
         draft = Path(folder) / path.name
@@ -142,6 +140,21 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
         else:
             meshlab.write(draft, mesh if isinstance(mesh, Mesh) else from_polydata(mesh))
         os.replace(draft, path)
+
+
+def require_writable(path: str | Path) -> None:
+    """Raise the MeshError that `write_mesh` would, before the work that is to be written."""
+    path = Path(path)
+    suffix = path.suffix.lower()
+    known = {*_WRITERS, *_VTK_WRITES, *meshlab.WRITES}
+    if path.is_dir():
+        raise MeshError(f"{path}: a folder is there; name a file")
+    if suffix not in known:
+        raise MeshError(f"{path}: cannot write {suffix or 'no suffix'}; can {_listed(known)}")
+    if not path.parent.is_dir():
+        raise MeshError(f"{path}: there is no folder {path.parent}")
+    if not os.access(path.parent, os.W_OK):
+        raise MeshError(f"{path}: the folder {path.parent} may not be written to")
 
 
 def to_polydata(mesh: Mesh) -> pv.PolyData:
@@ -200,44 +213,6 @@ def with_vertices(polydata: pv.PolyData, vertices: ArrayLike) -> pv.PolyData:
         for name in stale:
             attributes[name] = np.asarray(fresh, dtype=attributes[name].dtype)
     return moved
-
-
-def _read_with_vtk(path: Path) -> pv.PolyData:
-    """Return the surface that one of VTK's readers finds; its complaints become a MeshError."""
-    try:
-        with pv.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
-            data = pv.get_reader(path).read()
-    except RuntimeError as error:
-        raise MeshError(f"is no readable {path.suffix} file ({_last_line(error)})") from None
-    if isinstance(data, pv.MultiBlock):
-        parts = [part for part in data.recursive_iterator(skip_none=True) if part.n_cells]
-        surfaces = [_surface(part) for part in parts]
-        return surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
-    return _surface(data)
-
-
-def _surface(data: pv.DataSet) -> pv.PolyData:
-    if isinstance(data, pv.PolyData):
-        return data
-    if not isinstance(data, pv.UnstructuredGrid):
-        raise MeshError(f"holds a {type(data).__name__}, not a surface")
-    if not set(data.celltypes.tolist()) <= _SURFACE_CELLS:
-        raise MeshError("holds cells other than triangles and polygons; extract its surface first")
-    counts = np.diff(pv.convert_array(data.GetCells().GetOffsetsArray()))
-    surface = polydata_of(np.asarray(data.points, dtype=float), counts, data.cell_connectivity)
-    for mine, theirs in (
-        (surface.point_data, data.point_data),
-        (surface.cell_data, data.cell_data),
-        (surface.field_data, data.field_data),
-    ):
-        for name, values in theirs.items():
-            mine[name] = values
-    return surface
-
-
-def _last_line(error: Exception) -> str:
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    return lines[-1] if lines else type(error).__name__
 
 
 def _listed(suffixes: set[str]) -> str:

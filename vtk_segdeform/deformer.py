@@ -7,6 +7,8 @@
 
 All of it happens in a frame of the mesh's own, its vertices centred in a ball of diameter 1, so
 that neither the unit of the scene nor its place matters, nor, as with a box, how it is turned.
+
+Long because every option of the method meets here, and each is told in the docstring.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ from .constraints import VolumeConstraint, region_volumes, total_volume
 from .energy import shape_energy
 from .errors import CageError, ConstraintError, RegionError
 from .mesh import Mesh
-from .positions import checked_constraints, connected_sets, position_term
+from .positions import checked_constraints, checked_targets, connected_sets, position_term
 from .progress import Progress, part
 from .regions import Regions
 from .rotations import rotation_groups as group_by_part
@@ -35,7 +37,10 @@ from .targets import waypoints
 from .volume import signed_volume
 
 _LEG_TOLERANCE, _LEG_STEPS = 1e-3, 12  # for the targets on the way to a far one
-_POSITION_WEIGHT = 1e3  # of the shape energy's trace, shared out over each handle's vertices
+_POSITION_WEIGHT = 1e2  # of the shape energy's trace, shared out over each handle's vertices
+_WORTH, _COST = 0.7, 2.0  # more weight must bring errors down to this, at this rise of the energy
+_FAR = 1e3  # mesh sizes
+_MET = 1e-3  # diagonals within which a vertex counts as in its place
 
 
 class Deformer:
@@ -98,7 +103,7 @@ class Deformer:
         preserve_region_volumes: bool = False,
         stretch: float = 10.0,
         rotation_groups: int | None = 300,
-        tolerance: float = 1e-6,
+        tolerance: float = 1e-7,
         max_steps: int = 500,
         window: int = 5,
         exact_volume: bool = True,
@@ -156,8 +161,7 @@ class Deformer:
         expected, got = [cage.n_vertices for cage in self.cages], [len(pose) for pose in poses]
         if got != expected:
             raise CageError(f"cage_vertices must hold {expected} points, cage by cage; got {got}")
-        targets = self._inward(self._checked_targets(targets))
-        self.reset()
+        targets = self._inward(checked_targets(targets, len(self.handle)))
         self._p, self._targets = self._inward(np.concatenate(poses)), targets
 
     def solve(self, targets: ArrayLike, *, max_steps: int | None = None) -> Solution:
@@ -177,20 +181,35 @@ class Deformer:
         ConstraintError
             If *targets* has the wrong shape or holds NaN or infinite coordinates.
         """
-        goal = self._inward(self._checked_targets(targets))
+        goal = self._inward(checked_targets(targets, len(self.handle)))
+        if np.abs(goal).max(initial=0.0) > _FAR:
+            raise ConstraintError(
+                f"a target is {np.abs(goal).max():.0e} times the mesh's size away from it; "
+                "are both in the same unit?"
+            )
         limit = self._options.max_steps if max_steps is None else max_steps
         options = replace(self._options, max_steps=limit)
         *way, _ = waypoints(self._targets, goal, self._handles)
         on_the_way = replace(options, tolerance=_LEG_TOLERANCE, max_steps=_LEG_STEPS)
         steps = sum(self._move(leg, on_the_way).steps for leg in way)
-        while True:
-            result = self._move(goal, options)
-            steps += result.steps
-            errors = np.linalg.norm(result.x[self._held] - self._places(goal), axis=1)
+        result = self._move(goal, options)
+        steps += result.steps
+        while result.status is not Status.STEP_LIMIT:
+            errors = self._errors(result)
             stiffer = self._solver.positions.stiffened(errors, self._hold_tolerance)
-            if stiffer is None or result.status is Status.STEP_LIMIT:
-                return self._solution(result, steps)
-            self._solver = replace(self._solver, positions=stiffer)
+            if stiffer is None:
+                break
+            looser = self._solver
+            self._solver = replace(looser, positions=stiffer)
+            held = self._move(goal, options)
+            steps += held.steps
+            # Where a cage cannot put a vertex in place, weight wins nothing and wrecks the rest.
+            gain = self._errors(held).max() / errors.max()
+            if gain > _WORTH or held.shape > _COST * result.shape:
+                self._solver, self._p = looser, result.p
+                break
+            result = held
+        return self._solution(result, steps)
 
     def _take_hold(self, fixed: ArrayLike, handle: ArrayLike) -> None:
         mesh = self.mesh
@@ -209,13 +228,21 @@ class Deformer:
         self._p, self._targets = result.p, targets
         return result
 
+    def _errors(self, result: Iteration) -> FloatArray:
+        return np.asarray(
+            np.linalg.norm(result.x[self._held] - self._places(self._targets), axis=1)
+        )
+
     def _places(self, targets: FloatArray) -> FloatArray:
         return np.concatenate([targets, self._rest.vertices[self.fixed]])
 
     def _solution(self, result: Iteration, steps: int) -> Solution:
         x, rest = result.x, self._rest
-        handle = np.linalg.norm(x[self.handle] - self._targets, axis=1)
-        fixed = np.linalg.norm(x[self.fixed] - rest.vertices[self.fixed], axis=1)
+        errors = self._errors(result) * self._size / self.mesh.diagonal
+        handle, fixed = np.split(errors, [len(self.handle)])
+        status = result.status
+        if status is Status.CONVERGED and errors.max(initial=0.0) > _MET:
+            status = Status.MISSED
         before = signed_volume(rest.vertices, rest.faces)
         p = self._outward(result.p)
         columns = self._solver.energy.subspace.columns
@@ -224,24 +251,12 @@ class Deformer:
             cage_vertices=tuple(p[c] for c in columns),
             volume_change=signed_volume(x, rest.faces) / before - 1.0,
             region_volume_change=np.array([v.violation(x) / v.target for v in self._volumes]),
-            handle_error=float(handle.max(initial=0.0)) * self._size / self.mesh.diagonal,
-            fixed_error=float(fixed.max(initial=0.0)) * self._size / self.mesh.diagonal,
+            handle_error=float(handle.max(initial=0.0)),
+            fixed_error=float(fixed.max(initial=0.0)),
             steps=steps,
-            status=result.status,
+            status=status,
             merits=result.merits,
         )
-
-    def _checked_targets(self, targets: ArrayLike) -> FloatArray:
-        try:
-            array = as_points(targets, "targets") if len(self.handle) else np.empty((0, 3))
-        except ValueError as fault:
-            raise ConstraintError(str(fault)) from None
-        if array.shape != (len(self.handle), 3):
-            raise ConstraintError(
-                f"targets must give one point for each of the {len(self.handle)} handle vertices; "
-                f"got shape {array.shape}"
-            )
-        return array
 
     def _inward(self, points: FloatArray) -> FloatArray:
         return np.asarray((points - self._centre) / self._size)

@@ -93,6 +93,8 @@ def shape_energy(mesh: Mesh, subspace: Subspace, stretch: float, groups: IntArra
     groups : (n,) int or None
         The rotation group of each vertex; None gives each vertex its own rotation.
     """
+    if not 0.0 <= stretch < np.inf:
+        raise ValueError(f"stretch must be a number, 0 or more; got {stretch}")
     vertices, faces = mesh.vertices, mesh.faces
     areas = mixed_voronoi_areas(vertices, faces)
     laplacian = cotangent_laplacian(vertices, faces)

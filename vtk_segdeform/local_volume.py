@@ -27,7 +27,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from .arrays import FloatArray, IntArray
+from .arrays import FloatArray, IntArray, as_points
 from .mesh import Mesh
 from .volume import volume_gradient
 
@@ -48,7 +48,7 @@ class LocalVolume:
     """
 
     def __init__(self, mesh: Mesh) -> None:
-        self._faces = mesh.faces
+        self._faces, self._shape = mesh.faces, mesh.vertices.shape
         self._opposite, diameter = _opposite_vertices(mesh)
         n = mesh.n_vertices
         ring = (mesh.adjacency > 0).astype(float) + sparse.eye_array(n)
@@ -65,6 +65,9 @@ class LocalVolume:
 
         Vertices over (almost) no flesh at rest, on the rim of a thin plate say, get 0.
         """
+        vertices = as_points(vertices, "vertices")
+        if vertices.shape != self._shape:
+            raise ValueError(f"vertices must have shape {self._shape}; got {vertices.shape}")
         now = self._smoothed(vertices)
         return np.divide(now - self._rest, self._rest, where=self._trusted, out=np.zeros(len(now)))
 

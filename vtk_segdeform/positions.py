@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from .arrays import FloatArray, IntArray, as_ids
+from .arrays import FloatArray, IntArray, as_ids, as_points
 from .errors import ConstraintError
 from .mesh import Mesh
 
@@ -87,6 +87,20 @@ def checked_constraints(
             "take them out of one of the two"
         )
     return fixed, handle
+
+
+def checked_targets(targets: ArrayLike, n_handle: int) -> FloatArray:
+    """Return *targets* as (n_handle, 3), or raise a ConstraintError; without handles, any empty."""
+    try:
+        array = as_points(targets, "targets") if n_handle or np.size(targets) else np.empty((0, 3))
+    except ValueError as fault:
+        raise ConstraintError(str(fault)) from None
+    if len(array) != n_handle:
+        raise ConstraintError(
+            f"targets must give one point for each of the {n_handle} handle vertices; "
+            f"got shape {array.shape}"
+        )
+    return array
 
 
 def connected_sets(mesh: Mesh, ids: IntArray) -> list[IntArray]:

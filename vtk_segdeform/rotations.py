@@ -73,6 +73,8 @@ def group_by_position(positions: FloatArray, n_groups: int, *, rounds: int = 5) 
 
 def rotation_groups(positions: FloatArray, parts: IntArray, n_groups: int) -> IntArray:
     """Return (n,) int: about *n_groups* clusters of position, none of which spans two *parts*."""
+    if n_groups != int(n_groups) or n_groups < 1:
+        raise ValueError(f"rotation groups must be a whole number, 1 or more; got {n_groups}")
     groups = np.empty(len(positions), dtype=np.int64)
     used = 0
     for k in range(int(parts.max()) + 1):

@@ -84,8 +84,10 @@ def segment(
     The same for the same arguments, and for a mesh moved, turned or scaled, up to rounding.
     """
     n = mesh.n_vertices
-    if n_regions is not None and not (n_regions == int(n_regions) and 1 <= n_regions <= n):
-        raise RegionError(f"n_regions must be a whole number in 1..{n}; got {n_regions}")
+    if n_regions is not None:
+        if not (1 <= n_regions <= n and n_regions == int(n_regions)):
+            raise RegionError(f"n_regions must be a whole number in 1..{n}; got {n_regions}")
+        n_regions = int(n_regions)
     _tell(progress, 0.0, "thinning out vertices")
     shape = _without_ties(mesh)
     if n_regions is not None and n_regions <= mesh.components.max() + 1:

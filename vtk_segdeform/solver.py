@@ -16,17 +16,15 @@ Three things are added, each told by a number from the cactus bent by 60 degrees
 
 1. *Exact volume.*  Along Z = H^-1 G^T the volume is a cubic of the step length; its root is the
    last operation of every step.  |dV| / V is then about 1e-15; (21) alone leaves 1e-4.
-2. *Anderson acceleration.*  (21) is a fixed-point map p -> q(p) that converges slowly, because
-   rotations follow one by one.  The next p is the combination of the last few q whose residuals
-   q - p cancel best.  Hundreds of steps become tens.
+2. *Anderson acceleration* (`acceleration`).  (21) is a fixed-point map p -> q(p) that converges
+   slowly, because rotations follow one by one.  Hundreds of steps become tens.
 3. *Safeguard.*  All iterates meet the constraints, so the objective itself is the merit: an
    accelerated step that raises it is thrown away for the plain one, and a plain step that raises
    it is shortened, epsilon of section 3.3.
 
 Source
 ------
-Section 3.3 of the paper.  D. G. Anderson, "Iterative procedures for nonlinear integral
-equations", J. ACM 12(4), 1965.  Y. Peng, B. Deng, J. Zhang, F. Geng, W. Qin, L. Liu, "Anderson
+Section 3.3 of the paper.  Y. Peng, B. Deng, J. Zhang, F. Geng, W. Qin, L. Liu, "Anderson
 acceleration for geometry optimization and physics simulation", SIGGRAPH 2018 (the safeguard).
 """
 
@@ -40,9 +38,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import linalg
 
+from .acceleration import Anderson
 from .arrays import FloatArray
 from .constraints import VolumeConstraint, restore
 from .energy import Energy
+from .errors import CageError
 from .positions import PositionTerm
 
 _RISE = 1e-13  # relative rise of the merit that counts as rounding
@@ -56,6 +56,10 @@ class Status(enum.Enum):
     CONVERGED = "converged"
     STEP_LIMIT = "stopped at the step limit; solve again to go on, or raise max_steps"
     STALLED = "no shorter step improves the shape; the targets may be out of reach"
+    MISSED = (
+        "converged, but not every handle or fixed vertex is in its place: "
+        "use more cage vertices, move less, or leave more room between handle and fixed vertices"
+    )
 
     def __str__(self) -> str:
         return self.value
@@ -65,10 +69,18 @@ class Status(enum.Enum):
 class SolverOptions:
     """How to iterate; the defaults are what the interactive editor uses."""
 
-    tolerance: float = 1e-6  # root-mean-square move of the surface in a step, mesh size 1
+    tolerance: float = 1e-7  # root-mean-square move of the surface in a step, mesh size 1
     max_steps: int = 500
     window: int = 5  # Anderson's memory; 0 is the plain iteration of the paper
     exact_volume: bool = True  # False leaves the linearised multiplier of (21), for comparison
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.tolerance < math.inf:
+            raise ValueError(f"tolerance must be a positive number; got {self.tolerance}")
+        if self.max_steps != int(self.max_steps) or self.max_steps < 1:
+            raise ValueError(f"max_steps must be a whole number, 1 or more; got {self.max_steps}")
+        if self.window != int(self.window) or self.window < 0:
+            raise ValueError(f"window must be a whole number, 0 or more; got {self.window}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +93,7 @@ class Iteration:
     status: Status
     steps: int
     step_size: float  # of the last step, root mean square over the surface
+    shape: float  # E(p): the objective without the position term
     merits: tuple[float, ...]  # the objective at the start and after each step
 
 
@@ -90,6 +103,7 @@ class _Point:
     x: FloatArray
     merit: float
     slope: FloatArray  # d
+    shape: float
 
 
 @dataclass(eq=False)
@@ -107,12 +121,21 @@ class GaussNewton:
         # near zero) leave H singular.  A share of the identity damps the step there; d is
         # untouched, and with it every point where the iteration can rest.
         trace = np.trace(hessian) / len(hessian)
-        damping = np.full(len(hessian), _DAMPING * trace)
-        self._factor = linalg.cho_factor(hessian + np.diag(damping))
+        damping = np.diag(np.full(len(hessian), _DAMPING * trace))
+        if not len(self.positions.rows):  # nothing holds the whole: rounding would carry it off
+            mean = self.energy.subspace.adjoint(np.ones((self.energy.subspace.n_vertices, 1)))
+            damping += trace * (mean @ mean.T) / np.vdot(mean, mean)
+        try:
+            self._factor = linalg.cho_factor(hessian + damping)
+        except linalg.LinAlgError:
+            raise CageError(
+                "the cages hardly move the mesh, so no pose can be solved for: "
+                "make them fit more tightly"
+            ) from None
 
     def minimise(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> Iteration:
         """Iterate from cage vertices *p* (m, 3) for positions *targets* (k, 3)."""
-        memory = _Anderson(options.window)
+        memory = Anderson(options.window)
         multipliers = np.zeros(len(self.constraints))
         here = self._evaluate(p, self.energy.subspace.map(p), targets)
         merits = [here.merit]
@@ -137,7 +160,9 @@ class GaussNewton:
             here = ahead
             merits.append(here.merit)
         steps = len(merits) - 1
-        return Iteration(here.p, here.x, multipliers, status, steps, size, tuple(merits))
+        return Iteration(
+            here.p, here.x, multipliers, status, steps, size, here.shape, tuple(merits)
+        )
 
     def _step(self, here: _Point) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
         """Return h and lambda of (21), and the directions Z in which the volume is restored."""
@@ -163,7 +188,7 @@ class GaussNewton:
     ) -> _Point:
         """Return *p* moved along *directions* onto the constraints, and the objective there."""
         if not np.isfinite(p).all():
-            return _Point(p, p, np.inf, p)
+            return _Point(p, p, np.inf, p, np.inf)
         if not directions or not options.exact_volume:
             return self._evaluate(p, self.energy.subspace.map(p), targets)
         x, *fields = np.split(
@@ -178,7 +203,7 @@ class GaussNewton:
     def _evaluate(self, p: FloatArray, x: FloatArray, targets: FloatArray) -> _Point:
         shape, shape_slope = self.energy.local_step(p, x)
         pull, pull_slope = self.positions.value_and_slope(p, targets)
-        return _Point(p, x, shape + pull, shape_slope + pull_slope)
+        return _Point(p, x, shape + pull, shape_slope + pull_slope, shape)
 
     def _shortened(
         self,
@@ -203,34 +228,3 @@ class GaussNewton:
 
     def _size(self, step: FloatArray) -> float:
         return math.sqrt(max(0.0, float(np.vdot(step, self.energy.mass @ step))))
-
-
-class _Anderson:
-    """The last few (p, h) and the combination of them whose residual is smallest.
-
-    Residuals are measured by H: plain distances between cage vertices count what moves nothing,
-    and take a sixth more steps.
-    """
-
-    def __init__(self, window: int) -> None:
-        self._window = window
-        self.forget()
-
-    def forget(self) -> None:
-        """Start again from the next step."""
-        self._last: tuple[FloatArray, FloatArray] | None = None
-        self._moves: list[FloatArray] = []  # differences of q = p + h
-        self._changes: list[FloatArray] = []  # differences of the residual
-
-    def extrapolate(self, p: FloatArray, h: FloatArray, residual: FloatArray) -> FloatArray:
-        """Return the accelerated successor of *p*, whose plain successor is p + h."""
-        q = p + h
-        if self._last is not None:
-            self._moves = [*self._moves, (q - self._last[0]).ravel()][-self._window :]
-            changes = [*self._changes, (residual - self._last[1]).ravel()]
-            self._changes = changes[-self._window :]
-        self._last = q, residual
-        if not self._changes:
-            return q
-        gamma = np.linalg.lstsq(np.array(self._changes).T, residual.ravel(), rcond=1e-10)[0]
-        return q - (gamma @ np.array(self._moves)).reshape(p.shape)

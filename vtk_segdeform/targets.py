@@ -20,6 +20,7 @@ from .rotations import rigid_fit
 
 _LONGEST_TURN = np.radians(30.0)
 _LONGEST_MOVE = 0.2  # of the mesh's size
+_MOST_LEGS = 50
 _HALF_TURN = 1e-6  # radians short of 180 degrees that count as 180
 
 
@@ -67,7 +68,7 @@ class _Screw:
             arms = np.cross(start - self._centre, self._axis)
             way = np.maximum(way, self._angle * np.linalg.norm(arms, axis=1))
         ratio = max(self._angle / _LONGEST_TURN, float(way.max()) / _LONGEST_MOVE)
-        self.legs = int(np.ceil(ratio - 1e-6))
+        self.legs = min(int(np.ceil(ratio - 1e-6)), _MOST_LEGS)
 
     def at(self, s: float) -> FloatArray:
         points = self._start + s * self._rest

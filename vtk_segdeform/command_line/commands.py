@@ -60,6 +60,7 @@ def bench(options: Namespace, say: Say, progress: Progress) -> bool:
 
 def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     """Move the handles of a mesh and write it, all its arrays and texture coordinates kept."""
+    convert.require_writable(options.output)
     surface, mesh = _read(options.input)
     fixed = parse_selection(options.fixed, mesh, point_arrays=surface.point_data, role="fixed")
     handle, targets = _handles(options.handles, surface, mesh, fixed)
@@ -80,7 +81,12 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     if options.picture is not None:
         picture_before_after(options.picture, mesh, solution.vertices, fixed=fixed, handle=handle)
         say(f"written         {options.picture}")
-    return solution.handle_error <= HANDLE_MET
+    if solution.handle_error > HANDLE_MET:
+        raise MeshError(
+            f"{options.output} is written, but a handle misses its target by "
+            f"{solution.handle_error:.1e} of the diagonal: {solution.status}"
+        )
+    return True
 
 
 def check(options: Namespace, say: Say, progress: Progress) -> bool:
@@ -112,6 +118,8 @@ def check(options: Namespace, say: Say, progress: Progress) -> bool:
 
 def regions(options: Namespace, say: Say, progress: Progress) -> bool:
     """Cut a mesh into regions; say how large they are, write them as point array "region"."""
+    if options.output is not None:
+        convert.require_writable(options.output)
     surface, mesh = _read(options.input)
     found = _regions(options, surface, mesh, progress)
     tell_regions(found, say)
