@@ -32,7 +32,8 @@ STORY = [
     "solution", "targets", "deformer", "pipeline",
     # meshes from code, from files, and as pictures
     "modelling.remeshing", "modelling.implicit", "models", "formats.polygons", "formats.off",
-    "formats.ply", "formats.wavefront", "formats.vtk_readers", "meshlab", "convert", "canvas", "pictures",
+    "formats.ply", "formats.wavefront", "formats.vtk_readers", "meshlab", "convert", "canvas",
+    "pictures",
     # the command line
     "command_line.selection", "command_line.motion", "command_line.outputs", "command_line.demo",
     "command_line.bench", "command_line.commands", "cli", "__main__",

@@ -26,7 +26,7 @@ from .arrays import as_points
 from .errors import MeshError
 from .formats.off import read_off, write_off
 from .formats.ply import read_ply, write_ply
-from .formats.polygons import triangles_of
+from .formats.polygons import polydata_of, triangles_of
 from .formats.vtk_readers import read_with_vtk
 from .formats.wavefront import read_obj, write_obj
 from .mesh import Mesh
