@@ -1,0 +1,91 @@
+"""Arrays and a header in one file, an uncompressed zip that ``numpy.load`` reads as any .npz.
+
+Nothing in a file is believed.  An array is read only once its shape and type are those that the
+caller expects, and not before its bytes are known to be in the file; checksums are compared.
+Nothing in a file is run either: no pickle.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Mapping
+from io import BytesIO
+from typing import IO, Any
+
+import numpy as np
+from numpy.lib import format as npy
+
+_HEADER = "header.json"
+_LONGEST_HEADER = 1 << 20  # bytes
+_LONGEST_NPY_HEADER = 1 << 12  # bytes, more than any array needs
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # what is the same is the same file
+_TYPES = {"f": np.dtype("<f8"), "i": np.dtype("<i8"), "b": np.dtype("|b1")}
+
+
+def write_archive(file: IO[bytes], header: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
+    """Write a *header*, plain enough for JSON, and *arrays* of float64, int64 or bool."""
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+        archive.writestr(zipfile.ZipInfo(_HEADER, _EPOCH), json.dumps(header, indent=1))
+        for name, array in arrays.items():
+            content = BytesIO()
+            npy.write_array(content, array.astype(_TYPES[array.dtype.kind]), allow_pickle=False)
+            archive.writestr(zipfile.ZipInfo(f"{name}.npy", _EPOCH), content.getbuffer())
+
+
+class Archive:
+    """The header and the arrays of an open file, each read only if it is what is expected.
+
+    Parameters
+    ----------
+    archive : zipfile.ZipFile
+        Open for reading.
+    size : int
+        Bytes of the whole file.
+    """
+
+    def __init__(self, archive: zipfile.ZipFile, size: int) -> None:
+        self._archive = archive
+        self._left = size  # bytes: members may not overlap to make more of the file than it is
+
+    def header(self) -> Any:
+        """Return what ``header.json`` says."""
+        return json.loads(self._bytes(_HEADER, _LONGEST_HEADER))
+
+    def array(self, name: str, kind: str, shape: tuple[int, ...]) -> Any:
+        """Return the array *name*, of *kind* "f", "i" or "b", if it has the *shape*.
+
+        Raises
+        ------
+        ValueError, OSError, zipfile.BadZipFile
+            If there is no such array, it is another, or its bytes are not those written.
+        """
+        dtype = _TYPES[kind]
+        size = dtype.itemsize
+        for count in shape:  # plain integers, which do not overflow
+            size *= count
+        content = BytesIO(self._bytes(f"{name}.npy", size + _LONGEST_NPY_HEADER))
+        if npy.read_magic(content) != (1, 0):
+            raise ValueError(f"{name} has another layout than this program writes")
+        found, fortran, kept = npy.read_array_header_1_0(
+            content, max_header_size=_LONGEST_NPY_HEADER
+        )
+        if (found, kept) != (shape, dtype):
+            raise ValueError(f"{name} must be {dtype} of shape {shape}; it is {kept} of {found}")
+        data = content.read()
+        if len(data) != size:
+            raise ValueError(f"{name} must hold {size} bytes; it holds {len(data)}")
+        if kind == "b" and max(data, default=0) > 1:
+            raise ValueError(f"{name} holds bytes that are neither true nor false")
+        array = np.frombuffer(data, dtype).reshape(shape, order="F" if fortran else "C")
+        return array.astype(dtype.newbyteorder("="))
+
+    def _bytes(self, name: str, limit: int) -> bytes:
+        if name not in self._archive.namelist():
+            raise ValueError(f"{name} is missing")
+        info = self._archive.getinfo(name)
+        size = max(info.file_size, info.compress_size)
+        if info.compress_type != zipfile.ZIP_STORED or size > min(limit, self._left):
+            raise ValueError(f"{name} is packed, or larger than it can be: {size} bytes")
+        self._left -= size
+        return self._archive.read(info)  # and compares the checksum

@@ -1,0 +1,194 @@
+"""What a session is at one moment.
+
+A `State` is frozen and its arrays are never written to, so that states share whatever did not
+change between them.  A step of history costs what it changed: a painted region one mask per
+region, a drag the vertices of the cages (m, 3) and the targets of the handles (k, 3).  The mesh,
+and the vertices of a pose, are in no state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from .arrays import FloatArray, IntArray, as_points, frozen
+from .cages import Cage
+from .errors import CageError, ConstraintError, RegionError, SegDeformError
+from .listeners import Change
+from .mesh import Mesh
+from .positions import checked_constraints
+from .regions import Regions
+
+_TINY = float(np.finfo(np.float64).tiny)
+
+
+class SessionError(SegDeformError, ValueError):
+    """An option, a name or a file that makes no sense to a session; the text says what would."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """How cages are fitted and poses solved for.
+
+    Parameters
+    ----------
+    n_cage_vertices : int
+        Of all cages together, for the next time they are fitted.
+    offset : float, optional
+        How far cages stay from the skin, in the mesh's unit; None chooses.  Likewise.
+    preserve_volume, preserve_region_volumes : bool
+        Hold the enclosed volume exactly; hold that of every region as well.
+    stretch : float
+        Strength of the stretch term relative to the detail term; 0 is the paper's energy.
+    rotation_groups : int, optional
+        How many rotations the detail turns by; None is one per vertex.
+
+    Raises
+    ------
+    SessionError
+        If a value is of the wrong kind or out of range.
+    """
+
+    n_cage_vertices: int = 155
+    offset: float | None = None
+    preserve_volume: bool = True
+    preserve_region_volumes: bool = False
+    stretch: float = 10.0
+    rotation_groups: int | None = 300
+
+    def __post_init__(self) -> None:
+        for name in ("preserve_volume", "preserve_region_volumes"):
+            if not isinstance(getattr(self, name), bool):
+                raise SessionError(f"{name} must be True or False; got {getattr(self, name)!r}")
+        _require_number("n_cage_vertices", self.n_cage_vertices, 8, whole=True)
+        _require_number("stretch", self.stretch, 0.0)
+        if self.offset is not None:
+            _require_number("offset", self.offset, _TINY)
+        if self.rotation_groups is not None:
+            _require_number("rotation_groups", self.rotation_groups, 1, whole=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Where the cages are, from which all else follows, and what for; read-only arrays."""
+
+    cage_vertices: tuple[FloatArray, ...]
+    """One (m_r, 3) float per region."""
+    targets: Mapping[str, FloatArray]
+    """For each handle (k, 3) float: where its vertices were to go."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """All that a session holds besides its mesh of n vertices; shared, never changed in place."""
+
+    regions: Regions | None = None
+    cages: tuple[Cage, ...] = ()
+    """At rest, one for each region, or none."""
+    fixed: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    """(f,) int."""
+    handles: Mapping[str, IntArray] = field(default_factory=lambda: MappingProxyType({}))
+    """(k,) int by name."""
+    pose: Pose | None = None
+    """None is rest."""
+    options: Options = field(default_factory=Options)
+
+    @property
+    def handle(self) -> IntArray:
+        """(k,) int: the vertices of all handles, one handle after the other."""
+        return np.concatenate([np.empty(0, dtype=np.int64), *self.handles.values()])
+
+    def changes(self, other: State) -> Change:
+        """Tell in what *other* is another state."""
+        pairs = (
+            (Change.REGIONS, self.regions is other.regions),
+            (Change.CAGES, self.cages == other.cages),  # the very same ones
+            (Change.CONSTRAINTS, self.fixed is other.fixed and self.handles is other.handles),
+            (Change.POSE, self.pose is other.pose),
+            (Change.OPTIONS, self.options == other.options),
+        )
+        changed = Change(0)
+        for change, same in pairs:
+            changed |= Change(0) if same else change
+        return changed
+
+
+def checked_state(mesh: Mesh, state: State) -> State:
+    """Return *state* with arrays of its own, or raise an error that says what does not fit.
+
+    Raises
+    ------
+    RegionError
+        If the regions are of another mesh.
+    CageError
+        If there is not one cage per region, a cage leaves out part of its region, or the pose has
+        other cages.
+    ConstraintError
+        If fixed vertices or handles are no vertices of *mesh* or share one, or the targets of the
+        pose are not theirs.
+    """
+    regions = None if state.regions is None else of_mesh(mesh, state.regions)
+    cages = fitting_cages(regions, state.cages) if state.cages else ()
+    fixed, handle = checked_constraints(mesh, state.fixed, state.handle)
+    lengths = [len(ids) for ids in state.handles.values()]
+    if not all(lengths):
+        raise ConstraintError("each handle must have a vertex or more; leave out empty ones")
+    handles = dict(zip(state.handles, np.split(handle, np.cumsum(lengths)[:-1]), strict=True))
+    pose = state.pose and _checked_pose(cages, lengths, list(handles), state.pose)
+    owned = MappingProxyType({name: _own(ids) for name, ids in handles.items()})
+    return State(regions, cages, _own(fixed), owned, pose, state.options)
+
+
+def of_mesh(mesh: Mesh, regions: Regions) -> Regions:
+    """Return *regions*, or a RegionError if they are of another mesh."""
+    if regions.mesh is mesh:
+        return regions
+    for mine, theirs in ((mesh.vertices, regions.mesh.vertices), (mesh.faces, regions.mesh.faces)):
+        if not np.array_equal(mine, theirs):
+            raise RegionError("these regions are of another mesh; make them anew on this one")
+    return Regions(mesh, regions.membership, regions.smoothness)
+
+
+def fitting_cages(regions: Regions | None, cages: Sequence[Cage]) -> tuple[Cage, ...]:
+    """Return *cages* as a tuple, or a CageError unless there is one around each region."""
+    if regions is None:
+        raise CageError("there are no regions to put cages around; make regions first")
+    if len(cages) != regions.n_regions:
+        raise CageError(f"{regions.n_regions} regions need as many cages; got {len(cages)}")
+    for r, cage in enumerate(cages):
+        cage.require_encloses(regions.mesh.vertices[regions.membership[r]], f"region {r}")
+    return tuple(cages)
+
+
+def _require_number(name: str, value: float, least: float, *, whole: bool = False) -> None:
+    number = isinstance(
+        value, int | np.integer if whole else int | float | np.number
+    ) and not isinstance(value, bool)
+    if not number or not least <= value < np.inf:
+        kind = "a whole number" if whole else "a number"
+        bound = "above 0" if least == _TINY else f"from {least:g} up"
+        raise SessionError(f"{name} must be {kind} {bound}; got {value!r}")
+
+
+def _checked_pose(
+    cages: Sequence[Cage], lengths: Sequence[int], names: Sequence[str], pose: Pose
+) -> Pose:
+    places = [as_points(points, "cage_vertices") for points in pose.cage_vertices]
+    expected, got = [cage.n_vertices for cage in cages], [len(points) for points in places]
+    if not cages or got != expected:
+        raise CageError(f"the pose must hold {expected} points, cage by cage; got {got}")
+    if list(pose.targets) != list(names):
+        raise ConstraintError(f"the pose has targets for {list(pose.targets)}, not {list(names)}")
+    targets = {name: as_points(points, "targets") for name, points in pose.targets.items()}
+    if [len(points) for points in targets.values()] != list(lengths):
+        raise ConstraintError("the pose must have one target for each vertex of each handle")
+    owned = MappingProxyType({name: _own(points) for name, points in targets.items()})
+    return Pose(tuple(_own(points) for points in places), owned)
+
+
+def _own(array: Any) -> Any:
+    return frozen(array.copy())
