@@ -71,6 +71,7 @@ class _Screw:
         self.legs = min(int(np.ceil(ratio - 1e-6)), _MOST_LEGS)
 
     def at(self, s: float) -> FloatArray:
+        """Return the handle after the share *s* of its way, (k, 3)."""
         points = self._start + s * self._rest
         if self._centre is None:
             return points + s * self._shift
