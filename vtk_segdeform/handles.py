@@ -17,7 +17,7 @@ from .arrays import FloatArray, IntArray, as_points, frozen
 from .errors import ConstraintError
 from .mesh import Mesh
 from .positions import checked_constraints
-from .state import Pose, State
+from .state import Pose, State, pieces
 
 Handles = Mapping[str, IntArray]
 Targets = Mapping[str, FloatArray]
@@ -133,14 +133,23 @@ def checked_targets(
     if not isinstance(targets, Mapping):
         lengths = [len(ids) for ids in handles.values()]
         points = _checked_points(mesh, targets, sum(lengths), "all handles")
-        pieces = np.split(points, np.cumsum(lengths)[:-1])
-        return {name: _own(piece) for name, piece in zip(handles, pieces, strict=True)}
+        pairs = zip(handles, pieces(points, lengths), strict=True)
+        return {name: _own(piece) for name, piece in pairs}
     for name in targets:
         require_handle(handles, name)
     return {
         name: _own(_checked_points(mesh, points, len(handles[name]), name))
         for name, points in targets.items()
     }
+
+
+def require_near(mesh: Mesh, points: FloatArray, name: str) -> None:
+    """Raise a ConstraintError if some of *points* are senselessly far from *mesh*."""
+    away = np.abs(points - mesh.vertices.mean(axis=0)).max(initial=0.0) / mesh.diagonal
+    if not away <= _FARTHEST:
+        raise ConstraintError(
+            f"{name} are {away:.3g} diagonals of the mesh away; at most {_FARTHEST:.0f} are allowed"
+        )
 
 
 def moved(points: FloatArray, matrix: ArrayLike) -> FloatArray:
@@ -160,12 +169,7 @@ def _checked_points(mesh: Mesh, targets: ArrayLike, count: int, name: str) -> Fl
         raise ConstraintError(str(fault)) from None
     if len(points) != count:
         raise ConstraintError(f"targets of {name} must be {count} points; got {len(points)}")
-    away = np.abs(points - mesh.vertices.mean(axis=0)).max(initial=0.0) / mesh.diagonal
-    if not away <= _FARTHEST:
-        raise ConstraintError(
-            f"targets of {name} are {away:.3g} diagonals of the mesh away; "
-            f"at most {_FARTHEST:.0f} are allowed"
-        )
+    require_near(mesh, points, f"targets of {name}")
     return points
 
 

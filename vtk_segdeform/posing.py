@@ -121,16 +121,15 @@ class Posing:
         for vertices in p:
             frozen(vertices)
         pose = Pose(p, MappingProxyType({}))
-        x = self.vertices(state, pose)
-        pose = replace(pose, targets=targets_at(state.handles, x))
-        return pose
+        here = targets_at(state.handles, self.vertices(state, pose))
+        return replace(pose, targets=here)
 
     def _with_volume_of_rest(
         self, state: State, cage_vertices: tuple[FloatArray, ...]
     ) -> tuple[FloatArray, ...]:
         pairs = zip(cage_vertices, state.cages, strict=True)
         outward = np.concatenate([volume_gradient(p, cage.faces) for p, cage in pairs])
-        outward /= np.abs(outward).max()
+        outward /= max(np.abs(outward).max(), np.finfo(float).tiny)
         subspace = self.bind(state)._energy.subspace
         p = np.concatenate(cage_vertices)
         x = self._centre + subspace.map(p - self._centre)

@@ -350,6 +350,7 @@ class Session(Timeline):
             raise CageError(str(fault)) from None
         if points.shape != places[region].shape:
             raise CageError(f"vertices must be {len(places[region])} points; got {len(points)}")
+        handles.require_near(self.mesh, points, "vertices")
         places[region] = points
         pose = self._posing.free_form(self._state, places)
         self._move(replace(self._state, pose=pose), f"cage {region}")

@@ -8,6 +8,7 @@ and the vertices of a pose, are in no state.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -137,7 +138,7 @@ def checked_state(mesh: Mesh, state: State) -> State:
     lengths = [len(ids) for ids in state.handles.values()]
     if not all(lengths):
         raise ConstraintError("each handle must have a vertex or more; leave out empty ones")
-    handles = dict(zip(state.handles, np.split(handle, np.cumsum(lengths)[:-1]), strict=True))
+    handles = dict(zip(state.handles, pieces(handle, lengths), strict=True))
     pose = state.pose and _checked_pose(cages, lengths, list(handles), state.pose)
     owned = MappingProxyType({name: _own(ids) for name, ids in handles.items()})
     return State(regions, cages, _own(fixed), owned, pose, state.options)
@@ -162,6 +163,12 @@ def fitting_cages(regions: Regions | None, cages: Sequence[Cage]) -> tuple[Cage,
     for r, cage in enumerate(cages):
         cage.require_encloses(regions.mesh.vertices[regions.membership[r]], f"region {r}")
     return tuple(cages)
+
+
+def pieces(array: Any, lengths: Sequence[int]) -> list[Any]:
+    """Return *array* in pieces of as many rows, one after the other."""
+    ends = np.cumsum([0, *lengths])
+    return [array[a:b] for a, b in itertools.pairwise(ends)]
 
 
 def _require_number(name: str, value: float, least: float, *, whole: bool = False) -> None:

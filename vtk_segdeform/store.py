@@ -18,7 +18,6 @@ checked as if they had come from a caller.
 
 from __future__ import annotations
 
-import itertools
 import os
 import secrets
 import struct
@@ -35,7 +34,7 @@ from .cages import Cage
 from .mesh import Mesh
 from .regions import Regions
 from .session import Session
-from .state import Options, Pose, SessionError, State
+from .state import Options, Pose, SessionError, State, pieces
 
 FORMAT = "vtk_segdeform session"
 VERSION = 1
@@ -145,20 +144,20 @@ def _read(archive: Archive) -> tuple[Mesh, State]:
     total = sum(m for m, _ in counts)
     cages: tuple[Cage, ...] = ()
     if counts:
-        vertices = _pieces(archive.array("cage_vertices", "f", (total, 3)), [m for m, _ in counts])
+        vertices = pieces(archive.array("cage_vertices", "f", (total, 3)), [m for m, _ in counts])
         n_faces = [k for _, k in counts]
-        faces = _pieces(archive.array("cage_faces", "i", (sum(n_faces), 3)), n_faces)
+        faces = pieces(archive.array("cage_faces", "i", (sum(n_faces), 3)), n_faces)
         cages = tuple(Cage(*pair) for pair in zip(vertices, faces, strict=True))
 
     sizes = {str(name): _whole(k, "handles") for name, k in _list(header, "handles")}
     if len(sizes) != len(_list(header, "handles")):
         raise SessionError("two handles have the same name")
     lengths, held = list(sizes.values()), sum(sizes.values())
-    ids = _pieces(archive.array("handle", "i", (held,)), lengths)
+    ids = pieces(archive.array("handle", "i", (held,)), lengths)
     pose = None
     if header.get("posed"):
-        places = _pieces(archive.array("pose", "f", (total, 3)), [m for m, _ in counts])
-        targets = _pieces(archive.array("targets", "f", (held, 3)), lengths)
+        places = pieces(archive.array("pose", "f", (total, 3)), [m for m, _ in counts])
+        targets = pieces(archive.array("targets", "f", (held, 3)), lengths)
         pose = Pose(tuple(places), dict(zip(sizes, targets, strict=True)))
     fixed = archive.array("fixed", "i", (_count(header, "n_fixed"),))
     options = Options(**header["options"])
@@ -185,11 +184,6 @@ def _settle(folder: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
-
-
-def _pieces(array: Any, lengths: list[int]) -> list[Any]:
-    ends = np.cumsum([0, *lengths])
-    return [array[a:b] for a, b in itertools.pairwise(ends)]
 
 
 def _plain(value: Any) -> Any:
