@@ -166,6 +166,26 @@ def test_the_same_drag_from_the_same_state_has_the_same_end():
     assert_array_equal(session.vertices, first)
 
 
+def test_after_undo_the_next_move_starts_from_the_pose_that_is_shown():
+    session = ready()
+    for degrees in (30, -30):
+        session.drag(SCENE.turned(degrees), max_steps=5)
+        session.commit()
+    session.undo()
+    fresh = Session(SCENE.mesh, state=session.state)
+    for each in (session, fresh):
+        each.drag(SCENE.turned(35), max_steps=1)
+    assert_array_equal(session.vertices, fresh.vertices)
+
+
+def test_a_new_step_after_undo_leaves_nothing_to_redo():
+    session = ready()
+    session.undo()
+    assert session.can_redo
+    session.set_fixed([1])
+    assert not session.can_redo
+
+
 def test_history_holds_no_vertices_of_the_mesh():
     session = ready()
     for k in range(5):
@@ -199,7 +219,7 @@ def test_history_is_bounded_and_the_oldest_steps_go_first():
     assert labels == ["set fixed"] * 3 + [None]
     assert session.fixed.tolist() == [2]
     with pytest.raises(SessionError, match="number of steps"):
-        History(-1)
+        History(0)
 
 
 def test_a_drag_is_one_step_and_its_label_names_what_was_dragged():
@@ -231,6 +251,9 @@ def test_revert_takes_a_drag_back_and_leaves_no_step():
     assert snapshot(session) == before
     assert session.undo_label == label
     assert not session.can_redo
+    session.add_handle(np.abs(X) < 0.1, "middle")
+    session.move_handle("middle", up(0.1), max_steps=1)
+    assert session.commit() == "drag middle"
 
 
 @pytest.mark.parametrize("action", ["undo", "set fixed"])
@@ -311,6 +334,8 @@ def test_fixed_vertices_and_handles_change_without_moving_anything():
     solution = session.move_handle("middle", up(1e-3))
     assert np.abs(session.vertices - posed).max() < 0.1
     assert solution.handle_error < 2e-3
+    session.add_handle(np.abs(X) < 0.05, "middle")
+    assert_array_equal(session.targets["middle"], session.vertices[np.abs(X) < 0.05])
     session.remove_handle("end")
     assert list(session.handles) == list(session.targets) == ["middle"]
     session.remove_handle("middle")
@@ -360,6 +385,16 @@ def test_regions_that_stay_in_their_cages_keep_them_and_others_drop_them():
     assert session.cages == SCENE.cages
     session.split_region(0)
     assert session.cages == ()
+
+
+def test_other_cages_put_the_pose_to_rest():
+    session = ready()
+    session.move_handle("tip", up(0.2), max_steps=2)
+    session.set_cages([Cage(1.01 * cage.vertices, cage.faces) for cage in SCENE.cages])
+    assert session.state.pose is None
+    assert_array_equal(session.targets["tip"], VERTICES[SCENE.handle])
+    assert session.undo() == "set cages"
+    assert session.state.pose is not None
 
 
 def test_cages_are_fitted_around_painted_regions():
@@ -514,6 +549,11 @@ def test_what_is_handed_in_can_be_written_to_afterwards():
     session.drag(targets)
     before = snapshot(session)
     ids[:], targets[:] = 0, 0.0
+    assert snapshot(session) == before
+    targets = VERTICES[SCENE.handle[:5]].copy()
+    session.drag({"tip": targets})
+    before = snapshot(session)
+    targets[:] = 0.0
     assert snapshot(session) == before
 
 

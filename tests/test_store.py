@@ -299,7 +299,7 @@ WRONG = [
     ({"fixed": np.array([0])}, "both fixed and handle"),
     ({"pose": np.full((4, 3), np.inf)}, "NaN or infinite"),
     ({"targets": np.zeros((2, 3))}, "targets must be"),
-    ({"compress": True}, "packed"),
+    ({"compress": True}, "header.json is compressed"),
 ]
 
 

@@ -84,8 +84,10 @@ class Archive:
         if name not in self._archive.namelist():
             raise ValueError(f"{name} is missing")
         info = self._archive.getinfo(name)
+        if info.compress_type != zipfile.ZIP_STORED:
+            raise ValueError(f"{name} is compressed, which this program never does")
         size = max(info.file_size, info.compress_size)
-        if info.compress_type != zipfile.ZIP_STORED or size > min(limit, self._left):
-            raise ValueError(f"{name} is packed, or larger than it can be: {size} bytes")
+        if size > min(limit, self._left):
+            raise ValueError(f"{name} is larger than it can be: {size} bytes")
         self._left -= size
         return self._archive.read(info)  # and compares the checksum

@@ -26,8 +26,8 @@ class History:
     """
 
     def __init__(self, limit: int) -> None:
-        if limit != int(limit) or limit < 0:
-            raise SessionError(f"history must be a number of steps, 0 or more; got {limit!r}")
+        if limit != int(limit) or limit < 1:
+            raise SessionError(f"history must be a number of steps, 1 or more; got {limit!r}")
         self._past: deque[tuple[str, State]] = deque(maxlen=int(limit))
         self._future: list[tuple[str, State]] = []
 
