@@ -30,6 +30,9 @@ STORY = [
     # the solver
     "subspace", "energy", "constraints", "positions", "acceleration", "solver",
     "solution", "targets", "deformer", "pipeline",
+    # a deformation in the making
+    "editing.listeners", "editing.state", "editing.history", "editing.painting", "editing.handles",
+    "editing.posing", "session", "editing.archive", "store",
     # meshes from code, from files, and as pictures
     "modelling.remeshing", "modelling.implicit", "models", "formats.polygons", "formats.off",
     "formats.ply", "formats.wavefront", "formats.vtk_readers", "meshlab", "convert", "canvas",

@@ -12,14 +12,14 @@ from scenes import sausage
 from solids import icosphere, rotation
 
 from vtk_segdeform.cages import Cage
-from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionError
-from vtk_segdeform.history import History
-from vtk_segdeform.listeners import Change
+from vtk_segdeform.editing.history import History
+from vtk_segdeform.editing.listeners import Change
+from vtk_segdeform.editing.state import Options, State
+from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionError, SessionError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
 from vtk_segdeform.solver import Status
-from vtk_segdeform.state import Options, SessionError, State
 from vtk_segdeform.subspace import bind
 from vtk_segdeform.volume import signed_volume
 

@@ -19,11 +19,11 @@ from scenes import sausage
 from solids import OCTAHEDRON, TETRAHEDRON
 
 from vtk_segdeform.cages import Cage
-from vtk_segdeform.errors import SegDeformError
+from vtk_segdeform.editing.state import Options, State
+from vtk_segdeform.errors import SegDeformError, SessionError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
-from vtk_segdeform.state import Options, SessionError, State
 from vtk_segdeform.store import load_session, save_session
 
 ROOT = Path(__file__).resolve().parent.parent

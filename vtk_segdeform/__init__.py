@@ -30,6 +30,8 @@ from . import errors, models
 from .cage_fit import fit_cages
 from .cages import Cage
 from .deformer import Deformer
+from .editing.listeners import Change
+from .editing.state import Options
 from .faults import find_faults
 from .local_volume import local_volume_change
 from .mean_value import mean_value_coordinates
@@ -38,8 +40,10 @@ from .pipeline import deform
 from .regions import Regions
 from .repair import repair
 from .segmentation import segment
+from .session import Session
 from .solution import Solution
 from .solver import Status
+from .store import load_session, save_session
 
 if _TYPE_CHECKING:
     from .convert import read_mesh, write_mesh
@@ -48,20 +52,25 @@ _NEED_PYVISTA = ("read_mesh", "write_mesh")  # imported when first asked for
 
 __all__ = [
     "Cage",
+    "Change",
     "Deformer",
     "Mesh",
+    "Options",
     "Regions",
+    "Session",
     "Solution",
     "Status",
     "deform",
     "errors",
     "find_faults",
     "fit_cages",
+    "load_session",
     "local_volume_change",
     "mean_value_coordinates",
     "models",
     "read_mesh",
     "repair",
+    "save_session",
     "segment",
     "write_mesh",
 ]

@@ -32,7 +32,7 @@ from .regions import Regions
 from .rotations import rotation_groups as group_by_part
 from .solution import Solution
 from .solver import GaussNewton, Iteration, SolverOptions, Status
-from .subspace import bind
+from .subspace import Subspace, bind
 from .targets import waypoints
 from .volume import signed_volume
 
@@ -148,6 +148,11 @@ class Deformer:
         other = copy.copy(self)
         other._take_hold(fixed, handle)
         return other
+
+    @property
+    def subspace(self) -> Subspace:
+        """W~, from which ``subspace.map`` makes mesh vertices of stacked cage vertices."""
+        return self._energy.subspace
 
     def reset(self) -> None:
         """Forget the last pose: the next solve starts from rest."""

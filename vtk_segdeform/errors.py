@@ -24,6 +24,10 @@ class ConstraintError(SegDeformError, ValueError):
     """Fixed vertices, handles or targets that make no sense: out of range, overlapping, NaN."""
 
 
+class SessionError(SegDeformError, ValueError):
+    """An option, a name or a file that makes no sense to a session; the text says what would."""
+
+
 class Cancelled(SegDeformError, RuntimeError):
     """The caller's progress callback asked to stop; nothing was changed."""
 

@@ -27,22 +27,22 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import handles, painting
 from .arrays import FloatArray, IntArray, as_points, frozen
 from .cage_fit import fit_cages
 from .cages import Cage
-from .errors import CageError, RegionError
-from .history import Timeline
-from .listeners import Change
+from .editing import handles, painting
+from .editing.history import Timeline
+from .editing.listeners import Change
+from .editing.posing import Posing
+from .editing.state import Options, Pose, State, checked_state, fitting_cages, of_mesh
+from .errors import CageError, RegionError, SessionError
 from .mesh import Mesh
-from .posing import Posing
 from .positions import checked_constraints
 from .progress import Progress
 from .regions import Regions
 from .segmentation import segment
 from .solution import Solution
 from .solver import Status
-from .state import Options, Pose, SessionError, State, checked_state, fitting_cages, of_mesh
 
 
 class Session(Timeline):

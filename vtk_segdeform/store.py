@@ -29,12 +29,13 @@ from typing import Any
 
 import numpy as np
 
-from .archive import Archive, write_archive
 from .cages import Cage
+from .editing.archive import Archive, write_archive
+from .editing.state import Options, Pose, State, pieces
+from .errors import SessionError
 from .mesh import Mesh
 from .regions import Regions
 from .session import Session
-from .state import Options, Pose, SessionError, State, pieces
 
 FORMAT = "vtk_segdeform session"
 VERSION = 1

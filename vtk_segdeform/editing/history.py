@@ -11,8 +11,9 @@ from collections import deque
 from collections.abc import Callable
 from typing import final
 
+from ..errors import SessionError
 from .listeners import Change, Listener, Listeners
-from .state import SessionError, State
+from .state import State
 
 
 @final

@@ -17,17 +17,17 @@ from types import MappingProxyType
 
 import numpy as np
 
-from .arrays import FloatArray, frozen
-from .constraints import region_volumes, total_volume
-from .deformer import Deformer
-from .errors import CageError, ConstraintError
+from ..arrays import FloatArray, frozen
+from ..constraints import region_volumes, total_volume
+from ..deformer import Deformer
+from ..errors import CageError, ConstraintError
+from ..mesh import Mesh
+from ..progress import Progress
+from ..solution import Solution
+from ..volume import signed_volume, volume_gradient
 from .handles import targets_at
 from .listeners import Change
-from .mesh import Mesh
-from .progress import Progress
-from .solution import Solution
 from .state import Pose, State
-from .volume import signed_volume, volume_gradient
 
 _KEPT = 3  # bound deformers: undo past a change of cages or options, and back, binds nothing anew
 _SAME_VOLUME = 1e-9  # relative: a pose off by more does not meet a constraint it was not made for
@@ -130,7 +130,7 @@ class Posing:
         pairs = zip(cage_vertices, state.cages, strict=True)
         outward = np.concatenate([volume_gradient(p, cage.faces) for p, cage in pairs])
         outward /= max(np.abs(outward).max(), np.finfo(float).tiny)
-        subspace = self.bind(state)._energy.subspace
+        subspace = self.bind(state).subspace
         p = np.concatenate(cage_vertices)
         x = self._centre + subspace.map(p - self._centre)
         p = p + total_volume(self._mesh).exact_step(x, subspace.map(outward)) * outward
@@ -167,7 +167,7 @@ class Posing:
     def _evaluated(self, state: State, pose: Pose) -> tuple[FloatArray, float]:
         """Return x = W~ p and its volume change."""
         if self._shape is None or self._shape[0] is not pose:
-            subspace = self.bind(state)._energy.subspace
+            subspace = self.bind(state).subspace
             p = np.concatenate(pose.cage_vertices)
             # About the centre, so that far from the origin no more digits go than have to.
             x = self._centre + subspace.map(p - self._centre)

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csgraph
 
-from .arrays import BoolArray, FloatArray, as_ids
-from .errors import RegionError
-from .mesh import Mesh
-from .regions import Regions
+from ..arrays import BoolArray, FloatArray, as_ids
+from ..errors import RegionError
+from ..mesh import Mesh
+from ..regions import Regions
 
 _OVERLAP = 0.1  # of a new region's width, counted in edges
 

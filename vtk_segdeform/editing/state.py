@@ -16,19 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import FloatArray, IntArray, as_points, frozen
-from .cages import Cage
-from .errors import CageError, ConstraintError, RegionError, SegDeformError
+from ..arrays import FloatArray, IntArray, as_points, frozen
+from ..cages import Cage
+from ..errors import CageError, ConstraintError, RegionError, SessionError
+from ..mesh import Mesh
+from ..positions import checked_constraints
+from ..regions import Regions
 from .listeners import Change
-from .mesh import Mesh
-from .positions import checked_constraints
-from .regions import Regions
 
 _TINY = float(np.finfo(np.float64).tiny)
-
-
-class SessionError(SegDeformError, ValueError):
-    """An option, a name or a file that makes no sense to a session; the text says what would."""
 
 
 @dataclass(frozen=True, kw_only=True)

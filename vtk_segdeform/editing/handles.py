@@ -13,10 +13,10 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import FloatArray, IntArray, as_points, frozen
-from .errors import ConstraintError
-from .mesh import Mesh
-from .positions import checked_constraints
+from ..arrays import FloatArray, IntArray, as_points, frozen
+from ..errors import ConstraintError
+from ..mesh import Mesh
+from ..positions import checked_constraints
 from .state import Pose, State, pieces
 
 Handles = Mapping[str, IntArray]

@@ -1,0 +1,1 @@
+"""What stands behind `session` and `store`: states, their history, painting, handles, poses."""
