@@ -14,6 +14,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "vtk_segdeform"
+WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 
 # One line per part of the story; a new file takes its place here.
 STORY = [
@@ -35,8 +36,14 @@ STORY = [
     "editing.posing", "session", "editing.archive", "store",
     # meshes from code, from files, and as pictures
     "modelling.remeshing", "modelling.implicit", "models", "formats.polygons", "formats.off",
-    "formats.ply", "formats.wavefront", "formats.vtk_readers", "meshlab", "convert", "canvas",
-    "pictures",
+    "formats.ply", "formats.wavefront", "formats.vtk_readers", "meshlab", "convert", "palette",
+    "canvas", "pictures",
+    # widgets over a session
+    "widgets.gestures", "widgets.sight", "widgets.view", "widgets.widget", "widgets.surface_display",
+    "widgets.picking", "widgets.region_colours", "widgets.region_selector",
+    "widgets.cage_display", "widgets.gizmo", "widgets.handle_dragger", "widgets.diverging",
+    "widgets.volume_overlay", "widgets.jobs", "widgets.status_line", "widgets.help_card",
+    "widgets.recording", "widgets.film", "widgets.editor", "plugin",
     # the command line
     "command_line.selection", "command_line.motion", "command_line.outputs", "command_line.demo",
     "command_line.bench", "command_line.commands", "cli", "__main__",
@@ -57,6 +64,7 @@ GRANTED = {
     "canvas": VTK | {"pyvista"},
     "pictures": VTK | {"pyvista"},
     "command_line.outputs": {"pyvista"},
+    "plugin": {"pyvista"},
 }
 
 MAY_PRINT_AND_EXIT = {"cli", "__main__"}
@@ -64,7 +72,7 @@ LONGEST = 250
 FILES = {
     ".".join(path.relative_to(PACKAGE).with_suffix("").parts): path
     for path in sorted(PACKAGE.rglob("*.py"))
-}
+} | {f"widgets.{path.stem}": path for path in sorted(WIDGETS.glob("*.py"))}
 NAMES = [name for name in FILES if not name.endswith("__init__")]
 CHAPTERS = [name for name in STORY if name in NAMES]
 
@@ -83,7 +91,13 @@ def imports(name: str) -> Iterator[tuple[str, bool]]:
             else:
                 yield ".".join(named), True
         elif isinstance(node, ast.ImportFrom):
-            yield str(node.module).partition(".")[0], False
+            package, _, module = str(node.module).partition(".")
+            if package != "vtk_segdeform":
+                yield package, False
+            elif module:
+                yield module, True
+            else:
+                yield from ((alias.name, True) for alias in node.names)
 
 
 def test_every_file_has_its_place_in_the_story():
@@ -100,7 +114,8 @@ def test_a_chapter_imports_only_earlier_ones(name):
 
 @pytest.mark.parametrize("name", CHAPTERS)
 def test_a_chapter_imports_only_the_libraries_it_is_granted(name):
-    allowed = NUMERIC | GRANTED.get(name, set()) | set(sys.stdlib_module_names)
+    granted = VTK if name.startswith("widgets.") else GRANTED.get(name, set())
+    allowed = NUMERIC | granted | set(sys.stdlib_module_names)
     foreign = {module for module, ours in imports(name) if not ours} - allowed
     assert not foreign, f"{name} imports {sorted(foreign)}"
 

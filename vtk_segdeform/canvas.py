@@ -25,10 +25,10 @@ from vtkmodules.vtkIOImage import vtkPNGWriter
 
 from .arrays import FloatArray
 from .errors import MeshError, MissingDependencyError
+from .palette import INK, PAPER
 
 Draw = Callable[[pv.Plotter], None]
 
-INK, PAPER = "#333333", "#FFFFFF"
 _HEIGHT = 800  # pixels of a picture
 _TITLE, _MARGIN = 0.1, 0.04  # shares of the height: for the words on top, and around
 _ASIDE, _ABOVE = np.radians(14.0), np.radians(10.0)

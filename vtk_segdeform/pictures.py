@@ -5,8 +5,7 @@
     volume change       the deformed mesh coloured by a signed share, in per cent, white at zero
     distortion          the deformed mesh coloured by a size, dark at zero
 
-The colours are those of Okabe and Ito, which colour-blind people tell apart.  `canvas` chooses
-the camera and writes the files.
+The colours are those of `palette`.  `canvas` chooses the camera and writes the files.
 """
 
 from __future__ import annotations
@@ -20,9 +19,10 @@ import pyvista as pv
 from numpy.typing import ArrayLike
 
 from .arrays import FloatArray, IntArray, as_ids, as_points
-from .canvas import INK, add_surface, require_offscreen, view_of, write_panels
+from .canvas import add_surface, require_offscreen, view_of, write_panels
 from .formats.polygons import polydata_of
 from .mesh import Mesh
+from .palette import BODY, FIXED, HANDLE, INK, of_region
 from .regions import CageSurface
 
 __all__ = [
@@ -30,8 +30,6 @@ __all__ = [
     "picture_volume_change", "require_offscreen",
 ]  # fmt: skip
 
-COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7", "#F0E442", "#0072B2", "#D55E00")
-BODY, FIXED, HANDLE = "#BFD7EA", "#707070", "#D7261E"
 _BAR = 0.17  # share of the height that a colour bar takes
 
 
@@ -55,7 +53,7 @@ def picture_regions_and_cages(
         One per region, in the same order; without any, only the regions are drawn.
     """
     belongs = np.asarray(membership, dtype=bool)
-    palette = np.array([pv.Color(COLOURS[r % len(COLOURS)]).int_rgb for r in range(len(belongs))])
+    palette = np.array([of_region(r) for r in range(len(belongs))])
     shares = belongs / belongs.sum(axis=0)
     colours = (shares.T @ palette)[mesh.faces].mean(axis=1)
     everything = np.concatenate([mesh.vertices, *(cage.vertices for cage in cages)])

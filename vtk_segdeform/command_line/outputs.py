@@ -11,14 +11,14 @@ import pyvista as pv
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage
 from ..formats.polygons import polydata_of
-from ..pictures import COLOURS
+from ..palette import COLOURS, rgb
 from ..regions import Regions
 from ..repair import Repair
 from ..solution import Solution
 
 Say = Callable[[str], None]
 
-_PALETTE = np.array([pv.Color(colour).int_rgb for colour in COLOURS], dtype=np.uint8)
+_PALETTE = np.array([rgb(colour) for colour in COLOURS])
 
 
 def tell_regions(regions: Regions, say: Say) -> None:

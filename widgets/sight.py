@@ -1,0 +1,82 @@
+"""Where things of the world are seen, and what of the world is where something is seen.
+
+world       where the mesh is
+display     (x, y) pixels from the window's lower left corner, and a depth in 0..1
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from vtk_segdeform.arrays import FloatArray
+
+from .gestures import Pointer
+
+
+class Sight:
+    """What a renderer's camera sees.
+
+    Parameters
+    ----------
+    renderer : vtkRenderer
+        In a window; its camera may change at any time.
+    """
+
+    def __init__(self, renderer: Any) -> None:
+        self.renderer = renderer
+
+    @property
+    def camera(self) -> Any:
+        """The vtkCamera in use."""
+        return self.renderer.GetActiveCamera()
+
+    def to_display(self, points: FloatArray) -> FloatArray:
+        """Return (k, 3) display coordinates of (k, 3) world *points*; NaN behind the camera."""
+        homogeneous = np.column_stack([points, np.ones(len(points))]) @ self._projection().T
+        w = homogeneous[:, 3:]
+        clip = np.divide(homogeneous[:, :3], w, out=np.full((len(w), 3), np.nan), where=w > 0.0)
+        return np.asarray(self._origin() + 0.5 * (clip + 1.0) * self._extent())
+
+    def to_world(self, display: FloatArray) -> FloatArray:
+        """Return (k, 3) world points of (k, 3) *display* coordinates."""
+        clip = 2.0 * (np.asarray(display) - self._origin()) / self._extent() - 1.0
+        inverse = np.linalg.inv(self._projection())
+        homogeneous = np.column_stack([clip, np.ones(len(clip))]) @ inverse.T
+        return np.asarray(homogeneous[:, :3] / homogeneous[:, 3:])
+
+    def ray(self, pointer: Pointer) -> tuple[FloatArray, FloatArray]:
+        """Return where the line of sight enters and leaves what the camera sees, (3,) each."""
+        ends = self.to_world(np.array([[*pointer.position, 0.0], [*pointer.position, 1.0]]))
+        return ends[0], ends[1]
+
+    def pixel_at(self, point: FloatArray) -> float:
+        """Return how long one pixel is at a world *point* (3,), in the mesh's unit."""
+        if self.camera.GetParallelProjection():
+            return float(2.0 * self.camera.GetParallelScale() / self._extent()[1])
+        away = (np.asarray(point) - self.camera.GetPosition()) @ self.towards_scene
+        half = np.tan(0.5 * np.radians(self.camera.GetViewAngle()))
+        return float(2.0 * max(away, 1e-12) * half / self._extent()[1])
+
+    @property
+    def towards_scene(self) -> FloatArray:
+        """(3,) float: the direction in which the camera looks, length 1."""
+        return np.array(self.camera.GetDirectionOfProjection())
+
+    def contains(self, pointer: Pointer) -> bool:
+        """Tell whether *pointer* is in this renderer's part of the window."""
+        inside = (pointer.position - self._origin()[:2]) / self._extent()[:2]
+        return bool(((inside >= 0.0) & (inside <= 1.0)).all())
+
+    def _projection(self) -> FloatArray:
+        matrix = self.camera.GetCompositeProjectionTransformMatrix(
+            self.renderer.GetTiledAspectRatio(), -1, 1
+        )
+        return np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
+
+    def _origin(self) -> FloatArray:
+        return np.array([*self.renderer.GetOrigin(), 0.0])
+
+    def _extent(self) -> FloatArray:
+        return np.maximum([*self.renderer.GetSize(), 1.0], 1.0)

@@ -1,0 +1,215 @@
+"""A renderer and its interactor, wherever they come from, and what widgets need of the two.
+
+Callbacks are guarded: an exception in one would be printed by VTK, or turned into a warning by
+pyvista, and be lost.  Here it reaches the listeners of `on_failure`: a status line, a test.
+
+While a camera style drags it keeps all mouse events to itself, so whoever has to follow the
+camera asks for `before_render` instead.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from vtkmodules.vtkRenderingCore import vtkRenderer
+
+from .gestures import Phase, Pointer
+from .sight import Sight
+
+_log = logging.getLogger(__name__)
+
+Stop = Callable[[], None]
+ABOVE_CAMERA = 1.0  # priority: VTK's own widgets have 0.5, camera styles 0
+
+
+class View(Sight):
+    """One renderer in one window.
+
+    Parameters
+    ----------
+    renderer : vtkRenderer
+        Where the widgets are drawn.
+    interactor : vtkRenderWindowInteractor
+        That of the renderer's window.
+    """
+
+    def __init__(self, renderer: Any, interactor: Any) -> None:
+        super().__init__(renderer)
+        self.interactor = interactor
+        self._failures: list[Callable[[Exception], None]] = []
+        self._front: Any = None
+        self._stop_front: Stop | None = None
+        self._depth = 0  # of callbacks within callbacks
+        self._touched = False
+
+    @classmethod
+    def of(cls, view: Any) -> View:
+        """Return the view of a pyvista plotter, of a (renderer, interactor), or *view* itself."""
+        if isinstance(view, cls):
+            return view
+        if isinstance(view, tuple) and len(view) == 2:
+            return cls(*view)
+        if hasattr(view, "iren") and hasattr(view, "renderer"):
+            if view.iren is None:
+                raise ValueError("view: this plotter was made without an interactor")
+            return cls(view.renderer, view.iren.interactor)
+        raise TypeError(
+            f"view must be a pyvista plotter or (renderer, interactor); got {type(view).__name__}"
+        )
+
+    @property
+    def window(self) -> Any:
+        """The vtkRenderWindow, or None once it is closed."""
+        return self.renderer.GetRenderWindow()
+
+    @property
+    def front(self) -> Any:
+        """A vtkRenderer that looks the same way, its actors hidden by nothing; made on demand."""
+        if self._front is None:
+            window = self.window
+            self._front = vtkRenderer()
+            layer = window.GetNumberOfLayers()
+            window.SetNumberOfLayers(layer + 1)
+            self._front.SetLayer(layer)
+            self._front.InteractiveOff()
+            self._front.SetViewport(*self.renderer.GetViewport())
+            window.AddRenderer(self._front)
+            self._stop_front = self.before_render(self._follow)
+        return self._front
+
+    def remove_front(self) -> None:
+        """Take the `front` renderer out of the window, with all that is in it."""
+        if self._front is None:
+            return
+        if self._stop_front is not None:
+            self._stop_front()
+        self._front.RemoveAllViewProps()
+        window = self._front.GetRenderWindow()
+        if window is not None:
+            window.RemoveRenderer(self._front)
+            window.SetNumberOfLayers(max(1, window.GetNumberOfLayers() - 1))
+        self._front = None
+
+    def render(self) -> None:
+        """Draw everything; nothing happens once the window is closed."""
+        if self.window is not None:
+            self.window.Render()
+
+    def touch(self) -> None:
+        """See that what has changed is drawn: at the end of the event in hand, or else now.
+
+        Nothing happens before the window was drawn for the first time.
+        """
+        if self._depth:
+            self._touched = True
+        elif self.window is not None and not self.window.GetNeverRendered():
+            self.render()
+
+    # What happens.
+
+    def observe(
+        self, event: str, callback: Callable[[], bool | None], priority: float = ABOVE_CAMERA
+    ) -> Stop:
+        """Call *callback* at each of an interactor's events.
+
+        Where it returns True, or fails, those of lower priority do not hear of the event.
+        """
+        tag = 0
+
+        def called(*_: object) -> None:
+            taken: bool | None = True
+            with self.guarded(), self._drawn_after():
+                taken = callback()
+            command = self.interactor.GetCommand(tag)
+            if taken and command is not None:  # the callback may have stopped itself
+                command.SetAbortFlag(1)
+
+        tag = self.interactor.AddObserver(event, called, priority)
+        return _once(lambda: self.interactor.RemoveObserver(tag))
+
+    def before_render(self, callback: Callable[[], None]) -> Stop:
+        """Call *callback* each time the renderer is about to draw; what it touches is drawn."""
+
+        def called(*_: object) -> None:
+            touched, self._depth = self._touched, self._depth + 1
+            try:
+                with self.guarded():
+                    callback()
+            finally:
+                self._touched, self._depth = touched, self._depth - 1
+
+        tag = self.renderer.AddObserver("StartEvent", called)
+        return _once(lambda: self.renderer.RemoveObserver(tag))
+
+    def every(self, milliseconds: int, callback: Callable[[], None]) -> Stop:
+        """Call *callback* again and again from the event loop, until stopped."""
+        timer = self.interactor.CreateRepeatingTimer(milliseconds)
+        stop = self.observe("TimerEvent", lambda: callback() or False)
+
+        def stop_both() -> None:
+            stop()
+            self.interactor.DestroyTimer(timer)
+
+        return _once(stop_both)
+
+    def pointer(self, phase: Phase) -> Pointer:
+        """Return where the interactor has the pointer, as the given *phase*."""
+        x, y = self.interactor.GetEventPosition()
+        shift, control = self.interactor.GetShiftKey(), self.interactor.GetControlKey()
+        return Pointer(phase, float(x), float(y), shift=bool(shift), control=bool(control))
+
+    # What goes wrong.
+
+    def on_failure(self, listener: Callable[[Exception], None]) -> Stop:
+        """Tell *listener* of every exception in a callback, from now on until stopped."""
+        self._failures.append(listener)
+        return _once(lambda: self._failures.remove(listener))
+
+    @contextmanager
+    def guarded(self) -> Iterator[None]:
+        """Hand what is raised inside to those who asked; with nobody there it is raised on."""
+        try:
+            yield
+        except Exception as error:  # the border to the event loop: anything may come
+            _log.info("a callback failed", exc_info=True)
+            if not self._failures:
+                raise
+            for listener in list(self._failures):
+                listener(error)
+
+    @contextmanager
+    def _drawn_after(self) -> Iterator[None]:
+        self._depth += 1
+        try:
+            yield
+        finally:
+            self._depth -= 1
+            if self._touched and not self._depth:
+                self._touched = False
+                self.render()
+
+    def _follow(self) -> None:
+        """Let the front renderer look where the renderer does, and both see all of both."""
+        self._front.SetViewport(*self.renderer.GetViewport())
+        both = [r.ComputeVisiblePropBounds() for r in (self.renderer, self._front)]
+        bounds = np.array([b for b in both if b[0] <= b[1]])
+        if len(bounds):
+            low, high = bounds[:, ::2].min(axis=0), bounds[:, 1::2].max(axis=0)
+            self.renderer.ResetCameraClippingRange(*np.stack([low, high], axis=1).ravel())
+        # A copy: whoever takes a screenshot swaps the cameras while it draws.
+        self._front.GetActiveCamera().DeepCopy(self.camera)
+
+
+def _once(action: Callable[[], object]) -> Stop:
+    """Return a callable that does *action* the first time it is called."""
+    waiting = [action]
+
+    def stop() -> None:
+        if waiting:
+            waiting.pop()()
+
+    return stop

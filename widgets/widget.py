@@ -1,0 +1,181 @@
+"""What every widget is: something in a view that speaks to a session, and can be switched off.
+
+A widget says what a press begins (`begins`), and the rest is done here: the press is taken from
+the camera only if it begins something, moves and the release go to the gesture, Escape or the
+right button cancels it.  Outside its own things the camera works as ever.
+
+VTK's words are kept: `On`, `Off`, `SetEnabled`, `GetEnabled`, and observers of
+``StartInteractionEvent``, ``InteractionEvent`` and ``EndInteractionEvent``, called after whatever
+they tell of.
+"""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Callable
+from typing import Any
+
+from vtk_segdeform.session import Session
+
+from .gestures import Gesture, Grab, Phase, Pointer
+from .view import Stop, View
+
+INTERACTION_EVENTS = ("StartInteractionEvent", "InteractionEvent", "EndInteractionEvent")
+
+
+class Widget(abc.ABC):
+    """A piece of interface over one view and one session; off until `On`.
+
+    Parameters
+    ----------
+    view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
+        Where it lives.  Call `remove` before its window closes.
+    session : Session
+        What it shows and changes.
+    """
+
+    def __init__(self, view: Any, session: Session) -> None:
+        self.view = View.of(view)
+        self.session = session
+        self._grab = Grab()
+        self._stops: list[Stop] = []
+        self._observers: dict[int, tuple[str, Callable[[Widget, str], None]]] = {}
+        self._next_tag = 1
+        self._took_key = False
+
+    # What a widget says of itself.
+
+    def begins(self, press: Pointer) -> Gesture | None:
+        """Return the gesture that *press* begins, or None to leave it to the camera."""
+        del press
+        return None
+
+    def hovers(self, pointer: Pointer) -> None:
+        """Show what a press here would do; the pointer moves and no button is down."""
+        del pointer
+
+    def wheels(self, pointer: Pointer, clicks: int) -> bool:
+        """Turn the wheel by +1 or -1 *clicks*; False leaves it to the camera."""
+        del pointer, clicks
+        return False
+
+    def types(self, key: str, pointer: Pointer) -> bool:
+        """Take a key, VTK's name of it ("z", "Escape", "bracketleft"); False leaves it."""
+        del key, pointer
+        return False
+
+    @abc.abstractmethod
+    def remove(self) -> None:
+        """Take everything out of the view, for good."""
+
+    # Switching.
+
+    def On(self) -> None:  # noqa: N802 - VTK's word
+        """Listen to the view."""
+        if self._stops:
+            return
+        observe = self.view.observe
+        self._stops = [
+            observe("LeftButtonPressEvent", self._press),
+            observe("MouseMoveEvent", self._move),
+            observe("LeftButtonReleaseEvent", self._release),
+            observe("RightButtonPressEvent", self.cancel),
+            observe("MouseWheelForwardEvent", lambda: self._wheel(+1)),
+            observe("MouseWheelBackwardEvent", lambda: self._wheel(-1)),
+            observe("KeyPressEvent", self._key),
+            observe("CharEvent", lambda: self._took_key),  # comes after each press of a key
+        ]
+
+    def Off(self) -> None:  # noqa: N802
+        """Stop listening; a gesture that is going on is cancelled."""
+        self.cancel()
+        for stop in self._stops:
+            stop()
+        self._stops = []
+
+    def SetEnabled(self, enabled: bool) -> None:  # noqa: N802
+        """Switch on or off."""
+        if enabled:
+            self.On()
+        else:
+            self.Off()
+
+    def GetEnabled(self) -> bool:  # noqa: N802
+        """Tell whether it is on."""
+        return bool(self._stops)
+
+    def AddObserver(self, event: str, callback: Callable[[Widget, str], None]) -> int:  # noqa: N802
+        """Call ``callback(widget, event)`` at one of `INTERACTION_EVENTS`; return its tag."""
+        if event not in INTERACTION_EVENTS:
+            raise ValueError(f"event must be one of {', '.join(INTERACTION_EVENTS)}; got {event!r}")
+        tag, self._next_tag = self._next_tag, self._next_tag + 1
+        self._observers[tag] = event, callback
+        return tag
+
+    def RemoveObserver(self, tag: int) -> None:  # noqa: N802
+        """Forget the observer with this *tag*."""
+        self._observers.pop(tag, None)
+
+    @property
+    def is_grabbing(self) -> bool:
+        """Whether a gesture is going on."""
+        return self._grab.is_active
+
+    def cancel(self) -> bool:
+        """End the gesture as if it had never begun; False if there was none."""
+        if not self._grab.is_active:
+            return False
+        try:
+            self._grab.cancel()
+        finally:
+            self._tell("EndInteractionEvent")
+        return True
+
+    # From VTK's events to ours.
+
+    def _press(self) -> bool:
+        press = self.view.pointer(Phase.PRESS)
+        self.cancel()  # a release that never came
+        gesture = self.begins(press) if self.view.contains(press) else None
+        if gesture is None:
+            return False
+        self._grab.begin(gesture, press)
+        self._tell("StartInteractionEvent")
+        return True
+
+    def _move(self) -> bool:
+        if not self._grab.is_active:
+            self.hovers(self.view.pointer(Phase.HOVER))
+            return False
+        self._send(Phase.MOVE, "InteractionEvent")
+        return True
+
+    def _release(self) -> bool:
+        if not self._grab.is_active:
+            return False
+        self._send(Phase.RELEASE, "EndInteractionEvent")
+        return True
+
+    def _send(self, phase: Phase, event: str) -> None:
+        try:
+            self._grab.send(self.view.pointer(phase))
+        except BaseException:
+            self._tell("EndInteractionEvent")
+            raise
+        self._tell(event if self._grab.is_active else "EndInteractionEvent")
+
+    def _wheel(self, clicks: int) -> bool:
+        return self.wheels(self.view.pointer(Phase.HOVER), clicks)
+
+    def _key(self) -> bool:
+        key = self.view.interactor.GetKeySym() or ""
+        self._took_key = True  # also where it fails
+        self._took_key = (key == "Escape" and self.cancel()) or self.types(
+            key, self.view.pointer(Phase.HOVER)
+        )
+        return self._took_key
+
+    def _tell(self, event: str) -> None:
+        for name, callback in list(self._observers.values()):
+            if name == event:
+                callback(self, event)
