@@ -39,7 +39,8 @@ STORY = [
     "formats.ply", "formats.wavefront", "formats.vtk_readers", "meshlab", "convert", "palette",
     "canvas", "pictures",
     # widgets over a session
-    "widgets.gestures", "widgets.sight", "widgets.view", "widgets.widget", "widgets.surface_display",
+    "widgets.gestures", "widgets.sight", "widgets.view", "widgets.widget",
+    "widgets.surface_display",
     "widgets.picking", "widgets.region_colours", "widgets.region_selector",
     "widgets.cage_display", "widgets.gizmo", "widgets.handle_dragger", "widgets.diverging",
     "widgets.volume_overlay", "widgets.jobs", "widgets.status_line", "widgets.help_card",
