@@ -26,6 +26,7 @@ geometric model for elastic deformations", SIGGRAPH 2010 (spokes and rims).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,6 +65,12 @@ class Energy:
     def exact(self) -> bool:
         """Whether E is a minimum over the rotations, so that its gradient is the one returned."""
         return self.fit is self.pull
+
+    def fitted_rows(self, count: int) -> Iterator[FloatArray]:
+        """Yield K, what rotations are fitted to as rows on p (3 g, m), *count* groups at a time."""
+        for start in range(0, self.fit.shape[0], 3 * count):
+            rows = self.fit[start : start + 3 * count]
+            yield self.subspace.left(rows) if sparse.issparse(rows) else rows
 
     def local_step(self, p: FloatArray, x: FloatArray) -> tuple[float, FloatArray]:
         """Return E(p) and half its gradient (m, 3), with the local rotations at x = W~ p."""

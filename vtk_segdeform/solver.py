@@ -12,13 +12,16 @@ volume constraints (9).  The paper's step, with J_f replaced by A, is eq. (21):
 
 (The paper prints a minus before its lambda; with it G h = -g would not hold.)
 
-Three things are added, each told by a number from the cactus bent by 60 degrees:
+Four things are added, each told by a number from the cactus bent by 60 degrees:
 
 1. *Exact volume.*  Along Z = H^-1 G^T the volume is a cubic of the step length; its root is the
    last operation of every step.  |dV| / V is then about 1e-15; (21) alone leaves 1e-4.
-2. *Anderson acceleration* (`acceleration`).  (21) is a fixed-point map p -> q(p) that converges
-   slowly, because rotations follow one by one.  Hundreds of steps become tens.
-3. *Safeguard.*  All iterates meet the constraints, so the objective itself is the merit: an
+2. *Curvature* (`curvature`).  (21) lets rotations follow one step behind: hundreds of steps, and
+   a small one says little of how far there is to go.  With their part in H it is Newton's step
+   for the shape, and about as long as the way that is left.
+3. *Anderson acceleration* (`acceleration`) of (21) as a fixed-point map p -> q(p), for what H
+   still lacks: the curvature of the constraints.
+4. *Safeguard.*  All iterates meet the constraints, so the objective itself is the merit: an
    accelerated step that raises it is thrown away for the plain one, and a plain step that raises
    it is shortened, epsilon of section 3.3.
 
@@ -36,17 +39,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import linalg
 
 from .acceleration import Anderson
 from .arrays import FloatArray
 from .constraints import VolumeConstraint, restore
+from .curvature import Factor, curved_factor, factored
 from .energy import Energy
 from .errors import CageError
 from .positions import PositionTerm
 
 _RISE = 1e-13  # relative rise of the merit that counts as rounding
-_DAMPING = 1e-8  # of the mean diagonal of H
+_DAMPING = 1e-9  # of the mean diagonal of H
 _SHORTEST = 1.0 / 64.0  # epsilon of section 3.3 below which a step is given up
 
 
@@ -113,7 +116,8 @@ class GaussNewton:
     energy: Energy
     positions: PositionTerm
     constraints: Sequence[VolumeConstraint]
-    _factor: tuple[FloatArray, bool] = field(init=False, repr=False)
+    _hessian: FloatArray = field(init=False, repr=False)
+    _factor: Factor = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         hessian = self.energy.quadratic + self.positions.quadratic()
@@ -125,13 +129,14 @@ class GaussNewton:
         if not len(self.positions.rows):  # nothing holds the whole: rounding would carry it off
             mean = self.energy.subspace.adjoint(np.ones((self.energy.subspace.n_vertices, 1)))
             damping += trace * (mean @ mean.T) / np.vdot(mean, mean)
-        try:
-            self._factor = linalg.cho_factor(hessian + damping)
-        except linalg.LinAlgError:
+        self._hessian = hessian + damping
+        factor = factored(self._hessian)
+        if factor is None:
             raise CageError(
                 "the cages hardly move the mesh, so no pose can be solved for: "
                 "make them fit more tightly"
-            ) from None
+            )
+        self._factor = factor
 
     def minimise(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> Iteration:
         """Iterate from cage vertices *p* (m, 3) for positions *targets* (k, 3)."""
@@ -140,15 +145,18 @@ class GaussNewton:
         here = self._evaluate(p, self.energy.subspace.map(p), targets)
         merits = [here.merit]
         size, status = np.inf, Status.STEP_LIMIT
+        factor = self._factor
         for _ in range(options.max_steps):
-            step, multipliers, directions = self._step(here)
+            if options.window and self.energy.exact:
+                factor = curved_factor(self._hessian, self.energy, here.p) or self._factor
+            step, multipliers, directions = self._step(here, factor)
             size = self._size(step)
             if size <= options.tolerance:
                 status = Status.CONVERGED
                 break
             ahead = None
             if options.window:
-                guess = memory.extrapolate(here.p, step, np.triu(self._factor[0]) @ step)
+                guess = memory.extrapolate(here.p, step, self._factor.triangle.T @ step)
                 ahead = self._retract(guess, directions, targets, options)
                 if not self._improves(ahead, here):
                     memory.forget()
@@ -164,19 +172,21 @@ class GaussNewton:
             here.p, here.x, multipliers, status, steps, size, here.shape, tuple(merits)
         )
 
-    def _step(self, here: _Point) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
+    def _step(
+        self, here: _Point, factor: Factor
+    ) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
         """Return h and lambda of (21), and the directions Z in which the volume is restored."""
-        h = -linalg.cho_solve(self._factor, here.slope, check_finite=False)
+        h = -factor.solve(here.slope)
         if not self.constraints:
             return h, np.zeros(0), []
         rows = [self.energy.subspace.adjoint(c.gradient(here.x)) for c in self.constraints]
-        directions = [linalg.cho_solve(self._factor, row, check_finite=False) for row in rows]
+        directions = [factor.solve(row) for row in rows]
         matrix = np.array([[np.vdot(row, z) for z in directions] for row in rows])
         g = np.array([c.violation(here.x) for c in self.constraints])
         along = np.array([np.vdot(row, h) for row in rows])
         multipliers = np.linalg.lstsq(matrix, g + along, rcond=1e-12)[0]
-        for factor, z in zip(multipliers, directions, strict=True):
-            h -= factor * z
+        for multiplier, z in zip(multipliers, directions, strict=True):
+            h -= multiplier * z
         return h, multipliers, directions
 
     def _retract(

@@ -1,0 +1,99 @@
+"""The Hessian of the shape energy: it is what differences of the gradient tend to."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scenes import sausage
+from solids import rotation
+
+from vtk_segdeform.curvature import _rotations_part, curved_factor, factored
+from vtk_segdeform.energy import shape_energy
+from vtk_segdeform.rotations import group_by_position
+from vtk_segdeform.subspace import bind
+
+SCENE = sausage()
+REST = np.concatenate([cage.vertices for cage in SCENE.cages])
+RNG = np.random.default_rng(5)
+
+
+def energy_of(n_groups):
+    subspace = bind(SCENE.regions, SCENE.cages)
+    groups = n_groups and group_by_position(SCENE.mesh.vertices, n_groups)
+    return shape_energy(SCENE.mesh, subspace, 10.0, groups)
+
+
+def bent(p):
+    """Return *p* bent smoothly, by half a radian at the ends."""
+    angle = 0.15 * p[:, :1]
+    x, z = p[:, :1] * np.cos(angle), p[:, 2:] + p[:, :1] * np.sin(angle)
+    return np.hstack([x, p[:, 1:2], z])
+
+
+def hessian_times(energy, p, dp):
+    """Return half the Hessian of E at *p* times *dp*, from the two parts that the solver adds."""
+    lower = np.tril(_rotations_part(energy, p))
+    part = lower + np.tril(lower, -1).T
+    return energy.quadratic @ dp - (part @ dp.T.ravel()).reshape(3, -1).T
+
+
+def slope(energy, p):
+    return energy.local_step(p, energy.subspace.map(p))[1]
+
+
+@pytest.mark.parametrize("n_groups", [40, None])
+def test_it_is_the_derivative_of_the_gradient_to_second_order(n_groups):
+    energy, p = energy_of(n_groups), bent(REST)
+    dp = RNG.normal(size=p.shape)
+    exact = hessian_times(energy, p, dp)
+    errors = []
+    for step in (1e-2, 1e-3):
+        difference = slope(energy, p + step * dp) - slope(energy, p - step * dp)
+        errors.append(np.linalg.norm(difference / (2 * step) - exact) / np.linalg.norm(exact))
+    assert errors[1] < 1e-4
+    assert errors[1] < 0.02 * errors[0]  # slope 2: ten times closer, a hundred times better
+
+
+def test_turning_the_whole_costs_nothing():
+    energy = energy_of(40)
+    for axis in np.eye(3):
+        turn = np.cross(axis, REST)
+        assert np.vdot(turn, energy.quadratic @ turn) > 1.0  # the paper's Hessian resists
+        cost = np.vdot(turn, hessian_times(energy, REST, turn))
+        assert abs(cost) < 1e-9 * np.vdot(turn, energy.quadratic @ turn)
+
+
+def test_it_turns_with_the_pose():
+    energy, p = energy_of(40), bent(REST)
+    turn = rotation([1.0, 2.0, 0.5], 1.1)
+    dp = RNG.normal(size=p.shape)
+    turned = hessian_times(energy, p @ turn.T, dp @ turn.T)
+    expected = hessian_times(energy, p, dp) @ turn.T
+    assert_allclose(turned, expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_the_factor_solves_in_both_of_its_forms():
+    energy, p = energy_of(40), bent(REST)
+    held = energy.quadratic + np.eye(len(p)) * np.trace(energy.quadratic)
+    y = RNG.normal(size=p.shape)
+    plain = factored(held)
+    assert_allclose(held @ plain.solve(y), y, atol=1e-9)
+    curved = curved_factor(held, energy, p)
+    h = curved.solve(y)
+    back = hessian_times(energy, p, h) + (held - energy.quadratic) @ h
+    assert_allclose(back, y, atol=2e-3 * np.abs(y).max())  # a thousandth of the part is kept back
+
+
+def test_what_is_not_convex_has_no_factor():
+    assert factored(-np.eye(4)) is None
+    energy = energy_of(40)
+    assert curved_factor(-energy.quadratic, energy, REST) is None
+
+
+def test_a_mirrored_pose_still_has_a_factor():
+    energy = energy_of(40)
+    mirrored = REST * [1.0, 1.0, -1.0]
+    held = energy.quadratic + 1e-3 * np.eye(len(REST)) * np.trace(energy.quadratic)
+    factor = curved_factor(held, energy, mirrored)
+    assert factor is None or np.isfinite(factor.solve(mirrored)).all()

@@ -1,0 +1,110 @@
+"""How the shape energy curves: the Hessian of E(p), local rotations and all.
+
+The paper's step takes the rotations for given, so that its Hessian is Q alone; they follow one
+step behind, and stiff directions that are a matter of turning converge slowly.  But how they
+follow is known.  With S = K p, one 3 x 3 matrix per group, and N = R S its symmetric part,
+
+    f(S) = max_R tr(R S),      f(S + dS) = f(S) + tr(R dS) + 1/2 b^T M^-1 b + ...
+    b = axis of (R dS),  b_k = eps_kij (R dS)_ij,      M = tr(N) I - N
+
+b is the torque that dS leaves and M the stiffness that answers it, both about the same axes, so
+that half the Hessian of E = tr(p^T Q p) - 2 sum_g f(K_g p) + c is
+
+    H = Q (x) I  -  sum_g T_g M_g^-1 T_g^T,      T_g^T dp = b
+
+All of the sum would let the whole turn freely about a single handle, so a little is kept back.
+H is factored anew in every step, in coordinates stacked axis by axis.  Compressed or mirrored
+groups can make it indefinite; as much of the sum is then left out as it takes.  With nothing left
+it is the paper's.
+
+Source
+------
+B. Smith, F. de Goes, T. Kim, "Analytic eigensystems for isotropic distortion energies", ACM
+Trans. Graph. 38(1), 2019: the twist modes of the rotation's derivative.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+from scipy.linalg import blas
+
+from .arrays import FloatArray
+from .energy import Energy
+from .rotations import closest_rotations
+
+_SHARES = (0.999, 0.8, 0.5)  # of the rotations' part; the largest that leaves H convex
+_SOFTEST = 1e-3  # least stiffness of a group about an axis, as a share of its largest
+_CHUNK = 1000  # groups at a time
+# eps_kij as (i, c, k): row of R S, column of dp, axis of turning.
+_EPSILON = np.zeros((3, 3, 3))
+for _k, _i, _j in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+    _EPSILON[_i, _j, _k], _EPSILON[_j, _i, _k] = 1.0, -1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Factor:
+    """A factored Hessian: (m, m), the same for all three axes, or (3m, 3m)."""
+
+    triangle: FloatArray
+    coupled: bool
+
+    def solve(self, y: FloatArray) -> FloatArray:
+        """Return H^-1 y, (m, 3), for *y* (m, 3)."""
+        right = y.T.ravel() if self.coupled else y
+        solved = linalg.cho_solve((self.triangle, True), right, check_finite=False)
+        return solved.reshape(3, -1).T if self.coupled else np.asarray(solved)
+
+
+def factored(hessian: FloatArray) -> Factor | None:
+    """Return the factor of a Hessian (m, m) that is the same for all axes; None if not convex."""
+    try:
+        return Factor(linalg.cholesky(hessian, lower=True), coupled=False)
+    except linalg.LinAlgError:
+        return None
+
+
+def curved_factor(hessian: FloatArray, energy: Energy, p: FloatArray) -> Factor | None:
+    """Return the factor of *hessian* (m, m) less the rotations' part at *p* (m, 3).
+
+    None where no share of that part leaves it convex.
+    """
+    m = len(p)
+    part = _rotations_part(energy, p)
+    for share in _SHARES:
+        curved = -share * part
+        for axis in range(3):
+            block = slice(axis * m, (axis + 1) * m)
+            curved[block, block] += hessian
+        try:
+            return Factor(
+                linalg.cholesky(curved, lower=True, overwrite_a=True, check_finite=False),
+                coupled=True,
+            )
+        except linalg.LinAlgError:
+            continue
+    return None
+
+
+def _rotations_part(energy: Energy, p: FloatArray) -> FloatArray:
+    """Return the lower half of sum_g T_g M_g^-1 T_g^T, (3m, 3m), stacked axis by axis."""
+    m = len(p)
+    total = np.zeros((3 * m, 3 * m), order="F")
+    for reduced in energy.fitted_rows(_CHUNK):  # K of some groups, (3 g, m)
+        covariances = (reduced @ p).reshape(-1, 3, 3)
+        rotations = closest_rotations(covariances)
+        stretched = rotations @ covariances
+        symmetric = 0.5 * (stretched + np.swapaxes(stretched, 1, 2))
+        trace = np.trace(symmetric, axis1=1, axis2=2)
+        stiffness, axes = np.linalg.eigh(trace[:, None, None] * np.eye(3) - symmetric)
+        stiffness = np.maximum(stiffness, _SOFTEST * np.abs(stiffness).max(axis=1, keepdims=True))
+        root = axes / np.sqrt(np.maximum(stiffness, np.finfo(float).tiny))[:, None]  # M^-1/2
+        # T^T for each axis c of dp: eps_kic R_i. K, turned into the axes of M.
+        mixed = np.einsum("gkl,ick,gij->glcj", root, _EPSILON, rotations, optimize=True)
+        rows = mixed.reshape(-1, 9, 3) @ reduced.reshape(-1, 3, m)
+        total = blas.dsyrk(
+            1.0, rows.reshape(-1, 3 * m).T, beta=1.0, c=total, lower=1, overwrite_c=1
+        )
+    return np.asarray(total)
