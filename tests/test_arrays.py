@@ -23,7 +23,9 @@ def test_points_and_faces_come_out_as_plain_arrays():
         ([[1.0, 2.0]], r"handle must have shape \(n, 3\); got \(1, 2\)"),
         ([[0, 0, np.nan], [0, np.inf, 0], [0, 0, 0]], "handle holds 2 points with NaN"),
         ([["a", "b", "c"]], "handle must hold numbers"),
-        ([[1, 2, 3], [1, 2]], "handle must hold numbers"),
+        ([[1, 2, 3], [1, 2]], "handle must be an array; its rows differ in length"),
+        ([[1j, 0, 0]], "handle must hold real numbers; got complex128"),
+        (np.ma.array([[1.0, 2.0, 3.0]], mask=[[0, 1, 0]]), "handle holds masked entries"),
     ],
 )
 def test_bad_points_are_named_and_told_what_came(points, message):
@@ -58,6 +60,7 @@ def test_ids_keep_their_order_and_a_mask_becomes_ids():
         ([0, 5], r"fixed must index 0..4; got 0..5"),
         ([-1], r"fixed must index 0..4; got -1..-1"),
         ([1, 2, 1], "fixed names a vertex twice"),
+        (np.ma.array([1, 2], mask=[0, 1]), "fixed holds masked entries"),
         ([0.5], "fixed must hold vertex numbers or be a mask; got float64"),
         ([[0, 1]], r"fixed must be one row of vertex numbers; got shape \(1, 2\)"),
         ([True, False], r"fixed, a mask, must have shape \(5,\); got \(2,\)"),

@@ -222,6 +222,8 @@ def test_bench_prints_a_table_with_a_row_for_each_number_of_regions(capsys):
         (["check", "no-such-file.ply"], 1, "no-such-file.ply"),
         (["cages", "BAR", "-o", "no/such/folder/x.ply", *QUICK], 1, "no folder"),
         (["regions", "BAR", "-o", "x.xyz", "--regions", "1"], 1, ".xyz"),
+        (["regions", "BAR", "-o", "x.stl", "--regions", "1"], 1, "cannot write arrays"),
+        (["cages", "BAR", "-o", "x.obj", "--regions", "1"], 1, "cannot write arrays"),
     ],
 )  # fmt: skip
 def test_what_goes_wrong_is_one_line_on_stderr_and_an_exit_code(

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from solids import CUBE, SOLIDS, icosphere, torus, two_components
 
+import vtk_segdeform as sd
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.faults import find_faults
 from vtk_segdeform.mesh import Mesh
@@ -161,3 +162,18 @@ def test_a_pose_costs_a_fraction_of_the_check():
 
     mesh = Mesh(vertices, faces)
     assert best(lambda: mesh.with_vertices(vertices)) < 0.2 * best(lambda: Mesh(vertices, faces))
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda it: sd.segment(it, 2),
+        lambda it: sd.Regions.single(it),
+        lambda it: sd.fit_cages(it, None),
+        lambda it: sd.Deformer(it, None, ()),
+        lambda it: sd.Session(it),
+    ],
+)
+def test_what_is_no_mesh_is_told_how_to_become_one(ask):
+    with pytest.raises(sd.errors.MeshError, match=r"mesh must be a Mesh; got .*Make one by"):
+        ask(np.zeros((4, 3)))

@@ -23,7 +23,7 @@ def as_points(points: ArrayLike, name: str) -> FloatArray:
 
 def as_faces(faces: ArrayLike, n_points: int, name: str) -> IntArray:
     """Return *faces* as (m, 3) int with indices in 0..n_points-1, or raise a ValueError."""
-    array = np.asarray(faces)
+    array = _plain(faces, name)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"{name} must have shape (m, 3), triangles; got {array.shape}")
     if array.dtype.kind not in "iu":
@@ -39,7 +39,7 @@ def as_ids(ids: ArrayLike, n_points: int, name: str) -> IntArray:
 
     The order given is kept; a number given twice is an error.
     """
-    array = np.asarray(ids)
+    array = _plain(ids, name)
     if array.dtype == bool:
         if array.shape != (n_points,):
             raise ValueError(f"{name}, a mask, must have shape ({n_points},); got {array.shape}")
@@ -66,7 +66,20 @@ def frozen(array: NDArray[np.generic]) -> NDArray[np.generic]:
 
 
 def _as_numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
+    array = _plain(values, name)
+    if array.dtype.kind == "c":
+        raise ValueError(f"{name} must hold real numbers; got {array.dtype}")
     try:
-        return np.asarray(values, dtype=np.float64)
+        return array.astype(np.float64, copy=False)
     except (TypeError, ValueError):
         raise ValueError(f"{name} must hold numbers") from None
+
+
+def _plain(values: ArrayLike, name: str) -> NDArray[np.generic]:
+    """Return *values* as an array, nothing left out: a mask over some of them would get lost."""
+    if np.ma.is_masked(values):
+        raise ValueError(f"{name} holds masked entries; fill them in or leave them out")
+    try:
+        return np.asarray(values)
+    except ValueError:  # rows of different lengths
+        raise ValueError(f"{name} must be an array; its rows differ in length") from None

@@ -6,9 +6,8 @@
     clear       faces that came too near to the solid are pushed away from it
     check       closed, outward, free of self-intersections, around every vertex of the region
 
-A larger offset is an easier cage: slits close, limbs fuse, holes fill, until the offset surface
-is a ball.  So a cage that fails a check is made again with a larger offset, and the last
-resort, an ellipsoid around the region, cannot fail.
+A larger offset is an easier cage: slits close, limbs fuse, holes fill, until it is a ball.  So a
+cage that fails a check is made again with a larger offset; an ellipsoid, in the end, cannot fail.
 
 The n vertices of a cage of area A are about ``sqrt(A / n)`` apart; that length sets the offset
 where none is asked for, because mean value coordinates degrade close to large faces.
@@ -32,7 +31,7 @@ from .caging.cage_simplify import roundness, simplify
 from .caging.columns import inside_points
 from .caging.region_solid import Patch, Skin, SolidField, solid_field
 from .errors import CageError, RegionError
-from .mesh import Mesh
+from .mesh import Mesh, require_mesh
 from .progress import Progress, part
 from .regions import Regions
 from .surface.inside import distance_to_surface
@@ -91,6 +90,7 @@ def fit_cages(
     CageError
         If *n_vertices* is too small or *offset* is not positive.
     """
+    require_mesh(mesh)
     skin = Skin.of(mesh)
     patches = [Patch.of(skin, members) for members in regions.membership]
     numbers = _share_out(patches, n_vertices)

@@ -41,6 +41,7 @@ _WRITERS: dict[str, Callable[[Path, pv.PolyData], None]] = {
 }  # fmt: skip
 _VTK_READS = frozenset({".stl", ".vtk", ".vtp", ".vtu", ".vtkhdf", ".glb", ".gltf"})
 _VTK_WRITES = frozenset({".stl", ".vtk", ".vtp", ".vtkhdf"})
+_HOLD_ARRAYS = frozenset({".ply", ".vtk", ".vtp", ".vtkhdf"})
 
 
 def read_mesh(path: str | Path) -> Mesh:
@@ -142,15 +143,19 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
         os.replace(draft, path)
 
 
-def require_writable(path: str | Path) -> None:
-    """Raise the MeshError that `write_mesh` would, before the work that is to be written."""
+def require_writable(path: str | Path, *, arrays: bool = False) -> None:
+    """Raise the MeshError that `write_mesh` would, before the work that is to be written.
+
+    With *arrays* the file has to hold point arrays and colours, which some formats cannot.
+    """
     path = Path(path)
     suffix = path.suffix.lower()
-    known = {*_WRITERS, *_VTK_WRITES, *meshlab.WRITES}
+    known = _HOLD_ARRAYS if arrays else {*_WRITERS, *_VTK_WRITES, *meshlab.WRITES}
     if path.is_dir():
         raise MeshError(f"{path}: a folder is there; name a file")
     if suffix not in known:
-        raise MeshError(f"{path}: cannot write {suffix or 'no suffix'}; can {_listed(known)}")
+        what = "arrays and colours to " if arrays else ""
+        raise MeshError(f"{path}: cannot write {what}{suffix or 'no suffix'}; can {_listed(known)}")
     if not path.parent.is_dir():
         raise MeshError(f"{path}: there is no folder {path.parent}")
     if not os.access(path.parent, os.W_OK):

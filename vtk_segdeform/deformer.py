@@ -25,7 +25,7 @@ from .cages import Cage
 from .constraints import VolumeConstraint, region_volumes, total_volume
 from .energy import shape_energy
 from .errors import CageError, ConstraintError, RegionError
-from .mesh import Mesh
+from .mesh import Mesh, require_mesh
 from .positions import checked_constraints, checked_targets, connected_sets, position_term
 from .progress import Progress, part
 from .regions import Regions
@@ -111,6 +111,7 @@ class Deformer:
         blend: ArrayLike | None = None,
         progress: Progress | None = None,
     ) -> None:
+        require_mesh(mesh)
         if regions.mesh.n_vertices != mesh.n_vertices:
             raise RegionError(
                 f"these regions belong to a mesh of {regions.mesh.n_vertices} vertices, "

@@ -130,3 +130,12 @@ class Mesh:
             if name in self.__dict__:
                 posed.__dict__[name] = self.__dict__[name]
         return posed
+
+
+def require_mesh(mesh: object) -> None:
+    """Raise a MeshError unless *mesh* is a `Mesh`, and say how to make one."""
+    if not isinstance(mesh, Mesh):
+        raise MeshError(
+            f"mesh must be a Mesh; got {type(mesh).__name__}. Make one by Mesh(vertices, faces), "
+            "read_mesh(path) or convert.from_polydata(polydata)"
+        )

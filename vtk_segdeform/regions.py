@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from .arrays import BoolArray, FloatArray, IntArray
 from .blending import border_distance, distance_to_triangles, shares
 from .errors import RegionError
-from .mesh import Mesh
+from .mesh import Mesh, require_mesh
 
 _EQUAL = 1e-9  # weights that differ by rounding only
 
@@ -63,6 +63,7 @@ class Regions:
     smoothness: float = 1.0
 
     def __post_init__(self) -> None:
+        require_mesh(self.mesh)
         membership = np.array(self.membership)
         n = self.mesh.n_vertices
         if membership.dtype != bool or membership.ndim != 2 or membership.shape[1] != n:
@@ -88,6 +89,7 @@ class Regions:
     @classmethod
     def single(cls, mesh: Mesh) -> Regions:
         """Return one region that holds everything: the classical method with a single cage."""
+        require_mesh(mesh)
         return cls(mesh, np.ones((1, mesh.n_vertices), dtype=bool))
 
     @classmethod

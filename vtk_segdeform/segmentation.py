@@ -24,7 +24,7 @@ from scipy.sparse import csgraph
 
 from .arrays import FloatArray, IntArray
 from .errors import RegionError
-from .mesh import Mesh
+from .mesh import Mesh, require_mesh
 from .progress import Progress
 from .regions import Regions
 from .segmenting.coarse import Surface, coarsen, nearest_of, symmetric
@@ -83,16 +83,16 @@ def segment(
     -----
     The same for the same arguments, and for a mesh moved, turned or scaled, up to rounding.
     """
+    require_mesh(mesh)
     n = mesh.n_vertices
-    if n_regions is not None:
-        if not (1 <= n_regions <= n and n_regions == int(n_regions)):
-            raise RegionError(f"n_regions must be a whole number in 1..{n}; got {n_regions}")
-        n_regions = int(n_regions)
+    if n_regions is not None and not (1 <= n_regions <= n and n_regions == int(n_regions)):
+        raise RegionError(f"n_regions must be a whole number in 1..{n}; got {n_regions}")
     _tell(progress, 0.0, "thinning out vertices")
     shape = _without_ties(mesh)
     if n_regions is not None and n_regions <= mesh.components.max() + 1:
         labels = _merged_components(shape, int(n_regions))
     else:
+        n_regions = None if n_regions is None else int(n_regions)
         points = max(_POINTS, _POINTS_PER_REGION * (n_regions or 1))
         cell, surface = coarsen(shape, points, np.random.default_rng(seed))
         labels = _parts(surface, n_regions, progress)[cell]

@@ -36,7 +36,7 @@ from .editing.listeners import Change
 from .editing.posing import Posing
 from .editing.state import Options, Pose, State, checked_state, fitting_cages, of_mesh
 from .errors import CageError, RegionError, SessionError
-from .mesh import Mesh
+from .mesh import Mesh, require_mesh
 from .positions import checked_constraints
 from .progress import Progress
 from .regions import Regions
@@ -85,6 +85,7 @@ class Session(Timeline):
     """
 
     def __init__(self, mesh: Mesh, *, state: State | None = None, history: int = 100) -> None:
+        require_mesh(mesh)
         super().__init__(State() if state is None else checked_state(mesh, state), history)
         self._mesh = mesh
         self._posing = Posing(mesh)

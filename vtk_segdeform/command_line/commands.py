@@ -119,7 +119,7 @@ def check(options: Namespace, say: Say, progress: Progress) -> bool:
 def regions(options: Namespace, say: Say, progress: Progress) -> bool:
     """Cut a mesh into regions; say how large they are, write them as point array "region"."""
     if options.output is not None:
-        convert.require_writable(options.output)
+        convert.require_writable(options.output, arrays=True)
     surface, mesh = _read(options.input)
     found = _regions(options, surface, mesh, progress)
     tell_regions(found, say)
@@ -131,6 +131,8 @@ def regions(options: Namespace, say: Say, progress: Progress) -> bool:
 
 def cages(options: Namespace, say: Say, progress: Progress) -> bool:
     """Make the cages of a mesh; say how large they are, write all as one coloured surface."""
+    if options.output is not None:
+        convert.require_writable(options.output, arrays=True)
     surface, mesh = _read(options.input)
     found, made = _subspace(options, surface, mesh, progress)
     tell_regions(found, say)
