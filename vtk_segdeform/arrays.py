@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -75,7 +77,7 @@ def _as_numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
         raise ValueError(f"{name} must hold numbers") from None
 
 
-def _plain(values: ArrayLike, name: str) -> NDArray[np.generic]:
+def _plain(values: ArrayLike, name: str) -> NDArray[Any]:
     """Return *values* as an array, nothing left out: a mask over some of them would get lost."""
     if np.ma.is_masked(values):
         raise ValueError(f"{name} holds masked entries; fill them in or leave them out")

@@ -150,7 +150,7 @@ def require_writable(path: str | Path, *, arrays: bool = False) -> None:
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    known = _HOLD_ARRAYS if arrays else {*_WRITERS, *_VTK_WRITES, *meshlab.WRITES}
+    known = {*_HOLD_ARRAYS} if arrays else {*_WRITERS, *_VTK_WRITES, *meshlab.WRITES}
     if path.is_dir():
         raise MeshError(f"{path}: a folder is there; name a file")
     if suffix not in known:
