@@ -13,9 +13,8 @@ that half the Hessian of E = tr(p^T Q p) - 2 sum_g f(K_g p) + c is
     H = Q (x) I  -  sum_g T_g M_g^-1 T_g^T,      T_g^T dp = b
 
 All of the sum would let the whole turn freely about a single handle, so a little is kept back.
-H is factored anew in every step, in coordinates stacked axis by axis.  Compressed or mirrored
-groups can make it indefinite; as much of the sum is then left out as it takes.  With nothing left
-it is the paper's.
+Compressed or mirrored groups can make H indefinite; as much of the sum is then left out as it
+takes.  With nothing left it is the paper's.  Coordinates are stacked axis by axis.
 
 Source
 ------

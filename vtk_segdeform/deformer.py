@@ -69,7 +69,8 @@ class Deformer:
         When to stop: the surface moves less than this in a step, root mean square, as a share of
         the mesh's size (the diameter of a ball about its centre that holds it).
     window : int
-        Steps the acceleration remembers; 0 is the paper's plain iteration.
+        Steps the acceleration remembers; 0 is the paper's plain iteration, rotations taken for
+        given.
     exact_volume : bool
         False leaves the paper's linearised multiplier, for comparison.
     hold_tolerance : float

@@ -20,7 +20,7 @@ Four things are added, each told by a number from the cactus bent by 60 degrees:
    a small one says little of how far there is to go.  With their part in H it is Newton's step
    for the shape, and about as long as the way that is left.
 3. *Anderson acceleration* (`acceleration`) of (21) as a fixed-point map p -> q(p), for what H
-   still lacks: the curvature of the constraints.
+   still lacks: the curvature of the constraints, and of what has turned since it was factored.
 4. *Safeguard.*  All iterates meet the constraints, so the objective itself is the merit: an
    accelerated step that raises it is thrown away for the plain one, and a plain step that raises
    it is shortened, epsilon of section 3.3.
@@ -51,6 +51,7 @@ from .positions import PositionTerm
 _RISE = 1e-13  # relative rise of the merit that counts as rounding
 _DAMPING = 1e-9  # of the mean diagonal of H
 _SHORTEST = 1.0 / 64.0  # epsilon of section 3.3 below which a step is given up
+_OLD = 5  # steps after which the curvature is looked at again
 
 
 class Status(enum.Enum):
@@ -145,10 +146,12 @@ class GaussNewton:
         here = self._evaluate(p, self.energy.subspace.map(p), targets)
         merits = [here.merit]
         size, status = np.inf, Status.STEP_LIMIT
-        factor = self._factor
+        curved = bool(options.window) and self.energy.exact
+        factor, age = self._factor, _OLD
         for _ in range(options.max_steps):
-            if options.window and self.energy.exact:
-                factor = curved_factor(self._hessian, self.energy, here.p) or self._factor
+            if curved and age >= _OLD:
+                factor, age = curved_factor(self._hessian, self.energy, here.p) or self._factor, 0
+            age += 1
             step, multipliers, directions = self._step(here, factor)
             size = self._size(step)
             if size <= options.tolerance:
@@ -161,6 +164,9 @@ class GaussNewton:
                 if not self._improves(ahead, here):
                     memory.forget()
                     ahead = None
+                    if curved and age > 1:  # look again before giving way to the plain step
+                        age = _OLD
+                        continue
             ahead = ahead or self._shortened(here, step, directions, targets, options)
             if ahead is None:
                 status = Status.STALLED
