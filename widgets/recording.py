@@ -1,0 +1,216 @@
+"""What hands did in a window, as plain text that does it again: for tests and for bug reports.
+
+One line is one event: when, in seconds; what; where, in pixels from the lower left corner; and
+what was held down.  `Timer` is one tick of the event loop or several.  A recording begins with
+the window and the camera, and has them again before a press if they changed, so that a replay is
+exact also where a program moved the camera.
+
+    vtk_segdeform recording 1
+    0.000 Window 800 600
+    0.000 Camera position 0.0 -3.0 0.5 focus 0.0 0.0 0.5 up 0.0 0.0 1.0 angle 30.0 ...
+    0.731 MouseMove 412 300
+    0.802 LeftButtonPress 412 300 control
+    2.004 KeyPress 412 300 control key=z code=26
+    2.310 Timer 3
+
+Lines that are empty or begin with # say nothing.  It tells only what the hands did: to replay
+it, begin with the session and the view that it began with.
+
+A camera style that drags keeps all events from other observers, as a widget does by its abort
+flag; not from VTK's passive ones, which are called before everybody else.  The recorder is one.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, TextIO
+
+from vtkmodules.vtkCommonCore import vtkVersion
+
+from vtk_segdeform import __version__
+from vtk_segdeform.errors import SessionError
+
+from .transcript import EVENTS, TITLE, Camera, Entry, Input, Ticks, Window, read_entry
+from .view import View
+
+_LONGEST_PAUSE = 2.0  # seconds
+
+
+class Recorder:
+    """Writes down every event of a view, from when it is made until `stop`.
+
+    Parameters
+    ----------
+    view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
+        Whose events.
+    path : path, optional
+        A text file that each event is added to at once, so that it is there after a crash.
+
+    Raises
+    ------
+    SessionError
+        If *path* cannot be written.
+    """
+
+    def __init__(self, view: Any, path: str | os.PathLike[str] | None = None) -> None:
+        self.view = View.of(view)
+        self.lines: list[str] = []
+        self._start = time.monotonic()
+        self._told: dict[type, Entry] = {}
+        self._ticks = 0
+        self._file: TextIO | None = None
+        if path is not None:
+            self._file = _opened(path)
+        self._write(TITLE)
+        vtk = vtkVersion.GetVTKVersion()
+        self._write(f"# vtk_segdeform {__version__}, VTK {vtk}, {sys.platform}")
+        self._tell_scene()
+        self._tags = [self._watch(name) for name in (*EVENTS, "Timer")]
+
+    def stop(self) -> None:
+        """Write no more; the file is closed."""
+        if not self._tags:
+            return
+        for tag in self._tags:
+            self.view.interactor.RemoveObserver(tag)
+        self._tags = []
+        self._tell_ticks()
+        self._tell_scene()
+        if self._file is not None:
+            self._file.close()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write what was recorded so far to a text file; SessionError if that cannot be."""
+        with _opened(path) as file:
+            file.write("".join(f"{line}\n" for line in self.lines))
+
+    def _watch(self, name: str) -> int:
+        def called(*_: object) -> None:
+            with self.view.guarded():
+                self._hear(name)
+
+        interactor = self.view.interactor
+        tag: int = interactor.AddObserver(f"{name}Event", called)
+        interactor.GetCommand(tag).SetPassiveObserver(True)
+        return tag
+
+    def _hear(self, name: str) -> None:
+        if name == "Timer":
+            self._ticks += 1
+            return
+        self._tell_ticks()
+        if name.endswith("Press"):  # what follows depends on where the camera is
+            self._tell_scene()
+        self._tell(Input.of(name, self.view.interactor))
+
+    def _tell_ticks(self) -> None:
+        if self._ticks:
+            self._tell(Ticks(self._ticks))
+            self._ticks = 0
+
+    def _tell_scene(self) -> None:
+        if _is_closed(self.view.window):
+            return
+        for entry in (Window.of(self.view), Camera.of(self.view)):
+            if self._told.get(type(entry)) != entry:
+                self._told[type(entry)] = entry
+                self._tell(entry)
+
+    def _tell(self, entry: Entry) -> None:
+        self._write(f"{time.monotonic() - self._start:.3f} {entry}")
+
+    def _write(self, line: str) -> None:
+        self.lines.append(line)
+        if self._file is not None:
+            self._file.write(f"{line}\n")
+
+
+def replay(
+    view: Any,
+    source: str | os.PathLike[str] | Iterable[str],
+    *,
+    pace: float = 0.0,
+    busy: Callable[[], bool] | None = None,
+) -> None:
+    """Do again in *view* what a `Recorder` wrote down.
+
+    The whole of it is read and checked before the first event is sent.  It ends early if one of
+    the events closes the window.
+
+    Parameters
+    ----------
+    view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
+        Where; with the same session as when it was recorded.
+    source : path or iterable of str
+        The file, or its lines.
+    pace : float
+        1 for as fast as it was, 0.5 for twice as fast, long pauses cut short; 0 waits for nothing.
+    busy : callable, optional
+        Tells whether work goes on in the background; the next event then waits for its end, while
+        timers tick.
+
+    Raises
+    ------
+    SessionError
+        If there is no such file, or a line makes no sense: the text has its number.
+    """
+    view = View.of(view)
+    before = 0.0
+    for moment, entry in _read(source):
+        while busy is not None and busy():
+            Ticks(1).send(view)
+            time.sleep(0.005)
+        time.sleep(min(max(0.0, moment - before), _LONGEST_PAUSE) * pace)
+        before = moment
+        if _is_closed(view.window):
+            return
+        entry.send(view)
+
+
+def _read(source: str | os.PathLike[str] | Iterable[str]) -> list[tuple[float, Entry]]:
+    """Return when and what, for every line that says something."""
+    name = "recording"
+    lines: Iterable[str]
+    if isinstance(source, str | os.PathLike):
+        name = os.fspath(source)
+        try:
+            lines = Path(source).read_bytes().decode(errors="replace").splitlines()
+        except OSError as fault:
+            raise SessionError(f"{name}: cannot be read ({fault.strerror or fault})") from fault
+    else:
+        lines = source
+    entries, began = [], False
+    for number, line in enumerate(lines, start=1):
+        try:
+            text = line.strip()
+            if not began:
+                began = _is_title(text)
+            elif text and not text.startswith("#"):
+                entries.append(read_entry(text))
+        except ValueError as fault:
+            raise SessionError(f"{name}, line {number}: {fault}") from None
+    if not began:
+        raise SessionError(f"{name}: is empty; a recording begins with {TITLE!r}")
+    return entries
+
+
+def _is_title(text: str) -> bool:
+    if text != TITLE:
+        raise ValueError(f"a recording begins with {TITLE!r}; got {text[:60]!r}")
+    return True
+
+
+def _is_closed(window: Any) -> bool:
+    """Tell whether a window is gone; one that somebody still holds has lost what it drew with."""
+    return window is None or not (window.GetNeverRendered() or window.GetInitialized())
+
+
+def _opened(path: str | os.PathLike[str]) -> TextIO:
+    try:
+        return open(path, "w", encoding="utf-8", buffering=1)  # line by line
+    except OSError as fault:
+        raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
