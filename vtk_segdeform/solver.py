@@ -51,7 +51,7 @@ from .positions import PositionTerm
 _RISE = 1e-13  # relative rise of the merit that counts as rounding
 _DAMPING = 1e-9  # of the mean diagonal of H
 _SHORTEST = 1.0 / 64.0  # epsilon of section 3.3 below which a step is given up
-_OLD = 5  # steps after which the curvature is looked at again
+_OLD, _LONG = 5, 1e-2  # steps after which the curvature is looked at again; or after one as long
 
 
 class Status(enum.Enum):
@@ -149,7 +149,7 @@ class GaussNewton:
         curved = bool(options.window) and self.energy.exact
         factor, age = self._factor, _OLD
         for _ in range(options.max_steps):
-            if curved and age >= _OLD:
+            if curved and (age >= _OLD or size > _LONG):
                 factor, age = curved_factor(self._hessian, self.energy, here.p) or self._factor, 0
             age += 1
             step, multipliers, directions = self._step(here, factor)
