@@ -1,0 +1,145 @@
+"""A diverging scale at the right of a view and lines of text at its upper left.
+
+Sizes follow the window; the ink is dark or white, whichever is read better on what is behind it.
+A line may stand on the colour of a region.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import vtkmodules.vtkRenderingFreeType  # noqa: F401 - without it text is not drawn
+from vtkmodules.vtkRenderingAnnotation import vtkScalarBarActor
+from vtkmodules.vtkRenderingCore import vtkTextActor
+
+from vtk_segdeform.arrays import FloatArray
+from vtk_segdeform.palette import INK, PAPER, of_region, rgb
+
+from .diverging import lookup_table
+from .view import Stop, View
+
+_TICKS = 5
+
+
+class Legend:
+    """What the colours of a mesh mean, and some words; hidden until `show`.
+
+    Parameters
+    ----------
+    view : View
+        Where to draw.
+    title : str
+        Stands over the scale.
+    """
+
+    def __init__(self, view: View, title: str) -> None:
+        self.view = view
+        self._bar = _scalar_bar(title)
+        self._lines: list[Any] = []
+        self._laid_out: tuple[Any, ...] = ()
+        self._stop: Stop | None = None
+
+    def show(self, half_range: float, lines: Sequence[tuple[str, int | None]]) -> None:
+        """Show a scale up to *half_range*, a share, and *lines*; or other ones than before.
+
+        Parameters
+        ----------
+        half_range : float
+            See `diverging`.
+        lines : sequence of (text, region)
+            From the top; *region* is a number whose colour it stands on, or None.
+        """
+        renderer = self.view.renderer
+        if self._stop is None:
+            self._stop = self.view.before_render(self._lay_out)
+            renderer.AddViewProp(self._bar)
+        table = self._bar.GetLookupTable()
+        if table is None or table.GetTableRange()[1] != half_range:
+            self._bar.SetLookupTable(_annotated_table(half_range))
+        while len(self._lines) > len(lines):
+            renderer.RemoveViewProp(self._lines.pop())
+        while len(self._lines) < len(lines):
+            self._lines.append(vtkTextActor())
+            renderer.AddViewProp(self._lines[-1])
+        for actor, (text, region) in zip(self._lines, lines, strict=True):
+            actor.SetInput(f" {text} ")
+            style = actor.GetTextProperty()
+            style.SetBackgroundOpacity(0.0 if region is None else 1.0)
+            style.SetFrame(region is not None)
+            if region is not None:
+                style.SetBackgroundColor(*(of_region(region) / 255.0))
+                style.SetFrameColor(*style.GetBackgroundColor())
+        self._laid_out = ()
+
+    def hide(self) -> None:
+        """Take everything out of the view."""
+        if self._stop is not None:
+            self._stop()
+            self._stop = None
+        for prop in (self._bar, *self._lines):
+            self.view.renderer.RemoveViewProp(prop)
+        self._lines = []
+
+    def _lay_out(self) -> None:
+        renderer = self.view.renderer
+        width, height = renderer.GetSize()
+        now = width, height, renderer.GetBackground()
+        if now == self._laid_out:
+            return
+        self._laid_out = now
+        size = int(np.clip(height / 42, 11, 30))
+        for k, actor in enumerate(self._lines):
+            style = actor.GetTextProperty()
+            style.SetFontSize(size)
+            style.SetFrameWidth(size // 6)
+            on = style.GetBackgroundColor() if style.GetBackgroundOpacity() else now[2]
+            style.SetColor(*_ink_on(on))
+            actor.SetPosition(0.6 * size, height - 1.7 * size * (k + 1.2))
+        for style in (self._bar.GetTitleTextProperty(), self._bar.GetAnnotationTextProperty()):
+            style.SetFontSize(size)
+            style.SetColor(*_ink_on(now[2]))
+
+
+def signed(number: float, digits: int) -> str:
+    """Write "+2.5", "-10" or "0": no needless zeros, and no sign where there is nothing.
+
+    >>> signed(2.5, 1), signed(-10.0, 1), signed(-0.01, 1)
+    ('+2.5', '-10', '0')
+    """
+    rounded = round(number, digits)
+    return f"{rounded:+.{digits}f}".removesuffix(".0") if rounded else "0"
+
+
+def _scalar_bar(title: str) -> Any:
+    bar = vtkScalarBarActor()
+    bar.SetTitle(title)
+    bar.SetPosition(0.86, 0.25)
+    bar.SetWidth(0.12)
+    bar.SetHeight(0.5)
+    bar.UnconstrainedFontSizeOn()
+    bar.SetMaximumNumberOfColors(255)
+    bar.SetVerticalTitleSeparation(8)
+    # Ticks are annotations: VTK's number formats cannot write "+20 %", "0" and "-20 %" alike.
+    bar.DrawTickLabelsOff()
+    bar.DrawAnnotationsOn()
+    for style in (bar.GetTitleTextProperty(), bar.GetAnnotationTextProperty()):
+        style.ItalicOff()
+        style.BoldOff()
+        style.ShadowOff()
+    return bar
+
+
+def _annotated_table(half_range: float) -> Any:
+    table = lookup_table(half_range)
+    for share in np.linspace(-half_range, half_range, _TICKS):
+        percent = signed(100.0 * float(share), 1)
+        table.SetAnnotation(float(share), percent if percent == "0" else f"{percent} %")
+    return table
+
+
+def _ink_on(colour: Any) -> FloatArray:
+    """Return the one of dark and white that is read better on *colour*."""
+    dark = np.dot(colour, [0.2126, 0.7152, 0.0722]) < 0.45
+    return np.asarray(rgb(PAPER if dark else INK) / 255.0)

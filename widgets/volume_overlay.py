@@ -1,0 +1,230 @@
+"""The local volume change in colours over the mesh, with a scale, and totals as text.
+
+At each vertex i the share s_i by which the flesh under it has swollen (orange) or been pinched
+(blue) since rest.  The flesh under i are the tetrahedra from the triangles around i to o(i), the
+vertex across from it, where the largest inner ball that touches the skin at i touches it again:
+
+    L_i(x) = sum_{T = (a, b, c) at i} det(x_a - x_o, x_b - x_o, x_c - x_o) / 18
+    s_i(x) = sum_j k_ij L_j(x) / sum_j k_ij L_j(rest) - 1
+
+with k a smoothing over the surface.  s is 0 under any rigid motion, and is then one colour to the
+last pixel.  `vtk_segdeform.local_volume` computes it, and only while it is shown.
+
+The text tells, from top to bottom: (V - V0) / V0 of the whole mesh; the least and the largest s;
+(V - V0) / V0 of each region, closed at its border as `vtk_segdeform.constraints` tells; the steps
+of the last solve, and the time from the event that changed the pose to the end of drawing it.
+
+Source
+------
+The vertices o(i): J. Ma, S. W. Bae, S. Choi, "3D medial axis point approximation using nearest
+neighbors and the normal field", The Visual Computer 28, 2012.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from vtk_segdeform.arrays import FloatArray
+from vtk_segdeform.constraints import VolumeConstraint, region_volumes
+from vtk_segdeform.editing.listeners import Change
+from vtk_segdeform.local_volume import LocalVolume
+from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.regions import Regions
+from vtk_segdeform.session import Session
+
+from .diverging import colours_of, half_range_for
+from .legend import Legend, signed
+from .surface_display import SurfaceDisplay
+from .view import Stop, View
+
+_LAYER = "volume"
+_FIRST = 100.0  # priority: hears of an event before whoever changes the pose in it
+_MOST_REGIONS = 8  # more lines would cover the mesh
+_SOFT = 0.55, 0.45, 0.0  # ambient, diffuse, specular light: shadows are not to pass for values
+
+
+class VolumeOverlay:
+    """Colours, scale and text over a mesh; hidden until `show`.
+
+    Parameters
+    ----------
+    view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
+        Where to draw.
+    session : Session
+        Whose pose.
+    surface : SurfaceDisplay, optional
+        The mesh to colour, of the same session; without it there is one of its own.
+    """
+
+    def __init__(self, view: Any, session: Session, surface: SurfaceDisplay | None = None) -> None:
+        self.view = View.of(view)
+        self.session = session
+        self._own_surface = surface is None
+        self._surface = SurfaceDisplay(self.view, session) if surface is None else surface
+        self._legend = Legend(self.view, "local volume")
+        self._clock = _FrameClock(self.view)
+        self._local: LocalVolume | None = None
+        self._volumes: tuple[Regions, list[tuple[int, VolumeConstraint]]] | None = None
+        self._change: FloatArray | None = None
+        self._half_range: float | None = None
+        self._light = _SOFT
+        self._stop: Stop | None = None
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether it is to be seen."""
+        return self._stop is not None
+
+    @property
+    def change(self) -> FloatArray | None:
+        """(n,) float: s of the pose that is shown; None while hidden."""
+        return self._change
+
+    @property
+    def half_range(self) -> float | None:
+        """The share at the ends of the scale; None while hidden."""
+        return self._half_range
+
+    def prepare(self) -> None:
+        """Do ahead of time what the first `show` would have to wait for.
+
+        It depends on the mesh alone and draws nothing: another thread may do it.
+        """
+        self._prepared()
+
+    def show(self) -> None:
+        """Show it, and keep it up to date."""
+        if not self.is_shown:
+            self._stop = self.session.on_change(self._changed)
+            self._clock.start()
+            self._swap_light()
+            self._update()
+
+    def hide(self) -> None:
+        """Take it out of the view; nothing more is computed."""
+        if self._stop is None:
+            return
+        self._stop()
+        self._stop = self._change = self._half_range = None
+        self._clock.stop()
+        self._legend.hide()
+        self._swap_light()
+        self._surface.set_colours(_LAYER, None)
+
+    def remove(self) -> None:
+        """Take everything out of the view, for good."""
+        self.hide()
+        if self._own_surface:
+            self._surface.remove()
+
+    def _prepared(self) -> LocalVolume:
+        self._local = self._local or LocalVolume(self.session.mesh)
+        return self._local
+
+    def _changed(self, change: Change) -> None:
+        if change & Change.POSE:
+            self._clock.posed = True
+            self._update()
+        elif change & Change.REGIONS and self._change is not None and self._half_range is not None:
+            self._legend.show(self._half_range, self._lines(self._change))
+            self.view.touch()
+
+    def _update(self) -> None:
+        self._change = self._prepared().change(self.session.vertices)
+        self._half_range = half_range_for(self._change, self._half_range)
+        self._legend.show(self._half_range, self._lines(self._change))
+        self._surface.set_colours(_LAYER, colours_of(self._change, self._half_range))
+
+    def _swap_light(self) -> None:
+        """Give the surface the soft light and keep its own, or the other way round."""
+        skin, light = self._surface.actor.GetProperty(), self._light
+        self._light = skin.GetAmbient(), skin.GetDiffuse(), skin.GetSpecular()
+        skin.SetAmbient(light[0])
+        skin.SetDiffuse(light[1])
+        skin.SetSpecular(light[2])
+
+    def _lines(self, change: FloatArray) -> list[tuple[str, int | None]]:
+        low, high = (signed(100.0 * float(share), 0) for share in (change.min(), change.max()))
+        lines: list[tuple[str, int | None]] = [
+            (f"volume: {_precise(self.session.volume_change)}", None),
+            (f"local: {low} to {high} %", None),
+        ]
+        regions = self._region_changes()
+        lines += [
+            (f"region {region}: {signed(100.0 * share, 1)} %", region)
+            for region, share in regions[:_MOST_REGIONS]
+        ]
+        if len(regions) > _MOST_REGIONS:
+            lines.append((f"and {len(regions) - _MOST_REGIONS} regions more", None))
+        solution, seconds = self.session.solution, self._clock.seconds
+        work = [f"{solution.steps} step{'s' * (solution.steps != 1)}"] if solution else []
+        work += [f"{1000.0 * seconds:.0f} ms a frame"] if seconds is not None else []
+        return lines + [(", ".join(work), None)] if work else lines
+
+    def _region_changes(self) -> list[tuple[int, float]]:
+        """Return the number of each region that owns a face, and its (V - V0) / V0."""
+        session, regions = self.session, self.session.regions
+        if regions is None or regions.n_regions == 1:
+            return []
+        if session.state.pose is None:
+            return [(region, 0.0) for region in range(regions.n_regions)]
+        if self._volumes is None or self._volumes[0] is not regions:
+            self._volumes = regions, _owned_volumes(session.mesh, regions)
+        owners, volumes = zip(*self._volumes[1], strict=True)
+        if session.solution is not None:  # the solver has them already
+            shares = session.solution.region_volume_change.tolist()
+        else:
+            x = session.vertices
+            shares = [volume.violation(x) / volume.target for volume in volumes]
+        return list(zip(owners, shares, strict=True))
+
+
+class _FrameClock:
+    """How long the last change of the pose took, from the event it came by to its picture."""
+
+    def __init__(self, view: View) -> None:
+        self.posed = False
+        self.seconds: float | None = None
+        self._view = view
+        self._began: float | None = None
+        self._stops: list[Stop] = []
+
+    def start(self) -> None:
+        """Wait for events."""
+        window = self._view.window
+        events = ("MouseMoveEvent", "TimerEvent")
+        self._stops = [self._view.observe(event, self._begin, _FIRST) for event in events]
+        if window is not None:
+            tag = window.AddObserver("EndEvent", self._end)
+            self._stops.append(lambda: window.RemoveObserver(tag))
+
+    def stop(self) -> None:
+        """Wait no more, and forget."""
+        for stop in self._stops:
+            stop()
+        self._stops, self.seconds, self._began = [], None, None
+
+    def _begin(self) -> bool:
+        self._began, self.posed = time.perf_counter(), False
+        return False
+
+    def _end(self, *_: object) -> None:
+        if self.posed and self._began is not None:
+            self.seconds = time.perf_counter() - self._began
+        self._began, self.posed = None, False
+
+
+def _owned_volumes(mesh: Mesh, regions: Regions) -> list[tuple[int, VolumeConstraint]]:
+    """Return the volume of each region that owns a face, with the region's number."""
+    labels = regions.labels
+    owned = []
+    for volume in region_volumes(mesh, labels):
+        a, b, c = labels[volume.faces[0]].tolist()  # its own, and owned by the rule told there
+        owned.append((b if b == c else a, volume))
+    return owned
+
+
+def _precise(share: float) -> str:
+    """Write a share in per cent, or with its power of ten where that would read as nothing."""
+    return f"{signed(100.0 * share, 1)} %" if abs(share) >= 1e-3 or not share else f"{share:+.1e}"

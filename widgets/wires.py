@@ -1,0 +1,69 @@
+"""A triangle mesh as wires with a ball at each vertex, moved in place."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
+from vtkmodules.vtkCommonCore import reference, vtkPoints
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
+
+from vtk_segdeform.arrays import FloatArray, IntArray
+
+
+class Wires:
+    """Edges and vertices in one colour, as one actor.
+
+    Parameters
+    ----------
+    vertices : (m, 3) float
+        Copied.
+    edges : (e, 2) int
+        Drawn as lines.
+    balls : (b,) int
+        The vertices drawn as balls.
+    """
+
+    def __init__(self, vertices: FloatArray, edges: IntArray, balls: IntArray) -> None:
+        points = vtkPoints()
+        points.SetData(numpy_to_vtk(np.array(vertices, dtype=np.float64), deep=True))
+        self._data = vtkPolyData()
+        self._data.SetPoints(points)
+        self._data.SetLines(_cells(edges))
+        self._data.SetVerts(_cells(balls[:, None]))
+        self._points = vtk_to_numpy(points.GetData())
+        mapper = vtkPolyDataMapper()
+        mapper.SetInputData(self._data)
+        # With the offset that a surface asks VTK's mappers for, all of them, balls would sink
+        # into the depth: here it is taken off again.
+        offset = reference(0.0)
+        mapper.GetResolveCoincidentTopologyPointOffsetParameter(offset)
+        mapper.SetRelativeCoincidentTopologyPointOffsetParameter(-float(offset))
+        self.actor = vtkActor()
+        self.actor.SetMapper(mapper)
+        self.actor.PickableOff()
+        self.actor.GetProperty().RenderPointsAsSpheresOn()
+
+    def draw(self, colour: Any, *, line_width: float, ball_size: float) -> None:
+        """Draw with *colour*, (3,) of 0 to 255, and sizes in pixels."""
+        style = self.actor.GetProperty()
+        style.SetColor(*(np.asarray(colour) / 255.0))
+        style.SetLineWidth(line_width)
+        style.SetPointSize(ball_size)
+
+    def move(self, vertices: FloatArray) -> None:
+        """Put the vertices at other places (m, 3)."""
+        self._points[:] = vertices
+        self._data.GetPoints().GetData().Modified()
+        self._data.GetPoints().Modified()
+
+
+def _cells(corners: IntArray) -> Any:
+    count, length = corners.shape
+    cells = vtkCellArray()
+    offsets = numpy_to_vtkIdTypeArray(np.arange(count + 1, dtype=np.int64) * length, deep=True)
+    connectivity = numpy_to_vtkIdTypeArray(corners.ravel().astype(np.int64), deep=True)
+    cells.SetData(offsets, connectivity)
+    return cells
