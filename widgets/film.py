@@ -1,0 +1,177 @@
+"""A deformation as a moving picture: a GIF, an MP4, or a folder of PNG pictures.
+
+    film("bend.gif", session, targets)             a drag, a picture for each of its targets
+    film("turn.mp4", view, [turn_camera] * 90)     whatever is done before each picture
+    film = Film(view); stop = film.watch()         everything that is drawn from now on,
+    ...; stop(); film.save("work.gif")             say by hand, or by a replay
+
+Pictures are kept compressed until the film is saved; see `film_files` for what it is saved as.
+"""
+
+from __future__ import annotations
+
+import os
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+
+from vtk_segdeform.session import Session
+
+from .film_files import Picture, require_film, write_film
+from .off_screen import OffScreen
+from .view import Stop, View
+
+Targets = Mapping[str, ArrayLike] | ArrayLike
+Frame = Callable[[], object] | Targets | None
+
+
+class Film:
+    """Pictures of a view, in the order they were taken.
+
+    Parameters
+    ----------
+    view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
+        All its window is seen.
+    """
+
+    def __init__(self, view: Any) -> None:
+        self.view = View.of(view)
+        self._pictures: list[bytes] = []
+        self._shape = (0, 0, 3)
+
+    def __len__(self) -> int:
+        return len(self._pictures)
+
+    def __getitem__(self, number: int) -> Picture:
+        """Return a picture, (h, w, 3) uint8, upper row first."""
+        packed = self._pictures[number]
+        return np.frombuffer(zlib.decompress(packed), np.uint8).reshape(self._shape)
+
+    def snap(self) -> None:
+        """Draw the view and take a picture."""
+        self.view.render()
+        self._take()
+
+    def watch(self) -> Stop:
+        """Take a picture whenever the window was drawn, until what is returned is called."""
+
+        def called(*_: object) -> None:
+            with self.view.guarded():
+                self._take()
+
+        window = self.view.window
+        tag = window.AddObserver("EndEvent", called)
+        return lambda: window.RemoveObserver(tag)
+
+    def save(self, path: str | os.PathLike[str], *, fps: float = 20.0) -> None:
+        """Write the pictures; a file that is there is replaced, a folder is not.
+
+        Parameters
+        ----------
+        path : path
+            A .gif, an .mp4, or without a suffix a new folder for 0000.png, 0001.png, ...
+        fps : float
+            Pictures in a second.
+
+        Raises
+        ------
+        SessionError
+            If there are no pictures, or the film cannot be written there.
+        MissingDependencyError
+            If the library for such a film is absent.
+        """
+        write_film(path, self, fps)
+
+    def _take(self) -> None:
+        window = self.view.window
+        width, height = window.GetSize()
+        pixels = vtkUnsignedCharArray()
+        window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
+        picture = vtk_to_numpy(pixels).reshape(height, width, 3)[::-1]
+        if not self._pictures:  # the first says how large; videos want even numbers
+            self._shape = (height - height % 2, width - width % 2, 3)
+        whole = np.full(self._shape, 255, dtype=np.uint8)
+        h, w = min(height, self._shape[0]), min(width, self._shape[1])
+        whole[:h, :w] = picture[:h, :w]
+        self._pictures.append(zlib.compress(whole.tobytes(), 1))
+
+
+def film(
+    path: str | os.PathLike[str],
+    scene: Any,
+    frames: Iterable[Frame],
+    *,
+    fps: float = 20.0,
+    size: tuple[int, int] = (800, 600),
+) -> None:
+    """Make a film with one picture for each of *frames*.
+
+    Parameters
+    ----------
+    path : path
+        A .gif, an .mp4, or without a suffix a new folder of PNG pictures.
+    scene : Session, View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
+        A view as it is; or a session, whose mesh is then shown with fixed vertices in grey and
+        handles in red.
+    frames : iterable of callable, targets or None
+        Before each picture a callable is called, a session dragged to targets, (k, 3) or by the
+        name of the handle, as in `Session.drag`; None does nothing.  All targets together are one
+        step of the session, and none at all if something fails.
+    fps : float
+        Pictures in a second.
+    size : (width, height)
+        Pixels; of a session's film, a view has its own.
+
+    Raises
+    ------
+    SessionError
+        If the film cannot be written there; before anything is done.
+    MissingDependencyError
+        If the library for such a film is absent, or nothing can be rendered here.
+    """
+    require_film(path, fps)
+    session = scene if isinstance(scene, Session) else None
+    if isinstance(frames, Iterator):
+        room: Sequence[Frame] = []
+    else:
+        frames = room = list(frames)
+    if session is None:
+        made = Film(scene)
+        _shoot(made, None, frames)
+    else:
+        with OffScreen(session, size, room=_places(room)) as stage:
+            made = Film(stage.view)
+            try:
+                _shoot(made, session, frames)
+            except BaseException:
+                session.revert()
+                raise
+            session.commit()
+    made.save(path, fps=fps)
+
+
+def _shoot(made: Film, session: Session | None, frames: Iterable[Frame]) -> None:
+    for frame in frames:
+        if callable(frame):
+            frame()
+        elif frame is not None:
+            if session is None:
+                raise TypeError("targets are for a session; to film a view, give callables")
+            session.drag(frame)
+        made.snap()
+
+
+def _places(frames: Sequence[Frame]) -> list[NDArray[np.float64]]:
+    """Return the targets among *frames*, each (k, 3)."""
+    places: list[ArrayLike] = []
+    for frame in frames:
+        if isinstance(frame, Mapping):
+            places += frame.values()
+        elif frame is not None and not callable(frame):
+            places.append(frame)
+    return [np.asarray(place, dtype=float).reshape(-1, 3) for place in places]

@@ -1,0 +1,122 @@
+"""Films as files: GIF, MP4, or a folder of PNG pictures; each appears whole or not at all.
+
+GIFs have 256 colours, the same for all pictures so that nothing flickers; Pillow writes them,
+which pyvista brings along.  MP4s need imageio[ffmpeg].
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import tempfile
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkIOImage import vtkPNGWriter
+
+from vtk_segdeform.errors import MissingDependencyError, SessionError
+
+Picture = NDArray[np.uint8]  # (h, w, 3), upper row first, all of one size
+
+_SAMPLES = 12  # pictures that the colours of a GIF are taken from
+_NEEDS = {".gif": ("PIL.Image", "pillow"), ".mp4": ("imageio_ffmpeg", "'imageio[ffmpeg]'")}
+
+
+class Pictures(Protocol):
+    """A sequence of them."""
+
+    def __len__(self) -> int: ...
+    def __getitem__(self, number: int, /) -> Picture: ...
+
+
+def write_film(path: str | os.PathLike[str], pictures: Pictures, fps: float) -> None:
+    """Write *pictures*, *fps* in a second, as the suffix of *path* says.
+
+    Raises
+    ------
+    SessionError, MissingDependencyError
+        As `require_film`; or if there are no pictures.
+    """
+    path = Path(path)
+    require_film(path, fps)
+    if not len(pictures):
+        raise SessionError("there is nothing to see in a film without pictures")
+    write = {".gif": _write_gif, ".mp4": _write_mp4}.get(path.suffix.lower(), _write_folder)
+    # Beside the target, so that os.replace is a rename on one file system.
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".segdeform-") as folder:
+        draft = Path(folder) / path.name
+        write(draft, pictures, fps)
+        os.replace(draft, path)
+
+
+def require_film(path: str | os.PathLike[str], fps: float = 20.0) -> None:
+    """Raise what `Film.save` would, before the work that is to be filmed."""
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in (".gif", ".mp4", ""):
+        raise SessionError(f"{path}: a film is a .gif, an .mp4 or, without a suffix, a folder")
+    if not 0.1 <= fps <= 100.0:
+        raise SessionError(f"fps must be 0.1 to 100 pictures in a second; got {fps}")
+    if path.is_dir() or (not suffix and path.exists()):
+        raise SessionError(f"{path}: is there already; name another")
+    if not path.parent.is_dir():
+        raise SessionError(f"{path}: there is no folder {path.parent}")
+    if not os.access(path.parent, os.W_OK):
+        raise SessionError(f"{path}: the folder {path.parent} may not be written to")
+    if suffix in _NEEDS:
+        _library(suffix)
+
+
+def _write_gif(path: Path, pictures: Pictures, fps: float) -> None:
+    image = _library(".gif")
+    some = np.unique(np.linspace(0, len(pictures) - 1, _SAMPLES).round().astype(int))
+    sheet = image.fromarray(np.concatenate([pictures[int(k)] for k in some]))
+    # By coverage: counted by their number, a white ground would leave few colours for shades.
+    colours = sheet.quantize(256, method=image.Quantize.MAXCOVERAGE)
+    shades = image.Dither.FLOYDSTEINBERG
+    first, *rest = (
+        image.fromarray(pictures[k]).quantize(palette=colours, dither=shades)
+        for k in range(len(pictures))
+    )
+    first.save(path, format="GIF", save_all=True, append_images=rest, duration=1000.0 / fps, loop=0)
+
+
+def _write_mp4(path: Path, pictures: Pictures, fps: float) -> None:
+    height, width, _ = pictures[0].shape
+    writer = _library(".mp4").write_frames(str(path), (width, height), fps=fps, macro_block_size=2)
+    try:
+        writer.send(None)  # ready
+        for k in range(len(pictures)):
+            writer.send(pictures[k].tobytes())
+    finally:
+        writer.close()
+
+
+def _write_folder(path: Path, pictures: Pictures, fps: float) -> None:
+    del fps
+    path.mkdir()
+    height, width, _ = pictures[0].shape
+    for k in range(len(pictures)):
+        image = vtkImageData()
+        image.SetDimensions(width, height, 1)
+        rows = np.ascontiguousarray(pictures[k][::-1]).reshape(-1, 3)
+        image.GetPointData().SetScalars(numpy_to_vtk(rows, deep=True))
+        writer = vtkPNGWriter()
+        writer.SetFileName(str(path / f"{k:04d}.png"))
+        writer.SetInputData(image)
+        writer.Write()
+
+
+def _library(suffix: str) -> Any:
+    name, package = _NEEDS[suffix]
+    try:
+        return importlib.import_module(name)
+    except ImportError as fault:
+        raise MissingDependencyError(
+            f"to write {suffix} files, pip install {package}; or name a film without a suffix, "
+            "a folder of pictures"
+        ) from fault
