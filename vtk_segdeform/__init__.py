@@ -14,6 +14,8 @@ The story of the method, in the order of its files: `mesh`, `differential` (deta
 
 from __future__ import annotations
 
+import sys as _sys
+from importlib import import_module as _import_module
 from pathlib import Path as _Path
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 
@@ -47,8 +49,10 @@ from .store import load_session, save_session
 
 if _TYPE_CHECKING:
     from .convert import read_mesh, write_mesh
+    from .plugin import edit
 
-_NEED_PYVISTA = ("read_mesh", "write_mesh")  # imported when first asked for
+# pyvista is imported when something that needs it is first asked for.
+_NEED_PYVISTA = {"edit": "plugin", "read_mesh": "convert", "write_mesh": "convert"}
 
 __all__ = [
     "Cage",
@@ -61,6 +65,7 @@ __all__ = [
     "Solution",
     "Status",
     "deform",
+    "edit",
     "errors",
     "find_faults",
     "fit_cages",
@@ -78,7 +83,10 @@ __all__ = [
 
 def __getattr__(name: str) -> object:
     if name in _NEED_PYVISTA:
-        from . import convert
-
-        return getattr(convert, name)
+        module = _import_module(f"{__name__}.{_NEED_PYVISTA[name]}")
+        return getattr(module, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+if hasattr(_sys.modules.get("pyvista"), "register_plotter_component"):
+    from . import plugin as _plugin  # noqa: F401 - gives plotters and meshes their .segdeform

@@ -40,6 +40,7 @@ _EXAMPLES = """\
 examples:
   segdeform demo -o demo-output
   segdeform check scan.ply --repair -o closed.ply
+  segdeform edit horse.ply -o bent.ply
   segdeform deform horse.ply -o bent.ply --fixed 'z<10%' --handle 'z>90%' --rotate y,45
   segdeform deform a.off -o b.off --fixed a.sel --handle a.sel --matrix a.def --regions auto
   segdeform deform in.vtp -o out.vtp --fixed 'z<5%' \\
@@ -181,6 +182,9 @@ def _parser() -> argparse.ArgumentParser:
     _subspace(sub)
     _motion(sub)
 
+    text = "open a window to deform a mesh in, or a session saved there"
+    _input_output(command("edit", commands.edit, text), required=False)
+
     sub = command("check", commands.check, "report the faults of a mesh, and repair them")
     _input_output(sub, required=False)
     sub.add_argument("--repair", action="store_true", help="write the repaired mesh to -o OUT")
@@ -205,14 +209,10 @@ def _input_output(parser: argparse.ArgumentParser, *, required: bool) -> None:
 
 
 def _number_of_regions(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--regions", default="3", metavar="N",
-        help="how many regions: a number (3), auto, or the name of a point array of labels",
-    )  # fmt: skip
-    parser.add_argument(
-        "--overlap", type=_count, default=4, metavar="RINGS",
-        help="edge rings that regions from an array grow into each other (4)",
-    )  # fmt: skip
+    text = "how many regions: a number (3), auto, or the name of a point array of labels"
+    parser.add_argument("--regions", default="3", metavar="N", help=text)
+    text = "edge rings that regions from an array grow into each other (4)"
+    parser.add_argument("--overlap", type=_count, default=4, metavar="RINGS", help=text)
 
 
 def _subspace(parser: argparse.ArgumentParser) -> None:

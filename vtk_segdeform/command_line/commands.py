@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import convert
+from .. import convert, plugin
 from ..arrays import FloatArray, IntArray
 from ..cage_fit import fit_cages
 from ..cages import Cage
@@ -28,6 +28,8 @@ from ..progress import Progress, part
 from ..regions import Regions
 from ..repair import repair
 from ..segmentation import segment
+from ..session import Session
+from ..store import load_session
 from . import motion
 from .bench import table
 from .demo import HANDLE_MET
@@ -42,6 +44,8 @@ from .outputs import (
     tell_solution,
 )
 from .selection import parse_selection
+
+SESSION = ".segdeform"  # how the name of a session's file ends
 
 
 def demo(options: Namespace, say: Say, progress: Progress) -> bool:
@@ -86,6 +90,28 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
             f"{options.output} is written, but a handle misses its target by "
             f"{solution.handle_error:.1e} of the diagonal: {solution.status}"
         )
+    return True
+
+
+def edit(options: Namespace, say: Say, progress: Progress) -> bool:
+    """Open a window to deform a mesh in, or to go on with a saved session; write what it became."""
+    del progress  # the window has its own
+    if options.output is not None:
+        convert.require_writable(options.output)
+    if options.input.suffix == SESSION:
+        session = load_session(options.input)
+        surface = convert.to_polydata(session.mesh)
+    else:
+        surface, mesh = _read(options.input)
+        session = Session(mesh)
+    plugin.require_screen()
+    session = plugin.edit(
+        session, path=options.input.with_suffix(SESSION), title=f"segdeform {options.input.name}"
+    )
+    say(f"volume          changed by {session.volume_change:+.1e} of itself")
+    if options.output is not None:
+        convert.write_mesh(options.output, plugin.deformed(surface, session))
+        say(f"written         {options.output}")
     return True
 
 

@@ -1,0 +1,250 @@
+"""What pyvista's plotters and meshes can do once this package is there, and `edit`.
+
+    plotter.segdeform.edit(mesh)                     the editor, in a plotter of yours
+    plotter.segdeform.add_volume_overlay(session)    how the volume changes, in colours
+    mesh.segdeform.deform(fixed, handle, targets)    a deformed copy, arrays and all
+    mesh.segdeform.regions(3)                        a copy with arrays of its regions
+    mesh.segdeform.check()                           what keeps it from being deformed
+
+pyvista finds this module by its entry points, when ``segdeform`` is first asked for.  pyvistaqt
+hides those of plotters: there, and where the package is not installed, ``import vtk_segdeform``
+after pyvista does it, or ``import vtk_segdeform.plugin`` at any time.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import ArrayLike
+
+from . import convert, pipeline
+from .errors import MissingDependencyError
+from .faults import find_faults
+from .formats.polygons import triangles_of
+from .mesh import Mesh
+from .progress import Progress
+from .segmentation import segment
+from .session import Session
+from .surface.report import MeshReport
+
+if TYPE_CHECKING:
+    from .widgets.editor import DeformEditor
+    from .widgets.volume_overlay import VolumeOverlay
+
+_Path = str | os.PathLike[str] | None
+_log = logging.getLogger(__name__)
+
+_HANDLE_MET = 1e-3  # of the diagonal
+_UNSEEN = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")  # what VTK opens without a screen
+
+
+@overload
+def edit(mesh: Mesh, *, path: _Path = None, title: str = ...) -> Mesh: ...
+@overload
+def edit(mesh: Session, *, path: _Path = None, title: str = ...) -> Session: ...
+@overload
+def edit(mesh: pv.PolyData, *, path: _Path = None, title: str = ...) -> pv.PolyData: ...
+def edit(mesh: Any, *, path: _Path = None, title: str = "segdeform") -> Any:
+    """Open a window to deform *mesh* in; return what it is like when the window closes.
+
+    Parameters
+    ----------
+    mesh : Mesh, pyvista.PolyData or Session
+        A closed surface; or a session to go on with.
+    path : path, optional
+        Where the editor's keys save the session to and open it from.
+    title : str
+        Of the window.
+
+    Returns
+    -------
+    deformed : of the type of *mesh*
+        A deformed copy; of a PolyData with all its arrays.  A session is the same one, unless
+        another was opened in the editor.  Off-screen, with pyvista's OFF_SCREEN, the window
+        closes at once.
+
+    Raises
+    ------
+    MeshError
+        If *mesh* is a PolyData that is no closed, outward oriented two-manifold.
+    MissingDependencyError
+        If there is no screen.
+    """
+    session = _session_of(mesh)
+    if not pv.OFF_SCREEN:
+        require_screen()
+    plotter = pv.Plotter(title=title, notebook=False)
+    try:
+        editor = plotter.segdeform.edit(session, path=path)
+        plotter.show()
+    finally:
+        plotter.close()
+    if isinstance(mesh, Session):
+        return editor.session
+    if isinstance(mesh, Mesh):
+        return editor.session.mesh.with_vertices(editor.session.vertices)
+    return deformed(mesh, editor.session)
+
+
+def deformed(surface: pv.PolyData, session: Session) -> pv.PolyData:
+    """Return a copy of *surface* as *session* has it, or the session's mesh if it is another."""
+    if surface.n_points == session.mesh.n_vertices:
+        return convert.with_vertices(surface, session.vertices)
+    return convert.to_polydata(session.mesh.with_vertices(session.vertices))
+
+
+def require_screen() -> None:
+    """Make sure that a window can be opened where somebody sees it.
+
+    Raises
+    ------
+    MissingDependencyError
+        If not; the text says why.
+    """
+    if pv.OFF_SCREEN:
+        raise MissingDependencyError(
+            "there is no window to edit in: pyvista draws off-screen; unset PYVISTA_OFF_SCREEN"
+        )
+    probe = pv.Plotter(notebook=False)
+    kind = probe.render_window.GetClassName()
+    probe.close()
+    if kind in _UNSEEN:
+        raise MissingDependencyError(
+            "there is no screen to open a window on; set DISPLAY, or log in with 'ssh -X'"
+        )
+
+
+@pv.register_plotter_component("segdeform")
+class PlotterTools:
+    """Deformation in a plotter, also in pyvistaqt's; ``plotter.segdeform``.
+
+    What is added here is taken out again before the plotter closes.
+
+    Parameters
+    ----------
+    plotter : pyvista.BasePlotter
+        Where.
+    """
+
+    def __init__(self, plotter: pv.BasePlotter) -> None:
+        self._plotter = plotter
+        self._added: list[DeformEditor | VolumeOverlay] = []
+
+    def edit(self, mesh: Mesh | pv.PolyData | Session, *, path: _Path = None) -> DeformEditor:
+        """Put the editor into the plotter, in the subplot in hand, and switch it on.
+
+        What the plotter shows of *mesh* already is hidden: the editor draws it itself.
+
+        Parameters
+        ----------
+        mesh : Mesh, pyvista.PolyData or Session
+            What to edit; it is left as it is but for a session.  The editor's session has the
+            deformed vertices, in the same order.
+        path : path, optional
+            Where the editor's keys save the session to and open it from.
+        """
+        from .widgets.editor import DeformEditor
+
+        session = _session_of(mesh)
+        if isinstance(mesh, pv.PolyData):
+            for actor in self._plotter.renderer.actors.values():
+                if getattr(getattr(actor, "mapper", None), "dataset", None) is mesh:
+                    actor.visibility = False
+        editor = DeformEditor(self._plotter, session)
+        self._added.append(editor)
+        if path is not None:
+            editor.path = path
+        editor.On()
+        return editor
+
+    def add_volume_overlay(self, session: Session) -> VolumeOverlay:
+        """Show the mesh of *session*, coloured by its local volume change, with a scale."""
+        from .widgets.volume_overlay import VolumeOverlay
+
+        overlay = VolumeOverlay(self._plotter, session)
+        self._added.append(overlay)
+        overlay.show()
+        return overlay
+
+    def __plotter_close__(self) -> None:
+        while self._added:
+            self._added.pop().remove()
+
+
+@pv.register_dataset_accessor("segdeform", pv.PolyData)
+class PolyDataTools:
+    """Deformation of a surface; ``mesh.segdeform``.  The surface is left as it is.
+
+    Parameters
+    ----------
+    surface : pyvista.PolyData
+    """
+
+    def __init__(self, surface: pv.PolyData) -> None:
+        self._surface = surface
+
+    def deform(
+        self,
+        fixed: ArrayLike,
+        handle: ArrayLike,
+        targets: ArrayLike,
+        *,
+        n_regions: int | None = 3,
+        n_cage_vertices: int = 155,
+        preserve_volume: bool = True,
+        progress: Progress | None = None,
+    ) -> pv.PolyData:
+        """Return a deformed copy, handle points at *targets*, all arrays kept, normals anew.
+
+        The parameters, and what is raised, are those of `vtk_segdeform.deform`, which also tells
+        how the solver fared; here a handle that misses its target is only logged.
+        """
+        solution = pipeline.deform(
+            convert.from_polydata(self._surface), fixed, handle, targets,
+            n_regions=n_regions, n_cage_vertices=n_cage_vertices,
+            preserve_volume=preserve_volume, progress=progress,
+        )  # fmt: skip
+        if solution.handle_error > _HANDLE_MET:
+            error = solution.handle_error
+            _log.warning("handle off by %.1e of the diagonal: %s", error, solution.status)
+        return convert.with_vertices(self._surface, solution.vertices)
+
+    def regions(
+        self, n_regions: int | None = 3, *, progress: Progress | None = None
+    ) -> pv.PolyData:
+        """Return a copy with the regions that a deformation would have, as point arrays.
+
+        ``region`` (n,) int is the region with the most weight, ``regions_here`` (n,) int in how
+        many a point is, ``region_weights`` (n, r) float their weights, which sum to 1.
+
+        Parameters
+        ----------
+        n_regions : int or None
+            How many; None lets `vtk_segdeform.segment` choose.
+        progress : Progress, optional
+        """
+        found = segment(convert.from_polydata(self._surface), n_regions, progress=progress)
+        copy = self._surface.copy()
+        copy.point_data["regions_here"] = found.membership.sum(axis=0)
+        copy.point_data["region_weights"] = np.ascontiguousarray(found.weights.T)
+        copy.point_data["region"] = found.labels
+        return copy
+
+    def check(self) -> MeshReport:
+        """Return what keeps the surface from being deformed: ``.ok``, ``.faults``, as text."""
+        points = np.asarray(self._surface.points, dtype=np.float64)
+        return find_faults(points, triangles_of(self._surface))
+
+
+def _session_of(mesh: Mesh | pv.PolyData | Session) -> Session:
+    if isinstance(mesh, Session):
+        return mesh
+    if isinstance(mesh, Mesh):
+        return Session(mesh)
+    if isinstance(mesh, pv.PolyData):
+        return Session(convert.from_polydata(mesh))
+    raise TypeError(f"mesh must be a Mesh, a PolyData or a Session; got {type(mesh).__name__}")
