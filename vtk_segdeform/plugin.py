@@ -213,9 +213,7 @@ class PolyDataTools:
             _log.warning("handle off by %.1e of the diagonal: %s", error, solution.status)
         return convert.with_vertices(self._surface, solution.vertices)
 
-    def regions(
-        self, n_regions: int | None = 3, *, progress: Progress | None = None
-    ) -> pv.PolyData:
+    def regions(self, n_regions: int | None = 3, progress: Progress | None = None) -> pv.PolyData:
         """Return a copy with the regions that a deformation would have, as point arrays.
 
         ``region`` (n,) int is the region with the most weight, ``regions_here`` (n,) int in how
@@ -226,6 +224,7 @@ class PolyDataTools:
         n_regions : int or None
             How many; None lets `vtk_segdeform.segment` choose.
         progress : Progress, optional
+            Called meanwhile; may cancel.
         """
         found = segment(convert.from_polydata(self._surface), n_regions, progress=progress)
         copy = self._surface.copy()
