@@ -167,11 +167,11 @@ class VolumeOverlay:
         session, regions = self.session, self.session.regions
         if regions is None or regions.n_regions == 1:
             return []
-        if session.state.pose is None:
-            return [(region, 0.0) for region in range(regions.n_regions)]
         if self._volumes is None or self._volumes[0] is not regions:
             self._volumes = regions, _owned_volumes(session.mesh, regions)
         owners, volumes = zip(*self._volumes[1], strict=True)
+        if session.state.pose is None:
+            return [(owner, 0.0) for owner in owners]
         if session.solution is not None:  # the solver has them already
             shares = session.solution.region_volume_change.tolist()
         else:
