@@ -1,0 +1,40 @@
+"""The paper's figure 9: a single cage bends what it should leave alone, several cages do not.
+
+An arm of the cactus is laid down.  To one cage it is near the trunk and the other arm; cages of
+their own know better, at the same number of cage vertices.  Pictures go to a folder, if given.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+import vtk_segdeform as sd
+from vtk_segdeform.distortion import distortion
+
+mesh = sd.models.cactus(2500)
+x, _, height = mesh.vertices.T
+foot, tip = np.flatnonzero(height < 0.08), np.flatnonzero((x > 0.17) & (height > 0.75))
+shoulder = [0.2, 0.0, 0.56]
+down = Rotation.from_euler("y", 90, degrees=True)
+targets = down.apply(mesh.vertices[tip] - shoulder) + shoulder
+
+distortions = []
+for n_regions in (1, 5):
+    regions = sd.segment(mesh, n_regions) if n_regions > 1 else sd.Regions.single(mesh)
+    cages = sd.fit_cages(mesh, regions, n_vertices=155)
+    deformer = sd.Deformer(mesh, regions, cages, fixed=foot, handle=tip)
+    solution = deformer.solve(targets)
+    distortions.append(distortion(mesh, solution.vertices))
+    other_arm = np.linalg.norm(solution.vertices - mesh.vertices, axis=1)[x < -0.15].max()
+    print(
+        f"{n_regions} cage(s): distortion {distortions[-1]:.3f}, {solution.steps} steps, "
+        f"the other arm moved by {other_arm:.2f} of the height"
+    )
+    if len(sys.argv) > 1:
+        from vtk_segdeform.pictures import picture_before_after, picture_regions_and_cages
+
+        stem = f"{Path(sys.argv[1])}/{n_regions}-cages"
+        picture_regions_and_cages(f"{stem}.png", mesh, regions.membership, cages)
+        picture_before_after(f"{stem}-bent.png", mesh, solution.vertices, fixed=foot, handle=tip)
