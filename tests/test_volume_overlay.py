@@ -289,6 +289,8 @@ def test_the_time_of_a_frame_is_told_from_the_second_on(overlay):
     assert words(overlay)[-1].endswith(" ms a frame")
     assert 1 <= int(words(overlay)[-1].split()[0]) < 5000
     hand.release()
+    overlay.session.undo()  # by nobody's hand
+    assert not any("ms" in line for line in words(overlay))
     cages.remove()
     assert not hand.failures
 

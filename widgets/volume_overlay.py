@@ -124,7 +124,7 @@ class VolumeOverlay:
 
     def _changed(self, change: Change) -> None:
         if change & Change.POSE:
-            self._clock.posed = True
+            self._clock.note()
             self._update()
         elif change & Change.REGIONS and self._change is not None and self._half_range is not None:
             self._legend.show(self._half_range, self._lines(self._change))
@@ -184,8 +184,8 @@ class _FrameClock:
     """How long the last change of the pose took, from the event it came by to its picture."""
 
     def __init__(self, view: View) -> None:
-        self.posed = False
         self.seconds: float | None = None
+        self._posed = False
         self._view = view
         self._began: float | None = None
         self._stops: list[Stop] = []
@@ -199,6 +199,12 @@ class _FrameClock:
             tag = window.AddObserver("EndEvent", self._end)
             self._stops.append(lambda: window.RemoveObserver(tag))
 
+    def note(self) -> None:
+        """Note that the pose has changed: by the event in hand, or by a script, which has no time."""
+        self._posed = True
+        if self._began is None:
+            self.seconds = None
+
     def stop(self) -> None:
         """Wait no more, and forget."""
         for stop in self._stops:
@@ -206,13 +212,13 @@ class _FrameClock:
         self._stops, self.seconds, self._began = [], None, None
 
     def _begin(self) -> bool:
-        self._began, self.posed = time.perf_counter(), False
+        self._began, self._posed = time.perf_counter(), False
         return False
 
     def _end(self, *_: object) -> None:
-        if self.posed and self._began is not None:
+        if self._posed and self._began is not None:
             self.seconds = time.perf_counter() - self._began
-        self._began, self.posed = None, False
+        self._began, self._posed = None, False
 
 
 def _owned_volumes(mesh: Mesh, regions: Regions) -> list[tuple[int, VolumeConstraint]]:
