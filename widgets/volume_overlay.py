@@ -200,7 +200,7 @@ class _FrameClock:
             self._stops.append(lambda: window.RemoveObserver(tag))
 
     def note(self) -> None:
-        """Note that the pose has changed: by the event in hand, or by a script, which has no time."""
+        """Note that the pose has changed, by the event in hand or, untimed, by a script."""
         self._posed = True
         if self._began is None:
             self.seconds = None
