@@ -122,7 +122,7 @@ def require_screen() -> None:
 class PlotterTools:
     """Deformation in a plotter, also in pyvistaqt's; ``plotter.segdeform``.
 
-    What is added here is taken out again before the plotter closes.
+    What is `added` here is taken out again before the plotter closes.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class PlotterTools:
 
     def __init__(self, plotter: pv.BasePlotter) -> None:
         self._plotter = plotter
-        self._added: list[DeformEditor | VolumeOverlay] = []
+        self.added: list[DeformEditor | VolumeOverlay] = []
 
     def edit(self, mesh: Mesh | pv.PolyData | Session, *, path: _Path = None) -> DeformEditor:
         """Put the editor into the plotter, in the subplot in hand, and switch it on.
@@ -155,7 +155,7 @@ class PlotterTools:
                 if getattr(getattr(actor, "mapper", None), "dataset", None) is mesh:
                     actor.visibility = False
         editor = DeformEditor(self._plotter, session)
-        self._added.append(editor)
+        self.added.append(editor)
         if path is not None:
             editor.path = path
         editor.On()
@@ -166,13 +166,13 @@ class PlotterTools:
         from .widgets.volume_overlay import VolumeOverlay
 
         overlay = VolumeOverlay(self._plotter, session)
-        self._added.append(overlay)
+        self.added.append(overlay)
         overlay.show()
         return overlay
 
     def __plotter_close__(self) -> None:
-        while self._added:
-            self._added.pop().remove()
+        while self.added:
+            self.added.pop().remove()
 
 
 @pv.register_dataset_accessor("segdeform", pv.PolyData)
