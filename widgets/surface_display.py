@@ -41,7 +41,7 @@ class SurfaceDisplay:
         faces = session.mesh.faces
         corners = np.full(len(faces), 3)
         self.polydata = polydata_of(session.vertices.copy(), corners, faces.ravel())
-        self._points = vtk_to_numpy(self.polydata.GetPoints().GetData())
+        self._points: NDArray[np.float64] = vtk_to_numpy(self.polydata.GetPoints().GetData())
         self._normals = vtkTriangleMeshPointNormals()
         self._normals.SetInputData(self.polydata)
         self._mapper = vtkPolyDataMapper()

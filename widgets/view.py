@@ -15,6 +15,8 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+import vtkmodules.vtkRenderingFreeType
+import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - both: what renders, for whom pyvista is not
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from .gestures import Phase, Pointer
@@ -147,8 +149,13 @@ class View(Sight):
 
     def every(self, milliseconds: int, callback: Callable[[], None]) -> Stop:
         """Call *callback* again and again from the event loop, until stopped."""
+
+        def ticked() -> bool:
+            callback()
+            return False
+
         timer = self.interactor.CreateRepeatingTimer(milliseconds)
-        stop = self.observe("TimerEvent", lambda: callback() or False)
+        stop = self.observe("TimerEvent", ticked)
 
         def stop_both() -> None:
             stop()
