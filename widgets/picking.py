@@ -21,6 +21,7 @@ from .gestures import Pointer
 from .surface_display import SurfaceDisplay
 from .visibility import visible_vertices
 
+_SLACK = 1e-7  # of the diagonal: a line through an edge must not slip between its two faces
 _DETOUR = 1.4  # a path along edges is at most about as much longer than one across faces
 
 
@@ -59,9 +60,10 @@ class Picker:
         near, far = self._surface.view.ray(pointer)
         if not (np.isfinite(near).all() and np.isfinite(far).all()):
             return None
+        slack = _SLACK * self._surface.session.mesh.diagonal
         place, local = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
         t, part, face = reference(0.0), reference(0), reference(-1)
-        if not self._locator.IntersectWithLine(near, far, 0.0, t, place, local, part, face):
+        if not self._locator.IntersectWithLine(near, far, slack, t, place, local, part, face):
             return None
         point, corners = np.array(place), self._surface.session.mesh.faces[int(face)]
         away = np.linalg.norm(self._surface.points[corners] - point, axis=1)
