@@ -1,7 +1,7 @@
 """Regions, fixed vertices and handles as colours of the mesh.
 
-Regions have the colours of the palette, blended by their weights, so that an overlap is seen as
-what it is: a bit of both.  On top lie fixed vertices, grey, and handles, red; and on top of all
+Regions have the colours of the palette, in equal shares where they overlap, so that a stroke is
+seen as far as it went; blend weights fade towards its border.  On top lie fixed vertices, grey, and handles, red; and on top of all
 the preview of a stroke.
 """
 
@@ -79,7 +79,8 @@ class RegionColours:
             colours = np.tile(rgb(BODY).astype(float), (session.mesh.n_vertices, 1))
         else:
             palette = [of_region(r) for r in range(session.regions.n_regions)]
-            colours = session.regions.weights.T @ np.array(palette, dtype=float)
+            belongs = session.regions.membership
+            colours = (belongs / belongs.sum(axis=0)).T @ np.array(palette, dtype=float)
         colours[session.fixed] = rgb(FIXED)
         for vertices in session.handles.values():
             colours[vertices] = rgb(HANDLE)
