@@ -19,7 +19,7 @@ from vtk_segdeform.arrays import BoolArray, FloatArray
 
 from .gestures import Pointer
 from .surface_display import SurfaceDisplay
-from .visibility import visible_vertices
+from .visibility import seen_vertices
 
 _SLACK = 1e-7  # of the diagonal: a line through an edge must not slip between its two faces
 _DETOUR = 1.4  # a path along edges is at most about as much longer than one across faces
@@ -99,7 +99,7 @@ class Picker:
         inside = _in_polygon(display[:, :2], outline)
         if through or not inside.any():
             return inside
-        return inside & visible_vertices(display, self._surface.session.mesh.faces)
+        return inside & seen_vertices(display, self._surface.session.mesh.faces)
 
     def component(self, vertex: int) -> BoolArray:
         """Return (n,) bool: vertices joined to *vertex* by edges, however far."""

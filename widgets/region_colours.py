@@ -1,8 +1,8 @@
 """Regions, fixed vertices and handles as colours of the mesh.
 
 Regions have the colours of the palette, in equal shares where they overlap, so that a stroke is
-seen as far as it went; blend weights fade towards its border.  On top lie fixed vertices, grey, and handles, red; and on top of all
-the preview of a stroke.
+seen as far as it went; blend weights fade towards its border.  On top lie fixed vertices, grey,
+and handles, red; and on top of all the preview of a stroke.
 """
 
 from __future__ import annotations
