@@ -5,6 +5,7 @@ o(i) as well, on the other side.  The tetrahedra from the triangles around i to 
 under i, and their volume is
 
     L_i(x) = sum_{T = (a, b, c) at i} det(x_a - x_o, x_b - x_o, x_c - x_o) / 18
+           = sum_{T at i} (x_a - x_o) . N_T / 18,        N_T = (x_b - x_a) x (x_c - x_a)
 
 (a third of each tetrahedron: a triangle has three corners).  The local volume change is
 
@@ -29,7 +30,7 @@ from scipy.spatial import cKDTree
 
 from .arrays import FloatArray, IntArray, as_points
 from .mesh import Mesh
-from .volume import volume_gradient
+from .volume import corner_and_edges, volume_gradient
 
 _MOST_SHRINKS = 30
 _NARROWEST = np.cos(np.radians(40.0))  # a ball touching under a smaller angle sees its own skin
@@ -50,7 +51,9 @@ class LocalVolume:
     def __init__(self, mesh: Mesh) -> None:
         self._faces, self._shape = mesh.faces, mesh.vertices.shape
         self._opposite, diameter = _opposite_vertices(mesh)
-        n = mesh.n_vertices
+        n, m = mesh.n_vertices, mesh.n_faces
+        corners = mesh.faces.ravel(), np.repeat(np.arange(m), 3)
+        self._around = sparse.coo_array((np.ones(3 * m), corners), (n, m)).tocsr()
         ring = (mesh.adjacency > 0).astype(float) + sparse.eye_array(n)
         self._average = (sparse.diags_array(1.0 / ring.sum(axis=1)) @ ring).tocsr()
         edge = float(np.median(mesh.adjacency.data)) if mesh.adjacency.nnz else 1.0
@@ -72,11 +75,13 @@ class LocalVolume:
         return np.divide(now - self._rest, self._rest, where=self._trusted, out=np.zeros(len(now)))
 
     def _smoothed(self, x: FloatArray) -> FloatArray:
-        corners = self._faces.ravel()
-        apex = x[self._opposite[corners]]
-        a, b, c = (np.repeat(x[self._faces[:, k]], 3, axis=0) - apex for k in range(3))
-        volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 18.0
-        flesh: FloatArray = np.bincount(corners, volumes, minlength=len(x)).astype(np.float64)
+        x = x - x.mean(axis=0)
+        a, e, f = corner_and_edges(x, self._faces)
+        normals = np.cross(e, f)
+        heights = np.einsum("ij,ij->i", a, normals)
+        flesh = self._around @ np.column_stack([normals, heights])  # summed at each vertex
+        apex = x[self._opposite]
+        flesh = (flesh[:, 3] - np.einsum("ij,ij->i", apex, flesh[:, :3])) / 18.0
         for _ in range(self._rounds):
             flesh = self._average @ flesh
         return flesh

@@ -28,7 +28,7 @@ from .arrays import FloatArray, IntArray
 
 def signed_volume(vertices: FloatArray, faces: IntArray) -> float:
     """Return the enclosed volume (8) of (n, 3) *vertices*, (m, 3) *faces*; outward is positive."""
-    a, e, f = _corner_and_edges(vertices - vertices[0], faces)
+    a, e, f = corner_and_edges(vertices - vertices[0], faces)
     return float(np.einsum("ij,ij", a, np.cross(e, f)) / 6.0)
 
 
@@ -37,7 +37,7 @@ def volume_gradient(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
     The rows of J_g in eq. (12), one per vertex.
     """
-    _, e, f = _corner_and_edges(vertices, faces)
+    _, e, f = corner_and_edges(vertices, faces)
     normals = np.cross(e, f) / 6.0  # on a closed mesh the same sum as b x c, c x a, a x b
     gradient = np.empty_like(vertices)
     for axis in range(3):
@@ -48,8 +48,8 @@ def volume_gradient(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 def volume_along(vertices: FloatArray, direction: FloatArray, faces: IntArray) -> FloatArray:
     """Return (c0, c1, c2, c3) with V(vertices + t direction) = c0 + c1 t + c2 t^2 + c3 t^3."""
-    a, e, f = _corner_and_edges(vertices - vertices[0], faces)
-    u, v, w = _corner_and_edges(direction - direction[0], faces)
+    a, e, f = corner_and_edges(vertices - vertices[0], faces)
+    u, v, w = corner_and_edges(direction - direction[0], faces)
     ef, vw = np.cross(e, f), np.cross(v, w)
     mixed = np.cross(v, f) + np.cross(e, w)
     c0 = np.einsum("ij,ij", a, ef)
@@ -90,7 +90,7 @@ def step_to_volume(coefficients: FloatArray, target: float) -> float:
     return t * unit
 
 
-def _corner_and_edges(
+def corner_and_edges(
     points: FloatArray, faces: IntArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the first corner a of each face, b - a and c - a, (m, 3) each."""
