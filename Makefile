@@ -44,8 +44,11 @@ format: $(VENV)/installed-test
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+# mypy cannot see that widgets/ is vtk_segdeform.widgets, so it is shown the tree as installed.
 types: $(VENV)/installed-test
-	$(BIN)/mypy
+	@rm -rf build/types && mkdir -p build/types
+	@cp -r vtk_segdeform build/types/ && cp -r widgets build/types/vtk_segdeform/widgets
+	MYPYPATH=build/types $(BIN)/mypy -p vtk_segdeform
 
 clean:
 	rm -rf $(VENV) build dist demo-output *.egg-info .mypy_cache .pytest_cache .ruff_cache
