@@ -23,6 +23,9 @@ RIGHT = {
     "custom_cage": lambda names: (
         max(abs(names["by_hand"][0]), abs(names["session"].volume_change)) < 1e-12
     ),
+    "editor_in_a_plotter": lambda names: (
+        names["moved"] > 0.2 and abs(names["session"].volume_change) < 1e-12
+    ),
     "film_a_drag": lambda names: (
         len(names["changes"]) > 14 and max(map(abs, names["changes"])) < 1e-12
     ),

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
-from hands import picture
+from hands import Hand, picture
 from numpy.testing import assert_array_equal
 from scenes import sausage
 from solids import OCTAHEDRON
@@ -123,6 +123,32 @@ def test_the_overlay_shows_in_a_plotter_and_goes_with_it(plotter, session):
     session.drag(SCENE.turned(10.0))  # nobody draws any more
 
 
+def test_the_editor_takes_the_place_of_the_mesh_and_goes_with_the_plotter(plotter, bar):
+    actor = plotter.add_mesh(bar)
+    other = plotter.add_mesh(pv.Sphere(center=(2, 0, 0)))
+    editor = plotter.segdeform.edit(bar, path="bar.segdeform")
+    plotter.show(auto_close=False, interactive=False)
+    assert editor.GetEnabled()
+    assert editor.path == Path("bar.segdeform")
+    assert not actor.visibility
+    assert other.visibility
+    assert_array_equal(editor.session.vertices, bar.points)
+    plotter.close()
+    assert not editor.GetEnabled()
+    editor.session.segment(2)  # nobody shows it any more
+
+
+def test_a_handle_is_dragged_in_a_plotter_by_hand(plotter, session):
+    editor = plotter.segdeform.edit(session)
+    plotter.show(auto_close=False, interactive=False)
+    hand = Hand(editor.view)
+    pull(hand, editor)
+    assert editor.session is session
+    assert not hand.failures
+    assert abs(session.volume_change) < 1e-12
+    assert session.undo_label == "drag handle 1"
+
+
 # Finding it.
 
 
@@ -161,6 +187,66 @@ def test_the_package_alone_does_not_load_pyvista():
 
 
 # A window of its own.
+
+
+def pull(hand: Hand, editor) -> None:
+    """Go to the mode for it, and drag the middle of the handle aside."""
+    hand.key("4")
+    editor.wait()
+    session = editor.session
+    x, y = hand.at(session.vertices[session.handles["handle 1"]].mean(axis=0))
+    hand.drag([(x, y), (x + 6, y + 9), (x + 12, y + 21)])
+
+
+@pytest.mark.parametrize("kind", [sd.Mesh, pv.PolyData, sd.Session])
+def test_off_screen_the_window_closes_at_once_and_nothing_is_changed(kind, bar):
+    mesh = convert.from_polydata(bar)
+    given = {sd.Mesh: mesh, pv.PolyData: bar, sd.Session: sd.Session(mesh)}[kind]
+    back = sd.edit(given)
+    assert isinstance(back, kind)
+    vertices = back.points if kind is pv.PolyData else back.vertices
+    assert_array_equal(vertices, mesh.vertices)
+    if kind is pv.PolyData:
+        assert_array_equal(back["number"], bar["number"])
+
+
+def test_what_is_done_in_the_window_comes_back(session, monkeypatch):
+    show, failures = pv.Plotter.show, []
+
+    def show_and_work(plotter):
+        (editor,) = plotter.segdeform.added
+        show(plotter, auto_close=False, interactive=False)
+        hand = Hand(editor.view)
+        pull(hand, editor)
+        failures.extend(hand.failures)
+
+    monkeypatch.setattr(pv.Plotter, "show", show_and_work)
+    assert sd.edit(session) is session
+    assert failures == []
+    assert session.undo_label == "drag handle 1"
+    assert np.abs(session.vertices - session.mesh.vertices).max() > 0.1
+    surface = convert.to_polydata(session.mesh)
+    assert_array_equal(plugin.deformed(surface, session).points, session.vertices)
+    other = plugin.deformed(pv.Sphere(), session)  # another session was opened meanwhile
+    assert_array_equal(other.points, session.vertices)
+
+
+def test_the_command_writes_what_came_of_it(tmp_path, session, monkeypatch, capsys):
+    saved, out = tmp_path / "work.segdeform", tmp_path / "out.vtp"
+    sd.save_session(saved, session)
+
+    def edit(session, *, path, title):
+        assert path == saved
+        assert "work.segdeform" in title
+        session.drag(SCENE.turned(20.0))
+        return session
+
+    monkeypatch.setattr(plugin, "edit", edit)
+    monkeypatch.setattr(plugin, "require_screen", lambda: None)
+    assert main(["edit", str(saved), "-o", str(out)]) == 0
+    assert "volume          changed by" in capsys.readouterr().out
+    session.drag(SCENE.turned(20.0))
+    assert_array_equal(convert.read_polydata(out).points, session.vertices)
 
 
 def without_screen() -> dict[str, str]:
