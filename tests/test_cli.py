@@ -193,6 +193,23 @@ def test_the_demo_leaves_meshes_whose_volume_is_the_same(tmp_path, capsys):
     assert (bent.vertices - rest.vertices)[tip, 0].mean() > 0.3 * rest.vertices[:, 2].max()
 
 
+def test_the_interactive_bench_drags_in_a_window_and_splits_the_time_of_an_event():
+    pytest.importorskip("pyvista")
+    from vtk_segdeform.command_line.interactive import interactive_table
+    from vtk_segdeform.errors import MissingDependencyError
+
+    try:
+        head, _, names, _, row = interactive_table(sizes=(800,), moves=4).splitlines()
+    except MissingDependencyError as missing:
+        pytest.skip(str(missing))
+    assert "4 moves of a drag" in head
+    cells = dict(zip(names.split("|"), row.split("|"), strict=True))
+    event, *parts = (float(cells[f" {k} "]) for k in ("event ms", "solve", "map", "overlay"))
+    assert min(parts) >= 0.0
+    assert 0.0 < sum(parts) < 1.2 * event
+    assert int(cells[" steps "]) >= 1
+
+
 def test_bench_prints_a_table_with_a_row_for_each_number_of_regions(capsys):
     assert main(["bench", "--size", "1000", "--cage-vertices", "80"]) == 0
     rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("|")]

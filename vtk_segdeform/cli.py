@@ -200,6 +200,7 @@ def _parser() -> argparse.ArgumentParser:
     sub = command("bench", commands.bench, "time set-up and solving, as a Markdown table")
     sub.add_argument("--size", type=_count, default=5430, metavar="N", help="mesh vertices (5430)")
     sub.add_argument("--cage-vertices", type=_count, default=155, metavar="N", help="in all (155)")
+    sub.add_argument("--interactive", action="store_true", help="time a drag in a window instead")
     return parser
 
 

@@ -134,6 +134,7 @@ class Deformer:
             parts = np.unique(parts, return_inverse=True)[1]
             groups = group_by_part(self._rest.vertices, parts, rotation_groups)
         self._energy = shape_energy(self._rest, subspace, stretch, groups)
+        self._volume = signed_volume(self._rest.vertices, self._rest.faces)
         self._volumes = region_volumes(self._rest, regions.labels)
         self._constraints: Sequence[VolumeConstraint] = ()
         if preserve_region_volumes:
@@ -250,13 +251,12 @@ class Deformer:
         status = result.status
         if status is Status.CONVERGED and errors.max(initial=0.0) > _MET:
             status = Status.MISSED
-        before = signed_volume(rest.vertices, rest.faces)
         p = self._outward(result.p)
         columns = self._solver.energy.subspace.columns
         return Solution(
             vertices=self._outward(x),
             cage_vertices=tuple(p[c] for c in columns),
-            volume_change=signed_volume(x, rest.faces) / before - 1.0,
+            volume_change=signed_volume(x, rest.faces) / self._volume - 1.0,
             region_volume_change=np.array([v.violation(x) / v.target for v in self._volumes]),
             handle_error=float(handle.max(initial=0.0)),
             fixed_error=float(fixed.max(initial=0.0)),

@@ -60,8 +60,8 @@ class OffScreen:
         interactor.SetRenderWindow(self._window)
         interactor.SetInteractorStyle(vtkInteractorStyleTrackballCamera())
         self.view = View(renderer, interactor)
-        self._surface = SurfaceDisplay(self.view, session)
-        self._surface.set_colours("film", _colours(session))
+        self.surface = SurfaceDisplay(self.view, session)
+        self.surface.set_colours("film", _colours(session))
         rest = session.mesh.vertices
         self._look(view_of(rest, session.vertices), np.concatenate([rest, session.vertices, *room]))
 
@@ -74,7 +74,7 @@ class OffScreen:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._surface.remove()
+        self.surface.remove()
         self._window.Finalize()
 
     def _look(self, axes: FloatArray, points: FloatArray) -> None:

@@ -58,6 +58,11 @@ def demo(options: Namespace, say: Say, progress: Progress) -> bool:
 def bench(options: Namespace, say: Say, progress: Progress) -> bool:
     """Print the table of timings."""
     n_cage = options.cage_vertices
+    if options.interactive:
+        from .interactive import interactive_table
+
+        say(interactive_table(n_cage_vertices=n_cage, progress=progress))
+        return True
     say(table(n_vertices=options.size, n_cage_vertices=n_cage, progress=progress))
     return True
 
