@@ -22,12 +22,12 @@ Section = tuple[str, Sequence[tuple[str, str]]]
 _KEYS = "#0B4F82"
 _LARGEST, _SMALLEST = 24.0, 7.0  # pixels
 _LEADING, _MARGIN, _GAP = 1.5, 1.4, 2.0  # from line to line, around, between columns; in letters
-_ROOM = 0.94  # of the window
+_WIDE, _HIGH, _FOOT = 0.94, 0.86, 0.1  # shares of the window: the most, and what stays free below
 _PROBE = 20.0  # the size in which widths are measured
 
 
 class HelpCard:
-    """A list of keys in the middle of a view; hidden until `show`.
+    """A list of keys in the middle of a view, above a status line; hidden until `show`.
 
     Parameters
     ----------
@@ -92,11 +92,12 @@ class HelpCard:
             columns = _shared(self.sections, count)
             wide = count * column + (count - 1) * _GAP + 2 * _MARGIN  # in letters
             high = max(map(_n_lines, columns)) * _LEADING + 2 * _MARGIN
-            fitting = min(_ROOM * window[0] / wide, _ROOM * window[1] / high, _LARGEST)
+            fitting = min(_WIDE * window[0] / wide, _HIGH * window[1] / high, _LARGEST)
             choices.append((fitting, -count, columns, wide, high))
         size, _, columns, wide, high = max(choices, key=lambda choice: choice[:2])
         size = max(size, _SMALLEST)
-        x, y = 0.5 * (window[0] - wide * size), 0.5 * (window[1] - high * size)
+        x = 0.5 * (window[0] - wide * size)
+        y = 0.5 * ((1.0 + _FOOT) * window[1] - high * size)
         for rim, colour, layer in ((2.0, INK, 5), (0.0, PAPER, 6)):
             panel = Panel(self.view.front, colour, layer=layer)
             panel.place(x - rim, y - rim, wide * size + 2 * rim, high * size + 2 * rim)

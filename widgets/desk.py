@@ -1,0 +1,246 @@
+"""Where the editor works: one session on its stage, in a mode, with jobs, a file and a voice.
+
+One job runs at a time, and meanwhile the widgets are off: a session may not be asked for anything
+else while another thread binds it.  Whatever goes wrong, in a callback or in a job, is said in
+the line at the bottom and stays there until something succeeds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vtk_segdeform.editing.listeners import Change
+from vtk_segdeform.errors import SessionError
+from vtk_segdeform.progress import Progress
+from vtk_segdeform.session import Session
+
+from .help_card import HelpCard, Section
+from .hints import hint
+from .jobs import Job
+from .session_file import SessionFile, read_bound
+from .stage import Mode, Stage
+from .view import View
+from .voice import Voice
+
+
+class Desk:
+    """What the actions of the editor work on.
+
+    Parameters
+    ----------
+    view : View
+        Where everything is drawn.
+    session : Session
+        What is edited first.
+    keys : sequence of sections
+        For the help card.
+
+    Attributes
+    ----------
+    file : SessionFile
+        Where to save to and open from.
+    stage : Stage
+        The widgets, over `session`; others after another session was opened.
+    help : HelpCard
+        The card of keys.
+    voice : Voice
+        What is said in the line at the bottom.
+    """
+
+    def __init__(self, view: View, session: Session, keys: list[Section]) -> None:
+        self.view = view
+        self.help = HelpCard(view, keys)
+        self.voice = Voice(view)
+        self._mode = Mode.REGIONS
+        self._is_on = False
+        self._job: Job[Any] | None = None
+        self._doing, self._insists = "", False
+        self.stage = Stage(view, session)
+        self._listen()
+        self.file = SessionFile(Path("session.segdeform"), session)
+        self._stop_failures = view.on_failure(self._failed)
+
+    @property
+    def session(self) -> Session:
+        """What is edited; another one after `open`."""
+        return self.stage.session
+
+    @property
+    def mode(self) -> Mode:
+        """What the mouse does; may be set, also to one that still lacks something."""
+        return self._mode
+
+    @mode.setter
+    def mode(self, mode: Mode) -> None:
+        self._mode = mode
+        self.voice.forget()
+        self._settle()
+
+    @property
+    def is_on(self) -> bool:
+        """Whether the widgets listen, whenever there is no job."""
+        return self._is_on
+
+    @is_on.setter
+    def is_on(self, on: bool) -> None:
+        self._is_on = on
+        try:
+            if not on:
+                self.help.hide()
+                self.cancel()
+                self.wait()
+        finally:
+            self._settle()
+
+    def remove(self) -> None:
+        """Take everything out of the view, for good."""
+        self.is_on = False
+        self._stop_hearing()
+        self._stop_failures()
+        self.stage.remove()
+        self.help.remove()
+        self.voice.remove()
+        self.view.remove_front()
+
+    # Telling.
+
+    @property
+    def status(self) -> str:
+        """What the line at the bottom says."""
+        return self.voice.text
+
+    def say(self, text: str) -> None:
+        """Tell what was done, before the hint of what to do next."""
+        self.voice.note(text)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Say what there is to say now."""
+        mode = f"{self._mode.value} {self._mode.name}"
+        if self._job is not None:
+            then = "stopping ..." if self._job.is_cancelled else "Esc cancels"
+            doing = f"busy {self._doing}" if self._insists else self._doing
+            self.voice.count(mode, doing, self._job.fraction, then)
+        elif self._is_on:
+            self.voice.speak(mode, hint(self.stage, self._mode))
+        else:
+            self.voice.be_silent()
+
+    def _failed(self, error: Exception) -> None:
+        self.voice.complain(error)
+        self.refresh()
+
+    def _listen(self) -> None:
+        self._stop_hearing = self.session.on_change(self._changed)
+        for widget in self.stage.widgets:
+            widget.AddObserver("EndInteractionEvent", lambda *_: self.refresh())
+
+    def _changed(self, change: Change) -> None:
+        if change & Change.HISTORY:
+            self.voice.forget()
+        if change & Change.REGIONS:
+            self.stage.choose_region(self.stage.selector.region)
+        self.refresh()
+
+    # Jobs.
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a job is running."""
+        return self._job is not None
+
+    def start(
+        self, doing: str, work: Callable[[Progress], Any], done: Callable[[Any], object]
+    ) -> None:
+        """Do *work* in another thread, and then *done*, in this one, with what it returned.
+
+        Raises
+        ------
+        SessionError
+            If there is another job.
+        """
+        if self._job is not None:
+            raise SessionError(f"busy {self._doing}; wait for it, or cancel it")
+
+        def finish(result: Any) -> None:
+            done(result)
+            self._settle()
+
+        self.stage.rest()
+        self._doing, self._insists = doing, False
+        self._job = Job(self.view, work, done=finish, watch=self._watch)
+        self.refresh()
+
+    def wait(self) -> None:
+        """Stand still until there is no job any more; for scripts."""
+        while self._job is not None:
+            self._job.wait()
+
+    def cancel(self) -> None:
+        """Stop the job, or else put away the card of keys."""
+        if self._job is not None:
+            self._job.cancel()
+            self.refresh()
+        else:
+            self.help.hide()
+
+    def insist(self) -> None:
+        """Say that nothing else can be done while the job is running."""
+        self._insists = True
+        self.refresh()
+
+    def bind_if_ready(self) -> None:
+        """Before handles are dragged, do as a job what the first move would have to wait for."""
+        ready = self._is_on and self._mode is Mode.DEFORM and self.session.is_ready
+        if ready and not self.session.is_bound and self._job is None:
+            self.start("binding the mesh to its cages", self.stage.bind, lambda _: None)
+
+    def _watch(self, job: Job[Any]) -> None:
+        if not job.is_running:
+            self._job = None
+            self.voice.note("cancelled, nothing was changed" if job.is_cancelled else "")
+            self._enter()
+        self.refresh()
+
+    def _settle(self) -> None:
+        """Be in the mode of now, with all that goes with it."""
+        self._enter()
+        self.bind_if_ready()
+        self.refresh()
+
+    def _enter(self) -> None:
+        if self._is_on and self._job is None:
+            self.stage.enter(self._mode)
+        else:
+            self.stage.rest()
+
+    # Files.
+
+    def save(self) -> None:
+        """Write the session to the file."""
+        self.file.write(self.session)
+        self.say(f"saved to {self.file.path}")
+
+    def open(self, path: Path) -> None:
+        """Go on, when the job is done, with the session in *path*, which becomes the file."""
+
+        def take(session: Session) -> None:
+            self._take(session)
+            self.file.path = path
+            self.file.keeps(session)
+            self.say(f"opened {path}")
+
+        self.start(f"opening {path}", lambda progress: read_bound(path, progress), take)
+
+    def _take(self, session: Session) -> None:
+        other = not np.array_equal(session.mesh.vertices, self.session.mesh.vertices)
+        before, self.stage = self.stage, Stage(self.view, session)
+        self._stop_hearing()
+        before.remove()
+        self._listen()
+        if other:
+            self.view.renderer.ResetCamera()

@@ -1,0 +1,163 @@
+"""Regions, cages, handles and poses of one session in one window: four modes, and keys for all.
+
+    editor = DeformEditor(view, mesh)
+    editor.On()
+
+The line at the bottom says what to do next; H shows the keys, which `bindings` lists and
+`actions` tells.  What takes long, finding regions, fitting cages and binding, is a job in another
+thread: the camera works meanwhile, nothing else does, and Escape stops it.
+
+The camera style and pyvista's own keys are not touched.  The editor hears of keys after its
+widgets, so that x, y, z constrain a drag, but before VTK and pyvista, and keeps from them what
+means something to it.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.session import Session
+
+from .bindings import binding_of, help_sections, key_cap, modes_of, pressed_key
+from .desk import Desk
+from .stage import Mode, Stage
+from .view import Stop, View
+
+_AFTER_WIDGETS = 0.75  # priority: our widgets have 1, VTK's own 0.5, pyvista and camera styles 0
+
+
+class DeformEditor:
+    """The whole editor in one view; off until `On`.
+
+    Parameters
+    ----------
+    view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
+        Where it lives.  Call `remove` before its window closes.
+    session : Session or Mesh
+        What to edit; a mesh begins a session of its own.
+    """
+
+    def __init__(self, view: Any, session: Session | Mesh) -> None:
+        if not isinstance(session, Session | Mesh):
+            raise TypeError(f"session must be a Session or a Mesh; got {type(session).__name__}")
+        self.view = View.of(view)
+        has_camera = self.view.renderer.IsActiveCameraCreated()
+        session = session if isinstance(session, Session) else Session(session)
+        self._desk = Desk(self.view, session, help_sections())
+        if not has_camera:
+            self.view.renderer.ResetCamera()
+        self._took_key = False
+        self._stops: list[Stop] = []
+
+    @property
+    def session(self) -> Session:
+        """What is edited; another one after `load`."""
+        return self._desk.session
+
+    @property
+    def stage(self) -> Stage:
+        """The widgets, over `session`; others after `load`."""
+        return self._desk.stage
+
+    @property
+    def mode(self) -> Mode:
+        """What the mouse does; may be set, also to one that still lacks something."""
+        return self._desk.mode
+
+    @mode.setter
+    def mode(self, mode: Mode) -> None:
+        self._desk.mode = mode
+
+    @property
+    def path(self) -> Path:
+        """Where the keys save to and open from; "session.segdeform" in the working folder."""
+        return self._desk.file.path
+
+    @path.setter
+    def path(self, path: str | os.PathLike[str]) -> None:
+        self._desk.file.path = Path(path)
+
+    @property
+    def status(self) -> str:
+        """What the line at the bottom says."""
+        return self._desk.status
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a job is running."""
+        return self._desk.is_busy
+
+    def wait(self) -> None:
+        """Stand still until no job is running; what one raises comes out.  For scripts."""
+        self._desk.wait()
+
+    def save(self, path: str | os.PathLike[str] | None = None) -> None:
+        """Write the session to *path*, which becomes `path`, or to that; see `save_session`."""
+        if path is not None:
+            self.path = path
+        self._desk.save()
+
+    def load(self, path: str | os.PathLike[str]) -> None:
+        """Go on with the session in a file, which becomes `session`; see `load_session`."""
+        self._desk.open(Path(path))
+        self.wait()
+
+    # Switching.
+
+    def On(self) -> None:  # noqa: N802 - VTK's word
+        """Listen to the view."""
+        if not self._stops:
+            self._stops = [
+                self.view.observe("KeyPressEvent", self._key, _AFTER_WIDGETS),
+                self.view.observe("CharEvent", lambda: self._took_key, _AFTER_WIDGETS),
+            ]
+            self._desk.is_on = True
+
+    def Off(self) -> None:  # noqa: N802
+        """Stop listening; a job or gesture that is going on is cancelled, what is shown stays."""
+        for stop in self._stops:
+            stop()
+        self._stops = []
+        self._desk.is_on = False
+
+    def SetEnabled(self, enabled: bool) -> None:  # noqa: N802
+        """Switch on or off."""
+        if enabled:
+            self.On()
+        else:
+            self.Off()
+
+    def GetEnabled(self) -> bool:  # noqa: N802
+        """Tell whether it is on."""
+        return bool(self._stops)
+
+    def remove(self) -> None:
+        """Take everything out of the view, for good; the session stays as it is."""
+        self.Off()
+        self._desk.remove()
+
+    # Keys.
+
+    def _key(self) -> bool:
+        key = pressed_key(self.view.interactor)
+        self._took_key = bool(modes_of(key))  # also where it fails
+        if self._took_key:
+            self._type(key)
+        return self._took_key
+
+    def _type(self, key: str) -> None:
+        desk, binding = self._desk, binding_of(key, self.mode)
+        if desk.is_busy and not (binding and binding.while_busy):
+            desk.insist()
+            return
+        desk.voice.forget()
+        if binding is None or binding.action is None:
+            places = ", ".join(f"{mode.value} ({what})" for mode, what in modes_of(key))
+            desk.say(f"{key_cap(key)} is a key of {places}")
+            return
+        binding.action(desk)
+        desk.bind_if_ready()
+        desk.refresh()

@@ -1,0 +1,71 @@
+"""What the editor says in its line: what was done and what to do next, or what went wrong.
+
+What was done is said until the next thing is done; what went wrong as well, and alone.
+"""
+
+from __future__ import annotations
+
+from vtk_segdeform.errors import SegDeformError
+
+from .status_line import StatusLine
+from .view import View
+
+
+class Voice:
+    """The words in the status line of a view.
+
+    Parameters
+    ----------
+    view : View
+        Where the line lies.
+    """
+
+    def __init__(self, view: View) -> None:
+        self._line = StatusLine(view)
+        self._note = self._fault = self._question = self._last_question = ""
+
+    @property
+    def text(self) -> str:
+        """What the line says."""
+        return self._line.text
+
+    def note(self, text: str) -> None:
+        """Tell what was done."""
+        self._note, self._fault = text, ""
+
+    def complain(self, error: Exception) -> None:
+        """Tell what went wrong; our own errors are in words already."""
+        wordy = isinstance(error, SegDeformError | ValueError) and str(error)
+        self._fault = str(error) if wordy else f"a fault: {type(error).__name__}, {error}"
+
+    def forget(self) -> None:
+        """Tell no more of what was done, went wrong or was asked before."""
+        self._last_question, self._question = self._question, ""
+        self._note = self._fault = ""
+
+    def confirms(self, question: str) -> bool:
+        """Tell whether *question* was asked just before; else ask it."""
+        if self._last_question == question:
+            return True
+        self._question = question
+        self.note(question)
+        return False
+
+    def speak(self, mode: str, hint: str) -> None:
+        """Say all that, and *hint*, what to do next in *mode*."""
+        if self._fault:
+            self._line.warn(self._fault, mode)
+        else:
+            self._line.say(" · ".join(filter(None, (self._note, hint))), mode)
+
+    def count(self, mode: str, doing: str, fraction: float, then: str) -> None:
+        """Say how far one is with *doing* something, 0..1."""
+        self._line.progress(fraction, f"{doing}: {100.0 * fraction:.0f} % · {then}", mode)
+
+    def be_silent(self) -> None:
+        """Say nothing."""
+        self._line.say("")
+
+    def remove(self) -> None:
+        """Take the line out of the view, for good."""
+        self._line.remove()
