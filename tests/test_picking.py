@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 from hands import plain_view
 from scenes import sausage
+from scipy.sparse import csgraph
+from solids import icosphere, two_components
 from vtk_segdeform.widgets.gestures import Phase, Pointer
-from vtk_segdeform.widgets.picking import Picker, _in_polygon
+from vtk_segdeform.widgets.picking import Picker
+from vtk_segdeform.widgets.strokes import Lasso
 from vtk_segdeform.widgets.surface_display import SurfaceDisplay
+from vtk_segdeform.widgets.surface_distance import SurfaceDistance
 from vtk_segdeform.widgets.visibility import seen_vertices
 
 from vtk_segdeform import Mesh, Session, models
@@ -117,22 +121,85 @@ def test_a_brush_does_not_leak_to_what_is_near_in_space_only():
     view.camera.SetViewUp(0.0, 1.0, 0.0)
     view.renderer.ResetCamera()
     x, y, _ = view.to_display(np.array([[0.6, 0.5, 0.06]]))[0]
-    taken = picker.around(picker.hit(Pointer(Phase.HOVER, x, y)), 0.2)
+    taken = picker.distances([picker.hit(Pointer(Phase.HOVER, x, y))], 0.2) <= 0.2
     assert np.count_nonzero(taken) > 20
     assert (surface.points[taken, 2] > 0.0).all()  # the other leaf is half as far as the brush
     near = np.linalg.norm(surface.points - [0.6, 0.5, 0.06], axis=1) < 0.15
     assert (near & (surface.points[:, 2] < 0.0)).any()
 
 
-def test_a_brush_takes_at_least_the_nearest_vertex():
-    _, _, surface, picker = over(models.sphere(300))
-    hit = picker.hit(Pointer(Phase.HOVER, 200, 200))
-    taken = picker.around(hit, 1e-9)
-    assert np.flatnonzero(taken).tolist() == [hit.vertex]
-    wide = picker.around(hit, 0.5)
-    assert np.linalg.norm(surface.points[wide] - hit.point, axis=1).max() <= 0.5
-    near = np.linalg.norm(surface.points - hit.point, axis=1) < 0.4
-    assert wide[near].all()
+@pytest.mark.parametrize("count", [1, 3])
+def test_along_a_sphere_it_is_as_far_as_along_its_great_circles(count):
+    vertices, faces = icosphere(4)
+    wave = SurfaceDistance(len(vertices), faces)
+    where = RNG.choice(len(faces), count, replace=False)
+    points = np.einsum("kij,ki->kj", vertices[faces[where]], RNG.dirichlet([1, 1, 1], count))
+    distance = wave.within(vertices, points, where, 0.8)
+    directions = points / np.linalg.norm(points, axis=1)[:, None]
+    exact = np.arccos(np.clip(vertices @ directions.T, -1.0, 1.0)).min(axis=1)
+    reached = distance <= 0.8
+    assert np.count_nonzero(reached) > 100
+    assert reached[exact < 0.78].all()
+    assert not reached[exact > 0.81].any()
+    assert np.allclose(distance[reached], exact[reached], rtol=0.02, atol=0.01)
+
+
+def test_along_a_plane_it_is_exactly_as_far_as_straight():
+    n = 30
+    u, v = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+    flat = np.stack([u + 0.3 * v, v, 0.5 * u], axis=-1).reshape(-1, 3)  # skew triangles
+    k = (u * n + v)[:-1, :-1].ravel()
+    faces = np.concatenate([np.stack([k, k + n, k + n + 1], 1), np.stack([k, k + n + 1, k + 1], 1)])
+    middle = len(faces) // 4 + n // 2
+    point = flat[faces[middle]].mean(axis=0)
+    distance = SurfaceDistance(len(flat), faces).within(flat, point[None], np.array([middle]), 9.0)
+    straight = np.linalg.norm(flat - point, axis=1)
+    reached = distance <= 9.0
+    assert np.count_nonzero(reached) > 100
+    assert np.array_equal(reached, straight <= 9.0)
+    assert np.allclose(distance[reached], straight[reached], rtol=1e-5)
+
+
+def test_it_is_never_nearer_than_straight_nor_further_than_along_the_edges():
+    mesh = models.cactus(1500)
+    start = 700
+    face = int(np.flatnonzero((mesh.faces == start).any(axis=1))[0])
+    radius = 0.3 * mesh.diagonal
+    point = mesh.vertices[start]
+    wave = SurfaceDistance(mesh.n_vertices, mesh.faces)
+    distance = wave.within(mesh.vertices, point[None], np.array([face]), radius)
+    edges = csgraph.dijkstra(mesh.adjacency, indices=start)
+    straight = np.linalg.norm(mesh.vertices - point, axis=1)
+    slack = 1e-4 * radius
+    assert (distance >= straight - slack).all()
+    assert (distance[edges <= radius] <= edges[edges <= radius] + slack).all()
+    assert np.isinf(distance[straight > 1.5 * radius]).all()
+    inside = distance[mesh.edges] <= radius
+    around = mesh.edges[inside[:, 0] != inside[:, 1]]
+    assert np.isfinite(distance[around]).all()  # what a ring is drawn through
+
+
+def test_nothing_is_near_to_no_point():
+    _, _, _, picker = over(models.sphere(300))
+    assert np.isinf(picker.distances([], 1.0)).all()
+
+
+def test_a_needle_goes_through_front_and_back():
+    view, _, surface, picker = over(models.sphere(800))
+    front, back = picker.hits(Pointer(Phase.HOVER, 205, 213))
+    assert back.face != front.face
+    eye = np.array(view.camera.GetPosition())
+    assert np.linalg.norm(front.point - eye) < np.linalg.norm(back.point - eye)
+    near = np.linalg.norm(surface.points - front.point, axis=1)
+    assert near[front.vertex] == pytest.approx(near.min())
+    assert picker.hits(Pointer(Phase.HOVER, 2, 2)) == []
+
+
+def test_a_component_is_all_that_hangs_together():
+    vertices, faces = two_components()
+    _, _, _, picker = over(Mesh(vertices, faces))
+    second = picker.component(len(vertices) - 1)
+    assert np.array_equal(np.flatnonzero(second), np.arange(len(vertices) // 2, len(vertices)))
 
 
 def test_what_is_seen_is_what_no_triangle_hides():
@@ -170,19 +237,55 @@ def test_what_is_behind_the_camera_is_not_seen():
     assert not seen_vertices(np.full((3, 3), np.nan), np.array([[0, 1, 2]])).any()
 
 
-def test_inside_of_an_outline_is_where_a_ray_crosses_it_an_odd_number_of_times():
-    star = np.array([[0.0, 3.0], [2.0, -3.0], [-3.0, 1.0], [3.0, 1.0], [-2.0, -3.0]])
-    tips = 0.8 * star
-    assert _in_polygon(tips, star).all()
-    assert not _in_polygon(np.array([[0.0, 0.0], [5.0, 0.0], [np.nan, 0.0]]), star).any()
+def crossings_above(point, corners):
+    """Return how often a ray straight up crosses a closed line; side by side, in plain Python."""
+    count = 0
+    for (x0, y0), (x1, y1) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        if (x0 > point[0]) != (x1 > point[0]):
+            count += y0 + (point[0] - x0) * (y1 - y0) / (x1 - x0) > point[1]
+    return count
 
 
-def test_an_outline_takes_what_is_seen_or_all_of_it():
-    view, _, surface, picker = over(models.sphere(800))
-    whole = np.array([[0, 0], [400, 0], [400, 400], [0, 400]], dtype=float)
-    assert picker.inside(whole, through=True).all()
-    share = picker.inside(whole, through=False).mean()
-    assert 0.3 < share < 0.5  # less than half of a sphere is seen from near
-    left = whole * [0.5, 1.0]
-    taken = picker.inside(left, through=True)
-    assert np.array_equal(taken, view.to_display(surface.points)[:, 0] < 200)
+def test_a_lasso_goes_round_what_is_crossed_an_odd_number_of_times():
+    _, _, _, picker = over(models.cactus(800))
+    corners = (200 + 170 * RNG.uniform(-1, 1, (9, 2))).tolist()  # crosses itself
+    lasso = Lasso(picker, Pointer(Phase.PRESS, *corners[0]), through=True)
+    for corner in corners[1:]:
+        lasso.extend(Pointer(Phase.MOVE, *corner))
+        so_far = lasso.outline.tolist()
+        odd = [crossings_above(p, so_far) % 2 == 1 for p in picker.places()]
+        assert lasso.mask.tolist() == (odd if len(so_far) > 2 else [False] * len(odd))
+    assert 20 < lasso.mask.sum() < 780
+
+
+def test_what_is_seen_is_looked_at_again_when_the_camera_or_the_pose_has_changed():
+    scene = sausage()
+    view, session, surface, picker = over(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.set_fixed(scene.fixed)
+    session.add_handle(scene.handle)
+
+    def now():
+        return seen_vertices(view.to_display(surface.points), scene.mesh.faces)
+
+    first = picker.seen()
+    assert np.array_equal(first, now())
+    view.renderer.ResetCameraClippingRange(-9, 9, -9, 9, -9, 9)
+    assert picker.seen() is first  # no need to look
+    view.camera.Azimuth(50)
+    assert not np.array_equal(picker.seen(), first)
+    assert np.array_equal(picker.seen(), now())
+    second = picker.seen()
+    session.drag(scene.turned(60.0), max_steps=5)
+    assert not np.array_equal(picker.seen(), second)
+    assert np.array_equal(picker.seen(), now())
+
+
+def test_what_is_drawn_in_front_of_the_mesh_hides_none_of_it():
+    view, session, surface, picker = over(models.sphere(300))
+    before = picker.seen()
+    other = SurfaceDisplay(view, Session(Mesh(1.5 * surface.points, session.mesh.faces)))
+    view.render()
+    assert np.array_equal(Picker(surface).seen(), before)
+    other.remove()

@@ -13,6 +13,7 @@ from vtk_segdeform.palette import INK, PAPER, rgb
 
 from .view import View
 
+_DESIGNED_FOR = 600  # pixels of height; lines are wider in a higher window
 _WIDTHS = ((PAPER, 4.0), (INK, 1.5))  # pixels
 
 
@@ -29,13 +30,12 @@ class Outline:
         self._view = view
         self._line = vtkPolyData()
         self._actors = []
-        for colour, width in _WIDTHS:
+        for colour, _ in _WIDTHS:
             mapper = vtkPolyDataMapper2D()
             mapper.SetInputData(self._line)
             actor = vtkActor2D()
             actor.SetMapper(mapper)
             actor.GetProperty().SetColor(*(rgb(colour) / 255.0))
-            actor.GetProperty().SetLineWidth(width)
             actor.VisibilityOff()
             view.renderer.AddViewProp(actor)
             self._actors.append(actor)
@@ -50,6 +50,9 @@ class Outline:
         cells.InsertNextCell(len(corners) + 1)
         for k in [*range(len(corners)), 0]:
             cells.InsertCellPoint(k)
+        scale = float(np.clip(self._view.renderer.GetSize()[1] / _DESIGNED_FOR, 0.7, 3.0))
+        for actor, (_, width) in zip(self._actors, _WIDTHS, strict=True):
+            actor.GetProperty().SetLineWidth(scale * width)
         self._line.SetPoints(points)
         self._line.SetLines(cells)
         self._show(True)

@@ -1,28 +1,26 @@
-"""From the window to the mesh: the point under the pointer, and the vertices a stroke takes.
+"""From the window to the mesh: what is under the pointer, near it along the surface, or seen.
 
-point       where the line of sight meets the surface first
-brush       vertices near to it along the surface, so that nothing leaks to another limb
-outline     vertices inside a lasso or a rectangle, those that are seen or all
-component   what hangs together with a vertex
+Always in the pose that is drawn.  What a look-up needs is made when it is first asked for, and
+again only after the pose has changed, or for what is seen the camera.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csgraph
-from vtkmodules.vtkCommonCore import reference
-from vtkmodules.vtkCommonDataModel import vtkStaticCellLocator
+from vtkmodules.vtkCommonCore import vtkIdList, vtkPoints
+from vtkmodules.vtkCommonDataModel import vtkPolyData, vtkStaticCellLocator
 
 from vtk_segdeform.arrays import BoolArray, FloatArray
 
 from .gestures import Pointer
 from .surface_display import SurfaceDisplay
+from .surface_distance import SurfaceDistance
 from .visibility import seen_vertices
 
 _SLACK = 1e-7  # of the diagonal: a line through an edge must not slip between its two faces
-_DETOUR = 1.4  # a path along edges is at most about as much longer than one across faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,90 +28,93 @@ class Hit:
     """Where a line of sight meets the surface."""
 
     point: FloatArray
-    """(3,) float, in the present pose."""
+    """(3,) float: in the pose."""
     face: int
     vertex: int
-    """Of the face, the nearest one."""
+    """The corner of the face that is nearest to the point."""
 
 
 class Picker:
-    """Asks a surface, in the pose in which it is drawn.
+    """Look-ups in the mesh of a surface.
 
     Parameters
     ----------
     surface : SurfaceDisplay
-        Of n vertices.
+        The mesh, as it is drawn in its view.
     """
 
     def __init__(self, surface: SurfaceDisplay) -> None:
         self._surface = surface
+        self._view = surface.view
+        self._mesh = surface.session.mesh
+        # Not the data that is drawn: those are modified by every change of colour.
+        self._data = vtkPolyData()
+        self._data.SetPoints(surface.polydata.GetPoints())
+        self._data.SetPolys(surface.polydata.GetPolys())
         self._locator = vtkStaticCellLocator()
-        self._locator.SetDataSet(surface.polydata)
-        self._built_at = -1
+        self._locator.SetDataSet(self._data)
+        self._distance: SurfaceDistance | None = None
+        self._seen: tuple[int, FloatArray, BoolArray] | None = None
+        # Where these are seen tells where the camera is; not how far it sees, which changes
+        # whenever something else is drawn.
+        ends = np.stack([self._mesh.vertices.min(axis=0), self._mesh.vertices.max(axis=0)])
+        self._landmarks = ends[np.indices((2, 2, 2)).reshape(3, -1).T, np.arange(3)]
+
+    def hits(self, pointer: Pointer) -> list[Hit]:
+        """Return all that *pointer* is over, front and back, the nearest first."""
+        near, far = self._view.ray(pointer)
+        if not (np.isfinite(near).all() and np.isfinite(far).all()):
+            return []
+        self._locator.BuildLocator()  # does nothing unless the pose has changed
+        points, faces = vtkPoints(), vtkIdList()
+        slack = _SLACK * self._mesh.diagonal
+        self._locator.IntersectWithLine(near, far, slack, points, faces)
+        return [
+            self._hit(np.array(points.GetPoint(k)), faces.GetId(k))
+            for k in range(faces.GetNumberOfIds())
+        ]
 
     def hit(self, pointer: Pointer) -> Hit | None:
-        """Return what is under *pointer*, or None where the surface is not."""
-        points = self._surface.polydata.GetPoints()
-        if points.GetMTime() != self._built_at:  # the pose has changed
-            self._locator.ForceBuildLocator()
-            self._built_at = points.GetMTime()
-        near, far = self._surface.view.ray(pointer)
-        if not (np.isfinite(near).all() and np.isfinite(far).all()):
-            return None
-        slack = _SLACK * self._surface.session.mesh.diagonal
-        place, local = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
-        t, part, face = reference(0.0), reference(0), reference(-1)
-        if not self._locator.IntersectWithLine(near, far, slack, t, place, local, part, face):
-            return None
-        point, corners = np.array(place), self._surface.session.mesh.faces[int(face)]
-        away = np.linalg.norm(self._surface.points[corners] - point, axis=1)
-        return Hit(point, int(face), int(corners[away.argmin()]))
+        """Return what is seen at *pointer*, or None beside the mesh."""
+        return next(iter(self.hits(pointer)), None)
 
-    def around(self, hit: Hit, radius: float) -> BoolArray:
-        """Return (n,) bool: vertices no further than *radius* from *hit*, and joined to it so.
+    def distances(self, hits: Sequence[Hit], radius: float) -> FloatArray:
+        """Return how far each vertex is along the surface from the nearest of *hits*, (n,) float.
 
-        At least the nearest vertex, however small the radius.
+        Infinitely far, but for the vertices within *radius*, in the mesh's unit, and their
+        neighbours.
         """
-        mesh, points = self._surface.session.mesh, self._surface.points
-        near = np.linalg.norm(points - hit.point, axis=1) <= radius
-        corners = mesh.faces[hit.face]
-        start = np.linalg.norm(points[corners] - hit.point, axis=1)
-        way = csgraph.dijkstra(
-            mesh.adjacency, directed=False, indices=corners, limit=_DETOUR * radius
-        )
-        near &= (way + start[:, None]).min(axis=0) <= _DETOUR * radius
-        near[hit.vertex] = True
-        return np.asarray(near)
-
-    def inside(self, outline: FloatArray, *, through: bool) -> BoolArray:
-        """Return (n,) bool: vertices seen inside a closed *outline* (k, 2) in the window.
-
-        Parameters
-        ----------
-        outline : (k, 2) float
-            Corners, pixels; one that crosses itself holds what an odd number of its turns do.
-        through : bool
-            Also those that the body itself hides.
-        """
-        display = self._surface.view.to_display(self._surface.points)
-        inside = _in_polygon(display[:, :2], outline)
-        if through or not inside.any():
-            return inside
-        return inside & seen_vertices(display, self._surface.session.mesh.faces)
+        if self._distance is None:
+            self._distance = SurfaceDistance(self._mesh.n_vertices, self._mesh.faces)
+        points = np.array([hit.point for hit in hits]).reshape(-1, 3)
+        faces = np.array([hit.face for hit in hits], dtype=np.int64)
+        return self._distance.within(self._surface.points, points, faces, radius)
 
     def component(self, vertex: int) -> BoolArray:
-        """Return (n,) bool: vertices joined to *vertex* by edges, however far."""
-        components = self._surface.session.mesh.components
-        return np.asarray(components == components[vertex])
+        """Return the vertices that are connected with *vertex*, (n,) bool."""
+        return np.asarray(self._mesh.components == self._mesh.components[vertex])
 
+    def pixel_at(self, hit: Hit) -> float:
+        """Return how long one pixel is at a *hit*, in the mesh's unit."""
+        return self._view.pixel_at(hit.point)
 
-def _in_polygon(points: FloatArray, polygon: FloatArray) -> BoolArray:
-    """Return (n,) bool: how often a ray to the right crosses the polygon, odd or even."""
-    inside = np.zeros(len(points), dtype=bool)
-    x, y = points.T
-    for (x0, y0), (x1, y1) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        if y0 == y1:
-            continue
-        crosses = (y0 > y) != (y1 > y)
-        inside ^= crosses & (x < x0 + (y - y0) * (x1 - x0) / (y1 - y0))
-    return inside
+    def places(self) -> FloatArray:
+        """Return where each vertex is in the display, (n, 3) float, as `Sight.to_display`."""
+        return self._view.to_display(self._surface.points)
+
+    def seen(self) -> BoolArray:
+        """Return the vertices that the mesh does not hide from the camera, (n,) bool."""
+        posed = self._data.GetPoints().GetMTime()
+        looks = self._view.to_display(self._landmarks)[:, :2]
+        if (
+            self._seen is None
+            or self._seen[0] != posed
+            or not np.array_equal(self._seen[1], looks, equal_nan=True)
+        ):
+            self._seen = posed, looks, seen_vertices(self.places(), self._mesh.faces)
+        return self._seen[2]
+
+    def _hit(self, point: FloatArray, face: int) -> Hit:
+        corners = self._mesh.faces[face]
+        away = np.linalg.norm(self._surface.points[corners] - point, axis=1)
+        return Hit(point, face, int(corners[away.argmin()]))

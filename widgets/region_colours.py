@@ -17,7 +17,7 @@ from vtk_segdeform.palette import BODY, FIXED, HANDLE, of_region, rgb
 from .surface_display import SurfaceDisplay
 
 LAYER = "regions"
-_STRONG = 0.75  # of a preview's colour; the rest is what lies under it
+_STRONG = 0.9  # of a preview's colour; the rest is what lies under it
 
 
 class RegionColours:

@@ -1,66 +1,71 @@
-"""Paint regions, what stays fixed and what is dragged, onto the mesh.
+"""Paint regions, what stays fixed, and handles, on the mesh with the mouse.
 
-    brush       press on the mesh and move; the wheel over it, or ``[`` and ``]``, change its size
-    lasso       draw around vertices
-    rectangle   from corner to corner
-    component   click on what hangs together
+A stroke adds to what is painted, with Control held it subtracts; what would change is shown while
+it goes on, and the release makes one undo step of it.  Escape ends it with nothing changed.
 
-Plain adds, Control takes away; Shift leaves the mouse to the camera, and so does a brush beside
-the mesh.  A stroke is shown while it is made and is one step of the session's history when the
-button comes up; Escape or the right button ends it with nothing changed.
+brush, component    a press beside the mesh is left to the camera
+lasso, rectangle    begin anywhere; with Shift held the press is left to the camera, of any tool
+``[``  ``]``        smaller, larger brush; so does the wheel with Shift or Control held.  The wheel
+                    alone stays with the camera, also over the mesh: it fills the view when
+                    somebody paints its details, and there would be no place left to zoom.
+
+Other regions put the pose to rest, as they do in `Session`; fixed vertices and handles keep it.
+What a stroke leaves alone is told in `roles`.
 """
 
 from __future__ import annotations
 
-import enum
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from vtk_segdeform.arrays import BoolArray, FloatArray
+from vtk_segdeform.arrays import BoolArray
+from vtk_segdeform.editing.listeners import Change
 from vtk_segdeform.palette import PAPER, rgb
 from vtk_segdeform.session import Session
 
 from .brush_ring import BrushRing
 from .gestures import Gesture, Phase, Pointer
 from .outline import Outline
-from .picking import Hit, Picker
+from .picking import Picker
 from .region_colours import RegionColours
 from .roles import Paint, Role
+from .strokes import Brush, Component, Lasso, Rectangle, Stroke, Tool, under
 from .surface_display import SurfaceDisplay
 from .widget import Widget
 
 __all__ = ["Paint", "RegionSelector", "Tool"]
 
-_RADIUS = 0.05  # of the mesh's diagonal, to begin with
-_LARGER = 1.25  # by a click of the wheel, or a key
-_SMALLEST, _LARGEST = 0.002, 0.5  # of the diagonal
-_STEP = 0.5  # of the radius: between two dabs of a fast stroke
-_MOST_DABS = 50  # between two moves of the mouse
-_LEAST = 3.0  # pixels: a narrower lasso or rectangle is a slip of the hand
-
-
-class Tool(enum.Enum):
-    """How vertices are taken."""
-
-    BRUSH = enum.auto()
-    LASSO = enum.auto()
-    RECTANGLE = enum.auto()
-    COMPONENT = enum.auto()
+_RADIUS = 0.05  # of the mesh's diagonal, at first
+_SMALLEST, _LARGEST = 1e-4, 2.0  # of the diagonal
+_LARGER = 1.2  # by a click of the wheel or a key
 
 
 class RegionSelector(Widget):
-    """Paint on the mesh; off until `On`.
+    """Brush, lasso, rectangle and whole components, for regions, fixed vertices and handles.
 
     Parameters
     ----------
     view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
-        Where it lives.
+        Where it lives.  Call `remove` before its window closes.
     session : Session
-        Whose regions, fixed vertices and handles.
-    surface, colours : SurfaceDisplay, RegionColours, optional
-        The mesh and its colours, if they are shown already.
+        What is painted.
+    surface : SurfaceDisplay, optional
+        The mesh in the view; by default one of its own.
+    colours : RegionColours, optional
+        What shows the regions on *surface*, and what a stroke would change; by default its own.
+
+    Attributes
+    ----------
+    paints : Paint
+        What is painted.
+    region : int
+        Which region; one more than there are makes a new one.
+    handle : str or None
+        Which handle, also one that is still to come; None makes a new one, and is then its name.
+    through : bool
+        Whether what is hidden is painted too, as if the body were of glass.
     """
 
     def __init__(
@@ -71,178 +76,170 @@ class RegionSelector(Widget):
         colours: RegionColours | None = None,
     ) -> None:
         super().__init__(view, session)
-        self.tool = Tool.BRUSH
         self.paints = Paint.REGION
-        self.region = 0  # the number after the last one's is a new one
-        self.handle: str | None = None  # None is a new one, whose name then stands here
-        self.through = False  # whether lasso and rectangle reach what the body hides
-        self.surface = surface or SurfaceDisplay(self.view, session)
-        self.colours = colours or RegionColours(self.surface)
-        self._owned: list[Any] = [
-            *([] if colours else [self.colours]),
-            *([] if surface else [self.surface]),
-        ]
-        self._picker = Picker(self.surface)
-        self._outline = Outline(self.view)
-        self._ring = BrushRing(self.view)
-        self.radius = _RADIUS * session.mesh.diagonal
+        self.region = 0
+        self.handle: str | None = None
+        self.through = False
+        self._tool = Tool.BRUSH
+        self._radius = _RADIUS * session.mesh.diagonal
+        self._own: list[Callable[[], None]] = []  # what was made here goes from here, last first
+        if surface is None:
+            surface = SurfaceDisplay(self.view, session)
+            self._own.append(surface.remove)
+        if colours is None:
+            colours = RegionColours(surface)
+            self._own.append(colours.remove)
+        self.surface, self.colours = surface, colours
+        self._picker = Picker(surface)
+        self._ring, self._outline = BrushRing(surface), Outline(self.view)
+        self._own += [self._ring.remove, self._outline.remove, session.on_change(self._changed)]
+
+    @property
+    def tool(self) -> Tool:
+        """With what is painted; a stroke goes on with what it began with."""
+        return self._tool
+
+    @tool.setter
+    def tool(self, tool: Tool) -> None:
+        self._tool = tool
+        self._ring.hide()
 
     @property
     def radius(self) -> float:
-        """Of the brush, along the surface, in the mesh's unit."""
+        """How far the brush reaches along the surface, in the mesh's unit."""
         return self._radius
 
     @radius.setter
     def radius(self, radius: float) -> None:
-        size = self.session.mesh.diagonal
-        self._radius = float(np.clip(radius, _SMALLEST * size, _LARGEST * size))
+        if not 0.0 < radius < np.inf:
+            raise ValueError(f"radius must be above 0; got {radius}")
+        self._radius = radius
+
+    def grow(self) -> None:
+        """Add one ring of neighbours to what is painted."""
+        self.handle = self._role.give(self._next_to(self._role.members()))
+
+    def shrink(self) -> None:
+        """Take the outermost ring of vertices out of what is painted."""
+        members = self._role.members()
+        self.handle = self._role.take(members & self._next_to(~members))
 
     def region_under_pointer(self) -> int | None:
-        """Return the region that the mesh under the pointer belongs to most, or None."""
+        """Return the region that weighs most where the pointer is; None beside the mesh."""
         hit = self._picker.hit(self.view.pointer(Phase.HOVER))
         regions = self.session.regions
         return None if hit is None or regions is None else int(regions.labels[hit.vertex])
 
-    def grow(self) -> None:
-        """Add to what is painted the vertices next to it."""
-        self._give(self._next_to(self._role.members()))
+    def remove(self) -> None:
+        """Take everything out of the view, for good."""
+        self.Off()
+        while self._own:
+            self._own.pop()()
 
-    def shrink(self) -> None:
-        """Take from what is painted its outermost vertices."""
-        members = self._role.members()
-        self._take(members & self._next_to(~members))
+    # What the hands do.
 
-    def Off(self) -> None:  # noqa: N802 - VTK's word
+    def On(self) -> None:  # noqa: N802 - VTK's word
+        """Listen to the view."""
+        if not self.GetEnabled():
+            super().On()
+            self._stops.append(self.view.observe("LeaveEvent", self._ring.hide))
+
+    def Off(self) -> None:  # noqa: N802
         """Stop listening; a stroke that is going on is cancelled."""
         super().Off()
         self._ring.hide()
 
-    def remove(self) -> None:
-        """Take everything of its own out of the view, for good."""
-        self.Off()
-        self._outline.remove()
-        self._ring.remove()
-        for own in self._owned:
-            own.remove()
-
-    # What the mouse does.
-
     def begins(self, press: Pointer) -> Gesture | None:
-        """Begin a stroke, but leave Shift, and a press beside the mesh, to the camera."""
-        if press.shift:
-            return None
-        if self.tool in (Tool.LASSO, Tool.RECTANGLE):
-            return self._around(press)
-        hit = self._picker.hit(press)
-        if hit is None:
-            return None
-        return self._stroke(press, hit) if self.tool is Tool.BRUSH else self._click(press, hit)
+        """Begin a stroke with the tool; with Shift, or off the mesh, it is the camera's."""
+        stroke = None if press.shift else self._begun(press)
+        return None if stroke is None else self._follow(stroke, self._role, press.control)
 
     def hovers(self, pointer: Pointer) -> None:
-        """Show how large the brush is."""
-        hit = self._picker.hit(pointer) if self.tool is Tool.BRUSH else None
-        if hit is None or not self.view.contains(pointer):
-            self._ring.hide()
-        else:
-            self._ring.draw(hit.point, self._normal(hit), self.radius, self._role.colour)
+        """Show how far the brush would reach."""
+        if self.tool is Tool.BRUSH:
+            self._draw_ring(pointer, self._role, pointer.control)
 
     def wheels(self, pointer: Pointer, clicks: int) -> bool:
-        """Change the size of the brush, over the mesh; with Shift or Control zoom as ever."""
-        if pointer.shift or pointer.control or self._picker.hit(pointer) is None:
+        """Make the brush larger or smaller if Shift or Control is held."""
+        if self.is_grabbing:
+            return True  # a stroke is of one view and one radius
+        if self.tool is not Tool.BRUSH or not (pointer.shift or pointer.control):
             return False
-        return self._resize(pointer, clicks)
-
-    def types(self, key: str, pointer: Pointer) -> bool:
-        """Change the size of the brush."""
-        clicks = {"bracketleft": -1, "bracketright": +1}.get(key)
-        return clicks is not None and self._resize(pointer, clicks)
-
-    def _resize(self, pointer: Pointer, clicks: int) -> bool:
-        if self.tool is not Tool.BRUSH:
-            return False
-        self.radius *= _LARGER**clicks
-        self.hovers(pointer)
+        self._resize(clicks, pointer)
         return True
 
-    def _stroke(self, press: Pointer, hit: Hit) -> Gesture:
-        taken, before = self._picker.around(hit, self.radius), press
+    def types(self, key: str, pointer: Pointer) -> bool:
+        """Make the brush smaller or larger."""
+        clicks = {"bracketleft": -1, "bracketright": +1}.get(key)
+        if clicks is None or self.tool is not Tool.BRUSH:
+            return False
+        if not self.is_grabbing:
+            self._resize(clicks, pointer)
+        return True
+
+    # Strokes.
+
+    def _begun(self, press: Pointer) -> Stroke | None:
+        picker, through = self._picker, self.through
+        if self.tool is Tool.LASSO:
+            return Lasso(picker, press, through=through)
+        if self.tool is Tool.RECTANGLE:
+            return Rectangle(picker, press, through=through)
+        hit = picker.hit(press)
+        if hit is None:
+            return None
+        if self.tool is Tool.COMPONENT:
+            return Component(picker, hit.vertex)
+        return Brush(picker, press, radius=self.radius, through=through)
+
+    def _follow(self, stroke: Stroke, role: Role, subtract: bool) -> Gesture:
+        """Show what *stroke* would change until the release, then change it."""
         try:
-            self._preview(taken, press)
+            self._preview(stroke, role, subtract)
             while (pointer := (yield)).phase is Phase.MOVE:
-                for dab in self._dabs(before, pointer):
-                    taken |= self._picker.around(dab, self.radius)
-                before = pointer
-                self._preview(taken, press)
-                self.hovers(pointer)
+                stroke.extend(pointer)
+                self._preview(stroke, role, subtract)
+                if isinstance(stroke, Brush):
+                    self._draw_ring(pointer, role, subtract)
+            if pointer.phase is Phase.RELEASE:
+                stroke.extend(pointer)
+                self._finish(stroke.mask, role, subtract)
         finally:
             self.colours.preview(None)
-        self._finish(pointer, taken, subtract=press.control)
-
-    def _click(self, press: Pointer, hit: Hit) -> Gesture:
-        taken = self._picker.component(hit.vertex)
-        try:
-            self._preview(taken, press)
-            while (pointer := (yield)).phase is Phase.MOVE:
-                pass
-        finally:
-            self.colours.preview(None)
-        self._finish(pointer, taken, subtract=press.control)
-
-    def _around(self, press: Pointer) -> Gesture:
-        way = [press.position]
-        outline = np.array(way)
-        try:
-            while (pointer := (yield)).phase is Phase.MOVE:
-                way.append(pointer.position)
-                outline = np.array(way) if self.tool is Tool.LASSO else _box(way[0], way[-1])
-                self._outline.draw(outline)
-        finally:
             self._outline.hide()
-        if np.ptp(outline, axis=0).min() >= _LEAST:
-            taken = self._picker.inside(outline, through=self.through)
-            self._finish(pointer, taken, subtract=press.control)
 
-    def _dabs(self, start: Pointer, end: Pointer) -> Iterator[Hit]:
-        """Yield where the brush touches the mesh on the way, close enough to leave no gap."""
-        way = end.position - start.position
-        pixel = self.view.pixel_at(self.surface.points.mean(axis=0))
-        count = np.ceil(np.linalg.norm(way) * pixel / (_STEP * self.radius))
-        count = int(np.clip(count, 1, _MOST_DABS))
-        for share in np.arange(1, count + 1) / count:
-            x, y = start.position + share * way
-            dab = self._picker.hit(Pointer(Phase.MOVE, float(x), float(y)))
-            if dab is not None:
-                yield dab
+    def _preview(self, stroke: Stroke, role: Role, subtract: bool) -> None:
+        changed = role.changed(stroke.mask, subtract=subtract)
+        self.colours.preview(changed, rgb(PAPER) if subtract else role.colour)
+        if stroke.outline is not None:
+            self._outline.draw(stroke.outline)
 
-    # What becomes of it.
+    def _finish(self, vertices: BoolArray, role: Role, subtract: bool) -> None:
+        if vertices.any():
+            self.handle = role.take(vertices) if subtract else role.give(vertices)
 
     @property
     def _role(self) -> Role:
         return Role(self.session, self.paints, self.region, self.handle)
 
-    def _preview(self, taken: BoolArray, press: Pointer) -> None:
-        self.colours.preview(taken, rgb(PAPER) if press.control else self._role.colour)
-
-    def _finish(self, pointer: Pointer, taken: BoolArray, *, subtract: bool) -> None:
-        if pointer.phase is Phase.RELEASE and taken.any():
-            (self._take if subtract else self._give)(taken)
-
-    def _give(self, vertices: BoolArray) -> None:
-        self.handle = self._role.give(vertices)
-
-    def _take(self, vertices: BoolArray) -> None:
-        self.handle = self._role.take(vertices)
-
     def _next_to(self, vertices: BoolArray) -> BoolArray:
         return np.asarray(self.session.mesh.adjacency @ vertices.astype(float) > 0.0)
 
-    def _normal(self, hit: Hit) -> FloatArray:
-        a, b, c = self.surface.points[self.session.mesh.faces[hit.face]]
-        normal = np.cross(b - a, c - a)
-        length = np.linalg.norm(normal)
-        return np.asarray(normal / length if length > 0.0 else -self.view.towards_scene)
+    # The ring.
 
+    def _resize(self, clicks: int, pointer: Pointer) -> None:
+        smallest, largest = (share * self.session.mesh.diagonal for share in (_SMALLEST, _LARGEST))
+        self.radius = float(np.clip(self.radius * _LARGER**clicks, smallest, largest))
+        self._draw_ring(pointer, self._role, pointer.control)
 
-def _box(corner: FloatArray, opposite: FloatArray) -> FloatArray:
-    (x0, y0), (x1, y1) = corner, opposite
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+    def _draw_ring(self, pointer: Pointer, role: Role, subtract: bool) -> None:
+        hits = under(self._picker, pointer, self.through) if self.view.contains(pointer) else []
+        if hits:
+            distance = self._picker.distances(hits, self.radius)
+            self._ring.draw(distance, self.radius, rgb(PAPER) if subtract else role.colour)
+        else:
+            self._ring.hide()
+
+    def _changed(self, change: Change) -> None:
+        if change & Change.POSE:
+            self._ring.hide()  # it lies where the surface was

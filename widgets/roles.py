@@ -1,7 +1,8 @@
 """What a stroke makes of vertices: part of a region, fixed, or a handle.
 
-A vertex is either fixed, or of one handle, or neither: painting leaves out what has the other
-role already, and says so where nothing would be left.
+A vertex is either fixed, or of one handle, or neither; and it is in some region.  So painting
+leaves alone what is fixed or of a handle already, and taking away from a region what no other
+region holds.  Where nothing would be left to do for that reason, an error says so.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vtk_segdeform.arrays import BoolArray
-from vtk_segdeform.errors import ConstraintError, RegionError
+from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.palette import FIXED, HANDLE, of_region, rgb
 from vtk_segdeform.session import Session
 
@@ -47,64 +48,89 @@ class Role:
         session = self.session
         if self.paint is Paint.REGION:
             regions = session.regions
-            if regions is None:  # the first stroke begins from one region that holds everything
-                return np.full(session.mesh.n_vertices, self.region == 0)
-            if self.region < regions.n_regions:
+            if regions is not None and self.region < regions.n_regions:
                 return np.array(regions.membership[self.region], dtype=bool)
             return np.zeros(session.mesh.n_vertices, dtype=bool)
         ids = session.fixed if self.paint is Paint.FIXED else session.handles.get(self.handle or "")
         return self._mask([] if ids is None else ids)
 
+    def changed(self, vertices: BoolArray, *, subtract: bool) -> BoolArray:
+        """Return which of *vertices*, a mask (n,), `give` would change, or `take`."""
+        return vertices & self._open(subtract) & ~self._barred(subtract)
+
     def give(self, vertices: BoolArray) -> str | None:
         """Give the role to *vertices*, a mask (n,); return the handle's name, if it is one.
+
+        Nothing happens if all of them have it.
 
         Raises
         ------
         ConstraintError
-            If every one of them has the other role.
+            If all that do not are fixed or of another handle.
         RegionError
             If there is no such region.
         """
+        new = self.changed(vertices, subtract=False)
+        if not new.any():
+            if (vertices & self._open(False)).any():
+                raise ConstraintError(
+                    "all of these vertices are fixed or of a handle already; "
+                    "take them out there first"
+                )
+            return self.handle
         if self.paint is Paint.REGION:
-            self.session.paint_region(self.region, vertices)
-            return self.handle
-        taken = self._mask([] if self.paint is Paint.FIXED else self.session.fixed)
-        for name, ids in self.session.handles.items():
-            if self.paint is Paint.FIXED or name != self.handle:
-                taken |= self._mask(ids)
-        if not (vertices & ~taken).any():
-            raise ConstraintError(
-                "all of these vertices are fixed or of another handle; take them out there first"
-            )
-        after = self.members() | (vertices & ~taken)
-        if self.paint is Paint.FIXED:
-            self.session.set_fixed(after)
-            return self.handle
-        return self.session.add_handle(after, self.handle)
+            self.session.paint_region(self.region, new)
+        elif self.paint is Paint.FIXED:
+            self.session.set_fixed(self.members() | new)
+        else:
+            return self.session.add_handle(self.members() | new, self.handle)
+        return self.handle
 
     def take(self, vertices: BoolArray) -> str | None:
         """Take the role from *vertices*; return the handle's name, None once it has none left.
 
+        Nothing happens if none of them has it.
+
         Raises
         ------
         RegionError
-            If a region would be empty, or a vertex in no region.
+            If the region would be empty, or no other holds any of them.
+        ConstraintError
+            If it is not said which handle.
         """
+        if self.paint is Paint.HANDLE and self.handle is None:
+            raise ConstraintError("choose the handle to take vertices out of")
+        old = vertices & self._open(True)
+        if not old.any():
+            return self.handle
+        free = self.changed(vertices, subtract=True)
+        after = self.members() & ~old
         if self.paint is Paint.REGION:
-            if not (self.members() & vertices).any():
-                raise RegionError(f"none of these vertices is in region {self.region}")
-            self.session.paint_region(self.region, vertices, subtract=True)
-            return self.handle
-        after = self.members() & ~vertices
-        if self.paint is Paint.FIXED:
+            # Where none is free, the session says why.
+            self.session.paint_region(self.region, free if free.any() else old, subtract=True)
+        elif self.paint is Paint.FIXED:
             self.session.set_fixed(after)
-            return self.handle
-        if self.handle is None or self.handle not in self.session.handles:
-            return self.handle
-        if not after.any():
-            self.session.remove_handle(self.handle)
+        elif after.any():
+            return self.session.add_handle(after, self.handle)
+        else:
+            self.session.remove_handle(str(self.handle))
             return None
-        return self.session.add_handle(after, self.handle)
+        return self.handle
+
+    def _open(self, subtract: bool) -> BoolArray:
+        """Tell which vertices are not yet as a stroke would make them."""
+        return self.members() if subtract else ~self.members()
+
+    def _barred(self, subtract: bool) -> BoolArray:
+        """Tell which vertices a stroke leaves alone."""
+        session = self.session
+        if self.paint is Paint.REGION:
+            if subtract and session.regions is not None:
+                return np.asarray(session.regions.membership.sum(axis=0) < 2)
+            return self._mask([])
+        if subtract:
+            return self._mask([])
+        return self._mask(np.concatenate([session.fixed, *session.handles.values()]))
 
     def _mask(self, ids: object) -> BoolArray:
         mask = np.zeros(self.session.mesh.n_vertices, dtype=bool)

@@ -32,7 +32,7 @@ def seen_vertices(display: FloatArray, faces: IntArray) -> BoolArray:
     faces : (m, 3) int
         Triangles; both sides hide.
     """
-    seen = np.isfinite(display).all(axis=1)
+    seen = np.asarray(np.isfinite(display).all(axis=1))
     triangles = faces[seen[faces].all(axis=1)]
     vertices = np.flatnonzero(seen)
     if not len(triangles):
@@ -100,4 +100,4 @@ def _hides(display: FloatArray, corners: IntArray, vertex: IntArray) -> BoolArra
     za, zb, zc = (depth[k] - depth[vertex[hides]] for k in corners[hides].T)
     total = u + v + w
     around[hides] = (u * za + v * zb + w * zc) * total < -_NEARER * total**2
-    return around
+    return np.asarray(around)
