@@ -45,9 +45,11 @@ def seen_lines(gizmo, part):
     line = gizmo.line(part)[:, :2]
     if part.way is Way.ALONG:
         line = line[0] + np.linspace(0.3, 0.9, 7)[:, None] * (line[1] - line[0])
-    if part.way is Way.WITHIN:
+    elif part.way is Way.WITHIN:
         line = line[:4].mean(axis=0)[None]
-    return line[np.isfinite(line).all(axis=1)][::3]
+    else:
+        line = line[np.isfinite(line).all(axis=1)][::3]
+    return line
 
 
 def is_painted(image, place, colour):
@@ -170,7 +172,7 @@ def test_the_part_that_is_pointed_at_is_yellow_and_the_one_in_hand_is_alone(view
     gizmo = Gizmo(view)
     gizmo.place(CENTRE)
     arrow, ring = Part(Way.ALONG, 0), Part(Way.ABOUT, 2)
-    there, other = seen_lines(gizmo, arrow)[1], seen_lines(gizmo, ring)
+    there, other = seen_lines(gizmo, arrow)[3], seen_lines(gizmo, ring)
     gizmo.point_at(arrow)
     image = picture(view)
     assert is_painted(image, there, COLOURS[4])

@@ -133,13 +133,14 @@ class Gizmo:
         """Return the part under *pointer*, or None."""
         if self._centre is None or self._only is not None:
             return None
-        self._fit()  # the camera may have moved since
+        middle = self.view.to_display(self._centre[None])[0, :2]
+        if not np.linalg.norm(middle - pointer.position) < 1.5 * self._radius_in_pixels:
+            return None  # as mostly
         nearest, found = _REACH, None
-        for part in PARTS:
-            if self._is_to_be_seen(part):
-                away = self._away(part, pointer.position)
-                if away <= nearest:
-                    found, nearest = part, np.nextafter(away, -1.0)  # of equals the first
+        for part in filter(self._is_to_be_seen, PARTS):
+            away = self._away(part, pointer.position)
+            if away < nearest:
+                nearest, found = away, part
         return found
 
     def remove(self) -> None:
