@@ -154,9 +154,13 @@ def test_the_line_is_drawn_while_the_button_is_down(desk):
 
 def test_a_slip_of_the_hand_takes_nothing(desk):
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
-    desk.hand.drag([(200, 200), (201, 201)])
-    desk.hand.click((200, 200))
+    nearest = desk.points[desk.points[:, 1].argmin()]
+    x, y = (int(p) for p in desk.hand.at(nearest))  # just below and left of a vertex
+    desk.hand.drag([(x, y), (x + 1, y + 1)])
+    desk.hand.click((x, y))
     assert len(desk.session.fixed) == 0
+    desk.hand.drag([(x - 2, y - 2), (x + 3, y + 3)])
+    assert len(desk.session.fixed) == 1
 
 
 def test_a_click_takes_a_whole_component(desk):
@@ -263,8 +267,9 @@ def test_the_brush_stays_between_a_speck_and_everything(desk):
 
 def test_a_brush_paints_what_is_seen_or_right_through(desk):
     desk.selector.paints, desk.selector.radius = Paint.FIXED, 0.5
-    desk.hand.click(desk.under(0.8, 0.0))  # reaches round the side
-    assert (desk.points[desk.session.fixed, 1] < -0.1).all()
+    desk.hand.click(desk.under(0.9, 0.0))  # reaches round the side
+    assert (desk.points[desk.session.fixed, 1] < -0.05).all()
+    assert (desk.points[desk.session.fixed, 1] > -0.3).any()
     desk.session.undo()
     desk.selector.through = True
     desk.hand.click(desk.under(0.3, 0.0))
@@ -413,6 +418,21 @@ def test_the_ring_is_as_large_as_the_brush(desk):
     assert widths[1] / widths[0] == pytest.approx(2.0, abs=0.2)
     desk.hand.hover((5, 5))
     assert (picture(desk.view) == idle).all()
+
+
+def test_the_ring_goes_with_the_pointer_and_with_the_tool(desk):
+    idle = picture(desk.view)
+    leave = [
+        lambda: desk.hand.event("LeaveEvent"),
+        lambda: setattr(desk.selector, "tool", Tool.LASSO),
+        lambda: desk.selector.Off(),
+    ]
+    for leaves in leave:
+        desk.selector.tool = Tool.BRUSH
+        desk.hand.hover(desk.under(0.0, 0.0))
+        assert (picture(desk.view) != idle).any()
+        leaves()
+        assert (picture(desk.view) == idle).all()
 
 
 def test_growing_and_shrinking_are_rings_of_edges(desk):

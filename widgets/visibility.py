@@ -1,6 +1,6 @@
 """Which vertices of a mesh are seen, and which it hides itself, found without drawing.
 
-A vertex is hidden where a triangle that does not end at it covers it and is nearer.  That is
+A vertex is hidden where a triangle covers it and is nearer; one that ends at it is not.  That is
 exact at silhouettes, whatever else is drawn in front and however many pixels there are; a depth
 buffer would be neither.  Display coordinates are projective, so a triangle is flat in them, and
 its depth linear.
@@ -94,7 +94,6 @@ def _hides(display: FloatArray, corners: IntArray, vertex: IntArray) -> BoolArra
     # Twice the areas of the triangles that the vertex makes with each side.
     u, v, w = bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx
     around = ((u >= 0) & (v >= 0) & (w >= 0)) | ((u <= 0) & (v <= 0) & (w <= 0))
-    around &= (corners != vertex[:, None]).all(axis=1)
     hides = np.flatnonzero(around)
     u, v, w = u[hides], v[hides], w[hides]
     za, zb, zc = (depth[k] - depth[vertex[hides]] for k in corners[hides].T)
