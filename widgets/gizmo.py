@@ -221,7 +221,9 @@ class Gizmo:
             arrow = Part(Way.ALONG, axis)
             if self._is_to_be_seen(arrow):
                 start, tip = self.line(arrow)[[0, -1], :2]
-                x, y = tip + 0.65 * size * (tip - start) / np.linalg.norm(tip - start)
+                length = float(np.linalg.norm(tip - start))
+                onward = (tip - start) / length if length > 1.0 else np.array([0.0, 1.0])
+                x, y = tip + 0.65 * size * onward
                 letter.say("xyz"[axis], size, x, y)
             else:
                 letter.hide()
