@@ -131,7 +131,6 @@ def test_the_whole_story(any_view, tmp_path):
 
     desk.type("g")
     assert desk.session.regions.n_regions >= 2
-    desk.type("n")
     assert desk.editor.stage.selector.region == 1
     before = desk.session.regions.membership[1].copy()
     hand.drag([hand.at([0.0, -0.1, height]) for height in (0.45, 0.5, 0.55)])
@@ -235,9 +234,10 @@ def test_every_mode_says_what_it_lacks_and_the_key_that_makes_it(bare):
     bare.type("3", "t", "v", "d")
     corners = bare.around(x > 2.4)
     bare.hand.drag([corners[0], corners[2]])
+    assert "rectangle for handle 1" in bare.editor.status
     bare.type("4")
     assert bare.session.is_bound
-    assert "drag a handle" in bare.editor.status
+    assert "drag or turn a handle" in bare.editor.status
     pull_handle(bare)
     assert bare.session.undo_label == "drag handle 1"
     assert bare.hand.failures == []
@@ -283,6 +283,21 @@ def test_what_is_painted_is_chosen_by_keys(desk):
     desk.hand.hover(desk.hand.at([0.0, -0.8, 0.0]))
     desk.type("bracketright")
     assert selector.radius > radius
+
+
+def test_without_regions_one_paints_the_first_beside_all_the_rest(bare):
+    bare.type("g", "n", "n", "z")
+    assert bare.session.regions is None
+    bare.hand.click(bare.hand.at([-2.0, 0.0, 0.0]))
+    everything, painted = bare.session.regions.membership
+    assert everything.all()
+    assert 0 < np.count_nonzero(painted) < len(painted)
+    assert "region 1" in bare.editor.status
+    bare.type("g", "a", "z", "z")  # from a new region after many back to none
+    assert "no regions yet" in bare.editor.status
+    bare.hand.click(bare.hand.at([2.0, 0.0, 0.0]))
+    assert bare.session.regions.n_regions == 2
+    assert bare.hand.failures == []
 
 
 def test_regions_are_merged_cut_grown_and_shrunk(desk):
@@ -383,9 +398,11 @@ def test_what_goes_wrong_is_said_until_something_succeeds(desk):
     desk.hand.failures.clear()
     desk.hand.hover((5, 5))
     assert "in no region but 0" in desk.editor.status
-    desk.type("b")
-    assert "in no region" not in desk.editor.status
-    desk.type("m")  # points at nothing
+    desk.hand.click(desk.hand.at([1.0, -0.7, 0.0]))
+    assert desk.session.undo_label == "paint region 0"
+    assert desk.editor.status.startswith("brush for region 0")
+    desk.hand.hover((5, 5))
+    desk.type("m")  # with the pointer beside the mesh
     assert "point at the region" in desk.editor.status
     assert len(desk.hand.failures) == 1
     desk.hand.failures.clear()
@@ -432,6 +449,8 @@ def test_escape_cancels_a_job_and_nothing_is_changed(bare):
     assert not bare.session.can_undo
     assert "cancelled" in bare.editor.status
     assert bare.hand.failures == []
+    bare.hand.click(bare.hand.at([0.0, -0.8, 0.0]))  # and the brush paints again
+    assert bare.session.undo_label == "paint region 1"
     bare.type("g")
     assert bare.session.regions is not None
 
@@ -474,11 +493,15 @@ def test_opening_another_session_shows_it_and_goes_on_with_it(desk, tmp_path):
     desk.type("ctrl+o")
     assert "not saved: again" in desk.editor.status
     assert desk.session is first
+    shown = desk.view.renderer.GetViewProps().GetNumberOfItems()
     desk.type("ctrl+o")
+    assert desk.view.renderer.GetViewProps().GetNumberOfItems() == shown
     assert desk.session is not first
     assert "opened" in desk.editor.status
     assert_array_equal(desk.editor.stage.surface.points, posed)
     assert not desk.session.can_undo
+    first.set_fixed([])  # nobody listens to it any more
+    assert "opened" in desk.editor.status
     pull_handle(desk, (0, -20))
     assert desk.session.can_undo
     assert not first.is_dragging
@@ -526,7 +549,8 @@ def test_a_file_that_is_no_session_leaves_everything_as_it_was(desk, tmp_path):
 
 def test_a_session_of_another_mesh_is_shown_whole(desk, tmp_path):
     path = tmp_path / "sphere.segdeform"
-    save_session(path, Session(models.sphere(200)))
+    sphere = models.sphere(200)
+    save_session(path, Session(sphere.with_vertices(20.0 * sphere.vertices + [50.0, 0.0, 0.0])))
     desk.editor.load(path)
     assert desk.editor.stage.surface.points.shape == desk.session.mesh.vertices.shape
     seen = desk.view.to_display(desk.session.mesh.vertices)[:, :2]

@@ -45,6 +45,17 @@ def test_a_job_works_in_another_thread_and_delivers_in_this_one():
     assert not hand.failures
 
 
+def test_a_job_leaves_no_timer_behind():
+    hand = Hand(plain_view())
+    timers = []
+    hand.view.interactor.AddObserver("CreateTimerEvent", lambda *_: timers.append(1))
+    hand.view.interactor.AddObserver("DestroyTimerEvent", lambda *_: timers.pop())
+    job = Job(hand.view, lambda progress: None, done=lambda _: None)
+    assert timers == [1]
+    tick_until_ended(hand, job)
+    assert timers == []
+
+
 def test_a_watcher_hears_how_far_it_is_and_last_of_its_end():
     hand = Hand(plain_view())
     heard = []
@@ -141,19 +152,19 @@ def test_without_an_event_loop_one_waits():
 
 
 def test_a_thread_that_computes_gets_on_while_the_window_is_idle():
-    # As under a loop that keeps Python's lock between two timers: only ticks let the thread run.
+    # Each tick leaves the thread some time; without that 200 of them would be over in no time.
     hand = Hand(plain_view())
 
     def work(progress):
-        for k in range(2000):
-            progress(k / 2000, "counting")
+        for k in range(20_000):
+            progress(k / 20_000, "counting")
             sum(range(200))
         return "counted"
 
     delivered = []
     job = Job(hand.view, work, done=delivered.append)
     ticks = 0
-    while job.is_running and ticks < 500:
+    while job.is_running and ticks < 200:
         hand.tick()
         ticks += 1
     assert delivered == ["counted"]

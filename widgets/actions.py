@@ -144,7 +144,8 @@ def toggle_through(desk: Desk) -> None:
     """Reach the far side too, or what is seen only."""
     selector = desk.stage.selector
     selector.through = not selector.through
-    desk.say("reaches through the body" if selector.through else "reaches what is seen")
+    if not selector.through:  # else the hint says so
+        desk.say("reaches only what is seen")
 
 
 def grow(desk: Desk) -> None:

@@ -124,6 +124,7 @@ class Desk:
         if self._job is not None:
             then = "stopping ..." if self._job.is_cancelled else "Esc cancels"
             doing = f"busy {self._doing}" if self._insists else self._doing
+            doing = ": ".join(filter(None, (doing, self._job.text)))
             self.voice.count(mode, doing, self._job.fraction, then)
         elif self._is_on:
             self.voice.speak(mode, hint(self.stage, self._mode))

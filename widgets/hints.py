@@ -7,6 +7,7 @@ made from where one stands.
 from __future__ import annotations
 
 from vtk_segdeform.session import Session
+from vtk_segdeform.solver import Status
 
 from .legend import signed
 from .region_selector import Paint, Tool
@@ -62,7 +63,10 @@ def _of_drag(stage: Stage) -> str:
     session = stage.session
     if session.is_dragging:
         return f"volume {signed(100.0 * session.volume_change, 2)} % · Esc takes it back"
-    return session.what_next
+    solution = session.solution
+    if solution is not None and solution.status not in (Status.CONVERGED, Status.STEP_LIMIT):
+        return str(solution.status)
+    return "drag or turn a handle" + ("" if len(session.fixed) else " · 3, S for what stays")
 
 
 def _lead_on(stage: Stage, mode: Mode) -> str:

@@ -55,6 +55,7 @@ class Stage:
         self.overlay = VolumeOverlay(view, session, self.surface)
         self.cages_wanted = self.overlay_wanted = False
         self.cages.hide()
+        self.choose_region(0)
 
     @property
     def widgets(self) -> tuple[Widget, ...]:
@@ -68,8 +69,11 @@ class Stage:
         return 0 if regions is None else regions.n_regions
 
     def choose_region(self, region: int) -> None:
-        """Paint *region* from now on; one beyond the last is a new one."""
-        self.selector.region = min(region, self.n_regions)
+        """Paint *region* from now on; one beyond the last is a new one.
+
+        Where there are none yet, region 0 is to hold everything, and the first to paint is 1.
+        """
+        self.selector.region = min(region, self.n_regions) if self.n_regions else 1
 
     def enter(self, mode: Mode) -> None:
         """Switch on what belongs to *mode*, and show what goes with it."""

@@ -59,8 +59,8 @@ class Voice:
             self._line.say(" · ".join(filter(None, (self._note, hint))), mode)
 
     def count(self, mode: str, doing: str, fraction: float, then: str) -> None:
-        """Say how far one is with *doing* something, 0..1."""
-        self._line.progress(fraction, f"{doing}: {100.0 * fraction:.0f} % · {then}", mode)
+        """Say how far one is with *doing* something, 0..1, and what can be done about it."""
+        self._line.progress(fraction, f"{doing} · {100.0 * fraction:.0f} % · {then}", mode)
 
     def be_silent(self) -> None:
         """Say nothing."""
