@@ -156,6 +156,18 @@ def test_a_key_that_is_taken_stays_from_the_camera_and_others_do_not(scribble):
     assert scribble.keys == ["w", "s"]
 
 
+def test_a_closed_window_is_none_and_drawing_in_it_does_nothing():
+    plotter = pv.Plotter(off_screen=True)
+    view = View.of(plotter)
+    assert view.window is not None
+    plotter.show(auto_close=False, interactive=False)
+    assert view.window is not None
+    plotter.close()
+    assert view.window is None
+    view.render()
+    view.touch()
+
+
 def test_off_hears_nothing(scribble):
     scribble.Off()
     Hand(scribble.view).drag([(50, 50), (60, 60)])

@@ -40,9 +40,12 @@ class Sight:
         return np.asarray(self._origin() + 0.5 * (clip + 1.0) * self._extent())
 
     def to_world(self, display: FloatArray) -> FloatArray:
-        """Return (k, 3) world points of (k, 3) *display* coordinates."""
+        """Return (k, 3) world points of (k, 3) *display* coordinates; NaN if a camera sees none."""
         clip = 2.0 * (np.asarray(display) - self._origin()) / self._extent() - 1.0
-        inverse = np.linalg.inv(self._projection())
+        try:
+            inverse = np.linalg.inv(self._projection())
+        except np.linalg.LinAlgError:  # zoomed in or out beyond all numbers
+            return np.full(clip.shape, np.nan)
         homogeneous = np.column_stack([clip, np.ones(len(clip))]) @ inverse.T
         return np.asarray(homogeneous[:, :3] / homogeneous[:, 3:])
 

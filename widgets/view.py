@@ -66,7 +66,10 @@ class View(Sight):
     @property
     def window(self) -> Any:
         """The vtkRenderWindow, or None once it is closed."""
-        return self.renderer.GetRenderWindow()
+        window = self.renderer.GetRenderWindow()
+        # pyvista finalises a window and keeps it; before its first picture none is initialised.
+        closed = window is not None and not (window.GetNeverRendered() or window.GetInitialized())
+        return None if closed else window
 
     @property
     def front(self) -> Any:
@@ -148,7 +151,10 @@ class View(Sight):
         return _once(lambda: self.renderer.RemoveObserver(tag))
 
     def every(self, milliseconds: int, callback: Callable[[], None]) -> Stop:
-        """Call *callback* again and again from the event loop, until stopped."""
+        """Call *callback* again and again from the event loop, until stopped.
+
+        Not while a camera style drags: it keeps the timer's events to itself as well.
+        """
 
         def ticked() -> bool:
             callback()
