@@ -8,10 +8,10 @@ import sys
 
 import numpy as np
 import pyvista as pv
-from vtk_segdeform.widgets.recording import replay
 
 import vtk_segdeform as sd
 from vtk_segdeform.convert import to_polydata
+from vtk_segdeform.widgets.recording import replay
 
 show = sys.argv[1:] == ["show"]
 mesh = to_polydata(sd.models.cactus(1500))

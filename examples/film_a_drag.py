@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from vtk_segdeform.widgets.film import film
 
 import vtk_segdeform as sd
+from vtk_segdeform.widgets.film import film
 
 mesh = sd.models.cactus(2000)
 height = mesh.vertices[:, 2]

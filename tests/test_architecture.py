@@ -38,16 +38,32 @@ STORY = [
     "modelling.remeshing", "modelling.implicit", "models", "formats.polygons", "formats.off",
     "formats.ply", "formats.wavefront", "formats.vtk_readers", "meshlab", "convert", "palette",
     "canvas", "pictures",
-    # widgets over a session
+    # a view, and widgets in it
     "widgets.gestures", "widgets.sight", "widgets.view", "widgets.widget",
     "widgets.surface_display",
-    "widgets.picking", "widgets.region_colours", "widgets.region_selector",
-    "widgets.cage_display", "widgets.gizmo", "widgets.handle_dragger", "widgets.diverging",
-    "widgets.volume_overlay", "widgets.jobs", "widgets.status_line", "widgets.help_card",
-    "widgets.recording", "widgets.film", "widgets.editor", "plugin",
+    # painting
+    "widgets.surface_distance", "widgets.visibility", "widgets.picking", "widgets.region_colours",
+    "widgets.roles", "widgets.outline", "widgets.brush_ring", "widgets.strokes",
+    "widgets.region_selector",
+    # cages
+    "widgets.wires", "widgets.reach", "widgets.rejected_cage", "widgets.cage_drag",
+    "widgets.cage_display",
+    # dragging
+    "widgets.gizmo_shapes", "widgets.gizmo_solids", "widgets.panels", "widgets.gizmo_label",
+    "widgets.gizmo", "widgets.handle_motion", "widgets.handle_marks", "widgets.live_solve",
+    "widgets.handle_dragger",
+    # what becomes of the volume
+    "widgets.diverging", "widgets.legend", "widgets.volume_overlay",
+    # the editor
+    "widgets.jobs", "widgets.status_line", "widgets.help_card", "widgets.voice", "widgets.stage",
+    "widgets.hints", "widgets.session_file", "widgets.desk", "widgets.actions", "widgets.bindings",
+    "widgets.editor",
+    # recordings and films; pyvista's extension points
+    "widgets.transcript", "widgets.recording", "widgets.film_files", "widgets.off_screen",
+    "widgets.film", "plugin",
     # the command line
     "command_line.selection", "command_line.motion", "command_line.outputs", "command_line.demo",
-    "command_line.bench", "command_line.commands", "cli", "__main__",
+    "command_line.interactive", "command_line.bench", "command_line.commands", "cli", "__main__",
 ]  # fmt: skip
 
 NUMERIC = {"numpy", "scipy"}
@@ -87,7 +103,7 @@ def imports(name: str) -> Iterator[tuple[str, bool]]:
         elif isinstance(node, ast.ImportFrom) and node.level:
             named = [*folder[: len(folder) + 1 - node.level], *(node.module or "").split(".")]
             named = [part for part in named if part]
-            if PACKAGE.joinpath(*named).is_dir():
+            if PACKAGE.joinpath(*named).is_dir() or named == ["widgets"]:
                 yield from ((".".join([*named, alias.name]), True) for alias in node.names)
             else:
                 yield ".".join(named), True

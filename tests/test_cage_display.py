@@ -9,9 +9,6 @@ import pytest
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - a plain window needs it
 from hands import Hand, picture, plain_view
 from scenes import Scene, sausage
-from vtk_segdeform.widgets.cage_display import CageDisplay
-from vtk_segdeform.widgets.rejected_cage import WARNING
-from vtk_segdeform.widgets.surface_display import SurfaceDisplay
 from vtkmodules.vtkRenderingCore import vtkTextActor
 
 from vtk_segdeform import Session
@@ -19,6 +16,9 @@ from vtk_segdeform.cages import Cage
 from vtk_segdeform.editing.state import State
 from vtk_segdeform.errors import CageError
 from vtk_segdeform.palette import HANDLE, of_region, rgb
+from vtk_segdeform.widgets.cage_display import CageDisplay
+from vtk_segdeform.widgets.rejected_cage import WARNING
+from vtk_segdeform.widgets.surface_display import SurfaceDisplay
 
 
 @functools.lru_cache(maxsize=1)

@@ -15,14 +15,14 @@ from hands import Hand, picture, plain_view
 from numpy.testing import assert_array_equal
 from scenes import sausage
 from scipy.spatial.transform import Rotation
+
+from vtk_segdeform import Session, load_session, models, save_session
+from vtk_segdeform.volume import signed_volume
 from vtk_segdeform.widgets.bindings import BINDINGS
 from vtk_segdeform.widgets.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.gizmo_shapes import Part, Way
 from vtk_segdeform.widgets.region_selector import Paint, Tool
 from vtk_segdeform.widgets.view import View
-
-from vtk_segdeform import Session, load_session, models, save_session
-from vtk_segdeform.volume import signed_volume
 
 ROOT = Path(__file__).resolve().parent.parent
 

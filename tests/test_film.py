@@ -10,14 +10,14 @@ import pytest
 from hands import Hand, picture, plain_view
 from PIL import Image
 from scenes import sausage
-from vtk_segdeform.widgets.film import Film, film
-from vtk_segdeform.widgets.film_files import require_film
-from vtk_segdeform.widgets.recording import replay
-from vtk_segdeform.widgets.surface_display import SurfaceDisplay
 
 from vtk_segdeform import Session, models
 from vtk_segdeform.canvas import require_offscreen
 from vtk_segdeform.errors import CageError, MissingDependencyError, SessionError
+from vtk_segdeform.widgets.film import Film, film
+from vtk_segdeform.widgets.film_files import require_film
+from vtk_segdeform.widgets.recording import replay
+from vtk_segdeform.widgets.surface_display import SurfaceDisplay
 
 SCENE = sausage()
 SIZE = (120, 90)

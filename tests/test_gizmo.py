@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hands import picture, plain_view
 from solids import rotation
+
+from vtk_segdeform import Session, models
+from vtk_segdeform.palette import COLOURS, INK, rgb
 from vtk_segdeform.widgets.gestures import Phase, Pointer
 from vtk_segdeform.widgets.gizmo import AXIS_COLOURS, Gizmo
 from vtk_segdeform.widgets.gizmo_shapes import FREE, PARTS, Part, Way
 from vtk_segdeform.widgets.surface_display import SurfaceDisplay
-
-from vtk_segdeform import Session, models
-from vtk_segdeform.palette import COLOURS, INK, rgb
 
 CENTRE = np.array([0.2, 0.1, -0.1])  # within the ball that is in the view
 TURNED = rotation([1.0, 2.0, 3.0], 0.7)
@@ -20,11 +20,10 @@ LOOKS = [(4.0, -9.0, 5.0), (-6.0, 5.0, 3.0), (3.0, 4.0, -8.0)]
 VIEW_RING = Part(Way.ABOUT)
 
 
-@pytest.fixture(params=[False, True], ids=["perspective", "parallel"])
-def view(request):
+@pytest.fixture
+def view():
     view = plain_view()
     SurfaceDisplay(view, Session(models.sphere(300)))
-    view.camera.SetParallelProjection(request.param)
     look_from(view, LOOKS[0])
     return view
 
@@ -60,7 +59,9 @@ def is_painted(image, place, colour):
     return bool((np.abs(near - rgb(colour).astype(int)).max(axis=2) <= 2).any())
 
 
-def test_it_is_as_large_on_the_screen_from_near_and_far(view):
+@pytest.mark.parametrize("parallel", [False, True], ids=["perspective", "parallel"])
+def test_it_is_as_large_on_the_screen_from_near_and_far(view, parallel):
+    view.camera.SetParallelProjection(parallel)
     gizmo = Gizmo(view)
     gizmo.place(CENTRE)
     sizes = []
@@ -103,6 +104,7 @@ def test_the_body_does_not_hide_it(view):
 @pytest.mark.parametrize("axes", [np.eye(3), TURNED], ids=["world", "turned"])
 @pytest.mark.parametrize("place", LOOKS)
 def test_what_is_drawn_is_what_is_hit(view, place, axes):
+    view.camera.SetParallelProjection(place == LOOKS[1])
     look_from(view, place)
     gizmo = Gizmo(view)
     gizmo.place(CENTRE, axes)
@@ -139,6 +141,7 @@ def test_the_far_half_of_a_ring_is_not_there(view):
 
 @pytest.mark.parametrize("axis", range(3))
 def test_what_is_seen_end_on_is_not_there(view, axis):
+    view.camera.SetParallelProjection(axis == 1)
     place = 9.0 * np.eye(3)[axis]
     view.camera.SetViewUp(*np.eye(3)[axis - 1])
     view.camera.SetPosition(*place)

@@ -9,19 +9,19 @@ import pytest
 from hands import Hand, picture, plain_view
 from scenes import sausage
 from solids import rotation
-from vtk_segdeform.widgets.gestures import Phase, Pointer
-from vtk_segdeform.widgets.gizmo_shapes import FREE, PARTS, Part, Way
-from vtk_segdeform.widgets.handle_dragger import HandleDragger
-from vtk_segdeform.widgets.handle_motion import Grip, Motion
 
 from vtk_segdeform import Session
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.rotations import rigid_fit
 from vtk_segdeform.solver import Status
+from vtk_segdeform.widgets.gestures import Phase, Pointer
+from vtk_segdeform.widgets.gizmo_shapes import FREE, PARTS, Part, Way
+from vtk_segdeform.widgets.handle_dragger import HandleDragger
+from vtk_segdeform.widgets.handle_motion import Grip, Motion
 
 SCENE = sausage()
 TIP, TOP = "handle 1", "handle 2"
-LOOKS = [(6.0, -9.0, 5.0), (9.0, 7.0, 4.0), (-5.0, 6.0, -8.0)]
+LOOKS = [(10.0, -8.0, 6.0), (9.0, 7.0, 4.0), (-5.0, 6.0, -8.0)]
 VIEW_RING = Part(Way.ABOUT)
 
 
@@ -63,7 +63,7 @@ class Bench:
         """Return a pixel at which a press takes *part*."""
         line = self.gizmo.line(part)[:, :2]
         if part.way is Way.WITHIN:
-            line = line[:4].mean(axis=0)[None]
+            line = np.concatenate([line[:4].mean(axis=0)[None], 0.5 * (line[:4] + line[1:])])
         elif part.way is Way.ALONG:
             line = line[0] + np.linspace(0.2, 0.9, 15)[:, None] * (line[1] - line[0])
         places = np.round(line[np.isfinite(line).all(axis=1)])
@@ -102,9 +102,9 @@ def bench():
     bench.dragger.remove()
 
 
-def each_view(test):
-    test = pytest.mark.parametrize("parallel", [False, True], ids=["perspective", "parallel"])(test)
-    return pytest.mark.parametrize("look", LOOKS)(test)
+each_view = pytest.mark.parametrize(
+    ("look", "parallel"), [(LOOKS[0], False), (LOOKS[1], True), (LOOKS[2], False)]
+)
 
 
 def turned(bench):
@@ -122,9 +122,11 @@ def turned(bench):
 # What moves where.
 
 
-@each_view
-def test_every_part_moves_as_it_says(look, parallel):
-    local = parallel is (look == LOOKS[0])  # both, from both kinds of camera
+@pytest.mark.parametrize(
+    ("look", "parallel", "local"),
+    [(LOOKS[0], False, False), (LOOKS[1], True, True), (LOOKS[2], False, True)],
+)
+def test_every_part_moves_as_it_says(look, parallel, local):
     bench = Bench(look, parallel=parallel)
     axes = turned(bench) if local else np.eye(3)
     assert np.allclose(bench.gizmo.axes, axes, atol=1e-9)
@@ -180,9 +182,8 @@ def test_what_is_grabbed_stays_under_the_pointer(look, parallel):
     assert not hand.failures
 
 
-@pytest.mark.parametrize("parallel", [False, True])
-@pytest.mark.parametrize("ring", [VIEW_RING, Part(Way.ABOUT, 1)], ids=["view", "y"])
-def test_a_ring_turns_by_the_very_angle_seen_on_the_screen(parallel, ring):
+@pytest.mark.parametrize(("ring", "parallel"), [(VIEW_RING, False), (Part(Way.ABOUT, 1), True)])
+def test_a_ring_turns_by_the_very_angle_seen_on_the_screen(ring, parallel):
     bench = Bench((0.0, -12.0, 0.0), parallel=parallel)
     hand, start, centre = bench.hand, bench.targets(), bench.gizmo.centre
     if not parallel:  # the centre in the middle, so that its line of sight is y
@@ -193,7 +194,7 @@ def test_a_ring_turns_by_the_very_angle_seen_on_the_screen(parallel, ring):
     middle = bench.view.to_display(centre[None])[0, :2]
     place = bench.aim(ring)
     hand.press(place)
-    for degrees in (10.0, 70.0, 130.0, 190.0, 250.0):  # more than half a turn
+    for degrees in (20.0, 90.0, 150.0, 210.0):  # more than half a turn
         arm = rotation([0.0, 0.0, 1.0], np.radians(degrees))[:2, :2] @ (place - middle)
         there = np.round(middle + arm)
         a, b = place - middle, there - middle
@@ -210,10 +211,10 @@ def test_there_and_back_the_targets_are_where_they_were(bench):
     bench.session.drag({TIP: bench.targets() + [0.1, 0.2, 0.0]})
     bench.session.commit()
     before, pose = bench.targets(), bench.session.vertices
-    for part in (FREE, Part(Way.ALONG, 0), Part(Way.ABOUT, 2), VIEW_RING):
+    for part in (FREE, Part(Way.ALONG, 0), VIEW_RING):
         place = bench.aim(part)
         bench.hand.press(place)
-        for step in (10.0, 25.0, 40.0, 20.0, 0.0):
+        for step in (10.0, 25.0, 10.0, 0.0):
             bench.hand.move(place + [step, -0.5 * step])
         assert np.abs(bench.targets() - before).max() < 1e-13
         bench.hand.release(place)
@@ -244,9 +245,8 @@ def test_the_volume_is_exact_at_every_move_of_a_long_turn():
 # Seen from the side.
 
 
-@pytest.mark.parametrize("parallel", [False, True], ids=["perspective", "parallel"])
-@pytest.mark.parametrize("axis", range(3))
-def test_seen_from_its_side_nothing_flies_away(parallel, axis):
+@pytest.mark.parametrize(("axis", "parallel"), [(0, True), (1, False)])
+def test_seen_from_its_side_nothing_flies_away(axis, parallel):
     bench = Bench(12.0 * np.eye(3)[axis], parallel=parallel, up=np.eye(3)[axis - 2])
     hand, centre = bench.hand, bench.gizmo.centre
     bench.dragger.refine_while_resting = False
@@ -257,18 +257,18 @@ def test_seen_from_its_side_nothing_flies_away(parallel, axis):
         hand.move(place + [2.0, 3.0])
         for key in ("xyz"[axis], "xyz"[axis], "xyz"[axis - 1]):
             hand.key(key)
-            for step in ([40.0, 60.0], [-60.0, 20.0]):
+            for step in ([20.0, 30.0], [-30.0, 10.0]):
                 hand.move(place + step)
                 assert np.isfinite(bench.targets()).all()
                 away = np.linalg.norm(bench.targets().mean(axis=0) - centre)
-                assert away < window
+                assert away < 0.5 * window
         hand.key("Escape")
     assert not hand.failures
     assert bench.session.state.pose is None
 
 
 @pytest.mark.parametrize("parallel", [False, True], ids=["perspective", "parallel"])
-@pytest.mark.parametrize("tilt", [0.0, 1e-9, 1e-3, 0.1, 0.19, 0.21, 0.4, 1.0])
+@pytest.mark.parametrize("tilt", [0.0, 1e-9, 0.1, 0.19, 0.21, 1.0])
 def test_whatever_the_pointer_does_a_motion_is_rigid_and_near(parallel, tilt):
     view = plain_view()
     view.camera.SetParallelProjection(parallel)
@@ -380,6 +380,19 @@ def test_shift_moves_a_fifth_and_without_it_goes_on_from_there(bench):
     assert np.allclose(bench.shift(), 0.8 * whole, atol=1e-12)
     hand.move(place + [-40.0, 0.0])
     assert bench.shift()[0] < 0.0
+
+
+def test_a_slow_turn_goes_on_past_half_a_turn_of_the_hand():
+    bench = Bench((0.0, -12.0, 0.0), parallel=True)
+    middle, start = np.array(bench.hand.at(bench.gizmo.centre)), bench.targets()
+    place = bench.aim(VIEW_RING)
+    bench.hand.press(place, shift=True)
+    for degrees in (90.0, 170.0, 250.0, 340.0):
+        arm = rotation([0.0, 0.0, 1.0], np.radians(degrees))[:2, :2] @ (place - middle)
+        bench.hand.move(middle + arm, shift=True)
+        R, _ = rigid_fit(start, bench.targets())
+        assert np.allclose(R, rotation([0.0, -1.0, 0.0], np.radians(0.2 * degrees)), atol=0.005)
+    assert not bench.hand.failures
 
 
 def test_control_turns_by_fifteen_degrees_at_a_time():
@@ -545,6 +558,7 @@ def test_no_timer_runs_after_undo_off_or_remove_nor_where_it_is_not_wanted(bench
     drag()
     assert bench.has_timer
     bench.dragger.Off()
+    bench.dragger.refine_while_resting = True
     assert not bench.has_timer
     bench.session.undo()
     bench.dragger.On()

@@ -8,11 +8,11 @@ import time
 import numpy as np
 import pytest
 from hands import Hand, picture, plain_view
+
+from vtk_segdeform.errors import CageError, Cancelled
 from vtk_segdeform.widgets.help_card import HelpCard
 from vtk_segdeform.widgets.jobs import Job
 from vtk_segdeform.widgets.status_line import StatusLine
-
-from vtk_segdeform.errors import CageError, Cancelled
 
 SECTIONS = [
     ("Everywhere", [("Ctrl+Z", "undo"), ("H", "this card"), ("Esc", "cancel")]),

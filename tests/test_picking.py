@@ -8,14 +8,14 @@ from hands import plain_view
 from scenes import sausage
 from scipy.sparse import csgraph
 from solids import icosphere, two_components
+
+from vtk_segdeform import Mesh, Session, models
 from vtk_segdeform.widgets.gestures import Phase, Pointer
 from vtk_segdeform.widgets.picking import Picker
 from vtk_segdeform.widgets.strokes import Lasso
 from vtk_segdeform.widgets.surface_display import SurfaceDisplay
 from vtk_segdeform.widgets.surface_distance import SurfaceDistance
 from vtk_segdeform.widgets.visibility import seen_vertices
-
-from vtk_segdeform import Mesh, Session, models
 
 RNG = np.random.default_rng(3)
 

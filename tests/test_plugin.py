@@ -17,13 +17,13 @@ from hands import Hand, picture
 from numpy.testing import assert_array_equal
 from scenes import sausage
 from solids import OCTAHEDRON
-from vtk_segdeform.widgets.view import View
 
 import vtk_segdeform as sd
 from vtk_segdeform import convert, models, plugin
 from vtk_segdeform.cli import main
 from vtk_segdeform.errors import MeshError, MissingDependencyError
 from vtk_segdeform.volume import signed_volume
+from vtk_segdeform.widgets.view import View
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENE = sausage()

@@ -7,14 +7,14 @@ import pytest
 import pyvista as pv
 from hands import Hand, picture, plain_view
 from scenes import sausage
+
+from vtk_segdeform import Session
+from vtk_segdeform.errors import SessionError
 from vtk_segdeform.widgets.gestures import Gesture, Phase, Pointer
 from vtk_segdeform.widgets.recording import Recorder, replay
 from vtk_segdeform.widgets.surface_display import SurfaceDisplay
 from vtk_segdeform.widgets.view import View
 from vtk_segdeform.widgets.widget import Widget
-
-from vtk_segdeform import Session
-from vtk_segdeform.errors import SessionError
 
 SCENE = sausage()
 TITLE = "vtk_segdeform recording 1"

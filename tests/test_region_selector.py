@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hands import Hand, picture, plain_view
 from scenes import sausage
-from vtk_segdeform.widgets.region_selector import Paint, RegionSelector, Tool
 
 from vtk_segdeform import Regions, Session, models
 from vtk_segdeform.errors import ConstraintError, RegionError, SegDeformError
 from vtk_segdeform.palette import FIXED, HANDLE, rgb
+from vtk_segdeform.widgets.region_selector import Paint, RegionSelector, Tool
 
 WHOLE = [(2, 2), (398, 2), (398, 398), (2, 398)]
 
@@ -221,14 +221,13 @@ def test_a_region_cannot_be_emptied(desk):
     assert desk.session.regions is regions
 
 
-def test_brackets_and_the_wheel_with_a_key_held_change_the_brush(desk):
+def test_brackets_and_the_wheel_over_the_mesh_change_the_brush(desk):
     here, radius = desk.under(0.0, 0.0), desk.selector.radius
     camera = desk.view.camera.GetDistance()
-    for held in ({"shift": True}, {"control": True}):
-        desk.hand.wheel(+2, here, **held)
-        assert desk.selector.radius > 1.3 * radius
-        desk.hand.wheel(-2, here, **held)
-        assert desk.selector.radius == pytest.approx(radius)
+    desk.hand.wheel(+2, here)
+    assert desk.selector.radius > 1.3 * radius
+    desk.hand.wheel(-2, here)
+    assert desk.selector.radius == pytest.approx(radius)
     desk.hand.key("bracketright", here)
     assert desk.selector.radius > radius
     desk.hand.key("bracketleft", here)
@@ -236,11 +235,12 @@ def test_brackets_and_the_wheel_with_a_key_held_change_the_brush(desk):
     assert desk.view.camera.GetDistance() == camera
 
 
-def test_the_wheel_alone_zooms_but_not_in_the_middle_of_a_stroke(desk):
+def test_the_wheel_zooms_beside_the_mesh_and_with_a_key_held_but_not_during_a_stroke(desk):
     here, radius = desk.under(0.0, 0.0), desk.selector.radius
-    camera = desk.view.camera.GetDistance()
-    desk.hand.wheel(+1, here)
-    assert desk.view.camera.GetDistance() < camera
+    for place, held in (((5, 5), {}), (here, {"shift": True}), (here, {"control": True})):
+        camera = desk.view.camera.GetDistance()
+        desk.hand.wheel(+1, place, **held)
+        assert desk.view.camera.GetDistance() < camera
     assert desk.selector.radius == radius
     desk.selector.tool = Tool.LASSO
     desk.hand.press((50, 50))
@@ -253,9 +253,9 @@ def test_the_wheel_alone_zooms_but_not_in_the_middle_of_a_stroke(desk):
 
 def test_the_brush_stays_between_a_speck_and_everything(desk):
     here, size = desk.under(0.0, 0.0), desk.session.mesh.diagonal
-    desk.hand.wheel(+80, here, shift=True)
+    desk.hand.wheel(+80, here)
     assert desk.selector.radius == pytest.approx(2.0 * size)
-    desk.hand.wheel(-120, here, shift=True)
+    desk.hand.wheel(-120, here)
     assert 0.0 < desk.selector.radius < 1e-3 * size
     desk.selector.paints = Paint.FIXED
     desk.hand.click(here)

@@ -8,12 +8,12 @@ import pyvista as pv
 from hands import Hand, picture, plain_view
 from scenes import sausage
 from solids import icosphere
+
+from vtk_segdeform import Mesh, Session, models
 from vtk_segdeform.widgets.gestures import Gesture, Phase, Pointer
 from vtk_segdeform.widgets.surface_display import SurfaceDisplay
 from vtk_segdeform.widgets.view import View
 from vtk_segdeform.widgets.widget import Widget
-
-from vtk_segdeform import Mesh, Session, models
 
 RNG = np.random.default_rng(7)
 

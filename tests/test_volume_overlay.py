@@ -10,6 +10,14 @@ import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - a plain window needs it
 from hands import Hand, picture, plain_view
 from scenes import sausage
 from solids import rotation
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkRenderingAnnotation import vtkScalarBarActor
+from vtkmodules.vtkRenderingCore import vtkTextActor
+
+from vtk_segdeform import Regions, Session
+from vtk_segdeform.constraints import region_volumes
+from vtk_segdeform.local_volume import LocalVolume
+from vtk_segdeform.palette import of_region
 from vtk_segdeform.widgets.cage_display import CageDisplay
 from vtk_segdeform.widgets.diverging import (
     HALF_RANGES,
@@ -20,14 +28,6 @@ from vtk_segdeform.widgets.diverging import (
 )
 from vtk_segdeform.widgets.surface_display import SurfaceDisplay
 from vtk_segdeform.widgets.volume_overlay import VolumeOverlay
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkRenderingAnnotation import vtkScalarBarActor
-from vtkmodules.vtkRenderingCore import vtkTextActor
-
-from vtk_segdeform import Regions, Session
-from vtk_segdeform.constraints import region_volumes
-from vtk_segdeform.local_volume import LocalVolume
-from vtk_segdeform.palette import of_region
 
 RNG = np.random.default_rng(5)
 

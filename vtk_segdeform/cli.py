@@ -21,6 +21,7 @@ from typing import Any, TextIO
 
 from . import __version__
 from .command_line import commands
+from .command_line.bench import bench
 from .errors import ConstraintError, SegDeformError
 
 _TAKE_VECTORS = ("--rotate", "--pivot", "--translate")
@@ -28,8 +29,7 @@ DONE, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
 
 _SELECTION = """\
 selections (SEL):
-  z>80%            half-space; per cent of the bounding box along x, y or z
-  x<=0.25          half-space in the mesh's own unit
+  z>80%, x<=0.25   half-space; per cent of the bounding box, or in the mesh's own unit
   ids.txt          a file of vertex numbers, from 0
   pose.sel         one number per vertex: 0 fixed, 1 free, 2 handle
   name, name=2     a point array: not zero, or equal to 2
@@ -182,8 +182,8 @@ def _parser() -> argparse.ArgumentParser:
     _subspace(sub)
     _motion(sub)
 
-    text = "open a window to deform a mesh in, or a session saved there"
-    _input_output(command("edit", commands.edit, text), required=False)
+    sub = command("edit", commands.edit, "open a window to deform a mesh, or a saved session, in")
+    _input_output(sub, required=False)
 
     sub = command("check", commands.check, "report the faults of a mesh, and repair them")
     _input_output(sub, required=False)
@@ -197,7 +197,7 @@ def _parser() -> argparse.ArgumentParser:
     _input_output(sub, required=False)
     _subspace(sub)
 
-    sub = command("bench", commands.bench, "time set-up and solving, as a Markdown table")
+    sub = command("bench", bench, "time set-up and solving, as a Markdown table")
     sub.add_argument("--size", type=_count, default=5430, metavar="N", help="mesh vertices (5430)")
     sub.add_argument("--cage-vertices", type=_count, default=155, metavar="N", help="in all (155)")
     sub.add_argument("--interactive", action="store_true", help="time a drag in a window instead")

@@ -81,10 +81,10 @@ class LocalVolume:
         heights = np.einsum("ij,ij->i", a, normals)
         flesh = self._around @ np.column_stack([normals, heights])  # summed at each vertex
         apex = x[self._opposite]
-        flesh = (flesh[:, 3] - np.einsum("ij,ij->i", apex, flesh[:, :3])) / 18.0
+        flesh = np.asarray(flesh[:, 3] - np.einsum("ij,ij->i", apex, flesh[:, :3])) / 18.0
         for _ in range(self._rounds):
             flesh = self._average @ flesh
-        return flesh
+        return np.asarray(flesh)
 
 
 def local_volume_change(mesh: Mesh, vertices: FloatArray) -> FloatArray:

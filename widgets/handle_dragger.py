@@ -107,7 +107,8 @@ class HandleDragger(Widget):
     @refine_while_resting.setter
     def refine_while_resting(self, refines: bool) -> None:
         self._live.refines = refines
-        self._live.go_on()
+        if self.GetEnabled():
+            self._live.go_on()
 
     @property
     def is_refining(self) -> bool:

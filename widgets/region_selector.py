@@ -5,9 +5,8 @@ it goes on, and the release makes one undo step of it.  Escape ends it with noth
 
 brush, component    a press beside the mesh is left to the camera
 lasso, rectangle    begin anywhere; with Shift held the press is left to the camera, of any tool
-``[``  ``]``        smaller, larger brush; so does the wheel with Shift or Control held.  The wheel
-                    alone stays with the camera, also over the mesh: it fills the view when
-                    somebody paints its details, and there would be no place left to zoom.
+``[``  ``]``        smaller, larger brush; so does the wheel over the mesh.  Beside it, and with
+                    Shift or Control held, the wheel zooms as ever.
 
 Other regions put the pose to rest, as they do in `Session`; fixed vertices and handles keep it.
 What a stroke leaves alone is told in `roles`.
@@ -160,10 +159,12 @@ class RegionSelector(Widget):
             self._draw_ring(pointer, self._role, pointer.control)
 
     def wheels(self, pointer: Pointer, clicks: int) -> bool:
-        """Make the brush larger or smaller if Shift or Control is held."""
+        """Make the brush larger or smaller, over the mesh; with Shift or Control zoom."""
         if self.is_grabbing:
             return True  # a stroke is of one view and one radius
-        if self.tool is not Tool.BRUSH or not (pointer.shift or pointer.control):
+        if self.tool is not Tool.BRUSH or pointer.shift or pointer.control:
+            return False
+        if self._picker.hit(pointer) is None:
             return False
         self._resize(clicks, pointer)
         return True

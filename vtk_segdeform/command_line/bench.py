@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import statistics
 import time
+from argparse import Namespace
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -23,12 +24,24 @@ from ..regions import Regions
 from ..segmentation import segment
 from ..solution import Solution
 from .demo import bent_top
+from .interactive import interactive_table
+from .outputs import Say
 
 _T = TypeVar("_T")
 _HEAD = (
     "| regions | segment s | cages s | s per region | bind + factor s "
     "| jump ms | steps | ms per step | drag ms per move | volume change |"
 )
+
+
+def bench(options: Namespace, say: Say, progress: Progress) -> bool:
+    """Print the table of timings: of the solver, or of a drag in a window."""
+    n_cage = options.cage_vertices
+    if options.interactive:
+        say(interactive_table(n_cage_vertices=n_cage, progress=progress))
+    else:
+        say(table(n_vertices=options.size, n_cage_vertices=n_cage, progress=progress))
+    return True
 
 
 def table(

@@ -31,7 +31,6 @@ from ..segmentation import segment
 from ..session import Session
 from ..store import load_session
 from . import motion
-from .bench import table
 from .demo import HANDLE_MET
 from .demo import run as run_demo
 from .outputs import (
@@ -42,7 +41,7 @@ from .outputs import (
     tell_cages,
     tell_regions,
     tell_solution,
-)
+)  # fmt: skip
 from .selection import parse_selection
 
 SESSION = ".segdeform"  # how the name of a session's file ends
@@ -53,18 +52,6 @@ def demo(options: Namespace, say: Say, progress: Progress) -> bool:
     return run_demo(
         options.output, say, progress, n_vertices=options.size, draw=not options.no_pictures
     )
-
-
-def bench(options: Namespace, say: Say, progress: Progress) -> bool:
-    """Print the table of timings."""
-    n_cage = options.cage_vertices
-    if options.interactive:
-        from .interactive import interactive_table
-
-        say(interactive_table(n_cage_vertices=n_cage, progress=progress))
-        return True
-    say(table(n_vertices=options.size, n_cage_vertices=n_cage, progress=progress))
-    return True
 
 
 def deform(options: Namespace, say: Say, progress: Progress) -> bool:
