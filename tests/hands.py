@@ -1,14 +1,21 @@
-"""Hands for the tests: real interactor events, at display coordinates, and nothing else."""
+"""Hands for the tests: real interactor events, at display coordinates, and nothing else.
+
+Where nothing can be rendered, VTK ends the process on its first picture: the tests of whoever
+imports this are skipped there.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 import numpy as np
+import pytest
 from vtkmodules.vtkInteractionStyle import vtkInteractorStyleTrackballCamera
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
 from vtkmodules.vtkRenderingUI import vtkGenericRenderWindowInteractor
 
+from vtk_segdeform.canvas import require_offscreen
+from vtk_segdeform.errors import MissingDependencyError
 from vtk_segdeform.widgets.view import View
 
 
@@ -40,6 +47,12 @@ def picture(view: View) -> np.ndarray:
     image = grabbed.GetOutput()
     width, height, _ = image.GetDimensions()
     return vtk_to_numpy(image.GetPointData().GetScalars()).reshape(height, width, 3)[::-1].copy()
+
+
+try:
+    require_offscreen()
+except MissingDependencyError as missing:
+    pytest.skip(str(missing), allow_module_level=True)
 
 
 class Hand:
