@@ -387,7 +387,7 @@ def test_a_slow_turn_goes_on_past_half_a_turn_of_the_hand():
     middle, start = np.array(bench.hand.at(bench.gizmo.centre)), bench.targets()
     place = bench.aim(VIEW_RING)
     bench.hand.press(place, shift=True)
-    for degrees in (90.0, 170.0, 250.0, 340.0):
+    for degrees in (-90.0, -170.0, -250.0, -340.0):
         arm = rotation([0.0, 0.0, 1.0], np.radians(degrees))[:2, :2] @ (place - middle)
         bench.hand.move(middle + arm, shift=True)
         R, _ = rigid_fit(start, bench.targets())
@@ -494,6 +494,10 @@ def test_a_handle_that_goes_in_mid_drag_ends_the_drag(bench):
         bench.hand.release(place)
         while bench.session.undo_label != "mark handle 2":
             bench.session.undo()
+    bench.hand.press(place)
+    bench.session.remove_handle(bench.dragger.handle)
+    bench.hand.move(place + [20.0, 0.0])
+    assert not bench.dragger.is_grabbing
 
 
 def test_before_there_are_cages_there_is_nothing_to_see_or_grab():
@@ -592,6 +596,29 @@ def test_escape_and_the_right_button_go_back_to_the_pose_before_the_press(bench)
         hand.release(place)
         assert bench.session.state.pose is pose
     assert np.allclose(hand.at(bench.gizmo.centre), place, atol=1.0)
+
+
+def test_what_somebody_else_has_left_in_hand_is_not_taken_back(bench):
+    bench.session.drag({TIP: bench.targets() + [0.0, 0.1, 0.2]})
+    pose, place = bench.session.state.pose, bench.aim(FREE)
+    bench.hand.press(place)
+    bench.hand.move(place + [-40.0, 60.0])
+    bench.hand.key("Escape")
+    assert bench.session.state.pose is pose
+    assert bench.session.undo_label == "drag handle 1"
+
+
+def test_what_is_undone_is_not_refined(bench):
+    place = bench.aim(FREE)
+    bench.hand.drag([place, place + [-40.0, 60.0]])
+    place = bench.aim(FREE)
+    bench.hand.drag([place, place + [-40.0, 0.0]])
+    assert bench.has_timer
+    bench.session.undo()
+    pose = bench.session.state.pose
+    bench.hand.tick()
+    assert bench.session.state.pose is pose
+    assert not bench.has_timer
 
 
 def test_off_in_mid_drag_takes_it_back(bench):
