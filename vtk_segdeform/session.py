@@ -152,7 +152,7 @@ class Session(Timeline):
 
     @property
     def solution(self) -> Solution | None:
-        """How the solver came to this pose; None at rest and after undo, redo and loading."""
+        """How the solver came to this very pose; None at rest, after loading, in older poses."""
         if self._solution is None or self._solution[0] is not self._state.pose:
             return None
         return self._solution[1]
@@ -198,9 +198,9 @@ class Session(Timeline):
         regions = segment(self.mesh, n_regions, overlap=overlap, seed=seed, progress=progress)
         self._set_regions(regions, "segment")
 
-    def set_regions(self, regions: Regions) -> None:
-        """Take *regions* of this mesh."""
-        self._set_regions(of_mesh(self.mesh, regions), "set regions")
+    def set_regions(self, regions: Regions, *, label: str = "set regions") -> None:
+        """Take *regions* of this mesh; *label* is what `undo_label` calls it."""
+        self._set_regions(of_mesh(self.mesh, regions), label)
 
     def paint_region(self, region: int, vertices: ArrayLike, *, subtract: bool = False) -> None:
         """Add vertices, ids or a mask, to a region, or take them out; see `painting.painted`.
@@ -224,9 +224,9 @@ class Session(Timeline):
 
     # Cages.
 
-    def set_cages(self, cages: Sequence[Cage]) -> None:
+    def set_cages(self, cages: Sequence[Cage], *, label: str = "set cages") -> None:
         """Take *cages*, one around each region; CageError if they do not fit."""
-        self._set_cages(fitting_cages(self.regions, cages), "set cages")
+        self._set_cages(fitting_cages(self.regions, cages), label)
 
     def fitted_cages(self, progress: Progress | None = None) -> tuple[Cage, ...]:
         """Return cages for the regions, by the options, and change nothing.

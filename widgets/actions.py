@@ -87,7 +87,7 @@ def segment(desk: Desk) -> None:
     session = desk.session
 
     def keep(regions: Any) -> None:
-        session.set_regions(regions)
+        session.set_regions(regions, label="find regions")
         desk.say(f"{regions.n_regions} regions found")
 
     desk.start("finding regions", lambda p: segmented(session.mesh, progress=p), keep)
@@ -100,7 +100,7 @@ def fit_cages(desk: Desk) -> None:
         raise RegionError("there are no regions to fit cages to: G finds some, or paint them")
 
     def keep(cages: Any) -> None:
-        session.set_cages(cages)
+        session.set_cages(cages, label="fit cages")
         desk.say(f"{len(cages)} cages of {sum(cage.n_vertices for cage in cages)} vertices fitted")
 
     desk.start("fitting cages", session.fitted_cages, keep)
