@@ -135,8 +135,16 @@ def test_the_far_half_of_a_ring_is_not_there(view):
         places = view.to_display(CENTRE + gizmo.radius * points)
         return [gizmo.under(pointer(place)) for place in places]
 
+    def drawn(points):
+        image, places = picture(view), view.to_display(CENTRE + gizmo.radius * points)[:, :2]
+        return np.mean([is_painted(image, place, AXIS_COLOURS[2]) for place in places])
+
     assert ring not in hits(hidden)
     assert hits(shown).count(ring) > 0.7 * len(shown)
+    assert drawn(hidden) < 0.2  # where something else is
+    assert drawn(shown) > 0.7
+    gizmo.show_only(ring)
+    assert drawn(hidden) > 0.9
 
 
 @pytest.mark.parametrize("axis", range(3))

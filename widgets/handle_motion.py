@@ -10,8 +10,7 @@ met nowhere in particular: there pixels are counted instead.  And a line of sigh
 along the plane, or misses it beyond the horizon, is tilted towards it.  So whatever the pointer
 does, nothing flies away.
 
-The way is measured from the press: the pointer that goes back there takes everything back, to the
-last digit.
+The way is measured from the press: a pointer that goes back there takes everything back.
 """
 
 from __future__ import annotations
