@@ -157,7 +157,7 @@ def test_what_is_seen_end_on_is_not_there(view, axis):
     gizmo = Gizmo(view)
     gizmo.place(np.zeros(3))
     x, y = view.to_display(np.zeros((1, 3)))[0, :2]
-    grid = [(x + i, y + j) for i in range(-104, 105, 8) for j in range(-104, 105, 8)]
+    grid = [(x + i, y + j) for i in range(-99, 100, 11) for j in range(-99, 100, 11)]
     found = {gizmo.under(pointer(p)) for p in grid}
     others = [a for a in range(3) if a != axis]
     assert found == {

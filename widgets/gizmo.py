@@ -66,7 +66,6 @@ class Gizmo:
         self._stop = view.before_render(self._fit)
         self._dress()
         self._cut()
-        self._fit()
 
     @property
     def centre(self) -> FloatArray | None:
@@ -94,7 +93,6 @@ class Gizmo:
         """Be at *centre* (3,), turned as *axes* (3, 3), those of the world by default; or hide."""
         self._centre = centre
         self._axes = np.eye(3) if axes is None else axes
-        self._fit()
         self.view.touch()
 
     def point_at(self, part: Part | None) -> None:
@@ -109,14 +107,12 @@ class Gizmo:
         if part != self._only:
             self._only = part
             self._cut()
-            self._fit()
             self.view.touch()
 
     def say(self, words: str) -> None:
         """Have a few *words* beside it, or "" for none."""
         if words != self._words:
             self._words = words
-            self._fit()
             self.view.touch()
 
     def line(self, part: Part) -> FloatArray:
