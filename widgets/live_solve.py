@@ -19,7 +19,10 @@ from .view import Stop, View
 
 _BUDGET = 0.020  # seconds of an event: about half of what drawing takes without a graphics card
 _MOST_STEPS = 8  # a drag is to follow the pointer rather than to arrive
+_AT_REST = 3  # steps of a refinement, at least: with one at a time acceleration learns nothing
 _PERIOD = 40  # milliseconds between two refinements
+_AT_REST = 0.080  # seconds of a refinement, during which nobody waits for the pointer
+_FEWEST_AT_REST = 2  # steps; single ones forget what they learn, and need many times as many
 
 
 class LiveSolve:
@@ -49,9 +52,7 @@ class LiveSolve:
     @property
     def steps(self) -> int:
         """How many steps the next event has time for: 1 to 8, and 1 before anything is known."""
-        if not self._seconds:
-            return 1
-        return max(1, min(_MOST_STEPS, int(_BUDGET / max(median(self._seconds), 1e-6))))
+        return self._steps_in(_BUDGET, 1)
 
     @property
     def is_refining(self) -> bool:
@@ -62,7 +63,7 @@ class LiveSolve:
         """Do ``solve(max_steps=...)``, and see to it that the rest is done later."""
         if not self._session.is_bound:
             self._session.bind()  # seconds that say nothing of how long a step takes
-        self._spend(solve)
+        self._spend(solve, self.steps)
         self.go_on()
 
     def go_on(self) -> None:
@@ -85,7 +86,7 @@ class LiveSolve:
             return
         is_done = False
         try:
-            self._spend(self._session.refine)
+            self._spend(self._session.refine, self._steps_in(_AT_REST, _FEWEST_AT_REST))
             is_done = True
         finally:
             if not is_done:
@@ -93,7 +94,12 @@ class LiveSolve:
                 self._failed()
         self.go_on()
 
-    def _spend(self, solve: Callable[..., Solution]) -> None:
+    def _steps_in(self, seconds: float, fewest: int) -> int:
+        if not self._seconds:
+            return fewest
+        return max(fewest, min(_MOST_STEPS, int(seconds / max(median(self._seconds), 1e-6))))
+
+    def _spend(self, solve: Callable[..., Solution], steps: int) -> None:
         began = time.perf_counter()
-        solution = solve(max_steps=self.steps)
+        solution = solve(max_steps=steps)
         self._seconds.append((time.perf_counter() - began) / max(1, solution.steps))
