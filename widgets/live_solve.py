@@ -18,11 +18,10 @@ from vtk_segdeform.solver import Status
 from .view import Stop, View
 
 _BUDGET = 0.020  # seconds of an event: about half of what drawing takes without a graphics card
+_AT_REST = 0.080  # seconds of a refinement, when no pointer waits to be followed
 _MOST_STEPS = 8  # a drag is to follow the pointer rather than to arrive
-_AT_REST = 3  # steps of a refinement, at least: with one at a time acceleration learns nothing
+_FEWEST_AT_REST = 3  # with one at a time acceleration learns nothing, and it takes for ever
 _PERIOD = 40  # milliseconds between two refinements
-_AT_REST = 0.080  # seconds of a refinement, during which nobody waits for the pointer
-_FEWEST_AT_REST = 2  # steps; single ones forget what they learn, and need many times as many
 
 
 class LiveSolve:
