@@ -105,7 +105,7 @@ def _row(size: int, n_cage_vertices: int, moves: int, progress: Progress | None)
             ended = time.perf_counter()
             solved, mapped, told = stamps[:3]
             # The event has computed normals while it drew; once more, to know how long that took.
-            surface.update()
+            surface.polydata.GetPoints().Modified()
             again = time.perf_counter()
             surface.update_normals()
             normals = time.perf_counter() - again
