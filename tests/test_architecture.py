@@ -42,25 +42,26 @@ STORY = [
     "widgets.gestures", "widgets.sight", "widgets.view", "widgets.widget",
     "widgets.surface_display",
     # painting
-    "widgets.surface_distance", "widgets.visibility", "widgets.picking", "widgets.region_colours",
-    "widgets.roles", "widgets.outline", "widgets.brush_ring", "widgets.strokes",
-    "widgets.region_selector",
+    "widgets.painting.surface_distance", "widgets.painting.visibility", "widgets.picking",
+    "widgets.painting.region_colours", "widgets.painting.roles", "widgets.painting.outline",
+    "widgets.painting.brush_ring", "widgets.painting.strokes", "widgets.region_selector",
     # cages
-    "widgets.wires", "widgets.reach", "widgets.rejected_cage", "widgets.cage_drag",
-    "widgets.cage_display",
+    "widgets.caging.wires", "widgets.caging.reach", "widgets.caging.rejected_cage",
+    "widgets.caging.cage_drag", "widgets.cage_display",
     # dragging
-    "widgets.gizmo_shapes", "widgets.gizmo_solids", "widgets.panels", "widgets.gizmo_label",
-    "widgets.gizmo", "widgets.handle_motion", "widgets.handle_marks", "widgets.live_solve",
-    "widgets.handle_dragger",
+    "widgets.dragging.gizmo_shapes", "widgets.dragging.gizmo_solids", "widgets.dragging.panels",
+    "widgets.dragging.gizmo_label", "widgets.dragging.gizmo", "widgets.dragging.handle_motion",
+    "widgets.dragging.handle_marks", "widgets.dragging.live_solve", "widgets.handle_dragger",
     # what becomes of the volume
-    "widgets.diverging", "widgets.legend", "widgets.volume_overlay",
+    "widgets.colouring.diverging", "widgets.colouring.legend", "widgets.volume_overlay",
     # the editor
-    "widgets.jobs", "widgets.status_line", "widgets.help_card", "widgets.voice", "widgets.stage",
-    "widgets.hints", "widgets.session_file", "widgets.desk", "widgets.actions", "widgets.bindings",
-    "widgets.editor",
+    "widgets.editing.jobs", "widgets.editing.status_line", "widgets.editing.help_card",
+    "widgets.editing.voice", "widgets.editing.stage", "widgets.editing.hints",
+    "widgets.editing.session_file", "widgets.editing.desk", "widgets.editing.actions",
+    "widgets.editing.bindings", "widgets.editor",
     # recordings and films; pyvista's extension points
-    "widgets.transcript", "widgets.recording", "widgets.film_files", "widgets.off_screen",
-    "widgets.film", "plugin",
+    "widgets.filming.transcript", "widgets.recording", "widgets.filming.film_files",
+    "widgets.filming.off_screen", "widgets.film", "plugin",
     # the command line
     "command_line.selection", "command_line.motion", "command_line.outputs", "command_line.demo",
     "command_line.interactive", "command_line.bench", "command_line.commands", "cli", "__main__",
@@ -89,7 +90,10 @@ LONGEST = 250
 FILES = {
     ".".join(path.relative_to(PACKAGE).with_suffix("").parts): path
     for path in sorted(PACKAGE.rglob("*.py"))
-} | {f"widgets.{path.stem}": path for path in sorted(WIDGETS.glob("*.py"))}
+} | {
+    ".".join(("widgets", *path.relative_to(WIDGETS).with_suffix("").parts)): path
+    for path in sorted(WIDGETS.rglob("*.py"))
+}
 NAMES = [name for name in FILES if not name.endswith("__init__")]
 CHAPTERS = [name for name in STORY if name in NAMES]
 
@@ -103,7 +107,7 @@ def imports(name: str) -> Iterator[tuple[str, bool]]:
         elif isinstance(node, ast.ImportFrom) and node.level:
             named = [*folder[: len(folder) + 1 - node.level], *(node.module or "").split(".")]
             named = [part for part in named if part]
-            if PACKAGE.joinpath(*named).is_dir() or named == ["widgets"]:
+            if ".".join([*named, "__init__"]) in FILES or not named:
                 yield from ((".".join([*named, alias.name]), True) for alias in node.names)
             else:
                 yield ".".join(named), True

@@ -17,7 +17,7 @@ from vtk_segdeform.editing.state import State
 from vtk_segdeform.errors import CageError
 from vtk_segdeform.palette import HANDLE, of_region, rgb
 from vtk_segdeform.widgets.cage_display import CageDisplay
-from vtk_segdeform.widgets.rejected_cage import WARNING
+from vtk_segdeform.widgets.caging.rejected_cage import WARNING
 from vtk_segdeform.widgets.surface_display import SurfaceDisplay
 
 

@@ -18,9 +18,9 @@ from scipy.spatial.transform import Rotation
 
 from vtk_segdeform import Session, load_session, models, save_session
 from vtk_segdeform.volume import signed_volume
-from vtk_segdeform.widgets.bindings import BINDINGS
+from vtk_segdeform.widgets.dragging.gizmo_shapes import Part, Way
+from vtk_segdeform.widgets.editing.bindings import BINDINGS
 from vtk_segdeform.widgets.editor import DeformEditor, Mode
-from vtk_segdeform.widgets.gizmo_shapes import Part, Way
 from vtk_segdeform.widgets.region_selector import Paint, Tool
 from vtk_segdeform.widgets.view import View
 

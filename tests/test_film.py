@@ -15,7 +15,7 @@ from vtk_segdeform import Session, models
 from vtk_segdeform.canvas import require_offscreen
 from vtk_segdeform.errors import CageError, MissingDependencyError, SessionError
 from vtk_segdeform.widgets.film import Film, film
-from vtk_segdeform.widgets.film_files import require_film
+from vtk_segdeform.widgets.filming.film_files import require_film
 from vtk_segdeform.widgets.recording import replay
 from vtk_segdeform.widgets.surface_display import SurfaceDisplay
 

@@ -9,9 +9,9 @@ from solids import rotation
 
 from vtk_segdeform import Session, models
 from vtk_segdeform.palette import COLOURS, INK, rgb
+from vtk_segdeform.widgets.dragging.gizmo import AXIS_COLOURS, Gizmo
+from vtk_segdeform.widgets.dragging.gizmo_shapes import FREE, PARTS, Part, Way
 from vtk_segdeform.widgets.gestures import Phase, Pointer
-from vtk_segdeform.widgets.gizmo import AXIS_COLOURS, Gizmo
-from vtk_segdeform.widgets.gizmo_shapes import FREE, PARTS, Part, Way
 from vtk_segdeform.widgets.surface_display import SurfaceDisplay
 
 CENTRE = np.array([0.2, 0.1, -0.1])  # within the ball that is in the view

@@ -14,10 +14,10 @@ from vtk_segdeform import Session
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.rotations import rigid_fit
 from vtk_segdeform.solver import Status
+from vtk_segdeform.widgets.dragging.gizmo_shapes import FREE, PARTS, Part, Way
+from vtk_segdeform.widgets.dragging.handle_motion import Grip, Motion
 from vtk_segdeform.widgets.gestures import Phase, Pointer
-from vtk_segdeform.widgets.gizmo_shapes import FREE, PARTS, Part, Way
 from vtk_segdeform.widgets.handle_dragger import HandleDragger
-from vtk_segdeform.widgets.handle_motion import Grip, Motion
 
 SCENE = sausage()
 TIP, TOP = "handle 1", "handle 2"

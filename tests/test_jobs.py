@@ -10,9 +10,9 @@ import pytest
 from hands import Hand, picture, plain_view
 
 from vtk_segdeform.errors import CageError, Cancelled
-from vtk_segdeform.widgets.help_card import HelpCard
-from vtk_segdeform.widgets.jobs import Job
-from vtk_segdeform.widgets.status_line import StatusLine
+from vtk_segdeform.widgets.editing.help_card import HelpCard
+from vtk_segdeform.widgets.editing.jobs import Job
+from vtk_segdeform.widgets.editing.status_line import StatusLine
 
 SECTIONS = [
     ("Everywhere", [("Ctrl+Z", "undo"), ("H", "this card"), ("Esc", "cancel")]),

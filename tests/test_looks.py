@@ -18,7 +18,7 @@ from scenes import sausage
 
 from vtk_segdeform import Options, Session
 from vtk_segdeform.widgets import CageDisplay, HandleDragger, RegionSelector, Tool, VolumeOverlay
-from vtk_segdeform.widgets.region_colours import RegionColours
+from vtk_segdeform.widgets.painting.region_colours import RegionColours
 from vtk_segdeform.widgets.surface_display import SurfaceDisplay
 
 LOOKS = Path(__file__).resolve().parent / "looks"

@@ -54,9 +54,10 @@ def test_every_library_imported_is_declared(setup_cfg):
 
 def test_every_folder_with_code_is_a_declared_package(setup_cfg):
     declared = set(setup_cfg["options"]["packages"].split())
-    folders = {path.parent for path in (ROOT / "vtk_segdeform").rglob("__init__.py")}
-    names = {".".join(folder.relative_to(ROOT).parts) for folder in folders}
-    assert declared == names | {"vtk_segdeform.widgets"}
+    core = {path.relative_to(ROOT) for path in (ROOT / "vtk_segdeform").rglob("__init__.py")}
+    widgets = {path.relative_to(ROOT) for path in (ROOT / "widgets").rglob("__init__.py")}
+    there = core | {Path("vtk_segdeform", path) for path in widgets}
+    assert declared == {".".join(path.parent.parts) for path in there}
 
 
 def test_the_command_points_at_a_function(setup_cfg):
@@ -103,7 +104,8 @@ def test_the_wheel_holds_both_packages_and_the_licence(tmp_path):
     (wheel,) = tmp_path.glob("*.whl")
     inside = set(zipfile.ZipFile(wheel).namelist())
     for folder, place in (("vtk_segdeform", "vtk_segdeform"), ("widgets", "vtk_segdeform/widgets")):
-        assert {f"{place}/{path.name}" for path in (ROOT / folder).glob("*.py")} <= inside
+        ours = {path.relative_to(ROOT / folder) for path in (ROOT / folder).rglob("*.py")}
+        assert {f"{place}/{path.as_posix()}" for path in ours} <= inside
     assert "vtk_segdeform/py.typed" in inside
     assert any(name.endswith("LICENSE") for name in inside)
     assert not any(name.startswith(("tests/", "widgets/", "examples/")) for name in inside)

@@ -11,11 +11,11 @@ from solids import icosphere, two_components
 
 from vtk_segdeform import Mesh, Session, models
 from vtk_segdeform.widgets.gestures import Phase, Pointer
+from vtk_segdeform.widgets.painting.strokes import Lasso
+from vtk_segdeform.widgets.painting.surface_distance import SurfaceDistance
+from vtk_segdeform.widgets.painting.visibility import seen_vertices
 from vtk_segdeform.widgets.picking import Picker
-from vtk_segdeform.widgets.strokes import Lasso
 from vtk_segdeform.widgets.surface_display import SurfaceDisplay
-from vtk_segdeform.widgets.surface_distance import SurfaceDistance
-from vtk_segdeform.widgets.visibility import seen_vertices
 
 RNG = np.random.default_rng(3)
 

@@ -18,7 +18,7 @@ from scenes import sausage
 
 from vtk_segdeform import Session
 from vtk_segdeform.errors import SegDeformError
-from vtk_segdeform.widgets.bindings import BINDINGS
+from vtk_segdeform.widgets.editing.bindings import BINDINGS
 from vtk_segdeform.widgets.editor import DeformEditor
 
 SIZE = (260, 200)

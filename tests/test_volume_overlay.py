@@ -19,7 +19,7 @@ from vtk_segdeform.constraints import region_volumes
 from vtk_segdeform.local_volume import LocalVolume
 from vtk_segdeform.palette import of_region
 from vtk_segdeform.widgets.cage_display import CageDisplay
-from vtk_segdeform.widgets.diverging import (
+from vtk_segdeform.widgets.colouring.diverging import (
     HALF_RANGES,
     NEUTRAL,
     colours_of,

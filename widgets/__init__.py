@@ -14,12 +14,12 @@ Widgets turn events into our words and ask a session; they never compute.
 """
 
 from .cage_display import CageDisplay
+from .editing.stage import Mode
 from .editor import DeformEditor
 from .film import film
 from .handle_dragger import HandleDragger
 from .recording import Recorder, replay
 from .region_selector import Paint, RegionSelector, Tool
-from .stage import Mode
 from .surface_display import SurfaceDisplay
 from .view import View
 from .volume_overlay import VolumeOverlay

@@ -20,12 +20,12 @@ from vtk_segdeform.palette import HANDLE, of_region, rgb
 from vtk_segdeform.session import Session
 from vtk_segdeform.surface.manifold import face_edges
 
-from .cage_drag import Grip, drag_vertex
+from .caging.cage_drag import Grip, drag_vertex
+from .caging.reach import under_pointer
+from .caging.rejected_cage import RejectedCage
+from .caging.wires import Wires
 from .gestures import Gesture, Pointer
-from .reach import under_pointer
-from .rejected_cage import RejectedCage
 from .widget import Widget
-from .wires import Wires
 
 _DESIGNED_FOR = 600  # pixels of height; wires are thicker in a higher window
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)

@@ -21,9 +21,9 @@ from typing import Any
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.session import Session
 
-from .bindings import binding_of, help_sections, key_cap, modes_of, pressed_key
-from .desk import Desk
-from .stage import Mode, Stage
+from .editing.bindings import binding_of, help_sections, key_cap, modes_of, pressed_key
+from .editing.desk import Desk
+from .editing.stage import Mode, Stage
 from .view import Stop, View
 
 _AFTER_WIDGETS = 0.75  # priority: our widgets have 1, VTK's own 0.5, pyvista and camera styles 0

@@ -22,8 +22,8 @@ from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 
 from vtk_segdeform.session import Session
 
-from .film_files import Picture, require_film, write_film
-from .off_screen import OffScreen
+from .filming.film_files import Picture, require_film, write_film
+from .filming.off_screen import OffScreen
 from .view import Stop, View
 
 Targets = Mapping[str, ArrayLike] | ArrayLike

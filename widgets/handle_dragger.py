@@ -28,12 +28,12 @@ from vtk_segdeform.editing.listeners import Change
 from vtk_segdeform.rotations import rigid_fit
 from vtk_segdeform.session import Session
 
+from .dragging.gizmo import Gizmo
+from .dragging.gizmo_shapes import FREE, Part, Way
+from .dragging.handle_marks import HandleMarks
+from .dragging.handle_motion import Grip, Motion, next_constraint
+from .dragging.live_solve import LiveSolve
 from .gestures import Gesture, Phase, Pointer
-from .gizmo import Gizmo
-from .gizmo_shapes import FREE, Part, Way
-from .handle_marks import HandleMarks
-from .handle_motion import Grip, Motion, next_constraint
-from .live_solve import LiveSolve
 from .picking import Picker
 from .surface_display import SurfaceDisplay
 from .widget import Widget

@@ -16,9 +16,9 @@ from vtkmodules.vtkCommonDataModel import vtkPolyData, vtkStaticCellLocator
 from vtk_segdeform.arrays import BoolArray, FloatArray
 
 from .gestures import Pointer
+from .painting.surface_distance import SurfaceDistance
+from .painting.visibility import seen_vertices
 from .surface_display import SurfaceDisplay
-from .surface_distance import SurfaceDistance
-from .visibility import seen_vertices
 
 _SLACK = 1e-7  # of the diagonal: a line through an edge must not slip between its two faces
 

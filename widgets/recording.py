@@ -34,7 +34,7 @@ from vtkmodules.vtkCommonCore import vtkVersion
 from vtk_segdeform import __version__
 from vtk_segdeform.errors import SessionError
 
-from .transcript import EVENTS, TITLE, Camera, Entry, Input, Ticks, Window, read_entry
+from .filming.transcript import EVENTS, TITLE, Camera, Entry, Input, Ticks, Window, read_entry
 from .view import View
 
 _LONGEST_PAUSE = 2.0  # seconds

@@ -24,13 +24,13 @@ from vtk_segdeform.editing.listeners import Change
 from vtk_segdeform.palette import PAPER, rgb
 from vtk_segdeform.session import Session
 
-from .brush_ring import BrushRing
 from .gestures import Gesture, Phase, Pointer
-from .outline import Outline
+from .painting.brush_ring import BrushRing
+from .painting.outline import Outline
+from .painting.region_colours import RegionColours
+from .painting.roles import Paint, Role
+from .painting.strokes import Brush, Component, Lasso, Rectangle, Stroke, Tool, under
 from .picking import Picker
-from .region_colours import RegionColours
-from .roles import Paint, Role
-from .strokes import Brush, Component, Lasso, Rectangle, Stroke, Tool, under
 from .surface_display import SurfaceDisplay
 from .widget import Widget
 

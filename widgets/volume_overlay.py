@@ -33,8 +33,8 @@ from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
 
-from .diverging import colours_of, half_range_for
-from .legend import Legend, signed
+from .colouring.diverging import colours_of, half_range_for
+from .colouring.legend import Legend, signed
 from .surface_display import SurfaceDisplay
 from .view import Stop, View
 

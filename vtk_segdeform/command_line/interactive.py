@@ -23,9 +23,9 @@ from ..models import cactus
 from ..progress import Progress, part
 from ..segmentation import segment
 from ..session import Session
+from ..widgets.filming.off_screen import OffScreen
 from ..widgets.gestures import Phase
 from ..widgets.handle_dragger import HandleDragger
-from ..widgets.off_screen import OffScreen
 from ..widgets.volume_overlay import VolumeOverlay
 from .demo import bent_top
 

@@ -15,7 +15,7 @@ from vtk_segdeform.session import Session
 from vtk_segdeform.solution import Solution
 from vtk_segdeform.solver import Status
 
-from .view import Stop, View
+from ..view import Stop, View
 
 _BUDGET = 0.020  # seconds of an event: about half of what drawing takes without a graphics card
 _AT_REST = 0.080  # seconds of a refinement, when no pointer waits to be followed

@@ -11,7 +11,7 @@ from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.palette import INK, PAPER, rgb
 
-from .view import View
+from ..view import View
 
 _DESIGNED_FOR = 600  # pixels of height; lines are wider in a higher window
 _WIDTHS = ((PAPER, 4.0), (INK, 1.5))  # pixels

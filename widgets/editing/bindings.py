@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from ..region_selector import Paint, Tool
 from . import actions
 from .actions import Action
 from .help_card import Section
-from .region_selector import Paint, Tool
 from .stage import Mode
 
 R, C, H, D = Mode

@@ -17,8 +17,8 @@ import numpy as np
 
 from vtk_segdeform.arrays import BoolArray, FloatArray
 
-from .gestures import Phase, Pointer
-from .picking import Hit, Picker
+from ..gestures import Phase, Pointer
+from ..picking import Hit, Picker
 
 _APART = 0.3  # of the radius: between the places that a fast brush touches
 _MOST = 200  # such places between two moves of the mouse

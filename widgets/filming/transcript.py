@@ -17,7 +17,7 @@ from typing import Any, Protocol
 
 from vtk_segdeform.errors import SessionError
 
-from .view import View
+from ..view import View
 
 TITLE = "vtk_segdeform recording 1"
 EVENTS = (

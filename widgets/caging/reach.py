@@ -10,8 +10,8 @@ import numpy as np
 
 from vtk_segdeform.arrays import FloatArray, IntArray
 
-from .gestures import Pointer
-from .sight import Sight
+from ..gestures import Pointer
+from ..sight import Sight
 
 _REACH = 8.0  # pixels
 _BEHIND = 0.1  # pixels that each pixel further from the camera counts as

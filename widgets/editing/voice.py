@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from vtk_segdeform.errors import SegDeformError
 
+from ..view import View
 from .status_line import StatusLine
-from .view import View
 
 
 class Voice:

@@ -12,8 +12,8 @@ from typing import Any
 from vtk_segdeform.errors import ConstraintError, RegionError
 from vtk_segdeform.segmentation import segment as segmented
 
+from ..region_selector import Paint, Tool
 from .desk import Desk
-from .region_selector import Paint, Tool
 from .stage import Mode
 
 Action = Callable[[Desk], None]

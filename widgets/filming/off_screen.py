@@ -20,8 +20,8 @@ from vtk_segdeform.canvas import require_offscreen, view_of
 from vtk_segdeform.palette import BODY, FIXED, HANDLE, PAPER, rgb
 from vtk_segdeform.session import Session
 
-from .surface_display import SurfaceDisplay
-from .view import View
+from ..surface_display import SurfaceDisplay
+from ..view import View
 
 _MARGIN = 1.15  # more than what has to be seen: a body bends out of the way of its handles
 _SAMPLES = 8  # for smooth edges

@@ -18,12 +18,12 @@ from vtk_segdeform.errors import SessionError
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
+from ..view import View
 from .help_card import HelpCard, Section
 from .hints import hint
 from .jobs import Job
 from .session_file import SessionFile, read_bound
 from .stage import Mode, Stage
-from .view import View
 from .voice import Voice
 
 

@@ -14,7 +14,7 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 from vtk_segdeform.arrays import FloatArray, IntArray
 from vtk_segdeform.palette import INK, rgb
 
-from .surface_display import SurfaceDisplay
+from ..surface_display import SurfaceDisplay
 
 _DESIGNED_FOR = 600  # pixels of height; lines are wider in a higher window
 _RIM, _LINE = 5.5, 2.5  # pixels

@@ -27,7 +27,7 @@ from vtk_segdeform.surface.intersections import flat_faces, self_intersections
 from vtk_segdeform.surface.manifold import face_edges
 from vtk_segdeform.surface.topology import Sides, repeats_vertex
 
-from .view import View
+from ..view import View
 from .wires import Wires
 
 WARNING = rgb("#C2006B")  # neither a region's colour nor the red of what is dragged

@@ -14,7 +14,7 @@ from vtk_segdeform.arrays import BoolArray
 from vtk_segdeform.editing.listeners import Change
 from vtk_segdeform.palette import BODY, FIXED, HANDLE, of_region, rgb
 
-from .surface_display import SurfaceDisplay
+from ..surface_display import SurfaceDisplay
 
 LAYER = "regions"
 _STRONG = 0.9  # of a preview's colour; the rest is what lies under it

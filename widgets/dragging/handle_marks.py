@@ -7,8 +7,8 @@ import numpy as np
 from vtk_segdeform.palette import COLOURS, HANDLE, rgb
 from vtk_segdeform.session import Session
 
-from .view import View
-from .wires import Wires
+from ..caging.wires import Wires
+from ..view import View
 
 _POINTED_AT = COLOURS[4]
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)

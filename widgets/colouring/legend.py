@@ -17,8 +17,8 @@ from vtkmodules.vtkRenderingCore import vtkTextActor
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.palette import INK, PAPER, of_region, rgb
 
+from ..view import Stop, View
 from .diverging import lookup_table
-from .view import Stop, View
 
 _TICKS = 5
 

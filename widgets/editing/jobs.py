@@ -21,7 +21,7 @@ from typing import Generic, TypeVar
 from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.progress import Progress
 
-from .view import View
+from ..view import View
 
 T = TypeVar("T")
 

@@ -11,14 +11,14 @@ import enum
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.session import Session
 
-from .cage_display import CageDisplay
-from .handle_dragger import HandleDragger
-from .region_colours import RegionColours
-from .region_selector import Paint, RegionSelector
-from .surface_display import SurfaceDisplay
-from .view import View
-from .volume_overlay import VolumeOverlay
-from .widget import Widget
+from ..cage_display import CageDisplay
+from ..handle_dragger import HandleDragger
+from ..painting.region_colours import RegionColours
+from ..region_selector import Paint, RegionSelector
+from ..surface_display import SurfaceDisplay
+from ..view import View
+from ..volume_overlay import VolumeOverlay
+from ..widget import Widget
 
 
 class Mode(enum.Enum):

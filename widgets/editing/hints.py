@@ -9,8 +9,8 @@ from __future__ import annotations
 from vtk_segdeform.session import Session
 from vtk_segdeform.solver import Status
 
-from .legend import signed
-from .region_selector import Paint, Tool
+from ..colouring.legend import signed
+from ..region_selector import Paint, Tool
 from .stage import Mode, Stage
 
 _TOOLS = {

@@ -13,8 +13,8 @@ import numpy as np
 
 from vtk_segdeform.palette import INK, PAPER
 
-from .panels import Panel, Words
-from .view import Stop, View
+from ..dragging.panels import Panel, Words
+from ..view import Stop, View
 
 Section = tuple[str, Sequence[tuple[str, str]]]
 """A heading, and for each key its name and what it does."""

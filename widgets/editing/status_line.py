@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from .panels import Panel, Words
-from .view import View
+from ..dragging.panels import Panel, Words
+from ..view import View
 
 _CALM, _WARNING = "#2B2F36", "#8A2B06"  # white on them has a contrast above 7 to 1
 _LETTERS, _TAG, _BAR = "#FFFFFF", "#FFD27F", "#4FA3D9"

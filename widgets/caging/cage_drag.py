@@ -6,8 +6,8 @@ import numpy as np
 
 from vtk_segdeform.session import Session
 
-from .gestures import Gesture, Phase, Pointer
-from .sight import Sight
+from ..gestures import Gesture, Phase, Pointer
+from ..sight import Sight
 
 Grip = tuple[int, int]
 """A region, and a vertex of its cage."""

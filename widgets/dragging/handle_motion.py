@@ -23,9 +23,9 @@ from scipy.spatial.transform import Rotation
 
 from vtk_segdeform.arrays import FloatArray
 
-from .gestures import Pointer
+from ..gestures import Pointer
+from ..sight import Sight
 from .gizmo_shapes import Part, Way
-from .sight import Sight
 
 _EDGE_ON = 0.2  # sine of the angle at which a plane is seen, below which pixels are counted
 _SHALLOW = 0.1  # and to which a line of sight is tilted, later

@@ -13,7 +13,8 @@ from vtkmodules.vtkCommonDataModel import vtkPlane
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.palette import COLOURS, INK, PAPER
 
-from .gestures import Pointer
+from ..gestures import Pointer
+from ..view import View
 from .gizmo_label import Label
 from .gizmo_shapes import (
     BALL,
@@ -26,7 +27,6 @@ from .gizmo_shapes import (
     towards_corner,
 )
 from .gizmo_solids import Solid
-from .view import View
 
 AXIS_COLOURS = COLOURS[6], COLOURS[2], COLOURS[5]  # vermilion, green, blue
 _POINTED_AT = COLOURS[4]  # yellow, within a dark outline

@@ -1,0 +1,1 @@
+"""What showing cages and dragging their vertices takes."""

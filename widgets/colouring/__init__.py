@@ -1,0 +1,1 @@
+"""What showing a number per vertex takes."""

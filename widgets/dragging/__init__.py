@@ -1,0 +1,1 @@
+"""What dragging and turning handles takes."""

@@ -1,0 +1,1 @@
+"""What recordings and films are made of."""

@@ -1,0 +1,1 @@
+"""What painting regions, fixed vertices and handles takes."""
