@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from solids import icosphere, rotation
 
@@ -15,7 +15,7 @@ from vtk_segdeform.deformer import Deformer
 from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.regions import Regions, cage_distance_weights
-from vtk_segdeform.solver import Status
+from vtk_segdeform.solution import Status
 
 SCENE = sausage(2)
 VERTICES = SCENE.mesh.vertices
@@ -129,6 +129,28 @@ def test_stopping_early_says_so_and_goes_on_next_time():
     assert first.status is Status.STEP_LIMIT
     assert "solve again" in str(first.status)
     assert deformer.solve(SCENE.turned(20)).status is Status.CONVERGED
+
+
+def test_one_step_at_a_time_is_the_same_way_as_all_at_once():
+    targets = SCENE.turned(4)  # near: nothing in between
+    at_once = SCENE.deformer().solve(targets)
+    deformer = SCENE.deformer()
+    way = [deformer.solve(targets, max_steps=1)]
+    while way[-1].status is Status.STEP_LIMIT and len(way) < 3 * at_once.steps:
+        way.append(deformer.solve(targets, max_steps=1))
+    assert way[-1].status is at_once.status
+    assert sum(solution.steps for solution in way) == at_once.steps
+    assert_allclose(way[-1].vertices, at_once.vertices, rtol=0, atol=1e-9)
+
+
+def test_nothing_is_gone_on_with_after_a_reset_or_for_other_targets():
+    deformer = SCENE.deformer()
+    deformer.solve(SCENE.turned(20), max_steps=3)
+    deformer.solve(SCENE.turned(10), max_steps=3)
+    deformer.reset()
+    again, anew = deformer.solve(SCENE.turned(20)), SCENE.deformer().solve(SCENE.turned(20))
+    assert again.steps == anew.steps
+    assert_array_equal(again.vertices, anew.vertices)
 
 
 @pytest.mark.parametrize(

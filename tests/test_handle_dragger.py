@@ -13,7 +13,7 @@ from solids import rotation
 from vtk_segdeform import Session
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.rotations import rigid_fit
-from vtk_segdeform.solver import Status
+from vtk_segdeform.solution import Status
 from vtk_segdeform.widgets.dragging.gizmo_shapes import FREE, PARTS, Part, Way
 from vtk_segdeform.widgets.dragging.handle_motion import Grip, Motion
 from vtk_segdeform.widgets.gestures import Phase, Pointer

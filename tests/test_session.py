@@ -19,7 +19,7 @@ from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionEr
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
-from vtk_segdeform.solver import Status
+from vtk_segdeform.solution import Status
 from vtk_segdeform.subspace import bind
 from vtk_segdeform.volume import signed_volume
 

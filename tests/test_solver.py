@@ -9,7 +9,7 @@ from scenes import sausage
 from solids import rotation
 
 from vtk_segdeform.energy import shape_energy
-from vtk_segdeform.solver import Status
+from vtk_segdeform.solution import Status
 from vtk_segdeform.subspace import bind
 
 SCENE = sausage(2)

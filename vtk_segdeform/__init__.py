@@ -43,8 +43,7 @@ from .regions import Regions
 from .repair import repair
 from .segmentation import segment
 from .session import Session
-from .solution import Solution
-from .solver import Status
+from .solution import Solution, Status
 from .store import load_session, save_session
 
 if _TYPE_CHECKING:

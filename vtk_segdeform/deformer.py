@@ -25,13 +25,14 @@ from .cages import Cage
 from .constraints import VolumeConstraint, region_volumes, total_volume
 from .energy import shape_energy
 from .errors import CageError, ConstraintError, RegionError
+from .iteration import Iteration, SolverOptions
 from .mesh import Mesh, require_mesh
 from .positions import checked_constraints, checked_targets, connected_sets, position_term
 from .progress import Progress, part
 from .regions import Regions
 from .rotations import rotation_groups as group_by_part
-from .solution import Solution
-from .solver import GaussNewton, Iteration, SolverOptions, Status
+from .solution import Solution, Status
+from .solver import GaussNewton
 from .subspace import Subspace, bind
 from .targets import waypoints
 from .volume import signed_volume

@@ -41,8 +41,7 @@ from .positions import checked_constraints
 from .progress import Progress
 from .regions import Regions
 from .segmentation import segment
-from .solution import Solution
-from .solver import Status
+from .solution import Solution, Status
 
 
 class Session(Timeline):

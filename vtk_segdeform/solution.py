@@ -2,10 +2,25 @@
 
 from __future__ import annotations
 
+import enum
 from dataclasses import dataclass
 
 from .arrays import FloatArray
-from .solver import Status
+
+
+class Status(enum.Enum):
+    """Why the iteration ended, in words a status bar can show."""
+
+    CONVERGED = "converged"
+    STEP_LIMIT = "stopped at the step limit; solve again to go on, or raise max_steps"
+    STALLED = "no shorter step improves the shape; the targets may be out of reach"
+    MISSED = (
+        "converged, but not every handle or fixed vertex is in its place: "
+        "use more cage vertices, move less, or leave more room between handle and fixed vertices"
+    )
+
+    def __str__(self) -> str:
+        return self.value
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,6 @@ acceleration for geometry optimization and physics simulation", SIGGRAPH 2018 (t
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -46,59 +45,13 @@ from .constraints import VolumeConstraint, restore
 from .curvature import Factor, curved_factor, factored
 from .energy import Energy
 from .errors import CageError
+from .iteration import Course, Iteration, SolverOptions
 from .positions import PositionTerm
+from .solution import Status
 
 _RISE = 1e-13  # relative rise of the merit that counts as rounding
 _DAMPING = 1e-9  # of the mean diagonal of H
 _SHORTEST = 1.0 / 64.0  # epsilon of section 3.3 below which a step is given up
-_OLD, _LONG = 5, 1e-2  # steps after which the curvature is looked at again; or after one as long
-
-
-class Status(enum.Enum):
-    """Why the iteration ended, in words a status bar can show."""
-
-    CONVERGED = "converged"
-    STEP_LIMIT = "stopped at the step limit; solve again to go on, or raise max_steps"
-    STALLED = "no shorter step improves the shape; the targets may be out of reach"
-    MISSED = (
-        "converged, but not every handle or fixed vertex is in its place: "
-        "use more cage vertices, move less, or leave more room between handle and fixed vertices"
-    )
-
-    def __str__(self) -> str:
-        return self.value
-
-
-@dataclass(frozen=True)
-class SolverOptions:
-    """How to iterate; the defaults are what the interactive editor uses."""
-
-    tolerance: float = 1e-7  # root-mean-square move of the surface in a step, mesh size 1
-    max_steps: int = 500
-    window: int = 5  # Anderson's memory; 0 is the plain iteration of the paper
-    exact_volume: bool = True  # False leaves the linearised multiplier of (21), for comparison
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.tolerance < math.inf:
-            raise ValueError(f"tolerance must be a positive number; got {self.tolerance}")
-        if self.max_steps != int(self.max_steps) or self.max_steps < 1:
-            raise ValueError(f"max_steps must be a whole number, 1 or more; got {self.max_steps}")
-        if self.window != int(self.window) or self.window < 0:
-            raise ValueError(f"window must be a whole number, 0 or more; got {self.window}")
-
-
-@dataclass(frozen=True, eq=False)
-class Iteration:
-    """Where the iteration ended: cage vertices p (m, 3), surface x (n, 3), and how."""
-
-    p: FloatArray
-    x: FloatArray
-    multipliers: FloatArray
-    status: Status
-    steps: int
-    step_size: float  # of the last step, root mean square over the surface
-    shape: float  # E(p): the objective without the position term
-    merits: tuple[float, ...]  # the objective at the start and after each step
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +72,7 @@ class GaussNewton:
     constraints: Sequence[VolumeConstraint]
     _hessian: FloatArray = field(init=False, repr=False)
     _factor: Factor = field(init=False, repr=False)
+    _left: Course | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         hessian = self.energy.quadratic + self.positions.quadratic()
@@ -140,32 +94,37 @@ class GaussNewton:
         self._factor = factor
 
     def minimise(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> Iteration:
-        """Iterate from cage vertices *p* (m, 3) for positions *targets* (k, 3)."""
-        memory = Anderson(options.window)
+        """Iterate from cage vertices *p* (m, 3) for positions *targets* (k, 3).
+
+        From where the last call ended, for the same targets, it goes on as if it had not.
+        """
+        course, self._left = self._left, None
+        if course is None or not course.goes_on(p, targets, options):
+            course = Course(Anderson(options.window), self._factor)
         multipliers = np.zeros(len(self.constraints))
         here = self._evaluate(p, self.energy.subspace.map(p), targets)
         merits = [here.merit]
-        size, status = np.inf, Status.STEP_LIMIT
+        status = Status.STEP_LIMIT
         curved = bool(options.window) and self.energy.exact
-        factor, age = self._factor, _OLD
-        for _ in range(options.max_steps):
-            if curved and (age >= _OLD or size > _LONG):
-                factor, age = curved_factor(self._hessian, self.energy, here.p) or self._factor, 0
-            age += 1
-            step, multipliers, directions = self._step(here, factor)
-            size = self._size(step)
-            if size <= options.tolerance:
+        while len(merits) <= options.max_steps:
+            if curved and (course.factor_is_old):
+                course.renew(curved_factor(self._hessian, self.energy, here.p) or self._factor)
+            course.age += 1
+            step, multipliers, directions = self._step(here, course.factor)
+            course.size = self._size(step)
+            if course.size <= options.tolerance:
                 status = Status.CONVERGED
                 break
             ahead = None
             if options.window:
-                guess = memory.extrapolate(here.p, step, self._factor.triangle.T @ step)
+                residual = self._factor.triangle.T @ step
+                guess = course.memory.extrapolate(here.p, step, residual)
                 ahead = self._retract(guess, directions, targets, options)
                 if not self._improves(ahead, here):
-                    memory.forget()
+                    course.memory.forget()
                     ahead = None
-                    if curved and age > 1:  # look again before giving way to the plain step
-                        age = _OLD
+                    if curved and course.age > 1:  # look again before giving way to the plain step
+                        course.doubt_factor()
                         continue
             ahead = ahead or self._shortened(here, step, directions, targets, options)
             if ahead is None:
@@ -173,9 +132,16 @@ class GaussNewton:
                 break
             here = ahead
             merits.append(here.merit)
-        steps = len(merits) - 1
+        self._left = course.ended(here.p, targets, options)
         return Iteration(
-            here.p, here.x, multipliers, status, steps, size, here.shape, tuple(merits)
+            p=here.p,
+            x=here.x,
+            multipliers=multipliers,
+            status=status,
+            steps=len(merits) - 1,
+            step_size=course.size,
+            shape=here.shape,
+            merits=tuple(merits),
         )
 
     def _step(

@@ -13,7 +13,7 @@ from statistics import median
 
 from vtk_segdeform.session import Session
 from vtk_segdeform.solution import Solution
-from vtk_segdeform.solver import Status
+from vtk_segdeform.solution import Status
 
 from ..view import Stop, View
 

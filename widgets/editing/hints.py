@@ -7,7 +7,7 @@ made from where one stands.
 from __future__ import annotations
 
 from vtk_segdeform.session import Session
-from vtk_segdeform.solver import Status
+from vtk_segdeform.solution import Status
 
 from ..colouring.legend import signed
 from ..region_selector import Paint, Tool

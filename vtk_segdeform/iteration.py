@@ -1,0 +1,82 @@
+"""What an iteration is told, what it learns on its way, and what it returns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .acceleration import Anderson
+from .arrays import FloatArray
+from .curvature import Factor
+from .solution import Status
+
+_OLD, _LONG = 5, 1e-2  # steps after which the curvature is looked at again; or after one as long
+
+
+@dataclass(frozen=True)
+class SolverOptions:
+    """How to iterate; the defaults are what the interactive editor uses."""
+
+    tolerance: float = 1e-7  # root-mean-square move of the surface in a step, mesh size 1
+    max_steps: int = 500
+    window: int = 5  # Anderson's memory; 0 is the plain iteration of the paper
+    exact_volume: bool = True  # False leaves the linearised multiplier of (21), for comparison
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.tolerance < math.inf:
+            raise ValueError(f"tolerance must be a positive number; got {self.tolerance}")
+        if self.max_steps != int(self.max_steps) or self.max_steps < 1:
+            raise ValueError(f"max_steps must be a whole number, 1 or more; got {self.max_steps}")
+        if self.window != int(self.window) or self.window < 0:
+            raise ValueError(f"window must be a whole number, 0 or more; got {self.window}")
+
+
+@dataclass(eq=False)
+class Course:
+    """What an iteration learns on its way, so that a later call goes on as if it had not ended."""
+
+    memory: Anderson
+    factor: Factor
+    age: int = _OLD  # of the factor, in steps
+    size: float = math.inf  # of the last step
+    _end: tuple[FloatArray, FloatArray, SolverOptions] | None = None
+
+    @property
+    def factor_is_old(self) -> bool:
+        """Whether the curvature should be looked at again."""
+        return self.age >= _OLD or self.size > _LONG
+
+    def renew(self, factor: Factor) -> None:
+        """Take a factor made here."""
+        self.factor, self.age = factor, 0
+
+    def doubt_factor(self) -> None:
+        """Make it old."""
+        self.age = _OLD
+
+    def ended(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> Course:
+        """Remember where the call ended; return itself."""
+        self._end = p, targets, options
+        return self
+
+    def goes_on(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> bool:
+        """Tell whether a call with these begins where this ended."""
+        if self._end is None or replace(options, max_steps=1) != replace(self._end[2], max_steps=1):
+            return False
+        return np.array_equal(p, self._end[0]) and np.array_equal(targets, self._end[1])
+
+
+@dataclass(frozen=True, eq=False)
+class Iteration:
+    """Where the iteration ended: cage vertices p (m, 3), surface x (n, 3), and how."""
+
+    p: FloatArray
+    x: FloatArray
+    multipliers: FloatArray
+    status: Status
+    steps: int
+    step_size: float  # of the last step, root mean square over the surface
+    shape: float  # E(p): the objective without the position term
+    merits: tuple[float, ...]  # the objective at the start and after each step
