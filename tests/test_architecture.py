@@ -29,8 +29,8 @@ STORY = [
     "segmentation", "mean_value", "cages", "caging.columns", "caging.region_solid",
     "caging.cage_simplify", "cage_fit",
     # the solver
-    "subspace", "energy", "curvature", "constraints", "positions", "acceleration", "solution",
-    "iteration", "solver", "targets", "deformer", "pipeline",
+    "subspace", "energy", "cage_stiffness", "curvature", "constraints", "positions",
+    "acceleration", "solution", "iteration", "solver", "targets", "deformer", "pipeline",
     # a deformation in the making
     "editing.listeners", "editing.state", "editing.history", "editing.painting", "editing.handles",
     "editing.posing", "session", "editing.archive", "store",

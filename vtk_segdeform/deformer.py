@@ -20,7 +20,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import FloatArray, as_points
+from .arrays import FloatArray, IntArray, as_points
+from .cage_stiffness import with_cage_stiffness
 from .cages import Cage
 from .constraints import VolumeConstraint, region_volumes, total_volume
 from .energy import shape_energy
@@ -129,12 +130,12 @@ class Deformer:
         subspace = bind(regions, cages, blend=blend, progress=part(progress, 0.0, 0.8))
         if progress:
             progress(0.8, "factoring")
-        groups = None
-        if rotation_groups is not None and rotation_groups < mesh.n_vertices:
-            parts = regions.labels * mesh.n_vertices + mesh.components
-            parts = np.unique(parts, return_inverse=True)[1]
-            groups = group_by_part(self._rest.vertices, parts, rotation_groups)
+        self._rest_cages = np.concatenate([self._inward(cage.vertices) for cage in cages])
+        groups = self._rotation_groups(rotation_groups)
         self._energy = shape_energy(self._rest, subspace, stretch, groups)
+        if groups is not None and self._energy.exact:
+            faces = [cage.faces for cage in cages]
+            self._energy = with_cage_stiffness(self._energy, self._rest_cages, faces, groups)
         self._volume = signed_volume(self._rest.vertices, self._rest.faces)
         self._volumes = region_volumes(self._rest, regions.labels)
         self._constraints: Sequence[VolumeConstraint] = ()
@@ -142,7 +143,6 @@ class Deformer:
             self._constraints = self._volumes
         elif preserve_volume:
             self._constraints = (total_volume(self._rest),)
-        self._rest_cages = np.concatenate([self._inward(cage.vertices) for cage in cages])
         self._take_hold(fixed, handle)
         if progress:
             progress(1.0, "ready")
@@ -219,6 +219,13 @@ class Deformer:
                 break
             result = held
         return self._solution(result, steps)
+
+    def _rotation_groups(self, count: int | None) -> IntArray | None:
+        if count is None or count >= self.mesh.n_vertices:
+            return None if count is None else np.arange(self.mesh.n_vertices)
+        parts = self.regions.labels * self.mesh.n_vertices + self.mesh.components
+        parts = np.unique(parts, return_inverse=True)[1]
+        return group_by_part(self._rest.vertices, parts, count)
 
     def _take_hold(self, fixed: ArrayLike, handle: ArrayLike) -> None:
         mesh = self.mesh

@@ -27,6 +27,8 @@ from .mean_value import mean_value_coordinates
 from .progress import Progress, part
 from .regions import Regions
 
+_LARGEST = 1e3  # mesh diagonals a cage may measure
+
 
 @dataclass(frozen=True, eq=False)
 class Subspace:
@@ -80,6 +82,15 @@ class Subspace:
             out[:, columns] = by_column[:, rows] @ block
         return out
 
+    def squares(self, groups: IntArray) -> FloatArray:
+        """Return sum_{i in g} W~_ij^2, (G, m), for the group of each vertex *groups* (n,)."""
+        out = np.zeros((int(groups.max()) + 1, self.n_columns))
+        for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
+            places = (groups[rows], np.arange(len(rows)))
+            member = sparse.csr_array((np.ones(len(rows)), places), (len(out), len(rows)))
+            out[:, columns] = member @ block**2
+        return out
+
     def gram(self, operator: sparse.csr_array) -> FloatArray:
         """Return W~^T operator W~, (m, m), for a sparse symmetric *operator* (n, n).
 
@@ -123,7 +134,8 @@ def bind(
     Raises
     ------
     CageError
-        If there is not one cage per region, or a cage leaves out part of its region.
+        If there is not one cage per region, or a cage leaves out part of its region or is so
+        large that it hardly moves it.
     RegionError
         If *blend* is not as said above.
     """
@@ -158,6 +170,12 @@ def _check_cages(regions: Regions, cages: Sequence[Cage]) -> None:
         raise CageError("cages must hold Cage objects; make one by Cage(vertices, faces)")
     if len(cages) != regions.n_regions:
         raise CageError(f"{regions.n_regions} regions need as many cages; got {len(cages)}")
+    mesh = regions.mesh
     for r, cage in enumerate(cages):
-        members = regions.mesh.vertices[regions.membership[r]]
+        if np.ptp(cage.vertices, axis=0).max() > _LARGEST * mesh.diagonal:
+            raise CageError(
+                f"the cage of region {r} is more than {_LARGEST:.0f} times as large as the mesh "
+                "and hardly moves it; make it fit more tightly"
+            )
+        members = mesh.vertices[regions.membership[r]]
         cage.require_encloses(members, f"region {r}")
