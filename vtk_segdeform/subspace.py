@@ -88,7 +88,7 @@ class Subspace:
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
             places = (groups[rows], np.arange(len(rows)))
             member = sparse.csr_array((np.ones(len(rows)), places), (len(out), len(rows)))
-            out[:, columns] = member @ block**2
+            out[:, columns] = np.asarray(member @ block**2)
         return out
 
     def gram(self, operator: sparse.csr_array) -> FloatArray:
