@@ -9,7 +9,7 @@ thread: the camera works meanwhile, nothing else does, and Escape stops it.
 
 The camera style and pyvista's own keys are not touched.  The editor hears of keys after its
 widgets, so that x, y, z constrain a drag, but before VTK and pyvista, and keeps from them what
-means something to it.
+means something to it.  With several editors in one window they go to the one the pointer is over.
 """
 
 from __future__ import annotations
@@ -50,6 +50,7 @@ class DeformEditor:
         if not has_camera:
             self.view.renderer.ResetCamera()
         self._took_key = False
+        self._is_removed = False
         self._stops: list[Stop] = []
 
     @property
@@ -108,7 +109,15 @@ class DeformEditor:
     # Switching.
 
     def On(self) -> None:  # noqa: N802 - VTK's word
-        """Listen to the view."""
+        """Listen to the view.
+
+        Raises
+        ------
+        RuntimeError
+            After `remove`.
+        """
+        if self._is_removed:
+            raise RuntimeError("this editor was removed; make another one over its session")
         if not self._stops:
             self._stops = [
                 self.view.observe("KeyPressEvent", self._key, _AFTER_WIDGETS),
@@ -137,13 +146,15 @@ class DeformEditor:
     def remove(self) -> None:
         """Take everything out of the view, for good; the session stays as it is."""
         self.Off()
+        self._is_removed = True
         self._desk.remove()
 
     # Keys.
 
     def _key(self) -> bool:
         key = pressed_key(self.view.interactor)
-        self._took_key = bool(modes_of(key))  # also where it fails
+        meant = self.view.is_addressed
+        self._took_key = meant and bool(modes_of(key))  # also where it fails
         if self._took_key:
             self._type(key)
         return self._took_key

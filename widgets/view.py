@@ -77,8 +77,8 @@ class View(Sight):
         if self._front is None:
             window = self.window
             self._front = vtkRenderer()
-            layer = window.GetNumberOfLayers()
-            window.SetNumberOfLayers(layer + 1)
+            layer = 1 + max(r.GetLayer() for r in _renderers(window) if self._overlaps(r))
+            window.SetNumberOfLayers(max(window.GetNumberOfLayers(), layer + 1))
             self._front.SetLayer(layer)
             self._front.InteractiveOff()
             self._front.SetViewport(*self.renderer.GetViewport())
@@ -96,7 +96,7 @@ class View(Sight):
         window = self._front.GetRenderWindow()
         if window is not None:
             window.RemoveRenderer(self._front)
-            window.SetNumberOfLayers(max(1, window.GetNumberOfLayers() - 1))
+            window.SetNumberOfLayers(1 + max((r.GetLayer() for r in _renderers(window)), default=0))
         self._front = None
 
     def render(self) -> None:
@@ -169,6 +169,15 @@ class View(Sight):
 
         return _once(stop_both)
 
+    @property
+    def is_addressed(self) -> bool:
+        """Whether keys are meant for this view: the pointer is in it, or in no other one."""
+        pointer = self.pointer(Phase.HOVER)
+        if self.contains(pointer):
+            return True
+        other = self.interactor.FindPokedRenderer(*self.interactor.GetEventPosition())
+        return other is None or not Sight(other).contains(pointer)
+
     def pointer(self, phase: Phase) -> Pointer:
         """Return where the interactor has the pointer, as the given *phase*."""
         x, y = self.interactor.GetEventPosition()
@@ -205,6 +214,11 @@ class View(Sight):
                 self._touched = False
                 self.render()
 
+    def _overlaps(self, other: Any) -> bool:
+        """Tell whether another renderer draws on a part of the window where this one does."""
+        mine, its = np.array([self.renderer.GetViewport(), other.GetViewport()])
+        return bool((np.maximum(mine, its)[:2] < np.minimum(mine, its)[2:]).all())
+
     def _follow(self) -> None:
         """Let the front renderer look where the renderer does, and both see all of both."""
         self._front.SetViewport(*self.renderer.GetViewport())
@@ -215,6 +229,11 @@ class View(Sight):
             self.renderer.ResetCameraClippingRange(*np.stack([low, high], axis=1).ravel())
         # A copy: whoever takes a screenshot swaps the cameras while it draws.
         self._front.GetActiveCamera().DeepCopy(self.camera)
+
+
+def _renderers(window: Any) -> list[Any]:
+    renderers = window.GetRenderers()
+    return [renderers.GetItemAsObject(k) for k in range(renderers.GetNumberOfItems())]
 
 
 def _once(action: Callable[[], object]) -> Stop:

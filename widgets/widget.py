@@ -165,10 +165,14 @@ class Widget(abc.ABC):
         self._tell(event if self._grab.is_active else "EndInteractionEvent")
 
     def _wheel(self, clicks: int) -> bool:
-        return self.wheels(self.view.pointer(Phase.HOVER), clicks)
+        pointer = self.view.pointer(Phase.HOVER)
+        return self.view.contains(pointer) and self.wheels(pointer, clicks)
 
     def _key(self) -> bool:
         key = self.view.interactor.GetKeySym() or ""
+        if not (self.is_grabbing or self.view.is_addressed):
+            self._took_key = False
+            return False
         self._took_key = True  # also where it fails
         self._took_key = (key == "Escape" and self.cancel()) or self.types(
             key, self.view.pointer(Phase.HOVER)
