@@ -242,9 +242,28 @@ def test_other_archives_missing_files_and_folders_are_refused(tmp_path):
     np.savez(tmp_path / "arrays.npz", a=np.arange(3))
     with pytest.raises(SessionError, match=r"arrays\.npz: .*header\.json is missing"):
         load_session(tmp_path / "arrays.npz")
-    for path in (tmp_path, tmp_path / "none.npz"):
-        with pytest.raises(SessionError, match="there is no such file"):
-            load_session(path)
+    with pytest.raises(SessionError, match="there is no such file"):
+        load_session(tmp_path / "none.npz")
+    with pytest.raises(SessionError, match="is a folder, not a file"):
+        load_session(tmp_path)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no named pipes in folders here")
+def test_what_is_no_file_is_never_replaced(tmp_path):
+    pipe, folder = tmp_path / "pipe", tmp_path / "folder"
+    os.mkfifo(pipe)
+    folder.mkdir()
+    for path, kind in ((pipe, "a device or a pipe"), (folder, "a folder")):
+        with pytest.raises(SessionError, match=f"is {kind}, not a file"):
+            save_session(path, TINY)
+    assert pipe.is_fifo()
+    assert sorted(tmp_path.iterdir()) == [folder, pipe]
+
+
+@pytest.mark.parametrize("name", ["x" * 300, "a\0b"])
+def test_an_impossible_name_is_told(name, tmp_path):
+    with pytest.raises(SessionError):
+        save_session(tmp_path / name, TINY)
 
 
 def rewritten(content: bytes, *, compress: bool = False, **changes) -> bytes:
@@ -298,6 +317,9 @@ WRONG = [
     ({"fixed": np.array([99])}, "fixed must index"),
     ({"fixed": np.array([0])}, "both fixed and handle"),
     ({"pose": np.full((4, 3), np.inf)}, "NaN or infinite"),
+    ({"pose": np.full((4, 3), 1e300)}, "the pose reaches .* diagonals of the mesh away; it is damaged"),
+    ({"targets": np.full((1, 3), 1e9)}, "is damaged"),
+    ({"header": {"posed": "yes"}}, "posed must be true or false"),
     ({"targets": np.zeros((2, 3))}, "targets must be"),
     ({"compress": True}, "header.json is compressed"),
 ]

@@ -1,4 +1,4 @@
-"""Two editors side by side in one window: each hears what is meant for it, and outlives the other."""
+"""Two editors side by side in one window: each hears what is meant for it, alone."""
 
 from __future__ import annotations
 

@@ -58,9 +58,15 @@ def save_session(path: str | os.PathLike[str], session: Session) -> None:
     Raises
     ------
     SessionError
-        If the file cannot be written: no such folder, no permission, no space.
+        If the file cannot be written: no such folder, no permission, no space, or what has that
+        name is a folder or a device.
     """
-    target = Path(os.path.realpath(path))  # what a link points to, as open() would
+    try:
+        target = Path(os.path.realpath(path))  # what a link points to, as open() would
+    except ValueError as fault:
+        raise SessionError(f"{path!r}: is no name for a file ({fault})") from fault
+    if os.path.lexists(target) and not target.is_file():  # replacing a device would be its end
+        raise SessionError(f"{path}: is {_kind(target)}, not a file; choose another name")
     draft = target.with_name(f".segdeform-{secrets.token_hex(8)}.part")
     try:
         try:
@@ -91,7 +97,8 @@ def load_session(path: str | os.PathLike[str]) -> Session:
         names the file and the fault.
     """
     if not os.path.isfile(path):
-        raise SessionError(f"{path}: there is no such file")
+        what = f"is {_kind(path)}, not a file" if os.path.lexists(path) else "there is no such file"
+        raise SessionError(f"{path}: {what}")
     try:
         with open(path, "rb") as file, zipfile.ZipFile(file) as archive:
             mesh, state = _read(Archive(archive, os.path.getsize(path)))
@@ -99,6 +106,12 @@ def load_session(path: str | os.PathLike[str]) -> Session:
     except _FAULTS as fault:
         reason = str(fault) or type(fault).__name__
         raise SessionError(f"{path}: is no readable session file: {reason}") from fault
+
+
+def _kind(path: str | os.PathLike[str]) -> str:
+    if os.path.islink(path):
+        return "a broken link"
+    return "a folder" if os.path.isdir(path) else "a device or a pipe"
 
 
 def _write(file: Any, session: Session) -> None:
@@ -156,7 +169,9 @@ def _read(archive: Archive) -> tuple[Mesh, State]:
     lengths, held = list(sizes.values()), sum(sizes.values())
     ids = pieces(archive.array("handle", "i", (held,)), lengths)
     pose = None
-    if header.get("posed"):
+    if not isinstance(header["posed"], bool):
+        raise SessionError(f"posed must be true or false in the header; got {header['posed']!r}")
+    if header["posed"]:
         places = pieces(archive.array("pose", "f", (total, 3)), [m for m, _ in counts])
         targets = pieces(archive.array("targets", "f", (held, 3)), lengths)
         pose = Pose(tuple(places), dict(zip(sizes, targets, strict=True)))

@@ -25,6 +25,7 @@ from ..regions import Regions
 from .listeners import Change
 
 _TINY = float(np.finfo(np.float64).tiny)
+_WRECKED = 1e6  # diagonals from the mesh that no drag gets to
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +124,7 @@ def checked_state(mesh: Mesh, state: State) -> State:
         If the regions are of another mesh.
     CageError
         If there is not one cage per region, a cage leaves out part of its region, or the pose has
-        other cages.
+        other cages or numbers beyond all sense.
     ConstraintError
         If fixed vertices or handles are no vertices of *mesh* or share one, or the targets of the
         pose are not theirs.
@@ -136,6 +137,8 @@ def checked_state(mesh: Mesh, state: State) -> State:
         raise ConstraintError("each handle must have a vertex or more; leave out empty ones")
     handles = dict(zip(state.handles, pieces(handle, lengths), strict=True))
     pose = state.pose and _checked_pose(cages, lengths, list(handles), state.pose)
+    if pose:
+        _require_no_wreck(mesh, pose)
     owned = MappingProxyType({name: _own(ids) for name, ids in handles.items()})
     return State(regions, cages, _own(fixed), owned, pose, state.options)
 
@@ -191,6 +194,14 @@ def _checked_pose(
         raise ConstraintError("the pose must have one target for each vertex of each handle")
     owned = MappingProxyType({name: _own(points) for name, points in targets.items()})
     return Pose(tuple(_own(points) for points in places), owned)
+
+
+def _require_no_wreck(mesh: Mesh, pose: Pose) -> None:
+    """Raise a CageError if numbers of *pose* are so far off that vertices could overflow."""
+    every = np.concatenate([*pose.cage_vertices, *pose.targets.values()])
+    away = np.abs(every - mesh.vertices.mean(axis=0)).max(initial=0.0) / mesh.diagonal
+    if not away <= _WRECKED:
+        raise CageError(f"the pose reaches {away:.0e} diagonals of the mesh away; it is damaged")
 
 
 def _own(array: Any) -> Any:

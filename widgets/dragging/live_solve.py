@@ -12,8 +12,7 @@ from collections.abc import Callable
 from statistics import median
 
 from vtk_segdeform.session import Session
-from vtk_segdeform.solution import Solution
-from vtk_segdeform.solution import Status
+from vtk_segdeform.solution import Solution, Status
 
 from ..view import Stop, View
 

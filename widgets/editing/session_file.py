@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from vtk_segdeform.progress import Progress
@@ -33,7 +34,7 @@ class SessionFile:
     @property
     def is_ours(self) -> bool:
         """Whether nothing of others is lost by writing: it was written or read before."""
-        return self._ours == self.path or not self.path.exists()
+        return self._ours == self.path or not os.path.lexists(self.path)
 
     def is_behind(self, session: Session) -> bool:
         """Tell whether something would be lost if *session* were given up now."""
