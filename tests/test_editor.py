@@ -343,7 +343,9 @@ def test_back_to_rest_and_the_volume_let_go(desk):
     assert desk.session.state.pose is None
     desk.type("p")
     assert not desk.session.options.preserve_volume
-    assert desk.session.is_bound  # again, by a job
+    assert desk.session.is_bound  # still
+    assert "volume let go" in desk.editor.status
+    assert "the volume is free" in desk.editor.status
     pull_handle(desk)
     assert abs(desk.session.volume_change) > 1e-6
 

@@ -671,3 +671,17 @@ def test_halves_of_a_region_are_connected_overlap_and_cover_it():
     session.merge_regions([2, 0, 1])
     assert session.regions.n_regions == 1
     assert session.regions.membership.all()
+
+
+def test_letting_the_volume_go_binds_nothing_anew_and_it_comes_back_exactly():
+    session = ready()
+    session.move_handle("tip", up(0.5))
+    assert volume_error(session) < 1e-12
+    session.change_options(preserve_volume=False)
+    assert session.is_bound
+    session.move_handle("tip", up(0.6))
+    assert volume_error(session) > 1e-4
+    session.change_options(preserve_volume=True)
+    assert session.is_bound
+    session.move_handle("tip", up(0.1))
+    assert volume_error(session) < 1e-12

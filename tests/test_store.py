@@ -317,7 +317,7 @@ WRONG = [
     ({"fixed": np.array([99])}, "fixed must index"),
     ({"fixed": np.array([0])}, "both fixed and handle"),
     ({"pose": np.full((4, 3), np.inf)}, "NaN or infinite"),
-    ({"pose": np.full((4, 3), 1e300)}, "the pose reaches .* diagonals of the mesh away; it is damaged"),
+    ({"pose": np.full((4, 3), 1e300)}, "the pose reaches .* is damaged"),
     ({"targets": np.full((1, 3), 1e9)}, "is damaged"),
     ({"header": {"posed": "yes"}}, "posed must be true or false"),
     ({"targets": np.zeros((2, 3))}, "targets must be"),

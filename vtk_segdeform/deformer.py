@@ -138,18 +138,30 @@ class Deformer:
             self._energy = with_cage_stiffness(self._energy, self._rest_cages, faces, groups)
         self._volume = signed_volume(self._rest.vertices, self._rest.faces)
         self._volumes = region_volumes(self._rest, regions.labels)
-        self._constraints: Sequence[VolumeConstraint] = ()
-        if preserve_region_volumes:
-            self._constraints = self._volumes
-        elif preserve_volume:
-            self._constraints = (total_volume(self._rest),)
+        self._total_volume = total_volume(self._rest)
+        self._keep(preserve_volume, preserve_region_volumes)
         self._take_hold(fixed, handle)
         if progress:
             progress(1.0, "ready")
 
-    def hold(self, *, fixed: ArrayLike = (), handle: ArrayLike = ()) -> Deformer:
-        """Return a deformer at rest with other fixed and handle vertices; cages stay bound."""
+    def hold(
+        self,
+        *,
+        fixed: ArrayLike = (),
+        handle: ArrayLike = (),
+        preserve_volume: bool | None = None,
+        preserve_region_volumes: bool | None = None,
+    ) -> Deformer:
+        """Return a deformer at rest that holds other vertices or volumes; cages stay bound.
+
+        None keeps the volumes that this one keeps.
+        """
         other = copy.copy(self)
+        before = other._keeps
+        other._keep(
+            before[0] if preserve_volume is None else preserve_volume,
+            before[1] if preserve_region_volumes is None else preserve_region_volumes,
+        )
         other._take_hold(fixed, handle)
         return other
 
@@ -219,6 +231,14 @@ class Deformer:
                 break
             result = held
         return self._solution(result, steps)
+
+    def _keep(self, volume: bool, region_volumes: bool) -> None:
+        self._keeps = volume, region_volumes
+        self._constraints: Sequence[VolumeConstraint] = ()
+        if region_volumes:
+            self._constraints = self._volumes
+        elif volume:
+            self._constraints = (self._total_volume,)
 
     def _rotation_groups(self, count: int | None) -> IntArray | None:
         if count is None or count >= self.mesh.n_vertices:

@@ -31,6 +31,8 @@ from .state import Pose, State
 
 _KEPT = 3  # bound deformers: undo past a change of cages or options, and back, binds nothing anew
 _SAME_VOLUME = 1e-9  # relative: a pose off by more does not meet a constraint it was not made for
+_BINDING = "stretch", "rotation_groups"  # options that a bound deformer has for good
+_HOLDING = "preserve_volume", "preserve_region_volumes"  # and those that `Deformer.hold` changes
 _NO_TARGETS = np.empty((0, 3))
 
 
@@ -66,8 +68,6 @@ class Posing:
             self._mesh,
             state.regions,
             state.cages,
-            preserve_volume=state.options.preserve_volume,
-            preserve_region_volumes=state.options.preserve_region_volumes,
             stretch=state.options.stretch,
             rotation_groups=state.options.rotation_groups,
             progress=progress,
@@ -140,10 +140,16 @@ class Posing:
         bound = self.bind(state)
         if self._holding is not None:
             other, held, deformer = self._holding
-            if other is bound and not state.changes(held) & Change.CONSTRAINTS:
+            if other is bound and _held_alike(state, held):
                 return deformer
-        deformer = bound.hold(fixed=state.fixed, handle=state.handle)
-        self._holding = bound, State(fixed=state.fixed, handles=state.handles), deformer
+        deformer = bound.hold(
+            fixed=state.fixed,
+            handle=state.handle,
+            preserve_volume=state.options.preserve_volume,
+            preserve_region_volumes=state.options.preserve_region_volumes,
+        )
+        held = State(fixed=state.fixed, handles=state.handles, options=state.options)
+        self._holding = bound, held, deformer
         self._at = None
         return deformer
 
@@ -183,8 +189,12 @@ def _stacked(targets: Mapping[str, FloatArray]) -> FloatArray:
 
 
 def _bind_alike(a: State, b: State) -> bool:
-    """Tell whether one deformer serves both; how cages are fitted makes no difference to it."""
-    fit_alike = replace(
-        b.options, n_cage_vertices=a.options.n_cage_vertices, offset=a.options.offset
-    )
-    return a.regions is b.regions and a.cages == b.cages and a.options == fit_alike
+    """Tell whether one deformer serves both, whatever vertices and volumes it is to hold."""
+    alike = all(getattr(a.options, name) == getattr(b.options, name) for name in _BINDING)
+    return a.regions is b.regions and a.cages == b.cages and alike
+
+
+def _held_alike(a: State, b: State) -> bool:
+    """Tell whether the same vertices and volumes are held."""
+    alike = all(getattr(a.options, name) == getattr(b.options, name) for name in _HOLDING)
+    return alike and not a.changes(b) & Change.CONSTRAINTS

@@ -203,7 +203,8 @@ class Desk:
     def _watch(self, job: Job[Any]) -> None:
         if not job.is_running:
             self._job = None
-            self.voice.note("cancelled, nothing was changed" if job.is_cancelled else "")
+            if job.is_cancelled:
+                self.voice.note("cancelled, nothing was changed")
             self._enter()
         self.refresh()
 

@@ -63,6 +63,8 @@ def _of_drag(stage: Stage) -> str:
     session = stage.session
     if session.is_dragging:
         return f"volume {signed(100.0 * session.volume_change, 2)} % · Esc takes it back"
+    if not (session.options.preserve_volume or session.options.preserve_region_volumes):
+        return "drag or turn a handle, the volume is free · P holds it"
     solution = session.solution
     if solution is not None and solution.status not in (Status.CONVERGED, Status.STEP_LIMIT):
         return str(solution.status)
