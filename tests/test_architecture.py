@@ -56,9 +56,9 @@ STORY = [
     "widgets.colouring.diverging", "widgets.colouring.legend", "widgets.volume_overlay",
     # the editor
     "widgets.editing.jobs", "widgets.editing.status_line", "widgets.editing.help_card",
-    "widgets.editing.voice", "widgets.editing.stage", "widgets.editing.hints",
-    "widgets.editing.session_file", "widgets.editing.desk", "widgets.editing.actions",
-    "widgets.editing.bindings", "widgets.editor",
+    "widgets.editing.voice", "widgets.editing.work", "widgets.editing.stage",
+    "widgets.editing.hints", "widgets.editing.session_file", "widgets.editing.desk",
+    "widgets.editing.actions", "widgets.editing.bindings", "widgets.editor",
     # recordings and films; pyvista's extension points
     "widgets.filming.transcript", "widgets.recording", "widgets.filming.film_files",
     "widgets.filming.off_screen", "widgets.film", "plugin",

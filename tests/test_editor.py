@@ -300,6 +300,28 @@ def test_without_regions_one_paints_the_first_beside_all_the_rest(bare):
     assert bare.hand.failures == []
 
 
+def test_what_a_stroke_leaves_alone_is_told(desk):
+    hand, held = desk.hand, desk.session.regions.membership.sum(axis=0)
+    size = np.count_nonzero(desk.session.regions.membership[0])
+    desk.type("t", "v")  # all of it, through the body
+    hand.drag([(2, 40), (398, 398)], control=True)
+    left = np.count_nonzero(desk.session.regions.membership[0])
+    assert 0 < left < size
+    assert f"{left} vertices left as they were: no other region holds them" in desk.editor.status
+    assert left == np.count_nonzero(held[desk.session.regions.membership[0]] == 1)
+
+
+def test_painting_over_a_pose_says_that_it_is_at_rest_again(desk):
+    desk.type("4")
+    pull_handle(desk)
+    desk.type("1", "plus")
+    assert desk.session.state.pose is None
+    assert "at rest again" in desk.editor.status
+    desk.type("z")
+    assert desk.session.state.pose is not None
+    assert "at rest again" not in desk.editor.status
+
+
 def test_regions_are_merged_cut_grown_and_shrunk(desk):
     hand, selector = desk.hand, desk.editor.stage.selector
     size = np.count_nonzero(desk.session.regions.membership[0])

@@ -211,22 +211,35 @@ def test_a_warning_looks_different_until_something_else_is_said(line):
     assert (picture(line.view)[-2, -2] == calm).all()
 
 
-def test_a_long_text_takes_two_lines_and_never_more(line):
+@pytest.mark.parametrize(("tell", "most"), [("say", 2), ("warn", 4)])
+def test_a_long_text_takes_two_lines_and_a_warning_four_and_never_more(line, tell, most):
     line.say("short")
     one = strip_height(line.view)
-    line.warn("a text that is too long for one line, " * 3)
+    getattr(line, tell)("a text that is too long for one line, " * 3)
     two = strip_height(line.view)
-    line.warn("a text that is too long for any line, " * 20)
-    assert one < two == strip_height(line.view) < 2.2 * one
-    letters = (picture(line.view)[-two:, -5:] > 200).all(axis=2)
+    getattr(line, tell)("a text that is too long for any line, " * 20)
+    full = strip_height(line.view)
+    assert one < two <= full
+    assert 0.7 * most < full / one < 1.1 * most
+    letters = (picture(line.view)[-full:, -5:] > 200).all(axis=2)
     assert not letters.any()  # nothing runs out of the window
     assert line.text.endswith("for any line,")
 
 
-def test_a_word_wider_than_the_window_is_cut(line):
-    line.say("x" * 500)
-    assert strip_height(line.view) > 0
-    assert not (picture(line.view)[-20:, -5:] > 200).all(axis=2).any()
+def test_a_word_wider_than_the_window_is_broken_so_that_what_follows_is_seen(line):
+    line.say("short")
+    one = strip_height(line.view)
+    path = "/a/folder/" + "x" * 90 + "/file"
+    line.warn(f"{path}: cannot be written")
+    high = strip_height(line.view)
+    seen = picture(line.view)
+    assert 1.5 * one < high < 3.0 * one
+    assert not (seen[-high:, -5:] > 200).all(axis=2).any()
+    # The upper line is full of the path: it is not the sign of the warning alone.
+    assert (seen[-high : -high // 2, 300:-20] > 200).all(axis=2).any()
+    line.warn(path)
+    without = picture(line.view)
+    assert (seen[-one:] != without[-one:]).any()  # the reason is to be seen
 
 
 def test_the_line_follows_the_size_of_the_window(line):

@@ -216,6 +216,7 @@ class RegionSelector(Widget):
             self._outline.draw(stroke.outline)
 
     def _finish(self, vertices: BoolArray, role: Role, subtract: bool) -> None:
+        self.remark = role.remark(vertices, subtract=subtract)
         if vertices.any():
             self.handle = role.take(vertices) if subtract else role.give(vertices)
 

@@ -32,11 +32,17 @@ class Widget(abc.ABC):
         Where it lives.  Call `remove` before its window closes.
     session : Session
         What it shows and changes.
+
+    Attributes
+    ----------
+    remark : str
+        What is to be said of the last gesture, if anything.
     """
 
     def __init__(self, view: Any, session: Session) -> None:
         self.view = View.of(view)
         self.session = session
+        self.remark = ""
         self._grab = Grab()
         self._stops: list[Stop] = []
         self._observers: dict[int, tuple[str, Callable[[Widget, str], None]]] = {}

@@ -21,6 +21,7 @@ from ..view import Stop, View
 from .diverging import lookup_table
 
 _TICKS = 5
+_GROUND = 0.7  # opacity of the background's colour under what may lie over the mesh
 
 
 class Legend:
@@ -66,7 +67,7 @@ class Legend:
         for actor, (text, region) in zip(self._lines, lines, strict=True):
             actor.SetInput(f" {text} ")
             style = actor.GetTextProperty()
-            style.SetBackgroundOpacity(0.0 if region is None else 1.0)
+            style.SetBackgroundOpacity(_GROUND if region is None else 1.0)
             style.SetFrame(region is not None)
             if region is not None:
                 style.SetBackgroundColor(*(of_region(region) / 255.0))
@@ -94,11 +95,17 @@ class Legend:
             style = actor.GetTextProperty()
             style.SetFontSize(size)
             style.SetFrameWidth(size // 6)
-            on = style.GetBackgroundColor() if style.GetBackgroundOpacity() else now[2]
-            style.SetColor(*_ink_on(on))
+            if not style.GetFrame():
+                style.SetBackgroundColor(*now[2])
+            style.SetColor(*_ink_on(style.GetBackgroundColor()))
             actor.SetPosition(0.6 * size, height - 1.7 * size * (k + 1.2))
+        wide = min(max(0.12, 7.0 * size / width), 0.5)
+        self._bar.SetPosition(0.99 - wide, 0.25)
+        self._bar.SetWidth(wide)
         for style in (self._bar.GetTitleTextProperty(), self._bar.GetAnnotationTextProperty()):
             style.SetFontSize(size)
+            style.SetBackgroundColor(*now[2])
+            style.SetBackgroundOpacity(_GROUND)
             style.SetColor(*_ink_on(now[2]))
 
 

@@ -14,17 +14,17 @@ from typing import Any
 import numpy as np
 
 from vtk_segdeform.editing.listeners import Change
-from vtk_segdeform.errors import SessionError
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
 from ..view import View
+from ..widget import Widget
 from .help_card import HelpCard, Section
 from .hints import hint
-from .jobs import Job
 from .session_file import SessionFile, read_bound
 from .stage import Mode, Stage
 from .voice import Voice
+from .work import Work
 
 
 class Desk:
@@ -57,8 +57,7 @@ class Desk:
         self.voice = Voice(view)
         self._mode = Mode.REGIONS
         self._is_on = False
-        self._job: Job[Any] | None = None
-        self._doing, self._insists = "", False
+        self._work = Work(view, self._got_on)
         self.stage = Stage(view, session)
         self._listen()
         self.file = SessionFile(Path("session.segdeform"), session)
@@ -121,11 +120,8 @@ class Desk:
     def refresh(self) -> None:
         """Say what there is to say now."""
         mode = f"{self._mode.value} {self._mode.name}"
-        if self._job is not None:
-            then = "stopping ..." if self._job.is_cancelled else "Esc cancels"
-            doing = f"busy {self._doing}" if self._insists else self._doing
-            doing = ": ".join(filter(None, (doing, self._job.text)))
-            self.voice.count(mode, doing, self._job.fraction, then)
+        if self._work.job is not None:
+            self.voice.tell_of(self._work.job, mode, self._work.doing)
         elif self._is_on:
             self.voice.speak(mode, hint(self.stage, self._mode))
         else:
@@ -138,11 +134,19 @@ class Desk:
     def _listen(self) -> None:
         self._stop_hearing = self.session.on_change(self._changed)
         for widget in self.stage.widgets:
-            widget.AddObserver("EndInteractionEvent", lambda *_: self.refresh())
+            widget.AddObserver("EndInteractionEvent", self._ended)
+
+    def _ended(self, widget: Widget, _: str) -> None:
+        if widget.remark:
+            self.voice.note(widget.remark)
+        self.refresh()
 
     def _changed(self, change: Change) -> None:
         if change & Change.HISTORY:
             self.voice.forget()
+        remade = change & Change.POSE and change & (Change.REGIONS | Change.CAGES)
+        if remade and self.session.state.pose is None:
+            self.voice.note("at rest again: the pose was of other regions")
         if change & Change.REGIONS:
             self.stage.choose_region(self.stage.selector.region)
         self.refresh()
@@ -152,7 +156,7 @@ class Desk:
     @property
     def is_busy(self) -> bool:
         """Whether a job is running."""
-        return self._job is not None
+        return self._work.job is not None
 
     def start(
         self, doing: str, work: Callable[[Progress], Any], done: Callable[[Any], object]
@@ -164,47 +168,40 @@ class Desk:
         SessionError
             If there is another job.
         """
-        if self._job is not None:
-            raise SessionError(f"busy {self._doing}; wait for it, or cancel it")
 
         def finish(result: Any) -> None:
             done(result)
             self._settle()
 
+        self._work.start(doing, work, finish)
         self.stage.rest()
-        self._doing, self._insists = doing, False
-        self._job = Job(self.view, work, done=finish, watch=self._watch)
         self.refresh()
 
     def wait(self) -> None:
         """Stand still until there is no job any more; for scripts."""
-        while self._job is not None:
-            self._job.wait()
+        self._work.wait()
 
     def cancel(self) -> None:
         """Stop the job, or else put away the card of keys."""
-        if self._job is not None:
-            self._job.cancel()
+        if self._work.job is not None:
+            self._work.job.cancel()
             self.refresh()
         else:
             self.help.hide()
 
     def insist(self) -> None:
         """Say that nothing else can be done while the job is running."""
-        self._insists = True
+        self._work.insist()
         self.refresh()
 
     def bind_if_ready(self) -> None:
         """Before handles are dragged, do as a job what the first move would have to wait for."""
         ready = self._is_on and self._mode is Mode.DEFORM and self.session.is_ready
-        if ready and not self.session.is_bound and self._job is None:
+        if ready and not self.session.is_bound and not self.is_busy:
             self.start("binding the mesh to its cages", self.stage.bind, lambda _: None)
 
-    def _watch(self, job: Job[Any]) -> None:
-        if not job.is_running:
-            self._job = None
-            if job.is_cancelled:
-                self.voice.note("cancelled, nothing was changed")
+    def _got_on(self) -> None:
+        if not self.is_busy:
             self._enter()
         self.refresh()
 
@@ -215,7 +212,7 @@ class Desk:
         self.refresh()
 
     def _enter(self) -> None:
-        if self._is_on and self._job is None:
+        if self._is_on and not self.is_busy:
             self.stage.enter(self._mode)
         else:
             self.stage.rest()
@@ -239,8 +236,8 @@ class Desk:
         self.start(f"opening {path}", lambda progress: read_bound(path, progress), take)
 
     def _take(self, session: Session) -> None:
-        other = not np.array_equal(session.mesh.vertices, self.session.mesh.vertices)
         before, self.stage = self.stage, Stage(self.view, session)
+        other = not np.array_equal(session.mesh.vertices, before.session.mesh.vertices)
         self._stop_hearing()
         before.remove()
         self._listen()

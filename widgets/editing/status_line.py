@@ -1,7 +1,8 @@
 """One line at the bottom of a view: what to do next, what went wrong, how far a job is.
 
 A warning has another colour and a sign, and stays until something else is said.  What does not
-fit into the window's width is broken once; what does not fit into two lines either ends in dots.
+fit into the window's width is broken into two lines, a warning into four, within a word where it
+is as long as a path; what does not fit then ends in dots.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from ..view import View
 
 _CALM, _WARNING = "#2B2F36", "#8A2B06"  # white on them has a contrast above 7 to 1
 _LETTERS, _TAG, _BAR = "#FFFFFF", "#FFD27F", "#4FA3D9"
-_LINES = 2
+_LINES, _LINES_OF_WARNING = 2, 4
 
 
 class StatusLine:
@@ -33,7 +34,7 @@ class StatusLine:
         self._strip = Panel(front, _CALM, opacity=0.88, layer=2)
         self._bar = Panel(front, _BAR, layer=3)
         self._tag = Words(front, _TAG, bold=True, layer=4)
-        self._lines = [Words(front, _LETTERS, layer=4) for _ in range(_LINES)]
+        self._lines = [Words(front, _LETTERS, layer=4) for _ in range(_LINES_OF_WARNING)]
         self._said: tuple[str, str, bool, float | None] = "", "", False, None
         self._laid_out: tuple[Any, ...] = ()
         self._stop = self.view.before_render(self._lay_out)
@@ -88,7 +89,8 @@ class StatusLine:
         margin, leading = 0.7 * size, 1.45 * size
         self._tag.say(tag, size)
         left = margin + (self._tag.width() + size if tag else 0.0)
-        lines = self._broken(f"! {text}" if warning else text, size, width - margin - left)
+        room, most = width - margin - left, _LINES_OF_WARNING if warning else _LINES
+        lines = self._broken(f"! {text}" if warning else text, size, room, most)
         foot = 0.35 * size if fraction is None else 0.8 * size  # room for the bar
         high = foot + leading * len(lines) + 0.35 * size
         for k, words in enumerate(self._lines):
@@ -100,27 +102,31 @@ class StatusLine:
         self._bar.show(fraction is not None)
         self._bar.place(0.0, 0.0, width * (fraction or 0.0), 0.35 * size)
 
-    def _broken(self, text: str, size: float, room: float) -> list[str]:
-        """Return *text* in one line or two, each no wider than *room* pixels."""
-        probe, lines, rest = self._lines[0], list[str](), text.split()
-        while rest and len(lines) < _LINES:
-            fitting = len(rest)
-            while fitting > 1 and not _fits(probe, " ".join(rest[:fitting]), size, room):
-                fitting -= 1
-            lines.append(" ".join(rest[:fitting]))
-            rest = rest[fitting:]
-        last = lines.pop() if lines else ""
-        dots = "..." if rest else ""
-        while last and not _fits(probe, last + dots, size, room):
-            last, dots = last[:-1].rstrip(), "..."
-        return [*lines, last + dots]
+    def _broken(self, text: str, size: float, room: float, most: int) -> list[str]:
+        """Return *text* in at most *most* lines, each no wider than *room* pixels."""
+        lines = list[str]()
+        while text and len(lines) < most:
+            cut = self._fitting(text, size, room)
+            lines.append(text[:cut].rstrip())
+            text = text[cut:].lstrip()
+        if text:
+            cut = self._fitting(f"{lines[-1]}...", size, room)
+            lines[-1] = lines[-1][: min(cut, len(lines[-1])) - 3].rstrip() + "..."
+        return lines
+
+    def _fitting(self, text: str, size: float, room: float) -> int:
+        """Return after how many letters to break *text*, at best between two words."""
+        probe = self._lines[0]
+        low, high = 1, len(text)  # the first low letters fit, or nothing does
+        while low < high:
+            middle = (low + high + 1) // 2
+            probe.say(text[:middle], size)
+            low, high = (middle, high) if probe.width() <= room else (low, middle - 1)
+        space = text.rfind(" ", 0, low + 1)
+        # Rather in a long word than after the sign of a warning, alone in its line.
+        return space if low < len(text) and space > low // 3 else low
 
 
 def letter_size(width: int, height: int) -> float:
     """Return how large letters are in a window, pixels: what is read well, and fits."""
     return float(np.clip(min(height / 36.0, width / 48.0), 11.0, 26.0))
-
-
-def _fits(probe: Words, text: str, size: float, room: float) -> bool:
-    probe.say(text, size)
-    return probe.width() <= room

@@ -5,9 +5,12 @@ What was done is said until the next thing is done; what went wrong as well, and
 
 from __future__ import annotations
 
+from typing import Any
+
 from vtk_segdeform.errors import SegDeformError
 
 from ..view import View
+from .jobs import Job
 from .status_line import StatusLine
 
 
@@ -58,9 +61,13 @@ class Voice:
         else:
             self._line.say(" · ".join(filter(None, (self._note, hint))), mode)
 
-    def count(self, mode: str, doing: str, fraction: float, then: str) -> None:
-        """Say how far one is with *doing* something, 0..1, and what can be done about it."""
-        self._line.progress(fraction, f"{doing} · {100.0 * fraction:.0f} % · {then}", mode)
+    def tell_of(self, job: Job[Any], mode: str, doing: str) -> None:
+        """Say how far a *job* is with *doing* something, and what can be done about it."""
+        if job.is_cancelled:
+            self.note("cancelled, nothing was changed")  # to be said when it is over
+        then = "stopping ..." if job.is_cancelled else "Esc cancels"
+        what = ": ".join(filter(None, (doing, job.text)))
+        self._line.progress(job.fraction, f"{what} · {100.0 * job.fraction:.0f} % · {then}", mode)
 
     def be_silent(self) -> None:
         """Say nothing."""

@@ -58,6 +58,14 @@ class Role:
         """Return which of *vertices*, a mask (n,), `give` would change, or `take`."""
         return vertices & self._open(subtract) & ~self._barred(subtract)
 
+    def remark(self, vertices: BoolArray, *, subtract: bool) -> str:
+        """Return what is to be said of those of *vertices* that `give`, or `take`, leaves alone."""
+        count = np.count_nonzero(vertices & self._open(subtract) & self._barred(subtract))
+        if not count:
+            return ""
+        reason = "no other region holds them" if subtract else "fixed or of a handle already"
+        return f"{count} vertices left as they were: {reason}"
+
     def give(self, vertices: BoolArray) -> str | None:
         """Give the role to *vertices*, a mask (n,); return the handle's name, if it is one.
 
