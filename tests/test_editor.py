@@ -300,6 +300,23 @@ def test_without_regions_one_paints_the_first_beside_all_the_rest(bare):
     assert bare.hand.failures == []
 
 
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        ("m", "no regions to merge yet: G finds some"),
+        ("x", "no regions to cut yet: G finds some"),
+        ("c", "no cages to show yet: F fits them"),
+        ("f", "no regions to fit cages to"),
+        ("3n", "no handle yet"),
+    ],
+)
+def test_a_key_with_nothing_to_work_on_says_what_comes_first(bare, keys, says):
+    bare.type(*keys)
+    assert says in bare.editor.status
+    bare.type("3", "Delete")
+    assert "there is no handle yet" in bare.editor.status
+
+
 def test_what_a_stroke_leaves_alone_is_told(desk):
     hand, held = desk.hand, desk.session.regions.membership.sum(axis=0)
     size = np.count_nonzero(desk.session.regions.membership[0])
@@ -461,7 +478,7 @@ def test_while_a_job_runs_the_camera_works_and_nothing_else_does(bare):
     assert bare.session.regions is None
     bare.settle()
     assert bare.session.regions is not None
-    assert "regions found" in bare.editor.status
+    assert "1 region found · brush for region 0," in bare.editor.status
     assert bare.hand.failures == []
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from vtk_segdeform.errors import ConstraintError, RegionError
+from vtk_segdeform.errors import CageError, ConstraintError, RegionError
 from vtk_segdeform.segmentation import segment as segmented
 
 from ..region_selector import Paint, Tool
@@ -88,7 +88,8 @@ def segment(desk: Desk) -> None:
 
     def keep(regions: Any) -> None:
         session.set_regions(regions, label="find regions")
-        desk.say(f"{regions.n_regions} regions found")
+        desk.stage.choose_region(min(desk.stage.selector.region, regions.n_regions - 1))
+        desk.say(f"{_count(regions.n_regions, 'region')} found")
 
     desk.start("finding regions", lambda p: segmented(session.mesh, progress=p), keep)
 
@@ -101,13 +102,16 @@ def fit_cages(desk: Desk) -> None:
 
     def keep(cages: Any) -> None:
         session.set_cages(cages, label="fit cages")
-        desk.say(f"{len(cages)} cages of {sum(cage.n_vertices for cage in cages)} vertices fitted")
+        total = sum(cage.n_vertices for cage in cages)
+        desk.say(f"{_count(len(cages), 'cage')} fitted, {total} vertices in all")
 
     desk.start("fitting cages", session.fitted_cages, keep)
 
 
 def toggle_cages(desk: Desk) -> None:
     """Show cages in every mode, or in their own only."""
+    if not desk.session.cages:
+        raise CageError("there are no cages to show yet: F fits them to the regions")
     desk.stage.cages_wanted = not desk.stage.cages_wanted
     desk.stage.show(desk.mode)
     desk.say("cages shown" if desk.stage.cages.is_shown else "cages hidden")
@@ -172,6 +176,7 @@ def new_region(desk: Desk) -> None:
 def merge_region(desk: Desk) -> None:
     """Make one of the region that is painted and the one under the pointer."""
     selector = desk.stage.selector
+    _require_regions(desk, "merge")
     other = selector.region_under_pointer()
     if other is None or other == selector.region:
         raise RegionError(
@@ -184,6 +189,7 @@ def merge_region(desk: Desk) -> None:
 
 def split_region(desk: Desk) -> None:
     """Cut the region that is painted in two."""
+    _require_regions(desk, "cut")
     desk.session.split_region(desk.stage.selector.region)
     desk.say(f"region {desk.stage.selector.region} cut in two")
 
@@ -193,9 +199,7 @@ def split_region(desk: Desk) -> None:
 
 def next_handle(desk: Desk) -> None:
     """Paint or drag another handle."""
-    names = list(desk.session.handles)
-    if not names:
-        raise ConstraintError("there is no handle yet: in mode 3, D and then paint one")
+    names = _names(desk)
     tool: Any = desk.stage.dragger if desk.mode is Mode.DEFORM else desk.stage.selector
     here = names.index(tool.handle) if tool.handle in names else -1
     tool.handle = names[(here + 1) % len(names)]
@@ -210,9 +214,31 @@ def new_handle(desk: Desk) -> None:
 
 def remove_handle(desk: Desk) -> None:
     """Let go of the handle that is painted or dragged."""
+    _names(desk)
     stage = desk.stage
     name = stage.dragger.handle if desk.mode is Mode.DEFORM else stage.selector.handle
     if name is None:
         raise ConstraintError("no handle is chosen: N chooses one")
     desk.session.remove_handle(name)
     desk.say(f"{name} removed")
+
+
+def _require_regions(desk: Desk, verb: str) -> None:
+    if desk.stage.selector.region >= desk.stage.n_regions:
+        raise RegionError(
+            f"region {desk.stage.selector.region} is still to be painted; N chooses one to {verb}"
+            if desk.stage.n_regions
+            else f"there are no regions to {verb} yet: G finds some, or paint them"
+        )
+
+
+def _names(desk: Desk) -> list[str]:
+    """Return the names of the handles; an error says how to get one, where there is none."""
+    names = list(desk.session.handles)
+    if not names:
+        raise ConstraintError("there is no handle yet: in mode 3, D and then paint one")
+    return names
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"

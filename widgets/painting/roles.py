@@ -107,6 +107,8 @@ class Role:
             If it is not said which handle.
         """
         if self.paint is Paint.HANDLE and self.handle is None:
+            if not self.session.handles:
+                raise ConstraintError("there is no handle to take vertices out of yet")
             raise ConstraintError("choose the handle to take vertices out of")
         old = vertices & self._open(True)
         if not old.any():
