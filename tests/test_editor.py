@@ -523,6 +523,17 @@ def test_switched_off_or_removed_in_the_middle_of_a_job_it_lets_go(bare):
 # Files.
 
 
+@pytest.mark.parametrize("end", ["Off", "remove"])
+def test_it_can_be_left_while_a_job_is_about_to_fail(bare, tmp_path, end):
+    bare.editor.path = tmp_path / "none.segdeform"
+    bare.hand.key("o", control=True)
+    time.sleep(0.1)  # the job has failed, and nobody was told yet
+    getattr(bare.editor, end)()
+    assert not bare.editor.is_busy
+    assert not bare.editor.GetEnabled()
+    assert bare.hand.failures == []
+
+
 def test_opening_another_session_shows_it_and_goes_on_with_it(desk, tmp_path):
     desk.type("4")
     pull_handle(desk)

@@ -13,6 +13,7 @@ still.
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from concurrent import futures
@@ -24,6 +25,8 @@ from vtk_segdeform.progress import Progress
 from ..view import View
 
 T = TypeVar("T")
+
+_log = logging.getLogger(__name__)
 
 _PERIOD = 20  # milliseconds between two looks
 _SHARE = 0.01  # seconds of each period that are the thread's, whatever else goes on
@@ -96,7 +99,7 @@ class Job(Generic[T]):
         return self._stopping
 
     def cancel(self) -> None:
-        """Have the work stop at its next report; nothing is then delivered."""
+        """Have the work stop at its next report; nothing is then delivered, nor raised."""
         self._stopping = True
 
     def wait(self) -> None:
@@ -105,7 +108,7 @@ class Job(Generic[T]):
         Raises
         ------
         Exception
-            What the work raised; nothing if it was cancelled.
+            What the work raised; nothing if the job was cancelled.
         """
         if not self._ended:
             futures.wait([self._future])
@@ -132,10 +135,10 @@ class Job(Generic[T]):
         error = self._future.exception()
         self._stopping |= isinstance(error, Cancelled)
         self._tell()
-        if error is not None and not isinstance(error, Cancelled):
-            raise error
         if not self._stopping:
-            self._done(self._future.result())
+            self._done(self._future.result())  # or raises what the work raised
+        elif error is not None and not isinstance(error, Cancelled):
+            _log.info("a cancelled job failed", exc_info=error)
 
     def _tell(self) -> None:
         self._told, self._told_at = self._news, time.monotonic()

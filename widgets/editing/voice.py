@@ -39,7 +39,8 @@ class Voice:
     def complain(self, error: Exception) -> None:
         """Tell what went wrong; our own errors are in words already."""
         wordy = isinstance(error, SegDeformError | ValueError) and str(error)
-        self._fault = str(error) if wordy else f"a fault: {type(error).__name__}, {error}"
+        name = ", ".join(filter(None, (type(error).__name__, str(error))))
+        self._fault = str(error) if wordy else f"a fault: {name}"
 
     def forget(self) -> None:
         """Tell no more of what was done, went wrong or was asked before."""
