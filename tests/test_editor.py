@@ -649,3 +649,11 @@ def test_off_hears_nothing_and_on_goes_on(desk):
 def test_only_a_session_or_a_mesh_can_be_edited():
     with pytest.raises(TypeError, match="Session or a Mesh; got str"):
         DeformEditor(plain_view(), "cactus.obj")
+
+
+def test_a_window_of_one_pixel_is_drawn_without_complaint(desk, capfd):
+    desk.type("4", "o", "h")
+    for size in ((1, 300), (300, 1), (1, 1), (300, 300)):
+        desk.view.window.SetSize(*size)
+        desk.view.render()
+    assert capfd.readouterr() == ("", "")

@@ -25,6 +25,7 @@ from .sight import Sight
 _log = logging.getLogger(__name__)
 
 Stop = Callable[[], None]
+_SMALLEST = 8  # pixels, below which text would be a texture of nothing, of which VTK complains
 ABOVE_CAMERA = 1.0  # priority: VTK's own widgets have 0.5, camera styles 0
 
 
@@ -222,6 +223,7 @@ class View(Sight):
     def _follow(self) -> None:
         """Let the front renderer look where the renderer does, and both see all of both."""
         self._front.SetViewport(*self.renderer.GetViewport())
+        self._front.SetDraw(min(self.renderer.GetSize()) >= _SMALLEST)
         both = [r.ComputeVisiblePropBounds() for r in (self.renderer, self._front)]
         bounds = np.array([b for b in both if b[0] <= b[1]])
         if len(bounds):
