@@ -437,6 +437,30 @@ def test_cancelling_leaves_everything_as_it_was(work):
         assert session.undo_label == label
 
 
+def test_a_cage_vertex_that_goes_out_and_back_in_one_drag_leaves_everything_where_it_was():
+    session = ready()
+    session.move_handle("tip", up(0.5))
+    session.commit()
+    before, start = session.cage_vertices, session.cage_vertices[0]
+    for way in [*np.linspace(0.0, 1.0, 20), *np.linspace(1.0, 0.0, 20)]:
+        moved = start.copy()
+        moved[7] += way * np.array([0.3, -0.2, 0.5])
+        session.move_cage(0, moved)
+        assert volume_error(session) < 1e-13
+        assert (np.abs(session.cage_vertices[1] - before[1]).max() > 1e-6) == (way > 0.0)
+    for after, cage in zip(session.cage_vertices, before, strict=True):
+        assert_allclose(after, cage, atol=1e-12)
+
+
+def test_two_cages_moved_in_one_drag_are_both_where_they_were_put():
+    session = ready(preserve_volume=False)
+    moved = [cage + [0.0, 0.0, 0.1 * (k + 1)] for k, cage in enumerate(session.cage_vertices)]
+    session.move_cage(0, moved[0])
+    session.move_cage(1, moved[1])
+    for after, cage in zip(session.cage_vertices, moved, strict=True):
+        assert_array_equal(after, cage)
+
+
 def test_a_cage_vertex_can_be_moved_freely_and_the_volume_stays():
     session = ready()
     places = SCENE.cages[0].vertices.copy()

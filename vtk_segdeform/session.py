@@ -89,6 +89,7 @@ class Session(Timeline):
         self._mesh = mesh
         self._posing = Posing(mesh)
         self._solution: tuple[Pose, Solution] | None = None
+        self._put: tuple[Pose | None, list[FloatArray]] = None, []  # where `move_cage` put cages
 
     # What there is.
 
@@ -339,11 +340,13 @@ class Session(Timeline):
         """Put the vertices of one cage elsewhere, (m_r, 3); the mesh follows, x = W~ p.
 
         Part of the drag in hand, as `drag` is, but free: nothing is solved for, handles follow.
-        The volume is kept if the options say so, for which the cages move a little more.
+        The volume is kept if the options say so, for which all cages move a little more: by what
+        it takes from where they were put, so that a mouse that goes back takes that back as well.
         """
         if region not in range(len(self.cages)):
             raise CageError(f"region must be that of one of the {len(self.cages)} cages")
-        places = list(self.cage_vertices)
+        going_on = self.is_dragging and self._put[0] is self._state.pose
+        places = list(self._put[1] if going_on else self.cage_vertices)
         try:
             points = as_points(vertices, "vertices").copy()
         except ValueError as fault:
@@ -353,6 +356,7 @@ class Session(Timeline):
         handles.require_near(self.mesh, points, "vertices")
         places[region] = points
         pose = self._posing.free_form(self._state, places)
+        self._put = pose, places
         self._move(replace(self._state, pose=pose), f"cage {region}")
 
     def refine(self, *, max_steps: int | None = None) -> Solution:
