@@ -51,7 +51,8 @@ STORY = [
     # dragging
     "widgets.dragging.gizmo_shapes", "widgets.dragging.gizmo_solids", "widgets.dragging.panels",
     "widgets.dragging.gizmo_label", "widgets.dragging.gizmo", "widgets.dragging.handle_motion",
-    "widgets.dragging.handle_marks", "widgets.dragging.live_solve", "widgets.handle_dragger",
+    "widgets.dragging.handle_marks", "widgets.dragging.pace", "widgets.dragging.live_solve",
+    "widgets.handle_dragger",
     # what becomes of the volume
     "widgets.colouring.diverging", "widgets.colouring.legend", "widgets.volume_overlay",
     # the editor
@@ -60,8 +61,9 @@ STORY = [
     "widgets.editing.hints", "widgets.editing.session_file", "widgets.editing.desk",
     "widgets.editing.actions", "widgets.editing.bindings", "widgets.editor",
     # recordings and films; pyvista's extension points
-    "widgets.filming.transcript", "widgets.recording", "widgets.filming.film_files",
-    "widgets.filming.off_screen", "widgets.film", "plugin",
+    "widgets.filming.words", "widgets.filming.transcript", "widgets.filming.reading",
+    "widgets.recording", "widgets.filming.film_files", "widgets.filming.off_screen", "widgets.film",
+    "plugin",
     # the command line
     "command_line.selection", "command_line.motion", "command_line.outputs", "command_line.demo",
     "command_line.interactive", "command_line.bench", "command_line.commands", "cli", "__main__",

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import pyvista as pv
@@ -10,7 +13,9 @@ from scenes import sausage
 
 from vtk_segdeform import Session
 from vtk_segdeform.errors import SessionError
+from vtk_segdeform.widgets.dragging.pace import Pace, order_steps
 from vtk_segdeform.widgets.gestures import Gesture, Phase, Pointer
+from vtk_segdeform.widgets.handle_dragger import HandleDragger
 from vtk_segdeform.widgets.recording import Recorder, replay
 from vtk_segdeform.widgets.surface_display import SurfaceDisplay
 from vtk_segdeform.widgets.view import View
@@ -52,16 +57,21 @@ class Puller(Widget):
         self.session.commit()
 
 
+def ready_session() -> Session:
+    session = Session(SCENE.mesh)
+    session.set_regions(SCENE.regions)
+    session.set_cages(SCENE.cages)
+    session.set_fixed(SCENE.fixed)
+    session.add_handle(SCENE.handle)
+    return session
+
+
 class Desk:
     """A view with a session, something to drag, and a camera."""
 
     def __init__(self, view: View) -> None:
         self.view = view
-        self.session = Session(SCENE.mesh)
-        self.session.set_regions(SCENE.regions)
-        self.session.set_cages(SCENE.cages)
-        self.session.set_fixed(SCENE.fixed)
-        self.session.add_handle(SCENE.handle)
+        self.session = ready_session()
         SurfaceDisplay(view, self.session)
         self.puller = Puller(view, self.session)
         self.puller.On()
@@ -212,6 +222,63 @@ def test_a_plotter_is_recorded_and_replayed_with_the_keys_of_pyvista():
     assert np.array_equal(*ends)
 
 
+class Dragging:
+    """A view where a handle can be dragged; a step of the solver seems to take *seconds*."""
+
+    def __init__(self, monkeypatch, seconds: float) -> None:
+        clock = itertools.count()
+        own = SimpleNamespace(perf_counter=lambda: seconds * next(clock))
+        monkeypatch.setattr("vtk_segdeform.widgets.dragging.live_solve.time", own)
+        self.session = ready_session()
+        self.view = plain_view()
+        self.dragger = HandleDragger(self.view, self.session)
+        self.dragger.On()
+        self.view.renderer.ResetCamera()
+        self.view.render()
+
+    def work(self, hand: Hand) -> None:
+        """Drag, let it refine, take it back, drag from elsewhere, and look from elsewhere."""
+        x, y = hand.at(self.session.vertices[SCENE.handle].mean(axis=0))
+        hand.press((x, y))
+        for k in range(1, 5):
+            hand.move((x - 4 * k, y + 11 * k))
+        hand.tick(3)
+        hand.move((x - 22, y + 60))
+        hand.release((x - 22, y + 60))
+        hand.tick(2)
+        hand.drag([(20, 380), (35, 370)])
+        hand.tick(2)
+
+
+def test_a_drag_is_replayed_bit_for_bit_where_solving_is_much_slower(monkeypatch):
+    fast = Dragging(monkeypatch, 0.001)
+    hand, recorder = Hand(fast.view), Recorder(fast.view)
+    fast.work(hand)
+    recorder.stop()
+    assert hand.failures == []
+    given = {line.split()[-1] for line in recorder.lines if " Steps " in line}
+    assert len(given) > 1  # the first solve knows nothing of how long a step takes
+    ends = []
+    for lines in (recorder.lines, [line for line in recorder.lines if " Steps " not in line]):
+        slow = Dragging(monkeypatch, 0.5)
+        replay(slow.view, lines)
+        ends.append(np.array_equal(slow.session.vertices, fast.session.vertices))
+    assert ends == [True, False]  # and without being told how many steps it ends elsewhere
+
+
+def test_two_who_drag_in_one_window_share_the_orders_of_a_replay():
+    view = plain_view((50, 50))
+    one, other = Pace(view.interactor), Pace(view.interactor)
+    order_steps(view.interactor, (3, 4))
+    assert [one.steps(8), other.steps(8), one.steps(8)] == [3, 4, 8]
+    order_steps(view.interactor, (3, 4))
+    order_steps(view.interactor, ())
+    assert other.steps(7) == 7
+    other.stop()
+    order_steps(view.interactor, (2,))
+    assert [other.steps(7), one.steps(7)] == [7, 7]
+
+
 def test_the_next_event_waits_for_work_in_the_background():
     view = plain_view((50, 50))
     said = []
@@ -250,6 +317,7 @@ GOOD_CAMERA = "0 Camera position 0 0 5 focus 0 0 0 up 0 1 0 angle 30 parallel 0 
         ("nan MouseMove 1 1", "expected a number"),
         ("0.1", "expected a time and an event"),
         ("0.1 Timer 99999999", "whole number from 1 to 100000"),
+        ("0.1 Steps 0", "whole number from 1 to 100"),
         ("0.1 Window 99999 99999", "whole number from 1 to 16384"),
         (GOOD_CAMERA.replace("focus 0 0 0", "focus 0 0 5"), "no camera can stand like this"),
         (GOOD_CAMERA.replace("angle 30", "angle inf"), "expected a number"),

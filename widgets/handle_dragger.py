@@ -10,9 +10,8 @@ press on the vertices of any handle makes that one active, and drags it in the p
     control     turns by 15 degrees at a time
     escape, right button        back to the pose before the press
 
-One move is one solve, for where the pointer is now; it stops after about 30 ms.  While the pointer
-rests, and after the release, a timer goes on solving until the pose has converged.  A release
-makes one undo step, to which what is refined later belongs.
+One move is one solve, for where the pointer is now, of about 20 ms.  While the pointer rests, and
+after the release, a timer goes on until the pose has converged: it belongs to the same undo step.
 """
 
 from __future__ import annotations
@@ -132,6 +131,7 @@ class HandleDragger(Widget):
         """Take everything out of the view, for good."""
         self.Off()
         self._stop_listening()
+        self._live.remove()
         self.gizmo.remove()
         self._marks.remove()
         if self._own_surface:

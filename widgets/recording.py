@@ -12,9 +12,12 @@ exact also where a program moved the camera.
     0.802 LeftButtonPress 412 300 control
     2.004 KeyPress 412 300 control key=z code=26
     2.310 Timer 3
+    2.310 Steps 5
 
-Lines that are empty or begin with # say nothing.  It tells only what the hands did: to replay
-it, begin with the session and the view that it began with.
+Lines that are empty or begin with # say nothing.  `Steps` is how many steps of the solver there was
+time for: a replay gives it as many, and ends in the same pose also on a slower machine, to the
+last bit where numpy adds alike.  For the rest it tells only what the hands did: to replay it, begin
+with the session and the view that it began with.
 
 A camera style that drags keeps all events from other observers, as a widget does by its abort
 flag; not from VTK's passive ones, which are called before everybody else.  The recorder is one.
@@ -26,7 +29,6 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterable
-from pathlib import Path
 from typing import Any, TextIO
 
 from vtkmodules.vtkCommonCore import vtkVersion
@@ -34,7 +36,9 @@ from vtkmodules.vtkCommonCore import vtkVersion
 from vtk_segdeform import __version__
 from vtk_segdeform.errors import SessionError
 
-from .filming.transcript import EVENTS, TITLE, Camera, Entry, Input, Ticks, Window, read_entry
+from .dragging.pace import on_steps, order_steps
+from .filming.reading import read_recording
+from .filming.transcript import EVENTS, TITLE, Camera, Entry, Input, Steps, Ticks, Window
 from .view import View
 
 _LONGEST_PAUSE = 2.0  # seconds
@@ -70,6 +74,7 @@ class Recorder:
         self._write(f"# vtk_segdeform {__version__}, VTK {vtk}, {sys.platform}")
         self._tell_scene()
         self._tags = [self._watch(name) for name in (*EVENTS, "Timer")]
+        self._stop_steps = on_steps(self.view.interactor, self._solves)
 
     def stop(self) -> None:
         """Write no more; the file is closed."""
@@ -78,6 +83,7 @@ class Recorder:
         for tag in self._tags:
             self.view.interactor.RemoveObserver(tag)
         self._tags = []
+        self._stop_steps()
         self._tell_ticks()
         self._tell_scene()
         if self._file is not None:
@@ -106,6 +112,11 @@ class Recorder:
         if name.endswith("Press"):  # what follows depends on where the camera is
             self._tell_scene()
         self._tell(Input.of(name, self.view.interactor))
+
+    def _solves(self, steps: int) -> None:
+        with self.view.guarded():
+            self._tell_ticks()  # the last of them made it solve
+            self._tell(Steps(steps))
 
     def _tell_ticks(self) -> None:
         if self._ticks:
@@ -160,7 +171,7 @@ def replay(
     """
     view = View.of(view)
     before = 0.0
-    for moment, entry in _read(source):
+    for moment, entry, steps in read_recording(source):
         while busy is not None and busy():
             Ticks(1).send(view)
             time.sleep(0.005)
@@ -168,40 +179,11 @@ def replay(
         before = moment
         if _is_closed(view.window):
             return
-        entry.send(view)
-
-
-def _read(source: str | os.PathLike[str] | Iterable[str]) -> list[tuple[float, Entry]]:
-    """Return when and what, for every line that says something."""
-    name = "recording"
-    lines: Iterable[str]
-    if isinstance(source, str | os.PathLike):
-        name = os.fspath(source)
+        order_steps(view.interactor, steps)
         try:
-            lines = Path(source).read_bytes().decode(errors="replace").splitlines()
-        except OSError as fault:
-            raise SessionError(f"{name}: cannot be read ({fault.strerror or fault})") from fault
-    else:
-        lines = source
-    entries, began = [], False
-    for number, line in enumerate(lines, start=1):
-        try:
-            text = line.strip()
-            if not began:
-                began = _is_title(text)
-            elif text and not text.startswith("#"):
-                entries.append(read_entry(text))
-        except ValueError as fault:
-            raise SessionError(f"{name}, line {number}: {fault}") from None
-    if not began:
-        raise SessionError(f"{name}: is empty; a recording begins with {TITLE!r}")
-    return entries
-
-
-def _is_title(text: str) -> bool:
-    if text != TITLE:
-        raise ValueError(f"a recording begins with {TITLE!r}; got {text[:60]!r}")
-    return True
+            entry.send(view)
+        finally:
+            order_steps(view.interactor, ())
 
 
 def _is_closed(window: Any) -> bool:

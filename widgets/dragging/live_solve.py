@@ -2,6 +2,7 @@
 
 How many steps an event has time for is learned from how long the last ones took.  A solve that
 stopped for that is gone on with by a timer, until it has converged or can get no farther.
+A replay gives each event as many as it was given before; see `pace`.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from vtk_segdeform.session import Session
 from vtk_segdeform.solution import Solution, Status
 
 from ..view import Stop, View
+from .pace import Pace
 
 _BUDGET = 0.020  # seconds of an event: about half of what drawing takes without a graphics card
 _AT_REST = 0.080  # seconds of a refinement, when no pointer waits to be followed
@@ -46,6 +48,7 @@ class LiveSolve:
         self._view, self._session, self._failed = view, session, failed
         self._seconds: deque[float] = deque(maxlen=5)  # of one step; the median forgets hiccups
         self._stop: Stop | None = None
+        self._pace = Pace(view.interactor)
 
     @property
     def steps(self) -> int:
@@ -78,6 +81,11 @@ class LiveSolve:
             self._stop()
             self._stop = None
 
+    def remove(self) -> None:
+        """Stop for good."""
+        self.rest()
+        self._pace.stop()
+
     def _tick(self) -> None:
         self.go_on()  # something else may have changed the pose
         if self._stop is None:
@@ -99,5 +107,5 @@ class LiveSolve:
 
     def _spend(self, solve: Callable[..., Solution], steps: int) -> None:
         began = time.perf_counter()
-        solution = solve(max_steps=steps)
+        solution = solve(max_steps=self._pace.steps(steps))
         self._seconds.append((time.perf_counter() - began) / max(1, solution.steps))

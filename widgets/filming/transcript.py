@@ -4,6 +4,7 @@
     Camera position X Y Z focus X Y Z up X Y Z angle A parallel 0|1 scale S range NEAR FAR
     MouseMove X Y [shift] [control] [alt] [key=NAME] [code=NUMBER]      and all other `EVENTS`
     Timer TIMES
+    Steps NUMBER                    the solver was given so many at the event before, or last tick
 
 A line is believed in nothing: names are those listed here, numbers finite and of a size that
 makes sense.  What can be read can be sent; nothing else is ever done.
@@ -11,13 +12,13 @@ makes sense.  What can be read can be sent; nothing else is ever done.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
 from vtk_segdeform.errors import SessionError
 
 from ..view import View
+from .words import finite, so_many, whole
 
 TITLE = "vtk_segdeform recording 1"
 EVENTS = (
@@ -29,6 +30,7 @@ EVENTS = (
 )  # fmt: skip
 
 _FARTHEST, _LARGEST, _MOST = 100_000, 16_384, 100_000  # pixels away, of a window; ticks
+_MOST_STEPS = 100
 
 
 class Entry(Protocol):
@@ -53,7 +55,7 @@ class Window:
     @classmethod
     def read(cls, words: list[str]) -> Window:
         """Return what the *words* after the name say."""
-        width, height = (_whole(word, 1, _LARGEST) for word in _so_many(words, 2))
+        width, height = (whole(word, 1, _LARGEST) for word in so_many(words, 2))
         return cls(width, height)
 
     def __str__(self) -> str:
@@ -102,9 +104,9 @@ class Camera:
         for field, n in zip(fields(cls), (3, 3, 3, 1, 1, 1, 2), strict=True):
             if words[:1] != [field.name] or len(words) <= n:
                 raise ValueError(f"a camera needs {field.name!r} and {n} numbers here")
-            found[field.name] = tuple(_finite(word) for word in words[1 : n + 1])
+            found[field.name] = tuple(finite(word) for word in words[1 : n + 1])
             words = words[n + 1 :]
-        _so_many(words, 0)
+        so_many(words, 0)
         camera = cls(**found)
         near, far = camera.range
         sound = camera.position != camera.focus and any(camera.up) and camera.scale[0] > 0.0
@@ -162,7 +164,7 @@ class Input:
     @classmethod
     def read(cls, name: str, words: list[str]) -> Input:
         """Return what the *words* after the name say."""
-        x, y = (_whole(word, -_FARTHEST, _FARTHEST) for word in _so_many(words[:2], 2))
+        x, y = (whole(word, -_FARTHEST, _FARTHEST) for word in so_many(words[:2], 2))
         held: dict[str, Any] = {}
         for word in words[2:]:
             what, _, value = word.partition("=")
@@ -171,7 +173,7 @@ class Input:
             elif what == "key" and value:
                 held["key"] = value
             elif what == "code":
-                held["code"] = _whole(value, 0, 127)
+                held["code"] = whole(value, 0, 127)
             else:
                 raise ValueError(f"{word!r} is nothing that can be held down")
         return cls(name, x, y, **held)
@@ -207,12 +209,25 @@ class Ticks:
             view.interactor.InvokeEvent("TimerEvent")
 
 
+@dataclass(frozen=True)
+class Steps:
+    """How many the solver was given at the event before; a replay orders them before it."""
+
+    number: int
+
+    def __str__(self) -> str:
+        return f"Steps {self.number}"
+
+    def send(self, view: View) -> None:
+        """Do nothing by itself."""
+
+
 def read_entry(text: str) -> tuple[float, Entry]:
     """Return the time and the meaning of a line; ValueError says what is wrong with it."""
     moment, *words = text.split()
     if not words:
         raise ValueError(f"expected a time and an event; got {text[:60]!r}")
-    time, name, rest = _finite(moment), words[0], words[1:]
+    time, name, rest = finite(moment), words[0], words[1:]
     if name in EVENTS:
         return time, Input.read(name, rest)
     if name == "Window":
@@ -220,28 +235,7 @@ def read_entry(text: str) -> tuple[float, Entry]:
     if name == "Camera":
         return time, Camera.read(rest)
     if name == "Timer":
-        return time, Ticks(_whole(_so_many(rest, 1)[0], 1, _MOST))
+        return time, Ticks(whole(so_many(rest, 1)[0], 1, _MOST))
+    if name == "Steps":
+        return time, Steps(whole(so_many(rest, 1)[0], 1, _MOST_STEPS))
     raise ValueError(f"{name[:40]!r} is no event of a recording")
-
-
-def _so_many(words: list[str], n: int) -> list[str]:
-    if len(words) != n:
-        raise ValueError(f"expected {n} words, not {' '.join(words)[:60]!r}")
-    return words
-
-
-def _whole(word: str, least: int, most: int) -> int:
-    number = int(word) if word.removeprefix("-").isdecimal() and len(word) < 9 else None
-    if number is None or not least <= number <= most:
-        raise ValueError(f"expected a whole number from {least} to {most}; got {word[:40]!r}")
-    return number
-
-
-def _finite(word: str) -> float:
-    try:
-        number = float(word)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise ValueError(f"expected a number; got {word[:40]!r}")
-    return number
