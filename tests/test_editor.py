@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,7 @@ from vtk_segdeform.widgets.editing.bindings import BINDINGS
 from vtk_segdeform.widgets.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.region_selector import Paint, Tool
 from vtk_segdeform.widgets.view import View
+from vtk_segdeform.widgets.volume_overlay import VolumeOverlay
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -557,6 +559,46 @@ def test_opening_another_session_shows_it_and_goes_on_with_it(desk, tmp_path):
     pull_handle(desk, (0, -20))
     assert desk.session.can_undo
     assert not first.is_dragging
+
+
+def test_what_was_chosen_stays_chosen_when_another_session_is_opened(desk, tmp_path):
+    half = sausage().transformed(scale=0.5).mesh
+    path = tmp_path / "half.segdeform"
+    save_session(path, Session(half))
+    desk.type("3", "t", "v", "c", "4", "o", "3")
+    desk.editor.stage.selector.radius = 0.07 * desk.session.mesh.diagonal
+    before = desk.editor.stage
+    desk.editor.path = path
+    desk.type("ctrl+o", "ctrl+o")
+    stage = desk.editor.stage
+    assert stage is not before
+    assert desk.editor.mode is Mode.HANDLES
+    assert (stage.selector.tool, stage.selector.through) == (Tool.RECTANGLE, True)
+    assert stage.selector.radius == pytest.approx(0.07 * half.diagonal)
+    assert stage.cages.is_shown
+    desk.type("4")
+    assert stage.overlay.is_shown
+
+
+def test_volumes_are_prepared_beside_the_event_loop_in_the_mode_of_cages_too(desk, monkeypatch):
+    threads = []
+
+    def prepare(overlay):
+        threads.append(threading.current_thread())
+        own(overlay)
+
+    own = VolumeOverlay.prepare
+    monkeypatch.setattr(VolumeOverlay, "prepare", prepare)
+    desk.type("2")
+    desk.hand.key("o")
+    assert desk.editor.is_busy
+    assert "measuring local volumes" in desk.editor.status
+    assert not desk.editor.stage.overlay.is_shown
+    desk.settle()
+    assert desk.editor.stage.overlay.is_shown
+    assert desk.editor.stage.cages.GetEnabled()
+    assert threads != []
+    assert threading.main_thread() not in threads
 
 
 def test_opening_asks_again_when_something_was_done_in_between(desk, tmp_path):

@@ -86,6 +86,11 @@ class VolumeOverlay:
         """The share at the ends of the scale; None while hidden."""
         return self._half_range
 
+    @property
+    def is_prepared(self) -> bool:
+        """Whether `prepare` is done, so that `show` takes no longer than drawing."""
+        return self._local is not None
+
     def prepare(self) -> None:
         """Do ahead of time what the first `show` would have to wait for.
 

@@ -121,6 +121,7 @@ def toggle_overlay(desk: Desk) -> None:
     """Show the local volume change, or not."""
     desk.stage.overlay_wanted = not desk.stage.overlay_wanted
     desk.stage.show(desk.mode)
+    desk.bind_if_ready()  # which shows it, once it is prepared
 
 
 def toggle_volume(desk: Desk) -> None:

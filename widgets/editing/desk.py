@@ -195,10 +195,14 @@ class Desk:
         self.refresh()
 
     def bind_if_ready(self) -> None:
-        """Before handles are dragged, do as a job what the first move would have to wait for."""
-        ready = self._is_on and self._mode is Mode.DEFORM and self.session.is_ready
-        if ready and not self.session.is_bound and not self.is_busy:
-            self.start("binding the mesh to its cages", self.stage.bind, lambda _: None)
+        """Do as a job what the first move of a handle, or a look at volumes, had to wait for."""
+        stage, session = self.stage, self.session
+        if not self._is_on or self.is_busy:
+            return
+        if self._mode is Mode.DEFORM and session.is_ready and not session.is_bound:
+            self.start("binding the mesh to its cages", stage.bind, lambda _: None)
+        elif stage.wants_overlay(self._mode) and not stage.overlay.is_prepared:
+            self.start("measuring local volumes", stage.measure, lambda _: None)
 
     def _got_on(self) -> None:
         if not self.is_busy:
@@ -237,6 +241,7 @@ class Desk:
 
     def _take(self, session: Session) -> None:
         before, self.stage = self.stage, Stage(self.view, session)
+        self.stage.follow(before)
         other = not np.array_equal(session.mesh.vertices, before.session.mesh.vertices)
         self._stop_hearing()
         before.remove()

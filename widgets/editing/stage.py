@@ -92,14 +92,32 @@ class Stage:
             self.cages.show()
         else:
             self.cages.hide()
-        if self.overlay_wanted and mode in (Mode.CAGES, Mode.DEFORM):
+        if self.wants_overlay(mode) and self.overlay.is_prepared:
             self.overlay.show()
         else:
             self.overlay.hide()
 
+    def wants_overlay(self, mode: Mode) -> bool:
+        """Tell whether volumes are to be seen in *mode*: where something is deformed."""
+        return self.overlay_wanted and mode in (Mode.CAGES, Mode.DEFORM)
+
+    def follow(self, before: Stage) -> None:
+        """Go on with the tools of the stage *before*, and show what it did."""
+        mine, its = self.selector, before.selector
+        mine.tool, mine.through = its.tool, its.through
+        share = its.radius / before.session.mesh.diagonal
+        mine.radius = share * self.session.mesh.diagonal
+        self.dragger.local = before.dragger.local
+        self.cages_wanted, self.overlay_wanted = before.cages_wanted, before.overlay_wanted
+
     def bind(self, progress: Progress) -> None:
         """Do what the first drag would have to wait for; in any thread, while nothing is on."""
         self.session.bind(part(progress, 0.0, 0.9))
+        self.overlay.prepare()
+
+    def measure(self, progress: Progress) -> None:
+        """Do what a look at volumes would have to wait for; as `bind`."""
+        progress(0.0, "")
         self.overlay.prepare()
 
     def rest(self) -> None:
