@@ -85,11 +85,21 @@ class Words:
         "#RRGGBB".
     bold : bool
         Or of the usual weight.
+    typed : bool
+        As by a typewriter: brackets and commas are told apart better.
     layer : int
         As of a `Panel`.
     """
 
-    def __init__(self, renderer: Any, colour: str, *, bold: bool = False, layer: int = 1) -> None:
+    def __init__(
+        self,
+        renderer: Any,
+        colour: str,
+        *,
+        bold: bool = False,
+        typed: bool = False,
+        layer: int = 1,
+    ) -> None:
         self._renderer = renderer
         self._actor = vtkTextActor()
         self._actor.SetTextScaleModeToNone()
@@ -98,6 +108,8 @@ class Words:
         style = self._actor.GetTextProperty()
         style.SetColor(*(rgb(colour) / 255.0))
         style.SetBold(bold)
+        if typed:
+            style.SetFontFamilyToCourier()
         style.SetVerticalJustificationToCentered()
         renderer.AddViewProp(self._actor)
 

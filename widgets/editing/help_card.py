@@ -114,15 +114,17 @@ class HelpCard:
         for heading, rows in sections:
             for left, right in ((heading, ""), *rows):
                 is_heading = left is heading
-                self._put(left, INK if is_heading else _KEYS, (tabs[0], y), size)
-                self._put(right, INK, (tabs[1], y), size, bold=False)
+                colour = INK if is_heading else _KEYS
+                self._put(left, colour, (tabs[0], y), size, bold=True, key=not is_heading)
+                self._put(right, INK, (tabs[1], y), size)
                 y -= _LEADING * size
             y -= 0.5 * _LEADING * size
 
     def _put(
-        self, text: str, colour: str, at: tuple[float, float], size: float, *, bold: bool = True
-    ) -> Words:
-        words = Words(self.view.front, colour, bold=bold, layer=7)
+        self, text: str, colour: str, at: tuple[float, float], size: float,
+        *, bold: bool = False, key: bool = False,
+    ) -> Words:  # fmt: skip
+        words = Words(self.view.front, colour, bold=bold or key, typed=key, layer=7)
         words.say(text, size)
         words.place(*at)
         self._parts.append(words)
@@ -132,8 +134,8 @@ class HelpCard:
         """Return how wide the keys and what they do are, in letters."""
         rows = [row for _, rows in self.sections for row in rows]
         widths = [
-            [self._put(text, INK, (0.0, 0.0), _PROBE, bold=bold).width() for text in texts]
-            for texts, bold in (([key for key, _ in rows], True), ([say for _, say in rows], False))
+            [self._put(text, INK, (0.0, 0.0), _PROBE, key=key).width() for text in texts]
+            for texts, key in (([key for key, _ in rows], True), ([say for _, say in rows], False))
         ]
         self._clear_probes()
         keys, labels = (float(np.max(w, initial=0.0)) / _PROBE for w in widths)
