@@ -29,12 +29,15 @@ RIGHT = {
     "editor_in_a_plotter": lambda names: (
         names["moved"] > 0.2 and abs(names["session"].volume_change) < 1e-12
     ),
+    "editor_by_itself": lambda names: (
+        names["moved"] > 0.3 and abs(names["session"].volume_change) < 1e-12
+    ),
     "film_a_drag": lambda names: (
         len(names["changes"]) > 14 and max(map(abs, names["changes"])) < 1e-12
     ),
 }
 
-DRAW = {"editor_in_a_plotter", "film_a_drag"}  # in any case
+DRAW = {"editor_by_itself", "editor_in_a_plotter", "film_a_drag"}  # in any case
 
 
 def test_every_example_has_a_number_to_hold():

@@ -24,20 +24,16 @@ pytestmark = [
     ),
 ]
 
-# What is worked in.  It writes where the gizmo is whenever that may be grabbed, and the volume
-# of each pose that is drawn; the rest is what any user would write.
+# What is worked in, over pyvista or VTK alone.  It writes where the gizmo is whenever that may be
+# grabbed, and the volume of each pose that is drawn; the rest is what any user would write.
 WINDOW = """
 import json, sys
-import numpy as np
-import pyvista as pv
 import vtk_segdeform as sd
-from vtk_segdeform.convert import to_polydata
 
 place, log, path = sys.argv[1:]
 mesh = sd.models.cactus(1500)
 session = sd.Session(mesh)
-plotter = pv.Plotter(window_size=(800, 600), title="real window")
-editor = plotter.segdeform.edit(session, path=path)
+{opened}
 session.set_fixed(mesh.vertices[:, 2] < 0.1)
 session.add_handle(mesh.vertices[:, 2] > 0.9, "tip")
 volumes = []
@@ -49,12 +45,45 @@ def drawn(*_):
     with open(place, "w") as file:
         json.dump([editor.mode.name, editor.is_busy, editor.status, at, len(volumes)], file)
 
-plotter.camera_position = "xz"
-plotter.renderer.AddObserver("EndEvent", drawn)
-plotter.show()
+camera = editor.view.camera
+camera.SetFocalPoint(0.0, 0.0, 0.5)
+camera.SetPosition(0.0, -4.0, 0.5)
+camera.SetViewUp(0.0, 0.0, 1.0)
+editor.view.renderer.AddObserver("EndEvent", drawn)
+show()
 with open(log, "w") as file:
-    json.dump({"worst": max(map(abs, volumes)), "drawn": len(volumes)}, file)
+    json.dump({{"worst": max(map(abs, volumes)), "drawn": len(volumes)}}, file)
 """
+OPENED = {
+    "pyvista": """
+import pyvista as pv
+plotter = pv.Plotter(window_size=(800, 600), title="real window")
+editor = plotter.segdeform.edit(session, path=path)
+show = plotter.show
+""",
+    "vtk": """
+import vtkmodules.vtkRenderingUI
+from vtkmodules.vtkInteractionStyle import vtkInteractorStyleTrackballCamera
+from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow, vtkRenderWindowInteractor
+from vtk_segdeform.widgets import DeformEditor
+renderer, window, interactor = vtkRenderer(), vtkRenderWindow(), vtkRenderWindowInteractor()
+renderer.SetBackground(1.0, 1.0, 1.0)
+window.SetSize(800, 600)
+window.SetWindowName("real window")
+window.AddRenderer(renderer)
+interactor.SetRenderWindow(window)
+interactor.SetInteractorStyle(vtkInteractorStyleTrackballCamera())
+editor = DeformEditor((renderer, interactor), session)
+editor.path = path
+editor.On()
+
+def show():
+    window.Render()
+    interactor.Initialize()
+    interactor.Start()
+    editor.remove()
+""",
+}
 
 
 class Person:
@@ -113,8 +142,8 @@ class Person:
         time.sleep(0.3)
 
 
-@pytest.fixture
-def person(tmp_path):
+@pytest.fixture(params=OPENED)
+def person(tmp_path, request):
     number = 90 + os.getpid() % 900
     server = subprocess.Popen(
         ["Xvfb", f":{number}", "-screen", "0", "1024x768x24"], stderr=subprocess.DEVNULL
@@ -126,7 +155,7 @@ def person(tmp_path):
     time.sleep(1.0)
     files = [str(tmp_path / name) for name in ("place.json", "log.json", "work.segdeform")]
     script = tmp_path / "window.py"
-    script.write_text(WINDOW)
+    script.write_text(WINDOW.format(opened=OPENED[request.param]))
     process = subprocess.Popen(
         [sys.executable, str(script), *files], env=environment, stderr=subprocess.PIPE, text=True
     )

@@ -1,0 +1,82 @@
+"""The editor from a bare mesh to a bent one, by mouse and keys alone; it draws README pictures.
+
+    python examples/editor_by_itself.py FOLDER
+
+Regions are found and cages fitted, the foot and the tip are marked by rectangles, the tip is
+dragged aside and turned by the ring of its gizmo.
+"""
+
+import sys
+
+import numpy as np
+import pyvista as pv
+
+import vtk_segdeform as sd
+from vtk_segdeform.widgets import DeformEditor, replay
+
+mesh = sd.models.cactus(5430 if len(sys.argv) > 1 else 1500)
+plotter = pv.Plotter(off_screen=True, window_size=(1000, 700))
+plotter.set_background("white")
+editor = DeformEditor(plotter, mesh)
+editor.On()
+plotter.camera_position = [(0.4, -2.4, 0.85), (0.05, 0.0, 0.47), (0.0, 0.0, 1.0)]
+plotter.show(interactive=False, auto_close=False)
+session = editor.session
+
+
+def play(*lines):
+    """Do what *lines* of a recording say."""
+    replay(plotter, ["vtk_segdeform recording 1", *lines], busy=lambda: editor.is_busy)
+
+
+def keys(*names):
+    """Press keys, one after the other."""
+    play(*(f"0.0 KeyPress 5 300 key={name}" for name in names))
+
+
+def drag(places):
+    """Press at the first of some pixels, release at the last."""
+    seen = [f"{x:.0f} {y:.0f}" for x, y in places]
+    play(
+        f"0.0 MouseMove {seen[0]}",
+        f"0.0 LeftButtonPress {seen[0]}",
+        *(f"0.0 MouseMove {place}" for place in seen[1:]),
+        f"0.0 LeftButtonRelease {seen[-1]}",
+        "0.0 Timer 80",  # and what is left to refine
+    )
+
+
+def around(vertices):
+    """Return two corners of a rectangle around some vertices."""
+    seen = editor.view.to_display(session.vertices[vertices])[:, :2]
+    return seen.min(axis=0) - 3.0, seen.max(axis=0) + 3.0
+
+
+def picture(name):
+    """Keep what is seen, if a folder was named."""
+    if len(sys.argv) > 1:
+        plotter.screenshot(f"{sys.argv[1]}/{name}.png")
+
+
+height = mesh.vertices[:, 2]
+keys("g", "f", "2")
+picture("editor-cages")
+keys("3", "t", "v", "s")  # a rectangle, through the body, for what stays
+drag(around(height < 0.08))
+keys("d")  # and for what is dragged
+drag(around(height > 0.92))
+keys("4", "o")
+
+gizmo = editor.stage.dragger.gizmo
+(centre,) = editor.view.to_display(gizmo.centre[None])[:, :2]
+drag(centre + t * np.array([170.0, -75.0]) for t in np.linspace(0.0, 1.0, 20))
+(centre,) = editor.view.to_display(gizmo.centre[None])[:, :2]
+radius = 1.15 * gizmo.radius / editor.view.pixel_at(gizmo.centre)
+drag(centre + radius * np.array([np.cos(t), np.sin(t)]) for t in np.linspace(2.2, 1.0, 16))
+picture("editor-volume")
+keys("h")
+picture("editor-help")
+
+moved = np.linalg.norm(session.vertices - mesh.vertices, axis=1).max()
+print(f"moved by {moved:.2f}, volume changed by {session.volume_change:.0e} of itself")
+plotter.close()
