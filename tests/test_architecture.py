@@ -39,7 +39,7 @@ STORY = [
     "formats.ply", "formats.wavefront", "formats.vtk_readers", "meshlab", "convert", "palette",
     "canvas", "pictures",
     # a view, and widgets in it
-    "widgets.gestures", "widgets.sight", "widgets.view", "widgets.widget",
+    "widgets.gestures", "widgets.sight", "widgets.front", "widgets.view", "widgets.widget",
     "widgets.surface_display",
     # painting
     "widgets.painting.surface_distance", "widgets.painting.visibility", "widgets.picking",
@@ -55,14 +55,16 @@ STORY = [
     "widgets.handle_dragger",
     # what becomes of the volume
     "widgets.colouring.diverging", "widgets.colouring.legend", "widgets.volume_overlay",
+    # recordings and films
+    "widgets.filming.words", "widgets.filming.transcript", "widgets.filming.reading",
+    "widgets.recording", "widgets.filming.film_files", "widgets.filming.off_screen", "widgets.film",
     # the editor
     "widgets.editing.jobs", "widgets.editing.status_line", "widgets.editing.help_card",
     "widgets.editing.voice", "widgets.editing.work", "widgets.editing.stage",
-    "widgets.editing.hints", "widgets.editing.session_file", "widgets.editing.desk",
-    "widgets.editing.actions", "widgets.editing.bindings", "widgets.editor",
-    # recordings and films; pyvista's extension points
-    "widgets.filming.words", "widgets.filming.transcript", "widgets.filming.reading",
-    "widgets.recording", "widgets.filming.film_files", "widgets.filming.off_screen", "widgets.film",
+    "widgets.editing.hints", "widgets.editing.session_file", "widgets.editing.takes",
+    "widgets.editing.desk", "widgets.editing.actions", "widgets.editing.take_actions",
+    "widgets.editing.bindings", "widgets.editor",
+    # pyvista's extension points
     "plugin",
     # the command line
     "command_line.selection", "command_line.motion", "command_line.outputs", "command_line.demo",

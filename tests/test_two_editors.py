@@ -70,3 +70,11 @@ def test_one_that_was_removed_cannot_be_woken(halves):
     left.remove()
     with pytest.raises(RuntimeError, match="make another one"):
         left.On()
+
+
+def test_an_editor_alone_hears_keys_wherever_the_pointer_is(halves):
+    (left, right), hand = halves
+    right.remove()
+    hand.move(RIGHT)
+    hand.key("3")
+    assert left.mode is Mode.HANDLES

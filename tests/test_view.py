@@ -8,6 +8,7 @@ import pyvista as pv
 from hands import Hand, picture, plain_view
 from scenes import sausage
 from solids import icosphere
+from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from vtk_segdeform import Mesh, Session, models
 from vtk_segdeform.widgets.gestures import Gesture, Phase, Pointer
@@ -96,6 +97,10 @@ def test_a_view_is_made_from_a_plotter_or_a_pair_and_from_nothing_else():
         assert View.of((view.renderer, view.interactor)).renderer is view.renderer
         with pytest.raises(TypeError, match="view must be a pyvista plotter"):
             View.of("window")
+        with pytest.raises(TypeError, match=r"must be \(vtkRenderer, vtkRenderWindowInteractor\)"):
+            View.of((view.renderer, None))
+        with pytest.raises(ValueError, match="AddRenderer"):
+            View.of((vtkRenderer(), view.interactor))
     finally:
         plotter.close()
 

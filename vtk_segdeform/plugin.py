@@ -165,6 +165,8 @@ class PlotterTools:
         """Show the mesh of *session*, coloured by its local volume change, with a scale."""
         from .widgets.volume_overlay import VolumeOverlay
 
+        if not isinstance(session, Session):
+            raise TypeError(f"session must be a Session; got {type(session).__name__}")
         overlay = VolumeOverlay(self._plotter, session)
         self.added.append(overlay)
         overlay.show()
@@ -209,8 +211,7 @@ class PolyDataTools:
             preserve_volume=preserve_volume, progress=progress,
         )  # fmt: skip
         if solution.handle_error > _HANDLE_MET:
-            error = solution.handle_error
-            _log.warning("handle off by %.1e of the diagonal: %s", error, solution.status)
+            _log.warning("handle off by %.1e diagonals: %s", solution.handle_error, solution.status)
         return convert.with_vertices(self._surface, solution.vertices)
 
     def regions(self, n_regions: int | None = 3, progress: Progress | None = None) -> pv.PolyData:

@@ -70,6 +70,8 @@ class DeformEditor:
 
     @mode.setter
     def mode(self, mode: Mode) -> None:
+        if not isinstance(mode, Mode):
+            raise TypeError(f"mode must be one of {', '.join(map(str, Mode))}; got {mode!r}")
         self._desk.mode = mode
 
     @property

@@ -11,22 +11,23 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
-import numpy as np
 import vtkmodules.vtkRenderingFreeType
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - both: what renders, for whom pyvista is not
-from vtkmodules.vtkRenderingCore import vtkRenderer
+from vtkmodules.vtkCommonCore import vtkCommand
+from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindowInteractor
 
+from .front import Front
 from .gestures import Phase, Pointer
 from .sight import Sight
 
 _log = logging.getLogger(__name__)
 
 Stop = Callable[[], None]
-_SMALLEST = 8  # pixels, below which text would be a texture of nothing, of which VTK complains
 ABOVE_CAMERA = 1.0  # priority: VTK's own widgets have 0.5, camera styles 0
+_HEARS_KEYS = vtkCommand.UserEvent + 411  # never happens: a mark on renderers whose views do
 
 
 class View(Sight):
@@ -44,7 +45,7 @@ class View(Sight):
         super().__init__(renderer)
         self.interactor = interactor
         self._failures: list[Callable[[Exception], None]] = []
-        self._front: Any = None
+        self._front: Front | None = None
         self._stop_front: Stop | None = None
         self._depth = 0  # of callbacks within callbacks
         self._touched = False
@@ -55,10 +56,10 @@ class View(Sight):
         if isinstance(view, cls):
             return view
         if isinstance(view, tuple) and len(view) == 2:
-            return cls(*view)
+            return cls(*_checked_pair(*view))
         if hasattr(view, "iren") and hasattr(view, "renderer"):
             if view.iren is None:
-                raise ValueError("view: this plotter was made without an interactor")
+                raise ValueError("view: this plotter has no interactor, or was closed")
             return cls(view.renderer, view.iren.interactor)
         raise TypeError(
             f"view must be a pyvista plotter or (renderer, interactor); got {type(view).__name__}"
@@ -76,29 +77,16 @@ class View(Sight):
     def front(self) -> Any:
         """A vtkRenderer that looks the same way, its actors hidden by nothing; made on demand."""
         if self._front is None:
-            window = self.window
-            self._front = vtkRenderer()
-            layer = 1 + max(r.GetLayer() for r in _renderers(window) if self._overlaps(r))
-            window.SetNumberOfLayers(max(window.GetNumberOfLayers(), layer + 1))
-            self._front.SetLayer(layer)
-            self._front.InteractiveOff()
-            self._front.SetViewport(*self.renderer.GetViewport())
-            window.AddRenderer(self._front)
-            self._stop_front = self.before_render(self._follow)
-        return self._front
+            self._front = Front(self.renderer)
+            self._stop_front = self.before_render(self._front.follow)
+        return self._front.renderer
 
     def remove_front(self) -> None:
         """Take the `front` renderer out of the window, with all that is in it."""
-        if self._front is None:
-            return
-        if self._stop_front is not None:
+        if self._front is not None and self._stop_front is not None:
             self._stop_front()
-        self._front.RemoveAllViewProps()
-        window = self._front.GetRenderWindow()
-        if window is not None:
-            window.RemoveRenderer(self._front)
-            window.SetNumberOfLayers(1 + max((r.GetLayer() for r in _renderers(window)), default=0))
-        self._front = None
+            self._front.remove()
+            self._front = None
 
     def render(self) -> None:
         """Draw everything; nothing happens once the window is closed."""
@@ -135,7 +123,15 @@ class View(Sight):
                 command.SetAbortFlag(1)
 
         tag = self.interactor.AddObserver(event, called, priority)
-        return _once(lambda: self.interactor.RemoveObserver(tag))
+        if event != "KeyPressEvent":
+            return _once(lambda: self.interactor.RemoveObserver(tag))
+        mark = self.renderer.AddObserver(_HEARS_KEYS, lambda *_: None)
+
+        def stop() -> None:
+            self.interactor.RemoveObserver(tag)
+            self.renderer.RemoveObserver(mark)
+
+        return _once(stop)
 
     def before_render(self, callback: Callable[[], None]) -> Stop:
         """Call *callback* each time the renderer is about to draw; what it touches is drawn."""
@@ -172,12 +168,11 @@ class View(Sight):
 
     @property
     def is_addressed(self) -> bool:
-        """Whether keys are meant for this view: the pointer is in it, or in no other one."""
+        """Whether keys are meant for this view, not for another one that the pointer is in."""
         pointer = self.pointer(Phase.HOVER)
-        if self.contains(pointer):
-            return True
         other = self.interactor.FindPokedRenderer(*self.interactor.GetEventPosition())
-        return other is None or not Sight(other).contains(pointer)
+        elsewhere = other is not None and other.HasObserver(_HEARS_KEYS)
+        return self.contains(pointer) or not (elsewhere and Sight(other).contains(pointer))
 
     def pointer(self, phase: Phase) -> Pointer:
         """Return where the interactor has the pointer, as the given *phase*."""
@@ -201,8 +196,9 @@ class View(Sight):
             _log.info("a callback failed", exc_info=True)
             if not self._failures:
                 raise
-            for listener in list(self._failures):
-                listener(error)
+            with ExitStack() as told:  # one that fails keeps nobody from hearing
+                for listener in reversed(self._failures):
+                    told.callback(listener, error)
 
     @contextmanager
     def _drawn_after(self) -> Iterator[None]:
@@ -215,28 +211,6 @@ class View(Sight):
                 self._touched = False
                 self.render()
 
-    def _overlaps(self, other: Any) -> bool:
-        """Tell whether another renderer draws on a part of the window where this one does."""
-        mine, its = np.array([self.renderer.GetViewport(), other.GetViewport()])
-        return bool((np.maximum(mine, its)[:2] < np.minimum(mine, its)[2:]).all())
-
-    def _follow(self) -> None:
-        """Let the front renderer look where the renderer does, and both see all of both."""
-        self._front.SetViewport(*self.renderer.GetViewport())
-        self._front.SetDraw(min(self.renderer.GetSize()) >= _SMALLEST)
-        both = [r.ComputeVisiblePropBounds() for r in (self.renderer, self._front)]
-        bounds = np.array([b for b in both if b[0] <= b[1]])
-        if len(bounds):
-            low, high = bounds[:, ::2].min(axis=0), bounds[:, 1::2].max(axis=0)
-            self.renderer.ResetCameraClippingRange(*np.stack([low, high], axis=1).ravel())
-        # A copy: whoever takes a screenshot swaps the cameras while it draws.
-        self._front.GetActiveCamera().DeepCopy(self.camera)
-
-
-def _renderers(window: Any) -> list[Any]:
-    renderers = window.GetRenderers()
-    return [renderers.GetItemAsObject(k) for k in range(renderers.GetNumberOfItems())]
-
 
 def _once(action: Callable[[], object]) -> Stop:
     """Return a callable that does *action* the first time it is called."""
@@ -247,3 +221,13 @@ def _once(action: Callable[[], object]) -> Stop:
             waiting.pop()()
 
     return stop
+
+
+def _checked_pair(renderer: Any, interactor: Any) -> tuple[Any, Any]:
+    kinds = (renderer, vtkRenderer), (interactor, vtkRenderWindowInteractor)
+    for thing, kind in kinds:
+        if not isinstance(thing, kind):
+            raise TypeError(f"view must be (vtkRenderer, {kind.__name__}); got {thing!r}")
+    if renderer.GetRenderWindow() is None:
+        raise ValueError("view: the renderer is in no window; window.AddRenderer(renderer) first")
+    return renderer, interactor

@@ -34,7 +34,7 @@ class SessionFile:
     @property
     def is_ours(self) -> bool:
         """Whether nothing of others is lost by writing: it was written or read before."""
-        return self._ours == self.path or not os.path.lexists(self.path)
+        return self._ours == self.path or not os.path.isfile(self.path)
 
     def is_behind(self, session: Session) -> bool:
         """Tell whether something would be lost if *session* were given up now."""
