@@ -373,6 +373,13 @@ class Session(Timeline):
         self._go(replace(self._state, pose=pose), Change(0))
         return solution
 
+    def start_afresh(self) -> None:
+        """Let the next solve do what it would in a session just loaded, to the last bit.
+
+        The solver else remembers a little of how it got to the present pose.
+        """
+        self._posing.forget()
+
     def reset_pose(self) -> None:
         """Go back to rest; what is dragged is let go."""
         self._step("reset pose", replace(self._state, pose=None))

@@ -76,6 +76,10 @@ class Posing:
         self._bound = ((own, deformer), *self._bound)[:_KEPT]
         return deformer
 
+    def forget(self) -> None:
+        """Let the next `solve` start from its pose alone, as if that had just been loaded."""
+        self._at = None
+
     def vertices(self, state: State, pose: Pose) -> FloatArray:
         """Return the mesh (n, 3) in *pose* of *state*; read-only."""
         return self._evaluated(state, pose)[0]
