@@ -57,12 +57,16 @@ class Film:
         self.view.render()
         self._take()
 
-    def watch(self) -> Stop:
-        """Take a picture whenever the window was drawn, until what is returned is called."""
+    def watch(self, when: Callable[[], bool] | None = None) -> Stop:
+        """Take a picture whenever the window was drawn, until what is returned is called.
+
+        With *when*, only of what is drawn while it returns True.
+        """
 
         def called(*_: object) -> None:
             with self.view.guarded():
-                self._take()
+                if when is None or when():
+                    self._take()
 
         window = self.view.window
         tag = window.AddObserver("EndEvent", called)

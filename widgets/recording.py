@@ -25,6 +25,7 @@ flag; not from VTK's passive ones, which are called before everybody else.  The 
 
 from __future__ import annotations
 
+import itertools
 import os
 import sys
 import time
@@ -53,6 +54,10 @@ class Recorder:
         Whose events.
     path : path, optional
         A text file that each event is added to at once, so that it is there after a crash.
+    keys : str
+        Letters and digits that a replay is to type first.
+    skips : callable, optional
+        Tells of an `Input` whether to leave it out.
 
     Raises
     ------
@@ -60,8 +65,16 @@ class Recorder:
         If *path* cannot be written.
     """
 
-    def __init__(self, view: Any, path: str | os.PathLike[str] | None = None) -> None:
+    def __init__(
+        self,
+        view: Any,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        keys: str = "",
+        skips: Callable[[Input], bool] | None = None,
+    ) -> None:
         self.view = View.of(view)
+        self._skips = skips
         self.lines: list[str] = []
         self._start = time.monotonic()
         self._told: dict[type, Entry] = {}
@@ -73,6 +86,9 @@ class Recorder:
         vtk = vtkVersion.GetVTKVersion()
         self._write(f"# vtk_segdeform {__version__}, VTK {vtk}, {sys.platform}")
         self._tell_scene()
+        x, y = self.view.interactor.GetEventPosition()
+        for key, name in itertools.product(keys, ("KeyPress", "Char", "KeyRelease")):
+            self._tell(Input(name, x, y, key=key, code=ord(key)))
         self._tags = [self._watch(name) for name in (*EVENTS, "Timer")]
         self._stop_steps = on_steps(self.view.interactor, self._solves)
 
@@ -108,10 +124,13 @@ class Recorder:
         if name == "Timer":
             self._ticks += 1
             return
+        entry = Input.of(name, self.view.interactor)
+        if self._skips is not None and self._skips(entry):
+            return
         self._tell_ticks()
         if name.endswith("Press"):  # what follows depends on where the camera is
             self._tell_scene()
-        self._tell(Input.of(name, self.view.interactor))
+        self._tell(entry)
 
     def _solves(self, steps: int) -> None:
         with self.view.guarded():

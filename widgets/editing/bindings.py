@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..region_selector import Paint, Tool
-from . import actions
+from . import actions, take_actions
 from .actions import Action
 from .help_card import Section
 from .stage import Mode
@@ -53,6 +53,8 @@ BINDINGS = (
     Binding(("p",), ALL, "hold or free the volume", actions.toggle_volume),
     Binding(("ctrl+s",), ALL, "save", actions.save),
     Binding(("ctrl+o",), ALL, "open", actions.open_file),
+    Binding(("ctrl+r",), ALL, "record what you do", take_actions.record),
+    Binding(("ctrl+m",), ALL, "film the drags", take_actions.film),
     Binding(("h", "f1", "question"), ALL, "this card", actions.toggle_help, while_busy=True),
     Binding(("escape",), ALL, "cancel", actions.cancel, while_busy=True),
     Binding(("b",), PAINTING, "brush", actions.with_tool(Tool.BRUSH)),

@@ -23,6 +23,7 @@ from .help_card import HelpCard, Section
 from .hints import hint
 from .session_file import SessionFile, read_bound
 from .stage import Mode, Stage
+from .takes import Takes
 from .voice import Voice
 from .work import Work
 
@@ -49,12 +50,15 @@ class Desk:
         The card of keys.
     voice : Voice
         What is said in the line at the bottom.
+    takes : Takes
+        The recording and the film that are going on.
     """
 
     def __init__(self, view: View, session: Session, keys: list[Section]) -> None:
         self.view = view
         self.help = HelpCard(view, keys)
         self.voice = Voice(view)
+        self.takes = Takes(view)
         self._mode = Mode.REGIONS
         self._is_on = False
         self._work = Work(view, self._got_on)
@@ -100,6 +104,7 @@ class Desk:
         self.is_on = False
         self._stop_hearing()
         self._stop_failures()
+        self.takes.remove()
         self.stage.remove()
         self.help.remove()
         self.voice.remove()
@@ -119,7 +124,7 @@ class Desk:
 
     def refresh(self) -> None:
         """Say what there is to say now."""
-        mode = f"{self._mode.value} {self._mode.name}"
+        mode = " · ".join([f"{self._mode.value} {self._mode.name}", *self.takes.words])
         if self._work.job is not None:
             self.voice.tell_of(self._work.job, mode, self._work.doing)
         elif self._is_on:
@@ -161,13 +166,7 @@ class Desk:
     def start(
         self, doing: str, work: Callable[[Progress], Any], done: Callable[[Any], object]
     ) -> None:
-        """Do *work* in another thread, and then *done*, in this one, with what it returned.
-
-        Raises
-        ------
-        SessionError
-            If there is another job.
-        """
+        """Do *work* in another thread, then *done* here with what it returned; see `Work.start`."""
 
         def finish(result: Any) -> None:
             done(result)
