@@ -68,7 +68,8 @@ STORY = [
     "plugin",
     # the command line
     "command_line.selection", "command_line.motion", "command_line.outputs", "command_line.demo",
-    "command_line.interactive", "command_line.bench", "command_line.commands", "cli", "__main__",
+    "command_line.interactive", "command_line.bench", "command_line.commands",
+    "command_line.progress_bar", "command_line.replaying", "cli", "__main__",
 ]  # fmt: skip
 
 NUMERIC = {"numpy", "scipy"}
@@ -86,6 +87,7 @@ GRANTED = {
     "canvas": VTK | {"pyvista"},
     "pictures": VTK | {"pyvista"},
     "command_line.outputs": {"pyvista"},
+    "command_line.replaying": {"pyvista"},
     "plugin": {"pyvista"},
 }
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hands import picture, plain_view
 from PIL import Image
 from test_editor import Desk, desk, pull_handle, ready  # noqa: F401 - two of them are fixtures
 
-from vtk_segdeform import load_session
+from vtk_segdeform import load_session, read_mesh
+from vtk_segdeform.cli import main
 from vtk_segdeform.widgets.editor import Mode
 from vtk_segdeform.widgets.recording import replay
 from vtk_segdeform.widgets.region_selector import Tool
@@ -91,3 +94,26 @@ def test_a_second_recording_leaves_the_first(desk, tmp_path):  # noqa: F811
     assert (tmp_path / "work.recording-2.txt").exists()
     lines = (tmp_path / "work.recording-2.txt").read_text()
     assert "control key=r" not in lines
+
+
+def test_two_files_are_replayed_from_the_command_line(desk, tmp_path, capsys):  # noqa: F811
+    desk.editor.path = tmp_path / "work.segdeform"
+    desk.type("4", "ctrl+r")
+    pull_handle(desk)
+    desk.hand.tick(2)
+    desk.type("ctrl+r")
+    film, mesh = tmp_path / "bug.gif", tmp_path / "out.ply"
+    text, start = (str(tmp_path / f"work.recording.{end}") for end in ("txt", "segdeform"))
+    assert main(["replay", text, start, "--film", str(film), "-o", str(mesh)]) == 0
+    told = capsys.readouterr().out
+    assert "pictures" in told
+    assert "said" not in told
+    assert np.allclose(read_mesh(mesh).vertices, desk.session.vertices, atol=1e-9)
+    with Image.open(film) as pictures:
+        assert pictures.n_frames > 4
+
+    lines = Path(text).read_text().splitlines()
+    lines[6] = "0.5 MouseMove ten 3"
+    Path(text).write_text("\n".join(lines))
+    assert main(["replay", text, start, "--film", str(film)]) == 1
+    assert "line 7: expected a whole number" in capsys.readouterr().err

@@ -13,15 +13,16 @@ import argparse
 import os
 import re
 import sys
-import time
 from collections.abc import Sequence
 from ctypes.util import find_library
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from . import __version__
 from .command_line import commands
 from .command_line.bench import bench
+from .command_line.progress_bar import ProgressBar
+from .command_line.replaying import replay_command
 from .errors import ConstraintError, SegDeformError
 
 _TAKE_VECTORS = ("--rotate", "--pivot", "--translate")
@@ -45,6 +46,7 @@ examples:
   segdeform deform a.off -o b.off --fixed a.sel --handle a.sel --matrix a.def --regions auto
   segdeform deform in.vtp -o out.vtp --fixed 'z<5%' \\
       --handle left.txt --translate 0,0,0.2   --handle right.txt --rotate x,30 --pivot 0,0,1
+  segdeform replay horse.recording.txt horse.recording.segdeform --film bug.gif
   segdeform regions horse.ply -o regions.vtp --regions 6
   segdeform cages horse.ply -o cages.vtp --regions 6 --cage-vertices 300
 
@@ -80,30 +82,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         print(f"segdeform {options.command}: {_told(error)}", file=sys.stderr)
         return MISUSED if isinstance(error, ConstraintError) else FAILED
-
-
-class ProgressBar:
-    """One line, rewritten in place, when a person is watching and has waited for a second."""
-
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-        self._start = time.monotonic()
-        self._shown = False
-
-    def __call__(self, fraction: float, message: str) -> None:
-        """Show that *fraction* of the work is done, and what is going on."""
-        if self._stream.isatty() and time.monotonic() - self._start > 1.0:
-            filled = "#" * round(30 * min(max(fraction, 0.0), 1.0))
-            self._stream.write(f"\r[{filled:.<30}] {fraction:4.0%} {message:<40.40}")
-            self._stream.flush()
-            self._shown = True
-
-    def clear(self) -> None:
-        """Wipe the line, so that text can be written there."""
-        if self._shown:
-            self._stream.write("\r\x1b[K")
-            self._stream.flush()
-            self._shown = False
 
 
 def _draw_without_a_screen() -> None:
@@ -184,6 +162,11 @@ def _parser() -> argparse.ArgumentParser:
 
     sub = command("edit", commands.edit, "open a window to deform a mesh, or a saved session, in")
     _input_output(sub, required=False)
+
+    sub = command("replay", replay_command, "do again what was recorded in a window by Ctrl+R")
+    sub.add_argument("recording", type=Path, metavar="RECORDING", help="NAME.recording.txt")
+    _input_output(sub, required=False)
+    sub.add_argument("--film", type=Path, metavar="OUT", help="off-screen, to a .gif or an .mp4")
 
     sub = command("check", commands.check, "report the faults of a mesh, and repair them")
     _input_output(sub, required=False)

@@ -90,12 +90,7 @@ def edit(options: Namespace, say: Say, progress: Progress) -> bool:
     del progress  # the window has its own
     if options.output is not None:
         convert.require_writable(options.output)
-    if options.input.suffix == SESSION:
-        session = load_session(options.input)
-        surface = convert.to_polydata(session.mesh)
-    else:
-        surface, mesh = _read(options.input)
-        session = Session(mesh)
+    surface, session = opened(options.input)
     plugin.require_screen()
     session = plugin.edit(
         session, path=options.input.with_suffix(SESSION), title=f"segdeform {options.input.name}"
@@ -159,6 +154,15 @@ def cages(options: Namespace, say: Say, progress: Progress) -> bool:
         convert.write_mesh(options.output, coloured_cages(made))
         say(f"written         {options.output}")
     return True
+
+
+def opened(path: Path) -> tuple[Any, Session]:
+    """Return a surface with all its arrays and a session of it, or the saved one."""
+    if path.suffix == SESSION:
+        session = load_session(path)
+        return convert.to_polydata(session.mesh), session
+    surface, mesh = _read(path)
+    return surface, Session(mesh)
 
 
 def _read(path: Path) -> tuple[Any, Mesh]:
