@@ -59,7 +59,7 @@ $(VENV)/installed: setup.cfg pyproject.toml | $(BIN)/python
 	@touch $@
 
 $(VENV)/installed-test: setup.cfg pyproject.toml | $(BIN)/python
-	$(PIP) install --editable '.[test,meshlab]'
+	$(PIP) install --editable '.[test,qt,meshlab]'
 	@touch $@ $(VENV)/installed
 
 $(BIN)/python:

@@ -1,0 +1,122 @@
+"""Hands for Qt: real mouse and key events, sent to a widget on an X server of the tests' own.
+
+Qt draws VTK by an OpenGL widget, which its "offscreen" platform cannot: it takes an X server.
+The other tests of the same process go on drawing off-screen.  Where there is no Qt, no
+pyvistaqt or no Xvfb, the tests of whoever imports this are skipped.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable
+
+import hands  # noqa: F401 - skips where nothing can be drawn
+import numpy as np
+import pytest
+
+from vtk_segdeform.widgets.view import View
+
+QtWidgets = pytest.importorskip("qtpy.QtWidgets", reason="needs Qt", exc_type=ImportError)
+pytest.importorskip("pyvistaqt", reason="needs pyvistaqt", exc_type=ImportError)
+from qtpy import QtCore, QtTest  # noqa: E402 - only now is it known to be there
+
+if not shutil.which("Xvfb"):
+    pytest.skip("needs Xvfb (apt-get install xvfb)", allow_module_level=True)
+
+Qt = QtCore.Qt
+_SPECIAL = {"Escape": Qt.Key_Escape, "Home": Qt.Key_Home, "Delete": Qt.Key_Delete}
+
+
+@functools.cache
+def application():
+    """Return the one Qt application of the process, on a screen of its own."""
+    # Where it lacks a library of X, Qt ends the process; somebody else's, at first.
+    code = "from qtpy import QtWidgets; QtWidgets.QApplication([])"
+    on_x = {"QT_QPA_PLATFORM": "xcb"}
+    tried = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False,
+        env={**os.environ, **on_x, "DISPLAY": _new_screen()},
+    )  # fmt: skip
+    if tried.returncode:
+        pytest.skip(f"Qt cannot use X here: {' '.join(tried.stderr.split())[:300]}")
+    with pytest.MonkeyPatch.context() as patch:  # nobody else is to see the screen
+        for name, value in {**on_x, "DISPLAY": _new_screen()}.items():
+            patch.setenv(name, value)
+        return QtWidgets.QApplication(["segdeform tests"])
+
+
+def _new_screen() -> str:
+    """Start an X server that ends when the last of those who use it is gone; return its name."""
+    reading, writing = os.pipe()
+    os.set_inheritable(writing, True)
+    screen = ["-screen", "0", "1600x1200x24", "-nolisten", "tcp"]
+    os.posix_spawnp(
+        "Xvfb", ["Xvfb", "-terminate", "-displayfd", str(writing), *screen], os.environ,
+        file_actions=[(os.POSIX_SPAWN_OPEN, 2, os.devnull, os.O_WRONLY, 0)],
+    )  # fmt: skip
+    os.close(writing)
+    with os.fdopen(reading) as numbers:
+        return f":{numbers.readline().strip()}"
+
+
+def until(seen: Callable[[], object], what: str, seconds: float = 30.0) -> None:
+    """Let Qt's event loop run until *seen* returns something true."""
+    end = time.monotonic() + seconds
+    while not seen():
+        assert time.monotonic() < end, f"waited in vain for {what}"
+        application().processEvents()
+        time.sleep(0.002)
+
+
+class QtHand:
+    """A hand on the mouse and the keyboard of a Qt widget that shows a view.
+
+    Positions are VTK's, in its pixels from the lower left corner.
+    """
+
+    def __init__(self, widget, view: View) -> None:
+        self.widget, self.view = widget, view
+        self.failures: list[Exception] = []
+        view.on_failure(self.failures.append)
+
+    def at(self, point: Iterable[float]) -> tuple[float, float]:
+        """Return where a world *point* is seen."""
+        x, y, _ = self.view.to_display(np.array([list(point)]))[0]
+        return float(x), float(y)
+
+    def move(self, position) -> None:
+        QtTest.QTest.mouseMove(self.widget, self._pixel(position))
+        application().processEvents()
+
+    def press(self, position, held=Qt.NoModifier) -> None:
+        self.move(position)
+        QtTest.QTest.mousePress(self.widget, Qt.LeftButton, held, self._pixel(position))
+        application().processEvents()
+
+    def release(self, position, held=Qt.NoModifier) -> None:
+        QtTest.QTest.mouseRelease(self.widget, Qt.LeftButton, held, self._pixel(position))
+        application().processEvents()
+
+    def drag(self, positions, held=Qt.NoModifier) -> None:
+        """Press at the first of *positions*, move through the others, release at the last."""
+        positions = list(positions)
+        self.press(positions[0], held)
+        for position in positions[1:]:
+            self.move(position)
+        self.release(positions[-1], held)
+
+    def key(self, key: str, held=Qt.NoModifier) -> None:
+        """Type a letter, or "Escape"."""
+        code = _SPECIAL.get(key) or getattr(Qt, f"Key_{key.upper()}")
+        QtTest.QTest.keyClick(self.widget, code, held)
+        application().processEvents()
+
+    def _pixel(self, position):
+        """Return a place as Qt has it: device-independent, from the upper left corner."""
+        x, y = np.asarray(position, dtype=float) / self.widget.devicePixelRatioF()
+        return QtCore.QPoint(round(float(x)), round(self.widget.height() - 1 - float(y)))
