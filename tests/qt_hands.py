@@ -37,7 +37,8 @@ def application():
     """Return the one Qt application of the process, on a screen of its own."""
     # Where it lacks a library of X, Qt ends the process; somebody else's, at first.
     code = "from qtpy import QtWidgets; QtWidgets.QApplication([])"
-    on_x = {"QT_QPA_PLATFORM": "xcb"}
+    # VTK's off-screen windows are EGL's; a thread cannot change between that and GLX.
+    on_x = {"QT_QPA_PLATFORM": "xcb", "QT_XCB_GL_INTEGRATION": "xcb_egl"}
     tried = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False,
         env={**os.environ, **on_x, "DISPLAY": _new_screen()},

@@ -170,6 +170,34 @@ def test_a_thread_that_computes_gets_on_while_the_window_is_idle():
     assert delivered == ["counted"]
 
 
+def test_a_job_gets_on_while_the_camera_is_dragged_and_is_delivered_after_it(line):
+    view, told, done = line.view, [], []
+    hand = Hand(view)
+    go_on = threading.Event()
+
+    def work(progress):
+        progress(0.5, "half")
+        assert go_on.wait(20.0)
+        return "all"
+
+    hand.press((100, 150))  # the camera style has every event to itself now
+    hand.move((120, 150))
+    Job(view, work, done=done.append, watch=lambda job: told.append((job.text, job.is_running)))
+    for _ in range(20):
+        hand.tick()
+        time.sleep(0.01)
+    assert told == [("half", True)]
+    go_on.set()
+    for _ in range(5):
+        hand.tick()
+    assert done == []
+    hand.release((130, 150))
+    for _ in range(5):
+        hand.tick()
+    assert done == ["all"]
+    assert hand.failures == []
+
+
 # The line at the bottom.
 
 

@@ -150,7 +150,7 @@ class View(Sight):
     def every(self, milliseconds: int, callback: Callable[[], None]) -> Stop:
         """Call *callback* again and again from the event loop, until stopped.
 
-        Not while a camera style drags: it keeps the timer's events to itself as well.
+        Not while a camera style drags: it keeps the timer's events to itself as well; see `pulse`.
         """
 
         def ticked() -> bool:
@@ -165,6 +165,20 @@ class View(Sight):
             self.interactor.DestroyTimer(timer)
 
         return _once(stop_both)
+
+    def pulse(self, callback: Callable[[], None]) -> Stop:
+        """Call *callback* at the ticks of all timers, also while a camera style drags.
+
+        It may draw, but neither observe the interactor nor stop anything there.
+        """
+
+        def ticked(*_: object) -> None:
+            with self.guarded(), self._drawn_after():
+                callback()
+
+        tag = self.interactor.AddObserver("TimerEvent", ticked)
+        self.interactor.GetCommand(tag).SetPassiveObserver(1)
+        return _once(lambda: self.interactor.RemoveObserver(tag))
 
     @property
     def is_addressed(self) -> bool:

@@ -2,10 +2,10 @@
 
     Job(view, lambda progress: fit_cages(mesh, regions, progress=progress), done=keep)
 
-A timer of the view looks after the work: it hands the thread some time, tells whoever watches how
-far the work is, and, when it has ended, delivers what it returned or raises what it raised.  So
-all but *work* itself happens in the thread of the window, and a failure reaches
-`View.on_failure`.
+A timer of the view looks after the work: it hands the thread some time and tells whoever watches
+how far the work is, also while the camera is dragged; and, when it has ended and the camera is
+left alone, delivers what it returned or raises what it raised.  So all but *work* itself happens
+in the thread of the window, and a failure reaches `View.on_failure`.
 
 A VTK loop that waits for events keeps Python's lock; without the timer other threads would stand
 still.
@@ -76,7 +76,7 @@ class Job(Generic[T]):
         thread = futures.ThreadPoolExecutor(1, "segdeform job")
         self._future = thread.submit(work, self._report)
         thread.shutdown(wait=False)  # the thread goes when the work is done
-        self._stop_timer = view.every(_PERIOD, self._look)
+        self._stops = view.pulse(self._attend), view.every(_PERIOD, self._look)
 
     @property
     def fraction(self) -> float:
@@ -120,17 +120,21 @@ class Job(Generic[T]):
             raise Cancelled("cancelled; nothing was changed")
         self._news = fraction, text
 
-    def _look(self) -> None:
+    def _attend(self) -> None:
         futures.wait([self._future], timeout=_SHARE)
+        is_news = self._news != self._told and time.monotonic() - self._told_at > _NEWS
+        if is_news and not self._ended:
+            self._tell()
+
+    def _look(self) -> None:
         if self._future.done():
             self._deliver()
-        elif self._news != self._told and time.monotonic() - self._told_at > _NEWS:
-            self._tell()
 
     def _deliver(self) -> None:
         if self._ended:  # the timer fires once more while `done` waits for something
             return
-        self._stop_timer()
+        for stop in self._stops:
+            stop()
         self._ended = True
         error = self._future.exception()
         self._stopping |= isinstance(error, Cancelled)
