@@ -37,8 +37,10 @@ def application():
     """Return the one Qt application of the process, on a screen of its own."""
     # Where it lacks a library of X, Qt ends the process; somebody else's, at first.
     code = "from qtpy import QtWidgets; QtWidgets.QApplication([])"
-    # VTK's off-screen windows are EGL's; a thread cannot change between that and GLX.
-    on_x = {"QT_QPA_PLATFORM": "xcb", "QT_XCB_GL_INTEGRATION": "xcb_egl"}
+    # VTK's off-screen windows are EGL's; a thread cannot change between that and GLX.  Qt looks
+    # when it first draws.
+    os.environ["QT_XCB_GL_INTEGRATION"] = "xcb_egl"
+    on_x = {"QT_QPA_PLATFORM": "xcb"}
     tried = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False,
         env={**os.environ, **on_x, "DISPLAY": _new_screen()},
