@@ -54,7 +54,8 @@ STORY = [
     "widgets.dragging.handle_marks", "widgets.dragging.pace", "widgets.dragging.live_solve",
     "widgets.handle_dragger",
     # what becomes of the volume
-    "widgets.colouring.diverging", "widgets.colouring.legend", "widgets.volume_overlay",
+    "widgets.colouring.diverging", "widgets.colouring.legend", "widgets.colouring.region_volumes",
+    "widgets.volume_overlay",
     # recordings and films
     "widgets.filming.words", "widgets.filming.transcript", "widgets.filming.reading",
     "widgets.recording", "widgets.filming.film_files", "widgets.filming.off_screen", "widgets.film",

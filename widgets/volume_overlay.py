@@ -26,15 +26,13 @@ import time
 from typing import Any
 
 from vtk_segdeform.arrays import FloatArray
-from vtk_segdeform.constraints import VolumeConstraint, region_volumes
 from vtk_segdeform.editing.listeners import Change
 from vtk_segdeform.local_volume import LocalVolume
-from vtk_segdeform.mesh import Mesh
-from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
 
 from .colouring.diverging import colours_of, half_range_for
-from .colouring.legend import Legend, signed
+from .colouring.legend import Legend, precise, signed
+from .colouring.region_volumes import RegionVolumes
 from .surface_display import SurfaceDisplay
 from .view import Stop, View
 
@@ -65,7 +63,7 @@ class VolumeOverlay:
         self._legend = Legend(self.view, "local volume")
         self._clock = _FrameClock(self.view)
         self._local: LocalVolume | None = None
-        self._volumes: tuple[Regions, list[tuple[int, VolumeConstraint]]] | None = None
+        self._regions = RegionVolumes(session)
         self._change: FloatArray | None = None
         self._half_range: float | None = None
         self._light = _SOFT
@@ -152,10 +150,10 @@ class VolumeOverlay:
     def _lines(self, change: FloatArray) -> list[tuple[str, int | None]]:
         low, high = (signed(100.0 * float(share), 0) for share in (change.min(), change.max()))
         lines: list[tuple[str, int | None]] = [
-            (f"volume: {_precise(self.session.volume_change)}", None),
+            (f"volume: {precise(self.session.volume_change)}", None),
             (f"local: {low} to {high} %", None),
         ]
-        regions = self._region_changes()
+        regions = self._regions.changes()
         lines += [
             (f"region {region}: {signed(100.0 * share, 1)} %", region)
             for region, share in regions[:_MOST_REGIONS]
@@ -166,23 +164,6 @@ class VolumeOverlay:
         work = [f"{solution.steps} step{'s' * (solution.steps != 1)}"] if solution else []
         work += [f"{1000.0 * seconds:.0f} ms a frame"] if seconds is not None else []
         return lines + [(", ".join(work), None)] if work else lines
-
-    def _region_changes(self) -> list[tuple[int, float]]:
-        """Return the number of each region that owns a face, and its (V - V0) / V0."""
-        session, regions = self.session, self.session.regions
-        if regions is None or regions.n_regions == 1:
-            return []
-        if self._volumes is None or self._volumes[0] is not regions:
-            self._volumes = regions, _owned_volumes(session.mesh, regions)
-        owners, volumes = zip(*self._volumes[1], strict=True)
-        if session.state.pose is None:
-            return [(owner, 0.0) for owner in owners]
-        if session.solution is not None:  # the solver has them already
-            shares = session.solution.region_volume_change.tolist()
-        else:
-            x = session.vertices
-            shares = [volume.violation(x) / volume.target for volume in volumes]
-        return list(zip(owners, shares, strict=True))
 
 
 class _FrameClock:
@@ -224,18 +205,3 @@ class _FrameClock:
         if self._posed and self._began is not None:
             self.seconds = time.perf_counter() - self._began
         self._began, self._posed = None, False
-
-
-def _owned_volumes(mesh: Mesh, regions: Regions) -> list[tuple[int, VolumeConstraint]]:
-    """Return the volume of each region that owns a face, with the region's number."""
-    labels = regions.labels
-    owned = []
-    for volume in region_volumes(mesh, labels):
-        a, b, c = labels[volume.faces[0]].tolist()  # its own, and owned by the rule told there
-        owned.append((b if b == c else a, volume))
-    return owned
-
-
-def _precise(share: float) -> str:
-    """Write a share in per cent, or with its power of ten where that would read as nothing."""
-    return f"{signed(100.0 * share, 1)} %" if abs(share) >= 1e-3 or not share else f"{share:+.1e}"

@@ -119,6 +119,15 @@ def signed(number: float, digits: int) -> str:
     return f"{rounded:+.{digits}f}".removesuffix(".0") if rounded else "0"
 
 
+def precise(share: float) -> str:
+    """Write a share in per cent, or with its power of ten where that would read as nothing.
+
+    >>> precise(0.025), precise(2e-16), precise(0.0)
+    ('+2.5 %', '+2.0e-16', '0 %')
+    """
+    return f"{signed(100.0 * share, 1)} %" if abs(share) >= 1e-3 or not share else f"{share:+.1e}"
+
+
 def _scalar_bar(title: str) -> Any:
     bar = vtkScalarBarActor()
     bar.SetTitle(title)
