@@ -44,6 +44,11 @@ _VTK_WRITES = frozenset({".stl", ".vtk", ".vtp", ".vtkhdf"})
 _HOLD_ARRAYS = frozenset({".ply", ".vtk", ".vtp", ".vtkhdf"})
 
 
+def is_mesh_file(path: str | Path) -> bool:
+    """Tell whether *path* has a suffix of a format that `read_mesh` knows."""
+    return Path(path).suffix.lower() in {*_READERS, *_VTK_READS, *meshlab.READS}
+
+
 def read_mesh(path: str | Path) -> Mesh:
     """Return the closed mesh in a file.
 
@@ -91,8 +96,8 @@ def read_polydata(path: str | Path) -> pv.PolyData:
             f"{path}: {'a folder, not a' if path.is_dir() else 'there is no such'} file"
         )
     suffix = path.suffix.lower()
-    known = {*_READERS, *_VTK_READS, *meshlab.READS}
-    if suffix not in known:
+    if not is_mesh_file(path):
+        known = {*_READERS, *_VTK_READS, *meshlab.READS}
         raise MeshError(f"{path}: cannot read {suffix or 'no suffix'}; can {_listed(known)}")
     try:
         if suffix in _READERS:

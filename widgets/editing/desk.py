@@ -228,12 +228,11 @@ class Desk:
         self.say(f"saved to {self.file.path}")
 
     def open(self, path: Path) -> None:
-        """Go on, when the job is done, with the session in *path*, which becomes the file."""
+        """Go on, when the job is done, with the session or the mesh in *path*."""
 
         def take(session: Session) -> None:
             self._take(session)
-            self.file.path = path
-            self.file.keeps(session)
+            self.file.took(path, session)
             self.say(f"opened {path}")
 
         self.start(f"opening {path}", lambda progress: read_bound(path, progress), take)
