@@ -21,6 +21,7 @@ from typing import Any
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.session import Session
 
+from .editing.actions import Action
 from .editing.bindings import binding_of, help_sections, key_cap, modes_of, pressed_key
 from .editing.desk import Desk
 from .editing.stage import Mode, Stage
@@ -64,6 +65,11 @@ class DeformEditor:
         return self._desk.stage
 
     @property
+    def desk(self) -> Desk:
+        """What the actions of `editing.actions` work on, for `do`."""
+        return self._desk
+
+    @property
     def mode(self) -> Mode:
         """What the mouse does; may be set, also to one that still lacks something."""
         return self._desk.mode
@@ -97,6 +103,19 @@ class DeformEditor:
         """Stand still until no job is running; what one raises comes out.  For scripts."""
         self._desk.wait()
 
+    def do(self, action: Action, *, while_busy: bool = False) -> None:
+        """Do one of `editing.actions` as if its key were typed; what goes wrong is said.
+
+        Parameters
+        ----------
+        action : callable
+            ``action(desk)``.
+        while_busy : bool
+            Whether it can be done beside a job; else, if there is one, that is said instead.
+        """
+        with self.view.guarded():
+            self._do(action, while_busy)
+
     def save(self, path: str | os.PathLike[str] | None = None) -> None:
         """Write the session to *path*, which becomes `path`, or to that; see `save_session`."""
         if path is not None:
@@ -104,7 +123,7 @@ class DeformEditor:
         self._desk.save()
 
     def load(self, path: str | os.PathLike[str]) -> None:
-        """Go on with the session in a file, which becomes `session`; see `load_session`."""
+        """Go on with the session in a file, or its mesh; see `load_session`, `read_mesh`."""
         self._desk.open(Path(path))
         self.wait()
 
@@ -162,15 +181,19 @@ class DeformEditor:
         return self._took_key
 
     def _type(self, key: str) -> None:
-        desk, binding = self._desk, binding_of(key, self.mode)
-        if desk.is_busy and not (binding and binding.while_busy):
+        binding = binding_of(key, self.mode)
+        if binding is not None and binding.action is not None:
+            self._do(binding.action, binding.while_busy)
+            return
+        places = ", ".join(f"{mode.value} ({what})" for mode, what in modes_of(key))
+        self._do(lambda desk: desk.say(f"{key_cap(key)} is a key of {places}"), False)
+
+    def _do(self, action: Action, while_busy: bool) -> None:
+        desk = self._desk
+        if desk.is_busy and not while_busy:
             desk.insist()
             return
         desk.voice.forget()
-        if binding is None or binding.action is None:
-            places = ", ".join(f"{mode.value} ({what})" for mode, what in modes_of(key))
-            desk.say(f"{key_cap(key)} is a key of {places}")
-            return
-        binding.action(desk)
+        action(desk)
         desk.bind_if_ready()
         desk.refresh()

@@ -102,6 +102,7 @@ class RegionSelector(Widget):
     def tool(self, tool: Tool) -> None:
         self._tool = tool
         self._ring.hide()
+        self._tell("ModifiedEvent")
 
     @property
     def radius(self) -> float:
@@ -113,6 +114,7 @@ class RegionSelector(Widget):
         if not 0.0 < radius < np.inf:
             raise ValueError(f"radius must be above 0; got {radius}")
         self._radius = radius
+        self._tell("ModifiedEvent")
 
     def grow(self) -> None:
         """Add one ring of neighbours to what is painted."""

@@ -6,7 +6,7 @@ right button cancels it.  Outside its own things the camera works as ever.
 
 VTK's words are kept: `On`, `Off`, `SetEnabled`, `GetEnabled`, and observers of
 ``StartInteractionEvent``, ``InteractionEvent`` and ``EndInteractionEvent``, called after whatever
-they tell of.
+they tell of; and of ``ModifiedEvent``, where the widget has something that is set.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from .gestures import Gesture, Grab, Phase, Pointer
 from .view import Stop, View
 
 INTERACTION_EVENTS = ("StartInteractionEvent", "InteractionEvent", "EndInteractionEvent")
+_EVENTS = (*INTERACTION_EVENTS, "ModifiedEvent")
 
 
 class Widget(abc.ABC):
@@ -111,9 +112,9 @@ class Widget(abc.ABC):
         return bool(self._stops)
 
     def AddObserver(self, event: str, callback: Callable[[Widget, str], None]) -> int:  # noqa: N802
-        """Call ``callback(widget, event)`` at one of `INTERACTION_EVENTS`; return its tag."""
-        if event not in INTERACTION_EVENTS:
-            raise ValueError(f"event must be one of {', '.join(INTERACTION_EVENTS)}; got {event!r}")
+        """Call ``callback(widget, event)`` at one of the events above; return its tag."""
+        if event not in _EVENTS:
+            raise ValueError(f"event must be one of {', '.join(_EVENTS)}; got {event!r}")
         tag, self._next_tag = self._next_tag, self._next_tag + 1
         self._observers[tag] = event, callback
         return tag
