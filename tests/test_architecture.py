@@ -38,6 +38,8 @@ STORY = [
     "modelling.remeshing", "modelling.implicit", "models", "formats.polygons", "formats.off",
     "formats.ply", "formats.wavefront", "formats.vtk_readers", "meshlab", "convert", "palette",
     "canvas", "pictures",
+    # a VTK pipeline
+    "formats.vtk_surfaces", "filter_settings", "filters",
     # a view, and widgets in it
     "widgets.gestures", "widgets.sight", "widgets.front", "widgets.view", "widgets.widget",
     "widgets.surface_display",
@@ -87,6 +89,9 @@ GRANTED = {
     "convert": VTK | {"pyvista"},
     "canvas": VTK | {"pyvista"},
     "pictures": VTK | {"pyvista"},
+    "formats.vtk_surfaces": VTK,
+    "filter_settings": VTK,
+    "filters": VTK,
     "command_line.outputs": {"pyvista"},
     "command_line.replaying": {"pyvista"},
     "plugin": {"pyvista"},

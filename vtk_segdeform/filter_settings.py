@@ -1,0 +1,106 @@
+"""What a deforming filter is told, by setters in VTK's manner."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
+
+
+@dataclass(frozen=True)
+class Settings:
+    """All that may be set, as it is before anything is."""
+
+    n_regions: int = 3
+    n_cage_vertices: int = 155
+    overlap: int = 4
+    region_array: str = ""
+    fixed_array: str = "fixed"
+    handle_array: str = "handle"
+    fixed: tuple[int, ...] | None = None
+    handle: tuple[int, ...] | None = None
+    targets: tuple[tuple[float, ...], ...] | None = None
+    translation: tuple[float, ...] = (0.0, 0.0, 0.0)
+    axis: tuple[float, ...] = (0.0, 0.0, 1.0)
+    angle: float = 0.0
+    preserve_volume: bool = True
+    stretch: float = 10.0
+    local_volume: bool = True
+
+
+class SettingsOfAFilter(VTKPythonAlgorithmBase):  # type: ignore[misc]
+    """A filter with these settings; setting what is set already changes nothing."""
+
+    def __init__(self, **ports: Any) -> None:
+        super().__init__(**ports)
+        self._settings = Settings()
+
+    def SetNumberOfRegions(self, count: int) -> None:  # noqa: N802 - VTK's manner
+        """Find so many regions; 0 leaves the choice to `segment`."""
+        self._set(n_regions=int(count))
+
+    def SetNumberOfCageVertices(self, count: int) -> None:  # noqa: N802
+        """Fit cages of so many vertices, all together."""
+        self._set(n_cage_vertices=int(count))
+
+    def SetRegionArrayName(self, name: str) -> None:  # noqa: N802
+        """Name the point array of labels that makes regions; "" finds regions instead."""
+        self._set(region_array=str(name or ""))
+
+    def SetOverlap(self, rings: int) -> None:  # noqa: N802
+        """Let regions of labels grow by rings of edges; see `Regions.from_labels`."""
+        self._set(overlap=int(rings))
+
+    def SetFixedArrayName(self, name: str) -> None:  # noqa: N802
+        """Name the point array that is not 0 where points stay; it may be missing."""
+        self._set(fixed_array=str(name or ""), fixed=None)
+
+    def SetHandleArrayName(self, name: str) -> None:  # noqa: N802
+        """Name the point array that is not 0 where points are moved."""
+        self._set(handle_array=str(name or ""), handle=None)
+
+    def SetFixed(self, points: ArrayLike) -> None:  # noqa: N802
+        """Tell the points that stay by their numbers, instead of by an array."""
+        self._set(fixed=tuple(np.asarray(points, dtype=np.int64).ravel().tolist()))
+
+    def SetHandle(self, points: ArrayLike) -> None:  # noqa: N802
+        """Tell the points that are moved by their numbers, instead of by an array."""
+        self._set(handle=tuple(np.asarray(points, dtype=np.int64).ravel().tolist()))
+
+    def SetTargets(self, targets: ArrayLike | None) -> None:  # noqa: N802
+        """Send the handle's points, in their order, to (k, 3) places; None for a motion instead."""
+        rows = None if targets is None else np.asarray(targets, dtype=np.float64).tolist()
+        self._set(targets=None if rows is None else tuple(map(tuple, rows)))
+
+    def SetTranslation(self, x: float, y: float, z: float) -> None:  # noqa: N802
+        """Shift the handle."""
+        self._set(translation=(float(x), float(y), float(z)))
+
+    def SetRotationAxis(self, x: float, y: float, z: float) -> None:  # noqa: N802
+        """Turn the handle about an axis through its centre."""
+        self._set(axis=(float(x), float(y), float(z)))
+
+    def SetRotationAngle(self, degrees: float) -> None:  # noqa: N802
+        """Turn it by so much, the right hand's thumb along the axis."""
+        self._set(angle=float(degrees))
+
+    def SetPreserveVolume(self, hold: bool) -> None:  # noqa: N802
+        """Hold the enclosed volume exactly."""
+        self._set(preserve_volume=bool(hold))
+
+    def SetStretch(self, strength: float) -> None:  # noqa: N802
+        """See `Deformer`."""
+        self._set(stretch=float(strength))
+
+    def SetComputeLocalVolumeChange(self, on: bool) -> None:  # noqa: N802
+        """Add "LocalVolumeChange"; see `local_volume_change`."""
+        self._set(local_volume=bool(on))
+
+    def _set(self, **changes: Any) -> None:
+        settings = replace(self._settings, **changes)
+        if settings != self._settings:
+            self._settings = settings
+            self.Modified()
