@@ -39,7 +39,7 @@ STORY = [
     "formats.ply", "formats.wavefront", "formats.vtk_readers", "meshlab", "convert", "palette",
     "canvas", "pictures",
     # a VTK pipeline
-    "formats.vtk_surfaces", "filter_settings", "filters",
+    "formats.vtk_surfaces", "filter_settings", "filters", "paraview_plugin",
     # a view, and widgets in it
     "widgets.gestures", "widgets.sight", "widgets.front", "widgets.view", "widgets.widget",
     "widgets.surface_display",
@@ -69,6 +69,10 @@ STORY = [
     "widgets.editing.bindings", "widgets.editor",
     # pyvista's extension points
     "plugin",
+    # the editor in Qt
+    "widgets.editing.panel_actions", "widgets.panel.controls", "widgets.panel.modes",
+    "widgets.panel.painting", "widgets.panel.regions", "widgets.panel.handles",
+    "widgets.panel.options", "widgets.panel.foot", "widgets.panel.panel", "widgets.qt",
     # the command line
     "command_line.selection", "command_line.motion", "command_line.outputs", "command_line.demo",
     "command_line.interactive", "command_line.bench", "command_line.commands",
@@ -77,6 +81,7 @@ STORY = [
 
 NUMERIC = {"numpy", "scipy"}
 VTK = {"vtkmodules"}
+PANEL = {"controls", "modes", "painting", "regions", "handles", "options", "foot", "panel"}
 GRANTED = {
     "cage_fit": VTK,
     "modelling.implicit": VTK,
@@ -92,12 +97,15 @@ GRANTED = {
     "formats.vtk_surfaces": VTK,
     "filter_settings": VTK,
     "filters": VTK,
+    "paraview_plugin": {"paraview"},
     "command_line.outputs": {"pyvista"},
     "command_line.replaying": {"pyvista"},
     "plugin": {"pyvista"},
+    **{f"widgets.panel.{name}": {"qtpy"} for name in PANEL},
+    "widgets.qt": {"qtpy", "pyvistaqt"},
 }
 
-MAY_PRINT_AND_EXIT = {"cli", "__main__"}
+MAY_PRINT_AND_EXIT = {"cli", "__main__", "paraview_plugin"}
 LONGEST = 250
 FILES = {
     ".".join(path.relative_to(PACKAGE).with_suffix("").parts): path
@@ -147,7 +155,7 @@ def test_a_chapter_imports_only_earlier_ones(name):
 
 @pytest.mark.parametrize("name", CHAPTERS)
 def test_a_chapter_imports_only_the_libraries_it_is_granted(name):
-    granted = VTK if name.startswith("widgets.") else GRANTED.get(name, set())
+    granted = GRANTED.get(name, VTK if name.startswith("widgets.") else set())
     allowed = NUMERIC | granted | set(sys.stdlib_module_names)
     foreign = {module for module, ours in imports(name) if not ours} - allowed
     assert not foreign, f"{name} imports {sorted(foreign)}"

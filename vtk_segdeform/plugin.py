@@ -74,7 +74,7 @@ def edit(mesh: Any, *, path: _Path = None, title: str = "segdeform") -> Any:
     MissingDependencyError
         If there is no screen.
     """
-    session = _session_of(mesh)
+    session = session_of(mesh)
     if not pv.OFF_SCREEN:
         require_screen()
     plotter = pv.Plotter(title=title, notebook=False)
@@ -149,7 +149,7 @@ class PlotterTools:
         """
         from .widgets.editor import DeformEditor
 
-        session = _session_of(mesh)
+        session = session_of(mesh)
         if isinstance(mesh, pv.PolyData):
             for actor in self._plotter.renderer.actors.values():
                 if getattr(getattr(actor, "mapper", None), "dataset", None) is mesh:
@@ -240,7 +240,8 @@ class PolyDataTools:
         return find_faults(points, triangles_of(self._surface))
 
 
-def _session_of(mesh: Mesh | pv.PolyData | Session) -> Session:
+def session_of(mesh: Mesh | pv.PolyData | Session) -> Session:
+    """Return a session over *mesh*, or the session that it is."""
     if isinstance(mesh, Session):
         return mesh
     if isinstance(mesh, Mesh):
