@@ -3,6 +3,7 @@
 #   make demo       bend the cactus; mesh and pictures land in demo-output/
 #   make test       the whole suite            make campaign   the minutes-long runs
 #   make lint       ruff, nothing changed      make format     ruff, files rewritten
+#   make test-paraview   the plugin in a real ParaView
 #   make types      mypy --strict              make bench      the table of timings
 #
 # The first call makes a virtual environment in .venv; choose its Python with
@@ -20,7 +21,7 @@ ifeq ($(shell uname -s)$(DISPLAY)$(WAYLAND_DISPLAY),Linux)
 export VTK_DEFAULT_OPENGL_WINDOW ?= vtkEGLRenderWindow
 endif
 
-.PHONY: help demo test campaign lint format types bench clean
+.PHONY: help demo test test-paraview campaign lint format types bench clean
 help:
 	@sed -n '3,9s/^# *//p' Makefile
 
@@ -32,6 +33,14 @@ bench: $(VENV)/installed
 
 test: $(VENV)/installed-test
 	$(BIN)/python -m pytest -n 2
+
+# In a real ParaView, whose own numpy and scipy may be too old: newer ones are put beside it.
+test-paraview: $(VENV)/installed-test
+	@command -v pvpython >/dev/null || { \
+	  echo "There is no pvpython here. On Debian and Ubuntu: apt-get install paraview" >&2; exit 1; }
+	$(PIP) install --target build/paraview --upgrade --only-binary=:all: --python-version \
+	  `pvpython -c 'import sys; print("%d.%d" % sys.version_info[:2])'` numpy scipy
+	SEGDEFORM_PARAVIEW=$(CURDIR)/build/paraview $(BIN)/python -m pytest tests/test_paraview.py
 
 campaign: $(VENV)/installed-test
 	$(BIN)/python -m pytest -m campaign
