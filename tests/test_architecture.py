@@ -29,7 +29,7 @@ STORY = [
     "segmentation", "mean_value", "cages", "caging.columns", "caging.region_solid",
     "caging.cage_simplify", "cage_fit",
     # the solver
-    "subspace", "energy", "cage_stiffness", "curvature", "constraints", "positions",
+    "subspace", "passengers", "energy", "cage_stiffness", "curvature", "constraints", "positions",
     "acceleration", "solution", "iteration", "solver", "targets", "deformer", "pipeline",
     # a deformation in the making
     "editing.listeners", "editing.state", "editing.history", "editing.painting", "editing.handles",

@@ -32,6 +32,7 @@ RIGHT = {
     "editor_by_itself": lambda names: (
         names["moved"] > 0.3 and abs(names["session"].volume_change) < 1e-12
     ),
+    "carry_a_grid": lambda names: names["sizes"].min() > 0.2 and len(names["sizes"]) > 1000,
     "film_a_drag": lambda names: (
         len(names["changes"]) > 14 and max(map(abs, names["changes"])) < 1e-12
     ),

@@ -28,6 +28,7 @@ from .energy import shape_energy
 from .errors import CageError, ConstraintError, RegionError
 from .iteration import Iteration, SolverOptions
 from .mesh import Mesh, require_mesh
+from .passengers import Passengers, board
 from .positions import checked_constraints, checked_targets, connected_sets, position_term
 from .progress import Progress, part
 from .regions import Regions
@@ -128,6 +129,7 @@ class Deformer:
         self._options = SolverOptions(tolerance, max_steps, window, exact_volume)
 
         subspace = bind(regions, cages, blend=blend, progress=part(progress, 0.0, 0.8))
+        self._blend = regions.weights if blend is None else np.asarray(blend, dtype=np.float64)
         if progress:
             progress(0.8, "factoring")
         self._rest_cages = np.concatenate([self._inward(cage.vertices) for cage in cages])
@@ -169,6 +171,18 @@ class Deformer:
     def subspace(self) -> Subspace:
         """W~, from which ``subspace.map`` makes mesh vertices of stacked cage vertices."""
         return self._energy.subspace
+
+    def passengers(self, points: ArrayLike, *, progress: Progress | None = None) -> Passengers:
+        """Bind other points (k, 3) to the cages, to be moved with them; see `passengers`."""
+        return board(self.mesh, self._blend, self.cages, points, progress=progress)
+
+    def carry(self, points: ArrayLike) -> FloatArray:
+        """Return where other points (k, 3), given at rest, are in the last pose.
+
+        For many poses keep the `passengers`: binding is what takes long.
+        """
+        p = self._outward(self._p)
+        return self.passengers(points).moved([p[columns] for columns in self.subspace.columns])
 
     def reset(self) -> None:
         """Forget the last pose: the next solve starts from rest."""

@@ -242,10 +242,8 @@ class PolyDataTools:
 
 def session_of(mesh: Mesh | pv.PolyData | Session) -> Session:
     """Return a session over *mesh*, or the session that it is."""
-    if isinstance(mesh, Session):
-        return mesh
-    if isinstance(mesh, Mesh):
-        return Session(mesh)
+    if isinstance(mesh, Session | Mesh):
+        return mesh if isinstance(mesh, Session) else Session(mesh)
     if isinstance(mesh, pv.PolyData):
         return Session(convert.from_polydata(mesh))
     raise TypeError(f"mesh must be a Mesh, a PolyData or a Session; got {type(mesh).__name__}")

@@ -359,6 +359,10 @@ class Session(Timeline):
         self._put = pose, places
         self._move(replace(self._state, pose=pose), f"cage {region}")
 
+    def carry(self, points: ArrayLike) -> FloatArray:
+        """Return where other points (k, 3), given at rest, are in the present pose."""
+        return self._posing.bind(self._state).passengers(points).moved(self.cage_vertices)
+
     def refine(self, *, max_steps: int | None = None) -> Solution:
         """Go on solving for the present targets, as when a drag was stopped early.
 
