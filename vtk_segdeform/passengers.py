@@ -67,7 +67,7 @@ class Passengers:
             raise CageError(f"cage_vertices must hold {expected} points, cage by cage; got {got}")
         p = np.concatenate(poses)
         centre = p.mean(axis=0)  # about it, so that far from the origin no digits are lost
-        return centre + self.subspace.map(p - centre)
+        return np.asarray(centre + self.subspace.map(p - centre))
 
 
 def board(
@@ -108,7 +108,7 @@ def board(
 def blend_at(vertices: FloatArray, weights: FloatArray, points: FloatArray) -> FloatArray:
     """Return the blend weights (r, k) at *points* (k, 3), of those (r, n) at *vertices* (n, 3)."""
     count = min(_NEAREST, len(vertices))
-    distance, near = cKDTree(vertices).query(points, k=np.arange(1, count + 1))
+    distance, near = map(np.asarray, cKDTree(vertices).query(points, k=np.arange(1, count + 1)))
     farthest = distance[:, -1:]
     on_vertex = distance[:, 0] <= 1e-12 * farthest[:, 0]
     distance = np.maximum(distance, np.maximum(1e-12 * farthest, np.finfo(float).tiny))
@@ -118,4 +118,4 @@ def blend_at(vertices: FloatArray, weights: FloatArray, points: FloatArray) -> F
     level = strength.max(axis=1) <= 0.0  # all are equally far
     strength[level] = 1.0
     strength /= strength.sum(axis=1, keepdims=True)
-    return np.einsum("rks,ks->rk", weights[:, near], strength)
+    return np.asarray(np.einsum("rks,ks->rk", weights[:, near], strength))
