@@ -160,6 +160,8 @@ def _light_up(button: Any, down: bool) -> None:
         palette.setColor(roles.Button, palette.color(roles.Highlight))
         palette.setColor(roles.ButtonText, palette.color(roles.HighlightedText))
     button.setPalette(palette)
+    policies = Qt.FocusPolicy  # Tab leads to the one that is down, arrows to its neighbours
+    button.setFocusPolicy(policies.TabFocus if down else policies.NoFocus)
 
 
 def _policy(name: str) -> Any:

@@ -1,0 +1,530 @@
+"""The editor as a Qt widget and as a dock: real mouse and keys on the view and on the panel."""
+
+from __future__ import annotations
+
+import gc
+import os
+import subprocess
+import sys
+import threading
+import weakref
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from qt_hands import Qt, QtCore, QtHand, QtTest, QtWidgets, application, until
+from scenes import sausage
+
+import pyvistaqt  # isort: skip
+from vtk_segdeform import Session, models
+from vtk_segdeform.convert import read_mesh
+from vtk_segdeform.store import load_session
+from vtk_segdeform.widgets import Mode, Paint, Tool
+from vtk_segdeform.widgets.qt import DeformWidget, deform_dock
+
+MESH = models.cactus(1500)
+
+
+@pytest.fixture(scope="module")
+def state():
+    """Return the mesh and the state of a session that lacks nothing but a pose."""
+    scene = sausage()
+    session = Session(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.set_fixed(scene.fixed)
+    session.add_handle(scene.handle)
+    return scene.mesh, session.state
+
+
+class Seen:
+    """A widget on the screen, what it told of, and a hand on it."""
+
+    def __init__(self, widget, window=None):
+        window = window or widget
+        window.resize(900, 650)
+        window.show()
+        until(lambda: window.windowHandle() and window.windowHandle().isExposed(), "the window")
+        window.activateWindow()
+        until(window.isActiveWindow, "the focus")
+        self.widget, self.panel, self.editor = widget, widget.panel, widget.editor
+        self.deformed, self.errors, self.sessions = [], [], []
+        widget.deformed.connect(lambda: self.deformed.append(self.session.volume_change))
+        widget.error.connect(self.errors.append)
+        widget.session_changed.connect(self.sessions.append)
+
+    @property
+    def session(self):
+        return self.editor.session
+
+    def view_hand(self):
+        """Return a hand on the view, which looks from the front."""
+        plotter = self.widget.plotter
+        plotter.camera_position = "xz"
+        plotter.render()
+        plotter.setFocus()
+        return QtHand(plotter.interactor, self.editor.view)
+
+    def settle(self):
+        """Let Qt work until no job is running and the panel shows how things are."""
+        application().processEvents()
+        until(lambda: not self.editor.is_busy, "the job")
+        until(lambda: not self.panel._patience.isActive(), "the panel")
+
+    def click(self, button):
+        """Click in the middle of a button, or on the box of a check box."""
+        assert button.isVisible()
+        assert button.isEnabled()
+        check = isinstance(button, QtWidgets.QCheckBox)
+        place = QtCore.QPoint(8, button.height() // 2) if check else button.rect().center()
+        QtTest.QTest.mouseClick(button, Qt.LeftButton, Qt.NoModifier, place)
+        self.settle()
+
+    def click_row(self, tree, row, column=0, held=Qt.NoModifier):
+        """Click on a row of a list; in a column with a tick on the tick."""
+        box = tree.visualItemRect(tree.topLevelItem(row))
+        box = tree.visualRect(tree.indexFromItem(tree.topLevelItem(row), column)) if column else box
+        place = QtCore.QPoint(box.left() + 10, box.center().y())
+        QtTest.QTest.mouseClick(tree.viewport(), Qt.LeftButton, held, place)
+        self.settle()
+
+    def type_number(self, box, number):
+        """Type a number into a field, and Enter."""
+        box.setFocus()
+        box.selectAll()
+        QtTest.QTest.keyClicks(box, box.locale().toString(number))
+        QtTest.QTest.keyClick(box, Qt.Key_Return)
+        self.settle()
+
+    def mode(self, mode):
+        self.click(self.panel.head.modes[mode])
+
+
+@pytest.fixture
+def make():
+    """Yield a callable that puts a widget over a session on the screen."""
+    application()
+    made = []
+
+    def over(mesh):
+        made.append(Seen(DeformWidget(mesh)))
+        return made[-1]
+
+    yield over
+    for seen in made:
+        seen.widget.close()
+        seen.widget.deleteLater()
+    application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
+    application().processEvents()
+
+
+@pytest.fixture
+def seen(make, state):
+    """Return a widget over a session that is ready to be deformed."""
+    mesh, now = state
+    return make(Session(mesh, state=now))
+
+
+def rows(tree):
+    return [
+        tuple(tree.topLevelItem(k).text(c) for c in range(tree.columnCount()))
+        for k in range(tree.topLevelItemCount())
+    ]
+
+
+def around(seen, mask):
+    """Return two corners of a rectangle around some vertices, as they are seen."""
+    places = seen.editor.view.to_display(seen.session.vertices[mask])[:, :2]
+    return places.min(axis=0) - 4.0, places.max(axis=0) + 4.0
+
+
+def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
+    seen = make(MESH)
+    panel, hand, height = seen.panel, seen.view_hand(), MESH.vertices[:, 2]
+    seen.click(panel.regions.find)
+    assert seen.session.regions.n_regions == len(rows(panel.regions.list)) > 1
+    seen.mode(Mode.CAGES)
+    seen.click(panel.cages.fit)
+    assert [f"{cage.n_vertices} vertices" for cage in seen.session.cages] == [
+        cage for _, cage, _ in rows(panel.regions.list)
+    ]
+
+    seen.mode(Mode.HANDLES)
+    seen.click(panel.painting.tools[Tool.RECTANGLE])
+    seen.click(panel.painting.through)
+    seen.click_row(panel.handles.list, 0)  # what stays
+    hand.drag(around(seen, height < 0.08))
+    seen.click(panel.handles.new)
+    hand.drag(around(seen, height > 0.92))
+    seen.settle()
+    assert set(seen.session.fixed) <= set(np.flatnonzero(height < 0.12))
+    (name,) = seen.session.handles
+    counts = [len(seen.session.fixed), len(seen.session.handles[name])]
+    assert [int(count) for _, count in rows(panel.handles.list)] == counts
+    assert min(counts) > 5
+
+    seen.mode(Mode.DEFORM)
+    start = np.array(hand.at(seen.editor.stage.dragger.gizmo.centre))
+    seen.deformed.clear()
+    hand.drag(start + t * np.array([80.0, -25.0]) for t in np.linspace(0.0, 1.0, 12))
+    moved = np.array(hand.at(seen.editor.stage.dragger.gizmo.centre)) - start
+    assert moved == pytest.approx([80.0, -25.0], abs=3.0)
+    until(lambda: not seen.editor.stage.dragger.is_refining, "refinement")
+    assert len(seen.deformed) >= 12
+    assert max(map(abs, seen.deformed)) < 1e-12
+    bent = seen.session.vertices
+    seen.settle()
+    volumes = [text for _, _, text in rows(panel.regions.list)]
+    assert any(text not in ("", "0 %") for text in volumes)
+    seen.click(panel.head.undo)
+    assert_array_equal(seen.session.vertices, MESH.vertices)
+    seen.click(panel.head.redo)
+    assert_array_equal(seen.session.vertices, bent)
+    seen.click(panel.deform.rest)
+    assert seen.session.state.pose is None
+    assert seen.errors == hand.failures == []
+
+
+def test_regions_are_chosen_merged_and_cut_in_the_list(seen):
+    panel, session = seen.panel, seen.session
+    seen.click_row(panel.regions.list, 1)
+    assert seen.editor.stage.selector.region == 1
+    assert not panel.regions.merge.isEnabled()
+    seen.click_row(panel.regions.list, 0, held=Qt.ControlModifier)
+    seen.click(panel.regions.merge)
+    assert session.regions.n_regions == 1
+    assert "are one" in panel.foot.words.text()
+    seen.click(panel.regions.split)
+    assert session.regions.n_regions == 2
+    seen.click(panel.regions.new)
+    assert rows(panel.regions.list)[2][0] == "2, to be painted"
+    assert seen.editor.stage.selector.region == 2
+    assert not panel.regions.split.isEnabled()
+
+
+def test_a_tick_shows_one_cage_and_hides_it(seen):
+    seen.mode(Mode.CAGES)
+    cages = seen.editor.stage.cages
+    assert cages.is_shown
+    seen.click_row(seen.panel.regions.list, 1, column=1)
+    assert [cages.is_visible(region) for region in (0, 1)] == [True, False]
+    seen.click_row(seen.panel.regions.list, 1, column=1)
+    assert cages.is_visible(1)
+
+
+def test_handles_are_renamed_chosen_and_removed_in_the_list(seen):
+    seen.mode(Mode.HANDLES)
+    tree = seen.panel.handles.list
+    seen.click_row(tree, 1)
+    tree.setFocus()
+    QtTest.QTest.keyClick(tree, Qt.Key_F2)
+    field = tree.viewport().findChild(QtWidgets.QLineEdit)
+    QtTest.QTest.keyClicks(field, "tail")
+    QtTest.QTest.keyClick(field, Qt.Key_Return)
+    seen.settle()
+    assert list(seen.session.handles) == ["tail"]
+    assert rows(tree)[1][0] == "tail"
+    assert seen.editor.stage.selector.handle == "tail"
+    seen.click_row(tree, 0)
+    assert seen.editor.stage.selector.paints is Paint.FIXED
+    seen.click_row(tree, 1)
+    assert seen.editor.stage.selector.paints is Paint.HANDLE
+    seen.click(seen.panel.handles.remove)
+    assert not seen.session.handles
+    assert [name for name, _ in rows(tree)] == ["what stays", "new handle, to be painted"]
+
+
+def test_options_are_steps_and_are_shown_when_they_are_undone(seen):
+    seen.mode(Mode.CAGES)
+    seen.type_number(seen.panel.cages.total, 90)
+    seen.type_number(seen.panel.cages.offset, 0.5)
+    seen.mode(Mode.DEFORM)
+    part, options = seen.panel.deform, lambda: seen.session.options
+    seen.type_number(part.stretch, 3.0)
+    seen.type_number(part.groups, 0)
+    seen.click(part.hold)
+    seen.click(part.hold_each)
+    assert (options().n_cage_vertices, options().offset) == (90, 0.5)
+    assert (options().stretch, options().rotation_groups) == (3.0, None)
+    assert (options().preserve_volume, options().preserve_region_volumes) == (False, True)
+    for _ in range(6):
+        seen.click(seen.panel.head.undo)
+    assert seen.panel.deform.stretch.value() == 10.0
+    assert seen.panel.deform.groups.value() == 300
+    assert seen.panel.deform.hold.isChecked()
+    assert not seen.panel.deform.hold_each.isChecked()
+    seen.mode(Mode.CAGES)
+    assert seen.panel.cages.total.value() == 155
+    assert seen.panel.cages.offset.text() == "by itself"
+    assert seen.panel.head.undo.toolTip() == "Nothing to undo"
+
+
+def test_what_keys_and_the_wheel_do_is_shown_in_the_panel(seen):
+    hand, part = seen.view_hand(), seen.panel.painting
+    hand.key("l")
+    seen.settle()
+    assert part.tools[Tool.LASSO].isChecked()
+    assert not part.radius.isEnabled()
+    for key in "bv":
+        hand.key(key)
+    seen.settle()
+    assert part.through.isChecked()
+    before = part.radius.value()
+    QtTest.QTest.keyClick(hand.widget, "]")
+    seen.settle()
+    assert part.radius.value() == pytest.approx(1.2 * before, rel=1e-3)
+    seen.type_number(part.radius, 0.25)
+    assert seen.editor.stage.selector.radius == pytest.approx(0.25)
+    for key in "qe4":  # the first two would end a window of pyvista's, or VTK's
+        hand.key(key)
+    seen.settle()
+    assert seen.panel.head.modes[Mode.DEFORM].isChecked()
+    assert part.isHidden()
+    seen.click(seen.panel.deform.overlay)
+    assert seen.editor.stage.overlay.is_shown
+
+
+def test_a_click_on_a_button_leaves_the_keys_to_the_view(seen):
+    hand = seen.view_hand()
+    seen.click(seen.panel.painting.tools[Tool.LASSO])
+    assert seen.widget.plotter.hasFocus()
+    hand.key("b")
+    assert seen.editor.stage.selector.tool is Tool.BRUSH
+
+
+def test_a_job_shows_how_far_it_is_and_is_cancelled(seen):
+    go_on, delivered = threading.Event(), []
+
+    def work(progress):
+        progress(0.4, "by hand")
+        assert go_on.wait(30.0)
+        progress(0.5, "by foot")
+
+    seen.editor.do(lambda desk: desk.start("counting", work, delivered.append))
+    foot = seen.panel.foot
+    until(lambda: foot.bar.isVisible() and foot.bar.value() == 400, "the bar")
+    assert foot.words.text() == "Counting: by hand · 40 % · Esc cancels"
+    assert not seen.panel.regions.find.isEnabled()  # nothing else is done meanwhile
+    assert not seen.panel.head.modes[Mode.DEFORM].isEnabled()
+    QtTest.QTest.mouseClick(foot.cancel, Qt.LeftButton)
+    until(lambda: "stopping" in foot.words.text(), "the answer")
+    go_on.set()
+    seen.settle()
+    assert delivered == []
+    assert "cancelled" in foot.words.text().lower()
+    assert not foot.bar.isVisible()
+    assert seen.panel.regions.find.isEnabled()
+
+
+def test_what_goes_wrong_is_said_told_and_then_forgotten(seen):
+    seen.mode(Mode.HANDLES)
+    seen.panel.handles.list.topLevelItem(1).setText(0, "")  # no name for a handle
+    seen.settle()
+    (error,) = seen.errors
+    assert "name" in error
+    assert seen.panel.foot.words.text().lower() == error.lower()
+    assert seen.panel.foot.sign.isVisible()
+    assert rows(seen.panel.handles.list)[1][0] == "handle 1"
+    seen.mode(Mode.DEFORM)
+    assert not seen.panel.foot.sign.isVisible()
+
+
+# Files.
+
+
+def answer(monkeypatch, path):
+    for name in ("getOpenFileName", "getSaveFileName"):
+        monkeypatch.setattr(QtWidgets.QFileDialog, name, lambda *_: (str(path), ""))
+
+
+def test_a_session_is_saved_and_opened_again(seen, tmp_path, monkeypatch):
+    path = tmp_path / "arm.segdeform"
+    answer(monkeypatch, tmp_path / "arm")
+    seen.panel.head.ask_and_save()
+    assert list(load_session(path).handles) == ["handle 1"]
+    before = seen.session
+    answer(monkeypatch, path)
+    seen.click(seen.panel.head.open)  # saved: no question
+    assert seen.sessions == [seen.session]
+    assert seen.session is not before
+    assert seen.session.regions.n_regions == len(rows(seen.panel.regions.list)) == 2
+    before.set_fixed([])  # the one that went is nobody's business any more
+    seen.session.remove_handle("handle 1")
+    seen.mode(Mode.HANDLES)
+    assert len(seen.session.fixed) == int(rows(seen.panel.handles.list)[0][1]) > 0
+
+
+def test_what_is_not_saved_is_given_up_only_when_asked(seen, tmp_path, monkeypatch):
+    path = tmp_path / "ball.ply"
+    from vtk_segdeform.convert import write_mesh
+
+    write_mesh(path, models.sphere(300))
+    answer(monkeypatch, path)
+    seen.session.set_fixed([])
+    before, buttons = seen.session, QtWidgets.QMessageBox.StandardButton
+    for button, goes in ((buttons.Cancel, False), (buttons.Discard, True)):
+        monkeypatch.setattr(QtWidgets.QMessageBox, "question", lambda *_, b=button: b)
+        seen.click(seen.panel.head.open)
+        assert (seen.session is not before) is goes
+    assert seen.session.mesh.n_vertices == models.sphere(300).n_vertices
+    assert seen.editor.path == tmp_path / "ball.segdeform"  # a mesh is not written over
+
+
+def test_the_mesh_is_written_as_it_is_now(seen, tmp_path, monkeypatch):
+    shift = np.eye(4)
+    shift[2, 3] = 0.4
+    seen.session.move_handle("handle 1", shift)
+    seen.session.commit()
+    answer(monkeypatch, tmp_path / "bent.ply")
+    seen.panel.head.ask_and_export()
+    assert_array_equal(read_mesh(tmp_path / "bent.ply").vertices, seen.session.vertices)
+    answer(monkeypatch, tmp_path / "nowhere" / "bent.ply")
+    seen.panel.head.ask_and_export()
+    assert len(seen.errors) == 1
+
+
+# Hosts.
+
+
+def test_two_widgets_in_one_window_and_a_dock_mind_their_own_business(state):
+    app, (mesh, now) = application(), state
+    window = QtWidgets.QMainWindow()
+    tabs = QtWidgets.QSplitter(window)
+    first, second = (DeformWidget(Session(mesh, state=now)) for _ in range(2))
+    plotter = pyvistaqt.QtInteractor(tabs, auto_update=False, off_screen=False)
+    dock = deform_dock(plotter, Session(mesh, state=now), window)
+    for each in (first, second, plotter):
+        tabs.addWidget(each)
+    window.setCentralWidget(tabs)
+    window.addDockWidget(Qt.RightDockWidgetArea, dock)
+    window.resize(1500, 650)
+    hands = [Seen(widget, window) for widget in (first, second, dock)]
+    window.resize(1500, 650)
+    app.processEvents()
+    hands[0].mode(Mode.DEFORM)
+    hands[2].mode(Mode.CAGES)
+    assert [seen.editor.mode for seen in hands] == [Mode.DEFORM, Mode.REGIONS, Mode.CAGES]
+    shift = np.eye(4)
+    shift[2, 3] = 0.4
+    hands[0].session.move_handle("handle 1", shift)
+    hands[0].session.commit()
+    assert [len(seen.deformed) for seen in hands] == [1, 0, 0]
+    hands[1].click_row(second.panel.regions.list, 1)
+    hands[1].click(second.panel.regions.split)
+    assert [seen.session.regions.n_regions for seen in hands] == [2, 3, 2]
+    first.close()  # one goes, the others stay
+    hands[2].mode(Mode.DEFORM)
+    assert not first.editor.GetEnabled()
+    assert second.editor.GetEnabled()
+    plotter.close()  # the dock's editor goes with the view it is in
+    assert not dock.editor.GetEnabled()
+    until(lambda: not dock.panel.isEnabled(), "the panel")
+    second.close()
+    window.close()
+    window.deleteLater()
+    application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
+
+
+@pytest.mark.parametrize("times", [2, pytest.param(50, marks=pytest.mark.campaign)])
+def test_nothing_is_left_of_widgets_that_were_closed(state, times):
+    app, (mesh, now) = application(), state
+    session = Session(mesh, state=now)
+
+    def open_and_close(job):
+        seen = Seen(DeformWidget(session))
+        if job:
+            QtTest.QTest.mouseClick(seen.panel.regions.find, Qt.LeftButton)
+        parts = [seen.widget, seen.panel, seen.editor, seen.widget.plotter]
+        gone = [weakref.ref(part) for part in parts]
+        seen.widget.close()
+        assert not seen.editor.is_busy
+        seen.widget.deleteLater()
+        del seen, parts
+        app.sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
+        app.processEvents()
+        gc.collect()
+        return [ref() for ref in gone]
+
+    open_and_close(job=True)
+    files, threads = len(os.listdir("/proc/self/fd")), threading.active_count()
+    for number in range(times):
+        assert open_and_close(job=number % 4 == 0) == [None] * 4
+    assert app.topLevelWidgets() == []
+    assert threading.active_count() == threads
+    assert len(os.listdir("/proc/self/fd")) <= files + 2
+    session.set_fixed([])  # and nobody listens to the session
+    assert session._listeners._listeners == {}
+
+
+def test_a_window_that_is_deleted_without_a_word_takes_all_with_it(state):
+    app, (mesh, now) = application(), state
+    session, window = Session(mesh, state=now), QtWidgets.QMainWindow()
+    widget = DeformWidget(session, window)
+    window.setCentralWidget(widget)
+    Seen(widget, window)
+    editor = widget.editor
+    window.deleteLater()
+    app.sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
+    app.processEvents()
+    assert not editor.GetEnabled()
+    session.set_fixed([])
+    app.processEvents()
+
+
+# For everybody.
+
+
+@pytest.mark.parametrize("mode", list(Mode))
+def test_everything_is_reached_by_tab_and_tells_what_it_is(seen, mode):
+    seen.mode(mode)
+    kinds = (QtWidgets.QAbstractButton, QtWidgets.QAbstractSpinBox, QtWidgets.QTreeWidget)
+    wanted = {
+        each
+        for kind in kinds
+        for each in seen.panel.findChildren(kind)
+        if each.isVisible() and each.isEnabled()
+    }
+    assert len(wanted) > 8
+    assert [each for each in wanted if not each.toolTip()] == []
+    reached, heights = set(), []
+    seen.panel.head.open.setFocus()
+    until(seen.panel.head.open.hasFocus, "the focus")
+    for _ in range(60):
+        here = application().focusWidget()
+        if here in wanted and here not in reached:
+            reached.add(here)
+            heights.append(here.mapTo(seen.panel, here.rect().topLeft()).y())
+        QtTest.QTest.keyClick(here, Qt.Key_Tab)
+    assert heights == sorted(heights)  # from the top down
+    assert {each for each in wanted if each.focusPolicy() != Qt.NoFocus} <= reached
+    exclusive = {each for each in wanted - reached if each.group() is not None}
+    assert wanted - reached == exclusive  # where arrows lead
+    here = seen.panel.head.modes[mode]
+    here.setFocus()
+    QtTest.QTest.keyClick(here, Qt.Key_Left if mode is Mode.DEFORM else Qt.Key_Right)
+    assert seen.editor.mode is not mode
+
+
+def test_in_a_dark_palette_the_panel_is_dark_and_its_words_are_light(seen):
+    from qtpy import QtGui
+
+    before = application().palette()
+    application().setPalette(QtGui.QPalette(QtGui.QColor("#3a3a3a"), QtGui.QColor("#2b2b2b")))
+    try:
+        seen.settle()
+        application().processEvents()
+        image = seen.panel.grab().toImage().convertToFormat(QtGui.QImage.Format_Grayscale8)
+        grey = np.array(image.constBits()).reshape(image.height(), image.bytesPerLine())
+        assert np.median(grey) < 60
+        assert grey.max() > 200
+    finally:
+        application().setPalette(before)
+
+
+def test_it_works_where_pixels_are_smaller_than_points():
+    application()  # or skip
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", __file__, "-k", "tick or far_it_is"],
+        env={**os.environ, "QT_SCALE_FACTOR": "1.5"}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert "2 passed" in done.stdout, done.stdout + done.stderr
