@@ -43,17 +43,17 @@ def application():
     on_x = {"QT_QPA_PLATFORM": "xcb"}
     tried = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False,
-        env={**os.environ, **on_x, "DISPLAY": _new_screen()},
+        env={**os.environ, **on_x, "DISPLAY": new_screen()},
     )  # fmt: skip
     if tried.returncode:
         pytest.skip(f"Qt cannot use X here: {' '.join(tried.stderr.split())[:300]}")
     with pytest.MonkeyPatch.context() as patch:  # nobody else is to see the screen
-        for name, value in {**on_x, "DISPLAY": _new_screen()}.items():
+        for name, value in {**on_x, "DISPLAY": new_screen()}.items():
             patch.setenv(name, value)
         return QtWidgets.QApplication(["segdeform tests"])
 
 
-def _new_screen() -> str:
+def new_screen() -> str:
     """Start an X server that ends when the last of those who use it is gone; return its name."""
     reading, writing = os.pipe()
     os.set_inheritable(writing, True)

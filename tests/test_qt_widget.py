@@ -8,11 +8,22 @@ import subprocess
 import sys
 import threading
 import weakref
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from qt_hands import Qt, QtCore, QtHand, QtTest, QtWidgets, application, until
+from qt_hands import (
+    Qt,
+    QtCore,
+    QtHand,
+    QtTest,
+    QtWidgets,
+    application,
+    new_screen,
+    until,
+)
+from qtpy import QtGui
 from scenes import sausage
 
 import pyvistaqt  # isort: skip
@@ -183,6 +194,15 @@ def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
     seen.click(panel.deform.rest)
     assert seen.session.state.pose is None
     assert seen.errors == hand.failures == []
+
+
+def test_the_whole_mesh_is_seen_at_first(seen):
+    view = seen.editor.view
+    view.render()
+    places = view.to_display(seen.session.vertices)[:, :2] / view.renderer.GetSize()
+    assert places.min() > 0.0
+    assert places.max() < 1.0
+    assert np.ptp(places, axis=0).max() > 0.4
 
 
 def test_regions_are_chosen_merged_and_cut_in_the_list(seen):
@@ -506,8 +526,6 @@ def test_everything_is_reached_by_tab_and_tells_what_it_is(seen, mode):
 
 
 def test_in_a_dark_palette_the_panel_is_dark_and_its_words_are_light(seen):
-    from qtpy import QtGui
-
     before = application().palette()
     application().setPalette(QtGui.QPalette(QtGui.QColor("#3a3a3a"), QtGui.QColor("#2b2b2b")))
     try:
@@ -528,3 +546,21 @@ def test_it_works_where_pixels_are_smaller_than_points():
         env={**os.environ, "QT_SCALE_FACTOR": "1.5"}, capture_output=True, text=True,
     )  # fmt: skip
     assert "2 passed" in done.stdout, done.stdout + done.stderr
+
+
+def test_the_example_of_an_application_runs(tmp_path):
+    application()  # or skip
+    example = Path(__file__).resolve().parent.parent / "examples" / "qt_application.py"
+    screen = {
+        "DISPLAY": new_screen(),
+        "QT_QPA_PLATFORM": "xcb",
+        "PYTHONPATH": example.parent.parent,
+    }
+    subprocess.run(
+        [sys.executable, example, "--picture", tmp_path / "window.png"],
+        env={**os.environ, **screen}, check=True, timeout=100,
+    )  # fmt: skip
+    picture = QtGui.QImage(str(tmp_path / "window.png")).convertToFormat(QtGui.QImage.Format_RGB32)
+    colours = np.array(picture.constBits()).reshape(-1, 4)[:, :3].astype(int)
+    body = (np.ptp(colours, axis=1) > 10) & (colours.mean(axis=1) < 220)
+    assert 0.04 < body.mean() < 0.5  # the cactus, the mode that is on, the status line

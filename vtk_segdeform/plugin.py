@@ -8,7 +8,7 @@
 
 pyvista finds this module by its entry points, when ``segdeform`` is first asked for.  pyvistaqt
 hides those of plotters: there, and where the package is not installed, ``import vtk_segdeform``
-after pyvista does it, or ``import vtk_segdeform.plugin`` at any time.
+after pyvista does it, or ``import vtk_segdeform.plugin``.
 """
 
 from __future__ import annotations
@@ -158,6 +158,8 @@ class PlotterTools:
         self.added.append(editor)
         if path is not None:
             editor.path = path
+        if not self._plotter.camera_set:
+            self._plotter.reset_camera()  # as `add_mesh` does
         editor.On()
         return editor
 
