@@ -36,8 +36,8 @@ STORY = [
     "editing.posing", "session", "editing.archive", "store",
     # meshes from code, from files, and as pictures
     "modelling.remeshing", "modelling.implicit", "models", "formats.polygons", "formats.off",
-    "formats.ply", "formats.wavefront", "formats.vtk_readers", "meshlab", "convert", "palette",
-    "canvas", "pictures",
+    "formats.ply", "formats.wavefront", "formats.vtk_readers", "formats.meshlab_layers", "meshlab",
+    "convert", "meshlab_project", "palette", "canvas", "pictures",
     # a VTK pipeline
     "formats.vtk_surfaces", "filter_settings", "filters", "paraview_plugin",
     # a view, and widgets in it
@@ -90,7 +90,9 @@ GRANTED = {
     "formats.ply": {"pyvista"},
     "formats.wavefront": {"pyvista"},
     "formats.vtk_readers": {"pyvista"},
-    "meshlab": {"pymeshlab"},
+    "formats.meshlab_layers": {"pyvista"},
+    "meshlab": {"pymeshlab", "pyvista"},
+    "meshlab_project": {"pyvista"},
     "convert": VTK | {"pyvista"},
     "canvas": VTK | {"pyvista"},
     "pictures": VTK | {"pyvista"},

@@ -6,13 +6,16 @@ import sys
 
 import numpy as np
 import pytest
+import pyvista as pv
 from numpy.testing import assert_allclose, assert_array_equal
+from scenes import sausage
 from solids import icosphere, torus
 
 from vtk_segdeform import meshlab
-from vtk_segdeform.convert import read_mesh, write_mesh
+from vtk_segdeform.convert import from_polydata, read_mesh, to_polydata, write_mesh
 from vtk_segdeform.errors import MeshError, MissingDependencyError
 from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.session import Session
 from vtk_segdeform.volume import signed_volume
 
 
@@ -48,10 +51,120 @@ def test_without_it_every_call_says_what_to_install(tmp_path):
 @pytest.mark.usefixtures("with_pymeshlab")
 def test_there_and_back_changes_nothing():
     mesh = Mesh(*torus())
-    again = meshlab.from_meshset(meshlab.to_meshset(mesh))
+    surface = meshlab.from_meshset(meshlab.to_meshset(mesh))
+    assert not surface.point_data
+    assert not surface.cell_data
+    again = from_polydata(surface)
     assert_array_equal(again.vertices, mesh.vertices)
     assert_array_equal(again.faces, mesh.faces)
     assert again.vertices.flags.c_contiguous
+
+
+def painted() -> pv.PolyData:
+    """Return a torus with all that MeshLab knows of a surface, each its own at random."""
+    rng = np.random.default_rng(5)
+    surface = to_polydata(Mesh(*torus()))
+    for attributes, n in (
+        (surface.point_data, surface.n_points),
+        (surface.cell_data, surface.n_cells),
+    ):
+        attributes["selection"] = rng.integers(0, 2, n).astype(np.uint8)
+        attributes["quality"] = 1e3 * rng.normal(size=n)
+        attributes["RGBA"] = rng.integers(0, 256, (n, 4)).astype(np.uint8)
+    surface.cell_data["TextureCorners"] = rng.random((surface.n_cells, 6)).astype(np.float32)
+    surface.point_data["TextureCoordinates"] = rng.random((surface.n_points, 2)).astype(np.float32)
+    surface.point_data.active_texture_coordinates_name = "TextureCoordinates"
+    return surface
+
+
+def same(a: pv.PolyData, b: pv.PolyData) -> bool:
+    """Tell whether two surfaces are the same to the last bit, arrays and all."""
+    assert_array_equal(a.points, b.points)
+    assert_array_equal(a.regular_faces, b.regular_faces)
+    for mine, other in ((a.point_data, b.point_data), (a.cell_data, b.cell_data)):
+        assert sorted(mine) == sorted(other)
+        for name in mine:
+            assert_array_equal(np.asarray(mine[name]), np.asarray(other[name]), err_msg=name)
+    assert_array_equal(a.active_texture_coordinates, b.active_texture_coordinates)
+    return True
+
+
+@pytest.mark.usefixtures("with_pymeshlab")
+def test_selection_quality_colours_and_texture_come_back_to_the_last_bit():
+    surface = painted()
+    meshset = meshlab.to_meshset(surface)
+    layer = meshset.current_mesh()
+    chosen = surface.point_data["selection"].astype(bool)
+    assert_array_equal(layer.vertex_selection_array(), chosen)
+    assert layer.selected_face_number() == surface.cell_data["selection"].sum()
+    again = meshlab.from_meshset(meshset)
+    assert same(again, surface)
+    assert same(meshlab.from_meshset(meshlab.to_meshset(again)), surface)
+
+
+@pytest.mark.usefixtures("with_pymeshlab")
+def test_what_is_selected_there_is_held_dragged_or_a_region_here():
+    scene = sausage(2)
+    meshset = meshlab.to_meshset(scene.mesh)
+    assert len(meshlab.selected_vertices(meshset)) == 0
+    meshset.compute_selection_by_condition_per_vertex(condselect="(x < -2.4)")
+    session = Session(scene.mesh)
+    session.set_fixed(meshlab.selected_vertices(meshset))
+    assert_array_equal(session.fixed, scene.fixed)
+    meshset.set_selection_none()
+    meshset.compute_selection_by_condition_per_face(condselect="((x0>2.4)&&(x1>2.4)&&(x2>2.4))")
+    of_faces = meshlab.selected_vertices(meshset)
+    whole = scene.mesh.faces[np.isin(scene.mesh.faces, scene.handle).all(axis=1)]
+    assert_array_equal(of_faces, np.unique(whole))
+    session.add_handle(of_faces, "tip")
+    session.paint_region(1, of_faces)
+    assert session.regions.membership[1, of_faces].all()
+
+
+@pytest.mark.usefixtures("with_pymeshlab")
+def test_a_session_is_its_mesh_and_its_cages_in_their_pose():
+    scene = sausage(2)
+    session = Session(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.set_fixed(scene.fixed)
+    session.add_handle(scene.handle)
+    session.drag(scene.turned(20), max_steps=3)
+    meshset = meshlab.to_meshset(session)
+    assert_array_equal(meshlab.selected_vertices(meshset), scene.handle)
+    layers = meshlab.layers_from_meshset(meshset)
+    assert list(layers) == ["mesh", "cage 1", "cage 2"]
+    assert_array_equal(layers["mesh"].points, session.vertices)
+    assert_array_equal(layers["mesh"]["quality"], scene.regions.labels)
+    for name, vertices in zip(("cage 1", "cage 2"), session.cage_vertices, strict=True):
+        assert_array_equal(layers[name].points, vertices)
+
+
+@pytest.mark.usefixtures("with_pymeshlab")
+def test_a_moved_layer_is_where_it_is_shown_and_equal_names_get_a_number():
+    ball = Mesh(*icosphere(1))
+    meshset = meshlab.to_meshset({"a": ball})
+    meshset.add_mesh(meshset.current_mesh())
+    meshset.current_mesh().set_label("a")
+    meshset.compute_matrix_from_translation(axisx=2.0, freeze=False)
+    layers = meshlab.layers_from_meshset(meshset)
+    assert list(layers) == ["a", "a 2"]
+    assert_allclose(layers["a 2"].points - layers["a"].points, np.tile([2.0, 0.0, 0.0], (18, 1)))
+
+
+@pytest.mark.usefixtures("with_pymeshlab")
+def test_quadrangles_are_cut_and_what_is_no_surface_is_refused():
+    cube = pv.Cube().clean()
+    cube.cell_data["quality"] = np.arange(6.0)
+    again = meshlab.from_meshset(meshlab.to_meshset(cube))
+    assert again.n_cells == 12
+    assert_array_equal(np.sort(again.cell_data["quality"]), np.repeat(np.arange(6.0), 2))
+    for wrong in (3, {"a": "b"}, pv.ImageData()):
+        with pytest.raises(MeshError, match="expected a Mesh, a PolyData, a Session or a dict"):
+            meshlab.to_meshset(wrong)
+    for ask in (meshlab.from_meshset, meshlab.selected_vertices):
+        with pytest.raises(MeshError, match="has no layer"):
+            ask(meshlab.to_meshset({}))
 
 
 @pytest.mark.usefixtures("with_pymeshlab")

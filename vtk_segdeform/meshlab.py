@@ -1,5 +1,12 @@
 """PyMeshLab, if it is installed: meshes to and from it, its simplification, its file formats.
 
+    Mesh, PolyData, Session  --to_meshset-->    MeshSet
+    PolyData                 <--from_meshset--  MeshSet       its current layer
+    fixed, handle, region    <--selected_vertices--           what is selected there
+
+Selection, quality, colours and texture coordinates go both ways, as arrays of the PolyData that
+`formats.meshlab_layers` lists; `convert.from_polydata` makes the `Mesh` of one.
+
 PyMeshLab is under the GPL (version 3), this package is not: it is imported inside the calls
 below, nowhere else, and everything but these calls works without it.
 
@@ -10,17 +17,24 @@ that are meant as such, not as per cent, have to be wrapped in its ``PureValue``
 from __future__ import annotations
 
 import importlib
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .arrays import FloatArray, IntArray
 from .errors import MeshError, MissingDependencyError
+from .formats.meshlab_layers import Surface, as_layers, free_name, ingredients, surface_of
 from .mesh import Mesh
+from .session import Session
+
+if TYPE_CHECKING:
+    import pyvista as pv
 
 READS = frozenset({".3ds", ".bre", ".ctm", ".dae", ".ptx", ".qobj", ".x3d", ".x3dv", ".wrl"})
 WRITES = frozenset({".3ds", ".ctm", ".dae", ".wrl", ".x3d"})
+_MARK = "selected_here"
 
 
 def available() -> bool:
@@ -32,22 +46,81 @@ def available() -> bool:
     return True
 
 
-def to_meshset(mesh: Mesh) -> Any:
-    """Return a ``pymeshlab.MeshSet`` with *mesh* as its current mesh, vertices in order."""
-    meshset = _pymeshlab().MeshSet(verbose=False)
-    meshset.add_mesh(_pymeshlab().Mesh(mesh.vertices, mesh.faces))
+def to_meshset(what: Surface | Session | Mapping[str, Surface]) -> Any:
+    """Return a ``pymeshlab.MeshSet``, vertices and faces in order, its first layer the current one.
+
+    Parameters
+    ----------
+    what : Mesh, pyvista.PolyData, Session, or dict of str to Mesh or PolyData
+        One layer; the mesh and the cages of a session, in its pose; or layers by name.  Polygons
+        are cut into triangles.
+
+    Raises
+    ------
+    MissingDependencyError
+        If PyMeshLab is not installed.
+    MeshError
+        If *what* is none of these.
+
+    Notes
+    -----
+    PyMeshLab has no call to select given vertices.  They are marked by an attribute of the
+    layer's own, "selected_here", which stays there.
+    """
+    pymeshlab = _pymeshlab()
+    meshset = pymeshlab.MeshSet(verbose=False)
+    for name, surface in as_layers(what).items():
+        arrays, vertices, faces = ingredients(surface)
+        meshset.add_mesh(pymeshlab.Mesh(**arrays), name)
+        layer, condition = meshset.current_mesh(), f"({_MARK} > 0)"
+        # The attribute goes to the layer: from the mesh it is copied from, PyMeshLab crashes.
+        if vertices is not None:
+            layer.add_vertex_custom_scalar_attribute(vertices, _MARK)
+            meshset.compute_selection_by_condition_per_vertex(condselect=condition)
+        if faces is not None:
+            layer.add_face_custom_scalar_attribute(faces, _MARK)
+            meshset.compute_selection_by_condition_per_face(condselect=condition)
+    if meshset.mesh_number():
+        meshset.set_current_mesh(0)
     return meshset
 
 
-def from_meshset(meshset: Any) -> Mesh:
-    """Return the current mesh of a ``pymeshlab.MeshSet``.
+def from_meshset(meshset: Any) -> pv.PolyData:
+    """Return the current layer of a ``pymeshlab.MeshSet``, with all that MeshLab knows of it.
 
     Raises
     ------
     MeshError
-        If it is not a closed, outward oriented two-manifold.
+        If there is no layer.
     """
-    return Mesh(*_arrays(meshset))
+    return surface_of(_current(meshset))
+
+
+def layers_from_meshset(meshset: Any) -> dict[str, pv.PolyData]:
+    """Return all layers of a ``pymeshlab.MeshSet`` by name; equal names get a number."""
+    layers: dict[str, pv.PolyData] = {}
+    for layer in meshset:
+        layers[free_name(layer.label(), layers)] = surface_of(layer)
+    return layers
+
+
+def selected_vertices(meshset: Any) -> IntArray:
+    """Return (k,) int, the vertices selected in the current layer and the corners of its faces'.
+
+    To hold still, to drag, or as a region: ``session.set_fixed(selected_vertices(meshset))``,
+    ``session.add_handle(...)``, ``session.paint_region(0, ...)``, as the layer's vertices are
+    those of the mesh.
+
+    Raises
+    ------
+    MeshError
+        If there is no layer.
+    """
+    layer = _current(meshset)
+    chosen = np.array(layer.vertex_selection_array(), dtype=bool)
+    if layer.face_number():
+        chosen[layer.face_matrix()[layer.face_selection_array()].ravel()] = True
+    return np.flatnonzero(chosen)
 
 
 def read_faces(path: str | Path) -> tuple[FloatArray, IntArray]:
@@ -107,11 +180,17 @@ def simplify(mesh: Mesh, n_vertices: int) -> Mesh:
         preserveboundary=True,
         autoclean=True,
     )
-    return from_meshset(meshset)
+    return Mesh(*_arrays(meshset))
+
+
+def _current(meshset: Any) -> Any:
+    if not meshset.mesh_number():
+        raise MeshError("this MeshSet has no layer; add a mesh to it first")
+    return meshset.current_mesh()
 
 
 def _arrays(meshset: Any) -> tuple[FloatArray, IntArray]:
-    current = meshset.current_mesh()
+    current = _current(meshset)
     vertices = np.ascontiguousarray(current.vertex_matrix(), dtype=np.float64)
     faces = np.ascontiguousarray(current.face_matrix(), dtype=np.int64)
     return vertices, faces.reshape(-1, 3)

@@ -89,20 +89,29 @@ def write_ply(path: Path, surface: pv.PolyData) -> None:
     vertex = _columns(surface.point_data, surface.n_points)
     texture = surface.active_texture_coordinates
     if texture is not None:
-        vertex |= {"s": np.asarray(texture[:, 0], "f8"), "t": np.asarray(texture[:, 1], "f8")}
+        places = np.asarray(texture, dtype="f8").T  # by the names that MeshLab reads as doubles
+        vertex |= dict(zip(_TEXTURE[-1], places, strict=False))
     points = np.asarray(surface.points, dtype="f8")
     vertex = {name: points[:, k] for k, name in enumerate("xyz")} | vertex
     face = _columns(surface.cell_data, len(counts))
     header = [b"ply", b"format binary_little_endian 1.0", f"element vertex {len(points)}".encode()]
     header += [f"property {_WORDS[c.dtype.str[1:]]} {n}".encode() for n, c in vertex.items()]
     header += [f"element face {len(counts)}".encode(), b"property list uchar int vertex_indices"]
+    even = len(set(counts.tolist())) == 1
+    seams = surface.cell_data.get("TextureCorners") if even else None  # (m, 2 per corner)
+    if seams is not None:  # the one type that MeshLab reads
+        header += [b"property list uchar float texcoord"]
     header += [f"property {_WORDS[c.dtype.str[1:]]} {n}".encode() for n, c in face.items()]
     with path.open("wb") as file:
         file.write(b"\n".join([*header, b"end_header", b""]))
         file.write(_packed(vertex))
-        if len(set(counts.tolist())) == 1:
+        if even:
             rows = corners.reshape(len(counts), -1).astype("<i4")
-            first = {"k": counts.astype("u1")} | {str(k): c for k, c in enumerate(rows.T)}
+            first = {"#": counts.astype("u1")} | {f"#{k}": c for k, c in enumerate(rows.T)}
+            if seams is not None:
+                seams = np.asarray(seams, dtype="f4").T
+                first["#uv"] = np.full(len(counts), len(seams), dtype="u1")
+                first |= {f"#uv{k}": c for k, c in enumerate(seams)}
             file.write(_packed(first | face))
             return
         size = len(_packed(face)) // max(len(counts), 1)

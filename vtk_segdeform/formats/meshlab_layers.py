@@ -1,0 +1,153 @@
+"""Layers of MeshLab as pyvista's PolyData: everything MeshLab knows of a surface, by name.
+
+A `Mesh` is positions and triangles only, so what else a layer has travels in the arrays of a
+PolyData, which files, views and the deformation (`convert.with_vertices`) hand on already:
+
+    selection            point and cell array "selection", uint8, 1 is selected
+    quality              point and cell array "quality", float64
+    colour               point and cell array "RGBA", uint8 (n, 4)
+    texture coordinates  of vertices: active ones, "TextureCoordinates" (n, 2);
+                         of corners: cell array "TextureCorners" (m, 6)
+
+These are the names that PLY files have for them here.  MeshLab holds texture coordinates in single
+precision, the rest in double.  It gives each vertex a colour and a quality: white and 0, if it was
+told none, are no arrays.  A layer's matrix is applied to its positions.
+
+No import of PyMeshLab: functions below only ask a mesh that a caller of PyMeshLab got.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Container, Mapping
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+import pyvista as pv
+
+from ..errors import MeshError
+from ..mesh import Mesh
+from ..session import Session
+from .polygons import polydata_of
+
+Surface: TypeAlias = Mesh | pv.PolyData
+_CORNERS, _TEXTURE = "TextureCorners", "TextureCoordinates"
+
+
+class Ingredients(NamedTuple):
+    """A surface in the terms of ``pymeshlab.Mesh(**arrays)``, and what that cannot be told."""
+
+    arrays: dict[str, Any]
+    selected_vertices: Any  # (n,) float, 1 is selected; None if none is
+    selected_faces: Any  # (m,)
+
+
+def layers_of(session: Session) -> dict[str, pv.PolyData]:
+    """Return a session as layers: "mesh" and "cage 1", "cage 2" ..., all in the present pose.
+
+    Vertices of handles are selected; the quality of a vertex is the number of its region.
+    """
+    mesh = as_surface(session.mesh.with_vertices(session.vertices))
+    if session.handles:
+        selection = np.zeros(session.mesh.n_vertices, dtype=np.uint8)
+        selection[np.concatenate(list(session.handles.values()))] = 1
+        mesh.point_data["selection"] = selection
+    if session.regions is not None:
+        mesh.point_data["quality"] = session.regions.labels.astype(np.float64)
+    layers = {"mesh": mesh}
+    for k, (cage, vertices) in enumerate(zip(session.cages, session.cage_vertices, strict=True)):
+        counts = np.full(len(cage.faces), 3)
+        layers[f"cage {k + 1}"] = polydata_of(vertices, counts, cage.faces.ravel())
+    return layers
+
+
+def as_layers(what: Surface | Session | Mapping[str, Surface]) -> dict[str, pv.PolyData]:
+    """Return one surface, a session, or several surfaces by name, as layers."""
+    if isinstance(what, Session):
+        return layers_of(what)
+    layers = what if isinstance(what, Mapping) else {"mesh": what}
+    return {str(name): as_surface(surface) for name, surface in layers.items()}
+
+
+def as_surface(surface: Surface) -> pv.PolyData:
+    """Return triangles with float64 points; polygons are cut, arrays stay."""
+    if isinstance(surface, Mesh):
+        return polydata_of(surface.vertices, np.full(surface.n_faces, 3), surface.faces.ravel())
+    if not isinstance(surface, pv.PolyData):
+        raise MeshError(
+            "expected a Mesh, a PolyData, a Session or a dict of surfaces; "
+            f"got {type(surface).__name__}"
+        )
+    if not surface.is_all_triangles:
+        surface = surface.triangulate()
+    return surface
+
+
+def free_name(name: str, taken: Container[str]) -> str:
+    """Return *name*, or "name 2", "name 3" ... where that is taken."""
+    names = itertools.chain([name], (f"{name} {k}" for k in itertools.count(2)))
+    return next(each for each in names if each not in taken)
+
+
+def ingredients(surface: pv.PolyData) -> Ingredients:
+    """Return what a ``pymeshlab.Mesh`` is made from."""
+    points, cells = surface.point_data, surface.cell_data
+    arrays: dict[str, Any] = {
+        "vertex_matrix": np.asarray(surface.points, dtype=np.float64),
+        "face_matrix": surface.regular_faces,
+    }
+    for sort, attributes in (("v", points), ("f", cells)):
+        if "quality" in attributes:
+            arrays[f"{sort}_scalar_array"] = np.asarray(attributes["quality"], dtype=np.float64)
+        colour = _colour(attributes)
+        if colour is not None:
+            arrays[f"{sort}_color_matrix"] = colour / 255.0
+    texture = surface.active_texture_coordinates
+    if texture is not None:
+        arrays["v_tex_coords_matrix"] = np.asarray(texture[:, :2], dtype=np.float64)
+    if _CORNERS in cells:
+        corners = np.asarray(cells[_CORNERS], dtype=np.float64)
+        arrays["w_tex_coords_matrix"] = corners.reshape(-1, 2)
+    return Ingredients(arrays, _selection(points), _selection(cells))
+
+
+def surface_of(layer: Any) -> pv.PolyData:
+    """Return a ``pymeshlab.Mesh`` with all it has."""
+    faces = np.asarray(layer.face_matrix(), dtype=np.int64).reshape(-1, 3)
+    points = np.asarray(layer.transformed_vertex_matrix(), dtype=np.float64)
+    surface = polydata_of(points, np.full(len(faces), 3), faces.ravel())
+    for sort, attributes in (("vertex", surface.point_data), ("face", surface.cell_data)):
+        selected = getattr(layer, f"{sort}_selection_array")()
+        if selected.any():
+            attributes["selection"] = selected.astype(np.uint8)
+        if getattr(layer, f"has_{sort}_scalar")():
+            quality = np.asarray(getattr(layer, f"{sort}_scalar_array")())
+            if quality.any():
+                attributes["quality"] = quality
+        if getattr(layer, f"has_{sort}_color")():
+            colour = np.asarray(getattr(layer, f"{sort}_color_matrix")())
+            if (colour != 1.0).any():
+                attributes["RGBA"] = np.rint(colour * 255.0).astype(np.uint8, order="C")
+    if layer.has_vertex_tex_coord():
+        texture = np.ascontiguousarray(layer.vertex_tex_coord_matrix())
+        surface.point_data[_TEXTURE] = texture
+        surface.point_data.active_texture_coordinates_name = _TEXTURE
+    if layer.has_wedge_tex_coord():
+        corners = np.ascontiguousarray(layer.wedge_tex_coord_matrix())
+        surface.cell_data[_CORNERS] = corners.reshape(len(faces), 6)
+    return surface
+
+
+def _colour(attributes: Any) -> Any:
+    """Return (n, 4) of the colours, or None."""
+    name = next((name for name in ("RGBA", "RGB") if name in attributes), None)
+    if name is None:
+        return None
+    colour = np.asarray(attributes[name])
+    opaque = np.full((len(colour), 1), 255)
+    return np.hstack([colour, opaque])[:, :4].astype(np.float64)
+
+
+def _selection(attributes: Any) -> Any:
+    chosen = np.asarray(attributes["selection"]) != 0 if "selection" in attributes else None
+    return chosen.astype(np.float64) if chosen is not None and chosen.any() else None

@@ -1,0 +1,182 @@
+"""MeshLab projects, .mlp: a mesh and its cages as layers that MeshLab opens together.
+
+    work.mlp              which layers there are, and where each is placed; XML
+    work.layers/*.ply     the layers, with selection, quality, colours and texture coordinates
+
+PyMeshLab is not needed.  MeshLab keeps a selection in a PLY file as bit 32 of the property
+``flags``; here it is the array "selection", as `formats.meshlab_layers` has it.
+
+A project may come from anywhere, so only files in its own folder and below are read, and entities
+are not expanded.  Writing puts new files next to the old ones and .mlp last: whatever happens, it
+names layers that belong together.  Nothing but *path* and the folder of its layers is touched,
+and in that folder only files with names that are made here.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pyvista as pv
+
+from .arrays import FloatArray
+from .convert import read_polydata, with_vertices, write_mesh
+from .errors import MeshError
+from .formats.meshlab_layers import Surface, as_layers, free_name
+from .session import Session
+
+_SELECTED = 0x20  # of MeshLab's flags
+_OURS = re.compile(r"\d+-[0-9a-f]{12}\.ply")
+_HEAD = "<!DOCTYPE MeshLabDocument>\n"
+_LARGEST = 10_000_000  # bytes; projects are lists
+_IDENTITY = "\n1 0 0 0 \n0 1 0 0 \n0 0 1 0 \n0 0 0 1 \n"
+
+
+def read_project(path: str | Path) -> dict[str, pv.PolyData]:
+    """Return the layers of a MeshLab project, by name, each where its matrix places it.
+
+    Parameters
+    ----------
+    path : str or Path
+        An .mlp file; equal names of layers get a number.
+
+    Raises
+    ------
+    MeshError
+        If it is no such file; or names a layer outside its folder, or one that cannot be read.
+    MissingDependencyError
+        If only PyMeshLab reads a layer's format, and it is not installed.
+    """
+    path = Path(path)
+    layers: dict[str, pv.PolyData] = {}
+    for element in _parsed(path).iterfind("MeshGroup/MLMesh"):
+        file = _inside(path, element.get("filename", ""))
+        surface = read_polydata(file)
+        for attributes in (surface.point_data, surface.cell_data):
+            if "flags" in attributes:
+                chosen = np.asarray(attributes.pop("flags")).astype(np.int64) & _SELECTED != 0
+                if chosen.any():
+                    attributes["selection"] = chosen.astype(np.uint8)
+        matrix = _matrix(path, element)
+        if not np.array_equal(matrix, np.eye(4)):
+            points = np.asarray(surface.points, dtype=np.float64)
+            surface = with_vertices(surface, points @ matrix[:3, :3].T + matrix[:3, 3])
+        layers[free_name(element.get("label") or file.stem, layers)] = surface
+    if not layers:
+        raise MeshError(f"{path}: the project has no layers")
+    return layers
+
+
+def write_project(path: str | Path, what: Surface | Session | Mapping[str, Surface]) -> None:
+    """Write layers as a MeshLab project.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``work.mlp``; the layers go to a folder ``work.layers`` beside it.
+    what : Mesh, pyvista.PolyData, Session, or dict of str to Mesh or PolyData
+        As `meshlab.to_meshset` takes it.
+
+    Raises
+    ------
+    MeshError
+        If the suffix is not .mlp, the folder is not there, or *what* is none of these.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".mlp":
+        raise MeshError(f"{path}: the name of a MeshLab project ends in .mlp")
+    folder = path.with_suffix(".layers")
+    if not (path.parent.is_dir() and os.access(path.parent, os.W_OK)):
+        raise MeshError(f"{path}: there is no folder {path.parent} that may be written to")
+    if path.is_dir() or folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise MeshError(f"{path}: {folder.name} or {path.name} is something else already")
+    layers = as_layers(what)
+    project = ElementTree.Element("MeshLabProject")
+    group = ElementTree.SubElement(project, "MeshGroup")
+    folder.mkdir(exist_ok=True)
+    names = set()
+    with tempfile.TemporaryDirectory(dir=folder, prefix=".segdeform-") as drafts:
+        for number, (label, surface) in enumerate(layers.items()):
+            draft = Path(drafts) / "layer.ply"
+            write_mesh(draft, _with_flags(surface))
+            name = f"{number}-{hashlib.sha256(draft.read_bytes()).hexdigest()[:12]}.ply"
+            os.replace(draft, folder / name)
+            names.add(name)
+            place = {"label": _printable(label), "visible": "1"}
+            place["filename"] = f"{folder.name}/{name}"
+            mesh = ElementTree.SubElement(group, "MLMesh", place)
+            ElementTree.SubElement(mesh, "MLMatrix44").text = _IDENTITY
+        ElementTree.SubElement(project, "RasterGroup")
+        ElementTree.indent(project, " ")
+        text = _HEAD + ElementTree.tostring(project, encoding="unicode") + "\n"
+        draft = Path(drafts) / "project.mlp"
+        draft.write_text(text, encoding="utf-8")
+        os.replace(draft, path)
+    for file in folder.iterdir():
+        if _OURS.fullmatch(file.name) and file.name not in names:
+            file.unlink()
+
+
+def _with_flags(surface: pv.PolyData) -> pv.PolyData:
+    copy = surface.copy(deep=False)
+    for attributes in (copy.point_data, copy.cell_data):
+        if "selection" in attributes:
+            chosen = np.asarray(attributes.pop("selection")) != 0
+            attributes["flags"] = (chosen * _SELECTED).astype(np.int32)
+    return copy
+
+
+def _printable(text: str) -> str:
+    """Return *text* without the control characters that XML cannot hold."""
+    return "".join(letter if letter.isprintable() else " " for letter in text)
+
+
+def _parsed(path: Path) -> ElementTree.Element:
+    if not path.is_file():
+        raise MeshError(f"{path}: there is no such file")
+    if path.stat().st_size > _LARGEST:
+        raise MeshError(f"{path}: too large for a MeshLab project")
+    data = path.read_bytes()
+    if b"<!ENTITY" in data.upper() or b"\0" in data:
+        raise MeshError(f"{path}: is no MeshLab project, it declares entities or is not text")
+    try:
+        root = ElementTree.fromstring(data)
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise MeshError(f"{path}: is no MeshLab project ({error})") from None
+    if root.tag != "MeshLabProject":
+        raise MeshError(f"{path}: is no MeshLab project; its root is {root.tag[:40]!r}")
+    return root
+
+
+def _inside(path: Path, name: str) -> Path:
+    """Return the file of a layer, which must be in the project's own folder or below."""
+    folder = path.parent.resolve()
+    try:
+        file = (folder / name).resolve()
+        named = bool(name) and file.is_relative_to(folder) and file.is_file()
+    except (OSError, ValueError, RuntimeError):  # too long, or links in a circle
+        named = False
+    if not named:
+        raise MeshError(
+            f"{path}: the layer {name[:200]!r} is no file in the project's folder; "
+            "copy it there, and save the project again"
+        )
+    return file
+
+
+def _matrix(path: Path, element: ElementTree.Element) -> FloatArray:
+    words = (element.findtext("MLMatrix44") or _IDENTITY).split()
+    try:
+        matrix = np.array([float(word) for word in words]).reshape(4, 4)
+    except ValueError:
+        matrix = np.full((4, 4), np.nan)
+    if not np.isfinite(matrix).all() or not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+        label = element.get("label", "")[:80]
+        raise MeshError(f"{path}: the matrix of layer {label!r} is no affine map")
+    return matrix
