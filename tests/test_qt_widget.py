@@ -34,7 +34,7 @@ from vtk_segdeform.store import load_session
 from vtk_segdeform.widgets import Mode, Paint, Tool
 from vtk_segdeform.widgets.qt import DeformWidget, deform_dock
 
-MESH = models.cactus(1500)
+MESH = models.cactus(800)
 
 
 @pytest.fixture(scope="module")
@@ -261,7 +261,8 @@ def test_handles_are_renamed_chosen_and_removed_in_the_list(seen):
     assert [name for name, _ in rows(tree)] == ["what stays", "new handle, to be painted"]
 
 
-def test_options_are_steps_and_are_shown_when_they_are_undone(seen):
+def test_options_are_steps_and_are_shown_when_they_are_undone(make):
+    seen = make(models.sphere(300))
     seen.mode(Mode.CAGES)
     seen.type_number(seen.panel.cages.total, 90)
     seen.type_number(seen.panel.cages.offset, 0.5)
