@@ -19,7 +19,7 @@ from scenes import sausage
 from solids import OCTAHEDRON
 
 import vtk_segdeform as sd
-from vtk_segdeform import convert, models, plugin
+from vtk_segdeform import canvas, convert, models, plugin
 from vtk_segdeform.cli import main
 from vtk_segdeform.errors import MeshError, MissingDependencyError
 from vtk_segdeform.volume import signed_volume
@@ -242,7 +242,7 @@ def test_the_command_writes_what_came_of_it(tmp_path, session, monkeypatch, caps
         return session
 
     monkeypatch.setattr(plugin, "edit", edit)
-    monkeypatch.setattr(plugin, "require_screen", lambda: None)
+    monkeypatch.setattr("vtk_segdeform.command_line.commands.require_screen", lambda: None)
     assert main(["edit", str(saved), "-o", str(out)]) == 0
     assert "volume          changed by" in capsys.readouterr().out
     session.drag(SCENE.turned(20.0))
@@ -287,4 +287,4 @@ def test_what_is_no_mesh_is_refused():
     with pytest.raises(TypeError, match="mesh must be a Mesh, a PolyData or a Session; got str"):
         sd.edit("cactus")
     with pytest.raises(MissingDependencyError, match="off-screen"):
-        plugin.require_screen()
+        canvas.require_screen()

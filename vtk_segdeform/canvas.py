@@ -32,6 +32,7 @@ Draw = Callable[[pv.Plotter], None]
 _HEIGHT = 800  # pixels of a picture
 _TITLE, _MARGIN = 0.1, 0.04  # shares of the height: for the words on top, and around
 _ASIDE, _ABOVE = np.radians(14.0), np.radians(10.0)
+_UNSEEN = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")  # what VTK opens without a screen
 _PROBE = "import pyvista; pyvista.Plotter(off_screen=True).show()"
 
 
@@ -52,6 +53,27 @@ def require_offscreen() -> None:
         raise MissingDependencyError(
             "cannot render pictures here: VTK finds no OpenGL to draw with. On Debian or Ubuntu: "
             "apt-get install --no-install-recommends libegl1 libgl1"
+        )
+
+
+def require_screen() -> None:
+    """Make sure that a window can be opened where somebody sees it.
+
+    Raises
+    ------
+    MissingDependencyError
+        If not; the text says why.
+    """
+    if pv.OFF_SCREEN:
+        raise MissingDependencyError(
+            "there is no window to edit in: pyvista draws off-screen; unset PYVISTA_OFF_SCREEN"
+        )
+    probe = pv.Plotter(notebook=False)
+    kind = probe.render_window.GetClassName()
+    probe.close()
+    if kind in _UNSEEN:
+        raise MissingDependencyError(
+            "there is no screen to open a window on; set DISPLAY, or log in with 'ssh -X'"
         )
 
 

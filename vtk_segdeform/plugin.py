@@ -22,7 +22,7 @@ import pyvista as pv
 from numpy.typing import ArrayLike
 
 from . import convert, pipeline
-from .errors import MissingDependencyError
+from .canvas import require_screen
 from .faults import find_faults
 from .formats.polygons import triangles_of
 from .mesh import Mesh
@@ -39,7 +39,6 @@ _Path = str | os.PathLike[str] | None
 _log = logging.getLogger(__name__)
 
 _HANDLE_MET = 1e-3  # of the diagonal
-_UNSEEN = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")  # what VTK opens without a screen
 
 
 @overload
@@ -95,27 +94,6 @@ def deformed(surface: pv.PolyData, session: Session) -> pv.PolyData:
     if surface.n_points == session.mesh.n_vertices:
         return convert.with_vertices(surface, session.vertices)
     return convert.to_polydata(session.mesh.with_vertices(session.vertices))
-
-
-def require_screen() -> None:
-    """Make sure that a window can be opened where somebody sees it.
-
-    Raises
-    ------
-    MissingDependencyError
-        If not; the text says why.
-    """
-    if pv.OFF_SCREEN:
-        raise MissingDependencyError(
-            "there is no window to edit in: pyvista draws off-screen; unset PYVISTA_OFF_SCREEN"
-        )
-    probe = pv.Plotter(notebook=False)
-    kind = probe.render_window.GetClassName()
-    probe.close()
-    if kind in _UNSEEN:
-        raise MissingDependencyError(
-            "there is no screen to open a window on; set DISPLAY, or log in with 'ssh -X'"
-        )
 
 
 @pv.register_plotter_component("segdeform")

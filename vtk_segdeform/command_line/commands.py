@@ -18,6 +18,7 @@ from .. import convert, plugin
 from ..arrays import FloatArray, IntArray
 from ..cage_fit import fit_cages
 from ..cages import Cage
+from ..canvas import require_screen
 from ..deformer import Deformer
 from ..errors import ConstraintError, MeshError
 from ..faults import find_faults
@@ -91,7 +92,7 @@ def edit(options: Namespace, say: Say, progress: Progress) -> bool:
     if options.output is not None:
         convert.require_writable(options.output)
     surface, session = opened(options.input)
-    plugin.require_screen()
+    require_screen()
     session = plugin.edit(
         session, path=options.input.with_suffix(SESSION), title=f"segdeform {options.input.name}"
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 import pyvista as pv
 
 from .. import convert, plugin
-from ..canvas import require_offscreen
+from ..canvas import require_offscreen, require_screen
 from ..progress import Progress
 from ..session import Session
 from .commands import opened
@@ -73,7 +73,7 @@ def replayed(
     if unseen:
         require_offscreen()
     else:
-        plugin.require_screen()
+        require_screen()
     plotter = pv.Plotter(off_screen=unseen, title=f"segdeform {recording.name}", notebook=False)
     faults: list[Exception] = []
     try:
