@@ -60,8 +60,9 @@ class Seen:
         window.activateWindow()
         until(window.isActiveWindow, "the focus")
         self.widget, self.panel, self.editor = widget, widget.panel, widget.editor
-        self.deformed, self.errors, self.sessions = [], [], []
+        self.deformed, self.errors, self.sessions, self.regions = [], [], [], []
         widget.deformed.connect(lambda: self.deformed.append(self.session.volume_change))
+        widget.regions_changed.connect(lambda: self.regions.append(self.session.regions))
         widget.error.connect(self.errors.append)
         widget.session_changed.connect(self.sessions.append)
 
@@ -376,7 +377,10 @@ def test_a_session_is_saved_and_opened_again(seen, tmp_path, monkeypatch):
     assert seen.sessions == [seen.session]
     assert seen.session is not before
     assert seen.session.regions.n_regions == len(rows(seen.panel.regions.list)) == 2
-    before.set_fixed([])  # the one that went is nobody's business any more
+    before.merge_regions([0, 1])  # the one that went is nobody's business any more
+    assert seen.regions == []
+    seen.session.merge_regions([0, 1])
+    assert seen.regions == [seen.session.regions]
     seen.session.remove_handle("handle 1")
     seen.mode(Mode.HANDLES)
     assert len(seen.session.fixed) == int(rows(seen.panel.handles.list)[0][1]) > 0
@@ -494,8 +498,31 @@ def test_a_window_that_is_deleted_without_a_word_takes_all_with_it(state):
     window.deleteLater()
     delete_now()
     assert not editor.GetEnabled()
-    session.set_fixed([])
+    session.merge_regions([0, 1])  # and nobody listens any more, nor fails to
     application().processEvents()
+
+
+def test_a_dock_that_is_deleted_leaves_the_editor_as_it_is(state):
+    application()
+    mesh, now = state
+    window = QtWidgets.QMainWindow()
+    plotter = pyvistaqt.QtInteractor(window, auto_update=False, off_screen=False)
+    window.setCentralWidget(plotter)
+    dock = deform_dock(plotter, Session(mesh, state=now), window)
+    window.show()
+    editor, failures = dock.editor, []
+    editor.view.on_failure(failures.append)
+    dock.deleteLater()
+    delete_now()
+    editor.mode = Mode.CAGES
+    editor.session.merge_regions([0, 1])
+    application().processEvents()
+    assert editor.GetEnabled()
+    assert failures == []
+    plotter.close()
+    window.close()
+    window.deleteLater()
+    delete_now()
 
 
 # For everybody.
