@@ -155,6 +155,7 @@ def test_an_editor_that_was_removed_leaves_nothing_alive(qt):
     assert gone() is None
 
 
+@pytest.mark.campaign
 def test_the_story_on_a_screen_with_larger_pixels():
     application()  # or skip
     done = subprocess.run(
