@@ -90,10 +90,11 @@ class Legend:
         if now == self._laid_out:
             return
         self._laid_out = now
-        size = int(np.clip(height / 42, 11, 30))
+        size = int(np.clip(height / 42, 11, 30))  # pixels; VTK's are as large at 72 dots per inch
+        points = max(6, round(size * 72 / (renderer.GetRenderWindow().GetDPI() or 72)))
         for k, actor in enumerate(self._lines):
             style = actor.GetTextProperty()
-            style.SetFontSize(size)
+            style.SetFontSize(points)
             style.SetFrameWidth(size // 6)
             if not style.GetFrame():
                 style.SetBackgroundColor(*now[2])
@@ -103,7 +104,7 @@ class Legend:
         self._bar.SetPosition(0.99 - wide, 0.25)
         self._bar.SetWidth(wide)
         for style in (self._bar.GetTitleTextProperty(), self._bar.GetAnnotationTextProperty()):
-            style.SetFontSize(size)
+            style.SetFontSize(points)
             style.SetBackgroundColor(*now[2])
             style.SetBackgroundOpacity(_GROUND)
             style.SetColor(*_ink_on(now[2]))
