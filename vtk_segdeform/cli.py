@@ -20,6 +20,7 @@ from typing import Any
 
 from . import __version__
 from .command_line import commands
+from .command_line.application import application
 from .command_line.bench import bench
 from .command_line.progress_bar import ProgressBar
 from .command_line.replaying import replay_command
@@ -42,6 +43,7 @@ examples:
   segdeform demo -o demo-output
   segdeform check scan.ply --repair -o closed.ply
   segdeform edit horse.ply -o bent.ply
+  segdeform app horse.ply
   segdeform deform horse.ply -o bent.ply --fixed 'z<10%' --handle 'z>90%' --rotate y,45
   segdeform deform a.off -o b.off --fixed a.sel --handle a.sel --matrix a.def --regions auto
   segdeform deform in.vtp -o out.vtp --fixed 'z<5%' \\
@@ -162,6 +164,9 @@ def _parser() -> argparse.ArgumentParser:
 
     sub = command("edit", commands.edit, "open a window to deform a mesh, or a saved session, in")
     _input_output(sub, required=False)
+
+    sub = command("app", application, "open the desktop program, with a mesh, a session or nothing")
+    sub.add_argument("input", type=Path, nargs="?", metavar="FILE", help="a mesh or a session")
 
     sub = command("replay", replay_command, "do again what was recorded in a window by Ctrl+R")
     sub.add_argument("recording", type=Path, metavar="RECORDING", help="NAME.recording.txt")

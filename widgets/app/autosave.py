@@ -1,0 +1,191 @@
+"""Where unsaved work is kept, whose it is, and which of it a crash has left behind.
+
+    folder/8f31.../lock                 held for as long as the program runs that works on it
+                   about.json           what the work is on
+                   session.segdeform    the work; written whole, as every session
+
+Each document has a slot of its own from its first change until it is saved or given up.  A slot
+that nobody holds belongs to nobody any more: its program has crashed, or was killed.  Who asks
+for what is `left` holds it from then on, so that of several programs only one offers it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from pathlib import Path
+
+from vtk_segdeform.errors import SessionError
+from vtk_segdeform.progress import Progress
+from vtk_segdeform.session import Session
+from vtk_segdeform.store import save_session
+
+from ..editing.session_file import read_bound
+from .lock import hold
+
+_LOCK, _ABOUT, _SESSION = "lock", "about.json", "session.segdeform"
+_TRIES = 5
+
+
+def user_folder() -> Path:
+    """Return where this user's programs keep such things on this system."""
+    if sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Application Support"
+    else:
+        base = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
+    return Path(base) / "segdeform" / "unsaved"
+
+
+@dataclass(frozen=True)
+class About:
+    """What some work is on."""
+
+    name: str = "a mesh"
+    """For people: "horse.ply"."""
+    session: str = ""
+    """The session file it is saved to, if any."""
+    mesh: str = ""
+    """The mesh file it began with, if any."""
+
+
+class Slot:
+    """A place for the work on one document; ours as long as it is held.
+
+    Parameters
+    ----------
+    folder : Path
+        Where.
+    handle : int
+        What holds it.
+    about : About
+        What the work is on.
+    """
+
+    def __init__(self, folder: Path, handle: int, about: About) -> None:
+        self.about = about
+        self.path = folder / _SESSION
+        self._folder = folder
+        self._handle: int | None = handle
+
+    @property
+    def when(self) -> datetime:
+        """When the work was last kept; local time."""
+        return datetime.fromtimestamp(self.path.stat().st_mtime)
+
+    def write(self, session: Session) -> None:
+        """Keep *session*, as it is at this moment; in any thread.
+
+        Raises
+        ------
+        SessionError
+            If it cannot be written; what was kept before stays.
+        """
+        save_session(self.path, session)
+
+    def read(self, progress: Progress) -> Session:
+        """Return what was kept; bound, if it is in a pose."""
+        return read_bound(self.path, progress)
+
+    def release(self) -> None:
+        """Leave it to whoever asks for it next."""
+        if self._handle is not None:
+            os.close(self._handle)
+            self._handle = None
+
+    def remove(self) -> None:
+        """Delete it, the work first: half of it gone is no work left."""
+        self.path.unlink(missing_ok=True)
+        self.release()  # where open files cannot be deleted
+        with suppress(OSError):  # somebody else who found it empty deletes it too
+            for path in list(self._folder.iterdir()):
+                path.unlink(missing_ok=True)
+            self._folder.rmdir()
+
+
+class Autosaves:
+    """All slots in a folder.
+
+    Parameters
+    ----------
+    folder : Path, optional
+        `user_folder` unless given; made when it is needed.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from vtk_segdeform import models
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     crashed, next_one = Autosaves(Path(folder)), Autosaves(Path(folder))
+    ...     slot = crashed.new(About("ball.ply"))
+    ...     slot.write(Session(models.sphere(300)))
+    ...     print([each.about.name for each in next_one.left()])
+    ...     slot.release()  # as the operating system does when the program ends
+    ...     print([each.about.name for each in next_one.left()])
+    []
+    ['ball.ply']
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self.folder = user_folder() if folder is None else folder
+
+    def new(self, about: About) -> Slot:
+        """Return a slot that nobody else has.
+
+        Raises
+        ------
+        SessionError
+            If nothing can be written or held there.
+        """
+        try:
+            for _ in range(_TRIES):
+                folder = self.folder / secrets.token_hex(8)
+                folder.mkdir(parents=True, mode=0o700)
+                with suppress(FileNotFoundError):  # one who tidies up found it empty
+                    handle = hold(folder / _LOCK)
+                    if handle is not None:
+                        _write_about(folder, about)
+                        return Slot(folder, handle, about)
+        except OSError as fault:
+            raise SessionError(f"{self.folder}: {fault.strerror or fault}") from fault
+        raise SessionError(f"{self.folder}: files there cannot be locked")
+
+    def left(self) -> list[Slot]:
+        """Return what programs that are gone have left, the latest first; all of it held now."""
+        return sorted(self._left(), key=lambda slot: slot.when, reverse=True)
+
+    def _left(self) -> Iterator[Slot]:
+        folders = sorted(self.folder.iterdir()) if self.folder.is_dir() else []
+        for folder in folders:
+            handle = None
+            with suppress(OSError):  # gone meanwhile, or not ours to open
+                handle = hold(folder / _LOCK)
+            if handle is None:
+                continue
+            slot = Slot(folder, handle, _read_about(folder))
+            if slot.path.is_file():
+                yield slot
+            else:
+                slot.remove()  # it ended before there was anything to keep
+
+
+def _write_about(folder: Path, about: About) -> None:
+    draft = folder / f"{_ABOUT}.part"
+    draft.write_text(json.dumps(asdict(about)), encoding="utf-8")
+    os.replace(draft, folder / _ABOUT)
+
+
+def _read_about(folder: Path) -> About:
+    """Return what is told of the work; without it, or where it is damaged, there is still work."""
+    try:
+        told = json.loads((folder / _ABOUT).read_text(encoding="utf-8"))
+        return About(str(told["name"]), str(told["session"]), str(told["mesh"]))
+    except (OSError, ValueError, KeyError, TypeError):
+        return About()

@@ -1,0 +1,51 @@
+"""A file that one process holds, and that everybody sees held, until it ends, however it ends.
+
+The operating system keeps the lock, so that none outlives a crash or a ``kill -9``, and a new
+process with an old number is not taken for the old one.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _lock(handle: int) -> None:
+        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+
+else:
+    import fcntl
+
+    def _lock(handle: int) -> None:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def hold(path: Path) -> int | None:
+    """Hold a file, which is made if need be.
+
+    Returns
+    -------
+    handle : int or None
+        Open, and held until it is closed; None if somebody holds it already, also in this
+        process, if it was taken away meanwhile, or where files cannot be locked.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be opened.
+    """
+    handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+    is_held = False
+    try:
+        _lock(handle)
+        # Somebody who held it before may have deleted it since it was opened.
+        is_held = os.path.samestat(os.fstat(handle), os.stat(path))
+    except OSError:
+        pass
+    finally:
+        if not is_held:
+            os.close(handle)
+    return handle if is_held else None

@@ -1,0 +1,124 @@
+"""What the window's document is saved to: a session, a mesh, a picture; and who is asked before.
+
+Every function takes the `Window` and returns whether the file is there.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from qtpy import QtWidgets
+
+from vtk_segdeform.errors import SessionError
+
+from ..editing.actions import Action
+from ..editing.desk import Desk
+from ..editing.panel_actions import saving
+from .asking import MESHES, Answer, ask_replace, ask_save, tell_failure
+from .documents import SUFFIX, writing_mesh
+
+_SESSIONS = f"Sessions (*{SUFFIX})"
+_PICTURES = "Pictures (*.png *.jpg *.jpeg)"
+
+
+def save_session(window: Any) -> bool:
+    """Save the session to its file; ask for one if it has none."""
+    path = window.document.session_path
+    if path is None:
+        return save_session_as(window)
+    if not _done(window, saving(path)):
+        return False
+    window.keep_in_mind(window.document)
+    return True
+
+
+def save_session_as(window: Any) -> bool:
+    """Ask for a file, which is the session's from then on."""
+    path = _path(window, "Save session", _SESSIONS, SUFFIX)
+    if path is None or not _done(window, saving(path)):
+        return False
+    window.keep_in_mind(replace(window.document, session_path=path, name=path.name))
+    window.recent.add(path)
+    return True
+
+
+def save_mesh(window: Any) -> bool:
+    """Save the mesh as it is in this pose to where it was saved before; else ask."""
+    path = window.document.mesh_path
+    if path is None:
+        return save_mesh_as(window)
+    done = _done(window, writing_mesh(path, window.document.surface))
+    if done:
+        window.mesh_state = window.session.state
+    return done
+
+
+def save_mesh_as(window: Any) -> bool:
+    """Ask for a file for the mesh; its suffix is its format."""
+    source = window.document.source
+    suffix = ".ply" if source is None else source.suffix
+    path = _path(window, "Save mesh", f"Meshes ({MESHES})", suffix)
+    if path is None or not _done(window, writing_mesh(path, window.document.surface)):
+        return False
+    window.keep_in_mind(replace(window.document, mesh_path=path))
+    window.mesh_state = window.session.state
+    return True
+
+
+def export_picture(window: Any) -> bool:
+    """Ask for a file, and draw there what the view shows, but for its words."""
+    path = _path(window, "Export picture", _PICTURES, ".png")
+    return path is not None and _done(window, lambda desk: _draw(window, desk, path))
+
+
+def may_be_given_up(window: Any) -> bool:
+    """Tell whether what is open can go: it is saved, or somebody said so."""
+    if not window.is_behind:
+        return True
+    mesh_is_saved = window.mesh_state is window.session.state
+    answer = ask_save(window, window.document.name, mesh_is_saved=mesh_is_saved)
+    return save_session(window) if answer is Answer.SAVE else answer is Answer.DISCARD
+
+
+def _done(window: Any, action: Action) -> bool:
+    """Do it, also beside a job; what goes wrong is told in a box, and in the editor's line."""
+    editor = window.editor
+    editor.do(action, while_busy=True)
+    fault = editor.desk.voice.fault
+    if fault:
+        tell_failure(window, "This could not be saved", fault)
+    return not fault
+
+
+def _path(window: Any, title: str, kinds: str, suffix: str) -> Path | None:
+    """Return the path somebody chooses, with a suffix, or None."""
+    proposal = window.document.proposal
+    if proposal.suffix != suffix or not title.endswith("session"):
+        proposal = proposal.with_suffix(suffix)
+    if proposal == window.document.source:  # which is not to be written over by mere Enter
+        proposal = proposal.with_stem(f"{proposal.stem}-bent")
+    name, _ = QtWidgets.QFileDialog.getSaveFileName(window, title, str(proposal), kinds)
+    if not name:
+        return None
+    path = Path(name)
+    if path.suffix:
+        return path
+    path = path.with_suffix(suffix)
+    return path if not path.exists() or ask_replace(window, path.name) else None
+
+
+def _draw(window: Any, desk: Desk, path: Path) -> None:
+    plotter = window.editor_widget.plotter
+    desk.voice.be_silent()
+    desk.view.render()
+    picture = plotter.grabFramebuffer()
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".segdeform-") as folder:
+        draft = os.path.join(folder, path.name)
+        if not picture.save(draft):
+            raise SessionError(f"{path}: cannot be written as a picture; name a .png or a .jpg")
+        os.replace(draft, path)
+    desk.say(f"picture written to {path}")
