@@ -32,8 +32,8 @@ STORY = [
     "subspace", "passengers", "energy", "cage_stiffness", "curvature", "constraints", "positions",
     "acceleration", "solution", "iteration", "solver", "targets", "deformer", "pipeline",
     # a deformation in the making
-    "editing.listeners", "editing.state", "editing.history", "editing.painting", "editing.handles",
-    "editing.posing", "session", "editing.archive", "store",
+    "editing.listeners", "editing.naming", "editing.state", "editing.history", "editing.painting",
+    "editing.handles", "editing.posing", "session", "editing.archive", "store",
     # meshes from code, from files, and as pictures
     "modelling.remeshing", "modelling.implicit", "models", "formats.polygons", "formats.off",
     "formats.ply", "formats.wavefront", "formats.vtk_readers", "formats.meshlab_layers", "meshlab",
@@ -73,15 +73,21 @@ STORY = [
     "widgets.editing.panel_actions", "widgets.panel.controls", "widgets.panel.modes",
     "widgets.panel.painting", "widgets.panel.regions", "widgets.panel.handles",
     "widgets.panel.options", "widgets.panel.foot", "widgets.panel.panel", "widgets.qt",
+    # the desktop program
+    "widgets.app.lock", "widgets.app.autosave", "widgets.app.documents", "widgets.app.recent",
+    "widgets.app.keeper", "widgets.app.opening", "widgets.app.start_page", "widgets.app.drops",
+    "widgets.app.asking", "widgets.app.saving", "widgets.app.menus", "widgets.app.window",
     # the command line
     "command_line.selection", "command_line.motion", "command_line.outputs", "command_line.demo",
     "command_line.interactive", "command_line.bench", "command_line.commands",
-    "command_line.progress_bar", "command_line.replaying", "cli", "__main__",
+    "command_line.progress_bar", "command_line.replaying", "command_line.application",
+    "cli", "__main__",
 ]  # fmt: skip
 
 NUMERIC = {"numpy", "scipy"}
 VTK = {"vtkmodules"}
 PANEL = {"controls", "modes", "painting", "regions", "handles", "options", "foot", "panel"}
+PROGRAM = {"keeper", "opening", "start_page", "drops", "asking", "saving", "menus", "window"}
 GRANTED = {
     "cage_fit": VTK,
     "modelling.implicit": VTK,
@@ -105,6 +111,8 @@ GRANTED = {
     "plugin": {"pyvista"},
     **{f"widgets.panel.{name}": {"qtpy"} for name in PANEL},
     "widgets.qt": {"qtpy", "pyvistaqt"},
+    **{f"widgets.app.{name}": {"qtpy"} for name in PROGRAM},
+    "command_line.application": {"qtpy"},
 }
 
 MAY_PRINT_AND_EXIT = {"cli", "__main__", "paraview_plugin"}
