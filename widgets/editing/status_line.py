@@ -98,6 +98,7 @@ class StatusLine:
             words.place(left, high - 0.35 * size - (k + 0.5) * leading)
         self._tag.place(margin, high - 0.35 * size - 0.5 * leading)
         self._strip.colour(_WARNING if warning else _CALM)
+        self._strip.show(bool(tag or text))
         self._strip.place(0.0, 0.0, width, high)
         self._bar.show(fraction is not None)
         self._bar.place(0.0, 0.0, width * (fraction or 0.0), 0.35 * size)
