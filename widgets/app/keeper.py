@@ -17,6 +17,7 @@ from vtk_segdeform.editing.listeners import Change
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.session import Session
 
+from ..view import Stop
 from .autosave import About, Autosaves, Slot
 
 INTERVAL = 10.0  # seconds that a crash may cost, of a drag that is still going on
@@ -58,7 +59,7 @@ class Keeper(QtCore.QObject):
         self._writing: futures.Future[Slot] | None = None
         self._has_failed = self._again = False
         self._threads = futures.ThreadPoolExecutor(1, "segdeform keeper")
-        self._stop: Callable[[], None] | None = None
+        self._stops = stops_of(self)
         self._at_once = self._timer(0, self.keep)
         self._when_quiet = self._timer(_QUIET, self.keep)
         self._at_last = self._timer(round(1000.0 * interval), self.keep)
@@ -95,15 +96,15 @@ class Keeper(QtCore.QObject):
         self.forget()
         self._session, self.about, self._is_behind = session, about, is_behind
         self._slot, self._kept = slot, session.state if slot is not None else None
-        self._stop = session.on_change(self._changed)
+        self._stops.append(session.on_change(self._changed))
 
     def forget(self) -> None:
         """Delete what is kept: it is saved, or was given up."""
         for timer in (self._at_once, self._when_quiet, self._at_last, self._looks):
             timer.stop()
-        if self._stop is not None:
-            self._stop()
-        self._stop = self._session = None
+        while self._stops:
+            self._stops.pop()()
+        self._session = None
         if self._writing is not None:
             futures.wait([self._writing])
             self._writing = None
@@ -181,3 +182,15 @@ class Keeper(QtCore.QObject):
         timer.setInterval(milliseconds)
         timer.timeout.connect(call)
         return timer
+
+
+def stops_of(hearer: Any) -> list[Stop]:
+    """Return a list for what ends the hearing of a QObject; done when Qt deletes it."""
+    stops: list[Stop] = []
+
+    def stop(*_: object) -> None:
+        while stops:
+            stops.pop()()
+
+    hearer.destroyed.connect(stop)
+    return stops

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from qtpy import QtGui, QtWidgets
+from qtpy import QtCore, QtGui, QtWidgets
 
 from vtk_segdeform import __version__
 
@@ -14,6 +14,7 @@ from . import saving
 from .asking import tell_about
 from .start_page import home_as_tilde
 
+_FOLDER = 300  # points at most
 _Keys = QtGui.QKeySequence.StandardKey
 
 
@@ -93,7 +94,10 @@ class Menus:
         window, menu = self._window, self.recent
         menu.clear()
         for number, path in enumerate(window.recent.paths, 1):
-            name = f"{path.name}    {home_as_tilde(path.parent)}".replace("&", "&&")
+            folder = menu.fontMetrics().elidedText(
+                home_as_tilde(path.parent), QtCore.Qt.TextElideMode.ElideMiddle, _FOLDER
+            )
+            name = f"{path.name}    {folder}".replace("&", "&&")
             action = menu.addAction(f"&{number}  {name}")
             action.setEnabled(path.is_file())
             action.triggered.connect(_calling(window.open, path))

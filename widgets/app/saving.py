@@ -70,7 +70,7 @@ def save_mesh_as(window: Any) -> bool:
 
 
 def export_picture(window: Any) -> bool:
-    """Ask for a file, and draw there what the view shows, but for its words."""
+    """Ask for a file, and draw there what the view shows, but for its words and what is grabbed."""
     path = _path(window, "Export picture", _PICTURES, ".png")
     return path is not None and _done(window, lambda desk: _draw(window, desk, path))
 
@@ -112,10 +112,14 @@ def _path(window: Any, title: str, kinds: str, suffix: str) -> Path | None:
 
 
 def _draw(window: Any, desk: Desk, path: Path) -> None:
-    plotter = window.editor_widget.plotter
+    mode = desk.mode
+    desk.stage.rest()  # no gizmo
     desk.voice.be_silent()
     desk.view.render()
-    picture = plotter.grabFramebuffer()
+    picture = window.editor_widget.plotter.grabFramebuffer()
+    desk.mode = mode
+    dragger = desk.stage.dragger
+    dragger.refine_while_resting = dragger.refine_while_resting  # go on, if that was so
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=".segdeform-") as folder:
         draft = os.path.join(folder, path.name)
         if not picture.save(draft):

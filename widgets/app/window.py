@@ -23,7 +23,7 @@ from .asking import ask_file, choose_work, tell_failure
 from .autosave import Autosaves, Slot
 from .documents import Document, Opened, from_file, from_slot, the_cactus
 from .drops import Drops
-from .keeper import INTERVAL, Keeper
+from .keeper import INTERVAL, Keeper, stops_of
 from .menus import Menus, lead_panel
 from .opening import Opening, Request, WaitingPage
 from .recent import Recent
@@ -73,6 +73,7 @@ class Window(QtWidgets.QMainWindow):
         self.mesh_state: object = None
         self.editor_widget: Any = None
         self._opening: Opening | None = None
+        self._stops = stops_of(self)
         self.pages = QtWidgets.QStackedWidget()
         self.start_page, self.waiting = StartPage(), WaitingPage()
         self.start_page.open_wanted.connect(self.ask_and_open)
@@ -179,7 +180,7 @@ class Window(QtWidgets.QMainWindow):
         widget = self.editor_widget = DeformWidget(session, self)
         widget.editor.desk.file = self.document.file(session, is_unsaved=bool(request.slot))
         lead_panel(self)
-        self._stop_hearing = widget.editor.desk.voice.on_word(self._heard)
+        self._stops.append(widget.editor.desk.voice.on_word(self._heard))
         widget.session_changed.connect(lambda _: self._mind())
         self._mind(request.slot)
         self.pages.addWidget(widget)
@@ -212,7 +213,7 @@ class Window(QtWidgets.QMainWindow):
     def _close_document(self) -> None:
         widget, self.editor_widget = self.editor_widget, None
         if widget is not None:
-            self._stop_hearing()
+            self._stops.pop()()
             widget.close()
             self.pages.removeWidget(widget)
             widget.deleteLater()
