@@ -19,7 +19,7 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 # One line per part of the story; a new file takes its place here.
 STORY = [
     # a checked mesh
-    "arrays", "errors", "progress", "surface.topology", "surface.manifold", "surface.inside",
+    "errors", "arrays", "progress", "surface.topology", "surface.manifold", "surface.inside",
     "surface.intersections", "surface.report", "surface.shells", "faults", "mesh", "surface.holes",
     "surface.splitting", "surface.repair_steps", "repair",
     # what a deformation keeps

@@ -7,32 +7,36 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .errors import ArgumentError
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 
 def as_points(points: ArrayLike, name: str) -> FloatArray:
-    """Return *points* as (n, 3) float, or raise a ValueError that says what came instead."""
+    """Return *points* as (n, 3) float, or raise an ArgumentError that says what came instead."""
     array = _as_numbers(points, name)
     if array.ndim != 2 or array.shape[1] != 3:
-        raise ValueError(f"{name} must have shape (n, 3); got {array.shape}")
+        raise ArgumentError(f"{name} must have shape (n, 3); got {array.shape}")
     bad = np.count_nonzero(~np.isfinite(array).all(axis=1))
     if bad:
-        raise ValueError(f"{name} holds {bad} points with NaN or infinite coordinates")
+        raise ArgumentError(
+            f"{name} holds {bad} points with NaN or infinite coordinates; all must be finite"
+        )
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
 def as_faces(faces: ArrayLike, n_points: int, name: str) -> IntArray:
-    """Return *faces* as (m, 3) int with indices in 0..n_points-1, or raise a ValueError."""
-    array = _plain(faces, name)
+    """Return *faces* as (m, 3) int with indices in 0..n_points-1, or raise an ArgumentError."""
+    array = plain(faces, name)
     if array.ndim != 2 or array.shape[1] != 3:
-        raise ValueError(f"{name} must have shape (m, 3), triangles; got {array.shape}")
+        raise ArgumentError(f"{name} must have shape (m, 3), triangles; got {array.shape}")
     if array.dtype.kind not in "iu":
-        raise ValueError(f"{name} must hold integers; got {array.dtype}")
+        raise ArgumentError(f"{name} must hold integers; got {array.dtype}")
     if len(array) and (array.min() < 0 or array.max() >= n_points):
         low, high = array.min(), array.max()
-        raise ValueError(f"{name} must index 0..{n_points - 1}; got {low}..{high}")
+        raise ArgumentError(f"{name} must index 0..{n_points - 1}; got {low}..{high}")
     return np.ascontiguousarray(array, dtype=np.int64)
 
 
@@ -41,23 +45,23 @@ def as_ids(ids: ArrayLike, n_points: int, name: str) -> IntArray:
 
     The order given is kept; a number given twice is an error.
     """
-    array = _plain(ids, name)
+    array = plain(ids, name)
     if array.dtype == bool:
         if array.shape != (n_points,):
-            raise ValueError(f"{name}, a mask, must have shape ({n_points},); got {array.shape}")
+            raise ArgumentError(f"{name}, a mask, must have shape ({n_points},); got {array.shape}")
         return np.flatnonzero(array).astype(np.int64)
     if array.size == 0:
         return np.empty(0, dtype=np.int64)
     if array.dtype.kind not in "iu":
-        raise ValueError(f"{name} must hold vertex numbers or be a mask; got {array.dtype}")
+        raise ArgumentError(f"{name} must hold vertex numbers or be a mask; got {array.dtype}")
     array = np.atleast_1d(array).astype(np.int64)
     if array.ndim != 1:
-        raise ValueError(f"{name} must be one row of vertex numbers; got shape {array.shape}")
+        raise ArgumentError(f"{name} must be one row of vertex numbers; got shape {array.shape}")
     if array.min() < 0 or array.max() >= n_points:
         low, high = array.min(), array.max()
-        raise ValueError(f"{name} must index 0..{n_points - 1}; got {low}..{high}")
+        raise ArgumentError(f"{name} must index 0..{n_points - 1}; got {low}..{high}")
     if len(np.unique(array)) != len(array):
-        raise ValueError(f"{name} names a vertex twice")
+        raise ArgumentError(f"{name} names a vertex twice; name each once")
     return array
 
 
@@ -68,20 +72,20 @@ def frozen(array: NDArray[np.generic]) -> NDArray[np.generic]:
 
 
 def _as_numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
-    array = _plain(values, name)
+    array = plain(values, name)
     if array.dtype.kind == "c":
-        raise ValueError(f"{name} must hold real numbers; got {array.dtype}")
+        raise ArgumentError(f"{name} must hold real numbers; got {array.dtype}")
     try:
         return array.astype(np.float64, copy=False)
     except (TypeError, ValueError):
-        raise ValueError(f"{name} must hold numbers") from None
+        raise ArgumentError(f"{name} must hold numbers; got {array.dtype}") from None
 
 
-def _plain(values: ArrayLike, name: str) -> NDArray[Any]:
+def plain(values: ArrayLike, name: str) -> NDArray[Any]:
     """Return *values* as an array, nothing left out: a mask over some of them would get lost."""
     if np.ma.is_masked(values):
-        raise ValueError(f"{name} holds masked entries; fill them in or leave them out")
+        raise ArgumentError(f"{name} holds masked entries; fill them in or leave them out")
     try:
         return np.asarray(values)
     except ValueError:  # rows of different lengths
-        raise ValueError(f"{name} must be an array; its rows differ in length") from None
+        raise ArgumentError(f"{name} must be an array; its rows differ in length") from None

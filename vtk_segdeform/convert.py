@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from . import meshlab
 from .arrays import as_points
-from .errors import MeshError
+from .errors import ArgumentError, MeshError
 from .formats.off import read_off, write_off
 from .formats.ply import read_ply, write_ply
 from .formats.polygons import polydata_of, triangles_of
@@ -203,7 +203,7 @@ def with_vertices(polydata: pv.PolyData, vertices: ArrayLike) -> pv.PolyData:
     """
     points = as_points(vertices, "vertices")
     if len(points) != polydata.n_points:
-        raise ValueError(f"vertices must have {polydata.n_points} rows; got {len(points)}")
+        raise ArgumentError(f"vertices must have {polydata.n_points} rows; got {len(points)}")
     moved = polydata.copy(deep=True)
     moved.points = points.copy()
     for attributes, of_points in ((moved.point_data, True), (moved.cell_data, False)):

@@ -8,6 +8,10 @@ class SegDeformError(Exception):
     """Everything this package raises on purpose."""
 
 
+class ArgumentError(SegDeformError, ValueError):
+    """An array or a number of the wrong shape, type or range; the text says what it must be."""
+
+
 class MeshError(SegDeformError, ValueError):
     """The mesh is not a closed, outward oriented two-manifold; the text names each fault."""
 

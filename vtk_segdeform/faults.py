@@ -12,7 +12,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import FloatArray, IntArray
+from .arrays import FloatArray, IntArray, plain
+from .errors import ArgumentError
 from .surface.report import Fault, Id, Kind, MeshReport
 from .surface.shells import wrong_way_round
 from .surface.topology import Sides, connected, first_equal_row, repeats_face, repeats_vertex
@@ -75,19 +76,19 @@ def find_faults(vertices: ArrayLike, faces: ArrayLike) -> MeshReport:
 
 def as_soup(vertices: ArrayLike, faces: ArrayLike) -> tuple[FloatArray, IntArray]:
     """Return arrays (n, 3) float and (m, 3) int whatever they hold; only shape and type matter."""
-    points, triangles = np.asarray(vertices), np.asarray(faces)
+    points, triangles = plain(vertices, "vertices"), plain(faces, "faces")
     if points.size == 0:
         points = np.empty((0, 3))
     if triangles.size == 0:
         triangles = np.empty((0, 3), np.int64)
     if points.ndim != 2 or points.shape[1] != 3:
-        raise ValueError(f"vertices must have shape (n, 3); got {points.shape}")
+        raise ArgumentError(f"vertices must have shape (n, 3); got {points.shape}")
     if triangles.ndim != 2 or triangles.shape[1] != 3:
-        raise ValueError(f"faces must have shape (m, 3), triangles; got {triangles.shape}")
+        raise ArgumentError(f"faces must have shape (m, 3), triangles; got {triangles.shape}")
     if points.dtype.kind not in "iuf":
-        raise ValueError(f"vertices must hold numbers; got {points.dtype}")
+        raise ArgumentError(f"vertices must hold numbers; got {points.dtype}")
     if triangles.dtype.kind not in "iu":
-        raise ValueError(f"faces must hold integers; got {triangles.dtype}")
+        raise ArgumentError(f"faces must hold integers; got {triangles.dtype}")
     return (
         np.ascontiguousarray(points, dtype=np.float64),
         np.ascontiguousarray(triangles, dtype=np.int64),

@@ -29,6 +29,7 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from .arrays import FloatArray, IntArray, as_points
+from .errors import ArgumentError
 from .mesh import Mesh
 from .volume import corner_and_edges, volume_gradient
 
@@ -70,7 +71,7 @@ class LocalVolume:
         """
         vertices = as_points(vertices, "vertices")
         if vertices.shape != self._shape:
-            raise ValueError(f"vertices must have shape {self._shape}; got {vertices.shape}")
+            raise ArgumentError(f"vertices must have shape {self._shape}; got {vertices.shape}")
         now = self._smoothed(vertices)
         return np.divide(now - self._rest, self._rest, where=self._trusted, out=np.zeros(len(now)))
 

@@ -15,7 +15,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from .arrays import FloatArray, IntArray, as_points
-from .errors import MeshError
+from .errors import ArgumentError, MeshError
 from .faults import as_soup, find_faults
 from .surface.topology import edge_keys
 
@@ -123,7 +123,9 @@ class Mesh:
         """
         points = as_points(vertices, "vertices")
         if points.shape != self.vertices.shape:
-            raise ValueError(f"vertices must have shape {self.vertices.shape}; got {points.shape}")
+            raise ArgumentError(
+                f"vertices must have shape {self.vertices.shape}; got {points.shape}"
+            )
         posed = object.__new__(Mesh)
         posed.__setstate__((points.copy(), self.faces))
         for name in ("edges", "components"):  # the same at every pose: hand on what is known

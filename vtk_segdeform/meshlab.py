@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .arrays import FloatArray, IntArray
-from .errors import MeshError, MissingDependencyError
+from .errors import ArgumentError, MeshError, MissingDependencyError
 from .formats.meshlab_layers import Surface, as_layers, free_name, ingredients, surface_of
 from .mesh import Mesh
 from .session import Session
@@ -170,7 +170,7 @@ def simplify(mesh: Mesh, n_vertices: int) -> Mesh:
         If PyMeshLab is not installed.
     """
     if n_vertices < 4:
-        raise ValueError(f"n_vertices must be 4 or more; got {n_vertices}")
+        raise ArgumentError(f"n_vertices must be 4 or more; got {n_vertices}")
     meshset = to_meshset(mesh)
     euler = mesh.n_vertices - len(mesh.edges) + mesh.n_faces  # stays; V - E + F with E = 3/2 F
     meshset.meshing_decimation_quadric_edge_collapse(

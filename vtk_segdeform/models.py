@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from .arrays import IntArray
+from .errors import ArgumentError
 from .mesh import Mesh
 from .modelling.implicit import Limb, standing_body
 
@@ -107,7 +108,7 @@ def bar(
         How often each edge is divided: 2 (ab + bc + ca) + 2 vertices.
     """
     if min(divisions) < 1 or min(size) <= 0:
-        raise ValueError(f"size and divisions must be positive; got {size} and {divisions}")
+        raise ArgumentError(f"size and divisions must be positive; got {size} and {divisions}")
     sides, faces, count = [], [], 0
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3
@@ -135,7 +136,7 @@ def torus(n_vertices: int = 3000, *, major: float = 1.0, minor: float = 0.35) ->
         Radius of the ring and of the tube.
     """
     if n_vertices < 30 or not 0 < minor < major:
-        raise ValueError(
+        raise ArgumentError(
             "a torus needs n_vertices >= 30 and 0 < minor < major; "
             f"got {n_vertices}, minor {minor}, major {major}"
         )
@@ -168,7 +169,7 @@ def sphere(n_vertices: int = 2562, *, radius: float = 1.0) -> Mesh:
 
 def _require(n_vertices: int, least: int) -> None:
     if n_vertices < least:
-        raise ValueError(f"n_vertices must be {least} or more; got {n_vertices}")
+        raise ArgumentError(f"n_vertices must be {least} or more; got {n_vertices}")
 
 
 def _chequered(p: int, q: int) -> IntArray:

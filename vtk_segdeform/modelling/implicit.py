@@ -31,6 +31,7 @@ from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 
 from ..arrays import FloatArray, IntArray
+from ..errors import ArgumentError
 from ..mesh import Mesh
 from .remeshing import Field, flip, refine, relax, split_to, vertex_normals
 
@@ -161,7 +162,7 @@ def _contour_below(field: Field, box: FloatArray, n: int) -> tuple[FloatArray, I
             break
         spacing *= float(np.sqrt(max(len(vertices), 8) / (0.985 * n)))
     if best is None or not len(best[0]):
-        raise ValueError(f"n_vertices = {n} is too few for this shape; ask for more")
+        raise ArgumentError(f"n_vertices = {n} is too few for this shape; ask for more")
     return best
 
 
