@@ -43,6 +43,8 @@ class Keeper(QtCore.QObject):
         What the work is on; told beside what is kept from the next slot on.
     """
 
+    kept = QtCore.Signal()
+    """The work as it was a moment ago is on disk."""
     failed = QtCore.Signal(str)
     """The work cannot be kept, and why; told once, until it can be again."""
 
@@ -155,6 +157,7 @@ class Keeper(QtCore.QObject):
         self._looks.stop()
         if error is None:
             self._has_failed = False
+            self.kept.emit()
         elif isinstance(error, SegDeformError | OSError):
             self._fail(error)
         else:

@@ -1,0 +1,242 @@
+"""Hands for the desktop program: a window on a screen, and somebody who answers its questions.
+
+Run by itself it is a program that drags, or saves, and tells of every pose, until it is killed:
+
+    python app_hands.py drag|save FOLDER
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+from qt_hands import Qt, QtCore, QtHand, QtTest, QtWidgets, application, until
+from scenes import sausage
+
+from vtk_segdeform import Session
+from vtk_segdeform.store import save_session
+from vtk_segdeform.widgets import Mode
+from vtk_segdeform.widgets.app.autosave import Autosaves, Slot
+from vtk_segdeform.widgets.app.window import Window
+
+INTERVAL = 0.3  # seconds
+
+
+def ready_session() -> Session:
+    """Return a session that lacks nothing but a pose."""
+    scene = sausage()
+    session = Session(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.set_fixed(scene.fixed)
+    session.add_handle(scene.handle)
+    return session
+
+
+def digest(session: Session) -> str:
+    """Return what tells one pose from another, to the last bit of what is seen and kept."""
+    pose, parts = session.state.pose, [session.vertices, session.fixed]
+    if pose is not None:
+        parts += [*pose.cage_vertices, *pose.targets.values()]
+    whole = hashlib.sha256()
+    for part in parts:
+        whole.update(np.ascontiguousarray(part).tobytes())
+    return whole.hexdigest()[:16]
+
+
+class Boxes(QtCore.QObject):
+    """Somebody who reads each box and clicks what was agreed on; with none agreed, closes it.
+
+    Attributes
+    ----------
+    answers : list of str
+        What to click, box by box.
+    seen : list of str
+        What the boxes said.
+    """
+
+    def __init__(self):
+        super().__init__()
+        self.answers, self.seen, self.unexpected = [], [], []
+        self._timer = QtCore.QTimer(self)
+        self._timer.timeout.connect(self._look)
+        self._timer.start(10)
+
+    def _look(self):
+        box = application().activeModalWidget()
+        if not isinstance(box, QtWidgets.QMessageBox) or not box.isVisible():
+            return
+        text = f"{box.text()}\n{box.informativeText()}"
+        self.seen.append(text)
+        if not self.answers:
+            self.unexpected.append(text)
+            box.reject()
+            return
+        answer = self.answers.pop(0)
+        if answer == "Escape":
+            QtTest.QTest.keyClick(box, Qt.Key_Escape)
+            return
+        (button,) = (b for b in box.buttons() if b.text().replace("&", "") == answer)
+        QtTest.QTest.mouseClick(button, Qt.LeftButton)
+
+
+class AppHand:
+    """A hand on a window of the program."""
+
+    def __init__(self, window: Window):
+        self.window = window
+        window.resize(900, 650)
+        window.show()
+        until(lambda: window.windowHandle() and window.windowHandle().isExposed(), "the window")
+        window.activateWindow()
+        until(window.isActiveWindow, "the focus")
+
+    @property
+    def page(self):
+        return self.window.pages.currentWidget()
+
+    @property
+    def title(self):
+        """The title as it is read: with a star if something is not saved."""
+        star = "*" if self.window.isWindowModified() else ""
+        return self.window.windowTitle().replace("[*]", star)
+
+    def settle(self):
+        """Let the window get on until nothing is opened, worked at or still to be kept."""
+        application().processEvents()
+        until(lambda: self.page is not self.window.waiting, "the file")
+        if self.window.has_mesh:
+            until(lambda: not self.window.editor.is_busy, "the job")
+            dragger = self.window.editor.stage.dragger
+            until(lambda: not dragger.is_refining, "refinement")
+        until(lambda: self.window.keeper.is_idle, "the keeper")
+
+    def click(self, button):
+        assert button.isVisible()
+        assert button.isEnabled()
+        QtTest.QTest.mouseClick(button, Qt.LeftButton)
+        application().processEvents()
+
+    def choose(self, *path):
+        """Click through menus, by the beginnings of what they say."""
+        bar = self.window.menuBar()
+        action = _named(bar, path[0])
+        _click(bar, action)
+        for name in path[1:]:
+            menu = action.menu()
+            until(menu.isVisible, f"the menu {path[0]}")
+            action = _named(menu, name)
+            assert action.isEnabled(), name
+            _click(menu, action)
+        application().processEvents()
+
+    def reads(self, *path):
+        """Return what a menu says, once it is open; then close it."""
+        bar = self.window.menuBar()
+        action = _named(bar, path[0])
+        menus = [action.menu()]
+        _click(bar, action)
+        for name in path[1:]:
+            action = _named(menus[-1], name)
+            _click(menus[-1], action)
+            until(action.menu().isVisible, f"the menu {name}")
+            menus.append(action.menu())
+        said = {
+            action.text().replace("&", "").partition("\t")[0]: action
+            for action in menus[-1].actions()
+        }
+        for menu in reversed(menus):
+            QtTest.QTest.keyClick(menu, Qt.Key_Escape)
+        application().processEvents()
+        return said
+
+    def view_hand(self) -> QtHand:
+        """Return a hand on the view, from the front, with handles to drag."""
+        editor, plotter = self.window.editor, self.window.editor_widget.plotter
+        editor.mode = Mode.DEFORM
+        self.settle()
+        plotter.camera_position = "xz"
+        plotter.render()
+        plotter.setFocus()
+        return QtHand(plotter.interactor, editor.view)
+
+    def way(self, *, by=(0.0, 60.0), steps=6):
+        """Return places on the screen that lead away from the middle of the handle."""
+        view, gizmo = self.window.editor.view, self.window.editor.stage.dragger.gizmo
+        start = view.to_display(np.array([gizmo.centre]))[0, :2]
+        return [start + t * np.array(by) for t in np.linspace(0.0, 1.0, steps)]
+
+
+def _named(menu, beginning):
+    actions = [a for a in menu.actions() if a.text().replace("&", "").startswith(beginning)]
+    assert actions, f"no {beginning} in {[a.text() for a in menu.actions()]}"
+    return actions[0]
+
+
+def _click(menu, action):
+    place = menu.actionGeometry(action).center()
+    QtTest.QTest.mouseClick(menu, Qt.LeftButton, Qt.NoModifier, place)
+    application().processEvents()
+
+
+# The program that is killed.
+
+
+def _tell(*words):
+    os.write(1, (" ".join(map(str, words)) + "\n").encode())
+
+
+def _program(what: str, folder: Path) -> None:
+    write = Slot.write
+
+    def telling_write(slot, session):
+        shown = digests.get(id(session.state.pose), "")
+        write(slot, session)
+        _tell("kept", shown)
+
+    Slot.write = telling_write
+    settings = QtCore.QSettings(str(folder / "settings.ini"), QtCore.QSettings.Format.IniFormat)
+    application()
+    window = Window(settings, Autosaves(folder / "unsaved"), interval=INTERVAL)
+    hand = AppHand(window)
+    path = folder / "arm.segdeform"
+    window.open(path)
+    until(lambda: window.has_mesh, "the file")
+    session, digests, poses = window.session, {}, []
+
+    def told(_):
+        pose = session.state.pose
+        if id(pose) not in digests:
+            poses.append(pose)  # so that no other gets its number
+            digests[id(pose)] = digest(session)
+            _tell("pose", digests[id(pose)])
+
+    told(None)
+    session.on_change(told)
+    view = hand.view_hand()
+    _tell("ready")
+    if what == "drag":
+        way = hand.way(steps=8)
+        view.drag(way)
+        hand.settle()
+        _tell("finished", digest(session))
+        there = hand.way(by=(0.0, -90.0), steps=20)
+        view.press(there[0])
+        while True:  # to and fro, and never let go
+            for place in [*there, *reversed(there)]:
+                view.move(place)
+                _tell("moved")
+    while True:
+        view.drag(hand.way(by=(0.0, 25.0), steps=3))
+        _tell("saving")
+        QtTest.QTest.keyClick(view.widget, Qt.Key_S, Qt.ControlModifier)
+        _tell("saved", digest(session))
+        view.drag(hand.way(by=(0.0, -25.0), steps=3))
+        save_session(folder / "beside.segdeform", session)
+
+
+if __name__ == "__main__":
+    _program(sys.argv[1], Path(sys.argv[2]))
