@@ -136,7 +136,7 @@ def test_the_whole_story(any_view, tmp_path):
     assert desk.editor.stage.selector.region == 1
     before = desk.session.regions.membership[1].copy()
     hand.drag([hand.at([0.0, -0.1, height]) for height in (0.45, 0.5, 0.55)])
-    assert desk.session.undo_label == "paint region 1"
+    assert desk.session.undo_label == "paint region 2"
     assert np.count_nonzero(desk.session.regions.membership[1]) > np.count_nonzero(before)
 
     desk.type("f")
@@ -272,9 +272,9 @@ def test_what_is_painted_is_chosen_by_keys(desk):
         assert selector.tool is tool
     assert selector.paints is Paint.REGION
     desk.type("n")
-    assert "region 1" in desk.editor.status
+    assert "region 2" in desk.editor.status
     desk.type("n", "a")
-    assert "region 2 (new)" in desk.editor.status
+    assert "region 3 (new)" in desk.editor.status
     desk.type("3", "s")
     assert selector.paints is Paint.FIXED
     desk.type("d", "n")
@@ -294,7 +294,7 @@ def test_without_regions_one_paints_the_first_beside_all_the_rest(bare):
     everything, painted = bare.session.regions.membership
     assert everything.all()
     assert 0 < np.count_nonzero(painted) < len(painted)
-    assert "region 1" in bare.editor.status
+    assert "region 2" in bare.editor.status
     bare.type("g", "a", "z", "z")  # from a new region after many back to none
     assert "no regions yet" in bare.editor.status
     bare.hand.click(bare.hand.at([2.0, 0.0, 0.0]))
@@ -436,14 +436,14 @@ def test_the_card_of_keys_comes_and_goes(desk):
 
 def test_what_goes_wrong_is_said_until_something_succeeds(desk):
     desk.hand.click(desk.hand.at([-2.0, 0.0, 0.0]), control=True)  # out of the only region there
-    assert "in no region but 0" in desk.editor.status
+    assert "in no region but region 1" in desk.editor.status
     assert [type(failure).__name__ for failure in desk.hand.failures] == ["RegionError"]
     desk.hand.failures.clear()
     desk.hand.hover((5, 5))
-    assert "in no region but 0" in desk.editor.status
+    assert "in no region but region 1" in desk.editor.status
     desk.hand.click(desk.hand.at([1.0, -0.7, 0.0]))
-    assert desk.session.undo_label == "paint region 0"
-    assert desk.editor.status.startswith("brush for region 0")
+    assert desk.session.undo_label == "paint region 1"
+    assert desk.editor.status.startswith("brush for region 1")
     desk.hand.hover((5, 5))
     desk.type("m")  # with the pointer beside the mesh
     assert "point at the region" in desk.editor.status
@@ -480,7 +480,7 @@ def test_while_a_job_runs_the_camera_works_and_nothing_else_does(bare):
     assert bare.session.regions is None
     bare.settle()
     assert bare.session.regions is not None
-    assert "1 region found · brush for region 0," in bare.editor.status
+    assert "1 region found · brush for region 1," in bare.editor.status
     assert bare.hand.failures == []
 
 
@@ -493,7 +493,7 @@ def test_escape_cancels_a_job_and_nothing_is_changed(bare):
     assert "cancelled" in bare.editor.status
     assert bare.hand.failures == []
     bare.hand.click(bare.hand.at([0.0, -0.8, 0.0]))  # and the brush paints again
-    assert bare.session.undo_label == "paint region 1"
+    assert bare.session.undo_label == "paint region 2"
     bare.type("g")
     assert bare.session.regions is not None
 

@@ -225,9 +225,48 @@ def test_regions_are_chosen_merged_and_cut_in_the_list(seen):
     seen.click(panel.regions.split)
     assert session.regions.n_regions == 2
     seen.click(panel.regions.new)
-    assert rows(panel.regions.list)[2][0] == "2, to be painted"
+    assert rows(panel.regions.list)[2][0] == "region 3, to be painted"
     assert seen.editor.stage.selector.region == 2
     assert not panel.regions.split.isEnabled()
+
+
+def rename(tree, name):
+    """Type another name for the row that is chosen."""
+    tree.setFocus()
+    QtTest.QTest.keyClick(tree, Qt.Key_F2)
+    field = tree.viewport().findChild(QtWidgets.QLineEdit)
+    field.setText(name)  # a keyboard has no keys for all of them
+    QtTest.QTest.keyClick(field, Qt.Key_Return)
+
+
+def test_regions_are_renamed_in_the_list_and_names_are_told_everywhere(seen):
+    tree, session = seen.panel.regions.list, seen.session
+    assert [name for name, *_ in rows(tree)] == ["region 1", "region 2"]
+    seen.click_row(tree, 1, column=2)  # beside the name
+    rename(tree, " the left arm\N{WHITE SMILING FACE} ")
+    seen.settle()
+    assert session.region_names == ("region 1", "the left arm\N{WHITE SMILING FACE}")
+    assert rows(tree)[1][0] == session.region_names[1]
+    assert seen.panel.foot.words.text().startswith("Region 2 is now the left arm")
+    assert len(seen.regions) == 1
+    rename(tree, "region 1")
+    seen.settle()
+    assert "another name" in seen.errors.pop()
+    assert rows(tree)[1][0] == session.region_names[1]
+    rename(tree, "arm")
+    seen.settle()
+    assert "brush for arm," in seen.editor.status
+    seen.click(seen.panel.regions.split)
+    assert [name for name, *_ in rows(tree)] == ["region 1", "arm", "arm 2"]
+    seen.click_row(tree, 2, held=Qt.ControlModifier)
+    seen.click(seen.panel.regions.merge)
+    assert "Arm and arm 2 are one" in seen.panel.foot.words.text()
+    box = tree.visualItemRect(tree.topLevelItem(0))
+    QtTest.QTest.mouseDClick(tree.viewport(), Qt.LeftButton, Qt.NoModifier, box.center())
+    QtTest.QTest.keyClick(tree.viewport().findChild(QtWidgets.QLineEdit), Qt.Key_Escape)
+    seen.settle()
+    assert session.region_names == ("region 1", "arm")
+    assert seen.errors == []
 
 
 def test_a_tick_shows_one_cage_and_hides_it(seen):
@@ -244,11 +283,7 @@ def test_handles_are_renamed_chosen_and_removed_in_the_list(seen):
     seen.mode(Mode.HANDLES)
     tree = seen.panel.handles.list
     seen.click_row(tree, 1)
-    tree.setFocus()
-    QtTest.QTest.keyClick(tree, Qt.Key_F2)
-    field = tree.viewport().findChild(QtWidgets.QLineEdit)
-    QtTest.QTest.keyClicks(field, "tail")
-    QtTest.QTest.keyClick(field, Qt.Key_Return)
+    rename(tree, "tail")
     seen.settle()
     assert list(seen.session.handles) == ["tail"]
     assert rows(tree)[1][0] == "tail"

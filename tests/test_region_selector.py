@@ -62,7 +62,7 @@ def test_a_stroke_of_the_brush_adds_what_it_passes_over_in_one_step(desk):
     assert np.abs(places[:, 2] - 0.6).max() < 0.35
     for x in (-0.6, -0.3, 0.0, 0.3, 0.6):
         assert np.abs(places[:, 0] - x).min() < 0.15
-    assert desk.session.undo() == "paint region 1"
+    assert desk.session.undo() == "paint region 2"
     assert np.array_equal(desk.session.regions.membership[1], before)
 
 
@@ -206,7 +206,7 @@ def test_what_no_other_region_holds_stays_and_where_that_is_all_of_it_one_is_tol
     desk.hand.drag([(2, 2), (398, 398)], control=True)
     error = desk.hand.failures.pop()
     assert isinstance(error, RegionError)
-    assert "are in no region but 0; add them to another one first" in str(error)
+    assert "are in no region but region 1; add them to another one first" in str(error)
     assert desk.session.regions is regions
 
 
@@ -217,7 +217,7 @@ def test_a_region_cannot_be_emptied(desk):
     desk.hand.drag([(2, 2), (398, 398)], control=True)
     error = desk.hand.failures.pop()
     assert isinstance(error, RegionError)
-    assert "region 0 would be empty; merge it" in str(error)
+    assert "region 1 would be empty; merge it" in str(error)
     assert desk.session.regions is regions
 
 
@@ -365,7 +365,7 @@ def test_the_pose_stays_for_handles_and_goes_to_rest_for_regions():
     hand.click(hand.at(pose[middle]))
     assert session.regions.membership[2, middle]
     assert np.array_equal(session.vertices, scene.mesh.vertices)
-    assert session.undo() == "paint region 2"
+    assert session.undo() == "paint region 3"
     assert np.array_equal(session.vertices, pose)
     assert not hand.failures
     selector.remove()

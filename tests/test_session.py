@@ -469,7 +469,7 @@ def test_a_cage_vertex_can_be_moved_freely_and_the_volume_stays():
     assert volume_error(session) < 1e-13
     moved = np.abs(session.vertices - VERTICES).max(axis=1)
     assert moved.max() > 0.01
-    assert session.commit() == "drag cage 0"
+    assert session.commit() == "drag the cage of region 1"
     assert_array_equal(session.targets["tip"], session.vertices[SCENE.handle])
     session.undo()
     assert_array_equal(session.vertices, VERTICES)
@@ -600,6 +600,13 @@ WRONG = [
     (lambda s: s.paint_region(3, X < -2.0), RegionError, r"one of 0\.\.1"),
     (lambda s: s.paint_region(0, [-1]), RegionError, "vertices must index"),
     (lambda s: s.merge_regions([1]), RegionError, "two regions or more"),
+    (lambda s: s.rename_region(2, "arm"), RegionError, "no region 2 to name; there are 2, from 0"),
+    (lambda s: s.rename_region(0, "x" * 81), RegionError, "may have 80 letters; got 81"),
+    (lambda s: s.rename_region(0, "two\nlines"), RegionError, "printable"),
+    (lambda s: s.rename_region(0, "\u202egnp.exe"), RegionError, "printable"),  # turns what follows
+    (lambda s: s.rename_region(0, "half a \ud83d"), RegionError, "printable"),
+    (lambda s: s.rename_region(0, "region 2"), RegionError, "while it has no name"),
+    (lambda s: s.rename_region(0, None), RegionError, "printable text; got None"),
     (lambda s: s.split_region(0, X < 9.0), RegionError, "cannot be split: all"),
     (lambda s: s.set_regions(Regions.single(Mesh(*icosphere(2)))), RegionError, "another mesh"),
     (lambda s: s.set_cages(SCENE.cages[:1]), CageError, "2 regions need as many cages; got 1"),
@@ -652,6 +659,8 @@ def test_a_state_of_another_mesh_or_against_itself_is_refused():
     for bad, error in (
         (replace(state, cages=()), CageError),
         (replace(state, handles={}), ConstraintError),
+        (replace(state, region_names=("arm", "arm")), RegionError),
+        (replace(state, region_names=("", "", "arm")), RegionError),
         (replace(state, fixed=SCENE.handle), ConstraintError),
         (replace(state, pose=replace(state.pose, targets={"tip": NEAR[1:]})), ConstraintError),
     ):
@@ -671,6 +680,98 @@ def test_far_from_the_origin_a_pose_keeps_its_volume():
         session.drag(scene.turned(degrees, about=shift), max_steps=3)
         assert abs(session.volume_change) < 1e-10
         session.commit()
+
+
+ODD = [
+    "左腕",
+    "\N{WOMAN}\N{ZERO WIDTH JOINER}\N{MICROSCOPE}",
+    "ذراع",
+    "a\N{COMBINING DIAERESIS}",
+    "$x$ | %s <b>",
+]
+
+
+def test_regions_are_called_by_their_place_until_they_have_a_name():
+    session = Session(SCENE.mesh)
+    assert session.region_names == ()
+    session.set_regions(SCENE.regions)
+    assert session.region_names == ("region 1", "region 2")
+    assert session.region_name(2) == "region 3"  # that of one still to come
+    news = []
+    session.on_change(news.append)
+    for name in ODD:
+        session.rename_region(1, f"  {name} ")
+        assert session.region_names == ("region 1", name)
+        assert news[-1] == Change.NAMES | Change.HISTORY
+    with pytest.raises(RegionError, match="already"):
+        session.rename_region(0, ODD[-1])
+    session.rename_region(1, ODD[-1])  # no other name: no step
+    assert session.undo() == f"rename {ODD[-2]}"
+    assert session.region_names == ("region 1", ODD[-2])
+    session.rename_region(1, "")
+    assert session.region_names == ("region 1", "region 2")
+    session.rename_region(1, "arm")
+    session.rename_region(1, "region 2")  # what it would be called anyway is no name
+    session.merge_regions([0, 1])
+    assert session.region_names == ("region 1",)
+
+
+def test_a_name_goes_with_its_region_and_with_what_becomes_of_it():
+    scene = sausage(4)
+    session = Session(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.rename_region(1, "arm")
+    session.rename_region(3, "leg")
+    assert len(session.cages) == 4  # a name changes nothing else
+    masks = session.regions.membership
+    whole = dict(zip(session.region_names, masks, strict=True))
+
+    def mask(name):
+        return session.regions.membership[session.region_names.index(name)]
+
+    session.split_region(1)
+    assert session.region_names == ("region 1", "arm", "region 3", "leg", "arm 2")
+    assert_array_equal(mask("arm") | mask("arm 2"), whole["arm"])
+    assert_array_equal(mask("leg"), whole["leg"])
+    session.split_region(4)
+    assert session.region_names[5] == "arm 3"
+    session.merge_regions([0, 5, 4, 1])  # the first that has a name gives it
+    assert session.region_names == ("arm", "region 2", "leg")
+    assert_array_equal(mask("arm"), whole["arm"] | whole["region 1"])
+    session.split_region(1)
+    assert session.region_names == ("arm", "region 2", "leg", "region 4")
+    session.paint_region(4, scene.mesh.vertices[:, 0] > 2.0)
+    assert session.region_names[2:] == ("leg", "region 4", "region 5")
+    for _ in range(5):
+        session.undo()
+    assert session.region_names == ("region 1", "arm", "region 3", "leg")
+    session.segment(2)  # other regions
+    assert session.region_names == ("region 1", "region 2")
+
+
+def test_errors_and_steps_call_a_region_by_its_name():
+    session = ready()
+    session.rename_region(0, "tail")
+    with pytest.raises(RegionError, match="in no region but tail; add"):
+        session.paint_region(0, X < -2.0, subtract=True)
+    with pytest.raises(RegionError, match="tail cannot be split"):
+        session.split_region(0, X < 9.0)
+    with pytest.raises(CageError, match=r"tail .*outside the cage"):
+        session.set_cages([Cage(*icosphere(1))] * 2)
+    session.split_region(0)
+    assert session.undo_label == "split tail"
+
+
+def test_effort_counts_every_step_of_the_solver_and_nothing_else():
+    session = ready()
+    steps = [session.move_handle("tip", up(z), max_steps=2).steps for z in (0.1, 0.2)]
+    session.commit()
+    steps.append(session.refine(max_steps=3).steps)
+    session.undo()
+    session.move_cage(0, session.cage_vertices[0] + [0.0, 0.0, 0.01])
+    assert session.effort.steps == sum(steps) > 0
+    assert session.effort.seconds > 0.0
 
 
 def test_halves_of_a_region_are_connected_overlap_and_cover_it():

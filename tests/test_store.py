@@ -36,6 +36,7 @@ def posed() -> Session:
     session = Session(SCENE.mesh, state=State(options=options))
     session.set_regions(Regions(SCENE.mesh, SCENE.regions.membership, smoothness=1.5))
     session.set_cages(SCENE.cages)
+    session.rename_region(1, "左腕 \N{WOMAN}\N{ZERO WIDTH JOINER}\N{MICROSCOPE}")
     session.set_fixed(SCENE.fixed[::-1])
     session.add_handle(SCENE.handle, "the tip · 1")
     session.add_handle(np.abs(SCENE.mesh.vertices[:, 0]) < 0.1)
@@ -76,6 +77,7 @@ def same(a: Session, b: Session) -> bool:
         and list(one.handles) == list(other.handles)
         and (one.pose is None) == (other.pose is None)
         and one.options == other.options
+        and a.region_names == b.region_names
         and one.regions.smoothness == other.regions.smoothness
     )
 
@@ -128,6 +130,23 @@ def test_a_loaded_session_goes_on_as_the_saved_one_would(tmp_path):
         each.move_handle("handle 1", np.diag([1.0, 1.0, 1.1, 1.0]), max_steps=2)
         assert abs(each.volume_change) < 1e-13
     assert loaded.undo() == "drag handle 1"
+    assert same(loaded, POSED)
+
+
+def test_a_file_without_names_as_older_programs_wrote_it_is_read_as_before(tmp_path):
+    content = saved(POSED, tmp_path)
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        header = json.loads(archive.read("header.json"))
+    assert header.pop("region_names") == ["", POSED.region_names[1]]
+    assert header["version"] == 1  # older programs read files with names, too
+    nameless = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(nameless, "w") as new:
+        for name in old.namelist():
+            new.writestr(name, json.dumps(header) if name == "header.json" else old.read(name))
+    (tmp_path / "old.npz").write_bytes(nameless.getvalue())
+    loaded = load_session(tmp_path / "old.npz")
+    assert loaded.region_names == ("region 1", "region 2")
+    loaded.rename_region(1, POSED.region_names[1])
     assert same(loaded, POSED)
 
 
@@ -319,6 +338,12 @@ WRONG = [
     ({"pose": np.full((4, 3), np.inf)}, "NaN or infinite"),
     ({"pose": np.full((4, 3), 1e300)}, "the pose reaches .* is damaged"),
     ({"targets": np.full((1, 3), 1e9)}, "is damaged"),
+    ({"header": {"region_names": "arm"}}, "region_names must be a list"),
+    ({"header": {"region_names": ["arm", "leg"]}}, "2 names for 1 regions"),
+    ({"header": {"region_names": [7]}}, "name must be printable text; got 7"),
+    ({"header": {"region_names": ["a\0b"]}}, "name must be printable text"),
+    ({"header": {"region_names": ["a" * 81]}}, "80 letters"),
+    ({"header": {"region_names": ["region 2"]}}, "while it has no name"),
     ({"header": {"posed": "yes"}}, "posed must be true or false"),
     ({"targets": np.zeros((2, 3))}, "targets must be"),
     ({"compress": True}, "header.json is compressed"),

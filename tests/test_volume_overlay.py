@@ -235,7 +235,7 @@ def test_a_bend_that_loses_volume_is_seen_to_be_pinched(overlay):
 def test_the_words_tell_totals_regions_and_steps(overlay):
     session = overlay.session
     overlay.show()
-    regions = [f"region {r}: 0 %" for r in range(3)]
+    regions = [f"region {r}: 0 %" for r in (1, 2, 3)]
     assert words(overlay) == ["volume: 0 %", "local: 0 to 0 %", *regions]
     session.change_options(preserve_volume=True)
     solution = session.drag(sausage(3).turned(30.0), max_steps=4)
@@ -265,7 +265,7 @@ def test_each_region_is_told_on_its_colour(overlay):
         line.GetInput().strip(): line.GetTextProperty() for line in props(overlay, vtkTextActor)
     }
     for region in range(3):
-        style = lines[f"region {region}: 0 %"]
+        style = lines[f"region {region + 1}: 0 %"]
         assert np.allclose(style.GetBackgroundColor(), of_region(region) / 255.0)
         assert style.GetBackgroundOpacity() == 1.0
     overlay.session.merge_regions([0, 1])
@@ -355,10 +355,10 @@ def test_a_region_without_a_face_is_left_out():
     view = plain_view()
     overlay = VolumeOverlay(view, session)
     overlay.show()
-    assert words(overlay)[2:] == ["region 0: 0 %", "region 2: 0 %"]
+    assert words(overlay)[2:] == ["region 1: 0 %", "region 3: 0 %"]
     session.change_options(preserve_volume=False)
     move_all(session, np.diag([1.0, 1.0, 1.1]))
-    assert words(overlay)[2:] == ["region 0: +10 %", "region 2: +10 %"]
+    assert words(overlay)[2:] == ["region 1: +10 %", "region 3: +10 %"]
     overlay.remove()
 
 

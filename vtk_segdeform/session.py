@@ -20,9 +20,11 @@ in other files.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,7 +32,7 @@ from numpy.typing import ArrayLike
 from .arrays import FloatArray, IntArray, as_points, frozen
 from .cage_fit import fit_cages
 from .cages import Cage
-from .editing import handles, painting
+from .editing import handles, naming, painting
 from .editing.history import Timeline
 from .editing.listeners import Change
 from .editing.posing import Posing
@@ -42,6 +44,15 @@ from .progress import Progress
 from .regions import Regions
 from .segmentation import segment
 from .solution import Solution, Status
+
+
+class Effort(NamedTuple):
+    """What solving has taken so far; the difference of two is what something took."""
+
+    steps: int
+    """Of the solver."""
+    seconds: float
+    """On the clock, binding included where it was not done before."""
 
 
 class Session(Timeline):
@@ -89,6 +100,7 @@ class Session(Timeline):
         self._mesh = mesh
         self._posing = Posing(mesh)
         self._solution: tuple[Pose, Solution] | None = None
+        self._effort = Effort(0, 0.0)
         self._put: tuple[Pose | None, list[FloatArray]] = None, []  # where `move_cage` put cages
 
     # What there is.
@@ -102,6 +114,12 @@ class Session(Timeline):
     def regions(self) -> Regions | None:
         """The regions, or None before there are any."""
         return self._state.regions
+
+    @property
+    def region_names(self) -> tuple[str, ...]:
+        """What the regions are called; by its place, "region 1", ..., one without a name."""
+        count = 0 if self.regions is None else self.regions.n_regions
+        return tuple(self.region_name(region) for region in range(count))
 
     @property
     def cages(self) -> tuple[Cage, ...]:
@@ -158,6 +176,11 @@ class Session(Timeline):
         return self._solution[1]
 
     @property
+    def effort(self) -> Effort:
+        """What `drag`, `move_handle` and `refine` have taken since the session was made."""
+        return self._effort
+
+    @property
     def is_ready(self) -> bool:
         """Whether there is a handle to drag, and cages to drag it with."""
         return bool(self.cages) and bool(self.handles)
@@ -208,25 +231,56 @@ class Session(Timeline):
         The number after the last region's is a new region.  Where there are no regions yet, one
         that holds everything is the first.
         """
-        regions = painting.painted(self._some_regions(), region, vertices, subtract=subtract)
-        self._set_regions(regions, f"paint region {region}")
+        regions, name = self._some_regions(), self.region_name(region)
+        after = painting.painted(regions, region, vertices, subtract=subtract, name=name)
+        self._set_regions(after, f"paint {name}", self._state.region_names)
 
     def merge_regions(self, which: Sequence[int]) -> None:
-        """Make two regions or more one, in the place of the first."""
-        self._set_regions(painting.merged(self._some_regions(), which), "merge regions")
+        """Make two regions or more one, in the place of the first; it keeps their first name."""
+        regions = painting.merged(self._some_regions(), which)
+        names = naming.merged(self._state.region_names, [int(region) for region in which])
+        self._set_regions(regions, "merge regions", names)
 
     def split_region(
         self, region: int, vertices: ArrayLike | None = None, *, overlap: int | None = None
     ) -> None:
-        """Cut a region in two, *vertices* of it, or its far half, apart; see `painting.split`."""
-        regions = painting.split(self._some_regions(), region, vertices, overlap=overlap)
-        self._set_regions(regions, f"split region {region}")
+        """Cut a region in two, *vertices* of it, or its far half, apart; see `painting.split`.
+
+        The part that stays keeps the name, the other one, "arm 2" beside "arm", comes last.
+        """
+        regions, name = self._some_regions(), self.region_name(region)
+        after = painting.split(regions, region, vertices, overlap=overlap, name=name)
+        names = naming.split(self._state.region_names, int(region), regions.n_regions)
+        self._set_regions(after, f"split {name}", names)
+
+    def region_name(self, region: int) -> str:
+        """Return what a region is called, or is going to be: number 0 is "region 1" at first."""
+        return naming.called(self._state.region_names, region)
+
+    def rename_region(self, region: int, name: str) -> None:
+        """Call a region something else; "" calls it by its place again.
+
+        Names go with their regions through painting, merging and splitting; other regions, set
+        or found, have none.
+
+        Raises
+        ------
+        RegionError
+            If there is no such region, or *name* is another one's or no printable text of at most
+            80 letters.
+        """
+        count = 0 if self.regions is None else self.regions.n_regions
+        if region not in range(count):
+            raise RegionError(f"there is no region {region} to name; there are {count}, from 0")
+        names = naming.renamed(self._state.region_names, int(region), name)
+        label = f"rename {self.region_name(region)}"
+        self._step(label, replace(self._state, region_names=names))
 
     # Cages.
 
     def set_cages(self, cages: Sequence[Cage], *, label: str = "set cages") -> None:
         """Take *cages*, one around each region; CageError if they do not fit."""
-        self._set_cages(fitting_cages(self.regions, cages), label)
+        self._set_cages(fitting_cages(self.regions, cages, self._state.region_names), label)
 
     def fitted_cages(self, progress: Progress | None = None) -> tuple[Cage, ...]:
         """Return cages for the regions, by the options, and change nothing.
@@ -307,9 +361,7 @@ class Session(Timeline):
             cages.  The pose is then as it was.
         """
         wanted = handles.checked_targets(self.mesh, self.handles, targets)
-        pose, solution = self._posing.solve(
-            self._state, MappingProxyType({**self.targets, **wanted}), max_steps
-        )
+        pose, solution = self._solve({**self.targets, **wanted}, max_steps)
         self._solution = pose, solution
         self._move(replace(self._state, pose=pose), *wanted)
         return solution
@@ -357,7 +409,7 @@ class Session(Timeline):
         places[region] = points
         pose = self._posing.free_form(self._state, places)
         self._put = pose, places
-        self._move(replace(self._state, pose=pose), f"cage {region}")
+        self._move(replace(self._state, pose=pose), f"the cage of {self.region_name(region)}")
 
     def carry(self, points: ArrayLike) -> FloatArray:
         """Return where other points (k, 3), given at rest, are in the present pose."""
@@ -368,7 +420,7 @@ class Session(Timeline):
 
         No step of its own: it belongs to the drag in hand, or else to the last step.
         """
-        pose, solution = self._posing.solve(self._state, self.targets, max_steps)
+        pose, solution = self._solve(self.targets, max_steps)
         if solution.steps == 0:  # there already: the pose stays the very same
             here = self._state.pose
             self._solution = None if here is None else (here, solution)
@@ -397,13 +449,22 @@ class Session(Timeline):
         options = replace(self.options, **changes)  # type: ignore[arg-type]  # it checks them
         self._step("change options", replace(self._state, options=options))
 
+    def _solve(
+        self, targets: Mapping[str, FloatArray], max_steps: int | None
+    ) -> tuple[Pose, Solution]:
+        began = time.perf_counter()
+        pose, solution = self._posing.solve(self._state, MappingProxyType({**targets}), max_steps)
+        steps, seconds = self._effort
+        self._effort = Effort(steps + solution.steps, seconds + time.perf_counter() - began)
+        return pose, solution
+
     def _rest_targets(self) -> Mapping[str, FloatArray]:
         return handles.targets_at(self.handles, self.mesh.vertices)
 
     def _some_regions(self) -> Regions:
         return self.regions or Regions.single(self.mesh)
 
-    def _set_regions(self, regions: Regions, label: str) -> None:
+    def _set_regions(self, regions: Regions, label: str, names: naming.Names = ()) -> None:
         old = self.regions
         cages: tuple[Cage, ...] = ()
         if old is not None:
@@ -411,7 +472,8 @@ class Session(Timeline):
             if same and old.smoothness == regions.smoothness:
                 return
             cages = self.cages if _still_fit(old, regions, self.cages) else ()
-        self._step(label, replace(self._state, regions=regions, cages=cages, pose=None))
+        after = replace(self._state, regions=regions, cages=cages, pose=None, region_names=names)
+        self._step(label, after)
 
     def _set_cages(self, cages: tuple[Cage, ...], label: str) -> None:
         self._step(label, replace(self._state, cages=cages, pose=None))

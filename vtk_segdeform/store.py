@@ -130,6 +130,8 @@ def _write(file: Any, session: Session) -> None:
         "posed": pose is not None,
         "options": {name: _plain(value) for name, value in asdict(state.options).items()},
     }
+    if state.region_names:  # programs that know of none read the file all the same
+        header["region_names"] = list(state.region_names)
     arrays: dict[str, Any] = {"mesh_vertices": mesh.vertices, "mesh_faces": mesh.faces}
     arrays |= {"fixed": state.fixed, "handle": state.handle}
     if regions is not None:
@@ -177,7 +179,9 @@ def _read(archive: Archive) -> tuple[Mesh, State]:
         pose = Pose(tuple(places), dict(zip(sizes, targets, strict=True)))
     fixed = archive.array("fixed", "i", (_count(header, "n_fixed"),))
     options = Options(**header["options"])
-    return mesh, State(regions, cages, fixed, dict(zip(sizes, ids, strict=True)), pose, options)
+    names = tuple(_list(header, "region_names")) if "region_names" in header else ()
+    handles = dict(zip(sizes, ids, strict=True))
+    return mesh, State(regions, cages, fixed, handles, pose, options, names)
 
 
 def _checked_header(header: Any) -> Mapping[str, Any]:

@@ -27,16 +27,18 @@ from typing import Any
 
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.editing.listeners import Change
+from vtk_segdeform.editing.naming import called
 from vtk_segdeform.local_volume import LocalVolume
 from vtk_segdeform.session import Session
 
 from .colouring.diverging import colours_of, half_range_for
-from .colouring.legend import Legend, precise, signed
+from .colouring.legend import Legend, brief, precise, signed
 from .colouring.region_volumes import RegionVolumes
 from .surface_display import SurfaceDisplay
 from .view import Stop, View
 
 _LAYER = "volume"
+_OF_REGIONS = Change.REGIONS | Change.NAMES
 _FIRST = 100.0  # priority: hears of an event before whoever changes the pose in it
 _MOST_REGIONS = 8  # more lines would cover the mesh
 _SOFT = 0.55, 0.45, 0.0  # ambient, diffuse, specular light: shadows are not to pass for values
@@ -129,7 +131,7 @@ class VolumeOverlay:
         if change & Change.POSE:
             self._clock.note()
             self._update()
-        elif change & Change.REGIONS and self._change is not None and self._half_range is not None:
+        elif change & _OF_REGIONS and self._change is not None and self._half_range is not None:
             self._legend.show(self._half_range, self._lines(self._change))
             self.view.touch()
 
@@ -155,7 +157,7 @@ class VolumeOverlay:
         ]
         regions = self._regions.changes()
         lines += [
-            (f"region {region}: {signed(100.0 * share, 1)} %", region)
+            (f"{self._name(region)}: {signed(100.0 * share, 1)} %", region)
             for region, share in regions[:_MOST_REGIONS]
         ]
         if len(regions) > _MOST_REGIONS:
@@ -164,6 +166,9 @@ class VolumeOverlay:
         work = [f"{solution.steps} step{'s' * (solution.steps != 1)}"] if solution else []
         work += [f"{1000.0 * seconds:.0f} ms a frame"] if seconds is not None else []
         return lines + [(", ".join(work), None)] if work else lines
+
+    def _name(self, region: int) -> str:
+        return brief(self.session.region_name(region), called((), region))
 
 
 class _FrameClock:

@@ -17,13 +17,13 @@ from ..arrays import FloatArray, IntArray, as_points, frozen
 from ..errors import ConstraintError
 from ..mesh import Mesh
 from ..positions import checked_constraints
+from .naming import fault_of
 from .state import Pose, State, pieces
 
 Handles = Mapping[str, IntArray]
 Targets = Mapping[str, FloatArray]
 
 _FARTHEST = 30.0  # diagonals of the mesh from its centre; on the way there are legs of a fifth
-_LONGEST_NAME = 80
 
 
 def with_handle(mesh: Mesh, state: State, name: str, vertices: ArrayLike) -> Handles:
@@ -174,10 +174,9 @@ def _checked_points(mesh: Mesh, targets: ArrayLike, count: int, name: str) -> Fl
 
 
 def _check_name(name: str) -> None:
-    if not isinstance(name, str) or not name.strip() or not name.isprintable():
-        raise ConstraintError(f"a handle's name must be printable text; got {name!r}")
-    if len(name) > _LONGEST_NAME:
-        raise ConstraintError(f"a handle's name may have {_LONGEST_NAME} letters; got {len(name)}")
+    fault = fault_of(name)
+    if fault:
+        raise ConstraintError(f"a handle{fault}")
 
 
 def _own(points: FloatArray) -> FloatArray:

@@ -18,6 +18,8 @@ class Change(enum.Flag):
 
     REGIONS = enum.auto()
     """`Session.regions`."""
+    NAMES = enum.auto()
+    """`Session.region_names`; where regions are others as well, names may be as they were."""
     CAGES = enum.auto()
     """`Session.cages`, at rest."""
     CONSTRAINTS = enum.auto()

@@ -20,7 +20,9 @@ from ..regions import Regions
 _OVERLAP = 0.1  # of a new region's width, counted in edges
 
 
-def painted(regions: Regions, region: int, vertices: ArrayLike, *, subtract: bool) -> Regions:
+def painted(
+    regions: Regions, region: int, vertices: ArrayLike, *, subtract: bool, name: str = ""
+) -> Regions:
     """Return *regions* with *vertices* added to one of them, or taken out of it.
 
     Parameters
@@ -33,6 +35,8 @@ def painted(regions: Regions, region: int, vertices: ArrayLike, *, subtract: boo
         Those of them that are in it already, or not in it, do no harm.
     subtract : bool
         Take them out.
+    name : str, optional
+        What errors call the region.
 
     Raises
     ------
@@ -47,13 +51,14 @@ def painted(regions: Regions, region: int, vertices: ArrayLike, *, subtract: boo
     membership = regions.membership.copy()
     membership[region] = membership[region] & ~mask if subtract else membership[region] | mask
     bare = np.flatnonzero(~membership.any(axis=0))
+    name = name or f"region {region}"
     if len(bare):
         raise RegionError(
             f"{len(bare)} of these vertices (the first is {bare[0]}) are in no region but "
-            f"{region}; add them to another one first"
+            f"{name}; add them to another one first"
         )
     if not membership[region].any():
-        raise RegionError(f"region {region} would be empty; merge it with another one instead")
+        raise RegionError(f"{name} would be empty; merge it with another one instead")
     return Regions(mesh, membership, regions.smoothness)
 
 
@@ -79,6 +84,7 @@ def split(
     vertices: ArrayLike | None = None,
     *,
     overlap: int | None = None,
+    name: str = "",
 ) -> Regions:
     """Return *regions* with one of them cut in two; the second part comes last.
 
@@ -94,6 +100,8 @@ def split(
     overlap : int, optional
         Rings of edges by which both parts grow over the cut, inside the region.  None takes a
         tenth of their width, as `segment` does, at least 2.
+    name : str, optional
+        What errors call the region.
 
     Raises
     ------
@@ -106,8 +114,8 @@ def split(
     first = whole & ~second
     if not first.any() or not second.any():
         raise RegionError(
-            f"region {region} cannot be split: {'all' if second.any() else 'none'} of its "
-            "vertices would be in the second part; name some of them"
+            f"{name or f'region {region}'} cannot be split: {'all' if second.any() else 'none'} "
+            "of its vertices would be in the second part; name some of them"
         )
     if overlap is None:
         overlap = max(2, round(_OVERLAP * np.sqrt(np.count_nonzero(whole) / 2)))

@@ -23,6 +23,7 @@ from ..mesh import Mesh
 from ..positions import checked_constraints
 from ..regions import Regions
 from .listeners import Change
+from .naming import Names, called, checked_names
 
 _TINY = float(np.finfo(np.float64).tiny)
 _WRECKED = 1e6  # diagonals from the mesh that no drag gets to
@@ -94,6 +95,8 @@ class State:
     pose: Pose | None = None
     """None is rest."""
     options: Options = field(default_factory=Options)
+    region_names: Names = ()
+    """What `naming` makes of the names that regions were given."""
 
     @property
     def handle(self) -> IntArray:
@@ -104,6 +107,7 @@ class State:
         """Tell in what *other* is another state."""
         pairs = (
             (Change.REGIONS, self.regions is other.regions),
+            (Change.NAMES, self.region_names == other.region_names),
             (Change.CAGES, self.cages == other.cages),  # the very same ones
             (Change.CONSTRAINTS, self.fixed is other.fixed and self.handles is other.handles),
             (Change.POSE, self.pose is other.pose),
@@ -121,7 +125,7 @@ def checked_state(mesh: Mesh, state: State) -> State:
     Raises
     ------
     RegionError
-        If the regions are of another mesh.
+        If the regions are of another mesh, or a name cannot be one or is there twice.
     CageError
         If there is not one cage per region, a cage leaves out part of its region, or the pose has
         other cages or numbers beyond all sense.
@@ -130,7 +134,8 @@ def checked_state(mesh: Mesh, state: State) -> State:
         pose are not theirs.
     """
     regions = None if state.regions is None else of_mesh(mesh, state.regions)
-    cages = fitting_cages(regions, state.cages) if state.cages else ()
+    names = checked_names(state.region_names, regions.n_regions if regions else 0)
+    cages = fitting_cages(regions, state.cages, names) if state.cages else ()
     fixed, handle = checked_constraints(mesh, state.fixed, state.handle)
     lengths = [len(ids) for ids in state.handles.values()]
     if not all(lengths):
@@ -140,7 +145,7 @@ def checked_state(mesh: Mesh, state: State) -> State:
     if pose:
         _require_no_wreck(mesh, pose)
     owned = MappingProxyType({name: _own(ids) for name, ids in handles.items()})
-    return State(regions, cages, _own(fixed), owned, pose, state.options)
+    return State(regions, cages, _own(fixed), owned, pose, state.options, names)
 
 
 def of_mesh(mesh: Mesh, regions: Regions) -> Regions:
@@ -153,14 +158,19 @@ def of_mesh(mesh: Mesh, regions: Regions) -> Regions:
     return Regions(mesh, regions.membership, regions.smoothness)
 
 
-def fitting_cages(regions: Regions | None, cages: Sequence[Cage]) -> tuple[Cage, ...]:
-    """Return *cages* as a tuple, or a CageError unless there is one around each region."""
+def fitting_cages(
+    regions: Regions | None, cages: Sequence[Cage], names: Names = ()
+) -> tuple[Cage, ...]:
+    """Return *cages* as a tuple, or a CageError unless there is one around each region.
+
+    The error calls regions by their *names*.
+    """
     if regions is None:
         raise CageError("there are no regions to put cages around; make regions first")
     if len(cages) != regions.n_regions:
         raise CageError(f"{regions.n_regions} regions need as many cages; got {len(cages)}")
     for r, cage in enumerate(cages):
-        cage.require_encloses(regions.mesh.vertices[regions.membership[r]], f"region {r}")
+        cage.require_encloses(regions.mesh.vertices[regions.membership[r]], called(names, r))
     return tuple(cages)
 
 

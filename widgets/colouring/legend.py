@@ -21,6 +21,8 @@ from ..view import Stop, View
 from .diverging import lookup_table
 
 _TICKS = 5
+_LETTERS = 25  # of a name
+_LATIN, _SIGNS = 0x17F, "–—‘’‚“”„†‡•…‰‹›€™"  # the letters of VTK's own font
 _GROUND = 0.7  # opacity of the background's colour under what may lie over the mesh
 
 
@@ -65,7 +67,7 @@ class Legend:
             self._lines.append(vtkTextActor())
             renderer.AddViewProp(self._lines[-1])
         for actor, (text, region) in zip(self._lines, lines, strict=True):
-            actor.SetInput(f" {text} ")
+            actor.SetInput(f" {text} ".replace("$", r"\$"))  # which begins TeX
             style = actor.GetTextProperty()
             style.SetBackgroundOpacity(_GROUND if region is None else 1.0)
             style.SetFrame(region is not None)
@@ -118,6 +120,17 @@ def signed(number: float, digits: int) -> str:
     """
     rounded = round(number, digits)
     return f"{rounded:+.{digits}f}".removesuffix(".0") if rounded else "0"
+
+
+def brief(name: str, place: str) -> str:
+    """Return a name that takes no more of a view than it may, or *place*, if VTK lacks letters.
+
+    >>> brief("the lower half of the left arm", "region 1"), brief("左腕", "region 2")
+    ('the lower half of the ...', 'region 2')
+    """
+    if any(ord(letter) > _LATIN and letter not in _SIGNS for letter in name):
+        return place
+    return name if len(name) <= _LETTERS else f"{name[: _LETTERS - 3].rstrip()} ..."
 
 
 def precise(share: float) -> str:

@@ -116,13 +116,13 @@ class Words:
     @property
     def text(self) -> str:
         """What it says."""
-        return str(self._actor.GetInput() or "")
+        return str(self._actor.GetInput() or "").replace(r"\$", "$")
 
     def say(self, text: str, size: float) -> None:
         """Say *text* in letters of *size*, the pixels from line to line, about."""
         dots = self._renderer.GetRenderWindow().GetDPI() or _DOTS_PER_INCH
         self._actor.GetTextProperty().SetFontSize(max(6, round(size * _DOTS_PER_INCH / dots)))
-        self._actor.SetInput(text)
+        self._actor.SetInput(text.replace("$", r"\$"))  # else VTK takes what is between two for TeX
 
     def place(self, x: float, y: float) -> None:
         """Begin at *x*, with the middle of the text's height at *y*."""

@@ -181,18 +181,21 @@ def merge_region(desk: Desk) -> None:
     other = selector.region_under_pointer()
     if other is None or other == selector.region:
         raise RegionError(
-            f"point at the region that is to become one with region {selector.region}"
+            "point at the region that is to become one with "
+            f"{desk.session.region_name(selector.region)}"
         )
+    names = " and ".join(map(desk.session.region_name, sorted([selector.region, other])))
     desk.session.merge_regions([selector.region, other])
     selector.region = min(selector.region, other)
-    desk.say(f"regions {selector.region} and {max(selector.region, other)} are one")
+    desk.say(f"{names} are one")
 
 
 def split_region(desk: Desk) -> None:
     """Cut the region that is painted in two."""
     _require_regions(desk, "cut")
-    desk.session.split_region(desk.stage.selector.region)
-    desk.say(f"region {desk.stage.selector.region} cut in two")
+    region = desk.stage.selector.region
+    desk.session.split_region(region)
+    desk.say(f"{desk.session.region_name(region)} cut in two")
 
 
 # Handles.
@@ -227,7 +230,8 @@ def remove_handle(desk: Desk) -> None:
 def _require_regions(desk: Desk, verb: str) -> None:
     if desk.stage.selector.region >= desk.stage.n_regions:
         raise RegionError(
-            f"region {desk.stage.selector.region} is still to be painted; N chooses one to {verb}"
+            f"{desk.session.region_name(desk.stage.selector.region)} is still to be painted; "
+            f"N chooses one to {verb}"
             if desk.stage.n_regions
             else f"there are no regions to {verb} yet: G finds some, or paint them"
         )

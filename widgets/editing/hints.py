@@ -6,10 +6,11 @@ made from where one stands.
 
 from __future__ import annotations
 
+from vtk_segdeform.editing.naming import called
 from vtk_segdeform.session import Session
 from vtk_segdeform.solution import Status
 
-from ..colouring.legend import signed
+from ..colouring.legend import brief, signed
 from ..region_selector import Paint, Tool
 from .stage import Mode, Stage
 
@@ -50,7 +51,8 @@ def _of_painting(stage: Stage) -> str:
     selector = stage.selector
     if selector.paints is Paint.REGION:
         new = selector.region >= stage.n_regions
-        what = f"region {selector.region}" + (" (new)" if new else "")
+        name = stage.session.region_name(selector.region)
+        what = brief(name, called((), selector.region)) + (" (new)" if new else "")
     elif selector.paints is Paint.FIXED:
         what = "what stays fixed"
     else:

@@ -27,11 +27,23 @@ def merging(regions: Sequence[int]) -> Action:
     def merge(desk: Desk) -> None:
         if len(regions) < 2:
             raise RegionError("choose two regions or more that are to become one")
+        *names, last = map(desk.session.region_name, sorted(regions))
         desk.session.merge_regions(sorted(regions))
         desk.stage.choose_region(min(regions))
-        desk.say(f"regions {', '.join(map(str, sorted(regions)))} are one")
+        desk.say(f"{', '.join(names)} and {last} are one")
 
     return merge
+
+
+def naming_region(region: int, name: str) -> Action:
+    """Return the action that calls *region* something else, or by its place where it is ""."""
+
+    def call(desk: Desk) -> None:
+        before = desk.session.region_name(region)
+        desk.session.rename_region(region, name)
+        desk.say(f"{before} is now {desk.session.region_name(region)}")
+
+    return call
 
 
 def showing_cage(region: int, visible: bool) -> Action:

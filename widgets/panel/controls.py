@@ -66,8 +66,11 @@ def check_box(text: str, tip: str) -> Any:
 
 
 def table(columns: list[str], tip: str, rows: int) -> Any:
-    """Return an empty table, at most *rows* rows high, or half of that; last columns narrow."""
-    tree = QtWidgets.QTreeWidget()
+    """Return an empty table, at most *rows* rows high, or half of that; last columns narrow.
+
+    Items that may be edited are renamed in the first column, by two clicks there or by F2.
+    """
+    tree = _Table()
     tree.setHeaderLabels(columns)
     tree.setRootIsDecorated(False)
     tree.setUniformRowHeights(True)
@@ -152,6 +155,21 @@ def swatch(colour: str, widget: Any) -> Any:
 def sentence(text: str) -> str:
     """Begin *text* with a capital."""
     return text[:1].upper() + text[1:]
+
+
+class _Table(QtWidgets.QTreeWidget):
+    def __init__(self) -> None:
+        super().__init__()
+        triggers = QtWidgets.QAbstractItemView.EditTrigger
+        self.setEditTriggers(triggers.DoubleClicked | triggers.EditKeyPressed)
+
+    def edit(self, index: Any, *how: Any) -> Any:
+        triggers = QtWidgets.QAbstractItemView.EditTrigger
+        if how and how[0] == triggers.EditKeyPressed:
+            index = index.siblingAtColumn(0)
+        elif how and how[0] == triggers.DoubleClicked and index.column():
+            return False
+        return super().edit(index, *how)
 
 
 def _light_up(button: Any, down: bool) -> None:

@@ -35,10 +35,6 @@ class HandlesPart(QtWidgets.QGroupBox):
         self._editor = editor
         self._rows: list[tuple[str, int]] = []
         self.list = table(["Name", "Vertices"], _TIP, rows=6)
-        self.list.setEditTriggers(
-            QtWidgets.QAbstractItemView.EditTrigger.DoubleClicked
-            | QtWidgets.QAbstractItemView.EditTrigger.EditKeyPressed
-        )
         self.list.itemSelectionChanged.connect(self._selected)
         self.list.itemChanged.connect(self._edited)
         self.new = key_button(editor, "a", Mode.HANDLES, "New")

@@ -45,7 +45,7 @@ class DeformPanel(QtWidgets.QWidget):
     deformed = QtCore.Signal()
     """The pose is another one; at every move of a drag."""
     regions_changed = QtCore.Signal()
-    """`Session.regions` are others."""
+    """`Session.regions` are others, or called otherwise."""
     session_changed = QtCore.Signal(object)
     """Another session was opened: this one."""
     error = QtCore.Signal(str)
@@ -154,7 +154,7 @@ class DeformPanel(QtWidgets.QWidget):
     def _changed(self, change: Change) -> None:
         if change & Change.POSE:
             self.deformed.emit()
-        if change & Change.REGIONS:
+        if change & (Change.REGIONS | Change.NAMES):
             self.regions_changed.emit()
 
 

@@ -1,4 +1,4 @@
-"""The panel's list of regions: colour, cage, and what became of the volume."""
+"""The panel's list of regions: colour, name, cage, and what became of the volume."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from vtk_segdeform.palette import COLOURS
 from ..colouring.legend import precise
 from ..colouring.region_volumes import RegionVolumes
 from ..editing.actions import split_region
-from ..editing.panel_actions import choosing_region, merging, showing_cage
+from ..editing.panel_actions import choosing_region, merging, naming_region, showing_cage
 from ..editing.stage import Mode
 from ..editor import DeformEditor
 from .controls import RIGHT, column, key_button, push_button, row, swatch, table
 
 Qt = QtCore.Qt
-_CAGE, _VOLUME = 1, 2
-_TIP = "the one that is chosen is painted; a tick shows its cage"
+_NAME, _CAGE, _VOLUME = 0, 1, 2
+_TIP = "the one that is chosen is painted; a tick shows its cage; F2 renames it"
 
 
 class _Row(NamedTuple):
@@ -47,7 +47,7 @@ class RegionsPart(QtWidgets.QGroupBox):
         self.list = table(["Region", "Cage", "Volume"], _TIP, rows=7)
         self.list.setSelectionMode(QtWidgets.QAbstractItemView.SelectionMode.ExtendedSelection)
         self.list.itemSelectionChanged.connect(self._selected)
-        self.list.itemChanged.connect(self._ticked)
+        self.list.itemChanged.connect(self._edited)
         self.find = key_button(editor, "g", Mode.REGIONS, "Find regions")
         self.new = key_button(editor, "a", Mode.REGIONS, "New")
         self.merge = push_button("Merge", "make one of those that are chosen in the list")
@@ -85,7 +85,7 @@ class RegionsPart(QtWidgets.QGroupBox):
         rows = [
             _Row(
                 region,
-                f"{region}",
+                editor.session.region_name(region),
                 f"{cages[region].n_vertices} vertices" if cages else "none yet",
                 stage.cages.is_visible(region) if cages else None,
                 precise(volumes[region]) if region in volumes else "",
@@ -94,7 +94,9 @@ class RegionsPart(QtWidgets.QGroupBox):
         ]
         new = stage.selector.region
         if editor.mode is Mode.REGIONS and new >= stage.n_regions:
-            rows.append(_Row(new, f"{new}, to be painted", "", None, ""))
+            rows.append(
+                _Row(new, f"{editor.session.region_name(new)}, to be painted", "", None, "")
+            )
         return rows
 
     def _show(self, rows: list[_Row]) -> None:
@@ -106,8 +108,12 @@ class RegionsPart(QtWidgets.QGroupBox):
             tree.addTopLevelItem(QtWidgets.QTreeWidgetItem())
         for k, each in enumerate(rows):
             item = tree.topLevelItem(k)
-            item.setText(0, each.name)
-            item.setIcon(0, swatch(COLOURS[each.region % len(COLOURS)], tree))
+            item.setText(_NAME, each.name)
+            item.setToolTip(_NAME, f"{each.name} (F2 renames it)")  # there may be no room for it
+            there = each.region < self._editor.stage.n_regions
+            editable = Qt.ItemFlag.ItemIsEditable
+            item.setFlags(item.flags() | editable if there else item.flags() & ~editable)
+            item.setIcon(_NAME, swatch(COLOURS[each.region % len(COLOURS)], tree))
             item.setText(_CAGE, each.cage)
             item.setText(_VOLUME, each.volume)
             item.setTextAlignment(_VOLUME, RIGHT)
@@ -133,8 +139,11 @@ class RegionsPart(QtWidgets.QGroupBox):
             self._editor.do(choosing_region(chosen[0]))
         self.refresh()
 
-    def _ticked(self, item: Any, which: int) -> None:
+    def _edited(self, item: Any, which: int) -> None:
+        row = self._rows[self.list.indexOfTopLevelItem(item)]
         if which == _CAGE:
-            region = self._rows[self.list.indexOfTopLevelItem(item)].region
             shown = item.checkState(_CAGE) == Qt.CheckState.Checked
-            self._editor.do(showing_cage(region, shown))
+            self._editor.do(showing_cage(row.region, shown))
+        elif which == _NAME and item.text(_NAME) != row.name:
+            self._rows = []  # to be shown anew, also where the name is refused
+            self._editor.do(naming_region(row.region, item.text(_NAME)))
