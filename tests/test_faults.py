@@ -93,7 +93,15 @@ def test_a_mesh_turned_inside_out_is_found_wherever_it_lies():
 def test_a_flat_closed_mesh_encloses_nothing():
     vertices, faces = CUBE
     turned = vertices * [1.0, 1.0, 0.0] @ rotation([1.0, 2.0, 3.0], 0.7).T
-    assert Kind.INWARD in kinds(turned, faces)
+    assert kinds(turned, faces) == {Kind.NO_VOLUME: 1}
+
+
+@pytest.mark.parametrize(("scale", "kind"), [(1e150, Kind.TOO_LARGE), (1e-150, Kind.TOO_SMALL)])
+def test_a_size_that_no_volume_can_be_computed_for_is_named(scale, kind):
+    vertices, faces = CUBE
+    assert set(kinds(vertices * scale, faces)) == {kind}
+    for still in (scale**0.46, 1.0 / scale**0.46):
+        assert find_faults(vertices * still, faces).ok
 
 
 @pytest.mark.parametrize("depth", [1, 2, 3])

@@ -15,10 +15,12 @@ from numpy.typing import ArrayLike
 from .arrays import FloatArray, IntArray, plain
 from .errors import ArgumentError
 from .surface.report import Fault, Id, Kind, MeshReport
-from .surface.shells import wrong_way_round
+from .surface.shells import without_volume, wrong_way_round
 from .surface.topology import Sides, connected, first_equal_row, repeats_face, repeats_vertex
 
+HOPELESS = (Kind.EMPTY, Kind.BAD_INDEX, Kind.TOO_LARGE, Kind.TOO_SMALL)  # nothing else is asked
 _EXAMPLES = 4
+_LARGEST, _SMALLEST = 1e70, 1e-70  # fourth powers of lengths must be numbers
 _FLAT = 1e-12  # a face of less height than this share of its longest edge has no area
 
 
@@ -54,7 +56,7 @@ def find_faults(vertices: ArrayLike, faces: ArrayLike) -> MeshReport:
     points, triangles = as_soup(vertices, faces)
     n_components = 0
     found = list(_number_faults(points, triangles))
-    if not any(fault.kind in (Kind.EMPTY, Kind.BAD_INDEX) for fault in found):
+    if not any(fault.kind in HOPELESS for fault in found):
         sound = ~repeats_vertex(triangles) & ~repeats_face(triangles)
         sides = Sides(triangles[sound], len(points))
         n_components = int(sides.shells.max(initial=-1)) + 1
@@ -101,6 +103,11 @@ def _number_faults(points: FloatArray, faces: IntArray) -> Iterator[Fault]:
     yield from _some(Kind.NON_FINITE, np.flatnonzero(~np.isfinite(points).all(axis=1)))
     bad = ((faces < 0) | (faces >= len(points))).any(axis=1)
     yield from _some(Kind.BAD_INDEX, np.flatnonzero(bad))
+    finite = points[np.isfinite(points).all(axis=1)]
+    far = np.where(np.isfinite(points), np.abs(points), 0.0).max(axis=1, initial=0.0) > _LARGEST
+    yield from _some(Kind.TOO_LARGE, np.flatnonzero(far))
+    if len(finite) and not far.any() and 0.0 < np.ptp(finite, axis=0).max() < _SMALLEST:
+        yield Fault(Kind.TOO_SMALL, 1)
     used = np.zeros(len(points), dtype=bool)
     used[faces[~bad]] = True
     yield from _some(Kind.UNREFERENCED, np.flatnonzero(~used))
@@ -143,8 +150,10 @@ def _inward_shells(points: FloatArray, sides: Sides) -> Iterator[Fault]:
     if asked.any():
         _, shells = np.unique(sides.shells[asked], return_inverse=True)
         wrong = wrong_way_round(points, sides.faces[asked], shells)
+        flat = without_volume(points, sides.faces[asked], shells)
         _, first = np.unique(shells, return_index=True)
-        yield from _some(Kind.INWARD, sides.faces[asked][first[wrong], 0])
+        yield from _some(Kind.INWARD, sides.faces[asked][first[wrong & ~flat], 0])
+        yield from _some(Kind.NO_VOLUME, sides.faces[asked][first[flat], 0])
 
 
 def _some(

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 
 from .arrays import FloatArray, IntArray
 from .errors import MeshError
-from .faults import as_soup, find_faults
+from .faults import HOPELESS, as_soup, find_faults
 from .surface import repair_steps as steps
-from .surface.report import Kind, MeshReport
+from .surface.report import MeshReport
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,8 @@ def repair(
     Raises
     ------
     MeshError
-        If there are no faces, none worth keeping, or faces with bad indices.
+        If there are no faces, none worth keeping, faces with bad indices, or coordinates beyond all
+        computing.
     ValueError
         If an array has the wrong shape or type.
 
@@ -85,8 +86,11 @@ def repair(
     """
     points, triangles = as_soup(vertices, faces)
     report = find_faults(points, triangles)
-    if report.count(Kind.EMPTY) or report.count(Kind.BAD_INDEX):
-        raise MeshError(f"nothing to repair: {', '.join(map(str, report.faults))}")
+    hopeless = [
+        f"{fault}; {fault.kind.advice}" for fault in report.faults if fault.kind in HOPELESS
+    ]
+    if hopeless:
+        raise MeshError(f"nothing to repair: {'; '.join(hopeless)}")
     draft = steps.Draft(points, triangles, np.arange(len(points)), np.arange(len(triangles)))
     done: list[str] = []
     if not report.ok:
@@ -105,7 +109,10 @@ def repair(
             draft, sentence = step(draft)
             done += [sentence] if sentence else []
             if not len(draft.faces):
-                raise MeshError(f"nothing is left of the mesh after: {'; '.join(done)}")
+                raise MeshError(
+                    f"nothing is left of the mesh after: {'; '.join(done)}; "
+                    "look at where it comes from"
+                )
         report = find_faults(draft.vertices, draft.faces)
     return Repair(
         draft.vertices, draft.faces, tuple(done), draft.vertex_map, draft.face_map, report

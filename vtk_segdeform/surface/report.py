@@ -27,6 +27,18 @@ class Kind(enum.Enum):
         "face ",
         "count vertices from 0, and pass all of them",
     )
+    TOO_LARGE = (
+        "vertex too far out to compute volumes with",
+        "vertices too far out to compute volumes with",
+        "vertex ",
+        "scale the mesh down: coordinates may be 1e70 at most",
+    )
+    TOO_SMALL = (
+        "mesh too small to compute volumes with",
+        "meshes too small to compute volumes with",
+        "",
+        "scale it up: it must be 1e-70 long at least",
+    )
     UNREFERENCED = (
         "unreferenced vertex",
         "unreferenced vertices",
@@ -69,7 +81,13 @@ class Kind(enum.Enum):
         "inside-out component",
         "inside-out components",
         "at vertex ",
-        "`repair` would turn round what encloses any volume",
+        "`repair` would turn them round",
+    )
+    NO_VOLUME = (
+        "component that encloses no volume",
+        "components that enclose no volume",
+        "at vertex ",
+        "give it thickness, leave it out or, where digits are lost, move it near to the origin",
     )
     ZERO_AREA = "face without area", "faces without area", "face ", "allowed", False
     COINCIDENT = (

@@ -40,6 +40,12 @@ def wrong_way_round(vertices: FloatArray, faces: IntArray, shells: IntArray) -> 
     return wrong
 
 
+def without_volume(vertices: FloatArray, faces: IntArray, shells: IntArray) -> BoolArray:
+    """Return which shells enclose no volume but what rounding leaves, (k,) bool; see above."""
+    volume, scale = _volumes(vertices, faces, shells)
+    return np.asarray(np.abs(volume) <= _NO_VOLUME * scale)
+
+
 def _volumes(
     vertices: FloatArray, faces: IntArray, shells: IntArray
 ) -> tuple[FloatArray, FloatArray]:
