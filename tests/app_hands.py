@@ -107,7 +107,7 @@ class AppHand:
     def settle(self):
         """Let the window get on until nothing is opened, worked at or still to be kept."""
         application().processEvents()
-        until(lambda: self.page is not self.window.waiting, "the file")
+        until(lambda: self.page is not self.window.pages.waiting, "the file")
         if self.window.has_mesh:
             until(lambda: not self.window.editor.is_busy, "the job")
             dragger = self.window.editor.stage.dragger

@@ -13,7 +13,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from qtpy import QtCore, QtOpenGLWidgets, QtWidgets
+from qtpy import QtCore, QtWidgets
 
 from vtk_segdeform.session import Session
 
@@ -25,10 +25,10 @@ from .documents import Document, Opened, from_file, from_slot, the_cactus
 from .drops import Drops
 from .keeper import INTERVAL, Keeper, stops_of
 from .menus import Menus, lead_panel
-from .opening import Opening, Request, WaitingPage
+from .opening import Opening, Request
+from .pages import Pages
 from .recent import Recent
 from .saving import may_be_given_up
-from .start_page import StartPage
 
 _SIZE = 1200, 800
 
@@ -74,20 +74,15 @@ class Window(QtWidgets.QMainWindow):
         self.editor_widget: Any = None
         self._opening: Opening | None = None
         self._stops = stops_of(self)
-        self.pages = QtWidgets.QStackedWidget()
-        self.start_page, self.waiting = StartPage(), WaitingPage()
-        self.start_page.open_wanted.connect(self.ask_and_open)
-        self.start_page.cactus_wanted.connect(self.open_cactus)
-        self.start_page.chosen.connect(self.open)
-        self.waiting.cancelled.connect(self._stop_opening)
-        # Without one from the start, Qt makes the window anew when the first view comes.
-        QtOpenGLWidgets.QOpenGLWidget(self.pages).hide()
-        self.pages.addWidget(self.start_page)
-        self.pages.addWidget(self.waiting)
+        self.pages = Pages()
+        self.pages.start.open_wanted.connect(self.ask_and_open)
+        self.pages.start.cactus_wanted.connect(self.open_cactus)
+        self.pages.start.chosen.connect(self.open)
+        self.pages.waiting.cancelled.connect(self._stop_opening)
         self.setCentralWidget(self.pages)
         self.menus = Menus(self)
         drops = Drops(self)
-        drops.held.connect(self.start_page.target.light_up)
+        drops.held.connect(self.pages.start.target.light_up)
         drops.dropped.connect(self.open)
         self.resize(*_SIZE)
         self._show_page()
@@ -163,9 +158,9 @@ class Window(QtWidgets.QMainWindow):
         if not may_be_given_up(self):
             return False
         self._stop_opening()
-        self.waiting.begin(request.name)
+        self.pages.waiting.begin(request.name)
         self._opening = Opening(request, self)
-        self._opening.got_on.connect(self.waiting.show_progress)
+        self._opening.got_on.connect(self.pages.waiting.show_progress)
         self._opening.opened.connect(self._opened)
         self._opening.failed.connect(self._failed)
         self._show_page()
@@ -175,6 +170,7 @@ class Window(QtWidgets.QMainWindow):
         self._end_opening()
         self.keeper.forget()
         self._close_document()
+        self.pages.delete_views()
         self.document, session = opened
         self.mesh_state = None
         widget = self.editor_widget = DeformWidget(session, self)
@@ -215,16 +211,15 @@ class Window(QtWidgets.QMainWindow):
         if widget is not None:
             self._stops.pop()()
             widget.close()
-            self.pages.removeWidget(widget)
-            widget.deleteLater()
 
     # What is shown.
 
     def _show_page(self) -> None:
-        page = self.waiting if self._opening is not None else self.editor_widget or self.start_page
-        if page is self.start_page:
-            self.start_page.show_recent(self.recent.paths)
-        self.pages.setCurrentWidget(page)
+        pages = self.pages
+        here = self.editor_widget or pages.start
+        if here is pages.start:
+            pages.start.show_recent(self.recent.paths)
+        pages.setCurrentWidget(here if self._opening is None else pages.waiting)
         self.menus.refresh()
         self._heard()
 
