@@ -112,7 +112,7 @@ def read_polydata(path: str | Path) -> pv.PolyData:
     except (ValueError, IndexError, KeyError, OverflowError, OSError) as error:
         raise MeshError(f"{path}: is no readable {suffix} file ({error})") from None
     if not surface.n_points or not surface.n_cells:
-        raise MeshError(f"{path}: holds no surface")
+        raise MeshError(f"{path}: holds no surface; give it polygons")
     return surface
 
 

@@ -26,10 +26,11 @@ def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.P
     points = np.ascontiguousarray(points, dtype=np.float64)
     if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
         raise MeshError(
-            f"a face names vertex {corners.min()} to {corners.max()}; there are {len(points)}"
+            f"a face names vertex {corners.min()} to {corners.max()}; "
+            f"there are {len(points)}: count from 0, and give all of them"
         )
     if len(counts) and counts.min() < 3:
-        raise MeshError(f"{np.count_nonzero(counts < 3)} faces have fewer than three corners")
+        raise MeshError(f"{np.count_nonzero(counts < 3)} faces have fewer than three corners; leave them out")
     surface = pv.PolyData()
     surface.points = points
     starts = np.insert(np.cumsum(counts), 0, 0)

@@ -26,7 +26,7 @@ def surface(polydata: Any) -> tuple[FloatArray, IntArray]:
     if not polydata.GetNumberOfPoints() or not (
         polydata.GetNumberOfPolys() or polydata.GetNumberOfStrips()
     ):
-        raise MeshError("the input holds no surface: it has no polygons")
+        raise MeshError("the input holds no surface; give it polygons")
     cut = vtkTriangleFilter()
     cut.PassVertsOff()
     cut.PassLinesOff()
