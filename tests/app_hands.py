@@ -88,7 +88,7 @@ class AppHand:
 
     def __init__(self, window: Window):
         self.window = window
-        window.resize(900, 650)
+        window.resize(700, 450)
         window.show()
         until(lambda: window.windowHandle() and window.windowHandle().isExposed(), "the window")
         window.activateWindow()

@@ -38,6 +38,8 @@ class Pages(QtWidgets.QStackedWidget):
         PySide would take what Qt makes later, in the same place, for what a view remembers; so
         nothing of a view is to outlive it, not even until the next collection of garbage.
         """
+        if self.count() == _OURS:
+            return
         while self.count() > _OURS:
             page = self.widget(_OURS)
             self.removeWidget(page)
