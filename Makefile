@@ -68,7 +68,7 @@ $(VENV)/installed: setup.cfg pyproject.toml | $(BIN)/python
 	@touch $@
 
 $(VENV)/installed-test: setup.cfg pyproject.toml | $(BIN)/python
-	$(PIP) install --editable '.[test,qt,meshlab]'
+	$(PIP) install --editable '.[test,qt,meshlab,fast]'
 	@touch $@ $(VENV)/installed
 
 $(BIN)/python:

@@ -59,8 +59,8 @@ def test_restore_meets_every_constraint_at_once():
     constraints = region_volumes(MESH, SCENE.regions.labels)
     x = MESH.vertices + wobble(2)
     directions = [c.gradient(MESH.vertices) for c in constraints]
-    t = restore(constraints, x, directions)
+    t = restore(constraints, np.hstack([x, *directions]))
     x = x + sum(step * d for step, d in zip(t, directions, strict=True))
     assert max(abs(c.violation(x)) for c in constraints) < 1e-12
-    (step,) = restore([total_volume(MESH)], x, [MESH.vertices])
+    (step,) = restore([total_volume(MESH)], np.hstack([x, MESH.vertices]))
     assert abs(step) < 1e-12

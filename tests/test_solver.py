@@ -155,7 +155,7 @@ def test_at_the_end_the_slope_is_a_multiple_of_the_volume_gradient():
     x = solver.energy.subspace.map(deformer._p)
     _, slope = solver.energy.local_step(deformer._p, x)
     slope = slope + solver.positions.value_and_slope(deformer._p, targets)[1]
-    gradient = solver.energy.subspace.adjoint(solver.constraints[0].gradient(x))
+    gradient = solver.energy.subspace.adjoint(solver.volumes.constraints[0].gradient(x))
     factor = np.vdot(slope, gradient) / np.vdot(gradient, gradient)
     assert np.linalg.norm(slope - factor * gradient) < 1e-5 * np.linalg.norm(slope)
 

@@ -20,7 +20,8 @@ from scipy.sparse import csgraph
 
 from .arrays import FloatArray, IntArray
 from .mesh import Mesh
-from .volume import signed_volume, step_to_volume, volume_along, volume_gradient
+from .subspace import Subspace
+from .volume import signed_volume, step_to_volume, volume_along_path, volume_gradient
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,18 +41,26 @@ class VolumeConstraint:
         gradient = volume_gradient(self._extended(x), self.faces)
         return gradient if self.extension is None else self.extension.T @ gradient
 
-    def exact_step(self, x: FloatArray, direction: FloatArray) -> float:
-        """Return the smallest t with g(x + t direction) = 0, to rounding."""
-        x, direction = self._extended(x), self._extended(direction)
-        return step_to_volume(volume_along(x, direction, self.faces), self.target)
+    def exact_step(self, path: FloatArray) -> float:
+        """Return the smallest t with g(x + t d) = 0, to rounding; x and d side by side (n, 6)."""
+        return step_to_volume(volume_along_path(self._extended(path), self.faces), self.target)
 
     def _extended(self, x: FloatArray) -> FloatArray:
         return x if self.extension is None else self.extension @ x
 
 
+@dataclass(frozen=True, eq=False)
+class Volumes:
+    """Constraints as functions of the cage vertices: over ``surface.map(p)``."""
+
+    surface: Subspace
+    constraints: tuple[VolumeConstraint, ...]
+
+
 def total_volume(mesh: Mesh) -> VolumeConstraint:
     """Return the constraint that *mesh* keeps its enclosed volume."""
-    return VolumeConstraint(mesh.faces, signed_volume(mesh.vertices, mesh.faces))
+    faces = _in_order(mesh.faces)
+    return VolumeConstraint(faces, signed_volume(mesh.vertices, faces))
 
 
 def region_volumes(mesh: Mesh, labels: IntArray) -> tuple[VolumeConstraint, ...]:
@@ -79,15 +88,15 @@ def region_volumes(mesh: Mesh, labels: IntArray) -> tuple[VolumeConstraint, ...]
     return tuple(constraints)
 
 
-def restore(
-    constraints: Sequence[VolumeConstraint], x: FloatArray, directions: Sequence[FloatArray]
-) -> FloatArray:
-    """Return the step t (c,) along *directions*, c fields (n, 3), that meets all constraints.
+def restore(constraints: Sequence[VolumeConstraint], paths: FloatArray) -> FloatArray:
+    """Return the step t (c,) along each of c directions that meets all constraints.
 
-    One constraint: the exact root of its cubic.  Several: Newton's method on t.
+    *paths* (n, 3 + 3 c) has the vertices and their c directions side by side.  One constraint:
+    the exact root of its cubic.  Several: Newton's method on t.
     """
     if len(constraints) == 1:
-        return np.array([constraints[0].exact_step(x, directions[0])])
+        return np.array([constraints[0].exact_step(paths)])
+    x, *directions = np.split(paths, len(constraints) + 1, axis=1)
     t = np.zeros(len(constraints))
     here = x
     for _ in range(_NEWTON_STEPS):
@@ -102,7 +111,20 @@ def restore(
     return t
 
 
+def moved(paths: FloatArray, t: FloatArray) -> FloatArray:
+    """Return the vertices of *paths* (n, 3 + 3 c) after the step *t* (c,) along its directions."""
+    x = paths[:, :3]
+    for k, tk in enumerate(t, start=1):
+        x = x + tk * paths[:, 3 * k : 3 * k + 3]
+    return np.ascontiguousarray(x)
+
+
 _NEWTON_STEPS = 6
+
+
+def _in_order(faces: IntArray) -> IntArray:
+    """Return *faces* sorted by vertex: a million are summed up in half the time."""
+    return faces[np.argsort(faces.min(axis=1), kind="stable")]
 
 
 def _face_labels(corners: IntArray) -> IntArray:

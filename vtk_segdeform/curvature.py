@@ -24,6 +24,7 @@ Trans. Graph. 38(1), 2019: the twist modes of the rotation's derivative.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,9 +53,15 @@ class Factor:
 
     def solve(self, y: FloatArray) -> FloatArray:
         """Return H^-1 y, (m, 3), for *y* (m, 3)."""
-        right = y.T.ravel() if self.coupled else y
-        solved = linalg.cho_solve((self.triangle, True), right, check_finite=False)
-        return solved.reshape(3, -1).T if self.coupled else np.asarray(solved)
+        return self.solve_all([y])[0]
+
+    def solve_all(self, ys: Sequence[FloatArray]) -> list[FloatArray]:
+        """Return H^-1 y for each y (m, 3)."""
+        right = [y.T.reshape(-1, 1) for y in ys] if self.coupled else ys
+        solved = linalg.cho_solve((self.triangle, True), np.hstack(right), check_finite=False)
+        if self.coupled:
+            return [column.reshape(3, -1).T for column in solved.T]
+        return np.split(solved, len(ys), axis=1)
 
 
 def factored(hessian: FloatArray) -> Factor | None:

@@ -16,6 +16,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +24,7 @@ from numpy.typing import ArrayLike
 from .arrays import FloatArray, IntArray, as_points
 from .cage_stiffness import with_cage_stiffness
 from .cages import Cage
-from .constraints import VolumeConstraint, region_volumes, total_volume
+from .constraints import VolumeConstraint, moved, region_volumes, restore, total_volume
 from .energy import shape_energy
 from .errors import CageError, ConstraintError, RegionError
 from .iteration import Iteration, SolverOptions
@@ -35,9 +36,9 @@ from .regions import Regions
 from .rotations import rotation_groups as group_by_part
 from .solution import Solution, Status
 from .solver import GaussNewton
+from .stand_in import StandIn
 from .subspace import Subspace, bind
 from .targets import waypoints
-from .volume import signed_volume
 
 _LEG_TOLERANCE, _LEG_STEPS = 1e-3, 12  # for the targets on the way to a far one
 _POSITION_WEIGHT = 1e2  # of the shape energy's trace, shared out over each handle's vertices
@@ -138,9 +139,8 @@ class Deformer:
         if groups is not None and self._energy.exact:
             faces = [cage.faces for cage in cages]
             self._energy = with_cage_stiffness(self._energy, self._rest_cages, faces, groups)
-        self._volume = signed_volume(self._rest.vertices, self._rest.faces)
-        self._volumes = region_volumes(self._rest, regions.labels)
-        self._total_volume = total_volume(self._rest)
+        self._stand_in = StandIn(mesh, subspace, whole=self._energy.turns_vertices)
+        self._total_volume = total_volume(mesh)
         self._keep(preserve_volume, preserve_region_volumes)
         self._take_hold(fixed, handle)
         if progress:
@@ -184,20 +184,22 @@ class Deformer:
         p = self._outward(self._p)
         return self.passengers(points).moved([p[columns] for columns in self.subspace.columns])
 
+    def surface(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
+        """Return the mesh (n, 3) with its cages at *cage_vertices*, (m_r, 3) each: x = W~ p."""
+        return self._surface(self._stacked(cage_vertices) - self._centre)
+
     def reset(self) -> None:
         """Forget the last pose: the next solve starts from rest."""
         self._solver = self._at_rest
+        self._solver.forget()
         self._p = self._rest_cages
         self._targets = self._rest.vertices[self.handle]
 
     def resume(self, cage_vertices: Sequence[ArrayLike], targets: ArrayLike) -> None:
         """Go on from an earlier pose: a `Solution.cage_vertices`, and the targets it was for."""
-        poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
-        expected, got = [cage.n_vertices for cage in self.cages], [len(pose) for pose in poses]
-        if got != expected:
-            raise CageError(f"cage_vertices must hold {expected} points, cage by cage; got {got}")
-        targets = self._inward(checked_targets(targets, len(self.handle)))
-        self._p, self._targets = self._inward(np.concatenate(poses)), targets
+        p = self._inward(self._stacked(cage_vertices))
+        self._solver.forget()
+        self._p, self._targets = p, self._inward(checked_targets(targets, len(self.handle)))
 
     def solve(self, targets: ArrayLike, *, max_steps: int | None = None) -> Solution:
         """Return the pose whose handle vertices are at *targets*.
@@ -246,13 +248,27 @@ class Deformer:
             result = held
         return self._solution(result, steps)
 
-    def _keep(self, volume: bool, region_volumes: bool) -> None:
-        self._keeps = volume, region_volumes
-        self._constraints: Sequence[VolumeConstraint] = ()
-        if region_volumes:
-            self._constraints = self._volumes
+    def _stacked(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
+        poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
+        expected, got = [cage.n_vertices for cage in self.cages], [len(pose) for pose in poses]
+        if got != expected:
+            raise CageError(f"cage_vertices must hold {expected} points, cage by cage; got {got}")
+        return np.concatenate(poses)
+
+    def _keep(self, volume: bool, of_regions: bool) -> None:
+        self._keeps = volume, of_regions
+        self._constraints: tuple[VolumeConstraint, ...] = ()
+        if of_regions:
+            self._constraints = self._region_volumes
         elif volume:
             self._constraints = (self._total_volume,)
+
+    @cached_property
+    def _region_volumes(self) -> tuple[VolumeConstraint, ...]:
+        return region_volumes(self.mesh, self.regions.labels)
+
+    def _region_volume_changes(self, x: FloatArray) -> FloatArray:
+        return np.array([each.violation(x) / each.target for each in self._region_volumes])
 
     def _rotation_groups(self, count: int | None) -> IntArray | None:
         if count is None or count >= self.mesh.n_vertices:
@@ -270,7 +286,8 @@ class Deformer:
         weight = _POSITION_WEIGHT * float(np.trace(self._energy.quadratic))
         rows = self._energy.subspace.at(self._held)
         positions = position_term(rows, [*self._handles, *patches], weight)
-        self._at_rest = GaussNewton(self._energy, positions, self._constraints)
+        volumes = self._stand_in.volumes(self._constraints, self._rest.vertices)
+        self._at_rest = GaussNewton(self._energy, positions, volumes)
         self.reset()
 
     def _move(self, targets: FloatArray, options: SolverOptions) -> Iteration:
@@ -279,32 +296,52 @@ class Deformer:
         return result
 
     def _errors(self, result: Iteration) -> FloatArray:
-        return np.asarray(
-            np.linalg.norm(result.x[self._held] - self._places(self._targets), axis=1)
-        )
+        x = self._solver.positions.rows @ result.p
+        return np.asarray(np.linalg.norm(x - self._places(self._targets), axis=1))
 
     def _places(self, targets: FloatArray) -> FloatArray:
         return np.concatenate([targets, self._rest.vertices[self.fixed]])
 
+    def _landed(self, result: Iteration) -> tuple[FloatArray, FloatArray]:
+        """Return cage vertices and mesh vertices, the mesh's own volume exactly as held."""
+        p, directions = result.p * self._size, [z * self._size for z in result.directions]
+        exact = bool(directions) and self._options.exact_volume
+        paths = self._surface(p, directions if exact else [])
+        if not exact:
+            return p, paths
+        t = restore(self._constraints, paths)
+        p = p + sum(tk * z for tk, z in zip(t, directions, strict=True))
+        return p, moved(paths, t)
+
+    def _surface(self, p: FloatArray, directions: Sequence[FloatArray] = ()) -> FloatArray:
+        """Return x for cages at *p* (m, 3), about the centre; and W~ z for *directions* z beside.
+
+        x is rest + W~ (p - rest), which is W~ p: the rest shape keeps its last digit however W~
+        is rounded.
+        """
+        moves = p - self._rest_cages * self._size
+        start = np.zeros((self.mesh.n_vertices, 3 + 3 * len(directions)))
+        start[:, :3] = self.mesh.vertices
+        return self.subspace.map(np.hstack([moves, *directions]), start)
+
     def _solution(self, result: Iteration, steps: int) -> Solution:
-        x, rest = result.x, self._rest
         errors = self._errors(result) * self._size / self.mesh.diagonal
         handle, fixed = np.split(errors, [len(self.handle)])
         status = result.status
         if status is Status.CONVERGED and errors.max(initial=0.0) > _MET:
             status = Status.MISSED
-        p = self._outward(result.p)
-        columns = self._solver.energy.subspace.columns
+        p, x = self._landed(result)
+        volume = self._total_volume
         return Solution(
-            vertices=self._outward(x),
-            cage_vertices=tuple(p[c] for c in columns),
-            volume_change=signed_volume(x, rest.faces) / self._volume - 1.0,
-            region_volume_change=np.array([v.violation(x) / v.target for v in self._volumes]),
+            vertices=x,
+            cage_vertices=tuple(p[columns] + self._centre for columns in self.subspace.columns),
+            volume_change=volume.violation(x) / volume.target,
             handle_error=float(handle.max(initial=0.0)),
             fixed_error=float(fixed.max(initial=0.0)),
             steps=steps,
             status=status,
             merits=result.merits,
+            region_volumes=self._region_volume_changes,
         )
 
     def _inward(self, points: FloatArray) -> FloatArray:

@@ -26,7 +26,7 @@ geometric model for elastic deformations", SIGGRAPH 2010 (spokes and rims).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,6 +66,11 @@ class Energy:
         """Whether E is a minimum over the rotations, so that its gradient is the one returned."""
         return self.fit is self.pull
 
+    @property
+    def turns_vertices(self) -> bool:
+        """Whether every vertex has its own rotation, taken from x; groups take theirs from p."""
+        return sparse.issparse(self.fit)
+
     def fitted_rows(self, count: int) -> Iterator[FloatArray]:
         """Yield K, what rotations are fitted to as rows on p (3 g, m), *count* groups at a time."""
         for start in range(0, self.fit.shape[0], 3 * count):
@@ -74,12 +79,11 @@ class Energy:
 
     def local_step(self, p: FloatArray, x: FloatArray) -> tuple[float, FloatArray]:
         """Return E(p) and half its gradient (m, 3), with the local rotations at x = W~ p."""
-        per_vertex = sparse.issparse(self.fit)
-        argument = x if per_vertex else p
+        argument = x if self.turns_vertices else p
         stacked = self.fit @ argument
         turned = np.swapaxes(closest_rotations(stacked.reshape(-1, 3, 3)), 1, 2).reshape(-1, 3)
         reduced = self.pull.T @ turned
-        if per_vertex:
+        if self.turns_vertices:
             reduced = self.subspace.adjoint(reduced)
         product = self.quadratic @ p
         value = np.vdot(p, product) - 2.0 * np.vdot(p, reduced) + self.constant
@@ -102,18 +106,17 @@ def shape_energy(mesh: Mesh, subspace: Subspace, stretch: float, groups: IntArra
     """
     if not 0.0 <= stretch < np.inf:
         raise ValueError(f"stretch must be a number, 0 or more; got {stretch}")
-    vertices, faces = mesh.vertices, mesh.faces
+    n, vertices, faces = mesh.n_vertices, mesh.vertices, mesh.faces
     areas = mixed_voronoi_areas(vertices, faces)
     laplacian = cotangent_laplacian(vertices, faces)
     delta = mean_curvature_normals(vertices, faces)
-    curvature = sparse.diags_array(0.5 / areas) @ laplacian  # left side of (5)
-
-    bending = subspace.gram((curvature.T @ sparse.diags_array(areas) @ curvature).tocsr())
+    # The left side of (5) is C x / (2 A).
+    bending = subspace.gram_of_squares(laplacian, 0.25 / areas)
     stretching = subspace.gram(laplacian)
     unit = np.trace(bending) / np.trace(stretching)
 
-    detail = _stack([sparse.diags_array(areas * d) @ curvature for d in delta.T], groups)
-    fans = _stack(_fans(mesh), groups)
+    detail = _stack((sparse.diags_array(0.5 * d) @ laplacian for d in delta.T), groups, n)
+    fans = _stack(_fans(mesh), groups, n)
     pull = detail + (stretch * unit) * fans
     fit = pull if stretch > 0.0 else detail + unit * fans
     if groups is not None:
@@ -132,30 +135,23 @@ def shape_energy(mesh: Mesh, subspace: Subspace, stretch: float, groups: IntArra
     )
 
 
-def _fans(mesh: Mesh) -> list[sparse.csr_array]:
-    """Return, for each axis, the (n, n) operator of sum_{T at i} A_T / 3 J_T^T: row i, axis."""
-    corners = mesh.faces.ravel()
-    count = np.arange(len(corners))
-    shape = (len(corners), mesh.n_vertices)
-    at_vertex = sparse.coo_array((np.full(len(corners), 1.0 / 3.0), (corners, count)), shape[::-1])
-    # Every corner of a face sees the whole face: row 3 T + k holds face T's three gradients.
-    rows, columns = np.repeat(count, 3), np.repeat(mesh.faces, 3, axis=0).ravel()
-    gradients = area_gradients(mesh.vertices, mesh.faces)
-    fans = []
+def _fans(mesh: Mesh) -> Iterator[sparse.csr_array]:
+    """Yield, for each axis, the (n, n) operator of sum_{T at i} A_T / 3 J_T^T: row i, axis."""
+    shape = (mesh.n_vertices, mesh.n_vertices)
+    gradients = area_gradients(mesh.vertices, mesh.faces) / 3.0
+    # Every corner of a face sees the whole face.
+    seen, corner = np.repeat(mesh.faces, 3, axis=1).ravel(), np.tile(mesh.faces, 3).ravel()
     for axis in range(3):
-        values = np.repeat(gradients[:, :, axis], 3, axis=0).ravel()
-        on_face = sparse.coo_array((values, (rows, columns)), shape)
-        fans.append(at_vertex.tocsr() @ on_face.tocsr())
-    return fans
+        values = np.tile(gradients[:, :, axis], 3).ravel()
+        yield sparse.coo_array((values, (seen, corner)), shape).tocsr()
 
 
-def _stack(axes: list[sparse.csr_array], groups: IntArray | None) -> sparse.csr_array:
+def _stack(axes: Iterable[sparse.csr_array], groups: IntArray | None, n: int) -> sparse.csr_array:
     """Return (3 G, n): row 3 g + a is row g of axis a, summed over the vertices of group g."""
-    n = axes[0].shape[0]
     groups = np.arange(n) if groups is None else groups
     count = int(groups.max()) + 1
-    parts = []
+    stacked = sparse.csr_array((3 * count, n))
     for a, operator in enumerate(axes):
         place = sparse.coo_array((np.ones(n), (3 * groups + a, np.arange(n))), (3 * count, n))
-        parts.append(place.tocsr() @ operator)
-    return sparse.csr_array(parts[0] + parts[1] + parts[2])
+        stacked = stacked + place.tocsr() @ operator
+    return sparse.csr_array(stacked)

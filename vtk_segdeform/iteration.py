@@ -12,7 +12,7 @@ from .arrays import FloatArray
 from .curvature import Factor
 from .solution import Status
 
-_OLD, _LONG = 5, 1e-2  # steps after which the curvature is looked at again; or after one as long
+_OLD, _LONG = 20, 1e-2  # steps after which the curvature is looked at again; or after one as long
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,15 @@ class Course:
         """Whether the curvature should be looked at again."""
         return self.age >= _OLD or self.size > _LONG
 
+    @property
+    def is_astray(self) -> bool:
+        """Whether the step just found is too long to be trusted to a factor from elsewhere."""
+        return self.age > 1 and self.size > _LONG
+
+    def for_other_targets(self, options: SolverOptions) -> Course:
+        """Return a course that begins with what this one knows of the curvature."""
+        return Course(Anderson(options.window), self.factor, self.age, 0.0)
+
     def renew(self, factor: Factor) -> None:
         """Take a factor made here."""
         self.factor, self.age = factor, 0
@@ -70,11 +79,11 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class Iteration:
-    """Where the iteration ended: cage vertices p (m, 3), surface x (n, 3), and how."""
+    """Where the iteration ended: cage vertices p (m, 3), and how."""
 
     p: FloatArray
-    x: FloatArray
     multipliers: FloatArray
+    directions: tuple[FloatArray, ...]  # (m, 3) each: along which the volumes are restored
     status: Status
     steps: int
     step_size: float  # of the last step, root mean square over the surface

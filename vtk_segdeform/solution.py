@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
 
 from .arrays import FloatArray
 
@@ -33,8 +35,6 @@ class Solution:
     """One (m_r, 3) float per region: the cages that move it there."""
     volume_change: float
     """(V - V0) / V0, signed."""
-    region_volume_change: FloatArray
-    """The same for each region that owns a face, closed at its border."""
     handle_error: float
     """Distance of the farthest handle vertex from its target, in diagonals of the mesh."""
     fixed_error: float
@@ -45,3 +45,10 @@ class Solution:
     """Why the iteration ended; ``str(status)`` is advice."""
     merits: tuple[float, ...]
     """The objective at the start of the last leg and after each of its steps; it never rises."""
+    region_volumes: Callable[[FloatArray], FloatArray] = field(repr=False)
+    """What measures `region_volume_change`."""
+
+    @cached_property
+    def region_volume_change(self) -> FloatArray:
+        """(V - V0) / V0 of each region that owns a face, closed at its border; on demand."""
+        return self.region_volumes(self.vertices)

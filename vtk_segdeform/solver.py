@@ -41,7 +41,7 @@ import numpy as np
 
 from .acceleration import Anderson
 from .arrays import FloatArray
-from .constraints import VolumeConstraint, restore
+from .constraints import Volumes, moved, restore
 from .curvature import Factor, curved_factor, factored
 from .energy import Energy
 from .errors import CageError
@@ -52,15 +52,17 @@ from .solution import Status
 _RISE = 1e-13  # relative rise of the merit that counts as rounding
 _DAMPING = 1e-9  # of the mean diagonal of H
 _SHORTEST = 1.0 / 64.0  # epsilon of section 3.3 below which a step is given up
+_NOTHING = np.empty((0, 3))
 
 
 @dataclass(frozen=True, eq=False)
 class _Point:
     p: FloatArray
-    x: FloatArray
+    x: FloatArray  # the surface that `volumes` are taken over; empty where nothing asks for it
     merit: float
     slope: FloatArray  # d
     shape: float
+    shape_slope: FloatArray  # the part of d that targets have no say in
 
 
 @dataclass(eq=False)
@@ -69,10 +71,11 @@ class GaussNewton:
 
     energy: Energy
     positions: PositionTerm
-    constraints: Sequence[VolumeConstraint]
+    volumes: Volumes
     _hessian: FloatArray = field(init=False, repr=False)
     _factor: Factor = field(init=False, repr=False)
     _left: Course | None = field(init=False, repr=False, default=None)
+    _last: _Point | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         hessian = self.energy.quadratic + self.positions.quadratic()
@@ -93,16 +96,23 @@ class GaussNewton:
             )
         self._factor = factor
 
+    def forget(self) -> None:
+        """Let the next call begin as if it were the first."""
+        self._left = self._last = None
+
     def minimise(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> Iteration:
         """Iterate from cage vertices *p* (m, 3) for positions *targets* (k, 3).
 
         From where the last call ended, for the same targets, it goes on as if it had not.
         """
         course, self._left = self._left, None
-        if course is None or not course.goes_on(p, targets, options):
+        if course is None:
             course = Course(Anderson(options.window), self._factor)
-        multipliers = np.zeros(len(self.constraints))
-        here = self._evaluate(p, self.energy.subspace.map(p), targets)
+        elif not course.goes_on(p, targets, options):
+            course = course.for_other_targets(options)
+        multipliers = np.zeros(len(self.volumes.constraints))
+        directions: list[FloatArray] = []
+        here = self._taken_up(p, targets)
         merits = [here.merit]
         status = Status.STEP_LIMIT
         curved = bool(options.window) and self.energy.exact
@@ -112,6 +122,9 @@ class GaussNewton:
             course.age += 1
             step, multipliers, directions = self._step(here, course.factor)
             course.size = self._size(step)
+            if curved and course.is_astray:
+                course.doubt_factor()
+                continue
             if course.size <= options.tolerance:
                 status = Status.CONVERGED
                 break
@@ -132,11 +145,11 @@ class GaussNewton:
                 break
             here = ahead
             merits.append(here.merit)
-        self._left = course.ended(here.p, targets, options)
+        self._left, self._last = course.ended(here.p, targets, options), here
         return Iteration(
             p=here.p,
-            x=here.x,
             multipliers=multipliers,
+            directions=tuple(directions),
             status=status,
             steps=len(merits) - 1,
             step_size=course.size,
@@ -148,13 +161,13 @@ class GaussNewton:
         self, here: _Point, factor: Factor
     ) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
         """Return h and lambda of (21), and the directions Z in which the volume is restored."""
-        h = -factor.solve(here.slope)
-        if not self.constraints:
+        constraints, surface = self.volumes.constraints, self.volumes.surface
+        rows = [surface.adjoint(c.gradient(here.x)) for c in constraints]
+        h, *directions = factor.solve_all([-here.slope, *rows])
+        if not constraints:
             return h, np.zeros(0), []
-        rows = [self.energy.subspace.adjoint(c.gradient(here.x)) for c in self.constraints]
-        directions = [factor.solve(row) for row in rows]
         matrix = np.array([[np.vdot(row, z) for z in directions] for row in rows])
-        g = np.array([c.violation(here.x) for c in self.constraints])
+        g = np.array([c.violation(here.x) for c in constraints])
         along = np.array([np.vdot(row, h) for row in rows])
         multipliers = np.linalg.lstsq(matrix, g + along, rcond=1e-12)[0]
         for multiplier, z in zip(multipliers, directions, strict=True):
@@ -170,22 +183,33 @@ class GaussNewton:
     ) -> _Point:
         """Return *p* moved along *directions* onto the constraints, and the objective there."""
         if not np.isfinite(p).all():
-            return _Point(p, p, np.inf, p, np.inf)
+            return _Point(p, p, np.inf, p, np.inf, p)
         if not directions or not options.exact_volume:
-            return self._evaluate(p, self.energy.subspace.map(p), targets)
-        x, *fields = np.split(
-            self.energy.subspace.map(np.hstack([p, *directions])), len(directions) + 1, axis=1
-        )
-        for t, z, move in zip(
-            restore(self.constraints, x, fields), directions, fields, strict=True
-        ):
-            p, x = p + t * z, x + t * move
-        return self._evaluate(p, x, targets)
+            return self._evaluate(p, self._surface(p), targets)
+        paths = self.volumes.surface.map(np.hstack([p, *directions]))
+        t = restore(self.volumes.constraints, paths)
+        p = p + sum(tk * z for tk, z in zip(t, directions, strict=True))
+        return self._evaluate(p, moved(paths, t), targets)
+
+    def _surface(self, p: FloatArray) -> FloatArray:
+        asked = self.volumes.constraints or self.energy.turns_vertices
+        return self.volumes.surface.map(p) if asked else _NOTHING
 
     def _evaluate(self, p: FloatArray, x: FloatArray, targets: FloatArray) -> _Point:
-        shape, shape_slope = self.energy.local_step(p, x)
+        return self._pulled(p, x, self.energy.local_step(p, x), targets)
+
+    def _taken_up(self, p: FloatArray, targets: FloatArray) -> _Point:
+        """Return the point at *p*; where the last call ended, most of it is known."""
+        last = self._last
+        if last is None or last.p is not p:
+            return self._evaluate(p, self._surface(p), targets)
+        return self._pulled(p, last.x, (last.shape, last.shape_slope), targets)
+
+    def _pulled(
+        self, p: FloatArray, x: FloatArray, shape: tuple[float, FloatArray], targets: FloatArray
+    ) -> _Point:
         pull, pull_slope = self.positions.value_and_slope(p, targets)
-        return _Point(p, x, shape + pull, shape_slope + pull_slope, shape)
+        return _Point(p, x, shape[0] + pull, shape[1] + pull_slope, *shape)
 
     def _shortened(
         self,

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from .arrays import FloatArray, IntArray
+from .blocks import add_product, adjoint_product, double, picked, pieces
 from .cages import Cage
 from .errors import CageError, RegionError
 from .mean_value import mean_value_coordinates
@@ -28,6 +29,7 @@ from .progress import Progress, part
 from .regions import Regions
 
 _LARGEST = 1e3  # mesh diagonals a cage may measure
+_SINGLE = 8_000_000  # numbers in a block times regions beyond which W~ is kept in single precision
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,18 +51,18 @@ class Subspace:
         ends = np.cumsum([0, *(block.shape[1] for block in self.blocks)])
         return tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(ends))
 
-    def map(self, p: FloatArray) -> FloatArray:
-        """Return x = W~ p, (n, k), for stacked cage vertices *p* (m, k), k usually 3."""
-        x = np.zeros((self.n_vertices, p.shape[1]))
+    def map(self, p: FloatArray, start: FloatArray | None = None) -> FloatArray:
+        """Return x = W~ p, (n, k), for stacked cage vertices *p* (m, k), added to *start*."""
+        x = np.zeros((self.n_vertices, p.shape[1])) if start is None else start
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
-            x[rows] += block @ p[columns]
+            add_product(x, rows, block, p[columns])
         return x
 
     def adjoint(self, y: FloatArray) -> FloatArray:
         """Return W~^T y, (m, 3), for *y* (n, 3) on the mesh."""
         p = np.empty((self.n_columns, y.shape[1]))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
-            p[columns] = block.T @ y[rows]
+            p[columns] = adjoint_product(rows, block, y)
         return p
 
     def at(self, vertices: IntArray) -> FloatArray:
@@ -76,19 +78,33 @@ class Subspace:
 
     def left(self, operator: sparse.csr_array) -> FloatArray:
         """Return operator @ W~, dense (k, m), for a sparse *operator* (k, n) with few rows."""
-        by_column = operator.tocsc()
-        out = np.empty((operator.shape[0], self.n_columns))
-        for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
-            out[:, columns] = by_column[:, rows] @ block
+        columns, product = self._product(operator)
+        out = np.zeros((operator.shape[0], self.n_columns))
+        out[:, columns] = product
         return out
+
+    def averaged(self, mean: sparse.csr_array) -> Subspace:
+        """Return the subspace of the points mean @ x, for sparse weights *mean* (k, n)."""
+        rows, blocks = [], []
+        by_column = mean.tocsc()
+        for members, block in zip(self.rows, self.blocks, strict=True):
+            own = np.unique(by_column[:, members].indices).astype(np.int64)
+            averages = np.zeros((len(own), block.shape[1]))
+            for piece in pieces(len(members), block.shape[1]):
+                averages += by_column[:, members[piece]].tocsr()[own] @ double(block[piece])
+            rows.append(own)
+            blocks.append(averages)
+        return Subspace(mean.shape[0], tuple(rows), tuple(blocks))
 
     def squares(self, groups: IntArray) -> FloatArray:
         """Return sum_{i in g} W~_ij^2, (G, m), for the group of each vertex *groups* (n,)."""
         out = np.zeros((int(groups.max()) + 1, self.n_columns))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
-            places = (groups[rows], np.arange(len(rows)))
-            member = sparse.csr_array((np.ones(len(rows)), places), (len(out), len(rows)))
-            out[:, columns] = np.asarray(member @ block**2)
+            for piece in pieces(len(rows), block.shape[1]):
+                size = piece.stop - piece.start
+                places = (groups[rows[piece]], np.arange(size))
+                member = sparse.csr_array((np.ones(size), places), (len(out), size))
+                out[:, columns] += member @ double(block[piece]) ** 2
         return out
 
     def gram(self, operator: sparse.csr_array) -> FloatArray:
@@ -98,16 +114,47 @@ class Subspace:
         several cages beat one.
         """
         gram = np.zeros((self.n_columns, self.n_columns))
-        blocks = list(zip(self.rows, self.blocks, self.columns, strict=True))
-        for r, (rows_r, block_r, columns_r) in enumerate(blocks):
-            slab = operator[rows_r]
-            for rows_s, block_s, columns_s in blocks[: r + 1]:
-                coupling = slab[:, rows_s]
-                if coupling.nnz:
-                    product = block_r.T @ (coupling @ block_s)
-                    gram[columns_r, columns_s] = product
-                    gram[columns_s, columns_r] = product.T
+        for vertices in self._neighbourhoods():
+            here, w = self._product(picked(vertices, self.n_vertices))
+            there, product = self._product(operator[vertices])
+            gram[np.ix_(here, there)] += w.T @ product
         return 0.5 * (gram + gram.T)
+
+    def gram_of_squares(self, operator: sparse.csr_array, weights: FloatArray) -> FloatArray:
+        """Return (O W~)^T diag(weights) O W~, (m, m), for a sparse operator O (n, n)."""
+        gram = np.zeros((self.n_columns, self.n_columns))
+        for vertices in self._neighbourhoods():
+            columns, product = self._product(operator[vertices])
+            gram[np.ix_(columns, columns)] += (product.T * weights[vertices]) @ product
+        return 0.5 * (gram + gram.T)
+
+    def _neighbourhoods(self) -> list[IntArray]:
+        """Return all vertices in pieces, region by region: few cages reach into each."""
+        owner = np.zeros(self.n_vertices, dtype=np.int64)
+        for r, rows in enumerate(self.rows):
+            owner[rows] = r
+        order = np.argsort(owner, kind="stable")
+        return [order[piece] for piece in pieces(self.n_vertices, self.n_columns)]
+
+    def _product(self, operator: sparse.csr_array) -> tuple[IntArray, FloatArray]:
+        """Return the columns of operator @ W~ that cages reach, and these columns (k, c)."""
+        used, place = np.unique(operator.indices, return_inverse=True)
+        columns, parts = [], []
+        for rows, block, own in zip(self.rows, self.blocks, self.columns, strict=True):
+            found = np.searchsorted(rows, used)
+            mine = np.isin(used, rows, assume_unique=True)
+            if not mine.any():
+                continue
+            dense = np.zeros((len(used), block.shape[1]))
+            dense[mine] = block[found[mine]]
+            columns.append(np.arange(own.start, own.stop))
+            parts.append(dense)
+        if not columns:
+            return np.zeros(0, dtype=np.int64), np.zeros((operator.shape[0], 0))
+        compact = sparse.csr_array(
+            (operator.data, place, operator.indptr), (operator.shape[0], len(used))
+        )
+        return np.concatenate(columns), np.asarray(compact @ np.hstack(parts))
 
 
 def bind(
@@ -148,6 +195,8 @@ def bind(
         points = regions.mesh.vertices[members]
         block = mean_value_coordinates(points, cage.vertices, cage.faces, progress=share)
         block *= weights[r, members][:, None]
+        if np.count_nonzero(weights) * cage.n_vertices > _SINGLE:
+            block = block.astype(np.float32)
         rows.append(members)
         blocks.append(block)
     return Subspace(regions.mesh.n_vertices, tuple(rows), tuple(blocks))

@@ -50,7 +50,6 @@ class Posing:
         self._bound: tuple[tuple[State, Deformer], ...] = ()  # newest first
         self._holding: tuple[Deformer, State, Deformer] | None = None
         self._at: Pose | None = None  # where the holding deformer is; None if elsewhere
-        self._centre = mesh.vertices.mean(axis=0)
         self._shape: tuple[Pose, FloatArray, float] | None = None
 
     def is_bound(self, state: State) -> bool:
@@ -134,11 +133,10 @@ class Posing:
         pairs = zip(cage_vertices, state.cages, strict=True)
         outward = np.concatenate([volume_gradient(p, cage.faces) for p, cage in pairs])
         outward /= max(np.abs(outward).max(), np.finfo(float).tiny)
-        subspace = self.bind(state).subspace
-        p = np.concatenate(cage_vertices)
-        x = self._centre + subspace.map(p - self._centre)
-        p = p + total_volume(self._mesh).exact_step(x, subspace.map(outward)) * outward
-        return tuple(p[columns] for columns in subspace.columns)
+        deformer = self.bind(state)
+        path = np.hstack([deformer.surface(cage_vertices), deformer.subspace.map(outward)])
+        p = np.concatenate(cage_vertices) + total_volume(self._mesh).exact_step(path) * outward
+        return tuple(p[columns] for columns in deformer.subspace.columns)
 
     def _hold(self, state: State) -> Deformer:
         bound = self.bind(state)
@@ -177,10 +175,7 @@ class Posing:
     def _evaluated(self, state: State, pose: Pose) -> tuple[FloatArray, float]:
         """Return x = W~ p and its volume change."""
         if self._shape is None or self._shape[0] is not pose:
-            subspace = self.bind(state).subspace
-            p = np.concatenate(pose.cage_vertices)
-            # About the centre, so that far from the origin no more digits go than have to.
-            x = self._centre + subspace.map(p - self._centre)
+            x = self.bind(state).surface(pose.cage_vertices)
             frozen(x)
             rest, faces = self._mesh.vertices, self._mesh.faces
             change = signed_volume(x, faces) / signed_volume(rest, faces) - 1.0

@@ -1,0 +1,147 @@
+"""The compiled kernels do what their twins in numpy do."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from vtk_segdeform import fast, models, threads
+from vtk_segdeform.blocks import add_product, adjoint_product
+from vtk_segdeform.errors import Cancelled
+from vtk_segdeform.rotations import closest_rotations
+from vtk_segdeform.volume import signed_volume, volume_along, volume_gradient
+
+MESH = models.torus(3000)
+RNG = np.random.default_rng(2)
+MOVE = RNG.normal(size=MESH.vertices.shape)
+
+
+@pytest.fixture
+def twin(monkeypatch):
+    """Return a caller that calls once compiled and once plain, and returns both results."""
+    pytest.importorskip("numba")
+    assert fast.compiled(10**6) is not None
+
+    def both(call):
+        quick = call()
+        with monkeypatch.context() as without:
+            without.setattr(fast, "_kernels", lambda: None)
+            return quick, call()
+
+    return both
+
+
+@pytest.mark.parametrize("far", [0.0, 1e3])
+def test_volumes_agree(twin, far):
+    x, faces = MESH.vertices + far, MESH.faces
+    size = abs(signed_volume(MESH.vertices, faces))
+    for call in (
+        lambda: signed_volume(x, faces),
+        lambda: volume_along(x, MOVE, faces),
+        lambda: volume_gradient(x, faces),
+    ):
+        quick, plain = twin(call)
+        assert_allclose(quick, plain, rtol=1e-12, atol=(1e-14 + 1e-15 * far) * size)
+
+
+SHAPES = {
+    "any": RNG.normal(size=(300, 3, 3)),
+    "almost at rest": np.eye(3) + 0.1 * RNG.normal(size=(300, 3, 3)),
+    "flat": RNG.normal(size=(300, 3, 2)) @ RNG.normal(size=(300, 2, 3)),
+    "straight": RNG.normal(size=(300, 3, 1)) @ RNG.normal(size=(300, 1, 3)),
+    "mirrored": np.linalg.qr(RNG.normal(size=(300, 3, 3)))[0] * [1.0, 1.0, -1.0],
+    "half turns": np.tile(np.diag([-1.0, -1.0, 1.0]), (300, 1, 1)),
+    "nothing": np.zeros((300, 3, 3)),
+    "tiny": 1e-160 * RNG.normal(size=(300, 3, 3)),
+    "huge": 1e100 * RNG.normal(size=(300, 3, 3)),
+}
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+def test_rotations_are_rotations_and_as_close(twin, kind):
+    s = SHAPES[kind]
+    quick, plain = twin(lambda: closest_rotations(s))
+    assert_allclose(quick @ np.swapaxes(quick, 1, 2), np.tile(np.eye(3), (300, 1, 1)), atol=1e-13)
+    assert_allclose(np.linalg.det(quick), 1.0, atol=1e-13)
+    # Where several rotations are equally close, either may be found: what counts is how close.
+    reached, best = (np.einsum("gij,gji->g", r, s) for r in (quick, plain))
+    assert_allclose(reached, best, rtol=0.0, atol=1e-13 * np.abs(s).max())
+    if kind in ("any", "almost at rest", "flat"):
+        assert_allclose(quick, plain, atol=1e-11)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("columns", [3, 6, 9])
+def test_products_agree_and_are_taken_in_double_precision(twin, dtype, columns):
+    rows = np.sort(RNG.permutation(6000)[:4000])
+    block, p = RNG.normal(size=(4000, 37)).astype(dtype), RNG.normal(size=(37, columns))
+    y = RNG.normal(size=(6000, 3))
+
+    def product():
+        x = np.ones((6000, columns))
+        add_product(x, rows, block, p)
+        return x
+
+    quick, plain = twin(product)
+    exact = np.ones((6000, columns))
+    exact[rows] += block.astype(np.float64) @ p
+    assert_allclose(plain, exact, atol=1e-12)
+    assert_allclose(quick, exact, atol=1e-12)
+    quick, plain = twin(lambda: adjoint_product(rows, block, y))
+    assert_allclose(quick, plain, atol=1e-10)
+    assert_allclose(plain, block.astype(np.float64).T @ y[rows], atol=1e-10)
+
+
+def test_results_do_not_depend_on_how_many_threads_there_are(monkeypatch):
+    volume = volume_along(MESH.vertices, MOVE, MESH.faces)
+    monkeypatch.setattr(threads, "n_threads", lambda: 1)
+    assert_array_equal(volume_along(MESH.vertices, MOVE, MESH.faces), volume)
+
+
+def test_every_row_is_worked_on_once_and_by_others_than_the_caller(monkeypatch):
+    monkeypatch.setattr(threads, "n_threads", lambda: 2)
+    done, workers = np.zeros(1000, dtype=int), set()
+
+    def work(start, stop):
+        done[start:stop] += 1
+        workers.add(threading.current_thread())
+
+    threads.in_parallel(work, 1000, 7)
+    assert (done == 1).all()
+    assert threading.current_thread() not in workers
+
+
+def test_after_it_was_cancelled_nothing_works_on(monkeypatch):
+    monkeypatch.setattr(threads, "n_threads", lambda: 2)
+    done = []
+
+    def stop(fraction, message):
+        assert message == "counting"
+        if fraction >= 0.1:
+            raise Cancelled
+
+    def work(start, stop):
+        time.sleep(1e-3)
+        done.append(start)
+
+    with pytest.raises(Cancelled):
+        threads.in_parallel(work, 500, 1, progress=stop, message="counting")
+    finished = len(done)
+    assert 50 <= finished < 250
+    time.sleep(5e-3)
+    assert len(done) == finished
+
+
+def test_a_fault_in_the_work_reaches_the_caller(monkeypatch):
+    monkeypatch.setattr(threads, "n_threads", lambda: 2)
+
+    def work(start, stop):
+        if start == 50:
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        threads.in_parallel(work, 100, 10)

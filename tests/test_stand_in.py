@@ -1,0 +1,91 @@
+"""A coarse stand-in takes a large mesh's place within a step, and nowhere else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scenes import sausage
+
+from vtk_segdeform import stand_in, subspace
+from vtk_segdeform.constraints import region_volumes, total_volume
+from vtk_segdeform.stand_in import StandIn
+from vtk_segdeform.subspace import bind
+
+SCENE = sausage(3)
+SUBSPACE = bind(SCENE.regions, SCENE.cages)
+P0 = np.concatenate([cage.vertices for cage in SCENE.cages])
+
+
+@pytest.fixture
+def coarse(monkeypatch):
+    monkeypatch.setattr(stand_in, "_LARGE", 1000)
+    monkeypatch.setattr(stand_in, "_POINTS", 700)
+
+
+def test_a_small_mesh_stands_for_itself():
+    whole = StandIn(sausage(2).mesh, SUBSPACE)
+    assert whole.surface is SUBSPACE
+
+
+@pytest.mark.usefixtures("coarse")
+@pytest.mark.parametrize("constraints", [total_volume, region_volumes])
+def test_its_volumes_change_as_those_of_the_mesh(constraints):
+    mesh = SCENE.mesh
+    held = (total_volume(mesh),)
+    if constraints is region_volumes:
+        held = region_volumes(mesh, SCENE.regions.labels)
+    volumes = StandIn(mesh, SUBSPACE).volumes(held, mesh.vertices)
+    assert volumes.surface.n_vertices < 0.5 * mesh.n_vertices
+    at_rest = volumes.surface.map(P0)
+    for fine, rough in zip(held, volumes.constraints, strict=True):
+        assert abs(rough.violation(at_rest)) < 1e-12 * abs(rough.target)
+        assert rough.target == pytest.approx(fine.target, rel=0.05)
+        exact = SUBSPACE.adjoint(fine.gradient(mesh.vertices))
+        guess = volumes.surface.adjoint(rough.gradient(at_rest))
+        cosine = np.vdot(exact, guess) / np.linalg.norm(exact) / np.linalg.norm(guess)
+        assert cosine > 0.995
+
+
+@pytest.mark.usefixtures("coarse")
+def test_it_is_closed_wherever_the_mesh_is():
+    # A closed surface has the same volume about any origin.
+    held = region_volumes(SCENE.mesh, SCENE.regions.labels)
+    volumes = StandIn(SCENE.mesh, SUBSPACE).volumes(held, SCENE.mesh.vertices)
+    x = volumes.surface.map(P0)
+    for each in volumes.constraints:
+        assert_allclose(each.violation(x + [3.0, -2.0, 5.0]), 0.0, atol=1e-11)
+
+
+@pytest.mark.usefixtures("coarse")
+@pytest.mark.parametrize("option", ["preserve_volume", "preserve_region_volumes"])
+def test_the_pose_is_that_of_the_whole_and_its_volume_exact(monkeypatch, option):
+    targets = SCENE.turned(40)
+    rough = SCENE.deformer(**{option: True}).solve(targets)
+    monkeypatch.setattr(stand_in, "_LARGE", 10**9)
+    fine = SCENE.deformer(**{option: True}).solve(targets)
+    assert abs(rough.volume_change) < 1e-13
+    if option == "preserve_region_volumes":
+        assert np.abs(rough.region_volume_change).max() < 1e-12
+    away = np.linalg.norm(rough.vertices - fine.vertices, axis=1).max()
+    assert away < 3e-3 * SCENE.mesh.diagonal
+
+
+def test_one_rotation_per_vertex_needs_the_whole_mesh(coarse):
+    solution = SCENE.deformer(rotation_groups=None, max_steps=3).solve(SCENE.turned(5))
+    assert abs(solution.volume_change) < 1e-13
+
+
+def test_single_precision_is_the_papers_product_with_rounded_weights(monkeypatch):
+    monkeypatch.setattr(subspace, "_SINGLE", 0)
+    deformer = SCENE.deformer()
+    assert {block.dtype for block in deformer.subspace.blocks} == {np.dtype(np.float32)}
+    solution = deformer.solve(SCENE.turned(40))
+    assert abs(solution.volume_change) < 1e-13  # of the rounded weights: exact all the same
+    assert_allclose(deformer.surface(solution.cage_vertices), solution.vertices, atol=1e-13)
+    rest = [cage.vertices for cage in SCENE.cages]
+    assert_allclose(deformer.surface(rest), SCENE.mesh.vertices, rtol=0.0, atol=1e-15)
+    monkeypatch.undo()
+    double = SCENE.deformer().surface(solution.cage_vertices)
+    away = np.linalg.norm(double - solution.vertices, axis=1).max()
+    assert away < 1e-6 * SCENE.mesh.diagonal

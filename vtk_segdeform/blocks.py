@@ -1,0 +1,62 @@
+"""Products with the tall dense blocks of W~, a piece at a time, so that no large copy is made.
+
+A block is kept in single precision where a mesh is large: its rounded numbers then *are* W~, and
+every product with it is taken in double precision.  So x = W~ p is as linear, and its volume as
+exact, as ever, while half as much memory is read.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from .arrays import FloatArray, IntArray
+from .fast import compiled, inputs
+from .threads import in_parallel
+
+_CACHED = 1 << 17  # numbers of a block that are multiplied at a time: a megabyte
+_DENSE = 1 << 22  # numbers in a dense piece: 32 megabytes
+
+
+def add_product(x: FloatArray, rows: IntArray, block: FloatArray, p: FloatArray) -> None:
+    """Add block @ p to the *rows* of x, in double precision whatever the block is in."""
+    kernels = compiled(len(rows)) if p.shape[1] % 3 == 0 else None
+    if kernels:
+        arguments = inputs(rows, block, p.T)
+
+    def add(start: int, stop: int) -> None:
+        if kernels:
+            kernels.add_product(x, *arguments, start, stop)
+        else:
+            x[rows[start:stop]] += double(block[start:stop]) @ p
+
+    in_parallel(add, len(rows), max(_CACHED // block.shape[1], 1) * (4 if kernels else 1))
+
+
+def adjoint_product(rows: IntArray, block: FloatArray, y: FloatArray) -> FloatArray:
+    """Return block.T @ y[rows], in double precision."""
+    kernels = compiled(len(rows)) if y.shape[1] == 3 else None
+    if kernels:
+        kernels.add_adjoint(summed := np.zeros((3, block.shape[1])), *inputs(rows, block, y))
+        return summed.T
+    p = np.zeros((block.shape[1], y.shape[1]))
+    for piece in pieces(len(rows), block.shape[1]):
+        p += double(block[piece]).T @ y[rows[piece]]
+    return p
+
+
+def double(block: FloatArray) -> FloatArray:
+    """Return *block* in double precision."""
+    return block.astype(np.float64, copy=False)
+
+
+def pieces(n: int, width: int) -> list[slice]:
+    """Return 0..n in slices of rows whose dense arrays of *width* columns stay small."""
+    size = max(_DENSE // width, 1)
+    return [slice(start, min(start + size, n)) for start in range(0, n, size)]
+
+
+def picked(vertices: IntArray, n: int) -> sparse.csr_array:
+    """Return the (k, n) operator that picks *vertices*."""
+    k = len(vertices)
+    return sparse.csr_array((np.ones(k), vertices, np.arange(k + 1)), (k, n))

@@ -1,0 +1,22 @@
+"""The inner loops in compiled form, by numba; each does what a twin in numpy does, to rounding.
+
+    volumes       `volume.signed_volume`, `volume.volume_along_path`, `volume.volume_gradient`
+    products      `blocks.add_product`, `blocks.add_adjoint`
+    rotations     `rotations.closest_rotations`
+
+They let go of the interpreter and call no threads of their own; `threads.in_parallel` runs several
+at a time.  Their arguments are positional, as numba wants it, and outputs come in as arrays.
+"""
+
+from .products import add_adjoint, add_product
+from .rotations import rotations
+from .volumes import volume_along_sums, volume_gradient, volume_sums
+
+__all__ = [
+    "add_adjoint",
+    "add_product",
+    "rotations",
+    "volume_along_sums",
+    "volume_gradient",
+    "volume_sums",
+]

@@ -1,0 +1,63 @@
+"""Sums over triangles, for `volume`."""
+
+from __future__ import annotations
+
+import numba
+
+_compile = numba.njit(nogil=True, cache=True, error_model="numpy")
+
+
+@_compile
+def volume_sums(x, faces, out, size, first, last):
+    """Put six times the volume under each block of *size* faces into *out*, blocks first..last."""
+    ox, oy, oz = x[0, 0], x[0, 1], x[0, 2]
+    for block in range(first, last):
+        total = 0.0
+        for f in range(block * size, min((block + 1) * size, len(faces))):
+            i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+            ax, ay, az = x[i, 0] - ox, x[i, 1] - oy, x[i, 2] - oz
+            ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+            gx, gy, gz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+            total += ax * (ey * gz - ez * gy) + ay * (ez * gx - ex * gz) + az * (ex * gy - ey * gx)
+        out[block] = total
+
+
+@_compile
+def volume_along_sums(x, faces, out, size, first, last):
+    """Put six times the four coefficients of each block into *out* (blocks, 4); *x* is (n, 6)."""
+    ox, oy, oz = x[0, 0], x[0, 1], x[0, 2]
+    px, py, pz = x[0, 3], x[0, 4], x[0, 5]
+    for block in range(first, last):
+        c0 = c1 = c2 = c3 = 0.0
+        for f in range(block * size, min((block + 1) * size, len(faces))):
+            i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+            ax, ay, az = x[i, 0] - ox, x[i, 1] - oy, x[i, 2] - oz
+            ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+            gx, gy, gz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+            ux, uy, uz = x[i, 3] - px, x[i, 4] - py, x[i, 5] - pz
+            vx, vy, vz = x[j, 3] - x[i, 3], x[j, 4] - x[i, 4], x[j, 5] - x[i, 5]
+            wx, wy, wz = x[k, 3] - x[i, 3], x[k, 4] - x[i, 4], x[k, 5] - x[i, 5]
+            nx, ny, nz = ey * gz - ez * gy, ez * gx - ex * gz, ex * gy - ey * gx
+            mx = vy * gz - vz * gy + ey * wz - ez * wy
+            my = vz * gx - vx * gz + ez * wx - ex * wz
+            mz = vx * gy - vy * gx + ex * wy - ey * wx
+            qx, qy, qz = vy * wz - vz * wy, vz * wx - vx * wz, vx * wy - vy * wx
+            c0 += ax * nx + ay * ny + az * nz
+            c1 += ux * nx + uy * ny + uz * nz + ax * mx + ay * my + az * mz
+            c2 += ux * mx + uy * my + uz * mz + ax * qx + ay * qy + az * qz
+            c3 += ux * qx + uy * qy + uz * qz
+        out[block, 0], out[block, 1], out[block, 2], out[block, 3] = c0, c1, c2, c3
+
+
+@_compile
+def volume_gradient(x, faces, out):
+    """Add dV/dx to *out* (n, 3)."""
+    for f in range(len(faces)):
+        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+        ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+        gx, gy, gz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+        nx, ny, nz = (ey * gz - ez * gy) / 6.0, (ez * gx - ex * gz) / 6.0, (ex * gy - ey * gx) / 6.0
+        for corner in (i, j, k):
+            out[corner, 0] += nx
+            out[corner, 1] += ny
+            out[corner, 2] += nz

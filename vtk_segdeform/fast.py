@@ -1,0 +1,43 @@
+"""Whether the compiled kernels are at hand; every one has a twin in numpy that does as well.
+
+    kernels = compiled()        the module `compiled`, or None
+
+numba is optional (``pip install 'vtk-segdeform[fast]'``).  It is imported, which takes half a
+second, when the first array comes along that is large enough to win that back.
+``SEGDEFORM_NUMBA=0`` does without.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+WORTHWHILE = 2000  # faces, points: fewer are as quick in numpy
+
+
+def compiled(size: int = WORTHWHILE) -> Any:
+    """Return the compiled kernels if *size* is worth them and numba is there; else None."""
+    return _kernels() if size >= WORTHWHILE else None
+
+
+def inputs(*arrays: NDArray[Any]) -> tuple[NDArray[Any], ...]:
+    """Return *arrays* in the one form that kernels are compiled for: contiguous and read-only."""
+    plain = [np.ascontiguousarray(array).view() for array in arrays]
+    for array in plain:
+        array.flags.writeable = False
+    return tuple(plain)
+
+
+@functools.cache
+def _kernels() -> Any:
+    if os.environ.get("SEGDEFORM_NUMBA", "1") == "0":
+        return None
+    try:
+        return importlib.import_module(".compiled", __package__)
+    except ImportError:  # no numba, or one that does not fit this numpy
+        return None

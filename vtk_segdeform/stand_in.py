@@ -1,0 +1,82 @@
+"""A coarse stand-in for a large surface, over which the solver's steps take the volume.
+
+A step asks how the volume changes with the cages, and lands where it has not changed.  Over a
+million vertices that would take longer than all the rest of it.  So a large mesh is cut into a few
+thousand *cells* of neighbouring vertices; each counts as one point, the mean of its vertices, and
+each triangle whose corners lie in three cells as one triangle.  Means of x = W~ p are means of
+rows of W~ times p: the stand-in moves with the same cages and costs the same whatever it stands
+for.  Merging vertices leaves a closed surface closed, so its volume is as good a cubic as the
+mesh's own.
+
+Its volume differs from the mesh's by some per cent, what the cages do to the two by far less;
+and the last operation of every solve takes the mesh itself onto its own volume, exactly
+(`Deformer`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy import sparse
+
+from .arrays import FloatArray
+from .constraints import VolumeConstraint, Volumes
+from .mesh import Mesh
+from .segmenting.coarse import coarsen
+from .subspace import Subspace
+
+_POINTS = 2000  # about how many cells
+_LARGE = 4_000  # vertices beyond which a mesh has a stand-in
+
+
+class StandIn:
+    """Cells of a mesh, and W~ over them; a small mesh stands for itself.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        n vertices, at rest.
+    subspace : Subspace
+        W~.
+    whole : bool
+        Let a large mesh stand for itself, too.
+    """
+
+    def __init__(self, mesh: Mesh, subspace: Subspace, *, whole: bool = False) -> None:
+        self.surface, n = subspace, mesh.n_vertices
+        self._mean: sparse.csr_array | None = None  # (k, n), from vertices to cells
+        if n > _LARGE and not whole:
+            self._cells, _ = coarsen(mesh, _POINTS, np.random.default_rng(0))
+            areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), n)
+            share = areas / np.bincount(self._cells, areas)[self._cells]
+            self._mean = sparse.coo_array((share, (self._cells, np.arange(n)))).tocsr()
+            self.surface = subspace.averaged(self._mean)
+
+    def volumes(self, constraints: Sequence[VolumeConstraint], rest: FloatArray) -> Volumes:
+        """Return *constraints* on the mesh as constraints on the cages, held from *rest* (n, 3) on.
+
+        *rest* may be scaled and moved: its own volumes are what is held.
+        """
+        points = rest
+        if self._mean is not None:
+            constraints = [self._coarse(each) for each in constraints]
+            points = self._mean @ rest
+        free = [replace(each, target=0.0) for each in constraints]
+        return Volumes(
+            self.surface, tuple(replace(each, target=each.violation(points)) for each in free)
+        )
+
+    def _coarse(self, constraint: VolumeConstraint) -> VolumeConstraint:
+        """Return *constraint* over the cells."""
+        n, count, extension = len(self._cells), self.surface.n_vertices, constraint.extension
+        added = 0 if extension is None else extension.shape[0] - n
+        corners = np.concatenate([self._cells, count + np.arange(added)])[constraint.faces]
+        distinct = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+        if extension is not None:
+            member = sparse.csr_array((np.ones(n), self._cells, np.arange(n + 1)), (n, count))
+            extension = sparse.csr_array(
+                sparse.vstack([sparse.eye_array(count), extension[n:] @ member])
+            )
+        return VolumeConstraint(corners[distinct], constraint.target, extension)

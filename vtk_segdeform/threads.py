@@ -1,0 +1,77 @@
+"""Long loops over rows, a piece at a time, on all the cores that this process may use.
+
+    in_parallel(work, n, size)        calls work(start, stop) for pieces of about *size* rows
+
+numpy and the compiled kernels let go of the interpreter while they count, so plain threads do.
+There is one pool for the whole process, however many meshes are open in it, and a host
+application that wants its cores for itself says so by ``SEGDEFORM_THREADS=1``.  Every row is
+computed alike on whatever thread, so results do not depend on how many there are.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+from .progress import Progress
+
+
+def in_parallel(
+    work: Callable[[int, int], None],
+    n: int,
+    size: int,
+    *,
+    progress: Progress | None = None,
+    message: str = "",
+) -> None:
+    """Call *work* with (start, stop) for all of 0..n, *size* rows at a time, in any order.
+
+    Parameters
+    ----------
+    work : callable
+        Must not call `in_parallel` itself, and write to its own rows only.
+    n, size : int
+        How many rows there are, and how many make a piece.
+    progress : Progress, optional
+        Called in the caller's thread with the share done; when it raises, what has not begun is
+        left undone.
+    message : str
+        What *progress* is told.
+    """
+    pieces = [(start, min(start + size, n)) for start in range(0, n, size)]
+    if len(pieces) <= 1 or n_threads() == 1:
+        for start, stop in pieces:
+            work(start, stop)
+            if progress is not None:
+                progress(stop / n, message)
+        return
+    waiting = [_pool().submit(work, *piece) for piece in pieces]
+    try:
+        for piece, future in zip(pieces, waiting, strict=True):
+            future.result()
+            if progress is not None:
+                progress(piece[1] / n, message)
+    finally:
+        unfinished = [future for future in waiting if not future.cancel()]
+        for future in unfinished:  # nothing writes on after this has returned
+            future.exception()
+
+
+@functools.cache
+def n_threads() -> int:
+    """Return how many threads work: ``SEGDEFORM_THREADS``, or the cores of this process."""
+    wanted = os.environ.get("SEGDEFORM_THREADS", "")
+    if wanted.isdigit() and int(wanted) > 0:
+        return int(wanted)
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@functools.cache
+def _pool() -> ThreadPoolExecutor:
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(after_in_child=_pool.cache_clear)  # its threads stay with the parent
+    return ThreadPoolExecutor(n_threads(), thread_name_prefix="segdeform")
