@@ -29,7 +29,7 @@ from scenes import sausage
 
 import pyvistaqt  # isort: skip
 from vtk_segdeform import Session, models
-from vtk_segdeform.convert import read_mesh
+from vtk_segdeform.convert import read_mesh, read_polydata, to_polydata
 from vtk_segdeform.store import load_session
 from vtk_segdeform.widgets import Mode, Paint, Tool
 from vtk_segdeform.widgets.qt import DeformWidget, deform_dock
@@ -380,6 +380,62 @@ def test_a_job_shows_how_far_it_is_and_is_cancelled(seen):
     assert seen.panel.regions.find.isEnabled()
 
 
+def bend(seen, height=0.4):
+    """Lift the handle, by a script."""
+    shift = np.eye(4)
+    shift[2, 3] = height
+    seen.session.move_handle("handle 1", shift)
+    seen.session.commit()
+
+
+def test_the_log_unfolds_is_copied_and_cleared(seen):
+    part, clipboard = seen.panel.log, application().clipboard()
+    bend(seen)
+    seen.click(part.fold)
+    texts = [entry.text for entry in seen.editor.desk.log.entries]
+    assert [part.list.item(k).text() for k in range(part.list.count())] == texts
+    assert "drag handle 1" in texts[-1]
+    bend(seen, 0.3)
+    until(lambda: part.list.count() == len(texts) + 1, "the second drag")
+    seen.click(part.copy)
+    assert clipboard.text() == "\n\n".join(e.text for e in seen.editor.desk.log.entries)
+    part.list.setCurrentRow(part.list.count() - 2)
+    part.list.setFocus()
+    QtTest.QTest.keyClick(part.list, Qt.Key_C, Qt.ControlModifier)
+    assert clipboard.text() == texts[-1]
+    for _ in range(2):  # more than the log holds
+        for k in range(150):
+            seen.editor.desk.log.add_job(f"job {k}", 1.0, "done")
+        part.refresh()
+    assert part.list.count() == 200
+    assert "job 149" in part.list.item(199).text()
+    seen.click(part.clear)
+    assert part.list.count() == 0
+    assert not part.copy.isEnabled()
+    seen.click(part.fold)
+    assert not part.list.isVisible()
+
+
+def test_the_range_of_the_colours_is_typed_and_kept_for_the_next_session(seen, tmp_path):
+    seen.mode(Mode.DEFORM)
+    part, overlay = seen.panel.deform, lambda: seen.editor.stage.overlay
+    assert not part.range.isEnabled()
+    seen.click(part.overlay)
+    bend(seen)
+    chosen = overlay().half_range
+    seen.type_number(part.range, 37.5)
+    assert overlay().half_range == 0.375 != chosen
+    assert seen.session.undo_label == "drag handle 1"  # it is no step
+    seen.editor.save(tmp_path / "a.segdeform")
+    seen.editor.load(tmp_path / "a.segdeform")
+    seen.settle()
+    assert overlay().half_range == 0.375
+    assert part.range.value() == 37.5
+    seen.type_number(part.range, 0)
+    assert part.range.text() == "by itself"
+    assert overlay().half_range == chosen
+
+
 def test_what_goes_wrong_is_said_told_and_then_forgotten(seen):
     seen.mode(Mode.HANDLES)
     seen.panel.handles.list.topLevelItem(1).setText(0, "")  # no name for a handle
@@ -438,16 +494,69 @@ def test_what_is_not_saved_is_given_up_only_when_asked(seen, tmp_path, monkeypat
 
 
 def test_the_mesh_is_written_as_it_is_now(seen, tmp_path, monkeypatch):
-    shift = np.eye(4)
-    shift[2, 3] = 0.4
-    seen.session.move_handle("handle 1", shift)
-    seen.session.commit()
+    bend(seen)
     answer(monkeypatch, tmp_path / "bent.ply")
     seen.panel.head.ask_and_export()
     assert_array_equal(read_mesh(tmp_path / "bent.ply").vertices, seen.session.vertices)
     answer(monkeypatch, tmp_path / "nowhere" / "bent.ply")
     seen.panel.head.ask_and_export()
     assert len(seen.errors) == 1
+
+
+def with_arrays():
+    """Return an ellipsoid with something of everything that a surface can have."""
+    scene = sausage()
+    surface = to_polydata(scene.mesh)
+    rng = np.random.default_rng(1)
+    surface.point_data["heat"] = rng.random(surface.n_points)
+    surface.point_data["RGB"] = rng.integers(0, 255, (surface.n_points, 3), dtype=np.uint8)
+    surface.point_data["flow"] = rng.random((surface.n_points, 3))
+    surface.point_data["uv"] = rng.random((surface.n_points, 2))
+    surface.point_data.active_texture_coordinates_name = "uv"
+    surface.cell_data["part"] = np.arange(surface.n_cells)
+    surface.field_data["unit"] = ["mm"]
+    return scene, surface
+
+
+def test_a_surface_is_given_and_written_back_with_all_that_it_has(make, tmp_path, monkeypatch):
+    scene, surface = with_arrays()
+    seen = make(surface)
+    seen.session.set_regions(scene.regions)
+    seen.session.set_cages(scene.cages)
+    seen.session.add_handle(scene.handle)
+    bend(seen)
+    now = seen.widget.deformed_polydata()
+    assert_array_equal(now.points, seen.session.vertices)
+    assert_array_equal(surface.points, scene.mesh.vertices)
+    surface.point_data.clear()  # ours is as it was when it was given
+    everything = {"heat", "RGB", "flow", "uv"}
+    for name, holds in {
+        "a.vtp": everything, "a.vtk": everything, "a.vtkhdf": everything, "a.ply": {"heat", "RGB"},
+    }.items():  # fmt: skip
+        answer(monkeypatch, tmp_path / name)
+        seen.panel.head.ask_and_export()
+        read = read_polydata(tmp_path / name)
+        assert_array_equal(read.points, seen.session.vertices)
+        assert holds <= set(read.point_data.keys())
+        for each in holds:
+            assert_array_equal(read.point_data[each], now.point_data[each])
+        assert_array_equal(read.cell_data["part"], np.arange(scene.mesh.n_faces))
+        assert_array_equal(read.active_texture_coordinates, now.point_data["uv"])
+    assert seen.errors == []
+
+    # The same from a file, of which a session file remembers the mesh alone.
+    answer(monkeypatch, tmp_path / "a.vtp")
+    seen.editor.save(tmp_path / "a.segdeform")
+    seen.click(seen.panel.head.open)
+    assert_array_equal(seen.session.mesh.vertices, now.points)
+    again = seen.widget.deformed_polydata()
+    assert set(again.point_data.keys()) == everything
+    seen.editor.save(tmp_path / "b.segdeform")
+    seen.editor.load(tmp_path / "b.segdeform")
+    assert set(seen.widget.deformed_polydata().point_data.keys()) == everything
+    seen.editor.load(tmp_path / "a.segdeform")  # of another mesh
+    assert seen.widget.deformed_polydata().point_data.keys() == []
+    assert_array_equal(seen.widget.deformed_polydata().points, seen.session.vertices)
 
 
 # Hosts.
@@ -471,10 +580,7 @@ def test_two_widgets_in_one_window_and_a_dock_mind_their_own_business(state):
     hands[0].mode(Mode.DEFORM)
     hands[2].mode(Mode.CAGES)
     assert [seen.editor.mode for seen in hands] == [Mode.DEFORM, Mode.REGIONS, Mode.CAGES]
-    shift = np.eye(4)
-    shift[2, 3] = 0.4
-    hands[0].session.move_handle("handle 1", shift)
-    hands[0].session.commit()
+    bend(hands[0])
     assert [len(seen.deformed) for seen in hands] == [1, 0, 0]
     hands[1].click_row(second.panel.regions.list, 1)
     hands[1].click(second.panel.regions.split)

@@ -133,6 +133,7 @@ class PlotterTools:
                 if getattr(getattr(actor, "mapper", None), "dataset", None) is mesh:
                     actor.visibility = False
         editor = DeformEditor(self._plotter, session)
+        editor.desk.file.surface = surface_of(mesh)
         self.added.append(editor)
         if path is not None:
             editor.path = path
@@ -218,6 +219,11 @@ class PolyDataTools:
         """Return what keeps the surface from being deformed: ``.ok``, ``.faults``, as text."""
         points = np.asarray(self._surface.points, dtype=np.float64)
         return find_faults(points, triangles_of(self._surface))
+
+
+def surface_of(mesh: object) -> pv.PolyData | None:
+    """Return a PolyData with what else *mesh* has, if it is one, to be written with its pose."""
+    return mesh.copy(deep=False) if isinstance(mesh, pv.PolyData) else None
 
 
 def session_of(mesh: Mesh | pv.PolyData | Session) -> Session:

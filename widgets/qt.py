@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import pyvista
 import pyvistaqt
 from qtpy import QtWidgets
 
@@ -51,6 +52,7 @@ class DeformWidget(QtWidgets.QWidget):
         self.plotter = pyvistaqt.QtInteractor(self, auto_update=False, off_screen=False)
         self.plotter.setAcceptDrops(False)  # it would add the mesh beside the one that is edited
         self.editor: DeformEditor = self.plotter.segdeform.edit(session)
+        self.editor.desk.file.surface = plugin.surface_of(mesh)
         self.panel = DeformPanel(self.editor, self)
         self.deformed, self.regions_changed = self.panel.deformed, self.panel.regions_changed
         self.session_changed, self.error = self.panel.session_changed, self.panel.error
@@ -71,6 +73,13 @@ class DeformWidget(QtWidgets.QWidget):
     def session(self) -> Session:
         """What is edited; another one after `session_changed`."""
         return self.editor.session
+
+    def deformed_polydata(self) -> pyvista.PolyData:
+        """Return the mesh as it is now, with the arrays and polygons that it came with.
+
+        Those of the PolyData that was given, or of the file that was opened; normals anew.
+        """
+        return self.editor.desk.file.deformed(self.session)
 
     def closeEvent(self, event: Any) -> None:  # noqa: N802 - Qt's word
         """Free everything; the session stays as it is."""
@@ -113,6 +122,10 @@ class DeformDock(QtWidgets.QDockWidget):
         """What is edited; another one after `session_changed`."""
         return self.editor.session
 
+    def deformed_polydata(self) -> pyvista.PolyData:
+        """Return the mesh as it is now; see `DeformWidget.deformed_polydata`."""
+        return self.editor.desk.file.deformed(self.session)
+
 
 def deform_dock(view: Any, mesh: Any, parent: Any = None) -> DeformDock:
     """Put the editor into a view that is there, and return a dock with its panel.
@@ -131,5 +144,6 @@ def deform_dock(view: Any, mesh: Any, parent: Any = None) -> DeformDock:
         editor = view.segdeform.edit(mesh)
     else:
         editor = DeformEditor(view, plugin.session_of(mesh))
+        editor.desk.file.surface = plugin.surface_of(mesh)
         editor.On()
     return DeformDock(editor, parent)

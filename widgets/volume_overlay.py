@@ -25,6 +25,8 @@ from __future__ import annotations
 import time
 from typing import Any
 
+import numpy as np
+
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.editing.listeners import Change
 from vtk_segdeform.editing.naming import called
@@ -68,6 +70,7 @@ class VolumeOverlay:
         self._regions = RegionVolumes(session)
         self._change: FloatArray | None = None
         self._half_range: float | None = None
+        self._wanted_range: float | None = None
         self._light = _SOFT
         self._stop: Stop | None = None
 
@@ -85,6 +88,23 @@ class VolumeOverlay:
     def half_range(self) -> float | None:
         """The share at the ends of the scale; None while hidden."""
         return self._half_range
+
+    @property
+    def wanted_range(self) -> float | None:
+        """The share that is to be at the ends of the scale; None, as at first, chooses.
+
+        May be set, to a number above 0; else a ValueError.
+        """
+        return self._wanted_range
+
+    @wanted_range.setter
+    def wanted_range(self, share: float | None) -> None:
+        if share is not None and not 0.0 < share < np.inf:
+            raise ValueError(f"wanted_range must be a share above 0, or None; got {share!r}")
+        if share != self._wanted_range:
+            self._wanted_range, self._half_range = share, None
+            if self._change is not None:
+                self._show(self._change)
 
     @property
     def is_prepared(self) -> bool:
@@ -137,9 +157,12 @@ class VolumeOverlay:
 
     def _update(self) -> None:
         self._change = self._prepared().change(self.session.vertices)
-        self._half_range = half_range_for(self._change, self._half_range)
-        self._legend.show(self._half_range, self._lines(self._change))
-        self._surface.set_colours(_LAYER, colours_of(self._change, self._half_range))
+        self._show(self._change)
+
+    def _show(self, change: FloatArray) -> None:
+        self._half_range = self._wanted_range or half_range_for(change, self._half_range)
+        self._legend.show(self._half_range, self._lines(change))
+        self._surface.set_colours(_LAYER, colours_of(change, self._half_range))
 
     def _swap_light(self) -> None:
         """Give the surface the soft light and keep its own, or the other way round."""

@@ -164,7 +164,7 @@ def _scalar_bar(title: str) -> Any:
 def _annotated_table(half_range: float) -> Any:
     table = lookup_table(half_range)
     for share in np.linspace(-half_range, half_range, _TICKS):
-        percent = signed(100.0 * float(share), 1)
+        percent = signed(100.0 * float(share), 1 if half_range >= 0.01 else 3)
         table.SetAnnotation(float(share), percent if percent == "0" else f"{percent} %")
     return table
 

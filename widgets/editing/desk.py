@@ -11,8 +11,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from vtk_segdeform.editing.listeners import Change
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
@@ -21,7 +19,8 @@ from ..view import View
 from ..widget import Widget
 from .help_card import HelpCard, Section
 from .hints import hint
-from .session_file import SessionFile, read_bound
+from .log import Log
+from .session_file import SessionFile, read_all
 from .stage import Mode, Stage
 from .takes import Takes
 from .voice import Voice
@@ -50,6 +49,8 @@ class Desk:
         The card of keys.
     voice : Voice
         What is said in the line at the bottom.
+    log : Log
+        What was done, and what it took.
     takes : Takes
         The recording and the film that are going on.
     """
@@ -61,7 +62,8 @@ class Desk:
         self.takes = Takes(view)
         self._mode = Mode.REGIONS
         self._is_on = False
-        self._work = Work(view, self._got_on)
+        self.log = Log()
+        self._work = Work(view, self.voice, self.log, self._got_on)
         self.stage = Stage(view, session)
         self._listen()
         self.file = SessionFile(Path("session.segdeform"), session)
@@ -104,6 +106,7 @@ class Desk:
         self.is_on = False
         self._stop_hearing()
         self._stop_failures()
+        self.log.rest()
         self.takes.remove()
         self.stage.remove()
         self.help.remove()
@@ -137,6 +140,7 @@ class Desk:
         self.refresh()
 
     def _listen(self) -> None:
+        self.log.follow(self.session)
         self._stop_hearing = self.session.on_change(self._changed)
         for widget in self.stage.widgets:
             widget.AddObserver("EndInteractionEvent", self._ended)
@@ -230,19 +234,12 @@ class Desk:
     def open(self, path: Path) -> None:
         """Go on, when the job is done, with the session or the mesh in *path*."""
 
-        def take(session: Session) -> None:
-            self._take(session)
-            self.file.took(path, session)
+        def take(opened: tuple[Session, Any]) -> None:
+            session, surface = opened
+            self.stage = self.stage.succeeded_by(session)
+            self._stop_hearing()
+            self._listen()
+            self.file.took(path, session, surface)
             self.say(f"opened {path}")
 
-        self.start(f"opening {path}", lambda progress: read_bound(path, progress), take)
-
-    def _take(self, session: Session) -> None:
-        before, self.stage = self.stage, Stage(self.view, session)
-        self.stage.follow(before)
-        other = not np.array_equal(session.mesh.vertices, before.session.mesh.vertices)
-        self._stop_hearing()
-        before.remove()
-        self._listen()
-        if other:
-            self.view.renderer.ResetCamera()
+        self.start(f"opening {path}", lambda progress: read_all(path, progress), take)

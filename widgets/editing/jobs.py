@@ -94,6 +94,11 @@ class Job(Generic[T]):
         return not self._ended
 
     @property
+    def error(self) -> BaseException | None:
+        """What the work raised, once the job has ended."""
+        return self._future.exception() if self._ended else None
+
+    @property
     def is_cancelled(self) -> bool:
         """Whether the job was asked to stop; until it does, it is still running."""
         return self._stopping

@@ -92,6 +92,18 @@ def with_radius(radius: float) -> Action:
     return take
 
 
+def ranging(share: float | None) -> Action:
+    """Return the action that has the colours of volumes end at plus and minus a *share*.
+
+    None has the overlay choose.
+    """
+
+    def take(desk: Desk) -> None:
+        desk.stage.overlay.wanted_range = share
+
+    return take
+
+
 def setting(**changes: float | bool | None) -> Action:
     """Return the action that changes some of the session's options."""
     return lambda desk: desk.session.change_options(**changes)
@@ -113,7 +125,10 @@ def saving(path: Path) -> Action:
 
 
 def exporting(path: Path) -> Action:
-    """Return the action that writes the mesh in its pose, in the format of the suffix."""
+    """Return the action that writes the mesh in its pose, with all it came with.
+
+    In the format of the suffix, which may not hold all of it: see `convert.write_mesh`.
+    """
 
     def export(desk: Desk) -> None:
         from vtk_segdeform.convert import write_mesh  # which imports pyvista
@@ -121,7 +136,7 @@ def exporting(path: Path) -> Action:
         session = desk.session
         if session.is_dragging:
             raise SessionError("let go of what is dragged before the mesh is written")
-        write_mesh(path, session.mesh.with_vertices(session.vertices))
+        write_mesh(path, desk.file.deformed(session))
         desk.say(f"mesh written to {path}")
 
     return export

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import enum
 
+import numpy as np
+
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.session import Session
 
@@ -108,7 +110,17 @@ class Stage:
         share = its.radius / before.session.mesh.diagonal
         mine.radius = share * self.session.mesh.diagonal
         self.dragger.local = before.dragger.local
+        self.overlay.wanted_range = before.overlay.wanted_range
         self.cages_wanted, self.overlay_wanted = before.cages_wanted, before.overlay_wanted
+
+    def succeeded_by(self, session: Session) -> Stage:
+        """Take everything out of the view, and return a stage for another session in its place."""
+        after = Stage(self.selector.view, session)
+        after.follow(self)
+        self.remove()
+        if not np.array_equal(session.mesh.vertices, self.session.mesh.vertices):
+            after.selector.view.renderer.ResetCamera()
+        return after
 
     def bind(self, progress: Progress) -> None:
         """Do what the first drag would have to wait for; in any thread, while nothing is on."""

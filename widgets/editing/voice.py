@@ -16,6 +16,17 @@ from .jobs import Job
 from .status_line import StatusLine
 
 
+def words_of(error: BaseException) -> str:
+    """Return what went wrong in words.
+
+    >>> words_of(ValueError("too far")), words_of(KeyError())
+    ('too far', 'a fault: KeyError')
+    """
+    wordy = isinstance(error, SegDeformError | ValueError) and str(error)
+    name = ", ".join(filter(None, (type(error).__name__, str(error))))
+    return str(error) if wordy else f"a fault: {name}"
+
+
 class Voice:
     """The words in the status line of a view.
 
@@ -66,9 +77,7 @@ class Voice:
 
     def complain(self, error: Exception) -> None:
         """Tell what went wrong; our own errors are in words already."""
-        wordy = isinstance(error, SegDeformError | ValueError) and str(error)
-        name = ", ".join(filter(None, (type(error).__name__, str(error))))
-        self._fault = str(error) if wordy else f"a fault: {name}"
+        self._fault = words_of(error)
 
     def forget(self) -> None:
         """Tell no more of what was done, went wrong or was asked before."""

@@ -1,7 +1,8 @@
-"""What the editor is busy with: one job at a time, and what it is called."""
+"""What the editor is busy with: one job at a time, what it is called, and how it ended."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -10,6 +11,8 @@ from vtk_segdeform.progress import Progress
 
 from ..view import View
 from .jobs import Job
+from .log import Log
+from .voice import Voice, words_of
 
 
 class Work:
@@ -19,12 +22,17 @@ class Work:
     ----------
     view : View
         Whose timer looks after jobs.
+    voice : Voice
+        What says how one ended.
+    log : Log
+        Where that is written down.
     watch : callable
         Called when a job got on, or has ended.
     """
 
-    def __init__(self, view: View, watch: Callable[[], object]) -> None:
-        self._view, self._watch = view, watch
+    def __init__(self, view: View, voice: Voice, log: Log, watch: Callable[[], object]) -> None:
+        self._view, self._voice, self._log, self._watch = view, voice, log, watch
+        self._began = 0.0
         self._called, self._insists = "", False
         self.job: Job[Any] | None = None
         """The one that is running, if any."""
@@ -46,8 +54,10 @@ class Work:
         """
         if self.job is not None:
             raise SessionError(f"busy {self._called}; wait for it, or cancel it")
-        self._called, self._insists = doing, False
-        self.job = Job(self._view, work, done=done, watch=self._look)
+        self._called, self._insists, self._began = doing, False, time.monotonic()
+        self.job = Job(
+            self._view, work, done=lambda result: self._deliver(done, result), watch=self._look
+        )
 
     def wait(self) -> None:
         """Stand still until there is no job any more; for scripts."""
@@ -61,4 +71,19 @@ class Work:
     def _look(self, job: Job[Any]) -> None:
         if not job.is_running:
             self.job = None
+            if job.is_cancelled:
+                self._write("cancelled")
+            elif job.error is not None:
+                self._write(words_of(job.error))
         self._watch()
+
+    def _deliver(self, done: Callable[[Any], object], result: Any) -> None:
+        before, how = self._voice.noted, "failed"
+        try:
+            done(result)
+            how = self._voice.noted if self._voice.noted != before else "done"
+        finally:
+            self._write(how)
+
+    def _write(self, how: str) -> None:
+        self._log.add_job(self._called, time.monotonic() - self._began, how)

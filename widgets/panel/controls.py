@@ -6,6 +6,7 @@ no care; a button takes the focus by Tab only, so that keys go on to the view af
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from qtpy import QtCore, QtGui, QtWidgets
@@ -120,6 +121,16 @@ def form(*rows: tuple[str, Any]) -> Any:
         layout.addRow(name, field)
         layout.labelForField(field).setToolTip(field.toolTip())
     return layout
+
+
+def shortcut(keys: Any, parent: Any, do: Callable[[], object], *, alone: bool = False) -> None:
+    """Have *keys* do something where *parent* has the focus or, unless *alone*, what is in it."""
+    # Qt 5 has it in QtWidgets, Qt 6 in QtGui.
+    made = getattr(QtWidgets, "QShortcut", None) or QtGui.QShortcut
+    contexts = Qt.ShortcutContext
+    key = made(QtGui.QKeySequence(keys), parent)
+    key.setContext(contexts.WidgetShortcut if alone else contexts.WidgetWithChildrenShortcut)
+    key.activated.connect(do)
 
 
 def put(widget: Any, value: Any) -> None:

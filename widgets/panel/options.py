@@ -8,7 +8,7 @@ from qtpy import QtWidgets
 
 from ..colouring.legend import precise
 from ..editing.actions import toggle_cages, toggle_overlay
-from ..editing.panel_actions import setting
+from ..editing.panel_actions import ranging, setting
 from ..editing.stage import Mode
 from ..editor import DeformEditor
 from .controls import check_box, column, form, key_button, number_box, put, row
@@ -74,6 +74,16 @@ class DeformPart(QtWidgets.QGroupBox):
         self.volume.setToolTip("(V - V0) / V0 of the whole mesh")
         self.overlay = check_box("colour what swells", "show the local volume change (O)")
         self.overlay.clicked.connect(lambda: editor.do(toggle_overlay))
+        self.range = number_box(
+            QtWidgets.QDoubleSpinBox(), "the local volume change that the last colours stand for"
+        )
+        self.range.setRange(0.0, 1000.0)
+        self.range.setDecimals(1)
+        self.range.setSingleStep(5.0)
+        self.range.setSpecialValueText("by itself")
+        self.range.setPrefix("± ")
+        self.range.setSuffix(" %")
+        self.range.valueChanged.connect(lambda x: editor.do(ranging(0.01 * x or None)))
         self.hold = check_box("hold the volume", "keep the enclosed volume exactly (P)")
         self.hold.clicked.connect(lambda on: editor.do(setting(preserve_volume=on)))
         self.hold_each = check_box("of every region", "keep the volume of each region as well")
@@ -97,7 +107,11 @@ class DeformPart(QtWidgets.QGroupBox):
             form(("Volume change", self.volume)),
             row(self.hold, self.hold_each),
             self.overlay,
-            form(("Stretch", self.stretch), ("Rotation groups", self.groups)),
+            form(
+                ("Colours end at", self.range),
+                ("Stretch", self.stretch),
+                ("Rotation groups", self.groups),
+            ),
             self.rest,
         )
 
@@ -109,6 +123,8 @@ class DeformPart(QtWidgets.QGroupBox):
         put(self.hold, options.preserve_volume)
         put(self.hold_each, options.preserve_region_volumes)
         put(self.overlay, stage.overlay_wanted)
+        put(self.range, 100.0 * (stage.overlay.wanted_range or 0.0))
+        self.range.setEnabled(stage.overlay_wanted)
         put(self.stretch, options.stretch)
         put(self.groups, options.rotation_groups or 0)
         self.rest.setEnabled(session.state.pose is not None)

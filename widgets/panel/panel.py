@@ -11,15 +11,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from qtpy import QtCore, QtGui, QtWidgets
+from qtpy import QtCore, QtWidgets
 
 from vtk_segdeform.editing.listeners import Change
 
 from ..editing.bindings import binding_of
 from ..editing.stage import Mode
 from ..editor import DeformEditor
+from .controls import shortcut
 from .foot import Foot
 from .handles import HandlesPart
+from .log import LogPart
 from .modes import Head
 from .options import CagesPart, DeformPart
 from .painting import PaintingPart
@@ -54,7 +56,7 @@ class DeformPanel(QtWidgets.QWidget):
     def __init__(self, editor: DeformEditor, parent: Any = None) -> None:
         super().__init__(parent)
         self.editor = editor
-        self.head, self.foot = Head(editor), Foot(editor)
+        self.head, self.foot, self.log = Head(editor), Foot(editor), LogPart(editor)
         self.painting, self.regions = PaintingPart(editor), RegionsPart(editor)
         self.handles = HandlesPart(editor)
         self.cages, self.deform = CagesPart(editor), DeformPart(editor)
@@ -87,6 +89,7 @@ class DeformPanel(QtWidgets.QWidget):
         self._inside.setEnabled(not busy)
         self.head.refresh()
         self.foot.refresh()
+        self.log.refresh()
         if busy:  # the session is the job's
             return
         for part, modes in self._parts.items():
@@ -117,6 +120,7 @@ class DeformPanel(QtWidgets.QWidget):
         layout.addWidget(self.head)
         layout.addWidget(area, 1)
         layout.addWidget(self.foot)
+        layout.addWidget(self.log)
         self.setMinimumWidth(_WIDTH * self.fontMetrics().averageCharWidth())
         for keys, key in _KEYS.items():
             self._add_shortcut(keys, key)
@@ -126,10 +130,7 @@ class DeformPanel(QtWidgets.QWidget):
         if binding is None or binding.action is None:
             raise ValueError(f"{key!r} is no key of every mode")
         action, while_busy = binding.action, binding.while_busy
-        shortcut = QtWidgets.QShortcut if hasattr(QtWidgets, "QShortcut") else QtGui.QShortcut
-        made = shortcut(QtGui.QKeySequence(keys), self)
-        made.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-        made.activated.connect(lambda: self.editor.do(action, while_busy=while_busy))
+        shortcut(keys, self, lambda: self.editor.do(action, while_busy=while_busy))
 
     # What is heard.
 
