@@ -1,14 +1,15 @@
 """Hands for the desktop program: a window on a screen, and somebody who answers its questions.
 
-Run by itself it is a program that drags, or saves, and tells of every pose, until it is killed:
-
-    python app_hands.py drag|save FOLDER
+Run by itself it waits for lines such as "drag FOLDER", and for each starts a program that drags,
+or else saves, or rests after a drag, until it is killed; ``FOLDER/told`` says what it does.
 """
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import os
+import signal
 import sys
 from pathlib import Path
 
@@ -17,7 +18,6 @@ from qt_hands import Qt, QtCore, QtHand, QtTest, QtWidgets, application, until
 from scenes import sausage
 
 from vtk_segdeform import Session
-from vtk_segdeform.store import save_session
 from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.app.autosave import Autosaves, Slot
 from vtk_segdeform.widgets.app.window import Window
@@ -158,6 +158,7 @@ class AppHand:
         editor, plotter = self.window.editor, self.window.editor_widget.plotter
         editor.mode = Mode.DEFORM
         self.settle()
+        plotter.disable_anti_aliasing()  # three times as fast where there is no graphics card
         plotter.camera_position = "xz"
         plotter.render()
         plotter.setFocus()
@@ -182,61 +183,94 @@ def _click(menu, action):
     application().processEvents()
 
 
+def slots(folder: Path) -> list[Path]:
+    """Return the files in which unsaved work is kept now, beside the settings in *folder*."""
+    return sorted((folder / "unsaved").glob("*/session.segdeform"))
+
+
+def settings_in(folder: Path):
+    """Return settings that are not the user's."""
+    return QtCore.QSettings(str(folder / "settings.ini"), QtCore.QSettings.Format.IniFormat)
+
+
+def delete_now() -> None:
+    """Have nothing live on that Qt has deleted: of PySide's, it could be taken for what is new."""
+    for _ in range(2):
+        application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
+        application().processEvents()
+    gc.collect()
+
+
 # The program that is killed.
 
 
-def _tell(*words):
-    os.write(1, (" ".join(map(str, words)) + "\n").encode())
+def _start_programs() -> None:
+    """Fork one for each line: what takes long, all the imports, is done once."""
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for them
+    for line in sys.stdin:
+        if os.fork() == 0:
+            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+            what, folder = line.rstrip("\n").split(" ", 1)
+            _run(what, Path(folder))
 
 
-def _program(what: str, folder: Path) -> None:
-    write = Slot.write
+def _run(what: str, folder: Path) -> None:
+    """Be the program: with a new session in every step, a file of it, and a drag on the view."""
+    told = os.open(folder / "told", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
 
-    def telling_write(slot, session):
-        shown = digests.get(id(session.state.pose), "")
-        write(slot, session)
-        _tell("kept", shown)
+    def tell(*words):
+        os.write(told, f"{' '.join(words)}\n".encode())
 
-    Slot.write = telling_write
-    settings = QtCore.QSettings(str(folder / "settings.ini"), QtCore.QSettings.Format.IniFormat)
+    tell("number", str(os.getpid()))
+    poses = _told_poses(tell)
     application()
-    window = Window(settings, Autosaves(folder / "unsaved"), interval=INTERVAL)
+    window = Window(settings_in(folder), Autosaves(folder / "unsaved"), interval=INTERVAL)
     hand = AppHand(window)
-    path = folder / "arm.segdeform"
-    window.open(path)
+    window.open(folder / "arm.segdeform")
     until(lambda: window.has_mesh, "the file")
-    session, digests, poses = window.session, {}, []
-
-    def told(_):
-        pose = session.state.pose
-        if id(pose) not in digests:
-            poses.append(pose)  # so that no other gets its number
-            digests[id(pose)] = digest(session)
-            _tell("pose", digests[id(pose)])
-
-    told(None)
-    session.on_change(told)
+    session = window.session
+    poses(session)
+    session.on_change(lambda _: poses(session))
     view = hand.view_hand()
-    _tell("ready")
-    if what == "drag":
-        way = hand.way(steps=8)
-        view.drag(way)
+    if what != "save":
+        view.drag(hand.way(steps=6))
         hand.settle()
-        _tell("finished", digest(session))
+        tell("finished", digest(session))
+        until(lambda: what == "drag", "the end", 60.0)
         there = hand.way(by=(0.0, -90.0), steps=20)
         view.press(there[0])
         while True:  # to and fro, and never let go
             for place in [*there, *reversed(there)]:
                 view.move(place)
-                _tell("moved")
+                tell("moved")
     while True:
-        view.drag(hand.way(by=(0.0, 25.0), steps=3))
-        _tell("saving")
-        QtTest.QTest.keyClick(view.widget, Qt.Key_S, Qt.ControlModifier)
-        _tell("saved", digest(session))
-        view.drag(hand.way(by=(0.0, -25.0), steps=3))
-        save_session(folder / "beside.segdeform", session)
+        for by in (25.0, -25.0):
+            view.drag(hand.way(by=(0.0, by), steps=3))
+            tell("saving")
+            QtTest.QTest.keyClick(view.widget, Qt.Key_S, Qt.ControlModifier)
+            tell("saved", digest(session))
+
+
+def _told_poses(tell):
+    """Return what tells of a session's pose, if it is new; what is kept is told of as well."""
+    digests, poses, write = {}, [], Slot.write
+
+    def tell_pose(session):
+        pose = session.state.pose
+        if id(pose) not in digests:
+            poses.append(pose)  # so that no other gets its number
+            digests[id(pose)] = digest(session)
+            tell("pose", digests[id(pose)])
+
+    def telling_write(slot, session):
+        shown = digests.get(id(session.state.pose))
+        write(slot, session)
+        if shown is not None:
+            tell("kept", shown)
+
+    Slot.write = telling_write
+    return tell_pose
 
 
 if __name__ == "__main__":
-    _program(sys.argv[1], Path(sys.argv[2]))
+    _start_programs()

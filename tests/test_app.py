@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import sys
 import threading
@@ -12,7 +11,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from app_hands import AppHand, Boxes, Window, digest, ready_session
+from app_hands import (
+    AppHand,
+    Boxes,
+    Window,
+    delete_now,
+    digest,
+    ready_session,
+    settings_in,
+    slots,
+)
 from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 from qt_hands import Qt, QtCore, QtTest, QtWidgets, application, until
@@ -62,10 +70,8 @@ def start(tmp_path, boxes):
     made = []
 
     def begin(path=None, **options) -> AppHand:
-        ini = QtCore.QSettings.Format.IniFormat
-        settings = QtCore.QSettings(str(tmp_path / "settings.ini"), ini)
         options = {"interval": 1000.0, **options}
-        window = Window(settings, Autosaves(tmp_path / "unsaved"), **options)
+        window = Window(settings_in(tmp_path), Autosaves(tmp_path / "unsaved"), **options)
         made.append(AppHand(window))
         window.begin(path)
         made[-1].settle()
@@ -82,22 +88,9 @@ def start(tmp_path, boxes):
     delete_now()
 
 
-def delete_now():
-    """Have nothing live on that Qt has deleted: of PySide's, it could be taken for what is new."""
-    for _ in range(2):
-        application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
-        application().processEvents()
-    gc.collect()
-
-
 def choose_file(monkeypatch, path):
     for name in ("getOpenFileName", "getSaveFileName"):
         monkeypatch.setattr(QtWidgets.QFileDialog, name, lambda *_: (str(path or ""), ""))
-
-
-def slots(tmp_path):
-    """Return the folders in which unsaved work is kept now."""
-    return sorted((tmp_path / "unsaved").glob("*/session.segdeform"))
 
 
 def change(hand):
@@ -563,11 +556,8 @@ def bent(arm):
 
 @pytest.mark.parametrize("times", [1, pytest.param(30, marks=pytest.mark.campaign)])
 def test_nothing_is_left_of_windows_that_were_closed(ball_file, tmp_path, boxes, times):
-    ini = QtCore.QSettings.Format.IniFormat
-
     def open_and_close():
-        settings = QtCore.QSettings(str(tmp_path / "settings.ini"), ini)
-        window = Window(settings, Autosaves(tmp_path / "unsaved"))
+        window = Window(settings_in(tmp_path), Autosaves(tmp_path / "unsaved"))
         hand = AppHand(window)
         window.open(ball_file)
         hand.settle()
@@ -590,8 +580,7 @@ def test_nothing_is_left_of_windows_that_were_closed(ball_file, tmp_path, boxes,
 
 
 def test_a_window_that_is_deleted_without_a_word_is_spoken_to_no_more(tmp_path, ball_file, boxes):
-    settings = QtCore.QSettings(str(tmp_path / "s.ini"), QtCore.QSettings.Format.IniFormat)
-    hand = AppHand(Window(settings, Autosaves(tmp_path / "unsaved")))
+    hand = AppHand(Window(settings_in(tmp_path), Autosaves(tmp_path / "unsaved")))
     hand.window.open(ball_file)
     hand.settle()
     session, editor = hand.window.session, hand.window.editor
