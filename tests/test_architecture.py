@@ -20,7 +20,8 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 STORY = [
     # a checked mesh
     "errors", "arrays", "progress", "threads", "compiled.volumes", "compiled.products",
-    "compiled.rotations", "fast", "surface.topology", "surface.manifold", "surface.inside",
+    "compiled.rotations", "compiled.coordinates", "fast", "surface.topology",
+    "surface.manifold", "surface.inside",
     "surface.intersections", "surface.report", "surface.shells", "faults", "mesh", "surface.holes",
     "surface.splitting", "surface.repair_steps", "repair",
     # what a deformation keeps
@@ -90,12 +91,13 @@ STORY = [
 
 NUMERIC = {"numpy", "scipy"}
 VTK = {"vtkmodules"}
+KERNELS = {"volumes", "products", "rotations", "coordinates"}
 PANEL = {"controls", "modes", "painting", "regions", "handles", "options", "foot", "log", "panel"}
 PROGRAM = {
     "keeper", "opening", "start_page", "drops", "pages", "asking", "saving", "menus", "window",
 }  # fmt: skip
 GRANTED = {
-    **{f"compiled.{name}": {"numba"} for name in ("volumes", "products", "rotations")},
+    **{f"compiled.{name}": {"numba"} for name in KERNELS},
     "cage_fit": VTK,
     "modelling.implicit": VTK,
     "formats.polygons": VTK | {"pyvista"},

@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from vtk_segdeform import fast, models, threads
 from vtk_segdeform.blocks import add_product, adjoint_product
 from vtk_segdeform.errors import Cancelled
+from vtk_segdeform.mean_value import mean_value_coordinates
 from vtk_segdeform.rotations import closest_rotations
 from vtk_segdeform.volume import signed_volume, volume_along, volume_gradient
 
@@ -145,3 +146,16 @@ def test_a_fault_in_the_work_reaches_the_caller(monkeypatch):
 
     with pytest.raises(ZeroDivisionError):
         threads.in_parallel(work, 100, 10)
+
+
+def test_mean_value_coordinates_agree_wherever_the_point_is(twin):
+    cage = models.sphere(162)
+    p, corners = cage.vertices, cage.vertices[cage.faces]
+    share = RNG.dirichlet(np.ones(3), len(corners))[:, :, None]
+    on_faces, on_edges = (share * corners).sum(axis=1), corners[:, :2].mean(axis=1)
+    in_planes = 2.0 * corners[:, 0] - corners[:, 1]
+    places = [p, on_faces, on_edges, in_planes, on_faces * (1.0 - 1e-9), RNG.normal(size=(2000, 3))]
+    points = np.concatenate(places)
+    quick, plain = twin(lambda: mean_value_coordinates(points, p, cage.faces))
+    assert_allclose(quick, plain, atol=1e-11)
+    assert_allclose(quick @ p, points, atol=1e-11)

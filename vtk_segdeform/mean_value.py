@@ -52,9 +52,11 @@ from numpy.typing import ArrayLike
 
 from .arrays import FloatArray, IntArray, as_faces, as_points
 from .errors import CageError
+from .fast import compiled, inputs
 from .progress import Progress
 from .surface.intersections import flat_faces
 from .surface.manifold import connectivity_faults, counted, face_edges
+from .threads import in_parallel
 
 # Lengths are shares of the cage's diagonal.
 _ON = 1e-14  # as near as this, a point is on the vertex or edge
@@ -113,12 +115,18 @@ def mean_value_coordinates(
     centre, size = (low + high) / 2.0, np.linalg.norm(high - low)
     cage = _prepare((p - centre) / size, faces)
     weights = np.empty((len(x), len(p)))
+    kernels = compiled(len(x))
+    arguments = inputs(*_as_arrays(cage, faces)) if kernels else ()
+
+    def work(start: int, stop: int) -> None:
+        there = (x[start:stop] - centre) / size
+        if kernels:
+            kernels.weights(*inputs(there), *arguments, weights[start:stop])
+        else:
+            weights[start:stop] = _weights(cage, there.T).T
+
     rows = max(16, _BLOCK // faces.size)  # fewer than 16 cost more calls than they save memory
-    for start in range(0, len(x), rows):
-        stop = min(start + rows, len(x))
-        weights[start:stop] = _weights(cage, ((x[start:stop] - centre) / size).T).T
-        if progress is not None:
-            progress(stop / len(x), "mean value coordinates")
+    in_parallel(work, len(x), rows, progress=progress, message="mean value coordinates")
     return weights
 
 
@@ -170,6 +178,14 @@ def _prepare(p: FloatArray, faces: IntArray) -> _Cage:
         by_vertex=by_vertex,
         begins=np.searchsorted(corner[by_vertex], np.arange(len(p))),
     )
+
+
+def _as_arrays(cage: _Cage, faces: IntArray) -> tuple[FloatArray | IntArray, ...]:
+    """Return the cage as the compiled kernel takes it."""
+    planes, starts = cage.planes.reshape(4, len(faces), 4), np.stack([cage.start, cage.along])
+    numbers = np.stack([cage.length, cage.cosine[..., 0], cage.halved[..., 0]])
+    limits = np.array([_ON, _OFF, _NEAR])
+    return cage.p, cage.edges, cage.edge_of.T, faces, planes, starts, numbers, limits
 
 
 def _weights(cage: _Cage, x: FloatArray) -> FloatArray:

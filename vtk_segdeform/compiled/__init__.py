@@ -2,12 +2,14 @@
 
     volumes       `volume.signed_volume`, `volume.volume_along_path`, `volume.volume_gradient`
     products      `blocks.add_product`, `blocks.add_adjoint`
+    coordinates   `mean_value.mean_value_coordinates`
     rotations     `rotations.closest_rotations`
 
 They let go of the interpreter and call no threads of their own; `threads.in_parallel` runs several
 at a time.  Their arguments are positional, as numba wants it, and outputs come in as arrays.
 """
 
+from .coordinates import weights
 from .products import add_adjoint, add_product
 from .rotations import rotations
 from .volumes import volume_along_sums, volume_gradient, volume_sums
@@ -19,4 +21,5 @@ __all__ = [
     "volume_along_sums",
     "volume_gradient",
     "volume_sums",
+    "weights",
 ]
