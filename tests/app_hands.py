@@ -88,7 +88,7 @@ class AppHand:
 
     def __init__(self, window: Window):
         self.window = window
-        window.resize(700, 450)
+        window.resize(600, 400)
         window.show()
         until(lambda: window.windowHandle() and window.windowHandle().isExposed(), "the window")
         window.activateWindow()
@@ -158,7 +158,6 @@ class AppHand:
         editor, plotter = self.window.editor, self.window.editor_widget.plotter
         editor.mode = Mode.DEFORM
         self.settle()
-        plotter.disable_anti_aliasing()  # three times as fast where there is no graphics card
         plotter.camera_position = "xz"
         plotter.render()
         plotter.setFocus()

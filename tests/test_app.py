@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import threading
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import pyvista as pv
 from app_hands import (
     AppHand,
     Boxes,
@@ -33,6 +35,18 @@ from vtk_segdeform.widgets.app import documents
 from vtk_segdeform.widgets.app.autosave import About, Autosaves, Slot
 
 BALL = models.sphere(300)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def in_haste():
+    """Spend no time on smooth edges, nor on looking for garbage in what was imported."""
+    smooth = pv.global_theme.anti_aliasing
+    pv.global_theme.anti_aliasing = None
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()
+    pv.global_theme.anti_aliasing = smooth
 
 
 @pytest.fixture(scope="module")

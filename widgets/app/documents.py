@@ -1,4 +1,4 @@
-"""What can be open in the window, how it gets there, and how its mesh is written again.
+"""What can be open in the window, and how it gets there.
 
 Reading happens in any thread: nothing here knows of Qt.
 """
@@ -12,16 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from vtk_segdeform import models, plugin
-from vtk_segdeform.convert import from_polydata, read_polydata, write_mesh
-from vtk_segdeform.errors import MeshError, SegDeformError, SessionError
+from vtk_segdeform import models
+from vtk_segdeform.convert import from_polydata, read_polydata
+from vtk_segdeform.errors import MeshError, SegDeformError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
-from ..editing.actions import Action
-from ..editing.desk import Desk
 from ..editing.session_file import SessionFile, is_mesh, read_bound
+from ..editing.voice import words_of
 from .autosave import About, Slot
 
 SUFFIX = ".segdeform"
@@ -60,6 +59,7 @@ class Document:
         if self.session_path is not None:
             file.path = self.session_path
             file.keeps(kept)
+        file.surface = self.surface
         return file
 
 
@@ -100,28 +100,11 @@ def the_cactus(progress: Progress) -> Opened:
     return Document("the cactus"), Session(models.cactus())
 
 
-def writing_mesh(path: Path, surface: Any) -> Action:
-    """Return the action that writes the mesh in its pose, with all that *surface* has."""
-
-    def write(desk: Desk) -> None:
-        session = desk.session
-        if session.is_dragging:
-            raise SessionError("let go of what is dragged before the mesh is written")
-        if surface is None:
-            write_mesh(path, session.mesh.with_vertices(session.vertices))
-        else:
-            write_mesh(path, plugin.deformed(surface, session))
-        desk.say(f"mesh written to {path}")
-
-    return write
-
-
 def words(error: BaseException) -> str:
     """Return what went wrong; our own errors are in words already."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
-    told = isinstance(error, SegDeformError | ValueError) and str(error)
-    return str(error) if told else f"a fault: {type(error).__name__}, {error}"
+    return words_of(error)
 
 
 def _mesh_of(path: Path, surface: Any) -> Mesh:

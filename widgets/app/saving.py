@@ -17,9 +17,9 @@ from vtk_segdeform.errors import SessionError
 
 from ..editing.actions import Action
 from ..editing.desk import Desk
-from ..editing.panel_actions import saving
+from ..editing.panel_actions import exporting, saving
 from .asking import MESHES, Answer, ask_replace, ask_save, tell_failure
-from .documents import SUFFIX, writing_mesh
+from .documents import SUFFIX
 
 _SESSIONS = f"Sessions (*{SUFFIX})"
 _PICTURES = "Pictures (*.png *.jpg *.jpeg)"
@@ -51,7 +51,7 @@ def save_mesh(window: Any) -> bool:
     path = window.document.mesh_path
     if path is None:
         return save_mesh_as(window)
-    done = _done(window, writing_mesh(path, window.document.surface))
+    done = _done(window, exporting(path))
     if done:
         window.mesh_state = window.session.state
     return done
@@ -62,7 +62,7 @@ def save_mesh_as(window: Any) -> bool:
     source = window.document.source
     suffix = ".ply" if source is None else source.suffix
     path = _path(window, "Save mesh", f"Meshes ({MESHES})", suffix)
-    if path is None or not _done(window, writing_mesh(path, window.document.surface)):
+    if path is None or not _done(window, exporting(path)):
         return False
     window.keep_in_mind(replace(window.document, mesh_path=path))
     window.mesh_state = window.session.state
