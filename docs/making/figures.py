@@ -1,0 +1,202 @@
+"""The pictures of the pages, each drawn from the mesh that the page speaks of.
+
+``python -m making.figures NAME ...`` draws some.  Pictures that are compared are files of their own,
+NAME-1.png, NAME-2.png ..., seen by one camera at one scale: the page sets captions below them, and
+on a narrow screen sets them below each other.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from matplotlib.colors import LinearSegmentedColormap
+
+import vtk_segdeform as sd
+from making.made import FIGURES as FOLDER
+from making.plots import convergence, volume_along_a_step
+from making.scene import (
+    Drawing,
+    add_balls,
+    add_wires,
+    bar,
+    body,
+    bound,
+    cactus,
+    region_colours,
+    turned,
+    write,
+)
+from vtk_segdeform.canvas import add_surface
+from vtk_segdeform.convert import to_polydata
+from vtk_segdeform.filters import SegmentedCageDeformFilter
+from vtk_segdeform.formats.polygons import polydata_of
+from vtk_segdeform.palette import BODY, FIXED, HANDLE, of_region, rgb
+from vtk_segdeform.pictures import picture_volume_change
+
+RISING = LinearSegmentedColormap.from_list("rising", ["#DFE7EE", "#E69F00", "#A63A00"])
+
+
+def front() -> None:
+    """Draw the cactus with its regions, with its cages, and bent by them."""
+    parts = cactus()
+    mesh, cages = parts["mesh"], parts["cages"]
+    solution = bound(parts).solve(turned(mesh, parts["handle"], 60))
+    colours = region_colours(mesh, parts["regions"].weights)
+
+    def caged(vertices: Any, cage_vertices: Sequence[Any]) -> Drawing:
+        def draw(plotter: pv.Plotter) -> None:
+            body(mesh, vertices, 0.45 * colours + 0.55 * 255)(plotter)
+            for r, (cage, p) in enumerate(zip(cages, cage_vertices, strict=True)):
+                add_wires(plotter, r, cage.faces, p)
+
+        return draw
+
+    at_rest = [cage.vertices for cage in cages]
+    drawings = [
+        body(mesh, None, colours),
+        caged(mesh.vertices, at_rest),
+        caged(solution.vertices, solution.cage_vertices),
+    ]
+    write("front", drawings, np.concatenate([*at_rest, *solution.cage_vertices]))
+
+
+def regions() -> None:
+    """Draw labels, regions that overlap, and weights that fade."""
+    mesh, labels = cactus()["mesh"], cactus()["regions"].labels
+    grown = sd.Regions.from_labels(mesh, labels, overlap=8)
+    apart = labels == np.arange(3)[:, None]
+    mixed = grown.membership / grown.membership.sum(axis=0)
+    drawings = [body(mesh, None, region_colours(mesh, s)) for s in (apart, mixed, grown.weights)]
+    write("regions", drawings, mesh.vertices)
+
+
+def cages() -> None:
+    """Draw all cages, and one of them with what it moves."""
+    parts = cactus()
+    mesh, fitted, weights, arm = parts["mesh"], parts["cages"], parts["regions"].weights, 1
+    pale = 0.35 * region_colours(mesh, weights) + 0.65 * 255
+    share = weights[arm][mesh.faces].mean(axis=1)[:, None]
+
+    def all_of_them(plotter: pv.Plotter) -> None:
+        body(mesh, None, pale)(plotter)
+        for r, cage in enumerate(fitted):
+            add_wires(plotter, r, cage.faces, cage.vertices)
+
+    def one(plotter: pv.Plotter) -> None:
+        body(mesh, None, share * of_region(arm) + (1.0 - share) * 235.0)(plotter)
+        add_wires(plotter, arm, fitted[arm].faces, fitted[arm].vertices)
+
+    write("cages", [all_of_them, one], np.concatenate([cage.vertices for cage in fitted]))
+
+
+def influence() -> None:
+    """Draw how much one cage vertex has to say, and what happens when it is pulled."""
+    mesh = sd.models.bar(size=(0.25, 0.25, 1.0), divisions=(12, 12, 48))
+    box = sd.models.bar(size=(0.4, 0.4, 1.15), divisions=(1, 1, 3))
+    cage = box.vertices - [0.0, 0.0, 0.075]
+    weights = sd.mean_value_coordinates(mesh.vertices, cage, box.faces)
+    corner = int(np.argmax(cage @ [1.0, -0.3, 0.6] - (cage[:, 2] > 1.0)))
+    pulled = cage.copy()
+    pulled[corner] += [0.3, 0.0, 0.08]
+
+    def weighed(p: Any) -> Drawing:
+        def draw(plotter: pv.Plotter) -> None:
+            surface = polydata_of(weights @ p, np.full(mesh.n_faces, 3), mesh.faces.ravel())
+            surface.point_data["weight"] = weights[:, corner]
+            add_surface(plotter, surface, scalars="weight", cmap=RISING)
+            add_wires(plotter, 5, box.faces, p)
+            add_balls(plotter, p[[corner]], HANDLE, 30.0)
+
+        return draw
+
+    write("influence", [weighed(cage), weighed(pulled)], np.concatenate([cage, pulled]))
+
+
+def handles() -> None:
+    """Draw what stays, what is dragged, and what becomes of the rest."""
+    parts = cactus()
+    mesh = parts["mesh"]
+    bent = bound(parts).solve(turned(mesh, parts["handle"], 60)).vertices
+    colours = np.tile(rgb(BODY), (mesh.n_faces, 1)).astype(float)
+    for name, colour in (("fixed", FIXED), ("handle", HANDLE)):
+        colours[np.isin(mesh.faces, parts[name]).all(axis=1)] = rgb(colour)
+    drawings = [body(mesh, None, colours), body(mesh, bent, colours)]
+    write("handles", drawings, np.concatenate([mesh.vertices, bent]))
+
+
+def exact_volume() -> None:
+    """Draw the paper's figure 7: the same bend with the volume free, and with it held."""
+    parts, free, held = bar()
+    poses = [free.vertices, held.vertices]
+    write("exact_volume", [body(parts["mesh"], x) for x in poses], np.concatenate(poses))
+
+
+def several() -> None:
+    """Draw the paper's figure 9: one cage bends what it should leave alone, several do not."""
+    mesh = sd.models.cactus(2500)
+    x, _, height = mesh.vertices.T
+    foot, tip = np.flatnonzero(height < 0.08), np.flatnonzero((x > 0.17) & (height > 0.75))
+    targets = turned(mesh, tip, 90, np.array([0.2, 0.0, 0.56]))
+    drawings, seen = [body(mesh)], [mesh.vertices]
+    for found in (sd.Regions.single(mesh), sd.segment(mesh, n_regions=5)):
+        fitted = sd.fit_cages(mesh, found, n_vertices=155)
+        deformer = sd.Deformer(mesh, found, fitted, fixed=foot, handle=tip)
+        seen.append(deformer.solve(targets).vertices)
+        drawings.append(body(mesh, seen[-1], region_colours(mesh, found.weights)))
+    write("several", drawings, np.concatenate(seen))
+
+
+def local_volume() -> None:
+    """Draw where the body swells and where it is pinched."""
+    parts = cactus()
+    mesh = parts["mesh"]
+    x = bound(parts).solve(turned(mesh, parts["handle"], 60)).vertices
+    picture_volume_change(FOLDER / "local_volume.png", mesh, x, sd.local_volume_change(mesh, x))
+
+
+def pipeline() -> None:
+    """Draw what comes out of the filter for three settings of it."""
+    parts = cactus(2500)
+    bend = SegmentedCageDeformFilter()
+    bend.SetInputDataObject(0, to_polydata(parts["mesh"]))
+    bend.SetFixed(parts["fixed"])
+    bend.SetHandle(parts["handle"])
+    bend.SetRotationAxis(0, 1, 0)
+    poses = []
+    for angle, x, z in ((0, 0.0, 0.0), (30, 0.28, -0.08), (60, 0.49, -0.28)):
+        bend.SetRotationAngle(angle)
+        bend.SetTranslation(x, 0.0, z)
+        bend.Update()
+        poses.append(np.array(pv.wrap(bend.GetOutputDataObject(0)).points))
+    write("pipeline", [body(parts["mesh"], pose) for pose in poses], np.concatenate(poses))
+
+
+FIGURES: dict[str, tuple[Callable[[], None], int]] = {
+    "front": (front, 3),
+    "regions": (regions, 3),
+    "cages": (cages, 2),
+    "influence": (influence, 2),
+    "handles": (handles, 2),
+    "exact_volume": (exact_volume, 2),
+    "several": (several, 3),
+    "local_volume": (local_volume, 0),
+    "pipeline": (pipeline, 3),
+    "volume_along": (volume_along_a_step, 0),
+    "convergence": (convergence, 0),
+}
+"""What draws each, and how many files it is that are compared; 0 for a single one, NAME.png."""
+
+
+def files(name: str) -> list[str]:
+    """Return the files that a figure is written to."""
+    count = FIGURES[name][1]
+    return [f"{name}-{k}.png" for k in range(1, count + 1)] if count else [f"{name}.png"]
+
+
+if __name__ == "__main__":
+    for wanted in sys.argv[1:]:
+        FIGURES[wanted][0]()
