@@ -65,6 +65,17 @@ def as_ids(ids: ArrayLike, n_points: int, name: str) -> IntArray:
     return array
 
 
+def is_number(value: object, least: float = -np.inf) -> bool:
+    """Tell whether *value* is one finite real number, *least* or more."""
+    real = isinstance(value, int | float | np.integer | np.floating)
+    return real and least <= value < np.inf and not isinstance(value, bool)  # type: ignore[operator]
+
+
+def is_whole(value: object, least: int, most: float = np.inf) -> bool:
+    """Tell whether *value* is one whole number in *least*..*most*, be it written 4 or 4.0."""
+    return is_number(value, least) and value <= most and value % 1 == 0  # type: ignore[operator]
+
+
 def frozen(array: NDArray[np.generic]) -> NDArray[np.generic]:
     """Return *array* marked read-only, so that sharing it is safe."""
     array.flags.writeable = False
@@ -76,9 +87,11 @@ def _as_numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
     if array.dtype.kind == "c":
         raise ArgumentError(f"{name} must hold real numbers; got {array.dtype}")
     try:
-        return array.astype(np.float64, copy=False)
-    except (TypeError, ValueError):
-        raise ArgumentError(f"{name} must hold numbers; got {array.dtype}") from None
+        if array.dtype.kind in "biufO":
+            return array.astype(np.float64, copy=False)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise ArgumentError(f"{name} must hold numbers; got {array.dtype}")
 
 
 def plain(values: ArrayLike, name: str) -> NDArray[Any]:

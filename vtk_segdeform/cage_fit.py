@@ -25,7 +25,7 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 
-from .arrays import FloatArray, IntArray, as_ids
+from .arrays import FloatArray, IntArray, as_ids, is_number, is_whole
 from .cages import Cage, cage_faults
 from .caging.cage_simplify import roundness, simplify
 from .caging.columns import inside_points
@@ -132,9 +132,9 @@ def _share_out(patches: list[Patch], n_vertices: int) -> IntArray:
     The root of length over width gives long regions, which bend, their share.
     """
     fewest, most = _FEWEST * len(patches), _MOST * len(patches)
-    if n_vertices != int(n_vertices) or not fewest <= n_vertices <= most:
+    if not is_whole(n_vertices, fewest, most):
         each = f"at least {_FEWEST} and at most {_MOST} for each of {len(patches)} regions"
-        raise CageError(f"n_vertices must be {each}, {fewest} to {most}; got {n_vertices}")
+        raise CageError(f"n_vertices must be {each}, {fewest} to {most}; got {n_vertices!r}")
     area = np.array([patch.area for patch in patches])
     spread = np.array([patch.spread for patch in patches])
     need = np.sqrt(area * spread.sum(axis=1) / spread[:, 1:].sum(axis=1))
@@ -146,8 +146,8 @@ def _share_out(patches: list[Patch], n_vertices: int) -> IntArray:
 
 def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) -> Cage:
     """Return the first good cage, or the better of the first two that are merely valid."""
-    if offset is not None and not 0.0 < offset < np.inf:
-        raise CageError(f"offset must be a positive length; got {offset}")
+    if offset is not None and not (is_number(offset) and offset > 0.0):
+        raise CageError(f"offset must be a positive length; got {offset!r}")
     length = float(np.sqrt(patch.area / n))
     offset = _OFFSET * length if offset is None else offset
     valid: list[tuple[float, FloatArray, IntArray]] = []

@@ -18,6 +18,8 @@ from .surface.inside import distance_to_surface, winding_number
 from .surface.intersections import flat_faces, self_intersections
 from .surface.manifold import components, connectivity_faults, counted
 
+_LARGEST = 1e70  # as of a mesh, see `faults`
+
 __all__ = ["Cage", "cage_faults", "self_intersections", "winding_number"]
 
 
@@ -55,7 +57,9 @@ class Cage:
         triangles = as_faces(faces, len(points), "faces").copy()
         faults = cage_faults(points, triangles)
         if faults:
-            raise CageError("not a valid cage: " + "; ".join(faults))
+            raise CageError(
+                f"not a valid cage: {'; '.join(faults)}; mend it, or let fit_cages make one"
+            )
         points.flags.writeable = triangles.flags.writeable = False
         object.__setattr__(self, "vertices", points)
         object.__setattr__(self, "faces", triangles)
@@ -108,6 +112,8 @@ def cage_faults(vertices: ArrayLike, faces: ArrayLike) -> tuple[str, ...]:
     """
     points = as_points(vertices, "vertices")
     triangles = as_faces(faces, len(points), "faces")
+    if np.abs(points).max(initial=0.0) > _LARGEST:
+        return (f"its vertices are too large to compute with, above {_LARGEST:.0e}: scale it down",)
     faults = connectivity_faults(len(points), triangles)
     return tuple(faults or _flat_faults(points, triangles) or _solid_faults(points, triangles))
 

@@ -32,13 +32,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from .arrays import FloatArray, IntArray
+from .arrays import FloatArray, IntArray, is_number
 from .differential import (
     area_gradients,
     cotangent_laplacian,
     mean_curvature_normals,
     mixed_voronoi_areas,
 )
+from .errors import ArgumentError
 from .mesh import Mesh
 from .rotations import closest_rotations
 from .subspace import Subspace
@@ -104,8 +105,8 @@ def shape_energy(mesh: Mesh, subspace: Subspace, stretch: float, groups: IntArra
     groups : (n,) int or None
         The rotation group of each vertex; None gives each vertex its own rotation.
     """
-    if not 0.0 <= stretch < np.inf:
-        raise ValueError(f"stretch must be a number, 0 or more; got {stretch}")
+    if not is_number(stretch, 0.0):
+        raise ArgumentError(f"stretch must be a number, 0 or more; got {stretch!r}")
     n, vertices, faces = mesh.n_vertices, mesh.vertices, mesh.faces
     areas = mixed_voronoi_areas(vertices, faces)
     laplacian = cotangent_laplacian(vertices, faces)

@@ -9,6 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
 
+from .arrays import as_ids, plain
+from .errors import ArgumentError
+
+_MOST_POINTS = 2**62
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -64,15 +69,15 @@ class SettingsOfAFilter(VTKPythonAlgorithmBase):  # type: ignore[misc]
 
     def SetFixed(self, points: ArrayLike) -> None:  # noqa: N802
         """Tell the points that stay by their numbers, instead of by an array."""
-        self._set(fixed=tuple(np.asarray(points, dtype=np.int64).ravel().tolist()))
+        self._set(fixed=_numbers(points))
 
     def SetHandle(self, points: ArrayLike) -> None:  # noqa: N802
         """Tell the points that are moved by their numbers, instead of by an array."""
-        self._set(handle=tuple(np.asarray(points, dtype=np.int64).ravel().tolist()))
+        self._set(handle=_numbers(points))
 
     def SetTargets(self, targets: ArrayLike | None) -> None:  # noqa: N802
         """Send the handle's points, in their order, to (k, 3) places; None for a motion instead."""
-        rows = None if targets is None else np.asarray(targets, dtype=np.float64).tolist()
+        rows = None if targets is None else _places(targets)
         self._set(targets=None if rows is None else tuple(map(tuple, rows)))
 
     def SetTranslation(self, x: float, y: float, z: float) -> None:  # noqa: N802
@@ -104,3 +109,19 @@ class SettingsOfAFilter(VTKPythonAlgorithmBase):  # type: ignore[misc]
         if settings != self._settings:
             self._settings = settings
             self.Modified()
+
+
+def _places(targets: ArrayLike) -> list[list[float]]:
+    array = plain(targets, "targets")
+    if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "iuf":
+        raise ArgumentError(
+            f"targets must be (k, 3) real numbers; got {array.dtype} of shape {array.shape}"
+        )
+    return array.astype(np.float64).tolist()  # whether they are finite, the pipeline tells
+
+
+def _numbers(points: ArrayLike) -> tuple[int, ...]:
+    """Return numbers of points, or those a mask marks; whether they are there, the input tells."""
+    array = plain(points, "points")
+    ids = np.flatnonzero(array) if array.dtype == bool and array.ndim == 1 else array
+    return tuple(as_ids(ids, _MOST_POINTS, "points").tolist())

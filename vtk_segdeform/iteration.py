@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .acceleration import Anderson
-from .arrays import FloatArray
+from .arrays import FloatArray, is_number, is_whole
 from .curvature import Factor
+from .errors import ArgumentError
 from .solution import Status
 
 _OLD, _LONG = 20, 1e-2  # steps after which the curvature is looked at again; or after one as long
@@ -25,12 +26,14 @@ class SolverOptions:
     exact_volume: bool = True  # False leaves the linearised multiplier of (21), for comparison
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.tolerance < math.inf:
-            raise ValueError(f"tolerance must be a positive number; got {self.tolerance}")
-        if self.max_steps != int(self.max_steps) or self.max_steps < 1:
-            raise ValueError(f"max_steps must be a whole number, 1 or more; got {self.max_steps}")
-        if self.window != int(self.window) or self.window < 0:
-            raise ValueError(f"window must be a whole number, 0 or more; got {self.window}")
+        if not (is_number(self.tolerance) and self.tolerance > 0.0):
+            raise ArgumentError(f"tolerance must be a positive number; got {self.tolerance!r}")
+        for name, least in (("max_steps", 1), ("window", 0)):
+            value = getattr(self, name)
+            if not is_whole(value, least):
+                raise ArgumentError(
+                    f"{name} must be a whole number, {least} or more; got {value!r}"
+                )
 
 
 @dataclass(eq=False)

@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import BoolArray, FloatArray, IntArray
+from .arrays import BoolArray, FloatArray, IntArray, is_number, is_whole, plain
 from .blending import border_distance, distance_to_triangles, shares
 from .errors import RegionError
 from .mesh import Mesh, require_mesh
@@ -64,7 +64,7 @@ class Regions:
 
     def __post_init__(self) -> None:
         require_mesh(self.mesh)
-        membership = np.array(self.membership)
+        membership = plain(self.membership, "membership").copy()
         n = self.mesh.n_vertices
         if membership.dtype != bool or membership.ndim != 2 or membership.shape[1] != n:
             raise RegionError(
@@ -81,8 +81,8 @@ class Regions:
             raise RegionError(
                 f"{len(bare)} vertices lie in no region: {_some(bare)}; add them to a region"
             )
-        if not self.smoothness > 0.0:
-            raise RegionError(f"smoothness must be above 0; got {self.smoothness}")
+        if not (is_number(self.smoothness) and self.smoothness > 0.0):
+            raise RegionError(f"smoothness must be a number above 0; got {self.smoothness!r}")
         membership.flags.writeable = False
         object.__setattr__(self, "membership", membership)
 
@@ -95,7 +95,7 @@ class Regions:
     @classmethod
     def from_masks(cls, mesh: Mesh, masks: ArrayLike) -> Regions:
         """Return the regions that (r, n) bool *masks* describe, as they are."""
-        return cls(mesh, np.atleast_2d(np.asarray(masks)))
+        return cls(mesh, np.atleast_2d(plain(masks, "masks")))
 
     @classmethod
     def from_labels(cls, mesh: Mesh, labels: ArrayLike, overlap: int = 4) -> Regions:
@@ -125,7 +125,7 @@ class Regions:
         array([[1, 1, 1, 0],
                [0, 0, 0, 1]])
         """
-        array = np.asarray(labels)
+        array = plain(labels, "labels")
         if array.shape != (mesh.n_vertices,) or array.dtype.kind not in "iu":
             raise RegionError(
                 f"labels must be one integer for each of the {mesh.n_vertices} vertices; "
@@ -167,13 +167,15 @@ class Regions:
 
     def grow(self, rings: int) -> Regions:
         """Return the same regions, each with *rings* more rings of neighbours."""
-        if rings != int(rings) or rings < 0:
+        if not is_whole(rings, 0):
             raise RegionError(f"rings must be a whole number, 0 or more; got {rings}")
         membership = self.membership.copy()
         i, j = self.mesh.edges.T
         for members in membership:
             for _ in range(int(rings)):
-                touched = members[i] | members[j]
+                touched = members[i] != members[j]
+                if not touched.any():
+                    break
                 members[i[touched]] = members[j[touched]] = True
         return Regions(self.mesh, membership, self.smoothness)
 

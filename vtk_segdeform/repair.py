@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import FloatArray, IntArray
-from .errors import MeshError
+from .arrays import FloatArray, IntArray, is_number, is_whole
+from .errors import ArgumentError, MeshError
 from .faults import HOPELESS, as_soup, find_faults
 from .surface import repair_steps as steps
 from .surface.report import MeshReport
@@ -84,6 +84,10 @@ def repair(
     >>> mended.face_map, mended.report.ok
     (array([ 0,  1,  2, -1]), True)
     """
+    if not is_number(weld_distance, 0.0):
+        raise ArgumentError(f"weld_distance must be a length, 0 or more; got {weld_distance!r}")
+    if not is_whole(largest_hole, 0):
+        raise ArgumentError(f"largest_hole must be a whole number of edges; got {largest_hole!r}")
     points, triangles = as_soup(vertices, faces)
     report = find_faults(points, triangles)
     hopeless = [

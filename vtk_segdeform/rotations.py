@@ -19,7 +19,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arrays import FloatArray, IntArray
+from .arrays import FloatArray, IntArray, is_whole
+from .errors import ArgumentError
 from .fast import compiled, inputs
 
 _TIMES = 40  # as long as a face of a volume takes each
@@ -78,8 +79,8 @@ def group_by_position(positions: FloatArray, n_groups: int, *, rounds: int = 5) 
 
 def rotation_groups(positions: FloatArray, parts: IntArray, n_groups: int) -> IntArray:
     """Return (n,) int: about *n_groups* clusters of position, none of which spans two *parts*."""
-    if n_groups != int(n_groups) or n_groups < 1:
-        raise ValueError(f"rotation groups must be a whole number, 1 or more; got {n_groups}")
+    if not is_whole(n_groups, 1):
+        raise ArgumentError(f"rotation groups must be a whole number, 1 or more; got {n_groups!r}")
     groups = np.empty(len(positions), dtype=np.int64)
     used = 0
     for k in range(int(parts.max()) + 1):

@@ -22,7 +22,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from .arrays import FloatArray, IntArray
+from .arrays import FloatArray, IntArray, is_whole
 from .errors import RegionError
 from .mesh import Mesh, require_mesh
 from .progress import Progress
@@ -85,8 +85,8 @@ def segment(
     """
     require_mesh(mesh)
     n = mesh.n_vertices
-    if n_regions is not None and not (1 <= n_regions <= n and n_regions == int(n_regions)):
-        raise RegionError(f"n_regions must be a whole number in 1..{n}; got {n_regions}")
+    if n_regions is not None and not is_whole(n_regions, 1, n):
+        raise RegionError(f"n_regions must be a whole number in 1..{n}; got {n_regions!r}")
     _tell(progress, 0.0, "thinning out vertices")
     shape = _without_ties(mesh)
     if n_regions is not None and n_regions <= mesh.components.max() + 1:

@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, IntArray, as_points, frozen
+from ..arrays import FloatArray, IntArray, as_points, frozen, plain
 from ..errors import ConstraintError
 from ..mesh import Mesh
 from ..positions import checked_constraints
@@ -154,11 +154,13 @@ def require_near(mesh: Mesh, points: FloatArray, name: str) -> None:
 
 def moved(points: FloatArray, matrix: ArrayLike) -> FloatArray:
     """Return (k, 3) *points* under an affine (4, 4) *matrix*; ConstraintError if it is none."""
-    M = np.asarray(matrix, dtype=np.float64)
+    M = plain(matrix, "the matrix")
+    if M.dtype.kind not in "iuf":
+        raise ConstraintError(f"the matrix must hold real numbers; got {M.dtype}")
     if not np.array_equal(M[3], [0.0, 0.0, 0.0, 1.0]):
         raise ConstraintError(f"the last row of the matrix must be 0 0 0 1; got {M[3]}")
     if not np.isfinite(M).all():
-        raise ConstraintError("the matrix holds NaN or infinite numbers")
+        raise ConstraintError("the matrix holds NaN or infinite numbers; all must be finite")
     return np.asarray(points @ M[:3, :3].T + M[:3, 3])
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csgraph
 
-from ..arrays import BoolArray, FloatArray, as_ids
+from ..arrays import BoolArray, FloatArray, as_ids, is_whole
 from ..errors import RegionError
 from ..mesh import Mesh
 from ..regions import Regions
@@ -119,6 +119,8 @@ def split(
         )
     if overlap is None:
         overlap = max(2, round(_OVERLAP * np.sqrt(np.count_nonzero(whole) / 2)))
+    elif not is_whole(overlap, 0):
+        raise RegionError(f"overlap must be a whole number, 0 or more; got {overlap!r}")
     membership = regions.membership.copy()
     membership[region] = _grown(mesh, first, overlap) & whole
     second = _grown(mesh, second, overlap) & whole
@@ -147,8 +149,10 @@ def _far_half(mesh: Mesh, whole: BoolArray) -> BoolArray:
 def _grown(mesh: Mesh, mask: BoolArray, rings: int) -> BoolArray:
     mask = mask.copy()
     i, j = mesh.edges.T
-    for _ in range(rings):
-        touched = mask[i] | mask[j]
+    for _ in range(int(rings)):
+        touched = mask[i] != mask[j]
+        if not touched.any():
+            break
         mask[i[touched]] = mask[j[touched]] = True
     return mask
 
