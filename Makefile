@@ -4,6 +4,7 @@
 #   make test       the whole suite            make campaign   the minutes-long runs
 #   make lint       ruff, nothing changed      make format     ruff, files rewritten
 #   make test-paraview   the plugin in a real ParaView
+#   make docs       the documentation, docs/build/html/index.html
 #   make types      mypy --strict              make bench      the table of timings
 #
 # The first call makes a virtual environment in .venv; choose its Python with
@@ -21,9 +22,9 @@ ifeq ($(shell uname -s)$(DISPLAY)$(WAYLAND_DISPLAY),Linux)
 export VTK_DEFAULT_OPENGL_WINDOW ?= vtkEGLRenderWindow
 endif
 
-.PHONY: help demo test test-paraview campaign lint format types bench clean
+.PHONY: help demo test test-paraview campaign docs lint format types bench clean
 help:
-	@sed -n '3,9s/^# *//p' Makefile
+	@sed -n '3,10s/^# *//p' Makefile
 
 demo: $(VENV)/installed
 	$(BIN)/segdeform demo -o demo-output
@@ -45,6 +46,11 @@ test-paraview: $(VENV)/installed-test
 campaign: $(VENV)/installed-test
 	$(BIN)/python -m pytest -m campaign
 
+# Pictures, gallery and the table of keys are made anew where the code is newer.
+docs: $(VENV)/installed-docs
+	$(BIN)/python -m sphinx -q -W --keep-going -d docs/build/doctrees docs docs/build/html
+	@echo "docs/build/html/index.html"
+
 lint: $(VENV)/installed-test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -61,6 +67,7 @@ types: $(VENV)/installed-test
 
 clean:
 	rm -rf $(VENV) build dist demo-output *.egg-info .mypy_cache .pytest_cache .ruff_cache
+	rm -rf docs/build docs/figures docs/gallery
 
 # A stamp is older than setup.cfg when a dependency may have changed; then, and only then, pip runs.
 $(VENV)/installed: setup.cfg pyproject.toml | $(BIN)/python
@@ -69,6 +76,10 @@ $(VENV)/installed: setup.cfg pyproject.toml | $(BIN)/python
 
 $(VENV)/installed-test: setup.cfg pyproject.toml | $(BIN)/python
 	$(PIP) install --editable '.[test,qt,meshlab,fast]'
+	@touch $@ $(VENV)/installed
+
+$(VENV)/installed-docs: setup.cfg pyproject.toml | $(BIN)/python
+	$(PIP) install --editable '.[docs]'
 	@touch $@ $(VENV)/installed
 
 $(BIN)/python:
