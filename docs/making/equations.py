@@ -1,12 +1,12 @@
 r"""Formulas as MathML, which browsers set themselves; displayed ones with the paper's numbers.
 
     .. equation:: 13
-       :name: step
 
        h = -H^{-1} (d + G^T \lambda)
 
-is shown with "(13)" beside it, and ``:ref:`eq-13``` leads there from any page.  A number may be
-any short word; without one, none is shown.  Nothing is loaded from elsewhere and no script runs.
+is shown with "(13)" beside it; an empty line begins another formula of the same number.
+``:ref:`eq-13``` leads there from any page.  Without a number, none is shown.  Nothing is loaded
+from elsewhere and no script runs.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any
 from docutils import nodes
 from latex2mathml.converter import convert
 from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 
 
@@ -29,23 +30,23 @@ class Equation(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """Return the formula, in a frame with its number."""
-        latex = " ".join(self.content)
-        number = self.arguments[0] if self.arguments else ""
-        block = nodes.math_block(latex, latex, number=None, label=None)
-        frame = nodes.container("", block, classes=["equation"])
-        if number:
-            first = number.partition("–")[0].split(",")[0]
-            name = f"eq-{nodes.make_id(first) if not first.isdigit() else first}"
-            frame["ids"].append(name)
+        formulas = "\n".join(self.content).split("\n\n")
+        blocks = [nodes.math_block(f, f, number=None, label=None) for f in formulas]
+        frame = nodes.container("", nodes.container("", *blocks), classes=["equation"])
+        if self.arguments:
+            number = self.arguments[0]
+            frame["ids"].append(f"eq-{number}")
             frame += nodes.inline("", f"({number})", classes=["number"])
-            standard = self.env.get_domain("std")
-            standard.labels[name] = self.env.docname, name, f"({number})"  # type: ignore[attr-defined]
+            labels = self.env.domains.standard_domain.labels
+            labels[f"eq-{number}"] = self.env.docname, f"eq-{number}", f"({number})"
         return [frame]
 
 
 def as_mathml(latex: str, display: str) -> str:
     """Return a formula as MathML; whoever reads its source finds the LaTeX beside it."""
     made = convert(latex, display=display)
+    if "\\" in made:
+        raise ExtensionError(f"the formula {latex} has a command that is not understood")
     return made.replace("<math ", f'<math alttext="{html.escape(latex)}" ', 1)
 
 

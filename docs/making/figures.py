@@ -1,8 +1,8 @@
 """The pictures of the pages, each drawn from the mesh that the page speaks of.
 
-``python -m making.figures NAME ...`` draws some.  Pictures that are compared are files of their own,
-NAME-1.png, NAME-2.png ..., seen by one camera at one scale: the page sets captions below them, and
-on a narrow screen sets them below each other.
+``python -m making.figures NAME ...`` draws some.  Pictures that are compared are files of their
+own, NAME-1.png, NAME-2.png ..., seen by one camera at one scale: the page sets captions below
+them, and on a narrow screen sets them below each other.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ def volume_along_a_step() -> None:
     slope = cubic.deriv()(0.0)
     guess = (100.0 - cubic(0.0)) / slope
     root = min(r.real for r in (cubic - 100.0).roots() if abs(r.imag) < 1e-9 and r.real > 0.0)
-    t = np.linspace(0.0, 1.2 * guess, 200)
+    t = np.linspace(0.0, 1.5 * guess, 200)
 
     figure, axes = new_figure()
     axes.axhline(100.0, color=INK, lw=1, ls=":")
@@ -39,8 +39,7 @@ def volume_along_a_step() -> None:
     axes.plot([root], [100.0], color=OURS, marker="o")
     words = f"linear step: {cubic(guess):.1f} %"
     axes.annotate(words, (guess, cubic(guess)), (-8, 6), ha="right", **BESIDE)
-    axes.annotate("root of the cubic: 100 %", (root, 100.0), (2, -42), ha="center", **BESIDE,
-                  arrowprops={"arrowstyle": "-", "color": OURS})  # fmt: skip
+    axes.annotate("root of the cubic: 100 %", (root, 100.0), (10, -26), **BESIDE)
     axes.annotate("at rest", (0.0, 100.0), (0, 5), **BESIDE)
     axes.set(xlabel="step $t$", ylabel="volume [%]")
     figure.savefig(FOLDER / "volume_along.png", dpi=150)
