@@ -81,7 +81,7 @@ STORY = [
     "widgets.app.lock", "widgets.app.autosave", "widgets.app.documents", "widgets.app.recent",
     "widgets.app.keeper", "widgets.app.opening", "widgets.app.start_page", "widgets.app.drops",
     "widgets.app.pages", "widgets.app.asking", "widgets.app.saving", "widgets.app.menus",
-    "widgets.app.window",
+    "widgets.app.window", "widgets.app.none_count",
     # the command line
     "command_line.selection", "command_line.motion", "command_line.outputs", "command_line.demo",
     "command_line.interactive", "command_line.bench", "command_line.commands",
@@ -95,6 +95,7 @@ KERNELS = {"volumes", "products", "rotations", "coordinates"}
 PANEL = {"controls", "modes", "painting", "regions", "handles", "options", "foot", "log", "panel"}
 PROGRAM = {
     "keeper", "opening", "start_page", "drops", "pages", "asking", "saving", "menus", "window",
+    "none_count",
 }  # fmt: skip
 GRANTED = {
     **{f"compiled.{name}": {"numba"} for name in KERNELS},
