@@ -5,7 +5,7 @@
 #   make lint       ruff, nothing changed      make format     ruff, files rewritten
 #   make test-paraview   the plugin in a real ParaView
 #   make docs       the documentation, docs/build/html/index.html
-#   make types      mypy --strict              make bench      the table of timings
+#   make types      mypy --strict              make bench      a report of timings
 #
 # The first call makes a virtual environment in .venv; choose its Python with
 # `make PYTHON=python3.12 test`.
@@ -30,7 +30,7 @@ demo: $(VENV)/installed
 	$(BIN)/segdeform demo -o demo-output
 
 bench: $(VENV)/installed
-	$(BIN)/segdeform bench
+	$(BIN)/segdeform bench -o bench-output
 
 test: $(VENV)/installed-test
 	$(BIN)/python -m pytest -n 2

@@ -210,12 +210,15 @@ def test_the_interactive_bench_drags_in_a_window_and_splits_the_time_of_an_event
     assert int(cells[" steps "]) >= 1
 
 
-def test_bench_prints_a_table_with_a_row_for_each_number_of_regions(capsys):
-    assert main(["bench", "--size", "1000", "--cage-vertices", "80"]) == 0
-    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("|")]
-    assert len({row.count("|") for row in rows}) == 1
-    assert [row.split("|")[1].strip() for row in rows[2:]] == ["1", "3", "6"]
-    assert all(float(row.split("|")[-2]) < 1e-12 for row in rows[2:])
+def test_bench_leaves_a_report_and_says_what_does_not_hold(tmp_path, capsys):
+    size = ["--quick", "--size", "800", "--cage-vertices", "60"]
+    assert main(["bench", *size, "--only", "table1", "-o", str(tmp_path / "out")]) == 0
+    written = (tmp_path / "out" / "report.md").read_text()
+    assert "Table 1" in written
+    assert "800 vertices, 60 cage vertices" in written
+    told = capsys.readouterr().out.splitlines()
+    assert told[-1].endswith("report.md")
+    assert sum("gain of the products with W" in line for line in told) == 2
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from . import __version__
+from .benchmarks.report import EXPERIMENTS
 from .command_line import commands
 from .command_line.application import application
 from .command_line.bench import bench
@@ -185,8 +186,17 @@ def _parser() -> argparse.ArgumentParser:
     _input_output(sub, required=False)
     _subspace(sub)
 
-    sub = command("bench", bench, "time set-up and solving, as a Markdown table")
-    sub.add_argument("--size", type=_count, default=5430, metavar="N", help="mesh vertices (5430)")
+    sub = command("bench", bench, "measure against the paper and its peers; write a report")
+    sub.add_argument("-o", "--output", type=Path, default=Path("bench-output"), metavar="FOLDER")
+    much = sub.add_mutually_exclusive_group()
+    much.add_argument("--quick", action="store_true", help="small sizes, a few minutes")
+    much.add_argument("--full", action="store_true", help="up to a million vertices, an hour")
+    sub.add_argument(
+        "--only", action="append", default=[], choices=list(EXPERIMENTS), help="may be given again"
+    )
+    sub.add_argument(
+        "--size", type=_count, default=None, metavar="N", help="mesh vertices, one size"
+    )
     sub.add_argument("--cage-vertices", type=_count, default=155, metavar="N", help="in all (155)")
     sub.add_argument("--interactive", action="store_true", help="time a drag in a window instead")
     return parser

@@ -1,0 +1,1 @@
+"""Measurements: the paper's experiments, and its peers, each in one file; `report` runs them."""

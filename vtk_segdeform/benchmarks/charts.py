@@ -1,0 +1,108 @@
+"""Plots of the report, by matplotlib, without a window and without pyplot's global state.
+
+Colours are those of `palette`, and every line has a marker of its own: a plot reads in print.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import MissingDependencyError
+from ..palette import COLOURS, INK
+
+_MARKERS = "osD^vP*"
+_ORDER = (5, 0, 2, 3, 1, 6, 4)  # of the colours: those that print darkest first
+
+
+def line_plot(
+    path: Path,
+    x: Sequence[float],
+    panels: Mapping[str, Mapping[str, Sequence[float]]],
+    *,
+    across: str,
+    logarithmic: bool = False,
+) -> None:
+    """Write panels side by side: {what goes up: {name of a line: values over x}}.
+
+    Parameters
+    ----------
+    path : Path
+        A PNG file to write.
+    x : (k,) float
+        Shared by all lines.
+    panels : mapping
+        A panel for each quantity, with a line for each name.
+    across : str
+        What *x* is.
+    logarithmic : bool
+        Draw both axes by powers of ten.
+    """
+    figure, axes = _figure(len(panels))
+    for axis, (label, lines) in zip(axes, panels.items(), strict=True):
+        for k, (name, values) in enumerate(lines.items()):
+            colour = COLOURS[_ORDER[k % len(_ORDER)]]
+            axis.plot(x, values, marker=_MARKERS[k % len(_MARKERS)], color=colour, label=name)
+        axis.set_ylabel(label)
+        axis.set_xlabel(across)
+        if logarithmic:
+            axis.set_xscale("log")
+            axis.set_yscale("log")
+            axis.yaxis.set_major_formatter("{x:g}")
+            axis.set_xticks([], minor=True)
+            axis.set_xticks(list(x), [f"{size:,.0f}" for size in x])
+        else:
+            axis.set_ylim(bottom=0.0)
+            axis.set_xticks(list(x))
+        # Beside a panel or over it, where no line is hidden.
+        if len(panels) == 1:
+            axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+        elif len(lines) > 1:
+            axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
+    figure.savefig(path)
+
+
+def stack_plot(
+    path: Path, names: Sequence[str], parts: Mapping[str, Sequence[float]], *, across: str
+) -> None:
+    """Write a bar for each of *names*, as shares of its whole: {part: value under each name}."""
+    figure, (axis,) = _figure(1)
+    axis.grid(visible=False)
+    wholes = [sum(values) for values in zip(*parts.values(), strict=True)]
+    start = [0.0] * len(names)
+    for k, (part, values) in enumerate(parts.items()):
+        share = [100.0 * v / whole for v, whole in zip(values, wholes, strict=True)]
+        colour = COLOURS[_ORDER[k % len(_ORDER)]]
+        axis.barh(names, share, left=start, height=0.6, color=colour, label=part)
+        for row, (left, width, value) in enumerate(zip(start, share, values, strict=True)):
+            if width > 7.0:
+                dark = k in (0, 2, 5)
+                axis.text(
+                    left + 0.5 * width, row, f"{value:.3g}", ha="center", va="center",
+                    color="white" if dark else INK,
+                )  # fmt: skip
+        start = [a + b for a, b in zip(start, share, strict=True)]
+    axis.set_xlabel(across)
+    axis.set_xlim(0.0, 100.0)
+    axis.invert_yaxis()
+    figure.legend(loc="outside lower center", ncols=len(parts), frameon=False)
+    figure.savefig(path)
+
+
+def _figure(n_panels: int) -> tuple[Any, Any]:
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise MissingDependencyError(
+            "plots need matplotlib: pip install 'vtk-segdeform[bench]'"
+        ) from None
+    figure = Figure(figsize=(max(4.2 * n_panels, 7.0), 3.8), dpi=150, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(1, n_panels, squeeze=False)[0]
+    for axis in axes:
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.grid(color="#E5E5E5", linewidth=0.8)
+        axis.set_axisbelow(True)
+    return figure, axes

@@ -1,0 +1,82 @@
+"""A drag, frame by frame, each solved as far as an eye can tell.
+
+A frame has *converged* when the next step moves no vertex by more than 1e-4 of the diagonal.  How
+many steps that takes is found by looking; then the frame is done again, from the same pose, in
+one call of so many steps, and that is what is timed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from statistics import median
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..deformer import Deformer
+from ..solution import Solution
+from .measuring import timed
+from .tasks import NEAR, Task
+
+_MOST_STEPS = 300
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One frame of a drag."""
+
+    solution: Solution
+    steps: int
+    seconds: float
+
+
+def steps_to_rest(deformer: Deformer, targets: FloatArray) -> tuple[int, Solution]:
+    """Return after how many steps the next moves nothing by more than NEAR, and the pose there."""
+    near = NEAR * deformer.mesh.diagonal
+    here = deformer.solve(targets, max_steps=1)
+    for steps in range(1, _MOST_STEPS):
+        ahead = deformer.solve(targets, max_steps=1)
+        if np.linalg.norm(ahead.vertices - here.vertices, axis=1).max() <= near:
+            return steps, here
+        here = ahead
+    return _MOST_STEPS, here
+
+
+def frames(deformer: Deformer, way: Sequence[FloatArray]) -> Iterator[Frame]:
+    """Drag the handles along *way*, (k, 3) each, from where the deformer is at rest."""
+    deformer.reset()
+    cages: tuple[FloatArray, ...] = tuple(cage.vertices for cage in deformer.cages)
+    targets = deformer.mesh.vertices[deformer.handle]
+    for goal in way:
+        steps, _ = steps_to_rest(deformer, goal)
+        deformer.resume(cages, targets)
+        solution, seconds = timed(partial(deformer.solve, goal, max_steps=steps))
+        yield Frame(solution, steps, seconds)
+        cages, targets = solution.cage_vertices, goal
+
+
+def way_of(task: Task, moves: int) -> list[FloatArray]:
+    """Return targets that move on by 1 % of the diagonal, from rest."""
+    rest = task.mesh.vertices[task.handle]
+    aside = task.shifted(0.01).targets - task.targets
+    return [rest + (k + 1) * aside for k in range(moves)]
+
+
+def seconds_per_step(deformer: Deformer, task: Task, repeats: int) -> float:
+    """Return what one more step of a frame costs: the slope between few steps and many."""
+    rest = tuple(cage.vertices for cage in deformer.cages)
+    places = deformer.mesh.vertices[deformer.handle]
+    goal = way_of(task, 10)[-1]
+
+    def run(steps: int) -> Solution:
+        deformer.resume(rest, places)
+        return deformer.solve(goal, max_steps=steps)
+
+    few, many = run(2).steps, run(12).steps
+    if many == few:
+        return float("nan")
+    # Long and short by turns: what else the machine does slows both.
+    pairs = [(timed(lambda: run(12))[1], timed(lambda: run(2))[1]) for _ in range(repeats)]
+    return median(longer - shorter for longer, shorter in pairs) / (many - few)

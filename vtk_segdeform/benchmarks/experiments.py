@@ -1,0 +1,105 @@
+"""Figures 7, 8 and 9 of the paper, with a measure of distortion beside each picture.
+
+    7   with and without the volume held         the cactus, bent by 60 degrees
+    8   another model                            the dinosaur, its head turned back
+    9   one cage against three                   the cactus again
+
+The paper calls it distortion when a part of the shape changes much more than the others: bulges,
+dents.  So next to the mean over the surface stands what the worst hundredth exceeds.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from ..arrays import FloatArray
+from ..canvas import add_surface, view_of, write_panels
+from ..distortion import distortion, triangle_distortion
+from ..formats.polygons import polydata_of
+from ..mesh import Mesh
+from ..palette import INK
+from ..progress import Progress
+from ..solution import Solution
+from .scale import Scale
+from .sections import Cell, Figure, Section, Table
+from .tasks import Task, bent_cactus, bound, raised_neck
+
+COLUMNS = ("case", "volume %", "distortion", "worst hundredth", "handle error", "steps")
+_BAR = 0.17  # share of the height that a colour bar takes
+
+
+def run(scale: Scale, progress: Progress | None = None) -> Section:
+    """Return one table and one picture for each of the three figures."""
+    n = scale.n_cage_vertices
+    cactus, dinosaur = bent_cactus(scale.paper_size), raised_neck(max(scale.paper_size, 1000))
+    figures: dict[str, tuple[Task, dict[str, tuple[int, dict[str, Any]]]]] = {
+        "figure 7": (cactus, {
+            "volume held": (3, {}), "volume free": (3, {"preserve_volume": False}),
+            "free, detail only": (3, {"preserve_volume": False, "stretch": 0.0}),
+        }),
+        "figure 8": (dinosaur, {"one cage": (1, {}), "five regions": (5, {})}),
+        "figure 9": (cactus, {
+            "one cage": (1, {}), "three regions": (3, {}),
+            "three, detail only": (3, {"stretch": 0.0}),
+        }),
+    }  # fmt: skip
+    section = Section("Figures 7, 8 and 9")
+    for k, (name, (task, cases)) in enumerate(figures.items()):
+        poses: dict[str, FloatArray] = {}
+        rows = []
+        for case, (n_regions, options) in cases.items():
+            if progress:
+                progress(k / len(figures), f"{name}, {case}")
+            solution = bound(task, n_regions, n, **options).deformer.solve(task.targets)
+            poses[case] = solution.vertices
+            rows.append(row_of(case, task.mesh, solution))
+        section.tables.append(Table(COLUMNS, rows, f"{name}: {task.name}"))
+        caption = f"{name.capitalize()}: {', '.join(poses)}; coloured by distortion."
+        draw = partial(_draw, mesh=task.mesh, poses=poses)
+        section.figures.append(Figure(f"{name.replace(' ', '-')}.png", caption, draw))
+    return section
+
+
+def row_of(case: str, mesh: Mesh, solution: Solution) -> tuple[Cell, ...]:
+    """Return one row, under `COLUMNS`."""
+    return (
+        case,
+        100.0 * solution.volume_change,
+        distortion(mesh, solution.vertices),
+        worst_hundredth(mesh, solution.vertices),
+        solution.handle_error,
+        solution.steps,
+    )
+
+
+def worst_hundredth(mesh: Mesh, vertices: FloatArray) -> float:
+    """Return the distortion that a hundredth of the surface exceeds."""
+    each = triangle_distortion(mesh, vertices)
+    order = np.argsort(each)
+    share = np.cumsum(mesh.face_areas[order]) / mesh.face_areas.sum()
+    return float(each[order[np.searchsorted(share, 0.99)]])
+
+
+def _draw(path: Path, *, mesh: Mesh, poses: dict[str, FloatArray]) -> None:
+    """Draw the poses side by side, coloured by distortion on one scale."""
+    most = max(worst_hundredth(mesh, pose) for pose in poses.values())
+
+    def draw(plotter: pv.Plotter, pose: FloatArray) -> None:
+        surface = polydata_of(pose, np.full(mesh.n_faces, 3), mesh.faces.ravel())
+        surface.cell_data["distortion"] = triangle_distortion(mesh, pose)
+        add_surface(plotter, surface, scalars="distortion", cmap="cividis", clim=(0.0, most))
+        plotter.add_scalar_bar(
+            " ", n_labels=3, fmt="%.2g", color=INK, label_font_size=36,
+            width=0.7, height=0.1, position_x=0.15, position_y=0.02,
+        )  # fmt: skip
+
+    panels = [(name, partial(draw, pose=pose)) for name, pose in poses.items()]
+    everything = np.concatenate(list(poses.values()))
+    write_panels(
+        path, panels, everything, view_of(mesh.vertices, everything[: mesh.n_vertices]), foot=_BAR
+    )

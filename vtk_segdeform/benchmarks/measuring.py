@@ -1,0 +1,108 @@
+"""Clocks, memory, and a process of one's own to measure in.
+
+A time is the median of several; peak memory is that of a whole process, so that what is measured
+for it, and what may crash or fight over threads with what is there already, runs `apart`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import platform
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from pathlib import Path
+from typing import ParamSpec, TypeVar
+
+import numpy as np
+import scipy
+
+from .. import __version__
+from ..errors import MissingDependencyError
+from ..fast import compiled
+from ..threads import n_threads
+
+_T = TypeVar("_T")
+_P = ParamSpec("_P")
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+def timed(work: Callable[[], _T]) -> tuple[_T, float]:
+    """Return what *work* returns, and how many seconds it took."""
+    start = time.perf_counter()
+    result = work()
+    return result, time.perf_counter() - start
+
+
+def median_seconds(work: Callable[[], object], repeats: int) -> float:
+    """Return the median of *repeats* runs of *work*, after one that does not count."""
+    work()
+    return statistics.median(timed(work)[1] for _ in range(repeats))
+
+
+def forget_peak() -> None:
+    """Let `peak_memory` count from here on, where the system can (Linux)."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5")
+
+
+def peak_memory() -> float:
+    """Return the most memory this process has had, in gigabytes; NaN where nobody tells."""
+    status = Path("/proc/self/status")
+    if status.is_file():
+        for line in status.read_text().splitlines():
+            if line.startswith("VmHWM:"):
+                return float(line.split()[1]) / 1e6
+    try:
+        import resource
+    except ImportError:  # Windows
+        return float("nan")
+    unit = 1e9 if sys.platform == "darwin" else 1e6
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
+
+
+def apart(work: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> _T:
+    """Return what *work*, a function of a module, returns in a new process.
+
+    Raises
+    ------
+    MissingDependencyError
+        If the process died.
+    """
+    try:
+        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+            return pool.submit(work, *args, **kwargs).result()
+    except BrokenProcessPool:
+        raise MissingDependencyError("the process that ran it died") from None
+
+
+def called(own_process: bool, work: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> _T:
+    """Return what *work* returns, run `apart` or here."""
+    return apart(work, *args, **kwargs) if own_process else work(*args, **kwargs)
+
+
+def conditions() -> list[str]:
+    """Return what a reader has to know of the machine, one line each."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    limits = ", ".join(f"{name}={os.environ[name]}" for name in _THREADS if name in os.environ)
+    return [
+        f"{_processor()}; {cores} cores for this process; {platform.system()}",
+        f"Python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}, "
+        f"vtk_segdeform {__version__}",
+        f"{n_threads()} threads of our own, with{'' if compiled() else 'out'} compiled kernels; "
+        f"other libraries: {limits or 'as many as they like'}",
+    ]
+
+
+def _processor() -> str:
+    info = Path("/proc/cpuinfo")
+    if info.is_file():
+        for line in info.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()

@@ -1,0 +1,140 @@
+"""Other programs that deform the same task, each called as its own documentation says.
+
+All are optional and imported inside the call.  A program runs until its next iteration moves
+nothing by more than 1e-4 of the diagonal, or as many iterations as it may; one that cannot be
+asked (Open3D, Blender) runs as many as it is told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..errors import MissingDependencyError
+from .measuring import median_seconds, timed
+from .tasks import NEAR, Task
+
+_OPEN3D_ITERATIONS = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The pose (n, 3) that a program found, its seconds, and how often it went round."""
+
+    vertices: FloatArray
+    set_up: float
+    solve: float
+    iterations: int
+
+
+def until_rest(
+    start: FloatArray, near: float, most: int, iterate: Callable[[FloatArray], FloatArray]
+) -> tuple[FloatArray, int]:
+    """Return where *iterate* comes to rest from *start*, and after how many iterations."""
+    here = start
+    for count in range(1, most + 1):
+        ahead = iterate(here)
+        if np.linalg.norm(ahead - here, axis=1).max() <= near:
+            return ahead, count
+        here = ahead
+    return here, most
+
+
+def libigl_arap(task: Task, most: int) -> Answer:
+    """As-rigid-as-possible by libigl (spokes and rims)."""
+    (data, places), set_up = timed(lambda: _arap_data(task))
+    data.max_iter = 1
+    igl, near = _igl(), NEAR * task.mesh.diagonal
+    start = np.array(task.mesh.vertices)
+    (pose, count), solve = timed(
+        lambda: until_rest(start, near, most, lambda x: igl.arap_solve(places, data, x))
+    )
+    return Answer(np.asarray(pose), set_up, solve, count)
+
+
+def arap_iteration_seconds(task: Task, repeats: int) -> float:
+    """Return what one iteration of libigl's ARAP takes, its matrix factored already."""
+    data, places = _arap_data(task.shifted(0.0))
+    data.max_iter = 1
+    igl, start = _igl(), np.array(task.mesh.vertices)
+    return median_seconds(lambda: igl.arap_solve(places, data, start), repeats)
+
+
+def open3d_arap(task: Task, most: int) -> Answer:
+    """As-rigid-as-possible by Open3D, set-up and solve in one call."""
+    try:
+        import open3d
+    except (ImportError, OSError) as fault:
+        raise MissingDependencyError(f"open3d is not there ({fault})") from None
+    mesh = open3d.geometry.TriangleMesh(
+        open3d.utility.Vector3dVector(np.array(task.mesh.vertices)),
+        open3d.utility.Vector3iVector(task.mesh.faces.astype(np.int32)),
+    )
+    held = open3d.utility.IntVector(_held(task).astype(np.int32))
+    places = open3d.utility.Vector3dVector(_places(task))
+    count = min(most, _OPEN3D_ITERATIONS)
+    with open3d.utility.VerbosityContextManager(open3d.utility.VerbosityLevel.Error):
+        bent, solve = timed(lambda: mesh.deform_as_rigid_as_possible(held, places, max_iter=count))
+    return Answer(np.asarray(bent.vertices).copy(), 0.0, solve, count)
+
+
+def blender_laplacian(task: Task, most: int) -> Answer:
+    """Blender's Laplacian Deform modifier; every vertex that is held is an anchor."""
+    try:
+        import bpy
+    except (ImportError, OSError) as fault:
+        raise MissingDependencyError(f"bpy is not there ({fault})") from None
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    data = bpy.data.meshes.new("task")
+    data.from_pydata(task.mesh.vertices.tolist(), [], task.mesh.faces.tolist())
+    body = bpy.data.objects.new("task", data)
+    bpy.context.collection.objects.link(body)
+    bpy.context.view_layer.objects.active = body
+    anchors = body.vertex_groups.new(name="anchors")
+    anchors.add(_held(task).tolist(), 1.0, "REPLACE")
+    modifier: Any = body.modifiers.new("bend", "LAPLACIANDEFORM")
+    modifier.vertex_group, modifier.iterations = "anchors", min(most, _OPEN3D_ITERATIONS)
+    _, set_up = timed(lambda: bpy.ops.object.laplaciandeform_bind(modifier="bend"))
+    if not modifier.is_bind:
+        raise MissingDependencyError("Blender could not bind its modifier")
+    moved = np.array(task.mesh.vertices)
+    moved[task.handle] = task.targets
+
+    def evaluate() -> FloatArray:
+        data.vertices.foreach_set("co", moved.astype(np.float32).ravel())
+        data.update()
+        seen = body.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        out = np.empty(3 * len(moved), dtype=np.float32)
+        seen.vertices.foreach_get("co", out)
+        return out.reshape(-1, 3).astype(np.float64)
+
+    pose, solve = timed(evaluate)
+    return Answer(pose, set_up, solve, int(modifier.iterations))
+
+
+def _igl() -> Any:
+    try:
+        import igl
+    except ImportError as fault:
+        raise MissingDependencyError(f"libigl is not there ({fault})") from None
+    return igl
+
+
+def _arap_data(task: Task) -> tuple[Any, FloatArray]:
+    igl = _igl()
+    data = igl.ARAPData()
+    held = _held(task).astype(np.int32)
+    igl.arap_precomputation(task.mesh.vertices, task.mesh.faces, 3, held, data)
+    return data, _places(task)
+
+
+def _held(task: Task) -> np.ndarray[Any, np.dtype[np.int64]]:
+    return np.concatenate([task.fixed, task.handle])
+
+
+def _places(task: Task) -> FloatArray:
+    return np.concatenate([task.mesh.vertices[task.fixed], task.targets])
