@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scenes import sausage
 
-from vtk_segdeform import stand_in, subspace
+from vtk_segdeform import positions, stand_in, subspace
 from vtk_segdeform.constraints import region_volumes, total_volume
 from vtk_segdeform.stand_in import StandIn
 from vtk_segdeform.subspace import bind
@@ -89,3 +89,17 @@ def test_single_precision_is_the_papers_product_with_rounded_weights(monkeypatch
     double = SCENE.deformer().surface(solution.cage_vertices)
     away = np.linalg.norm(double - solution.vertices, axis=1).max()
     assert away < 1e-6 * SCENE.mesh.diagonal
+
+
+def test_neighbours_in_a_large_patch_share_a_place_and_are_held_no_worse(monkeypatch):
+    targets = SCENE.turned(40)
+    each = SCENE.deformer().solve(targets)
+    monkeypatch.setattr(positions, "_MANY", 20)
+    monkeypatch.setattr(positions, "_PLACES", 30)
+    deformer = SCENE.deformer()
+    assert len(deformer._solver.positions.rows) == 60
+    shared = deformer.solve(targets)
+    assert shared.handle_error < 1.5 * each.handle_error + 1e-4
+    assert shared.fixed_error < 1.5 * each.fixed_error + 1e-4
+    away = np.linalg.norm(shared.vertices - each.vertices, axis=1).max()
+    assert away < 4e-3 * SCENE.mesh.diagonal  # a quarter as many places

@@ -8,7 +8,6 @@ exact, as ever, while half as much memory is read.
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
 
 from .arrays import FloatArray, IntArray
 from .fast import compiled, inputs
@@ -54,9 +53,3 @@ def pieces(n: int, width: int) -> list[slice]:
     """Return 0..n in slices of rows whose dense arrays of *width* columns stay small."""
     size = max(_DENSE // width, 1)
     return [slice(start, min(start + size, n)) for start in range(0, n, size)]
-
-
-def picked(vertices: IntArray, n: int) -> sparse.csr_array:
-    """Return the (k, n) operator that picks *vertices*."""
-    k = len(vertices)
-    return sparse.csr_array((np.ones(k), vertices, np.arange(k + 1)), (k, n))

@@ -21,12 +21,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import FloatArray, IntArray, as_points
+from .arrays import FloatArray, IntArray, as_points, is_number, is_whole
 from .cage_stiffness import with_cage_stiffness
 from .cages import Cage
 from .constraints import VolumeConstraint, moved, region_volumes, restore, total_volume
 from .energy import shape_energy
-from .errors import CageError, ConstraintError, RegionError
+from .errors import ArgumentError, CageError, ConstraintError, RegionError
 from .iteration import Iteration, SolverOptions
 from .mesh import Mesh, require_mesh
 from .passengers import Passengers, board
@@ -126,6 +126,8 @@ class Deformer:
         self._centre = mesh.vertices.mean(axis=0)
         self._size = 2.0 * float(np.linalg.norm(mesh.vertices - self._centre, axis=1).max())
         self._rest = mesh.with_vertices(self._inward(mesh.vertices))
+        if not is_number(hold_tolerance, 0.0):
+            raise ArgumentError(f"hold_tolerance must be 0 or more; got {hold_tolerance!r}")
         self._hold_tolerance = hold_tolerance
         self._options = SolverOptions(tolerance, max_steps, window, exact_volume)
 
@@ -271,6 +273,8 @@ class Deformer:
         return np.array([each.violation(x) / each.target for each in self._region_volumes])
 
     def _rotation_groups(self, count: int | None) -> IntArray | None:
+        if count is not None and not is_whole(count, 1):
+            raise ArgumentError(f"rotation_groups must be 1 or more, or None; got {count!r}")
         if count is None or count >= self.mesh.n_vertices:
             return None if count is None else np.arange(self.mesh.n_vertices)
         parts = self.regions.labels * self.mesh.n_vertices + self.mesh.components
@@ -281,11 +285,15 @@ class Deformer:
         mesh = self.mesh
         self.fixed, self.handle = checked_constraints(mesh, fixed, handle)
         self._handles = connected_sets(mesh, self.handle)
-        self._held = np.concatenate([self.handle, self.fixed])
-        patches = [len(self.handle) + patch for patch in connected_sets(mesh, self.fixed)]
+        patches = connected_sets(mesh, self.fixed)
+        # Sets lie side by side here, and their vertices in them as in `handle` and `fixed`.
+        order = [*self._handles, *(len(self.handle) + patch for patch in patches)]
+        self._order = np.concatenate([np.zeros(0, dtype=np.int64), *order])
+        ids = np.concatenate([self.handle, self.fixed])
         weight = _POSITION_WEIGHT * float(np.trace(self._energy.quadratic))
-        rows = self._energy.subspace.at(self._held)
-        positions = position_term(rows, [*self._handles, *patches], weight)
+        positions = position_term(
+            self.subspace, self._rest.vertices, [ids[places] for places in order], weight
+        )
         volumes = self._stand_in.volumes(self._constraints, self._rest.vertices)
         self._at_rest = GaussNewton(self._energy, positions, volumes)
         self.reset()
@@ -296,11 +304,14 @@ class Deformer:
         return result
 
     def _errors(self, result: Iteration) -> FloatArray:
+        """Return how far each place of `PositionTerm` is off, (k,)."""
         x = self._solver.positions.rows @ result.p
         return np.asarray(np.linalg.norm(x - self._places(self._targets), axis=1))
 
     def _places(self, targets: FloatArray) -> FloatArray:
-        return np.concatenate([targets, self._rest.vertices[self.fixed]])
+        """Return the places for *targets* (k, 3) of the handle."""
+        where = np.concatenate([targets, self._rest.vertices[self.fixed]])
+        return self._solver.positions.gathered(where[self._order])
 
     def _landed(self, result: Iteration) -> tuple[FloatArray, FloatArray]:
         """Return cage vertices and mesh vertices, the mesh's own volume exactly as held."""
@@ -325,19 +336,21 @@ class Deformer:
         return self.subspace.map(np.hstack([moves, *directions]), start)
 
     def _solution(self, result: Iteration, steps: int) -> Solution:
-        errors = self._errors(result) * self._size / self.mesh.diagonal
-        handle, fixed = np.split(errors, [len(self.handle)])
-        status = result.status
-        if status is Status.CONVERGED and errors.max(initial=0.0) > _MET:
-            status = Status.MISSED
         p, x = self._landed(result)
+        targets = self._outward(self._targets)
+        handle = np.linalg.norm(x[self.handle] - targets, axis=1).max(initial=0.0)
+        fixed = np.linalg.norm(x[self.fixed] - self.mesh.vertices[self.fixed], axis=1)
+        errors = np.array([handle, fixed.max(initial=0.0)]) / self.mesh.diagonal
+        status = result.status
+        if status is Status.CONVERGED and errors.max() > _MET:
+            status = Status.MISSED
         volume = self._total_volume
         return Solution(
             vertices=x,
             cage_vertices=tuple(p[columns] + self._centre for columns in self.subspace.columns),
             volume_change=volume.violation(x) / volume.target,
-            handle_error=float(handle.max(initial=0.0)),
-            fixed_error=float(fixed.max(initial=0.0)),
+            handle_error=float(errors[0]),
+            fixed_error=float(errors[1]),
             steps=steps,
             status=status,
             merits=result.merits,

@@ -26,8 +26,9 @@ geometric model for elastic deformations", SIGGRAPH 2010 (spokes and rims).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -36,13 +37,14 @@ from .arrays import FloatArray, IntArray, is_number
 from .differential import (
     area_gradients,
     cotangent_laplacian,
-    mean_curvature_normals,
     mixed_voronoi_areas,
 )
 from .errors import ArgumentError
 from .mesh import Mesh
 from .rotations import closest_rotations
 from .subspace import Subspace
+
+_CHUNK = 200_000  # faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,52 +109,75 @@ def shape_energy(mesh: Mesh, subspace: Subspace, stretch: float, groups: IntArra
     """
     if not is_number(stretch, 0.0):
         raise ArgumentError(f"stretch must be a number, 0 or more; got {stretch!r}")
-    n, vertices, faces = mesh.n_vertices, mesh.vertices, mesh.faces
-    areas = mixed_voronoi_areas(vertices, faces)
-    laplacian = cotangent_laplacian(vertices, faces)
-    delta = mean_curvature_normals(vertices, faces)
-    # The left side of (5) is C x / (2 A).
-    bending = subspace.gram_of_squares(laplacian, 0.25 / areas)
-    stretching = subspace.gram(laplacian)
+    per_vertex = groups is None
+    shape = surface_operators(mesh, np.arange(mesh.n_vertices) if groups is None else groups)
+    areas = shape.areas
+    bending, stretching, mass = subspace.grams(shape.laplacian, 0.25 / areas, areas / areas.sum())
     unit = np.trace(bending) / np.trace(stretching)
-
-    detail = _stack((sparse.diags_array(0.5 * d) @ laplacian for d in delta.T), groups, n)
-    fans = _stack(_fans(mesh), groups, n)
-    pull = detail + (stretch * unit) * fans
-    fit = pull if stretch > 0.0 else detail + unit * fans
-    if groups is not None:
+    pull = shape.detail + (stretch * unit) * shape.fans
+    fit = pull if stretch > 0.0 else shape.detail + unit * shape.fans
+    if not per_vertex:
         fit, pull = (
             (reduced := subspace.left(pull), reduced)
             if fit is pull
             else (subspace.left(fit), subspace.left(pull))
         )
+    rest = float(areas @ (shape.delta**2).sum(axis=1))
     return Energy(
         quadratic=bending + stretch * unit * stretching,
-        constant=float(areas @ (delta**2).sum(axis=1) + 2 * stretch * unit * mesh.face_areas.sum()),
-        mass=subspace.gram(sparse.diags_array(areas / areas.sum()).tocsr()),
+        constant=rest + 2.0 * stretch * unit * float(mesh.face_areas.sum()),
+        mass=mass,
         fit=fit,
         pull=pull,
         subspace=subspace,
     )
 
 
-def _fans(mesh: Mesh) -> Iterator[sparse.csr_array]:
-    """Yield, for each axis, the (n, n) operator of sum_{T at i} A_T / 3 J_T^T: row i, axis."""
-    shape = (mesh.n_vertices, mesh.n_vertices)
-    gradients = area_gradients(mesh.vertices, mesh.faces) / 3.0
-    # Every corner of a face sees the whole face.
-    seen, corner = np.repeat(mesh.faces, 3, axis=1).ravel(), np.tile(mesh.faces, 3).ravel()
-    for axis in range(3):
-        values = np.tile(gradients[:, :, axis], 3).ravel()
-        yield sparse.coo_array((values, (seen, corner)), shape).tocsr()
+class SurfaceOperators(NamedTuple):
+    """What both lines of E are made of, over the vertices of a mesh."""
+
+    laplacian: sparse.csr_array  # C, (n, n)
+    areas: FloatArray  # A, (n,)
+    delta: FloatArray  # (n, 3), eq. (5)
+    detail: sparse.csr_array  # K of the first line, (3 G, n): 3 x 3 matrices S_g by rows
+    fans: sparse.csr_array  # K of the second, over s
 
 
-def _stack(axes: Iterable[sparse.csr_array], groups: IntArray | None, n: int) -> sparse.csr_array:
-    """Return (3 G, n): row 3 g + a is row g of axis a, summed over the vertices of group g."""
-    groups = np.arange(n) if groups is None else groups
-    count = int(groups.max()) + 1
-    stacked = sparse.csr_array((3 * count, n))
-    for a, operator in enumerate(axes):
-        place = sparse.coo_array((np.ones(n), (3 * groups + a, np.arange(n))), (3 * count, n))
-        stacked = stacked + place.tocsr() @ operator
-    return sparse.csr_array(stacked)
+def surface_operators(mesh: Mesh, groups: IntArray) -> SurfaceOperators:
+    """Return the operators of *mesh* for the rotation group of each vertex, *groups* (n,)."""
+    vertices, faces = mesh.vertices, mesh.faces
+    areas = mixed_voronoi_areas(vertices, faces)
+    laplacian = cotangent_laplacian(vertices, faces)
+    delta = (laplacian @ vertices) / (2.0 * areas)[:, None]  # the left side of (5) is C x / (2 A)
+    return SurfaceOperators(
+        laplacian=laplacian,
+        areas=areas,
+        delta=delta,
+        detail=_grouped(0.5 * delta, groups) @ laplacian,
+        fans=_fans(area_gradients(vertices, faces) / 3.0, faces, groups),
+    )
+
+
+def _grouped(values: FloatArray, groups: IntArray) -> sparse.csr_array:
+    """Return (3 G, n): row 3 g + a has ``values[i, a]`` at each vertex i of group g."""
+    n = len(groups)
+    rows = (3 * groups[:, None] + np.arange(3)).ravel()
+    entries = (values.ravel(), (rows, np.repeat(np.arange(n), 3)))
+    return sparse.coo_array(entries, (3 * (int(groups.max()) + 1), n)).tocsr()
+
+
+def _fans(gradients: FloatArray, faces: IntArray, groups: IntArray) -> sparse.csr_array:
+    """Return (3 G, n): row 3 g + a is axis a of sum_{i in g} sum_{T at i} A_T / 3 J_T^T.
+
+    *gradients* (m, 3, 3) are thirds of `area_gradients`: every corner sees the whole face.
+    """
+    shape = (3 * (int(groups.max()) + 1), len(groups))
+    fans = sparse.csr_array(shape)
+    for start in range(0, len(faces), _CHUNK):
+        corners, share = faces[start : start + _CHUNK], gradients[start : start + _CHUNK]
+        for seen in range(3):
+            rows = 3 * groups[corners[:, seen], None, None] + np.arange(3)  # (m, 1, axis)
+            rows = np.broadcast_to(rows, share.shape).ravel()
+            columns = np.repeat(corners, 3)
+            fans = fans + sparse.coo_array((share.ravel(), (rows, columns)), shape).tocsr()
+    return sparse.csr_array(fans)

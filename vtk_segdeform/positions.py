@@ -4,8 +4,9 @@
 
 Vertices joined by mesh edges form a *set*: a fixed patch, or a handle that moves on its own.
 Every set weighs the same, shared out evenly over its vertices, so that a handle of one vertex
-holds as well as a patch of a thousand.  A coarse cage cannot put every vertex of a set in place;
-`PositionTerm.stiffened` raises the weight of the sets that are off by too much.
+holds as well as a patch of a thousand; in a patch of many thousands, neighbours share a place,
+their mean.  A coarse cage cannot put every vertex of a set in place; `PositionTerm.stiffened`
+raises the weight of the sets that are off by too much.
 """
 
 from __future__ import annotations
@@ -20,7 +21,10 @@ from scipy.sparse import csgraph
 from .arrays import FloatArray, IntArray, as_ids, as_points
 from .errors import ConstraintError
 from .mesh import Mesh
+from .rotations import group_by_position
+from .subspace import Subspace
 
+_MANY, _PLACES = 1000, 500  # vertices of a set beyond which it has so many places
 _STIFFER = 10.0
 _STIFFEST = 1e4  # times the weight it started with
 
@@ -29,10 +33,15 @@ _STIFFEST = 1e4  # times the weight it started with
 class PositionTerm:
     """The term for k vertices in sets; `strength` (s,) multiplies the weight of each set."""
 
-    rows: FloatArray  # W~ at the vertices, (k, m)
+    rows: FloatArray  # W~ at the k places, (k, m)
     set_of: IntArray  # (k,)
     base: FloatArray  # omega before strength, (k,)
     strength: FloatArray
+    mean: sparse.csr_array | None = None  # (k, v), from the vertices held to the places
+
+    def gathered(self, targets: FloatArray) -> FloatArray:
+        """Return u (k, 3) for *targets* (v, 3) of the vertices held."""
+        return targets if self.mean is None else self.mean @ targets
 
     @property
     def weights(self) -> FloatArray:
@@ -62,13 +71,43 @@ class PositionTerm:
         return replace(self, strength=np.where(raised, self.strength * _STIFFER, self.strength))
 
 
-def position_term(rows: FloatArray, sets: list[IntArray], weight: float) -> PositionTerm:
-    """Return the term for vertices with W~ *rows* (k, m) in *sets*, each of total *weight*."""
-    set_of = np.zeros(len(rows), dtype=np.int64)
-    for number, members in enumerate(sets):
-        set_of[members] = number
-    size = np.bincount(set_of, minlength=len(sets))
-    return PositionTerm(rows, set_of, weight / size[set_of], np.ones(len(sets)))
+def position_term(
+    subspace: Subspace, vertices: FloatArray, held: list[IntArray], weight: float
+) -> PositionTerm:
+    """Return the term for sets of vertices *held*, each of total *weight*.
+
+    Parameters
+    ----------
+    subspace : Subspace
+        W~.
+    vertices : (n, 3) float
+        The mesh at rest.
+    held : list of (k_s,) int
+        The vertices of each set, as they follow each other in the targets.
+    weight : float
+        Of each set.
+    """
+    places = [_places(vertices[ids]) for ids in held]
+    size = np.array([int(place.max()) + 1 for place in places], dtype=np.int64)
+    set_of = np.repeat(np.arange(len(held)), size)
+    base = weight / size[set_of]
+    strength = np.ones(len(held))
+    ids = np.concatenate([np.zeros(0, dtype=np.int64), *held])
+    if len(ids) == len(set_of):
+        return PositionTerm(subspace.at(ids), set_of, base, strength)
+    begins = np.concatenate([[0], np.cumsum(size)])
+    row = np.concatenate([begin + place for begin, place in zip(begins, places, strict=False)])
+    share = 1.0 / np.bincount(row)[row]
+    mean = sparse.coo_array((share, (row, np.arange(len(ids))))).tocsr()
+    on_mesh = sparse.coo_array((share, (row, ids)), (len(set_of), len(vertices))).tocsr()
+    return PositionTerm(subspace.left(on_mesh), set_of, base, strength, mean)
+
+
+def _places(points: FloatArray) -> IntArray:
+    """Return (k,) the place of each point of a set: its own, or one shared by those near by."""
+    if len(points) <= _MANY:
+        return np.arange(len(points))
+    return group_by_position(points, _PLACES)
 
 
 def checked_constraints(

@@ -22,8 +22,11 @@ import numpy as np
 from .arrays import FloatArray, IntArray, is_whole
 from .errors import ArgumentError
 from .fast import compiled, inputs
+from .threads import in_parallel
 
 _TIMES = 40  # as long as a face of a volume takes each
+_MANY = 50_000  # positions
+_CACHED = 1 << 17  # distances at a time
 _TIE_BREAK = 1e-6  # relative: of equal distances one is preferred, the same in every frame
 
 
@@ -66,15 +69,17 @@ def group_by_position(positions: FloatArray, n_groups: int, *, rounds: int = 5) 
     distances equal, a random number that belongs to the vertex decides, and rounding does not.
     """
     n_groups = min(n_groups, len(positions))
-    favour = 1.0 + _TIE_BREAK * np.random.default_rng(0).random(len(positions))
-    centres = positions[_farthest_points(positions, n_groups, favour)]
-    labels = np.zeros(len(positions), dtype=np.int64)
-    for _ in range(rounds):
-        labels = _nearest(positions, centres, favour)
-        labels = np.unique(labels, return_inverse=True)[1].astype(np.int64)
+    rng = np.random.default_rng(0)
+    favour = 1.0 + _TIE_BREAK * rng.random(len(positions))
+    some = positions  # of many, these tell where the clusters are
+    if len(positions) > _MANY:
+        some = positions[np.sort(rng.permutation(len(positions))[:_MANY])]
+    centres = some[_farthest_points(some, n_groups, favour[: len(some)])]
+    for _ in range(rounds - 1):
+        labels = _numbered(_nearest(some, centres, favour))
         counts = np.bincount(labels)
-        centres = np.stack([np.bincount(labels, p) / counts for p in positions.T], axis=1)
-    return labels
+        centres = np.stack([np.bincount(labels, p) / counts for p in some.T], axis=1)
+    return _numbered(_nearest(positions, centres, favour))
 
 
 def rotation_groups(positions: FloatArray, parts: IntArray, n_groups: int) -> IntArray:
@@ -102,15 +107,21 @@ def _farthest_points(positions: FloatArray, count: int, favour: FloatArray) -> I
     return chosen
 
 
+def _numbered(labels: IntArray) -> IntArray:
+    return np.unique(labels, return_inverse=True)[1].astype(np.int64)
+
+
 def _nearest(positions: FloatArray, centres: FloatArray, favour: FloatArray) -> IntArray:
     nearest = np.empty(len(positions), dtype=np.int64)
-    size = max(1, 4_000_000 // len(centres))  # rows a chunk: some tens of megabytes
     squares = np.einsum("ij,ij->i", centres, centres)
-    for start in range(0, len(positions), size):
-        chunk = positions[start : start + size]
+
+    def work(start: int, stop: int) -> None:
+        chunk = positions[start:stop]
         own = np.einsum("ij,ij->i", chunk, chunk)[:, None]
         distance = (own + squares - 2.0 * chunk @ centres.T) * favour[: len(centres)]
-        nearest[start : start + size] = distance.argmin(axis=1)
+        nearest[start:stop] = distance.argmin(axis=1)
+
+    in_parallel(work, len(positions), max(1, _CACHED // len(centres)))
     return nearest
 
 

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from .arrays import FloatArray, IntArray
-from .blocks import add_product, adjoint_product, double, picked, pieces
+from .blocks import add_product, adjoint_product, double, pieces
 from .cages import Cage
 from .errors import CageError, RegionError
 from .mean_value import mean_value_coordinates
@@ -78,9 +78,11 @@ class Subspace:
 
     def left(self, operator: sparse.csr_array) -> FloatArray:
         """Return operator @ W~, dense (k, m), for a sparse *operator* (k, n) with few rows."""
-        columns, product = self._product(operator)
+        by_column = operator.tocsc()
         out = np.zeros((operator.shape[0], self.n_columns))
-        out[:, columns] = product
+        for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
+            for piece in pieces(len(rows), block.shape[1]):
+                out[:, columns] += by_column[:, rows[piece]] @ double(block[piece])
         return out
 
     def averaged(self, mean: sparse.csr_array) -> Subspace:
@@ -107,26 +109,28 @@ class Subspace:
                 out[:, columns] += member @ double(block[piece]) ** 2
         return out
 
-    def gram(self, operator: sparse.csr_array) -> FloatArray:
-        """Return W~^T operator W~, (m, m), for a sparse symmetric *operator* (n, n).
+    def grams(
+        self, laplacian: sparse.csr_array, strength: FloatArray, mass: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return W~^T C diag(strength) C W~, W~^T C W~ and W~^T diag(mass) W~, (m, m) each.
 
-        Regions whose vertices share no entry of the operator have a zero block: this is where
-        several cages beat one.
+        For a symmetric sparse C (n, n).  Cages that reach no common piece of the mesh have a zero
+        block: this is where several beat one.
         """
-        gram = np.zeros((self.n_columns, self.n_columns))
+        m = self.n_columns
+        squares, plain, masses = np.zeros((m, m)), np.zeros((m, m)), np.zeros((m, m))
         for vertices in self._neighbourhoods():
-            here, w = self._product(picked(vertices, self.n_vertices))
-            there, product = self._product(operator[vertices])
-            gram[np.ix_(here, there)] += w.T @ product
-        return 0.5 * (gram + gram.T)
-
-    def gram_of_squares(self, operator: sparse.csr_array, weights: FloatArray) -> FloatArray:
-        """Return (O W~)^T diag(weights) O W~, (m, m), for a sparse operator O (n, n)."""
-        gram = np.zeros((self.n_columns, self.n_columns))
-        for vertices in self._neighbourhoods():
-            columns, product = self._product(operator[vertices])
-            gram[np.ix_(columns, columns)] += (product.T * weights[vertices]) @ product
-        return 0.5 * (gram + gram.T)
+            ring = laplacian[vertices]
+            used = np.union1d(ring.indices, vertices)
+            place = np.searchsorted(used, ring.indices)
+            columns, w = self._dense(used)
+            compact = sparse.csr_array((ring.data, place, ring.indptr), (len(vertices), len(used)))
+            product, here = compact @ w, w[np.searchsorted(used, vertices)]
+            block = np.ix_(columns, columns)
+            squares[block] += (product.T * strength[vertices]) @ product
+            plain[block] += here.T @ product
+            masses[block] += (here.T * mass[vertices]) @ here
+        return 0.5 * (squares + squares.T), 0.5 * (plain + plain.T), 0.5 * (masses + masses.T)
 
     def _neighbourhoods(self) -> list[IntArray]:
         """Return all vertices in pieces, region by region: few cages reach into each."""
@@ -136,25 +140,20 @@ class Subspace:
         order = np.argsort(owner, kind="stable")
         return [order[piece] for piece in pieces(self.n_vertices, self.n_columns)]
 
-    def _product(self, operator: sparse.csr_array) -> tuple[IntArray, FloatArray]:
-        """Return the columns of operator @ W~ that cages reach, and these columns (k, c)."""
-        used, place = np.unique(operator.indices, return_inverse=True)
-        columns, parts = [], []
+    def _dense(self, vertices: IntArray) -> tuple[IntArray, FloatArray]:
+        """Return the columns of W~ that reach *vertices*, in order, and W~ there (k, c)."""
+        reached = []
         for rows, block, own in zip(self.rows, self.blocks, self.columns, strict=True):
-            found = np.searchsorted(rows, used)
-            mine = np.isin(used, rows, assume_unique=True)
-            if not mine.any():
-                continue
-            dense = np.zeros((len(used), block.shape[1]))
-            dense[mine] = block[found[mine]]
-            columns.append(np.arange(own.start, own.stop))
-            parts.append(dense)
-        if not columns:
-            return np.zeros(0, dtype=np.int64), np.zeros((operator.shape[0], 0))
-        compact = sparse.csr_array(
-            (operator.data, place, operator.indptr), (operator.shape[0], len(used))
-        )
-        return np.concatenate(columns), np.asarray(compact @ np.hstack(parts))
+            mine = np.flatnonzero(np.isin(vertices, rows, assume_unique=True))
+            if len(mine):
+                reached.append((mine, np.searchsorted(rows, vertices[mine]), block, own))
+        widths = [block.shape[1] for _, _, block, _ in reached]
+        w = np.zeros((len(vertices), sum(widths)))
+        ends = np.cumsum(widths)
+        for (mine, found, block, _), end in zip(reached, ends, strict=True):
+            w[mine, end - block.shape[1] : end] = block[found]
+        columns = [np.arange(own.start, own.stop) for *_, own in reached]
+        return np.concatenate(columns), w
 
 
 def bind(

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_faces, as_points
+from ..threads import in_parallel
 from .manifold import face_edges
 
 _BLOCK = 1 << 17  # numbers per temporary: a megabyte, stays in the cache
@@ -44,9 +45,9 @@ def winding_number(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> 
     a, b, c = p[faces.T]
     normal, det_abc = np.cross(b - a, c - a), np.einsum("fj,fj->f", a, np.cross(b, c))[:, None]
     number = np.empty(len(x))
-    rows = max(1, _BLOCK // len(faces))
-    for start in range(0, len(x), rows):
-        y = x[start : start + rows]
+
+    def work(start: int, stop: int) -> None:
+        y = x[start:stop]
         d = np.linalg.norm(p[:, None] - y, axis=2)
         dot = dot_ij - sum_ij @ y.T + np.einsum("nj,nj->n", y, y)
         d_a, d_b, d_c = (d[faces[:, k]] for k in range(3))
@@ -54,7 +55,9 @@ def winding_number(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> 
         half_omega = np.arctan2(
             det_abc - normal @ y.T, d_a * d_b * d_c + ab * d_c + bc * d_a + ca * d_b
         )
-        number[start : start + rows] = half_omega.sum(axis=0) / (2.0 * np.pi)
+        number[start:stop] = half_omega.sum(axis=0) / (2.0 * np.pi)
+
+    in_parallel(work, len(x), max(1, _BLOCK // len(faces)))
     return number
 
 
