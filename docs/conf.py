@@ -32,10 +32,10 @@ extensions = [
 ]
 exclude_patterns = ["build"]
 
-# Whatever a page refers to must be there.
+# Whatever a page refers to must be there.  Names in single backticks, as docstrings have them,
+# lead to what is public, and are set as code where they name inner things (`making.headers`).
 nitpicky = True
-# Names of inner things, in the docstrings of public ones, are set as code.
-default_role = "code"
+default_role = "py:obj"
 
 # What the pages of the API show, and how.  Qt need not be there to be written about.
 autodoc_mock_imports = ["pyvistaqt", "qtpy", "vtk_segdeform.widgets.panel"]

@@ -48,7 +48,15 @@ def make_page(name: str) -> None:
     if not pictures:
         kept = [DOCS / "pictures" / f"{name.replace('_', '-')}.png"]
         pictures = [f"/pictures/{path.name}" for path in kept if path.exists()]
-    lines = [title, "=" * len(title), "", *as_paragraphs(words), "", ".. container:: panels", ""]
+    lines = [
+        title,
+        "=" * len(title),
+        "",
+        *as_paragraphs(words),
+        "",
+        ".. container:: panels wide",
+        "",
+    ]
     lines += [f"   .. image:: {picture}\n      :alt: {title}\n" for picture in pictures]
     if printed:
         lines += ["It prints", "", ".. code-block:: text", "", indented(printed), ""]

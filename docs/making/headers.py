@@ -1,10 +1,14 @@
-"""Headers of modules on the pages of the API: what is indented in them is set as it stands.
+"""Docstrings as they are on the pages of the API.
 
-In the code they need no markup; here an indented block is a diagram or a piece of code.
+What is indented in the header of a module, a diagram or a piece of code, is set as it stands.
+`names` in docstrings become links where there is a page for them, and code elsewhere.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
+from docutils import nodes
 from sphinx.application import Sphinx
 
 
@@ -25,7 +29,14 @@ def mark_blocks(
     lines[:] = marked
 
 
+def set_as_code(app: Sphinx, env: object, node: Any, content: nodes.Node) -> nodes.Node | None:
+    """Return a name that has no page as it is."""
+    del app, env
+    return content if node.get("reftype") == "obj" else None
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Tell Sphinx."""
     app.connect("autodoc-process-docstring", mark_blocks)
+    app.connect("missing-reference", set_as_code)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
