@@ -9,10 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
 
-from .arrays import as_ids, plain
+from .arrays import plain
 from .errors import ArgumentError
-
-_MOST_POINTS = 2**62
 
 
 @dataclass(frozen=True)
@@ -117,11 +115,18 @@ def _places(targets: ArrayLike) -> list[list[float]]:
         raise ArgumentError(
             f"targets must be (k, 3) real numbers; got {array.dtype} of shape {array.shape}"
         )
-    return array.astype(np.float64).tolist()  # whether they are finite, the pipeline tells
+    rows: list[list[float]] = array.astype(np.float64).tolist()
+    return rows  # whether they are finite, the pipeline tells
 
 
 def _numbers(points: ArrayLike) -> tuple[int, ...]:
     """Return numbers of points, or those a mask marks; whether they are there, the input tells."""
     array = plain(points, "points")
-    ids = np.flatnonzero(array) if array.dtype == bool and array.ndim == 1 else array
-    return tuple(as_ids(ids, _MOST_POINTS, "points").tolist())
+    if array.dtype == bool and array.ndim == 1:
+        array = np.flatnonzero(array)
+    if array.size and (array.ndim > 1 or array.dtype.kind not in "iu"):
+        raise ArgumentError(
+            "points must be one row of vertex numbers, or a mask; "
+            f"got {array.dtype} of shape {array.shape}"
+        )
+    return tuple(array.astype(np.int64).ravel().tolist())

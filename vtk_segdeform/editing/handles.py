@@ -38,7 +38,7 @@ def with_handle(mesh: Mesh, state: State, name: str, vertices: ArrayLike) -> Han
     others = {other: ids for other, ids in state.handles.items() if other != name}
     _, ids = checked_constraints(mesh, state.fixed, vertices)
     if not len(ids):
-        raise ConstraintError("a handle needs one vertex or more; got none")
+        raise ConstraintError("a handle needs one vertex or more; got none: mark some")
     for other, taken in others.items():
         both = np.intersect1d(ids, taken)
         if len(both):
@@ -148,7 +148,8 @@ def require_near(mesh: Mesh, points: FloatArray, name: str) -> None:
     away = np.abs(points - mesh.vertices.mean(axis=0)).max(initial=0.0) / mesh.diagonal
     if not away <= _FARTHEST:
         raise ConstraintError(
-            f"{name} are {away:.3g} diagonals of the mesh away; at most {_FARTHEST:.0f} are allowed"
+            f"{name} are {away:.3g} diagonals of the mesh away; "
+            f"at most {_FARTHEST:.0f} are allowed: move less"
         )
 
 
