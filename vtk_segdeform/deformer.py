@@ -274,7 +274,7 @@ class Deformer:
 
     def _rotation_groups(self, count: int | None) -> IntArray | None:
         if count is not None and not is_whole(count, 1):
-            raise ArgumentError(f"rotation_groups must be 1 or more, or None; got {count!r}")
+            raise ArgumentError(f"rotation groups must be a whole number, 1 or more; got {count!r}")
         if count is None or count >= self.mesh.n_vertices:
             return None if count is None else np.arange(self.mesh.n_vertices)
         parts = self.regions.labels * self.mesh.n_vertices + self.mesh.components
