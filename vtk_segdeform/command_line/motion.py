@@ -66,9 +66,11 @@ def parse_rotation(text: str) -> tuple[FloatArray, float]:
 
 def read_matrix(path: str | Path) -> FloatArray:
     """Return the (4, 4) matrix in a text file of 16 numbers, row by row; # begins a comment."""
+    if not Path(path).is_file():  # a device would be read for ever
+        raise ConstraintError(f"matrix {path}: there is no such file; give one of 16 numbers")
     try:
         matrix = np.loadtxt(path, ndmin=2)
-    except ValueError as error:
+    except (ValueError, OSError) as error:
         raise ConstraintError(f"matrix {path} must hold 16 numbers: {error}") from None
     if matrix.size != 16 or not np.isfinite(matrix).all():
         raise ConstraintError(f"matrix {path} must hold 16 finite numbers; got {matrix.size}")

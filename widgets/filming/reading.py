@@ -31,6 +31,8 @@ def read_recording(source: str | os.PathLike[str] | Iterable[str]) -> list[Momen
     lines: Iterable[str]
     if isinstance(source, str | os.PathLike):
         name = os.fspath(source)
+        if not os.path.isfile(source):  # a device would be read for ever
+            raise SessionError(f"{name}: cannot be read; it is no file, or not there")
         try:
             lines = Path(source).read_bytes().decode(errors="replace").splitlines()
         except OSError as fault:
