@@ -53,7 +53,7 @@ def line_plot(
             axis.set_xticks([], minor=True)
             axis.set_xticks(list(x), [f"{size:,.0f}" for size in x])
         else:
-            axis.set_ylim(bottom=0.0)
+            axis.set_ylim(0.0, 1.1 * max(max(values) for values in lines.values()))
             axis.set_xticks(list(x))
         # Beside a panel or over it, where no line is hidden.
         if len(panels) == 1:

@@ -7,6 +7,7 @@ one call of so many steps, and that is what is timed.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -21,6 +22,7 @@ from .measuring import timed
 from .tasks import NEAR, Task
 
 _MOST_STEPS = 300
+_FEW, _MANY = 2, 10  # steps between which the cost of one is measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +32,7 @@ class Frame:
     solution: Solution
     steps: int
     seconds: float
+    processors: float  # seconds of all of them
 
 
 def steps_to_rest(deformer: Deformer, targets: FloatArray) -> tuple[int, Solution]:
@@ -52,8 +55,9 @@ def frames(deformer: Deformer, way: Sequence[FloatArray]) -> Iterator[Frame]:
     for goal in way:
         steps, _ = steps_to_rest(deformer, goal)
         deformer.resume(cages, targets)
+        spent = time.process_time()
         solution, seconds = timed(partial(deformer.solve, goal, max_steps=steps))
-        yield Frame(solution, steps, seconds)
+        yield Frame(solution, steps, seconds, time.process_time() - spent)
         cages, targets = solution.cage_vertices, goal
 
 
@@ -65,18 +69,22 @@ def way_of(task: Task, moves: int) -> list[FloatArray]:
 
 
 def seconds_per_step(deformer: Deformer, task: Task, repeats: int) -> float:
-    """Return what one more step of a frame costs: the slope between few steps and many."""
-    rest = tuple(cage.vertices for cage in deformer.cages)
-    places = deformer.mesh.vertices[deformer.handle]
-    goal = way_of(task, 10)[-1]
+    """Return what one more step of a frame costs: the slope between few steps and many.
+
+    NaN if the frame needs no more, or if the machine is too busy to tell.
+    """
+    first, second = way_of(task, 2)
+    deformer.reset()
+    begin = deformer.solve(first, max_steps=_MANY).cage_vertices
 
     def run(steps: int) -> Solution:
-        deformer.resume(rest, places)
-        return deformer.solve(goal, max_steps=steps)
+        deformer.resume(begin, first)
+        return deformer.solve(second, max_steps=steps)
 
-    few, many = run(2).steps, run(12).steps
+    few, many = run(_FEW).steps, run(_MANY).steps
     if many == few:
         return float("nan")
     # Long and short by turns: what else the machine does slows both.
-    pairs = [(timed(lambda: run(12))[1], timed(lambda: run(2))[1]) for _ in range(repeats)]
-    return median(longer - shorter for longer, shorter in pairs) / (many - few)
+    short, long = (partial(timed, partial(run, steps)) for steps in (_FEW, _MANY))
+    slope = median(long()[1] - short()[1] for _ in range(3 * repeats)) / (many - few)
+    return slope if slope > 0.0 else float("nan")

@@ -33,11 +33,13 @@ COLUMNS = ("case", "volume %", "distortion", "worst hundredth", "handle error", 
 _BAR = 0.17  # share of the height that a colour bar takes
 
 
-def run(scale: Scale, progress: Progress | None = None) -> Section:
-    """Return one table and one picture for each of the three figures."""
-    n = scale.n_cage_vertices
+Cases = dict[str, tuple[int, dict[str, Any]]]  # how many regions, and options of the deformer
+
+
+def figures_of(scale: Scale) -> dict[str, tuple[Task, Cases]]:
+    """Return what each figure bends, and in which cases."""
     cactus, dinosaur = bent_cactus(scale.paper_size), raised_neck(max(scale.paper_size, 1000))
-    figures: dict[str, tuple[Task, dict[str, tuple[int, dict[str, Any]]]]] = {
+    return {
         "figure 7": (cactus, {
             "volume held": (3, {}), "volume free": (3, {"preserve_volume": False}),
             "free, detail only": (3, {"preserve_volume": False, "stretch": 0.0}),
@@ -48,6 +50,11 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
             "three, detail only": (3, {"stretch": 0.0}),
         }),
     }  # fmt: skip
+
+
+def run(scale: Scale, progress: Progress | None = None) -> Section:
+    """Return one table and one picture for each of the three figures."""
+    n, figures = scale.n_cage_vertices, figures_of(scale)
     section = Section("Figures 7, 8 and 9")
     for k, (name, (task, cases)) in enumerate(figures.items()):
         poses: dict[str, FloatArray] = {}

@@ -29,6 +29,7 @@ from ..threads import n_threads
 
 _T = TypeVar("_T")
 _P = ParamSpec("_P")
+_LONG_ENOUGH, _MOST = 0.02, 20  # seconds and runs, for each that is asked for
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -40,9 +41,21 @@ def timed(work: Callable[[], _T]) -> tuple[_T, float]:
 
 
 def median_seconds(work: Callable[[], object], repeats: int) -> float:
-    """Return the median of *repeats* runs of *work*, after one that does not count."""
+    """Return the median of *repeats* runs of *work*, or more if short; a first does not count."""
     work()
-    return statistics.median(timed(work)[1] for _ in range(repeats))
+    times = [timed(work)[1] for _ in range(repeats)]
+    while sum(times) < _LONG_ENOUGH * repeats and len(times) < _MOST * repeats:
+        times.append(timed(work)[1])
+    return statistics.median(times)
+
+
+def processor_seconds(work: Callable[[], object], repeats: int) -> float:
+    """Return what one run of *work* costs all processors; others on the machine do not count."""
+    work()
+    start = time.process_time()
+    for _ in range(repeats):
+        work()
+    return (time.process_time() - start) / repeats
 
 
 def forget_peak() -> None:
@@ -91,12 +104,18 @@ def conditions() -> list[str]:
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     limits = ", ".join(f"{name}={os.environ[name]}" for name in _THREADS if name in os.environ)
     return [
-        f"{_processor()}; {cores} cores for this process; {platform.system()}",
+        f"{_processor()}; {cores} cores for this process; {platform.system()}{_load()}",
         f"Python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}, "
         f"vtk_segdeform {__version__}",
         f"{n_threads()} threads of our own, with{'' if compiled() else 'out'} compiled kernels; "
         f"other libraries: {limits or 'as many as they like'}",
     ]
+
+
+def _load() -> str:
+    if not hasattr(os, "getloadavg"):
+        return ""
+    return f"; {os.getloadavg()[0]:.1f} processes wanted to run in the last minute, this one too"
 
 
 def _processor() -> str:
