@@ -6,7 +6,6 @@ or else saves, or rests after a drag, until it is killed; ``FOLDER/told`` says w
 
 from __future__ import annotations
 
-import gc
 import hashlib
 import os
 import signal
@@ -17,6 +16,7 @@ import numpy as np
 from qt_hands import Qt, QtCore, QtHand, QtTest, QtWidgets, application, until
 from scenes import sausage
 
+import pyvistaqt  # isort: skip
 from vtk_segdeform import Session
 from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.app.autosave import Autosaves, Slot
@@ -134,7 +134,7 @@ class AppHand:
         application().processEvents()
 
     def reads(self, *path):
-        """Return what a menu says, once it is open; then close it."""
+        """Return what a menu says, once it is open: (can it be chosen, is it ticked) by text."""
         bar = self.window.menuBar()
         action = _named(bar, path[0])
         menus = [action.menu()]
@@ -145,8 +145,8 @@ class AppHand:
             until(action.menu().isVisible, f"the menu {name}")
             menus.append(action.menu())
         said = {
-            action.text().replace("&", "").partition("\t")[0]: action
-            for action in menus[-1].actions()
+            a.text().replace("&", "").partition("\t")[0]: (a.isEnabled(), a.isChecked())
+            for a in menus[-1].actions()
         }
         for menu in reversed(menus):
             QtTest.QTest.keyClick(menu, Qt.Key_Escape)
@@ -192,19 +192,27 @@ def settings_in(folder: Path):
     return QtCore.QSettings(str(folder / "settings.ini"), QtCore.QSettings.Format.IniFormat)
 
 
-def delete_now() -> None:
-    """Have nothing live on that Qt has deleted: of PySide's, it could be taken for what is new."""
+def delete(window) -> None:
+    """Close a window, and have nothing live on that Qt deletes with it.
+
+    PySide would take what is new in the same place for what the views remember; of a test that
+    failed they live on.
+    """
+    window.close()
+    for view in window.findChildren(pyvistaqt.QtInteractor):
+        view._ctx = view._surface = None
+    window.deleteLater()
     for _ in range(2):
         application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
         application().processEvents()
-    gc.collect()
 
 
 # The program that is killed.
 
 
 def _start_programs() -> None:
-    """Fork one for each line: what takes long, all the imports, is done once."""
+    """Fork one for each line: what takes long, imports and what is compiled, is done once."""
+    ready_session().bind()
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for them
     for line in sys.stdin:
         if os.fork() == 0:

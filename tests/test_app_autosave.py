@@ -15,7 +15,7 @@ from numpy.testing import assert_array_equal
 
 from vtk_segdeform import Session, models
 from vtk_segdeform.errors import SessionError
-from vtk_segdeform.widgets.app import autosave
+from vtk_segdeform.widgets.app import autosave, lock
 from vtk_segdeform.widgets.app.autosave import About, Autosaves, user_folder
 from vtk_segdeform.widgets.app.lock import hold
 
@@ -61,20 +61,18 @@ def test_work_of_a_program_that_runs_is_nobody_elses(folder):
     mine = Autosaves(folder).new(ABOUT)
     mine.write(work())
     theirs = subprocess.run(
-        [sys.executable, "-c", _LEFT, str(folder)],
-        capture_output=True, text=True, check=True, cwd=Path(__file__).parent.parent,
+        [sys.executable, "-c", _HOLD, lock.__file__, mine.path.with_name("lock")],
+        capture_output=True, text=True, check=True,
     )  # fmt: skip
-    assert theirs.stdout.split() == ["0"]
+    assert theirs.stdout.split() == ["None"]
     assert Autosaves(folder).left() == []  # nor another window's of the same program
     mine.release()
     assert len(Autosaves(folder).left()) == 1
 
 
-_LEFT = """
-import sys
-from pathlib import Path
-from vtk_segdeform.widgets.app.autosave import Autosaves
-print(len(Autosaves(Path(sys.argv[1])).left()))
+_HOLD = """
+import pathlib, runpy, sys
+print(runpy.run_path(sys.argv[1])["hold"](pathlib.Path(sys.argv[2])))
 """
 
 

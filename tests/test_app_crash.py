@@ -8,6 +8,7 @@ of those poses to the last bit, no older than the last that was kept.
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import random
 import signal
@@ -21,7 +22,7 @@ from app_hands import (
     AppHand,
     Boxes,
     Window,
-    delete_now,
+    delete,
     digest,
     ready_session,
     settings_in,
@@ -118,11 +119,10 @@ def recovered(folder: Path) -> str | None:
         assert boxes.seen[0].startswith("Recover unsaved work on arm.segdeform from ")
         assert hand.title == "arm.segdeform* - segdeform"
         boxes.answers[:] = ["Discard"]
-    hand.window.close()
-    hand.window.deleteLater()
+    delete(hand.window)
     assert slots(folder) == []
     del hand
-    delete_now()
+    gc.collect()
     return pose
 
 

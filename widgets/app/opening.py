@@ -53,9 +53,9 @@ class Opening(QtCore.QObject):
     def __init__(self, request: Request, parent: Any) -> None:
         super().__init__(parent)
         self.request = request
-        self._news, self._stopping = (0.0, ""), False
+        self._work = _Work()
         thread = futures.ThreadPoolExecutor(1, "segdeform opening")
-        self._future: futures.Future[Opened] = thread.submit(request.reader, self._report)
+        self._future: futures.Future[Opened] = thread.submit(request.reader, self._work.report)
         thread.shutdown(wait=False)
         self._timer = QtCore.QTimer(self)
         self._timer.timeout.connect(self._look)
@@ -63,19 +63,14 @@ class Opening(QtCore.QObject):
 
     def cancel(self) -> None:
         """Want it no more; the thread ends when it notices, and is not waited for."""
-        self._stopping = True
+        self._work.is_unwanted = True
         self._timer.stop()
         if self.request.slot is not None:
             self.request.slot.release()
 
-    def _report(self, fraction: float, text: str) -> None:
-        if self._stopping:
-            raise Cancelled("cancelled; nothing was changed")
-        self._news = fraction, text
-
     def _look(self) -> None:
         if not self._future.done():
-            self.got_on.emit(*self._news)
+            self.got_on.emit(*self._work.news)
             return
         self._timer.stop()
         error = self._future.exception()
@@ -83,6 +78,20 @@ class Opening(QtCore.QObject):
             self.opened.emit(self.request, self._future.result())
         else:
             self.failed.emit(self.request, words(error))
+
+
+class _Work:
+    """What both threads know; nothing of Qt's is to end in the other one."""
+
+    def __init__(self) -> None:
+        self.news = 0.0, ""
+        self.is_unwanted = False
+
+    def report(self, fraction: float, text: str) -> None:
+        """Be the reader's progress."""
+        if self.is_unwanted:
+            raise Cancelled("cancelled; nothing was changed")
+        self.news = fraction, text
 
 
 class WaitingPage(QtWidgets.QWidget):
