@@ -32,7 +32,7 @@ STORY = [
     "caging.cage_simplify", "cage_fit",
     # the solver
     "subspace", "passengers", "energy", "cage_stiffness", "curvature", "constraints", "stand_in",
-    "positions", "acceleration", "solution", "iteration", "solver", "targets", "deformer",
+    "binding", "positions", "acceleration", "solution", "iteration", "solver", "targets", "deformer",
     "pipeline",
     # a deformation in the making
     "editing.listeners", "editing.naming", "editing.state", "editing.history", "editing.painting",

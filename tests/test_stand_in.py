@@ -24,7 +24,7 @@ def coarse(monkeypatch):
 
 
 def test_a_small_mesh_stands_for_itself():
-    whole = StandIn(sausage(2).mesh, SUBSPACE)
+    whole = StandIn.of(sausage(2).mesh, SUBSPACE)
     assert whole.surface is SUBSPACE
 
 
@@ -35,7 +35,7 @@ def test_its_volumes_change_as_those_of_the_mesh(constraints):
     held = (total_volume(mesh),)
     if constraints is region_volumes:
         held = region_volumes(mesh, SCENE.regions.labels)
-    volumes = StandIn(mesh, SUBSPACE).volumes(held, mesh.vertices)
+    volumes = StandIn.of(mesh, SUBSPACE).volumes(held, mesh.vertices)
     assert volumes.surface.n_vertices < 0.5 * mesh.n_vertices
     at_rest = volumes.surface.map(P0)
     for fine, rough in zip(held, volumes.constraints, strict=True):
@@ -51,7 +51,7 @@ def test_its_volumes_change_as_those_of_the_mesh(constraints):
 def test_it_is_closed_wherever_the_mesh_is():
     # A closed surface has the same volume about any origin.
     held = region_volumes(SCENE.mesh, SCENE.regions.labels)
-    volumes = StandIn(SCENE.mesh, SUBSPACE).volumes(held, SCENE.mesh.vertices)
+    volumes = StandIn.of(SCENE.mesh, SUBSPACE).volumes(held, SCENE.mesh.vertices)
     x = volumes.surface.map(P0)
     for each in volumes.constraints:
         assert_allclose(each.violation(x + [3.0, -2.0, 5.0]), 0.0, atol=1e-11)

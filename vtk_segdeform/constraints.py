@@ -21,6 +21,7 @@ from scipy.sparse import csgraph
 from .arrays import FloatArray, IntArray
 from .mesh import Mesh
 from .subspace import Subspace
+from .threads import in_parallel
 from .volume import signed_volume, step_to_volume, volume_along_path, volume_gradient
 
 
@@ -113,13 +114,20 @@ def restore(constraints: Sequence[VolumeConstraint], paths: FloatArray) -> Float
 
 def moved(paths: FloatArray, t: FloatArray) -> FloatArray:
     """Return the vertices of *paths* (n, 3 + 3 c) after the step *t* (c,) along its directions."""
-    x = paths[:, :3]
-    for k, tk in enumerate(t, start=1):
-        x = x + tk * paths[:, 3 * k : 3 * k + 3]
-    return np.ascontiguousarray(x)
+    x = np.empty((len(paths), 3))
+
+    def work(start: int, stop: int) -> None:
+        piece = paths[start:stop]
+        x[start:stop] = piece[:, :3]
+        for k, tk in enumerate(t, start=1):
+            x[start:stop] += tk * piece[:, 3 * k : 3 * k + 3]
+
+    in_parallel(work, len(paths), _CACHED)
+    return x
 
 
 _NEWTON_STEPS = 6
+_CACHED = 1 << 14  # vertices moved at a time
 
 
 def _in_order(faces: IntArray) -> IntArray:

@@ -14,6 +14,7 @@ Long because every option of the method meets here, and each is told in the docs
 from __future__ import annotations
 
 import copy
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -21,23 +22,20 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import FloatArray, IntArray, as_points, is_number, is_whole
-from .cage_stiffness import with_cage_stiffness
+from .arrays import FloatArray, as_points, is_number, is_whole
+from .binding import Binder
 from .cages import Cage
 from .constraints import VolumeConstraint, moved, region_volumes, restore, total_volume
-from .energy import shape_energy
 from .errors import ArgumentError, CageError, ConstraintError, RegionError
 from .iteration import Iteration, SolverOptions
 from .mesh import Mesh, require_mesh
 from .passengers import Passengers, board
 from .positions import checked_constraints, checked_targets, connected_sets, position_term
-from .progress import Progress, part
+from .progress import Progress
 from .regions import Regions
-from .rotations import rotation_groups as group_by_part
 from .solution import Solution, Status
 from .solver import GaussNewton
-from .stand_in import StandIn
-from .subspace import Subspace, bind
+from .subspace import Subspace
 from .targets import waypoints
 
 _LEG_TOLERANCE, _LEG_STEPS = 1e-3, 12  # for the targets on the way to a far one
@@ -83,6 +81,8 @@ class Deformer:
     blend : (r, n) float, optional
         Blend weights instead of ``regions.weights``, for comparison; `cage_distance_weights` gives
         those of eq. (4) as printed.
+    cache : path, optional
+        A folder where what is bound is kept, and found the next time; see `binding`.
     progress : Progress, optional
         Called while binding; may cancel.
 
@@ -114,6 +114,7 @@ class Deformer:
         exact_volume: bool = True,
         hold_tolerance: float = 5e-4,
         blend: ArrayLike | None = None,
+        cache: str | os.PathLike[str] | None = None,
         progress: Progress | None = None,
     ) -> None:
         require_mesh(mesh)
@@ -128,20 +129,18 @@ class Deformer:
         self._rest = mesh.with_vertices(self._inward(mesh.vertices))
         if not is_number(hold_tolerance, 0.0):
             raise ArgumentError(f"hold_tolerance must be 0 or more; got {hold_tolerance!r}")
+        if rotation_groups is not None and not is_whole(rotation_groups, 1):
+            raise ArgumentError(
+                f"rotation groups must be a whole number, 1 or more; got {rotation_groups!r}"
+            )
         self._hold_tolerance = hold_tolerance
         self._options = SolverOptions(tolerance, max_steps, window, exact_volume)
 
-        subspace = bind(regions, cages, blend=blend, progress=part(progress, 0.0, 0.8))
-        self._blend = regions.weights if blend is None else np.asarray(blend, dtype=np.float64)
-        if progress:
-            progress(0.8, "factoring")
         self._rest_cages = np.concatenate([self._inward(cage.vertices) for cage in cages])
-        groups = self._rotation_groups(rotation_groups)
-        self._energy = shape_energy(self._rest, subspace, stretch, groups)
-        if groups is not None and self._energy.exact:
-            faces = [cage.faces for cage in cages]
-            self._energy = with_cage_stiffness(self._energy, self._rest_cages, faces, groups)
-        self._stand_in = StandIn(mesh, subspace, whole=self._energy.turns_vertices)
+        own = None if blend is None else np.asarray(blend, dtype=np.float64)
+        what = self._rest, regions, self.cages, self._rest_cages, own
+        binding = Binder(*what, stretch, rotation_groups).bound(cache, progress)
+        self._own_blend, self._energy, self._stand_in = own, binding.energy, binding.stand_in
         self._total_volume = total_volume(mesh)
         self._keep(preserve_volume, preserve_region_volumes)
         self._take_hold(fixed, handle)
@@ -176,7 +175,8 @@ class Deformer:
 
     def passengers(self, points: ArrayLike, *, progress: Progress | None = None) -> Passengers:
         """Bind other points (k, 3) to the cages, to be moved with them; see `passengers`."""
-        return board(self.mesh, self._blend, self.cages, points, progress=progress)
+        blend = self.regions.weights if self._own_blend is None else self._own_blend
+        return board(self.mesh, blend, self.cages, points, progress=progress)
 
     def carry(self, points: ArrayLike) -> FloatArray:
         """Return where other points (k, 3), given at rest, are in the last pose.
@@ -271,15 +271,6 @@ class Deformer:
 
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:
         return np.array([each.violation(x) / each.target for each in self._region_volumes])
-
-    def _rotation_groups(self, count: int | None) -> IntArray | None:
-        if count is not None and not is_whole(count, 1):
-            raise ArgumentError(f"rotation groups must be a whole number, 1 or more; got {count!r}")
-        if count is None or count >= self.mesh.n_vertices:
-            return None if count is None else np.arange(self.mesh.n_vertices)
-        parts = self.regions.labels * self.mesh.n_vertices + self.mesh.components
-        parts = np.unique(parts, return_inverse=True)[1]
-        return group_by_part(self._rest.vertices, parts, count)
 
     def _take_hold(self, fixed: ArrayLike, handle: ArrayLike) -> None:
         mesh = self.mesh

@@ -16,12 +16,12 @@ and the last operation of every solve takes the mesh itself onto its own volume,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 
-from .arrays import FloatArray
+from .arrays import FloatArray, IntArray
 from .constraints import VolumeConstraint, Volumes
 from .mesh import Mesh
 from .segmenting.coarse import coarsen
@@ -31,28 +31,37 @@ _POINTS = 2000  # about how many cells
 _LARGE = 4_000  # vertices beyond which a mesh has a stand-in
 
 
+@dataclass(frozen=True, eq=False)
 class StandIn:
-    """Cells of a mesh, and W~ over them; a small mesh stands for itself.
+    """Cells of a mesh, and W~ over them; made by `StandIn.of`.
 
     Parameters
     ----------
-    mesh : Mesh
-        n vertices, at rest.
-    subspace : Subspace
-        W~.
-    whole : bool
-        Let a large mesh stand for itself, too.
+    surface : Subspace
+        W~ over the cells; where there are none, over the mesh.
+    cells : (n,) int or None
+        The cell of each vertex; None where a mesh stands for itself.
+    shares : (n,) float or None
+        What each vertex counts in the mean of its cell.
     """
 
-    def __init__(self, mesh: Mesh, subspace: Subspace, *, whole: bool = False) -> None:
-        self.surface, n = subspace, mesh.n_vertices
-        self._mean: sparse.csr_array | None = None  # (k, n), from vertices to cells
-        if n > _LARGE and not whole:
-            self._cells, _ = coarsen(mesh, _POINTS, np.random.default_rng(0))
-            areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), n)
-            share = areas / np.bincount(self._cells, areas)[self._cells]
-            self._mean = sparse.coo_array((share, (self._cells, np.arange(n)))).tocsr()
-            self.surface = subspace.averaged(self._mean)
+    surface: Subspace
+    cells: IntArray | None = None
+    shares: FloatArray | None = None
+
+    @classmethod
+    def of(cls, mesh: Mesh, subspace: Subspace, *, whole: bool = False) -> StandIn:
+        """Return the stand-in of a *mesh* at rest that moves by *subspace*.
+
+        A small mesh stands for itself; with *whole*, a large one as well.
+        """
+        n = mesh.n_vertices
+        if n <= _LARGE or whole:
+            return cls(subspace)
+        cells, _ = coarsen(mesh, _POINTS, np.random.default_rng(0))
+        areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), n)
+        shares = areas / np.bincount(cells, areas)[cells]
+        return cls(subspace.averaged(_matrix(cells, shares)), cells, shares)
 
     def volumes(self, constraints: Sequence[VolumeConstraint], rest: FloatArray) -> Volumes:
         """Return *constraints* on the mesh as constraints on the cages, held from *rest* (n, 3) on.
@@ -60,23 +69,29 @@ class StandIn:
         *rest* may be scaled and moved: its own volumes are what is held.
         """
         points = rest
-        if self._mean is not None:
-            constraints = [self._coarse(each) for each in constraints]
-            points = self._mean @ rest
+        if self.cells is not None and self.shares is not None:
+            constraints = [_coarse(each, self.cells) for each in constraints]
+            points = _matrix(self.cells, self.shares) @ rest
         free = [replace(each, target=0.0) for each in constraints]
         return Volumes(
             self.surface, tuple(replace(each, target=each.violation(points)) for each in free)
         )
 
-    def _coarse(self, constraint: VolumeConstraint) -> VolumeConstraint:
-        """Return *constraint* over the cells."""
-        n, count, extension = len(self._cells), self.surface.n_vertices, constraint.extension
-        added = 0 if extension is None else extension.shape[0] - n
-        corners = np.concatenate([self._cells, count + np.arange(added)])[constraint.faces]
-        distinct = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
-        if extension is not None:
-            member = sparse.csr_array((np.ones(n), self._cells, np.arange(n + 1)), (n, count))
-            extension = sparse.csr_array(
-                sparse.vstack([sparse.eye_array(count), extension[n:] @ member])
-            )
-        return VolumeConstraint(corners[distinct], constraint.target, extension)
+
+def _coarse(constraint: VolumeConstraint, cells: IntArray) -> VolumeConstraint:
+    """Return *constraint* over the cells."""
+    n, count, extension = len(cells), int(cells.max()) + 1, constraint.extension
+    added = 0 if extension is None else extension.shape[0] - n
+    corners = np.concatenate([cells, count + np.arange(added)])[constraint.faces]
+    distinct = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    if extension is not None:
+        member = sparse.csr_array((np.ones(n), cells, np.arange(n + 1)), (n, count))
+        extension = sparse.csr_array(
+            sparse.vstack([sparse.eye_array(count), extension[n:] @ member])
+        )
+    return VolumeConstraint(corners[distinct], constraint.target, extension)
+
+
+def _matrix(cells: IntArray, shares: FloatArray) -> sparse.csr_array:
+    """Return (k, n), from vertices to the means of their cells."""
+    return sparse.coo_array((shares, (cells, np.arange(len(cells))))).tocsr()

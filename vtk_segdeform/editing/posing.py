@@ -18,6 +18,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ..arrays import FloatArray, frozen
+from ..binding import cache_folder
 from ..constraints import region_volumes, total_volume
 from ..deformer import Deformer
 from ..errors import CageError, ConstraintError
@@ -29,6 +30,7 @@ from .handles import targets_at
 from .listeners import Change
 from .state import Pose, State
 
+_DEAR = 20_000  # vertices of a mesh whose binding is kept on disk as well
 _KEPT = 3  # bound deformers: undo past a change of cages or options, and back, binds nothing anew
 _SAME_VOLUME = 1e-9  # relative: a pose off by more does not meet a constraint it was not made for
 _BINDING = "stretch", "rotation_groups"  # options that a bound deformer has for good
@@ -69,6 +71,7 @@ class Posing:
             state.cages,
             stretch=state.options.stretch,
             rotation_groups=state.options.rotation_groups,
+            cache=cache_folder() if self._mesh.n_vertices >= _DEAR else None,
             progress=progress,
         )
         own = State(state.regions, state.cages, options=state.options)

@@ -1,0 +1,143 @@
+"""What was bound once is found again, and nothing else is."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from scenes import sausage
+
+from vtk_segdeform import Deformer, Mesh, Regions, Session, binding, stand_in
+from vtk_segdeform.editing import posing
+from vtk_segdeform.errors import Cancelled
+
+SCENE = sausage(2)
+TARGETS = SCENE.turned(20)
+
+
+@pytest.fixture
+def counted(monkeypatch):
+    """Count how often cages are bound."""
+    bound = []
+    whole = binding.bind
+
+    def bind(*arguments, **options):
+        bound.append(1)
+        return whole(*arguments, **options)
+
+    monkeypatch.setattr(binding, "bind", bind)
+    return bound
+
+
+@pytest.mark.parametrize("large", [500, 10**9])
+def test_the_second_time_nothing_is_bound_and_the_pose_is_the_same_bit_for_bit(
+    tmp_path, counted, monkeypatch, large
+):
+    monkeypatch.setattr(stand_in, "_LARGE", large)
+    monkeypatch.setattr(stand_in, "_POINTS", 300)
+    first = SCENE.deformer(cache=tmp_path).solve(TARGETS)
+    assert len(counted) == 1
+    again = SCENE.deformer(cache=tmp_path).solve(TARGETS)
+    assert len(counted) == 1
+    assert_array_equal(again.vertices, first.vertices)
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def without_a_vertex_moved():
+    vertices = np.array(SCENE.mesh.vertices)
+    vertices[5] *= 1.0 + 1e-15
+    return Mesh(vertices, SCENE.mesh.faces)
+
+
+OTHERS = {
+    "mesh": lambda cache: Deformer(
+        mesh := without_a_vertex_moved(),
+        Regions.from_masks(mesh, SCENE.regions.membership),
+        SCENE.cages,
+        cache=cache,
+    ),
+    "cages": lambda cache: Deformer(
+        SCENE.mesh,
+        SCENE.regions,
+        [type(c)(c.vertices * [1.0, 1.0, 1.0 + 1e-12], c.faces) for c in SCENE.cages],
+        cache=cache,
+    ),
+    "regions": lambda cache: Deformer(
+        SCENE.mesh, SCENE.regions.grow(1), sausage(2).cages, cache=cache
+    ),
+    "blend": lambda cache: SCENE.deformer(
+        cache=cache, blend=SCENE.regions.membership / SCENE.regions.membership.sum(axis=0)
+    ),
+    "stretch": lambda cache: SCENE.deformer(cache=cache, stretch=9.0),
+    "groups": lambda cache: SCENE.deformer(cache=cache, rotation_groups=50),
+}
+
+
+@pytest.mark.parametrize("other", OTHERS)
+def test_whatever_it_depends_on_makes_another_one(tmp_path, counted, other):
+    SCENE.deformer(cache=tmp_path)
+    OTHERS[other](tmp_path)
+    assert len(counted) == 2
+
+
+def test_what_does_not_matter_to_it_finds_the_same(tmp_path, counted):
+    SCENE.deformer(cache=tmp_path)
+    SCENE.deformer(cache=tmp_path, preserve_volume=False, tolerance=1e-3)
+    assert len(counted) == 1
+
+
+@pytest.mark.parametrize("damage", ["cut", "empty", "other", "flipped"])
+def test_a_damaged_file_is_as_good_as_none(tmp_path, counted, damage):
+    sound = SCENE.deformer(cache=tmp_path).solve(TARGETS)
+    (path,) = tmp_path.iterdir()
+    content = bytearray(path.read_bytes())
+    if damage == "flipped":
+        content[len(content) // 2] ^= 255
+    made = {"cut": content[: len(content) // 2], "empty": b"", "other": b"PK nothing"}
+    path.write_bytes(made.get(damage, bytes(content)))
+    again = SCENE.deformer(cache=tmp_path).solve(TARGETS)
+    assert len(counted) == 2
+    assert_array_equal(again.vertices, sound.vertices)
+
+
+def test_a_folder_that_cannot_be_made_is_done_without(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    solution = SCENE.deformer(cache=tmp_path / "file" / "folder").solve(TARGETS)
+    assert abs(solution.volume_change) < 1e-12
+
+
+def test_cancelled_leaves_nothing_behind(tmp_path):
+    def stop(fraction, message):
+        if fraction > 0.3:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        SCENE.deformer(cache=tmp_path, progress=stop)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_was_not_used_for_longest_goes_first(tmp_path, monkeypatch):
+    kept = {}
+    for k, stretch in enumerate([1.0, 2.0, 3.0]):
+        SCENE.deformer(cache=tmp_path, stretch=stretch)
+        (kept[stretch],) = set(tmp_path.iterdir()) - set(kept.values())
+        os.utime(kept[stretch], (1e9 + k, 1e9 + k))
+    SCENE.deformer(cache=tmp_path, stretch=1.0)  # used again
+    monkeypatch.setattr(binding, "_MOST", int(3.5 * kept[1.0].stat().st_size))
+    SCENE.deformer(cache=tmp_path, stretch=4.0)
+    assert [path.exists() for path in kept.values()] == [True, False, True]
+
+
+def test_a_session_over_a_large_mesh_keeps_its_binding(tmp_path, counted, monkeypatch):
+    monkeypatch.setenv("SEGDEFORM_CACHE", str(tmp_path))
+    monkeypatch.setattr(posing, "_DEAR", 100)
+    for _ in range(2):
+        session = Session(SCENE.mesh)
+        session.set_regions(SCENE.regions)
+        session.set_cages(SCENE.cages)
+        session.bind()
+    assert len(counted) == 1
+    monkeypatch.setenv("SEGDEFORM_CACHE", "0")
+    assert binding.cache_folder() is None
