@@ -29,12 +29,17 @@ if not shutil.which("Xvfb"):
     pytest.skip("needs Xvfb (apt-get install xvfb)", allow_module_level=True)
 
 Qt = QtCore.Qt
+ONE_SCREEN = "SEGDEFORM_ONE_SCREEN"  # set where VTK is to have windows too, on the screen of Qt
 _SPECIAL = {"Escape": Qt.Key_Escape, "Home": Qt.Key_Home, "Delete": Qt.Key_Delete}
 
 
 @functools.cache
 def application():
     """Return the one Qt application of the process, on a screen of its own."""
+    if ONE_SCREEN in os.environ:
+        os.environ.pop("VTK_DEFAULT_OPENGL_WINDOW", None)
+        os.environ.update(DISPLAY=new_screen(), QT_QPA_PLATFORM="xcb")
+        return QtWidgets.QApplication(["segdeform tests"])
     # Where it lacks a library of X, Qt ends the process; somebody else's, at first.
     code = "from qtpy import QtWidgets; QtWidgets.QApplication([])"
     # VTK's off-screen windows are EGL's; a thread cannot change between that and GLX.  Qt looks

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import subprocess
 import sys
 import threading
-import weakref
 from pathlib import Path
 
 import numpy as np
@@ -596,36 +594,6 @@ def test_two_widgets_in_one_window_and_a_dock_mind_their_own_business(state):
     window.close()
     window.deleteLater()
     delete_now()
-
-
-@pytest.mark.parametrize("times", [2, pytest.param(50, marks=pytest.mark.campaign)])
-def test_nothing_is_left_of_widgets_that_were_closed(state, times):
-    app, (mesh, now) = application(), state
-    session = Session(mesh, state=now)
-
-    def open_and_close(job):
-        seen = Seen(DeformWidget(session))
-        if job:
-            QtTest.QTest.mouseClick(seen.panel.regions.find, Qt.LeftButton)
-        parts = [seen.widget, seen.panel, seen.editor, seen.widget.plotter]
-        gone = [weakref.ref(part) for part in parts]
-        seen.widget.close()
-        assert not seen.editor.is_busy
-        seen.widget.deleteLater()
-        del seen, parts
-        delete_now()
-        gc.collect()
-        return [ref() for ref in gone]
-
-    open_and_close(job=True)
-    files, threads = len(os.listdir("/proc/self/fd")), threading.active_count()
-    for number in range(times):
-        assert open_and_close(job=number % 4 == 0) == [None] * 4
-    assert app.topLevelWidgets() == []
-    assert threading.active_count() == threads
-    assert len(os.listdir("/proc/self/fd")) <= files + 2
-    session.set_fixed([])  # and nobody listens to the session
-    assert session._listeners._listeners == {}
 
 
 def test_a_window_that_is_deleted_without_a_word_takes_all_with_it(state):

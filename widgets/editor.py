@@ -45,7 +45,7 @@ class DeformEditor:
         if not isinstance(session, Session | Mesh):
             raise TypeError(f"session must be a Session or a Mesh; got {type(session).__name__}")
         self.view = View.of(view)
-        has_camera = self.view.renderer.IsActiveCameraCreated()
+        has_camera = _is_aimed(self.view.renderer)
         session = session if isinstance(session, Session) else Session(session)
         self._desk = Desk(self.view, session, help_sections())
         if not has_camera:
@@ -197,3 +197,13 @@ class DeformEditor:
         action(desk)
         desk.bind_if_ready()
         desk.refresh()
+
+
+def _is_aimed(renderer: Any) -> bool:
+    """Tell whether somebody has set the camera; an empty window, once drawn, has one as made."""
+    if not renderer.IsActiveCameraCreated():
+        return False
+    camera = renderer.GetActiveCamera()
+    as_made = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+    now = camera.GetPosition(), camera.GetFocalPoint(), camera.GetViewUp()
+    return bool(now != as_made or renderer.VisibleActorCount())
