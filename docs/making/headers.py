@@ -6,6 +6,9 @@ What is indented in the header of a module, a diagram or a piece of code, is set
 
 from __future__ import annotations
 
+import ast
+import re
+import textwrap
 from typing import Any
 
 from docutils import nodes
@@ -15,18 +18,24 @@ from sphinx.application import Sphinx
 def mark_blocks(
     app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
 ) -> None:
-    """Put a "::" before each indented block of a module's docstring, in place."""
+    """Mark each indented block of a module's docstring as what it is, in place."""
     del app, name, obj, options
     if what != "module":
         return
-    marked: list[str] = []
-    for line in lines:
-        begins = line.startswith("    ") and (not marked or not marked[-1].strip())
-        after_text = not any(before.startswith("    ") for before in marked[-2:])
-        if begins and after_text:
-            marked += ["::", ""]
-        marked.append(line)
-    lines[:] = marked
+    text = "\n".join(lines)
+    for block in re.findall(r"(?m)(?:^    .*\n|^\n(?=    ))+", text + "\n"):
+        marker = f"\n.. code-block:: {language_of(block)}\n\n"
+        text = text.replace(block.rstrip("\n"), marker + block.strip("\n") + "\n")
+    lines[:] = [*text.splitlines(), ""]
+
+
+def language_of(block: str) -> str:
+    """Return what an indented block is written in."""
+    try:
+        ast.parse(textwrap.dedent(block))
+    except SyntaxError:
+        return "text"
+    return "python"
 
 
 def set_as_code(app: Sphinx, env: object, node: Any, content: nodes.Node) -> nodes.Node | None:
@@ -37,6 +46,6 @@ def set_as_code(app: Sphinx, env: object, node: Any, content: nodes.Node) -> nod
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Tell Sphinx."""
-    app.connect("autodoc-process-docstring", mark_blocks)
+    app.connect("autodoc-process-docstring", mark_blocks, priority=400)  # before numpydoc
     app.connect("missing-reference", set_as_code)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
