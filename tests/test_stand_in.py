@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
+from scipy.spatial.transform import Rotation
 
-from vtk_segdeform import positions, stand_in, subspace
+from vtk_segdeform import models, positions, stand_in, subspace
 from vtk_segdeform.constraints import region_volumes, total_volume
+from vtk_segdeform.segmenting.coarse import coarsen
 from vtk_segdeform.stand_in import StandIn
 from vtk_segdeform.subspace import bind
 
@@ -103,3 +105,13 @@ def test_neighbours_in_a_large_patch_share_a_place_and_are_held_no_worse(monkeyp
     assert shared.fixed_error < 1.5 * each.fixed_error + 1e-4
     away = np.linalg.norm(shared.vertices - each.vertices, axis=1).max()
     assert away < 4e-3 * SCENE.mesh.diagonal  # a quarter as many places
+
+
+def test_its_cells_are_the_same_in_every_frame_even_where_many_are_equally_near():
+    mesh = models.bar(divisions=(8, 8, 30))
+    cells, _ = coarsen(mesh, 300, np.random.default_rng(0))
+    for seed in range(3):
+        turn = Rotation.random(random_state=seed).as_matrix()
+        turned = mesh.with_vertices(3.7 * mesh.vertices @ turn.T + [1.0, -2.0, 5.0])
+        again, _ = coarsen(turned, 300, np.random.default_rng(0))
+        assert_array_equal(again, cells)

@@ -22,6 +22,7 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from ..mesh import Mesh
 
 _LOOPS, _ENDS = 4, 12  # ends that distances are taken from
+_TIE_BREAK = 1e-6  # of an edge's length
 _STRAIGHT = np.pi / 4  # mean of length over steps, for a straight line walked in steps
 
 
@@ -137,9 +138,17 @@ def coarsen(mesh: Mesh, n_points: int, rng: np.random.Generator) -> tuple[IntArr
 
 
 def nearest_of(mesh: Mesh, start: IntArray) -> IntArray:
-    """Return (n,) int: for each vertex the nearest of *start*, over edges."""
+    """Return (n,) int: for each vertex the nearest of *start*, over edges.
+
+    On a regular mesh many are equally near.  Every vertex makes the edges at it a little longer,
+    by an amount of its own: so which one it is does not hang on rounding.
+    """
+    graph = sparse.csr_array(mesh.adjacency)
+    favour = _TIE_BREAK * np.random.default_rng(0).random(mesh.n_vertices)
+    ends = np.repeat(favour, np.diff(graph.indptr)) + favour[graph.indices]
+    lengths = sparse.csr_array((graph.data * (1.0 + ends), graph.indices, graph.indptr))
     _, _, source = csgraph.dijkstra(
-        mesh.adjacency, directed=False, indices=start, return_predecessors=True, min_only=True
+        lengths, directed=False, indices=start, return_predecessors=True, min_only=True
     )
     return np.asarray(source, dtype=np.int64)
 
