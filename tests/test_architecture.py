@@ -111,7 +111,7 @@ GRANTED = {
     "formats.off": {"pyvista"},
     "formats.ply": {"pyvista"},
     "formats.wavefront": {"pyvista"},
-    "formats.vtk_readers": {"pyvista"},
+    "formats.vtk_readers": {"pyvista", *VTK},
     "formats.meshlab_layers": {"pyvista"},
     "meshlab": {"pymeshlab", "pyvista"},
     "meshlab_project": {"pyvista"},

@@ -116,7 +116,7 @@ def test_cut_off_anywhere_the_old_project_is_still_whole(tmp_path, monkeypatch):
             real(a, b)
 
         monkeypatch.setattr(os, "replace", break_off)
-        with pytest.raises(OSError, match="power"):
+        with pytest.raises(MeshError, match="power"):
             write_project(tmp_path / "work.mlp", {"a": painted(), "b": BALL, "c": BALL})
         layers = read_project(tmp_path / "work.mlp")
         assert same(layers["a"], to_polydata(BALL))

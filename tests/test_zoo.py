@@ -29,7 +29,7 @@ from vtk_segdeform.errors import MeshError, SegDeformError
 LONGEST = 120.0  # seconds, for one case
 CURE = re.compile(
     r"\b(must|repair|make|add|give|use|take|leave|enlarge|scale|mark|name|choose|move|look|"
-    r"raise|reverse|pass|fit|segment|count|write|tell|select)\b"
+    r"same unit|raise|reverse|pass|fit|segment|count|write|tell|select)\b"
 )
 
 

@@ -27,7 +27,7 @@ from .errors import ArgumentError, MeshError
 from .formats.off import read_off, write_off
 from .formats.ply import read_ply, write_ply
 from .formats.polygons import polydata_of, triangles_of
-from .formats.vtk_readers import read_with_vtk
+from .formats.vtk_readers import read_with_vtk, write_with_vtk
 from .formats.wavefront import read_obj, write_obj
 from .mesh import Mesh
 
@@ -130,22 +130,41 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
     Raises
     ------
     MeshError
-        If the suffix is not known or the folder is not there.
+        If the suffix is not known, the folder is not there, or the disk is full.
     """
     path = Path(path)
     require_writable(path)
     surface = to_polydata(mesh) if isinstance(mesh, Mesh) else mesh
     suffix = path.suffix.lower()
-    # Beside the target, so that os.replace is a rename on one file system.
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".segdeform-") as folder:
-        draft = Path(folder) / path.name
-        if suffix in _WRITERS:
-            _WRITERS[suffix](draft, surface)
-        elif suffix in _VTK_WRITES:
-            surface.save(draft)
-        else:
-            meshlab.write(draft, mesh if isinstance(mesh, Mesh) else from_polydata(mesh))
-        os.replace(draft, path)
+    try:
+        # Beside the target, so that os.replace is a rename on one file system.
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".segdeform-") as folder:
+            draft = Path(folder) / path.name
+            if suffix in _WRITERS:
+                _WRITERS[suffix](draft, surface)
+            elif suffix in _VTK_WRITES:
+                write_with_vtk(draft, surface)
+            else:
+                _write_with_meshlab(draft, mesh if isinstance(mesh, Mesh) else from_polydata(mesh))
+            with open(draft, "rb") as file:
+                os.fsync(file.fileno())
+            os.replace(draft, path)
+    except OSError as fault:
+        reason = fault.strerror or str(fault)
+        raise MeshError(
+            f"{path}: cannot be written ({reason}); make room, or choose another place"
+        ) from fault
+
+
+def _write_with_meshlab(draft: Path, mesh: Mesh) -> None:
+    """Write through PyMeshLab; OSError unless all of it is there, which it does not say itself."""
+    try:
+        meshlab.write(draft, mesh)
+        whole = len(meshlab.read_faces(draft)[1]) == mesh.n_faces
+    except MeshError as fault:
+        raise OSError(str(fault).removeprefix(f"{draft}: ")) from None
+    if not whole:
+        raise OSError("what was written is not all of it")
 
 
 def require_writable(path: str | Path, *, arrays: bool = False) -> None:

@@ -99,28 +99,34 @@ def write_project(path: str | Path, what: Surface | Session | Mapping[str, Surfa
     layers = as_layers(what)
     project = ElementTree.Element("MeshLabProject")
     group = ElementTree.SubElement(project, "MeshGroup")
-    folder.mkdir(exist_ok=True)
-    names = set()
-    with tempfile.TemporaryDirectory(dir=folder, prefix=".segdeform-") as drafts:
-        for number, (label, surface) in enumerate(layers.items()):
-            draft = Path(drafts) / "layer.ply"
-            write_mesh(draft, _with_flags(surface))
-            name = f"{number}-{hashlib.sha256(draft.read_bytes()).hexdigest()[:12]}.ply"
-            os.replace(draft, folder / name)
-            names.add(name)
-            place = {"label": _printable(label), "visible": "1"}
-            place["filename"] = f"{folder.name}/{name}"
-            mesh = ElementTree.SubElement(group, "MLMesh", place)
-            ElementTree.SubElement(mesh, "MLMatrix44").text = _IDENTITY
-        ElementTree.SubElement(project, "RasterGroup")
-        ElementTree.indent(project, " ")
-        text = _HEAD + ElementTree.tostring(project, encoding="unicode") + "\n"
-        draft = Path(drafts) / "project.mlp"
-        draft.write_text(text, encoding="utf-8")
-        os.replace(draft, path)
-    for file in folder.iterdir():
-        if _OURS.fullmatch(file.name) and file.name not in names:
-            file.unlink()
+    try:
+        folder.mkdir(exist_ok=True)
+        names = set()
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".segdeform-") as drafts:
+            for number, (label, surface) in enumerate(layers.items()):
+                draft = Path(drafts) / "layer.ply"
+                write_mesh(draft, _with_flags(surface))
+                name = f"{number}-{hashlib.sha256(draft.read_bytes()).hexdigest()[:12]}.ply"
+                os.replace(draft, folder / name)
+                names.add(name)
+                place = {"label": _printable(label), "visible": "1"}
+                place["filename"] = f"{folder.name}/{name}"
+                mesh = ElementTree.SubElement(group, "MLMesh", place)
+                ElementTree.SubElement(mesh, "MLMatrix44").text = _IDENTITY
+            ElementTree.SubElement(project, "RasterGroup")
+            ElementTree.indent(project, " ")
+            text = _HEAD + ElementTree.tostring(project, encoding="unicode") + "\n"
+            draft = Path(drafts) / "project.mlp"
+            draft.write_text(text, encoding="utf-8")
+            os.replace(draft, path)
+        for file in folder.iterdir():
+            if _OURS.fullmatch(file.name) and file.name not in names:
+                file.unlink()
+    except OSError as fault:
+        reason = fault.strerror or str(fault)
+        raise MeshError(
+            f"{path}: cannot be written ({reason}); make room, or choose another place"
+        ) from fault
 
 
 def _with_flags(surface: pv.PolyData) -> pv.PolyData:

@@ -1,0 +1,62 @@
+"""Saves a session again and again, and is killed at random moments, as by a power cut or a user.
+
+    python killed_saver.py FOLDER COUNT SEED
+
+Prints how often the file held the old and the new session; anything else there is an error.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import signal
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+from solids import OCTAHEDRON, icosphere
+
+import vtk_segdeform as sd
+
+
+def main() -> None:
+    """Kill a child that saves, COUNT times."""
+    folder, count, seed = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
+    rng = np.random.default_rng(seed)
+    path = folder / "work.segdeform"
+    sessions = [sd.Session(sd.Mesh(*OCTAHEDRON)), sd.Session(sd.Mesh(*icosphere(3)))]
+    whole = []
+    for session in sessions:
+        session.add_handle([0], "h")
+        sd.save_session(path, session)
+        whole.append(path.read_bytes())
+    found: Counter[str] = Counter()
+    for number in range(count):
+        before = whole.index(path.read_bytes())
+        ready, begin = os.pipe()
+        child = os.fork()
+        if child == 0:
+            for turn in itertools.count(number):
+                os.write(begin, b".")
+                sd.save_session(path, sessions[turn % 2])
+        os.read(ready, 1)
+        time.sleep(rng.uniform(0.0, 0.02))
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        os.close(ready)
+        os.close(begin)
+        after = whole.index(path.read_bytes())  # ValueError if it is neither
+        sd.load_session(path)
+        found["old" if after == before else "new"] += 1
+        drafts = list(folder.glob(".segdeform-*"))
+        found["killed while writing"] += bool(drafts)
+        for draft in drafts:
+            draft.unlink()
+        assert list(folder.iterdir()) == [path]
+    print(*(f"{number} {what}" for what, number in sorted(found.items())), sep=", ")
+
+
+if __name__ == "__main__":
+    main()
