@@ -103,6 +103,35 @@ def test_selection_quality_colours_and_texture_come_back_to_the_last_bit():
 
 
 @pytest.mark.usefixtures("with_pymeshlab")
+def test_other_arrays_go_as_attributes_and_come_back_by_their_names():
+    surface = to_polydata(Mesh(*icosphere(1)))
+    rng = np.random.default_rng(3)
+    surface.point_data["heat of\u00e4"] = rng.random(surface.n_points)
+    surface.point_data["flow"] = rng.random((surface.n_points, 3))
+    surface.cell_data["flow"] = rng.random(surface.n_cells)
+    surface.cell_data["part"] = np.arange(surface.n_cells)
+    surface.point_data["words"] = ["a"] * surface.n_points  # none of numbers
+    surface.point_data["tensor"] = rng.random((surface.n_points, 9))  # MeshLab has none
+    meshset = meshlab.to_meshset(surface)
+    names = ["heat of\u00e4", "flow", "part"]
+    again = meshlab.from_meshset(meshset, names)
+    assert set(again.point_data.keys()) == set(names[:2])
+    assert set(again.cell_data.keys()) == {"flow", "part"}
+    for mine, other in (
+        (again.point_data, surface.point_data),
+        (again.cell_data, surface.cell_data),
+    ):
+        for name, values in mine.items():
+            assert_array_equal(values, other[name])
+    meshset.meshing_invert_face_orientation()  # what MeshLab does to the layer, they go through
+    turned = meshlab.from_meshset(meshset, ["part"])
+    assert_array_equal(turned.cell_data["part"], surface.cell_data["part"])
+    assert not meshlab.from_meshset(meshset).point_data
+    with pytest.raises(MeshError, match="no attribute 'cold'"):
+        meshlab.from_meshset(meshset, ["cold"])
+
+
+@pytest.mark.usefixtures("with_pymeshlab")
 def test_what_is_selected_there_is_held_dragged_or_a_region_here():
     scene = sausage(2)
     meshset = meshlab.to_meshset(scene.mesh)

@@ -5,7 +5,11 @@
     fixed, handle, region    <--selected_vertices--           what is selected there
 
 Selection, quality, colours and texture coordinates go both ways, as arrays of the PolyData that
-`formats.meshlab_layers` lists; `convert.from_polydata` makes the `Mesh` of one.
+`formats.meshlab_layers` lists; so do other arrays of numbers, as custom attributes, of which
+`from_meshset` has to be told the names.  `convert.from_polydata` makes the `Mesh` of a PolyData.
+
+The image of a texture stays behind: PyMeshLab (2025.7) takes one from a file only, by its filter
+``set_texture_per_mesh``, and hands one out only to a file, ``layer.textures()[name].save(path)``.
 
 PyMeshLab is under the GPL (version 3), this package is not: it is imported inside the calls
 below, nowhere else, and everything but these calls works without it.
@@ -17,7 +21,7 @@ that are meant as such, not as per cent, have to be wrapped in its ``PureValue``
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +29,14 @@ import numpy as np
 
 from .arrays import FloatArray, IntArray
 from .errors import ArgumentError, MeshError, MissingDependencyError
-from .formats.meshlab_layers import Surface, as_layers, free_name, ingredients, surface_of
+from .formats.meshlab_layers import (
+    Surface,
+    add_attributes,
+    as_layers,
+    free_name,
+    ingredients,
+    surface_of,
+)
 from .mesh import Mesh
 from .session import Session
 
@@ -70,9 +81,11 @@ def to_meshset(what: Surface | Session | Mapping[str, Surface]) -> Any:
     pymeshlab = _pymeshlab()
     meshset = pymeshlab.MeshSet(verbose=False)
     for name, surface in as_layers(what).items():
-        arrays, vertices, faces = ingredients(surface)
+        arrays, vertices, faces, of_vertices, of_faces = ingredients(surface)
         meshset.add_mesh(pymeshlab.Mesh(**arrays), name)
         layer, condition = meshset.current_mesh(), f"({_MARK} > 0)"
+        add_attributes(layer, "vertex", of_vertices)
+        add_attributes(layer, "face", of_faces)
         # The attribute goes to the layer: from the mesh it is copied from, PyMeshLab crashes.
         if vertices is not None:
             layer.add_vertex_custom_scalar_attribute(vertices, _MARK)
@@ -85,15 +98,22 @@ def to_meshset(what: Surface | Session | Mapping[str, Surface]) -> Any:
     return meshset
 
 
-def from_meshset(meshset: Any) -> pv.PolyData:
+def from_meshset(meshset: Any, arrays: Iterable[str] = ()) -> pv.PolyData:
     """Return the current layer of a ``pymeshlab.MeshSet``, with all that MeshLab knows of it.
+
+    Parameters
+    ----------
+    meshset : pymeshlab.MeshSet
+        Left as it is.
+    arrays : iterable of str
+        Names of custom attributes, of vertices or faces, to bring along as float64 arrays.
 
     Raises
     ------
     MeshError
-        If there is no layer.
+        If there is no layer, or no attribute of a name.
     """
-    return surface_of(_current(meshset))
+    return surface_of(_current(meshset), arrays, _pymeshlab().PyMeshLabException)
 
 
 def layers_from_meshset(meshset: Any) -> dict[str, pv.PolyData]:

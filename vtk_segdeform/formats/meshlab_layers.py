@@ -9,9 +9,13 @@ PolyData, which files, views and the deformation (`convert.with_vertices`) hand 
     texture coordinates  of vertices: active ones, "TextureCoordinates" (n, 2);
                          of corners: cell array "TextureCorners" (m, 6)
 
+    attributes           of MeshLab's users, numbers or vectors of vertices or faces: all other
+                         point and cell arrays (n,) and (n, 3) of numbers, under their names
+
 These are the names that PLY files have for them here.  MeshLab holds texture coordinates in single
 precision, the rest in double.  It gives each vertex a colour and a quality: white and 0, if it was
-told none, are no arrays.  A layer's matrix is applied to its positions.
+told none, are no arrays.  A layer's matrix is applied to its positions.  It does not tell what
+attributes there are, so who reads a layer names them.
 
 No import of PyMeshLab: functions below only ask a mesh that a caller of PyMeshLab got.
 """
@@ -19,7 +23,7 @@ No import of PyMeshLab: functions below only ask a mesh that a caller of PyMeshL
 from __future__ import annotations
 
 import itertools
-from collections.abc import Container, Mapping
+from collections.abc import Container, Iterable, Mapping
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -40,6 +44,8 @@ class Ingredients(NamedTuple):
     arrays: dict[str, Any]
     selected_vertices: Any  # (n,) float, 1 is selected; None if none is
     selected_faces: Any  # (m,)
+    of_vertices: dict[str, Any]  # attributes by name, (n,) or (n, 3) float
+    of_faces: dict[str, Any]
 
 
 def layers_of(session: Session) -> dict[str, pv.PolyData]:
@@ -108,11 +114,29 @@ def ingredients(surface: pv.PolyData) -> Ingredients:
     if _CORNERS in cells:
         corners = np.asarray(cells[_CORNERS], dtype=np.float64)
         arrays["w_tex_coords_matrix"] = corners.reshape(-1, 2)
-    return Ingredients(arrays, _selection(points), _selection(cells))
+    others = (_others(points, surface.n_points), _others(cells, surface.n_cells))
+    return Ingredients(arrays, _selection(points), _selection(cells), *others)
 
 
-def surface_of(layer: Any) -> pv.PolyData:
-    """Return a ``pymeshlab.Mesh`` with all it has."""
+def add_attributes(layer: Any, sort: str, attributes: Mapping[str, Any]) -> None:
+    """Give *attributes* to the vertices or faces, the *sort*, of a ``pymeshlab.Mesh``."""
+    for name, values in attributes.items():
+        kind = "scalar" if values.ndim == 1 else "point"
+        getattr(layer, f"add_{sort}_custom_{kind}_attribute")(values, name)
+
+
+def surface_of(layer: Any, names: Iterable[str] = (), absent: Any = ()) -> pv.PolyData:
+    """Return a ``pymeshlab.Mesh`` with all it has.
+
+    Parameters
+    ----------
+    layer : pymeshlab.Mesh
+        Left as it is.
+    names : iterable of str
+        Of the attributes to bring along; a MeshError if there is none of a name.
+    absent : type or tuple of types
+        What PyMeshLab raises where there is no attribute of a name.
+    """
     faces = np.asarray(layer.face_matrix(), dtype=np.int64).reshape(-1, 3)
     points = np.asarray(layer.transformed_vertex_matrix(), dtype=np.float64)
     surface = polydata_of(points, np.full(len(faces), 3), faces.ravel())
@@ -135,7 +159,34 @@ def surface_of(layer: Any) -> pv.PolyData:
     if layer.has_wedge_tex_coord():
         corners = np.ascontiguousarray(layer.wedge_tex_coord_matrix())
         surface.cell_data[_CORNERS] = corners.reshape(len(faces), 6)
+    for name in names:
+        _bring(layer, name, surface, absent)
     return surface
+
+
+def _bring(layer: Any, name: str, surface: pv.PolyData, absent: Any) -> None:
+    found = False
+    for sort, attributes in (("vertex", surface.point_data), ("face", surface.cell_data)):
+        for kind in ("scalar_attribute_array", "point_attribute_matrix"):
+            try:
+                values = getattr(layer, f"{sort}_custom_{kind}")(name)
+            except absent:
+                continue
+            attributes[name], found = np.ascontiguousarray(values), True
+    if not found:
+        raise MeshError(f"the layer has no attribute {name!r}, of vertices or of faces")
+
+
+def _others(attributes: Any, count: int) -> dict[str, Any]:
+    """Return the arrays that MeshLab has no place for, as float64."""
+    known = {"selection", "quality", "RGB", "RGBA", "Normals", "selected_here", _CORNERS, _TEXTURE}
+    known |= {attributes.active_normals_name, attributes.active_texture_coordinates_name}
+    arrays = {name: np.asarray(v) for name, v in attributes.items() if name not in known}
+    return {
+        name: np.asarray(values, dtype=np.float64)
+        for name, values in arrays.items()
+        if values.dtype.kind in "biuf" and values.shape in ((count,), (count, 3))
+    }
 
 
 def _colour(attributes: Any) -> Any:
