@@ -495,10 +495,13 @@ def test_what_is_recovered_later_or_never(start, arm, ball_file, tmp_path, boxes
         assert hand.title == ("ball.vtp - segdeform" if path else "segdeform")
         assert slots(tmp_path) == [slot]
     boxes.answers.append("Recover")
+    assert hand.reads("File")["Recover unsaved work ..."] == (True, False)
     hand.choose("File", "Recover unsaved work")
     hand.settle()
     assert hand.window.document.surface.point_data["height"][7] == BALL.vertices[7, 2]
     assert hand.title == "ball.vtp* - segdeform"
+    assert "recovered" in hand.window.editor.status
+    assert hand.reads("File")["Recover unsaved work ..."] == (False, False)
     boxes.answers.append("Discard")
     assert hand.window.close()
     left(tmp_path, bent(arm), About("arm"))

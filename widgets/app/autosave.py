@@ -161,6 +161,14 @@ class Autosaves:
         """Return what programs that are gone have left, the latest first; all of it held now."""
         return sorted(self._left(), key=lambda slot: slot.when, reverse=True)
 
+    @property
+    def has_left(self) -> bool:
+        """Whether there is any; it stays whoever's it is."""
+        left = self.left()
+        for slot in left:
+            slot.release()
+        return bool(left)
+
     def _left(self) -> Iterator[Slot]:
         folders = sorted(self.folder.iterdir()) if self.folder.is_dir() else []
         for folder in folders:

@@ -46,7 +46,8 @@ class Menus:
         self._add(menu, "&Open ...", window.ask_and_open, _Keys.Open)
         self.recent = menu.addMenu("Open &recent")
         self.recent.aboutToShow.connect(self._show_recent)
-        self._add(menu, "Recover &unsaved work ...", window.recover)
+        recover = self._add(menu, "Recover &unsaved work ...", window.recover)
+        menu.aboutToShow.connect(lambda: recover.setEnabled(window.autosaves.has_left))
         menu.addSeparator()
         for text, save, keys in (
             ("&Save session", saving.save_session, _Keys.Save),

@@ -51,8 +51,8 @@ class Window(QtWidgets.QMainWindow):
         Where what is open came from.
     editor_widget : DeformWidget or None
         What it is edited in.
-    keeper, recent : Keeper, Recent
-        Unsaved work, and the files that were open last.
+    keeper, autosaves, recent : Keeper, Autosaves, Recent
+        Unsaved work, where it is kept, and the files that were open last.
     mesh_state : object
         The state of the session of which the mesh is saved.
     """
@@ -66,8 +66,8 @@ class Window(QtWidgets.QMainWindow):
     ) -> None:
         super().__init__()
         self.recent = Recent(settings or QtCore.QSettings("vtk_segdeform", "segdeform"))
-        self._autosaves = autosaves or Autosaves()
-        self.keeper = Keeper(self._autosaves, self, interval=interval)
+        self.autosaves = autosaves or Autosaves()
+        self.keeper = Keeper(self.autosaves, self, interval=interval)
         self.keeper.failed.connect(self._say)
         self.document = Document("")
         self.mesh_state: object = None
@@ -141,7 +141,7 @@ class Window(QtWidgets.QMainWindow):
 
     def recover(self) -> bool:
         """Offer what crashed programs have left; tell whether some of it is taken."""
-        slot = choose_work(self, self._autosaves)
+        slot = choose_work(self, self.autosaves)
         if slot is None:
             return False
         if not self._open(Request(slot.about.name, from_slot(slot), slot=slot)):
@@ -184,6 +184,8 @@ class Window(QtWidgets.QMainWindow):
             self.recent.add(request.path)
         self._show_page()
         widget.setFocus()
+        if request.slot is not None:
+            self._say("recovered; it is still to be saved")
 
     def _failed(self, request: Request, text: str) -> None:
         self._stop_opening()
