@@ -85,9 +85,9 @@ STORY = [
     # the paper's experiments and its peers, measured
     "benchmarks.measuring", "benchmarks.scale", "benchmarks.sections", "benchmarks.charts",
     "benchmarks.tasks", "benchmarks.drags", "benchmarks.drawing", "benchmarks.programs",
-    "benchmarks.drag_profile", "benchmarks.table_one", "benchmarks.segmentation_study",
-    "benchmarks.experiments", "benchmarks.full_space", "benchmarks.peers",
-    "benchmarks.cage_making", "benchmarks.report",
+    "benchmarks.frame_profile", "benchmarks.drag_profile", "benchmarks.table_one",
+    "benchmarks.segmentation_study", "benchmarks.experiments", "benchmarks.full_space",
+    "benchmarks.peers", "benchmarks.cage_making", "benchmarks.report",
     # the command line
     "command_line.selection", "command_line.motion", "command_line.outputs", "command_line.demo",
     "command_line.interactive", "command_line.bench", "command_line.commands",

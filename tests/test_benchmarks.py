@@ -13,6 +13,7 @@ from vtk_segdeform.benchmarks import (
     cage_making,
     drag_profile,
     experiments,
+    frame_profile,
     peers,
     programs,
     report,
@@ -50,7 +51,7 @@ def without_peers(monkeypatch):
     for name in ("igl", "open3d", "bpy", "gpytoolbox", "gpytoolbox.copyleft", "igl.copyleft"):
         monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.delenv("SEGDEFORM_DATA", raising=False)
-    for module in (drag_profile, peers, report):
+    for module in (frame_profile, peers, report):
         monkeypatch.setattr(module, "warm_up", lambda: None)
 
 
