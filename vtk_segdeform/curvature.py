@@ -38,10 +38,11 @@ from .rotations import closest_rotations
 _SHARES = (0.999, 0.8, 0.5)  # of the rotations' part; the largest that leaves H convex
 _SOFTEST = 1e-3  # least stiffness of a group about an axis, as a share of its largest
 _CHUNK = 1000  # groups at a time
-# eps_kij as (i, c, k): row of R S, column of dp, axis of turning.
+# eps_kic as (k, c, i), axis of turning, column of dp, row of R S; k and c side by side.
 _EPSILON = np.zeros((3, 3, 3))
 for _k, _i, _j in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-    _EPSILON[_i, _j, _k], _EPSILON[_j, _i, _k] = 1.0, -1.0
+    _EPSILON[_k, _j, _i], _EPSILON[_k, _i, _j] = 1.0, -1.0
+_EPSILON = _EPSILON.reshape(9, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,20 +98,25 @@ def curved_factor(hessian: FloatArray, energy: Energy, p: FloatArray) -> Factor 
 def _rotations_part(energy: Energy, p: FloatArray) -> FloatArray:
     """Return the lower half of sum_g T_g M_g^-1 T_g^T, (3m, 3m), stacked axis by axis."""
     m = len(p)
-    total = np.zeros((3 * m, 3 * m), order="F")
-    for reduced in energy.fitted_rows(_CHUNK):  # K of some groups, (3 g, m)
-        covariances = (reduced @ p).reshape(-1, 3, 3)
-        rotations = closest_rotations(covariances)
-        stretched = rotations @ covariances
-        symmetric = 0.5 * (stretched + np.swapaxes(stretched, 1, 2))
-        trace = np.trace(symmetric, axis1=1, axis2=2)
-        stiffness, axes = np.linalg.eigh(trace[:, None, None] * np.eye(3) - symmetric)
-        stiffness = np.maximum(stiffness, _SOFTEST * np.abs(stiffness).max(axis=1, keepdims=True))
-        root = axes / np.sqrt(np.maximum(stiffness, np.finfo(float).tiny))[:, None]  # M^-1/2
-        # T^T for each axis c of dp: eps_kic R_i. K, turned into the axes of M.
-        mixed = np.einsum("gkl,ick,gij->glcj", root, _EPSILON, rotations, optimize=True)
-        rows = mixed.reshape(-1, 9, 3) @ reduced.reshape(-1, 3, m)
-        total = blas.dsyrk(
-            1.0, rows.reshape(-1, 3 * m).T, beta=1.0, c=total, lower=1, overwrite_c=1
-        )
-    return np.asarray(total)
+    total = np.zeros((3 * m, 3 * m))  # its upper half; the transpose is in BLAS's order
+    twists = _twists(energy.covariances(p))
+    for groups, columns, reduced in energy.fitted_rows(_CHUNK):
+        c = len(columns)
+        rows = (twists[groups] @ reduced).reshape(-1, 3 * c)  # T^T, turned into the axes of M
+        part = blas.dsyrk(1.0, rows.T, lower=1).T
+        stacked = (np.arange(3)[:, None] * m + columns).ravel()
+        total[np.ix_(stacked, stacked)] += part
+    return total.T
+
+
+def _twists(covariances: FloatArray) -> FloatArray:
+    """Return (G, 9, 3): what makes M^-1/2 T^T of K_g, for the axis of turning and that of dp."""
+    rotations = closest_rotations(covariances)
+    stretched = rotations @ covariances
+    symmetric = 0.5 * (stretched + np.swapaxes(stretched, 1, 2))
+    trace = np.trace(symmetric, axis1=1, axis2=2)
+    stiffness, axes = np.linalg.eigh(trace[:, None, None] * np.eye(3) - symmetric)
+    stiffness = np.maximum(stiffness, _SOFTEST * np.abs(stiffness).max(axis=1, keepdims=True))
+    root = axes / np.sqrt(np.maximum(stiffness, np.finfo(float).tiny))[:, None]  # M^-1/2
+    turned = (_EPSILON @ rotations).reshape(-1, 3, 9)  # T^T for each axis c of dp: eps_kic R_i.
+    return np.asarray((np.swapaxes(root, 1, 2) @ turned).reshape(-1, 9, 3))

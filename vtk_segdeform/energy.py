@@ -28,6 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -74,16 +75,45 @@ class Energy:
         """Whether every vertex has its own rotation, taken from x; groups take theirs from p."""
         return sparse.issparse(self.fit)
 
-    def fitted_rows(self, count: int) -> Iterator[FloatArray]:
-        """Yield K, what rotations are fitted to as rows on p (3 g, m), *count* groups at a time."""
-        for start in range(0, self.fit.shape[0], 3 * count):
-            rows = self.fit[start : start + 3 * count]
-            yield self.subspace.left(rows) if sparse.issparse(rows) else rows
+    def covariances(self, p: FloatArray) -> FloatArray:
+        """Return S_g = K_g p of every group, (G, 3, 3)."""
+        fitted = self.fit @ (self.subspace.map(p) if self.turns_vertices else p)
+        return np.asarray(fitted).reshape(-1, 3, 3)
+
+    def fitted_rows(self, count: int) -> Iterator[tuple[IntArray, IntArray, FloatArray]]:
+        """Yield K, what rotations are fitted to as rows on p, some *count* groups at a time.
+
+        As (groups, columns, rows): these groups (g,), the cage vertices (c,) that reach them, and
+        (g, 3, c).
+        """
+        if not self.turns_vertices:
+            yield from self._reaches
+            return
+        every = np.arange(self.subspace.n_columns)
+        for start in range(0, self.fit.shape[0] // 3, count):
+            rows = self.subspace.left(self.fit[3 * start : 3 * (start + count)])
+            groups = np.arange(start, start + len(rows) // 3)
+            yield groups, every, rows.reshape(len(groups), 3, -1)
+
+    @cached_property
+    def _reaches(self) -> list[tuple[IntArray, IntArray, FloatArray]]:
+        """K without its zeros: the groups that the same cages reach, together."""
+        cages, rows = self.subspace.columns, self.fit.reshape(-1, 3, self.fit.shape[1])
+        reached = np.stack([rows[:, :, own].any(axis=(1, 2)) for own in cages], axis=1)
+        blocks = []
+        for pattern in np.unique(reached, axis=0):
+            own = [np.arange(cages[r].start, cages[r].stop) for r in np.flatnonzero(pattern)]
+            if own:
+                groups, columns = (
+                    np.flatnonzero((reached == pattern).all(axis=1)),
+                    np.concatenate(own),
+                )
+                blocks.append((groups, columns, np.ascontiguousarray(rows[groups][:, :, columns])))
+        return blocks
 
     def local_step(self, p: FloatArray, x: FloatArray) -> tuple[float, FloatArray]:
         """Return E(p) and half its gradient (m, 3), with the local rotations at x = W~ p."""
-        argument = x if self.turns_vertices else p
-        stacked = self.fit @ argument
+        stacked = self.fit @ (x if self.turns_vertices else p)
         turned = np.swapaxes(closest_rotations(stacked.reshape(-1, 3, 3)), 1, 2).reshape(-1, 3)
         reduced = self.pull.T @ turned
         if self.turns_vertices:
