@@ -39,10 +39,9 @@ _SHARES = (0.999, 0.8, 0.5)  # of the rotations' part; the largest that leaves H
 _SOFTEST = 1e-3  # least stiffness of a group about an axis, as a share of its largest
 _CHUNK = 1000  # groups at a time
 # eps_kic as (k, c, i), axis of turning, column of dp, row of R S; k and c side by side.
-_EPSILON = np.zeros((3, 3, 3))
+_EPSILON = np.zeros((9, 3))
 for _k, _i, _j in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-    _EPSILON[_k, _j, _i], _EPSILON[_k, _i, _j] = 1.0, -1.0
-_EPSILON = _EPSILON.reshape(9, 3)
+    _EPSILON[3 * _k + _j, _i], _EPSILON[3 * _k + _i, _j] = 1.0, -1.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -86,7 +86,7 @@ class Energy:
         As (groups, columns, rows): these groups (g,), the cage vertices (c,) that reach them, and
         (g, 3, c).
         """
-        if not self.turns_vertices:
+        if not sparse.issparse(self.fit):
             yield from self._reaches
             return
         every = np.arange(self.subspace.n_columns)
@@ -98,7 +98,7 @@ class Energy:
     @cached_property
     def _reaches(self) -> list[tuple[IntArray, IntArray, FloatArray]]:
         """K without its zeros: the groups that the same cages reach, together."""
-        cages, rows = self.subspace.columns, self.fit.reshape(-1, 3, self.fit.shape[1])
+        cages, rows = self.subspace.columns, np.asarray(self.fit).reshape(-1, 3, self.fit.shape[1])
         reached = np.stack([rows[:, :, own].any(axis=(1, 2)) for own in cages], axis=1)
         blocks = []
         for pattern in np.unique(reached, axis=0):
