@@ -18,7 +18,12 @@ from collections.abc import Callable, Iterable
 import hands  # noqa: F401 - skips where nothing can be drawn
 import numpy as np
 import pytest
+from solids import icosphere
 
+from vtk_segdeform.cages import Cage
+from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.regions import Regions
+from vtk_segdeform.session import Session
 from vtk_segdeform.widgets.view import View
 
 QtWidgets = pytest.importorskip("qtpy.QtWidgets", reason="needs Qt", exc_type=ImportError)
@@ -70,6 +75,21 @@ def new_screen() -> str:
     os.close(writing)
     with os.fdopen(reading) as numbers:
         return f":{numbers.readline().strip()}"
+
+
+@functools.cache
+def small():
+    """Return an ellipsoid and the state of a session that lacks nothing but a pose."""
+    sphere, faces = icosphere(3)
+    session = Session(Mesh(sphere * [3.0, 0.8, 0.8], faces))
+    ball, ball_faces = icosphere(1)
+    x = session.mesh.vertices[:, 0]
+    session.set_regions(Regions.from_masks(session.mesh, np.array([x < 0.5, x > -0.5])))
+    shapes = [ball * [3.5, 1.6, 1.6] + [shift, 0.0, 0.0] for shift in (-1.5, 1.5)]
+    session.set_cages([Cage(shape, ball_faces) for shape in shapes])
+    session.set_fixed(x < -2.4)
+    session.add_handle(x > 2.4)
+    return session.mesh, session.state
 
 
 def until(seen: Callable[[], object], what: str, seconds: float = 30.0) -> None:

@@ -9,7 +9,6 @@ cannot: it is tested in a process of its own.
 from __future__ import annotations
 
 import contextlib
-import functools
 import gc
 import os
 import subprocess
@@ -28,15 +27,12 @@ from qt_hands import (
     QtTest,
     QtWidgets,
     application,
+    small,
     until,
 )
-from solids import icosphere
 from vtkmodules.vtkCommonCore import vtkWeakReference
 
 import pyvistaqt  # isort: skip
-from vtk_segdeform.cages import Cage
-from vtk_segdeform.mesh import Mesh
-from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
 from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.qt import DeformWidget, deform_dock
@@ -111,21 +107,6 @@ class Forgetful(PlainDock):
     def end(self):
         self.drawn_on.Finalize()
         self.window.close()
-
-
-@functools.cache
-def small():
-    """Return an ellipsoid and the state of a session that lacks nothing but a pose."""
-    sphere, faces = icosphere(3)
-    session = Session(Mesh(sphere * [3.0, 0.8, 0.8], faces))
-    ball, ball_faces = icosphere(1)
-    x = session.mesh.vertices[:, 0]
-    session.set_regions(Regions.from_masks(session.mesh, np.array([x < 0.5, x > -0.5])))
-    shapes = [ball * [3.5, 1.6, 1.6] + [shift, 0.0, 0.0] for shift in (-1.5, 1.5)]
-    session.set_cages([Cage(shape, ball_faces) for shape in shapes])
-    session.set_fixed(x < -2.4)
-    session.add_handle(x > 2.4)
-    return session.mesh, session.state
 
 
 def fifty(kind):

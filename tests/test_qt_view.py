@@ -18,7 +18,7 @@ from vtk_segdeform import models
 from vtk_segdeform.widgets.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.view import View
 
-MESH = models.cactus(1500)
+MESH = models.cactus(700)
 
 
 def in_a_window():

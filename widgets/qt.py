@@ -53,6 +53,7 @@ class DeformWidget(QtWidgets.QWidget):
         self.plotter.setAcceptDrops(False)  # it would add the mesh beside the one that is edited
         self.editor: DeformEditor = self.plotter.segdeform.edit(session)
         self.editor.desk.file.surface = plugin.surface_of(mesh)
+        self._aimed: tuple[float, ...] | None = tuple(self.plotter.camera.position)
         self.panel = DeformPanel(self.editor, self)
         self.deformed, self.regions_changed = self.panel.deformed, self.panel.regions_changed
         self.session_changed, self.error = self.panel.session_changed, self.panel.error
@@ -81,7 +82,14 @@ class DeformWidget(QtWidgets.QWidget):
         """
         return self.editor.desk.file.deformed(self.session)
 
-    def closeEvent(self, event: Any) -> None:  # noqa: N802 - Qt's word
+    def showEvent(self, event: Any) -> None:  # noqa: N802 - Qt's word
+        """Aim the camera, once it is known how wide the view is, unless somebody has aimed it."""
+        super().showEvent(event)
+        if self._aimed == tuple(self.plotter.camera.position):
+            self.plotter.reset_camera()
+        self._aimed = None
+
+    def closeEvent(self, event: Any) -> None:  # noqa: N802
         """Free everything; the session stays as it is."""
         if not self._is_closed:
             self._is_closed = True
