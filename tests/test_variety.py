@@ -43,7 +43,7 @@ def body(seed):
             value = smooth(value, np.linalg.norm(x - centre, axis=1) - radius, blend)
         if bore:
             side = x - np.outer(x @ axis, axis)
-            value = np.maximum(value, through - np.linalg.norm(side, axis=1))
+            value = -smooth(-value, np.linalg.norm(side, axis=1) - through, 0.05)  # no sharp edge
         return value
 
     points = np.concatenate([np.asarray(limb.points) for limb in limbs])
