@@ -113,9 +113,12 @@ def conditions() -> list[str]:
 
 
 def _load() -> str:
+    """Return how busy the machine is, if it tells; and a warning if that spoils what is timed."""
     if not hasattr(os, "getloadavg"):
         return ""
-    return f"; {os.getloadavg()[0]:.1f} processes wanted to run in the last minute, this one too"
+    wanting, cores = os.getloadavg()[0], os.cpu_count() or 1
+    warning = "; **busy with other work: do not trust the clock**" if wanting > cores + 0.5 else ""
+    return f"; {wanting:.1f} processes wanted to run in the last minute{warning}"
 
 
 def _processor() -> str:
