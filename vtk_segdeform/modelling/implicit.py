@@ -204,8 +204,12 @@ def _largest_part(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, In
 
 
 def _put_back(vertices: FloatArray, faces: IntArray, field: Field) -> FloatArray:
-    """Move each vertex along its normal onto the surface: two secant steps."""
+    """Move each vertex along its normal onto the surface: two secant steps.
+
+    None is longer than the edges: where the field is flat, in a sharp crease, it would run away.
+    """
     normals = vertex_normals(vertices, faces)
+    edge = float(np.linalg.norm(vertices[faces] - vertices[faces[:, [1, 2, 0]]], axis=2).mean())
     before, value = np.zeros(len(vertices)), field(vertices)
     step = -value
     for _ in range(2):
@@ -213,6 +217,7 @@ def _put_back(vertices: FloatArray, faces: IntArray, field: Field) -> FloatArray
         run = step - before
         slope = np.divide(after - value, run, out=np.ones_like(run), where=run != 0.0)
         before, value, step = step, after, step - after / np.clip(slope, 0.3, 3.0)
+        step = np.clip(step, -edge, edge)
     moved: FloatArray = vertices + step[:, None] * normals
     return moved
 
