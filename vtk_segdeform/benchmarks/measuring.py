@@ -12,7 +12,7 @@ import platform
 import statistics
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
@@ -47,6 +47,14 @@ def median_seconds(work: Callable[[], object], repeats: int) -> float:
     while sum(times) < _LONG_ENOUGH * repeats and len(times) < _MOST * repeats:
         times.append(timed(work)[1])
     return statistics.median(times)
+
+
+def by_turns(works: Sequence[Callable[[], object]], repeats: int) -> list[float]:
+    """Return the median seconds of each of *works*, run in turn so that all meet the same load."""
+    for work in works:
+        work()
+    rounds = [[timed(work)[1] for work in works] for _ in range(repeats)]
+    return [statistics.median(times) for times in zip(*rounds, strict=True)]
 
 
 def processor_seconds(work: Callable[[], object], repeats: int) -> float:
