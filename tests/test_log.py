@@ -54,12 +54,13 @@ def test_a_drag_is_one_entry_with_all_its_steps_and_its_end(written):
     assert 0.0 < entry.seconds <= session.effort.seconds
 
 
-def test_refining_goes_on_with_the_entry_until_something_else_is_done(written):
+@pytest.mark.parametrize("at_once", [1, 5])
+def test_refining_goes_on_with_the_entry_until_something_else_is_done(written, at_once):
     session, log = written
     steps = session.move_handle("tip", up(0.3), max_steps=2).steps
     session.commit()
     while session.solution.status is Status.STEP_LIMIT:
-        steps += session.refine(max_steps=5).steps
+        steps += session.refine(max_steps=at_once).steps
     (entry,) = log.entries
     assert (entry.number, entry.steps) == (1, steps)
     assert entry.outcome == str(session.solution.status) != str(Status.STEP_LIMIT)

@@ -69,6 +69,7 @@ class Log:
     def __init__(self, limit: int = LIMIT) -> None:
         self._entries: deque[Entry] = deque(maxlen=limit)
         self._count = 0
+        self._session: Session | None = None
         self._stop: Callable[[], None] | None = None
         self._drag: tuple[str, Solution | None, float] | None = None  # the one in hand
         self._before = Effort(0, 0.0)  # that one, or the next one
@@ -77,6 +78,9 @@ class Log:
     @property
     def entries(self) -> tuple[Entry, ...]:
         """From the oldest on."""
+        solution = None if self._session is None else self._session.solution
+        if self._refinable and solution is not None:  # it may have arrived without a step more
+            self._entries[-1] = replace(self._entries[-1], outcome=str(solution.status))
         return tuple(self._entries)
 
     def clear(self) -> None:
@@ -87,11 +91,13 @@ class Log:
     def follow(self, session: Session) -> None:
         """Write down the drags of *session*, and of no other one any more."""
         self.rest()
-        self._before, self._drag, self._refinable = session.effort, None, False
+        self._session, self._before = session, session.effort
+        self._drag, self._refinable = None, False
         self._stop = session.on_change(lambda change: self._changed(session, change))
 
     def rest(self) -> None:
         """Write down no more drags."""
+        self._refinable = False
         if self._stop is not None:
             self._stop()
 

@@ -96,6 +96,8 @@ class DeformPanel(QtWidgets.QWidget):
             part.setVisible(editor.mode in modes)
             if editor.mode in modes:
                 part.refresh()
+        if editor.stage.dragger.is_refining:  # which may end without another word
+            self._patience.start()
 
     def stop(self) -> None:
         """Hear of nothing any more, for good."""
