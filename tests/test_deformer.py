@@ -289,3 +289,13 @@ def test_binding_reports_its_progress_and_can_be_cancelled():
 
     with pytest.raises(Cancelled, match="enough"):
         SCENE.deformer(progress=stop)
+
+
+def test_a_copy_goes_on_as_the_deformer_would_and_leaves_it_where_it_is():
+    deformer = SCENE.deformer()
+    deformer.solve(SCENE.turned(20), max_steps=3)
+    ahead = deformer.copy().solve(SCENE.turned(30))
+    other = deformer.copy()
+    other.reset()
+    other.solve(SCENE.turned(-10))
+    assert_array_equal(deformer.solve(SCENE.turned(30)).vertices, ahead.vertices)

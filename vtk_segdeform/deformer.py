@@ -168,6 +168,12 @@ class Deformer:
         other._take_hold(fixed, handle)
         return other
 
+    def copy(self) -> Deformer:
+        """Return a deformer in the same pose that goes on from there by itself."""
+        other = copy.copy(self)
+        other._solver, other._at_rest = self._solver.copy(), self._at_rest.copy()
+        return other
+
     @property
     def subspace(self) -> Subspace:
         """W~, from which ``subspace.map`` makes mesh vertices of stacked cage vertices."""

@@ -33,6 +33,7 @@ acceleration for geometry optimization and physics simulation", SIGGRAPH 2018 (t
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -95,6 +96,12 @@ class GaussNewton:
                 "make them fit more tightly"
             )
         self._factor = factor
+
+    def copy(self) -> GaussNewton:
+        """Return one that goes on from here as this one would, on its own."""
+        other = copy.copy(self)
+        other._left = copy.deepcopy(self._left)
+        return other
 
     def forget(self) -> None:
         """Let the next call begin as if it were the first."""

@@ -1,8 +1,8 @@
 """A drag, frame by frame, each solved as far as an eye can tell.
 
 A frame has *converged* when the next step moves no vertex by more than 1e-4 of the diagonal.  How
-many steps that takes is found by looking; then the frame is done again, from the same pose, in
-one call of so many steps, and that is what is timed.
+many steps that takes is found by a copy that goes ahead; the frame itself is one call of so many
+steps, and that is what is timed.
 """
 
 from __future__ import annotations
@@ -50,15 +50,11 @@ def steps_to_rest(deformer: Deformer, targets: FloatArray) -> tuple[int, Solutio
 def frames(deformer: Deformer, way: Sequence[FloatArray]) -> Iterator[Frame]:
     """Drag the handles along *way*, (k, 3) each, from where the deformer is at rest."""
     deformer.reset()
-    cages: tuple[FloatArray, ...] = tuple(cage.vertices for cage in deformer.cages)
-    targets = deformer.mesh.vertices[deformer.handle]
     for goal in way:
-        steps, _ = steps_to_rest(deformer, goal)
-        deformer.resume(cages, targets)
+        steps, _ = steps_to_rest(deformer.copy(), goal)
         spent = time.process_time()
         solution, seconds = timed(partial(deformer.solve, goal, max_steps=steps))
         yield Frame(solution, steps, seconds, time.process_time() - spent)
-        cages, targets = solution.cage_vertices, goal
 
 
 def way_of(task: Task, moves: int) -> list[FloatArray]:
