@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import re
 from pathlib import Path
 
@@ -13,11 +14,17 @@ from ..errors import MeshError
 from .polygons import polydata_of
 
 _SPEAKER = re.compile(r"^\w+ \(\w+\): ")
+_XML = frozenset({".vtp", ".vtu"})
+_DENSEST = 1100  # bytes out of one that is compressed, at most
+_COUNTS = re.compile(rb'(NumberOf\w+)="(\d+)"')
+_BINARY = re.compile(rb'format="binary"[^>]*>\s*([A-Za-z0-9+/=]{32})')
 _SURFACE_CELLS = frozenset({5, 7, 9})  # VTK's numbers of triangle, polygon, quadrangle
 
 
 def read_with_vtk(path: Path) -> pv.PolyData:
     """Return the surface that one of VTK's readers finds; its complaints become a MeshError."""
+    if path.suffix.lower() in _XML:
+        _require_room_for_counts(path)
     try:
         with pv.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
             data = pv.get_reader(path).read()
@@ -28,6 +35,34 @@ def read_with_vtk(path: Path) -> pv.PolyData:
         surfaces = [_surface(part) for part in parts]
         return surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
     return _surface(data)
+
+
+def _require_room_for_counts(path: Path) -> None:
+    """Raise a MeshError if a file says that it has more than its bytes could ever hold.
+
+    VTK's XML readers believe it, ask for the memory, and end the process.  Each block of an array,
+    compressed or not, begins with its counts too: base64 of a few whole numbers.
+    """
+    data = path.read_bytes()
+    most = _DENSEST * len(data)
+    for match in _COUNTS.finditer(data):
+        if int(match[2]) > most:
+            raise MeshError(f"says {match[0].decode()}, which {len(data)} bytes cannot hold")
+    wide = b'header_type="UInt64"' in data[:1000]
+    coded = b"compressor=" in data[:1000]
+    for match in _BINARY.finditer(data):
+        words = np.frombuffer(_decoded(match[1]), "<u8" if wide else "<u4")
+        told = words[: 3 if coded else 1].astype(float)
+        if (told > most).any() or (coded and len(told) > 1 and told[0] * told[1] > most):
+            raise MeshError(f"an array says that it is larger than {len(data)} bytes can hold")
+
+
+def _decoded(word: bytes) -> bytes:
+    """Return what the first characters of base64 stand for, in whole numbers of 8 bytes."""
+    try:
+        return base64.b64decode(word)[:24]
+    except ValueError:
+        return b""
 
 
 def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
