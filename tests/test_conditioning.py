@@ -18,6 +18,7 @@ import vtk_segdeform as sd
 from vtk_segdeform.differential import corner_cotangents
 
 STEP = 1e-6
+LONG = pytest.mark.campaign
 
 
 def answer(soup, cage, shift=0.0):
@@ -40,7 +41,9 @@ def difference(one, other):
     return away.max() / good()[0].diagonal
 
 
-@pytest.mark.parametrize("share", [1e-1, 1e-3, 1e-9, 0.0])
+@pytest.mark.parametrize(
+    "share", [pytest.param(1e-1, marks=LONG), 1e-3, pytest.param(1e-9, marks=LONG), 0.0]
+)
 def test_needles_move_the_answer_by_less_than_a_hundredth_however_thin(share):
     mesh, solution = answer(zoo.split_near(share), zoo.ball())
     cotangents = np.abs(corner_cotangents(mesh.vertices, mesh.faces))
@@ -50,7 +53,7 @@ def test_needles_move_the_answer_by_less_than_a_hundredth_however_thin(share):
     assert difference(solution, good()[1]) < 0.01
 
 
-@pytest.mark.parametrize("gap", [1e-3, 1e-9])
+@pytest.mark.parametrize("gap", [pytest.param(1e-3, marks=LONG), 1e-9])
 def test_a_cage_almost_on_the_skin_is_as_good_as_one_a_hundredth_away(gap):
     near = answer(zoo.body(), zoo.moved(zoo.body(), 1.01))
     nearer = answer(zoo.body(), zoo.moved(zoo.body(), 1.0 + gap))
@@ -63,9 +66,11 @@ def test_a_cage_almost_on_the_skin_is_as_good_as_one_a_hundredth_away(gap):
     [
         (zoo.body, zoo.ball),
         (lambda: zoo.split_near(1e-9), zoo.ball),
-        (zoo.body, lambda: zoo.moved(zoo.body(), 1.0 + 1e-6)),
+        pytest.param(zoo.body, lambda: zoo.moved(zoo.body(), 1.0 + 1e-6), marks=LONG),
         (zoo.body, lambda: zoo.ball(10.0)),
-        (zoo.body, lambda: zoo.moved(zoo.split_near(1e-6), [1.25, 1.45, 1.45])),
+        pytest.param(
+            zoo.body, lambda: zoo.moved(zoo.split_near(1e-6), [1.25, 1.45, 1.45]), marks=LONG
+        ),
     ],
     ids=["good", "needles", "cage on the skin", "cage far away", "needles in the cage"],
 )
