@@ -96,7 +96,9 @@ def require_kept_on_a_full_disk(folder, suffix):
 @posix
 @pytest.mark.parametrize("suffix", SUFFIXES + FOREIGN)
 def test_on_a_full_disk_a_mesh_is_as_it_was_and_the_error_names_it(tmp_path, suffix, capfd):
+    here = os.getcwd()
     require_kept_on_a_full_disk(tmp_path, suffix)
+    assert os.getcwd() == here  # PyMeshLab goes elsewhere when it fails
     capfd.readouterr()
 
 

@@ -83,6 +83,7 @@ def test_a_frame_ends_where_the_next_step_moves_hardly_anything(task, deformer):
     assert [move > NEAR * task.mesh.diagonal for move in moves] == [True] * (steps - 1) + [False]
 
 
+@pytest.mark.usefixtures("steady")
 def test_the_drag_profile_has_finite_times_and_names_arap_when_it_is_absent():
     section = drag_profile.run(TINY)
     frame, set_up = section.tables

@@ -207,7 +207,7 @@ def special(folder):
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
-    """Have a few files of every kind read, all by one program: [(files, answers)] of three sorts."""
+    """Have a few files of every kind read, by one program: [(files, answers)] of three sorts."""
     folder = tmp_path_factory.mktemp("files")
     sound, harmed = originals(folder), mutants(folder, 34, seed=1)
     sorts = [sound, harmed, special(folder)[::4]]

@@ -225,7 +225,7 @@ def watch_cycles(kind, times):
     assert threading.active_count() == threads
     assert len(os.listdir("/proc/self/task")) <= tasks
     assert len(os.listdir("/proc/self/fd")) <= files
-    assert timers() == ticking == (0, 0)
+    assert all(np.less_equal(timers(), ticking))  # what an earlier test left may go meanwhile
     assert application().topLevelWidgets() == []
     if times > SETTLED:
         grown = min(memory[-3:]) - min(memory[SETTLED - 3 : SETTLED])

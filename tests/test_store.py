@@ -321,7 +321,7 @@ WRONG = [
     ({"header": {"handles": [["h", 1], ["h", 0]]}}, "two handles have the same name"),
     ({"header": {"handles": [["h", 1], ["i", 0]]}}, "each handle must have a vertex"),
     ({"header": {"smoothness": "much"}}, "smoothness must be a number"),
-    ({"header": {"smoothness": -1}}, "smoothness must be above 0"),
+    ({"header": {"smoothness": -1}}, "smoothness must be a number above 0"),
     ({"header": {"options": {"stretch": -1.0}}}, "stretch must be a number from 0 up"),
     ({"header": {"options": {"colour": 1}}}, "colour"),
     ({"header": {"options": 3}}, "mapping"),

@@ -127,6 +127,10 @@ class Deformer:
         self._centre = mesh.vertices.mean(axis=0)
         self._size = 2.0 * float(np.linalg.norm(mesh.vertices - self._centre, axis=1).max())
         self._rest = mesh.with_vertices(self._inward(mesh.vertices))
+        # Poses are taken about here, so that far from the origin they keep their digits.
+        is_far = float(np.linalg.norm(self._centre)) > self._size
+        self._origin = self._centre if is_far else np.zeros(3)
+        self._here = mesh.with_vertices(mesh.vertices - self._origin) if is_far else mesh
         if not is_number(hold_tolerance, 0.0):
             raise ArgumentError(f"hold_tolerance must be 0 or more; got {hold_tolerance!r}")
         if rotation_groups is not None and not is_whole(rotation_groups, 1):
@@ -141,7 +145,7 @@ class Deformer:
         what = self._rest, regions, self.cages, self._rest_cages, own
         binding = Binder(*what, stretch, rotation_groups).bound(cache, progress)
         self._own_blend, self._energy, self._stand_in = own, binding.energy, binding.stand_in
-        self._total_volume = total_volume(mesh)
+        self._total_volume = total_volume(self._here)
         self._keep(preserve_volume, preserve_region_volumes)
         self._take_hold(fixed, handle)
         if progress:
@@ -194,7 +198,7 @@ class Deformer:
 
     def surface(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
         """Return the mesh (n, 3) with its cages at *cage_vertices*, (m_r, 3) each: x = W~ p."""
-        return self._surface(self._stacked(cage_vertices) - self._centre)
+        return self._placed(self._surface(self._stacked(cage_vertices) - self._centre))
 
     def reset(self) -> None:
         """Forget the last pose: the next solve starts from rest."""
@@ -273,9 +277,10 @@ class Deformer:
 
     @cached_property
     def _region_volumes(self) -> tuple[VolumeConstraint, ...]:
-        return region_volumes(self.mesh, self.regions.labels)
+        return region_volumes(self._here, self.regions.labels)
 
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:
+        x = x - self._origin
         return np.array([each.violation(x) / each.target for each in self._region_volumes])
 
     def _take_hold(self, fixed: ArrayLike, handle: ArrayLike) -> None:
@@ -329,11 +334,16 @@ class Deformer:
         """
         moves = p - self._rest_cages * self._size
         start = np.zeros((self.mesh.n_vertices, 3 + 3 * len(directions)))
-        start[:, :3] = self.mesh.vertices
+        start[:, :3] = self._here.vertices
         return self.subspace.map(np.hstack([moves, *directions]), start)
+
+    def _placed(self, x: FloatArray) -> FloatArray:
+        return x + self._origin if self._origin.any() else x
 
     def _solution(self, result: Iteration, steps: int) -> Solution:
         p, x = self._landed(result)
+        volume_change = self._total_volume.violation(x) / self._total_volume.target
+        x = self._placed(x)
         targets = self._outward(self._targets)
         handle = np.linalg.norm(x[self.handle] - targets, axis=1).max(initial=0.0)
         fixed = np.linalg.norm(x[self.fixed] - self.mesh.vertices[self.fixed], axis=1)
@@ -341,11 +351,10 @@ class Deformer:
         status = result.status
         if status is Status.CONVERGED and errors.max() > _MET:
             status = Status.MISSED
-        volume = self._total_volume
         return Solution(
             vertices=x,
             cage_vertices=tuple(p[columns] + self._centre for columns in self.subspace.columns),
-            volume_change=volume.violation(x) / volume.target,
+            volume_change=volume_change,
             handle_error=float(errors[0]),
             fixed_error=float(errors[1]),
             steps=steps,

@@ -20,8 +20,10 @@ that are meant as such, not as per cent, have to be wrapped in its ``PureValue``
 
 from __future__ import annotations
 
+import contextlib
 import importlib
-from collections.abc import Iterable, Mapping
+import os
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -148,7 +150,8 @@ def read_faces(path: str | Path) -> tuple[FloatArray, IntArray]:
     pymeshlab = _pymeshlab()
     meshset = pymeshlab.MeshSet(verbose=False)
     try:
-        meshset.load_new_mesh(str(path))
+        with _standing_still():
+            meshset.load_new_mesh(str(Path(path).absolute()))
     except pymeshlab.PyMeshLabException as error:
         raise MeshError(f"{path}: PyMeshLab cannot read it: {error}") from None
     if meshset.mesh_number() > 1:
@@ -169,7 +172,8 @@ def write(path: str | Path, mesh: Mesh) -> None:
     """Write *mesh* in the format PyMeshLab knows by the suffix of *path*."""
     pymeshlab, meshset = _pymeshlab(), to_meshset(mesh)
     try:
-        meshset.save_current_mesh(str(path))
+        with _standing_still():
+            meshset.save_current_mesh(str(Path(path).absolute()))
     except pymeshlab.PyMeshLabException as error:
         raise MeshError(f"{path}: PyMeshLab cannot write it: {error}") from None
 
@@ -214,6 +218,16 @@ def _arrays(meshset: Any) -> tuple[FloatArray, IntArray]:
     vertices = np.ascontiguousarray(current.vertex_matrix(), dtype=np.float64)
     faces = np.ascontiguousarray(current.face_matrix(), dtype=np.int64)
     return vertices, faces.reshape(-1, 3)
+
+
+@contextlib.contextmanager
+def _standing_still() -> Iterator[None]:
+    """Stay in the current folder, which PyMeshLab leaves when it fails."""
+    folder = os.getcwd()
+    try:
+        yield
+    finally:
+        os.chdir(folder)
 
 
 def _pymeshlab() -> Any:

@@ -34,7 +34,9 @@ def read_off(path: Path) -> pv.PolyData:
     n, m = (int(word) for word in lines[0].split()[:2])
     if len(lines) < 1 + n + m:
         raise MeshError(f"says {n} vertices and {m} faces, but ends after {len(lines) - 1} lines")
-    table = np.array([line.split() for line in lines[1 : 1 + n]], dtype=float).reshape(n, -1 if n else 3)
+    table = np.array([line.split() for line in lines[1 : 1 + n]], dtype=float).reshape(
+        n, -1 if n else 3
+    )
     counts, corners = _polygons(lines[1 + n : 1 + n + m])
     surface = polydata_of(table[:, :3], counts, corners)
     extra = table[:, 3:]

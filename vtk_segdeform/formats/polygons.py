@@ -30,7 +30,9 @@ def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.P
             f"there are {len(points)}: count from 0, and give all of them"
         )
     if len(counts) and counts.min() < 3:
-        raise MeshError(f"{np.count_nonzero(counts < 3)} faces have fewer than three corners; leave them out")
+        raise MeshError(
+            f"{np.count_nonzero(counts < 3)} faces have fewer than three corners; leave them out"
+        )
     surface = pv.PolyData()
     surface.points = points
     starts = np.insert(np.cumsum(counts), 0, 0)
