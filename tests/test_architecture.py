@@ -104,6 +104,7 @@ PROGRAM = {
     "none_count",
 }  # fmt: skip
 GRANTED = {
+    "threads": {"threadpoolctl"},
     **{f"compiled.{name}": {"numba"} for name in KERNELS},
     "cage_fit": VTK,
     "modelling.implicit": VTK,

@@ -37,6 +37,7 @@ from .solution import Solution, Status
 from .solver import GaussNewton
 from .subspace import Subspace
 from .targets import waypoints
+from .threads import one_blas_thread
 
 _LEG_TOLERANCE, _LEG_STEPS = 1e-3, 12  # for the targets on the way to a far one
 _POSITION_WEIGHT = 1e2  # of the shape energy's trace, shared out over each handle's vertices
@@ -236,6 +237,10 @@ class Deformer:
                 f"a target is {np.abs(goal).max():.0e} times the mesh's size away from it; "
                 "are both in the same unit?"
             )
+        with one_blas_thread():
+            return self._solve(goal, max_steps)
+
+    def _solve(self, goal: FloatArray, max_steps: int | None) -> Solution:
         limit = self._options.max_steps if max_steps is None else max_steps
         options = replace(self._options, max_steps=limit)
         *way, _ = waypoints(self._targets, goal, self._handles)

@@ -10,10 +10,12 @@ computed alike on whatever thread, so results do not depend on how many there ar
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 from .progress import Progress
 
@@ -57,6 +59,28 @@ def in_parallel(
         unfinished = [future for future in waiting if not future.cancel()]
         for future in unfinished:  # nothing writes on after this has returned
             future.exception()
+
+
+def one_blas_thread() -> contextlib.AbstractContextManager[object]:
+    """Return a context in which BLAS stays in the caller's thread, where threadpoolctl is there.
+
+    A solver's step is many products too small to share out: waking another thread for each takes
+    longer than the product, and while it waits for more it holds the core that we are to use.
+    """
+    controller = _controller()
+    if controller is None:
+        return contextlib.nullcontext()
+    limited: contextlib.AbstractContextManager[object] = controller.limit(limits=1, user_api="blas")
+    return limited
+
+
+@functools.cache
+def _controller() -> Any:
+    try:
+        from threadpoolctl import ThreadpoolController
+    except ImportError:
+        return None
+    return ThreadpoolController()
 
 
 @functools.cache
