@@ -272,7 +272,7 @@ def test_a_pose_can_be_taken_up_again_where_it_was_left():
     deformer.resume(first.cage_vertices, SCENE.turned(30))
     again = deformer.solve(SCENE.turned(30))
     assert_allclose(again.vertices, first.vertices, atol=1e-4 * SCENE.mesh.diagonal)
-    assert again.steps <= 2
+    assert again.steps < first.steps
     with pytest.raises(CageError, match=r"must hold \[66, 66\] points, cage by cage; got \[66\]"):
         deformer.resume(first.cage_vertices[:1], SCENE.turned(30))
 

@@ -99,7 +99,7 @@ def test_neighbours_in_a_large_patch_share_a_place_and_are_held_no_worse(monkeyp
     monkeypatch.setattr(positions, "_MANY", 20)
     monkeypatch.setattr(positions, "_PLACES", 30)
     deformer = SCENE.deformer()
-    assert len(deformer._solver.positions.rows) == 60
+    assert len(deformer._ladder.solver.positions.rows) == 60
     shared = deformer.solve(targets)
     assert shared.handle_error < 1.5 * each.handle_error + 1e-4
     assert shared.fixed_error < 1.5 * each.fixed_error + 1e-4

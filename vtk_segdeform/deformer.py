@@ -35,13 +35,13 @@ from .progress import Progress
 from .regions import Regions
 from .solution import Solution, Status
 from .solver import GaussNewton
+from .stiffening import Ladder
 from .subspace import Subspace
 from .targets import waypoints
 from .threads import one_blas_thread
 
 _LEG_TOLERANCE, _LEG_STEPS = 1e-3, 12  # for the targets on the way to a far one
 _POSITION_WEIGHT = 1e2  # of the shape energy's trace, shared out over each handle's vertices
-_WORTH, _COST = 0.7, 2.0  # more weight must bring errors down to this, at this rise of the energy
 _FAR = 1e3  # mesh sizes
 _MET = 1e-3  # diagonals within which a vertex counts as in its place
 
@@ -176,7 +176,7 @@ class Deformer:
     def copy(self) -> Deformer:
         """Return a deformer in the same pose that goes on from there by itself."""
         other = copy.copy(self)
-        other._solver, other._at_rest = self._solver.copy(), self._at_rest.copy()
+        other._at_rest, other._ladder = self._at_rest.copy(), self._ladder.copy()
         return other
 
     @property
@@ -194,7 +194,7 @@ class Deformer:
 
         For many poses keep the `passengers`: binding is what takes long.
         """
-        p = self._outward(self._p)
+        p = self._outward(self._ladder.p)
         return self.passengers(points).moved([p[columns] for columns in self.subspace.columns])
 
     def surface(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
@@ -203,16 +203,12 @@ class Deformer:
 
     def reset(self) -> None:
         """Forget the last pose: the next solve starts from rest."""
-        self._solver = self._at_rest
-        self._solver.forget()
-        self._p = self._rest_cages
-        self._targets = self._rest.vertices[self.handle]
+        self._begin(self._rest_cages, self._rest.vertices[self.handle])
 
     def resume(self, cage_vertices: Sequence[ArrayLike], targets: ArrayLike) -> None:
         """Go on from an earlier pose: a `Solution.cage_vertices`, and the targets it was for."""
         p = self._inward(self._stacked(cage_vertices))
-        self._solver.forget()
-        self._p, self._targets = p, self._inward(checked_targets(targets, len(self.handle)))
+        self._begin(p, self._inward(checked_targets(targets, len(self.handle))))
 
     def solve(self, targets: ArrayLike, *, max_steps: int | None = None) -> Solution:
         """Return the pose whose handle vertices are at *targets*.
@@ -245,25 +241,12 @@ class Deformer:
         options = replace(self._options, max_steps=limit)
         *way, _ = waypoints(self._targets, goal, self._handles)
         on_the_way = replace(options, tolerance=_LEG_TOLERANCE, max_steps=_LEG_STEPS)
-        steps = sum(self._move(leg, on_the_way).steps for leg in way)
-        result = self._move(goal, options)
-        steps += result.steps
-        while result.status is not Status.STEP_LIMIT:
-            errors = self._errors(result)
-            stiffer = self._solver.positions.stiffened(errors, self._hold_tolerance)
-            if stiffer is None:
-                break
-            looser = self._solver
-            self._solver = replace(looser, positions=stiffer)
-            held = self._move(goal, options)
-            steps += held.steps
-            # Where a cage cannot put a vertex in place, weight wins nothing and wrecks the rest.
-            gain = self._errors(held).max() / errors.max()
-            if gain > _WORTH or held.shape > _COST * result.shape:
-                self._solver, self._p = looser, result.p
-                break
-            result = held
-        return self._solution(result, steps)
+        steps = sum(self._ladder.hurry(self._places(leg), on_the_way).steps for leg in way)
+        is_in_haste = max_steps is not None and not np.array_equal(goal, self._targets)
+        move = self._ladder.hurry if is_in_haste and self._ladder.is_climbed else self._ladder.move
+        result = move(self._places(goal), options)
+        self._targets = goal
+        return self._solution(result, steps + result.steps)
 
     def _stacked(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
         poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
@@ -305,20 +288,14 @@ class Deformer:
         self._at_rest = GaussNewton(self._energy, positions, volumes)
         self.reset()
 
-    def _move(self, targets: FloatArray, options: SolverOptions) -> Iteration:
-        result = self._solver.minimise(self._p, self._places(targets), options)
-        self._p, self._targets = result.p, targets
-        return result
-
-    def _errors(self, result: Iteration) -> FloatArray:
-        """Return how far each place of `PositionTerm` is off, (k,)."""
-        x = self._solver.positions.rows @ result.p
-        return np.asarray(np.linalg.norm(x - self._places(self._targets), axis=1))
+    def _begin(self, p: FloatArray, targets: FloatArray) -> None:
+        self._ladder = Ladder(self._at_rest, p, self._hold_tolerance)
+        self._targets = targets
 
     def _places(self, targets: FloatArray) -> FloatArray:
         """Return the places for *targets* (k, 3) of the handle."""
         where = np.concatenate([targets, self._rest.vertices[self.fixed]])
-        return self._solver.positions.gathered(where[self._order])
+        return self._at_rest.positions.gathered(where[self._order])
 
     def _landed(self, result: Iteration) -> tuple[FloatArray, FloatArray]:
         """Return cage vertices and mesh vertices, the mesh's own volume exactly as held."""
