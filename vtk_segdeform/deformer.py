@@ -290,7 +290,7 @@ class Deformer:
 
     def _begin(self, p: FloatArray, targets: FloatArray) -> None:
         self._ladder = Ladder(self._at_rest, p, self._hold_tolerance)
-        self._targets = targets
+        self._targets: FloatArray = targets
 
     def _places(self, targets: FloatArray) -> FloatArray:
         """Return the places for *targets* (k, 3) of the handle."""
