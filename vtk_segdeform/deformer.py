@@ -97,6 +97,9 @@ class Deformer:
         If *regions* belong to another mesh, or *blend* is no partition of unity over them.
     """
 
+    _ladder: Ladder
+    _targets: FloatArray  # (k, 3), in the frame of the mesh's own
+
     def __init__(
         self,
         mesh: Mesh,
@@ -290,7 +293,7 @@ class Deformer:
 
     def _begin(self, p: FloatArray, targets: FloatArray) -> None:
         self._ladder = Ladder(self._at_rest, p, self._hold_tolerance)
-        self._targets: FloatArray = targets
+        self._targets = targets
 
     def _places(self, targets: FloatArray) -> FloatArray:
         """Return the places for *targets* (k, 3) of the handle."""
