@@ -32,8 +32,8 @@ STORY = [
     "caging.cage_simplify", "cage_fit",
     # the solver
     "subspace", "passengers", "energy", "cage_stiffness", "curvature", "constraints", "stand_in",
-    "binding", "positions", "acceleration", "solution", "iteration", "solver", "stiffening",
-    "targets", "deformer", "pipeline",
+    "binding", "landing", "positions", "acceleration", "solution", "iteration", "solver",
+    "stiffening", "targets", "deformer", "pipeline",
     # a deformation in the making
     "editing.listeners", "editing.naming", "editing.state", "editing.history", "editing.painting",
     "editing.handles", "editing.posing", "session", "editing.archive", "store",

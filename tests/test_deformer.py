@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from solids import icosphere, rotation
 
+from vtk_segdeform.acceleration import Anderson
 from vtk_segdeform.cages import Cage
 from vtk_segdeform.deformer import Deformer
 from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionError
@@ -146,7 +147,7 @@ def test_one_step_at_a_time_is_the_same_way_as_all_at_once():
     assert_allclose(way[-1].vertices, at_once.vertices, rtol=0, atol=1e-9)
 
 
-def test_nothing_is_gone_on_with_after_a_reset_or_for_other_targets():
+def test_after_a_reset_nothing_is_known_of_what_was_before():
     deformer = SCENE.deformer()
     deformer.solve(SCENE.turned(20), max_steps=3)
     deformer.solve(SCENE.turned(10), max_steps=3)
@@ -154,6 +155,18 @@ def test_nothing_is_gone_on_with_after_a_reset_or_for_other_targets():
     again, anew = deformer.solve(SCENE.turned(20)), SCENE.deformer().solve(SCENE.turned(20))
     assert again.steps == anew.steps
     assert_array_equal(again.vertices, anew.vertices)
+
+
+def test_a_drag_learns_from_frame_to_frame(monkeypatch):
+    def drag():
+        deformer = SCENE.deformer(hold_tolerance=1.0)
+        poses = [deformer.solve(SCENE.turned(degrees)) for degrees in range(25)]
+        return sum(pose.steps for pose in poses), poses[-1].vertices
+
+    (few, there), _ = drag(), monkeypatch.setattr(Anderson, "begin_elsewhere", Anderson.forget)
+    many, also_there = drag()
+    assert few < many
+    assert np.abs(there - also_there).max() < 1e-5 * SCENE.mesh.diagonal
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ class Anderson:
     """
 
     def __init__(self, window: int) -> None:
-        self._window = window
+        self.window = window
         self.forget()
 
     def forget(self) -> None:
@@ -37,13 +37,21 @@ class Anderson:
         self._moves: list[FloatArray] = []  # differences of q = p + h
         self._changes: list[FloatArray] = []  # differences of the residual
 
+    def begin_elsewhere(self) -> None:
+        """Keep what was learned; the next p does not follow on the last one.
+
+        A drag moves the fixed point, but hardly changes how residuals answer to moves: what the
+        last frames learned of that saves the next one half of its steps.
+        """
+        self._last = None
+
     def extrapolate(self, p: FloatArray, h: FloatArray, residual: FloatArray) -> FloatArray:
         """Return the accelerated successor of *p*, whose plain successor is p + h."""
         q = p + h
         if self._last is not None:
-            self._moves = [*self._moves, (q - self._last[0]).ravel()][-self._window :]
+            self._moves = [*self._moves, (q - self._last[0]).ravel()][-self.window :]
             changes = [*self._changes, (residual - self._last[1]).ravel()]
-            self._changes = changes[-self._window :]
+            self._changes = changes[-self.window :]
         self._last = q, residual
         if not self._changes:
             return q

@@ -25,9 +25,10 @@ from numpy.typing import ArrayLike
 from .arrays import FloatArray, as_points, is_number, is_whole
 from .binding import Binder
 from .cages import Cage
-from .constraints import VolumeConstraint, moved, region_volumes, restore, total_volume
+from .constraints import VolumeConstraint, region_volumes, total_volume
 from .errors import ArgumentError, CageError, ConstraintError, RegionError
 from .iteration import Iteration, SolverOptions
+from .landing import along, scaled
 from .mesh import Mesh, require_mesh
 from .passengers import Passengers, board
 from .positions import checked_constraints, checked_targets, connected_sets, position_term
@@ -43,6 +44,8 @@ from .threads import one_blas_thread
 _LEG_TOLERANCE, _LEG_STEPS = 1e-3, 12  # for the targets on the way to a far one
 _POSITION_WEIGHT = 1e2  # of the shape energy's trace, shared out over each handle's vertices
 _FAR = 1e3  # mesh sizes
+_WIDE = 20_000  # vertices beyond which mapping directions too is what takes long
+_LANDINGS, _NEAR, _SAME = 4, 3e-5, 1e-7  # times it is gone on to that scale; and one of rounding
 _MET = 1e-3  # diagonals within which a vertex counts as in its place
 
 
@@ -98,7 +101,8 @@ class Deformer:
     """
 
     _ladder: Ladder
-    _targets: FloatArray  # (k, 3), in the frame of the mesh's own
+    _p: FloatArray  # (m, 3), the cages of the last pose, in the frame of the mesh's own
+    _targets: FloatArray  # (k, 3), what it was for
 
     def __init__(
         self,
@@ -197,7 +201,7 @@ class Deformer:
 
         For many poses keep the `passengers`: binding is what takes long.
         """
-        p = self._outward(self._ladder.p)
+        p = self._outward(self._p)
         return self.passengers(points).moved([p[columns] for columns in self.subspace.columns])
 
     def surface(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
@@ -249,7 +253,15 @@ class Deformer:
         move = self._ladder.hurry if is_in_haste and self._ladder.is_climbed else self._ladder.move
         result = move(self._places(goal), options)
         self._targets = goal
-        return self._solution(result, steps + result.steps)
+        steps += result.steps
+        x, missed = self._landed(result)
+        for _ in range(_LANDINGS):
+            if missed <= _NEAR or result.status is Status.STEP_LIMIT:
+                break
+            result = self._ladder.move(self._places(goal), options)
+            steps += result.steps
+            x, missed = self._landed(result)
+        return self._solution(result, x, steps)
 
     def _stacked(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
         poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
@@ -287,29 +299,47 @@ class Deformer:
         positions = position_term(
             self.subspace, self._rest.vertices, [ids[places] for places in order], weight
         )
-        volumes = self._stand_in.volumes(self._constraints, self._rest.vertices)
-        self._at_rest = GaussNewton(self._energy, positions, volumes)
+        self._volumes = self._stand_in.volumes(self._constraints, self._rest.vertices)
+        self._at_rest = GaussNewton(self._energy, positions, self._volumes)
+        one = len(self._constraints) == 1 and self._keeps == (True, False)
+        self._is_wide = one and self._stand_in.cells is not None and mesh.n_vertices > _WIDE
+        held = self._rest.vertices[self.fixed] if len(self.fixed) else np.zeros((1, 3))
+        self._anchor = held.mean(axis=0) * self._size  # stays where it is when the mesh is scaled
         self.reset()
 
     def _begin(self, p: FloatArray, targets: FloatArray) -> None:
+        self._at_rest.volumes = self._volumes
         self._ladder = Ladder(self._at_rest, p, self._hold_tolerance)
-        self._targets = targets
+        self._p, self._targets = p, targets
+        if self._is_wide and p is not self._rest_cages:
+            self._ladder.go_on_from(p)
 
     def _places(self, targets: FloatArray) -> FloatArray:
         """Return the places for *targets* (k, 3) of the handle."""
         where = np.concatenate([targets, self._rest.vertices[self.fixed]])
         return self._at_rest.positions.gathered(where[self._order])
 
-    def _landed(self, result: Iteration) -> tuple[FloatArray, FloatArray]:
-        """Return cage vertices and mesh vertices, the mesh's own volume exactly as held."""
-        p, directions = result.p * self._size, [z * self._size for z in result.directions]
-        exact = bool(directions) and self._options.exact_volume
-        paths = self._surface(p, directions if exact else [])
-        if not exact:
-            return p, paths
-        t = restore(self._constraints, paths)
-        p = p + sum(tk * z for tk, z in zip(t, directions, strict=True))
-        return p, moved(paths, t)
+    def _landed(self, result: Iteration) -> tuple[FloatArray, float]:
+        """Take the mesh onto the volume held; return its vertices, and by how much it was off.
+
+        That is as a scale; where it went along the solver's own directions, 0.
+        """
+        self._p, directions = result.p, result.directions
+        if not directions or not self._options.exact_volume:
+            return self._surface(self._p * self._size), 0.0
+        if self._is_wide:
+            x = self._surface(self._p * self._size)
+            scale = scaled(self._constraints[0], x, self._centre - self._origin + self._anchor)
+            anchor = self._anchor / self._size
+            self._p = anchor + scale * (self._p - anchor)
+            missed = abs(scale - 1.0)
+            if missed > _SAME:
+                self._ladder.go_on_from(self._p)
+            return x, missed
+        paths = self._surface(self._p * self._size, [z * self._size for z in directions])
+        steps, x = along(self._constraints, paths)
+        self._p = self._p + sum(tk * z for tk, z in zip(steps, directions, strict=True))
+        return x, 0.0
 
     def _surface(self, p: FloatArray, directions: Sequence[FloatArray] = ()) -> FloatArray:
         """Return x for cages at *p* (m, 3), about the centre; and W~ z for *directions* z beside.
@@ -318,15 +348,15 @@ class Deformer:
         is rounded.
         """
         moves = p - self._rest_cages * self._size
-        start = np.zeros((self.mesh.n_vertices, 3 + 3 * len(directions)))
-        start[:, :3] = self._here.vertices
+        rest = self._here.vertices
+        start = np.hstack([rest, np.zeros((len(rest), 3 * len(directions)))])
         return self.subspace.map(np.hstack([moves, *directions]), start)
 
     def _placed(self, x: FloatArray) -> FloatArray:
         return x + self._origin if self._origin.any() else x
 
-    def _solution(self, result: Iteration, steps: int) -> Solution:
-        p, x = self._landed(result)
+    def _solution(self, result: Iteration, x: FloatArray, steps: int) -> Solution:
+        p = self._p * self._size
         volume_change = self._total_volume.violation(x) / self._total_volume.target
         x = self._placed(x)
         targets = self._outward(self._targets)

@@ -57,8 +57,10 @@ class Course:
         return self.age > 1 and self.size > _LONG
 
     def for_other_targets(self, options: SolverOptions) -> Course:
-        """Return a course that begins with what this one knows of the curvature."""
-        return Course(Anderson(options.window), self.factor, self.age, 0.0)
+        """Return a course that begins with what this one has learned."""
+        self.memory.begin_elsewhere()
+        memory = self.memory if self.memory.window == options.window else Anderson(options.window)
+        return Course(memory, self.factor, self.age, 0.0)
 
     def renew(self, factor: Factor) -> None:
         """Take a factor made here."""

@@ -84,6 +84,15 @@ class Ladder:
         """Whether the pose that counts has more weight somewhere than there was to begin with."""
         return self._top is not self._lowest
 
+    def go_on_from(self, p: FloatArray) -> None:
+        """Go on from cage vertices *p* (m, 3); the volumes held are those that are there."""
+        self._top.p = p
+        self._has_hurried = self.is_climbed
+        self._above = [self._top] if self.is_climbed else []
+        volumes = self._top.solver.volumes.held_at(p)
+        for rung in (self._lowest, *self._above):
+            rung.solver.volumes = volumes
+
     def hurry(self, places: FloatArray, options: SolverOptions) -> Iteration:
         """Return a pose for *places* (k, 3) at the weights of the last; it is not final."""
         self._has_hurried = self.is_climbed
