@@ -29,21 +29,27 @@ _MIN_AREA = 1e-6  # share of the mean vertex area; keeps 1/A finite beside degen
 
 def corner_cotangents(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return (m, 3): the cotangent of the angle at each corner of each face."""
-    x = vertices[faces]
+    a, b, c = vertices[faces.T]
+    sides = c - b, a - c, b - a  # opposite their corners
+    sine = np.linalg.norm(np.cross(sides[1], sides[2]), axis=1)  # twice the area: of all three
     cotangents = np.empty(faces.shape)
     for corner in range(3):
-        u = x[:, (corner + 1) % 3] - x[:, corner]
-        v = x[:, (corner + 2) % 3] - x[:, corner]
-        cosine = np.einsum("ij,ij->i", u, v)
-        sine = np.linalg.norm(np.cross(u, v), axis=1)
+        cosine = -np.einsum("ij,ij->i", sides[corner - 1], sides[corner - 2])
         bound = np.maximum(sine, np.abs(cosine) / _MAX_COTANGENT)
         cotangents[:, corner] = np.divide(cosine, bound, where=bound > 0, out=np.zeros(len(faces)))
     return cotangents
 
 
-def cotangent_laplacian(vertices: FloatArray, faces: IntArray) -> sparse.csr_array:
-    """Return the (n, n) symmetric positive semi-definite C; x^T C x is twice Dirichlet's energy."""
-    half = 0.5 * corner_cotangents(vertices, faces).ravel()
+def cotangent_laplacian(
+    vertices: FloatArray, faces: IntArray, *, cotangents: FloatArray | None = None
+) -> sparse.csr_array:
+    """Return the (n, n) symmetric positive semi-definite C; x^T C x is twice Dirichlet's energy.
+
+    *cotangents* are those of `corner_cotangents`, where they are known already.
+    """
+    if cotangents is None:
+        cotangents = corner_cotangents(vertices, faces)
+    half = 0.5 * cotangents.ravel()
     i, j = faces[:, [1, 2, 0]].ravel(), faces[:, [2, 0, 1]].ravel()
     n = len(vertices)
     weights = sparse.coo_array((half, (i, j)), shape=(n, n)).tocsr()
@@ -51,13 +57,16 @@ def cotangent_laplacian(vertices: FloatArray, faces: IntArray) -> sparse.csr_arr
     return (sparse.diags_array(weights.sum(axis=1)) - weights).tocsr()
 
 
-def mixed_voronoi_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
+def mixed_voronoi_areas(
+    vertices: FloatArray, faces: IntArray, *, cotangents: FloatArray | None = None
+) -> FloatArray:
     """Return (n,): each vertex's mixed Voronoi area; they sum to the mesh's area."""
-    x = vertices[faces]
-    cotangents = corner_cotangents(vertices, faces)
-    edges = x[:, [2, 0, 1]] - x[:, [1, 2, 0]]  # edge opposite each corner
-    square = np.einsum("ijk,ijk->ij", edges, edges)
-    area = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)[:, None]
+    if cotangents is None:
+        cotangents = corner_cotangents(vertices, faces)
+    a, b, c = vertices[faces.T]
+    sides = c - b, a - c, b - a  # opposite their corners
+    square = np.stack([np.einsum("ij,ij->i", side, side) for side in sides], axis=1)
+    area = 0.5 * np.linalg.norm(np.cross(sides[0], sides[1]), axis=1)[:, None]
     # Voronoi part of corner a: (|ab|^2 cot c + |ac|^2 cot b) / 8.
     share = square * cotangents / 8.0
     voronoi = share.sum(axis=1, keepdims=True) - share
@@ -74,12 +83,16 @@ def mean_curvature_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     return (cotangent_laplacian(vertices, faces) @ vertices) / (2.0 * areas)[:, None]
 
 
-def area_gradients(vertices: FloatArray, faces: IntArray) -> FloatArray:
+def area_gradients(
+    vertices: FloatArray, faces: IntArray, *, cotangents: FloatArray | None = None
+) -> FloatArray:
     """Return (m, 3, 3): for each face and corner k, face area times the gradient of k's hat.
 
     With J the gradient over a face of a map x of the mesh, area J^T = sum_k g_k x_k^T.
     """
-    half = 0.5 * corner_cotangents(vertices, faces)
+    if cotangents is None:
+        cotangents = corner_cotangents(vertices, faces)
+    half = 0.5 * cotangents
     x = vertices[faces]
     gradients = np.empty((len(faces), 3, 3))
     for corner in range(3):

@@ -37,6 +37,7 @@ from scipy import sparse
 from .arrays import FloatArray, IntArray, is_number
 from .differential import (
     area_gradients,
+    corner_cotangents,
     cotangent_laplacian,
     mixed_voronoi_areas,
 )
@@ -176,15 +177,16 @@ class SurfaceOperators(NamedTuple):
 def surface_operators(mesh: Mesh, groups: IntArray) -> SurfaceOperators:
     """Return the operators of *mesh* for the rotation group of each vertex, *groups* (n,)."""
     vertices, faces = mesh.vertices, mesh.faces
-    areas = mixed_voronoi_areas(vertices, faces)
-    laplacian = cotangent_laplacian(vertices, faces)
+    cotangents = corner_cotangents(vertices, faces)
+    areas = mixed_voronoi_areas(vertices, faces, cotangents=cotangents)
+    laplacian = cotangent_laplacian(vertices, faces, cotangents=cotangents)
     delta = (laplacian @ vertices) / (2.0 * areas)[:, None]  # the left side of (5) is C x / (2 A)
     return SurfaceOperators(
         laplacian=laplacian,
         areas=areas,
         delta=delta,
         detail=_grouped(0.5 * delta, groups) @ laplacian,
-        fans=_fans(area_gradients(vertices, faces) / 3.0, faces, groups),
+        fans=_fans(area_gradients(vertices, faces, cotangents=cotangents) / 3.0, faces, groups),
     )
 
 

@@ -17,7 +17,6 @@ from scipy.sparse import csgraph
 from .arrays import FloatArray, IntArray, as_points
 from .errors import ArgumentError, MeshError
 from .faults import as_soup, find_faults
-from .surface.topology import edge_keys
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -91,8 +90,10 @@ class Mesh:
     @cached_property
     def edges(self) -> IntArray:
         """(e, 2) int: each edge once, smaller vertex first, in lexicographic order."""
-        keys = edge_keys(self.faces, self.faces[:, [1, 2, 0]], self.n_vertices)
-        return np.stack(np.divmod(np.unique(keys), self.n_vertices), axis=1)
+        tails, heads = self.faces.ravel(), self.faces[:, [1, 2, 0]].ravel()
+        once = tails < heads  # every edge is met once from either end
+        keys = np.sort(tails[once] * self.n_vertices + heads[once])
+        return np.stack(np.divmod(keys, self.n_vertices), axis=1)
 
     @cached_property
     def adjacency(self) -> sparse.csr_array:

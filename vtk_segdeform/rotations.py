@@ -108,7 +108,8 @@ def _farthest_points(positions: FloatArray, count: int, favour: FloatArray) -> I
 
 
 def _numbered(labels: IntArray) -> IntArray:
-    return np.unique(labels, return_inverse=True)[1].astype(np.int64)
+    number = np.cumsum(np.bincount(labels) > 0) - 1
+    return np.asarray(number[labels], dtype=np.int64)
 
 
 def _nearest(positions: FloatArray, centres: FloatArray, favour: FloatArray) -> IntArray:

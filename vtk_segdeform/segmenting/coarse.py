@@ -124,8 +124,8 @@ def coarsen(mesh: Mesh, n_points: int, rng: np.random.Generator) -> tuple[IntArr
     x = mesh.vertices
     spacing = 0.8 * np.sqrt(mesh.face_areas.sum() / n_points)
     kept = cell = np.arange(mesh.n_vertices)
+    edges = mesh.edges
     while True:
-        edges = _unique_edges(cell[mesh.edges])
         length = np.linalg.norm(np.subtract(*x[kept[edges.T]]), axis=1)
         short = edges[length < spacing]
         if mesh.n_vertices <= n_points or len(short) <= 0.01 * len(kept):
@@ -134,6 +134,7 @@ def coarsen(mesh: Mesh, n_points: int, rng: np.random.Generator) -> tuple[IntArr
         number = np.empty(mesh.n_vertices, dtype=np.int64)
         number[kept] = np.arange(len(kept))
         cell = number[nearest_of(mesh, kept)]
+        edges = _unique_edges(cell[mesh.edges], len(kept))
     return cell, _surface(mesh, cell, kept, edges)
 
 
@@ -180,11 +181,11 @@ def _surface(mesh: Mesh, cell: IntArray, kept: IntArray, edges: IntArray) -> Sur
     # The border between two cells crosses each edge between them, from one triangle's centre
     # over the edge's middle to the other's.
     sides = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    centres = np.repeat(mesh.vertices[mesh.faces].mean(axis=1), 3, axis=0)
-    width = np.linalg.norm(mesh.vertices[sides].mean(axis=1) - centres, axis=1)
     between = cell[sides]
-    crossing = between[:, 0] != between[:, 1]
-    contact = symmetric(between[crossing], _STRAIGHT * width[crossing], k)
+    crossing = np.flatnonzero(between[:, 0] != between[:, 1])
+    centres = mesh.vertices[mesh.faces[crossing // 3]].mean(axis=1)
+    width = np.linalg.norm(mesh.vertices[sides[crossing]].mean(axis=1) - centres, axis=1)
+    contact = symmetric(between[crossing], _STRAIGHT * width, k)
 
     distinct = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
     faces = corners[distinct]
@@ -224,6 +225,8 @@ def _shortcuts(x: FloatArray, faces: IntArray) -> tuple[IntArray, FloatArray]:
     return lines, np.hypot(s - t, height + depth)[hits]
 
 
-def _unique_edges(edges: IntArray) -> IntArray:
-    edges = np.sort(edges[edges[:, 0] != edges[:, 1]], axis=1)
-    return np.unique(edges, axis=0)
+def _unique_edges(edges: IntArray, n: int) -> IntArray:
+    low, high = np.minimum(*edges.T), np.maximum(*edges.T)
+    keys = np.sort((low * n + high)[low != high])
+    keys = keys[np.diff(keys, prepend=-1) > 0]
+    return np.stack(np.divmod(keys, n), axis=1)
