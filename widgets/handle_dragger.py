@@ -194,11 +194,11 @@ class HandleDragger(Widget):
                 session.commit(f"{'turn' if part.way is Way.ABOUT else 'drag'} {name}")
                 kept = True
         finally:
-            if not kept:
-                session.revert()
             self._held = None
             gizmo.say("")
             gizmo.show_only(None)
+            if not kept:  # after all that, as listeners of the session may raise
+                session.revert()
             self._live.go_on()
 
     def _take(self, part: Part, grip: Grip, press: Pointer) -> Motion:

@@ -116,11 +116,13 @@ class View(Sight):
 
         def called(*_: object) -> None:
             taken: bool | None = True
-            with self.guarded(), self._drawn_after():
-                taken = callback()
-            command = self.interactor.GetCommand(tag)
-            if taken and command is not None:  # the callback may have stopped itself
-                command.SetAbortFlag(1)
+            try:
+                with self.guarded(), self._drawn_after():
+                    taken = callback()
+            finally:  # also where a listener of failures fails: a camera would hear half a drag
+                command = self.interactor.GetCommand(tag)
+                if taken and command is not None:  # the callback may have stopped itself
+                    command.SetAbortFlag(1)
 
         tag = self.interactor.AddObserver(event, called, priority)
         if event != "KeyPressEvent":

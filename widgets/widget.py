@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Callable
+from contextlib import ExitStack
 from typing import Any
 
 from vtk_segdeform.session import Session
@@ -187,6 +188,7 @@ class Widget(abc.ABC):
         return self._took_key
 
     def _tell(self, event: str) -> None:
-        for name, callback in list(self._observers.values()):
-            if name == event:
-                callback(self, event)
+        with ExitStack() as told:  # one that raises keeps nobody from hearing
+            for name, callback in reversed(self._observers.values()):
+                if name == event:
+                    told.callback(callback, self, event)
