@@ -2,6 +2,7 @@
 #
 #   make demo       bend the cactus; mesh and pictures land in demo-output/
 #   make test       the whole suite            make campaign   the minutes-long runs
+#   make soak       random hands for an hour; SECONDS=900 for less
 #   make lint       ruff, nothing changed      make format     ruff, files rewritten
 #   make test-paraview   the plugin in a real ParaView
 #   make docs       the documentation, docs/build/html/index.html
@@ -22,9 +23,9 @@ ifeq ($(shell uname -s)$(DISPLAY)$(WAYLAND_DISPLAY),Linux)
 export VTK_DEFAULT_OPENGL_WINDOW ?= vtkEGLRenderWindow
 endif
 
-.PHONY: help demo test test-paraview campaign docs lint format types bench clean
+.PHONY: help demo test test-paraview campaign soak docs lint format types bench clean
 help:
-	@sed -n '3,10s/^# *//p' Makefile
+	@sed -n '3,9s/^# *//p' Makefile
 
 demo: $(VENV)/installed
 	$(BIN)/segdeform demo -o demo-output
@@ -45,6 +46,10 @@ test-paraview: $(VENV)/installed-test
 
 campaign: $(VENV)/installed-test
 	$(BIN)/python -m pytest -m campaign
+
+SECONDS ?= 3600
+soak: $(VENV)/installed-test
+	SEGDEFORM_SOAK=$(SECONDS) $(BIN)/python -m pytest -m campaign -s tests/test_soak.py -k hands
 
 # Pictures, gallery and the table of keys are made anew where the code is newer.
 docs: $(VENV)/installed-docs

@@ -7,6 +7,10 @@ make soak SECONDS=900       or for as long as you like
 
 from __future__ import annotations
 
+import os
+import threading
+import time
+
 import numpy as np
 import pytest
 from scenes import sausage
@@ -56,3 +60,67 @@ def test_so_does_one_with_more_weight_on_what_misses_its_place(count):
     far = scene.turned(20.0) + np.array([0.2, 0.4, 0.0])
     assert scene.deformer(hold_tolerance=1.0).solve(far).handle_error > 5e-4  # it is due
     sways_and_comes_back(drag, sways(scene, count, degrees=30.0), far, every=min(200, count // 2))
+
+
+# Random hands, watched by the minute.
+
+SECONDS = float(os.environ.get("SEGDEFORM_SOAK", "120"))
+
+
+def counted(monkey) -> dict[str, int]:
+    """Return how many there are of what must not pile up, with nothing in hand."""
+    monkey.rests()
+    return {
+        "threads": threading.active_count(),
+        "files": len(os.listdir("/proc/self/fd")) if os.path.isdir("/proc/self/fd") else 0,
+        "props": monkey.view.renderer.GetViewProps().GetNumberOfItems(),
+        "handles": len(monkey.editor.session.handles),
+        "MB": round(resident() / 1e6),
+    }
+
+
+def require_sound(session) -> None:
+    """Assert that no vertex is held twice, and that every handle has targets."""
+    held = np.concatenate([session.fixed, *session.handles.values()])
+    assert len(np.unique(held)) == len(held)
+    assert {name: len(ids) for name, ids in session.handles.items()} == {
+        name: len(targets) for name, targets in session.targets.items()
+    }
+
+
+@pytest.mark.campaign
+def test_random_hands_for_long_leave_nothing_behind(tmp_path):
+    from test_random_hands import Monkey  # here, as that is skipped where nothing can be drawn
+
+    monkey = Monkey(4, tmp_path)
+    end, looks = time.monotonic() + SECONDS, [counted(monkey)]
+    events, posed = 0, []
+    print()
+    while time.monotonic() < end:
+        until = time.monotonic() + min(60.0, SECONDS / 12.0)
+        while time.monotonic() < min(until, end):
+            monkey.acts()
+            events += 1
+            require_sound(monkey.editor.session)
+        looks.append(counted(monkey))
+        print(f"{events} events, {monkey.frames} frames, {monkey.posed} deformed: {looks[-1]}")
+        posed.append(monkey.posed)
+    first, last = looks[len(looks) // 4], looks[-1]
+    steps = 0
+    while monkey.editor.session.undo() is not None:
+        steps += 1
+        require_sound(monkey.editor.session)
+    print(
+        f"{SECONDS:.0f} s: {events} events, {monkey.refused} refused, |dV|/V at most "
+        f"{monkey.worst:.1e}, {last['MB'] - first['MB']} MB more since a quarter of the time, "
+        f"at most {max(look['handles'] for look in looks)} handles, {steps} steps undone"
+    )
+    assert posed[-1] > posed[len(posed) // 2]  # it got not stuck where nothing can be done
+    assert monkey.worst <= 1e-12
+    assert steps <= 100
+    assert last["MB"] - first["MB"] < 50
+    assert last["threads"] <= first["threads"]
+    assert last["files"] <= first["files"] + 3  # a recording may be going on
+    monkey.editor.remove()
+    assert monkey.view.renderer.GetViewProps().GetNumberOfItems() == 0
+    assert monkey.view.window.GetRenderers().GetNumberOfItems() == 1
