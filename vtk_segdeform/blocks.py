@@ -14,22 +14,26 @@ from .fast import compiled, inputs
 from .threads import in_parallel
 
 _CACHED = 1 << 17  # numbers of a block that are multiplied at a time: a megabyte
+_PIECES = 16  # of a block at most, for compiled kernels: to hand one over takes its time
 _DENSE = 1 << 22  # numbers in a dense piece: 32 megabytes
 
 
 def add_product(x: FloatArray, rows: IntArray, block: FloatArray, p: FloatArray) -> None:
     """Add block @ p to the *rows* of x, in double precision whatever the block is in."""
     kernels = compiled(len(rows)) if p.shape[1] % 3 == 0 else None
+    size = max(_CACHED // block.shape[1], 1)
     if kernels:
         arguments = inputs(rows, block, p.T)
+        add_rows = kernels.add_points if p.shape[1] == 3 else kernels.add_product
+        size = max(4 * size, -(-len(rows) // _PIECES))
 
     def add(start: int, stop: int) -> None:
         if kernels:
-            kernels.add_product(x, *arguments, start, stop)
+            add_rows(x, *arguments, start, stop)
         else:
             x[rows[start:stop]] += double(block[start:stop]) @ p
 
-    in_parallel(add, len(rows), max(_CACHED // block.shape[1], 1) * (4 if kernels else 1))
+    in_parallel(add, len(rows), size)
 
 
 def adjoint_product(rows: IntArray, block: FloatArray, y: FloatArray) -> FloatArray:

@@ -37,6 +37,10 @@ class VolumeConstraint:
         """Return g(x), in units of volume."""
         return signed_volume(self._extended(x), self.faces) - self.target
 
+    def relative(self, x: FloatArray) -> float:
+        """Return g(x) over the volume wanted."""
+        return self.violation(x) / self.target
+
     def gradient(self, x: FloatArray) -> FloatArray:
         """Return J_g, (n, 3): the derivative of g by each vertex."""
         gradient = volume_gradient(self._extended(x), self.faces)

@@ -14,13 +14,15 @@ Long because every option of the method meets here, and each is told in the docs
 from __future__ import annotations
 
 import copy
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import sparse
 
 from .arrays import FloatArray, as_points, is_number, is_whole
 from .binding import Binder
@@ -44,6 +46,7 @@ from .threads import one_blas_thread
 _LEG_TOLERANCE, _LEG_STEPS = 1e-3, 12  # for the targets on the way to a far one
 _POSITION_WEIGHT = 1e2  # of the shape energy's trace, shared out over each handle's vertices
 _FAR = 1e3  # mesh sizes
+_NONE = np.zeros(0, dtype=np.int64)
 _WIDE = 20_000  # vertices beyond which mapping directions too is what takes long
 _LANDINGS, _NEAR, _SAME = 4, 3e-5, 1e-7  # times it is gone on to that scale; and one of rounding
 _MET = 1e-3  # diagonals within which a vertex counts as in its place
@@ -284,7 +287,7 @@ class Deformer:
 
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:
         x = x - self._origin
-        return np.array([each.violation(x) / each.target for each in self._region_volumes])
+        return np.array([each.relative(x) for each in self._region_volumes])
 
     def _take_hold(self, fixed: ArrayLike, handle: ArrayLike) -> None:
         mesh = self.mesh
@@ -292,13 +295,16 @@ class Deformer:
         self._handles = connected_sets(mesh, self.handle)
         patches = connected_sets(mesh, self.fixed)
         # Sets lie side by side here, and their vertices in them as in `handle` and `fixed`.
-        order = [*self._handles, *(len(self.handle) + patch for patch in patches)]
-        self._order = np.concatenate([np.zeros(0, dtype=np.int64), *order])
         ids = np.concatenate([self.handle, self.fixed])
+        order = [*self._handles, *(len(self.handle) + patch for patch in patches)]
+        in_order = sparse.eye_array(len(ids)).tocsr()[np.concatenate([_NONE, *order])]
         weight = _POSITION_WEIGHT * float(np.trace(self._energy.quadratic))
         positions = position_term(
             self.subspace, self._rest.vertices, [ids[places] for places in order], weight
         )
+        gathered = in_order if positions.mean is None else positions.mean @ in_order
+        self._to_places = gathered[:, : len(self.handle)].tocsr()
+        self._fixed_places = gathered[:, len(self.handle) :] @ self._rest.vertices[self.fixed]
         self._volumes = self._stand_in.volumes(self._constraints, self._rest.vertices)
         self._at_rest = GaussNewton(self._energy, positions, self._volumes)
         one = len(self._constraints) == 1 and self._keeps == (True, False)
@@ -316,8 +322,7 @@ class Deformer:
 
     def _places(self, targets: FloatArray) -> FloatArray:
         """Return the places for *targets* (k, 3) of the handle."""
-        where = np.concatenate([targets, self._rest.vertices[self.fixed]])
-        return self._at_rest.positions.gathered(where[self._order])
+        return np.asarray(self._to_places @ targets + self._fixed_places)
 
     def _landed(self, result: Iteration) -> tuple[FloatArray, float]:
         """Take the mesh onto the volume held; return its vertices, and by how much it was off.
@@ -357,24 +362,25 @@ class Deformer:
 
     def _solution(self, result: Iteration, x: FloatArray, steps: int) -> Solution:
         p = self._p * self._size
-        volume_change = self._total_volume.violation(x) / self._total_volume.target
-        x = self._placed(x)
+        near, x = x, self._placed(x)
         targets = self._outward(self._targets)
-        handle = np.linalg.norm(x[self.handle] - targets, axis=1).max(initial=0.0)
-        fixed = np.linalg.norm(x[self.fixed] - self.mesh.vertices[self.fixed], axis=1)
-        errors = np.array([handle, fixed.max(initial=0.0)]) / self.mesh.diagonal
+        places = targets, self.mesh.vertices[self.fixed]
+        missed = (
+            _farthest(x[ids], u) for ids, u in zip((self.handle, self.fixed), places, strict=True)
+        )
+        errors = np.array(list(missed)) / self.mesh.diagonal
         status = result.status
         if status is Status.CONVERGED and errors.max() > _MET:
             status = Status.MISSED
         return Solution(
             vertices=x,
             cage_vertices=tuple(p[columns] + self._centre for columns in self.subspace.columns),
-            volume_change=volume_change,
             handle_error=float(errors[0]),
             fixed_error=float(errors[1]),
             steps=steps,
             status=status,
             merits=result.merits,
+            volume=partial(self._total_volume.relative, near),  # before a far place rounds it
             region_volumes=self._region_volume_changes,
         )
 
@@ -383,3 +389,8 @@ class Deformer:
 
     def _outward(self, points: FloatArray) -> FloatArray:
         return np.asarray(points * self._size + self._centre)
+
+
+def _farthest(x: FloatArray, places: FloatArray) -> float:
+    away = x - places
+    return math.sqrt(np.einsum("ij,ij->i", away, away).max(initial=0.0))

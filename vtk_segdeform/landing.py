@@ -36,7 +36,7 @@ def scaled(constraint: VolumeConstraint, x: FloatArray, centre: FloatArray) -> f
 
     Where the surface is inside-out, so that no size would do, nothing is scaled.
     """
-    ratio = constraint.violation(x) / constraint.target
+    ratio = constraint.relative(x)
     if not ratio > -1.0:
         return 1.0
     scale = float(np.cbrt(1.0 / (1.0 + ratio)))

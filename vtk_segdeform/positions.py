@@ -39,10 +39,6 @@ class PositionTerm:
     strength: FloatArray
     mean: sparse.csr_array | None = None  # (k, v), from the vertices held to the places
 
-    def gathered(self, targets: FloatArray) -> FloatArray:
-        """Return u (k, 3) for *targets* (v, 3) of the vertices held."""
-        return targets if self.mean is None else self.mean @ targets
-
     @property
     def weights(self) -> FloatArray:
         """omega, (k,)."""

@@ -33,8 +33,6 @@ class Solution:
     """(n, 3) float: the deformed mesh."""
     cage_vertices: tuple[FloatArray, ...]
     """One (m_r, 3) float per region: the cages that move it there."""
-    volume_change: float
-    """(V - V0) / V0, signed."""
     handle_error: float
     """Distance of the farthest handle vertex from its target, in diagonals of the mesh."""
     fixed_error: float
@@ -45,8 +43,15 @@ class Solution:
     """Why the iteration ended; ``str(status)`` is advice."""
     merits: tuple[float, ...]
     """The objective at the start of the last leg and after each of its steps; it never rises."""
+    volume: Callable[[], float] = field(repr=False)
+    """What measures `volume_change`."""
     region_volumes: Callable[[FloatArray], FloatArray] = field(repr=False)
     """What measures `region_volume_change`."""
+
+    @cached_property
+    def volume_change(self) -> float:
+        """(V - V0) / V0, signed; measured on demand."""
+        return self.volume()
 
     @cached_property
     def region_volume_change(self) -> FloatArray:

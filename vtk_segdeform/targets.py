@@ -19,6 +19,7 @@ from .arrays import FloatArray, IntArray
 from .rotations import rigid_fit
 
 _LONGEST_TURN = np.radians(30.0)
+_SHORT_TURN = np.radians(10.0)
 _LONGEST_MOVE = 0.2  # of the mesh's size
 _MOST_LEGS = 50
 _HALF_TURN = 1e-6  # radians short of 180 degrees that count as 180
@@ -34,6 +35,8 @@ def waypoints(start: FloatArray, end: FloatArray, handles: list[IntArray]) -> li
     handles : list of int arrays
         The places in 0..k-1 of each handle, moved on its own.
     """
+    if all(_is_short(start[h], end[h]) for h in handles):
+        return [end]
     motions = [_Screw(start[h], end[h]) for h in handles]
     count = max([1, *(motion.legs for motion in motions)])
     way = []
@@ -43,6 +46,21 @@ def waypoints(start: FloatArray, end: FloatArray, handles: list[IntArray]) -> li
             targets[handle] = motion.at(leg / count)
         way.append(targets)
     return [*way, end]
+
+
+def _is_short(start: FloatArray, end: FloatArray) -> bool:
+    """Tell whether one leg is plainly enough: cheaper to see than the screw itself.
+
+    A turn by theta moves points by 2 sin(theta / 2) times their distance from its axis, and no
+    axis is nearer to all of them than the one they are longest along.
+    """
+    move, share = end - start, np.full(len(start), 1.0 / len(start))
+    if np.einsum("ij,ij->i", move, move).max() > _LONGEST_MOVE**2:
+        return False
+    move -= share @ move
+    arms = start - share @ start
+    about_longest = np.linalg.eigvalsh(arms.T @ arms)[:2].sum()
+    return bool(np.vdot(move, move) <= _SHORT_TURN**2 * about_longest)
 
 
 class _Screw:

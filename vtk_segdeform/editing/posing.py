@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property, partial
 from types import MappingProxyType
 
 import numpy as np
@@ -53,6 +54,10 @@ class Posing:
         self._holding: tuple[Deformer, State, Deformer] | None = None
         self._at: Pose | None = None  # where the holding deformer is; None if elsewhere
         self._shape: tuple[Pose, FloatArray, float] | None = None
+
+    @cached_property
+    def _rest_volume(self) -> float:
+        return signed_volume(self._mesh.vertices, self._mesh.faces)
 
     def is_bound(self, state: State) -> bool:
         """Tell whether `bind` has nothing to do."""
@@ -113,7 +118,7 @@ class Posing:
         pose = Pose(solution.cage_vertices, targets)
         self._at = pose
         x, change = self._evaluated(state, pose)
-        return pose, replace(solution, vertices=x, volume_change=change)
+        return pose, replace(solution, vertices=x, volume=partial(float, change))
 
     def free_form(self, state: State, cage_vertices: Sequence[FloatArray]) -> Pose:
         """Return the pose of *cage_vertices* (m_r, 3), cage by cage, with the volume of rest.
@@ -172,7 +177,7 @@ class Posing:
         x, change = self._evaluated(state, pose)
         if state.options.preserve_region_volumes and state.regions is not None:
             constraints = region_volumes(self._mesh, state.regions.labels)
-            return all(abs(c.violation(x) / c.target) <= _SAME_VOLUME for c in constraints)
+            return all(abs(c.relative(x)) <= _SAME_VOLUME for c in constraints)
         return not state.options.preserve_volume or abs(change) <= _SAME_VOLUME
 
     def _evaluated(self, state: State, pose: Pose) -> tuple[FloatArray, float]:
@@ -180,8 +185,7 @@ class Posing:
         if self._shape is None or self._shape[0] is not pose:
             x = self.bind(state).surface(pose.cage_vertices)
             frozen(x)
-            rest, faces = self._mesh.vertices, self._mesh.faces
-            change = signed_volume(x, faces) / signed_volume(rest, faces) - 1.0
+            change = signed_volume(x, self._mesh.faces) / self._rest_volume - 1.0
             self._shape = pose, x, change
         return self._shape[1:]
 
