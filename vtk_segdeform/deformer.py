@@ -303,6 +303,7 @@ class Deformer:
             self.subspace, self._rest.vertices, [ids[places] for places in order], weight
         )
         gathered = in_order if positions.mean is None else positions.mean @ in_order
+        self._rest_of_fixed = mesh.vertices[self.fixed]
         self._to_places = gathered[:, : len(self.handle)].tocsr()
         self._fixed_places = gathered[:, len(self.handle) :] @ self._rest.vertices[self.fixed]
         self._volumes = self._stand_in.volumes(self._constraints, self._rest.vertices)
@@ -364,9 +365,10 @@ class Deformer:
         p = self._p * self._size
         near, x = x, self._placed(x)
         targets = self._outward(self._targets)
-        places = targets, self.mesh.vertices[self.fixed]
+        places = targets, self._rest_of_fixed
         missed = (
-            _farthest(x[ids], u) for ids, u in zip((self.handle, self.fixed), places, strict=True)
+            _farthest(np.take(x, ids, axis=0), u)
+            for ids, u in zip((self.handle, self.fixed), places, strict=True)
         )
         errors = np.array(list(missed)) / self.mesh.diagonal
         status = result.status

@@ -22,6 +22,7 @@ _LONGEST_TURN = np.radians(30.0)
 _SHORT_TURN = np.radians(10.0)
 _LONGEST_MOVE = 0.2  # of the mesh's size
 _MOST_LEGS = 50
+_SOME = 500  # vertices of a large handle that tell whether it moved far
 _HALF_TURN = 1e-6  # radians short of 180 degrees that count as 180
 
 
@@ -35,7 +36,8 @@ def waypoints(start: FloatArray, end: FloatArray, handles: list[IntArray]) -> li
     handles : list of int arrays
         The places in 0..k-1 of each handle, moved on its own.
     """
-    if all(_is_short(start[h], end[h]) for h in handles):
+    some = [h[:: max(1, len(h) // _SOME)] for h in handles]
+    if all(_is_short(start[h], end[h]) for h in some):
         return [end]
     motions = [_Screw(start[h], end[h]) for h in handles]
     count = max([1, *(motion.legs for motion in motions)])
