@@ -25,6 +25,7 @@ from vtk_segdeform.widgets.editing.bindings import BINDINGS
 from vtk_segdeform.widgets.editor import DeformEditor
 
 SIZE = (260, 200)
+LONGEST = 120.0  # seconds of a job, also where others are at work
 # Another file is opened rarely enough to have something to lose.
 KEYS = sorted({key for binding in BINDINGS for key in binding.keys})
 RARE = {"p": 0.3, "ctrl+o": 0.3, "ctrl+s": 0.2, "g": 0.1, "f": 1.5, "delete": 0.3, "backspace": 0.3}
@@ -140,9 +141,9 @@ class Monkey:
     def waits(self):
         if self.editor.is_busy:  # a camera that is held keeps the timer from everybody
             self.hand.release(self.place)
-        end = time.monotonic() + 30.0
+        end = time.monotonic() + LONGEST
         while self.editor.is_busy:
-            assert time.monotonic() < end, "a job does not end"
+            assert time.monotonic() < end, f"a job does not end: {self.editor.status}"
             self.hand.tick()
             time.sleep(0.001)
 

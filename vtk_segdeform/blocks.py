@@ -14,22 +14,22 @@ from .fast import compiled, inputs
 from .threads import in_parallel
 
 _CACHED = 1 << 17  # numbers of a block that are multiplied at a time: a megabyte
+_ROW = 24  # numbers that take as long as a face of a volume
 _PIECES = 16  # of a block at most, for compiled kernels: to hand one over takes its time
 _DENSE = 1 << 22  # numbers in a dense piece: 32 megabytes
 
 
 def add_product(x: FloatArray, rows: IntArray, block: FloatArray, p: FloatArray) -> None:
     """Add block @ p to the *rows* of x, in double precision whatever the block is in."""
-    kernels = compiled(len(rows)) if p.shape[1] % 3 == 0 else None
+    kernels = compiled(block.size // _ROW) if p.shape[1] % 3 == 0 else None
     size = max(_CACHED // block.shape[1], 1)
     if kernels:
         arguments = inputs(rows, block, p.T)
-        add_rows = kernels.add_points if p.shape[1] == 3 else kernels.add_product
         size = max(4 * size, -(-len(rows) // _PIECES))
 
     def add(start: int, stop: int) -> None:
         if kernels:
-            add_rows(x, *arguments, start, stop)
+            kernels.add_product(x, *arguments, start, stop)
         else:
             x[rows[start:stop]] += double(block[start:stop]) @ p
 
@@ -38,7 +38,7 @@ def add_product(x: FloatArray, rows: IntArray, block: FloatArray, p: FloatArray)
 
 def adjoint_product(rows: IntArray, block: FloatArray, y: FloatArray) -> FloatArray:
     """Return block.T @ y[rows], in double precision."""
-    kernels = compiled(len(rows)) if y.shape[1] == 3 else None
+    kernels = compiled(block.size // _ROW) if y.shape[1] == 3 else None
     if kernels:
         kernels.add_adjoint(summed := np.zeros((3, block.shape[1])), *inputs(rows, block, y))
         return summed.T

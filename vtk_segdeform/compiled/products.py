@@ -1,4 +1,7 @@
-"""Products of a block of W~ with a few columns, for `blocks`; single precision is widened."""
+"""Products of a block of W~ with a few columns, for `blocks`; single precision is widened.
+
+Four rows at a time: what is read of the columns then serves all of them.
+"""
 
 from __future__ import annotations
 
@@ -8,116 +11,81 @@ _compile = numba.njit(nogil=True, cache=True, error_model="numpy", fastmath={"re
 
 
 @_compile
-def add_points(x, rows, block, p, start, stop):
-    """Add block @ p.T to the *rows* start..stop of *x*, for *p* (3, m).
-
-    Four rows at a time: what is read of p then serves all of them.
-    """
-    m = p.shape[1]
-    p0, p1, p2 = p[0], p[1], p[2]
+def add_product(x, rows, block, p, start, stop):
+    """Add block @ p.T to the *rows* start..stop of *x*, for *p* (k, m) with k a multiple of 3."""
+    k, m = p.shape
     four = start + (stop - start) // 4 * 4
     for i in range(start, four, 4):
-        u, v, w, z = block[i], block[i + 1], block[i + 2], block[i + 3]
-        u0 = u1 = u2 = v0 = v1 = v2 = w0 = w1 = w2 = z0 = z1 = z2 = 0.0
-        for j in range(m):
-            a, b, c = p0[j], p1[j], p2[j]
-            s = float(u[j])
-            u0 += s * a
-            u1 += s * b
-            u2 += s * c
-            s = float(v[j])
-            v0 += s * a
-            v1 += s * b
-            v2 += s * c
-            s = float(w[j])
-            w0 += s * a
-            w1 += s * b
-            w2 += s * c
-            s = float(z[j])
-            z0 += s * a
-            z1 += s * b
-            z2 += s * c
-        row = rows[i]
-        x[row, 0] += u0
-        x[row, 1] += u1
-        x[row, 2] += u2
-        row = rows[i + 1]
-        x[row, 0] += v0
-        x[row, 1] += v1
-        x[row, 2] += v2
-        row = rows[i + 2]
-        x[row, 0] += w0
-        x[row, 1] += w1
-        x[row, 2] += w2
-        row = rows[i + 3]
-        x[row, 0] += z0
-        x[row, 1] += z1
-        x[row, 2] += z2
+        b0, b1, b2, b3 = block[i], block[i + 1], block[i + 2], block[i + 3]
+        r0, r1, r2, r3 = rows[i], rows[i + 1], rows[i + 2], rows[i + 3]
+        for c in range(0, k, 3):
+            px, py, pz = p[c], p[c + 1], p[c + 2]
+            x0 = y0 = z0 = x1 = y1 = z1 = x2 = y2 = z2 = x3 = y3 = z3 = 0.0
+            for j in range(m):
+                u, v, w = px[j], py[j], pz[j]
+                t = float(b0[j])
+                x0 += t * u
+                y0 += t * v
+                z0 += t * w
+                t = float(b1[j])
+                x1 += t * u
+                y1 += t * v
+                z1 += t * w
+                t = float(b2[j])
+                x2 += t * u
+                y2 += t * v
+                z2 += t * w
+                t = float(b3[j])
+                x3 += t * u
+                y3 += t * v
+                z3 += t * w
+            for r, a, b, d in (
+                (r0, x0, y0, z0),
+                (r1, x1, y1, z1),
+                (r2, x2, y2, z2),
+                (r3, x3, y3, z3),
+            ):
+                x[r, c] += a
+                x[r, c + 1] += b
+                x[r, c + 2] += d
     for i in range(four, stop):
-        u, row = block[i], rows[i]
-        u0 = u1 = u2 = 0.0
-        for j in range(m):
-            s = float(u[j])
-            u0 += s * p0[j]
-            u1 += s * p1[j]
-            u2 += s * p2[j]
-        x[row, 0] += u0
-        x[row, 1] += u1
-        x[row, 2] += u2
-
-
-@_compile
-def add_product(x, rows, block, p, start, stop):
-    """Add block @ p.T to the *rows* start..stop of *x*, for *p* (k, m) with k a multiple of 3.
-
-    Six columns, then three at a time, so that each row of the block is read as seldom as can be.
-    """
-    k, m = p.shape
-    for i in range(start, stop):
-        w, row = block[i], rows[i]
-        c = 0
-        while c + 6 <= k:
-            p0, p1, p2, p3, p4, p5 = p[c], p[c + 1], p[c + 2], p[c + 3], p[c + 4], p[c + 5]
-            s0 = s1 = s2 = s3 = s4 = s5 = 0.0
+        b0, r0 = block[i], rows[i]
+        for c in range(0, k, 3):
+            px, py, pz = p[c], p[c + 1], p[c + 2]
+            x0 = y0 = z0 = 0.0
             for j in range(m):
-                v = float(w[j])
-                s0 += v * p0[j]
-                s1 += v * p1[j]
-                s2 += v * p2[j]
-                s3 += v * p3[j]
-                s4 += v * p4[j]
-                s5 += v * p5[j]
-            x[row, c] += s0
-            x[row, c + 1] += s1
-            x[row, c + 2] += s2
-            x[row, c + 3] += s3
-            x[row, c + 4] += s4
-            x[row, c + 5] += s5
-            c += 6
-        while c + 3 <= k:
-            p0, p1, p2 = p[c], p[c + 1], p[c + 2]
-            s0 = s1 = s2 = 0.0
-            for j in range(m):
-                v = float(w[j])
-                s0 += v * p0[j]
-                s1 += v * p1[j]
-                s2 += v * p2[j]
-            x[row, c] += s0
-            x[row, c + 1] += s1
-            x[row, c + 2] += s2
-            c += 3
+                t = float(b0[j])
+                x0 += t * px[j]
+                y0 += t * py[j]
+                z0 += t * pz[j]
+            x[r0, c] += x0
+            x[r0, c + 1] += y0
+            x[r0, c + 2] += z0
 
 
 @_compile
 def add_adjoint(p, rows, block, y):
     """Add (block.T @ y[rows]).T to *p* (3, m), for *y* (n, 3)."""
     m = block.shape[1]
-    p0, p1, p2 = p[0], p[1], p[2]
-    for i in range(len(rows)):
-        w, row = block[i], rows[i]
-        y0, y1, y2 = y[row, 0], y[row, 1], y[row, 2]
+    px, py, pz = p[0], p[1], p[2]
+    four = len(rows) // 4 * 4
+    for i in range(0, four, 4):
+        b0, b1, b2, b3 = block[i], block[i + 1], block[i + 2], block[i + 3]
+        r0, r1, r2, r3 = rows[i], rows[i + 1], rows[i + 2], rows[i + 3]
+        x0, y0, z0 = y[r0, 0], y[r0, 1], y[r0, 2]
+        x1, y1, z1 = y[r1, 0], y[r1, 1], y[r1, 2]
+        x2, y2, z2 = y[r2, 0], y[r2, 1], y[r2, 2]
+        x3, y3, z3 = y[r3, 0], y[r3, 1], y[r3, 2]
         for j in range(m):
-            v = float(w[j])
-            p0[j] += v * y0
-            p1[j] += v * y1
-            p2[j] += v * y2
+            s, t, u, v = float(b0[j]), float(b1[j]), float(b2[j]), float(b3[j])
+            px[j] += s * x0 + t * x1 + u * x2 + v * x3
+            py[j] += s * y0 + t * y1 + u * y2 + v * y3
+            pz[j] += s * z0 + t * z1 + u * z2 + v * z3
+    for i in range(four, len(rows)):
+        b0, r0 = block[i], rows[i]
+        x0, y0, z0 = y[r0, 0], y[r0, 1], y[r0, 2]
+        for j in range(m):
+            t = float(b0[j])
+            px[j] += t * x0
+            py[j] += t * y0
+            pz[j] += t * z0
