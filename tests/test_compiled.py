@@ -84,7 +84,7 @@ def test_products_agree_and_are_taken_in_double_precision(twin, dtype, columns):
 
     def product():
         x = np.ones((6000, columns))
-        add_product(x, rows, block, p)
+        add_product(x, rows, block, p, heavy=True)
         return x
 
     quick, plain = twin(product)
@@ -92,7 +92,7 @@ def test_products_agree_and_are_taken_in_double_precision(twin, dtype, columns):
     exact[rows] += block.astype(np.float64) @ p
     assert_allclose(plain, exact, atol=1e-12)
     assert_allclose(quick, exact, atol=1e-12)
-    quick, plain = twin(lambda: adjoint_product(rows, block, y))
+    quick, plain = twin(lambda: adjoint_product(rows, block, y, heavy=True))
     assert_allclose(quick, plain, atol=1e-10)
     assert_allclose(plain, block.astype(np.float64).T @ y[rows], atol=1e-10)
 

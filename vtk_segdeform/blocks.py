@@ -7,25 +7,34 @@ exact, as ever, while half as much memory is read.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from .arrays import FloatArray, IntArray
-from .fast import compiled, inputs
+from .fast import WORTHWHILE, compiled, inputs
 from .threads import in_parallel
 
 _CACHED = 1 << 17  # numbers of a block that are multiplied at a time: a megabyte
-_ROW = 24  # numbers that take as long as a face of a volume
+_ROW = 48  # numbers that take as long as a face of a volume
 _PIECES = 16  # of a block at most, for compiled kernels: to hand one over takes its time
 _DENSE = 1 << 22  # numbers in a dense piece: 32 megabytes
 
 
-def add_product(x: FloatArray, rows: IntArray, block: FloatArray, p: FloatArray) -> None:
+def is_heavy(blocks: Sequence[FloatArray]) -> bool:
+    """Tell whether compiled kernels are worth it for products with all *blocks*."""
+    return sum(block.size for block in blocks) // _ROW >= WORTHWHILE
+
+
+def add_product(
+    x: FloatArray, rows: IntArray, block: FloatArray, p: FloatArray, *, heavy: bool
+) -> None:
     """Add block @ p to the *rows* of x, in double precision whatever the block is in."""
-    kernels = compiled(block.size // _ROW) if p.shape[1] % 3 == 0 else None
+    kernels = compiled() if heavy and p.shape[1] % 3 == 0 else None
     size = max(_CACHED // block.shape[1], 1)
     if kernels:
         arguments = inputs(rows, block, p.T)
-        size = max(4 * size, -(-len(rows) // _PIECES))
+        size = max(8 * size, -(-len(rows) // _PIECES))
 
     def add(start: int, stop: int) -> None:
         if kernels:
@@ -36,9 +45,9 @@ def add_product(x: FloatArray, rows: IntArray, block: FloatArray, p: FloatArray)
     in_parallel(add, len(rows), size)
 
 
-def adjoint_product(rows: IntArray, block: FloatArray, y: FloatArray) -> FloatArray:
+def adjoint_product(rows: IntArray, block: FloatArray, y: FloatArray, *, heavy: bool) -> FloatArray:
     """Return block.T @ y[rows], in double precision."""
-    kernels = compiled(block.size // _ROW) if y.shape[1] == 3 else None
+    kernels = compiled() if heavy and y.shape[1] == 3 else None
     if kernels:
         kernels.add_adjoint(summed := np.zeros((3, block.shape[1])), *inputs(rows, block, y))
         return summed.T

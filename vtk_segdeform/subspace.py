@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from .arrays import FloatArray, IntArray
-from .blocks import add_product, adjoint_product, double, pieces
+from .blocks import add_product, adjoint_product, double, is_heavy, pieces
 from .cages import Cage
 from .errors import CageError, RegionError
 from .mean_value import mean_value_coordinates
@@ -51,18 +51,22 @@ class Subspace:
         ends = np.cumsum([0, *(block.shape[1] for block in self.blocks)])
         return tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(ends))
 
+    @cached_property
+    def _is_heavy(self) -> bool:
+        return is_heavy(self.blocks)
+
     def map(self, p: FloatArray, start: FloatArray | None = None) -> FloatArray:
         """Return x = W~ p, (n, k), for stacked cage vertices *p* (m, k), added to *start*."""
         x = np.zeros((self.n_vertices, p.shape[1])) if start is None else start
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
-            add_product(x, rows, block, p[columns])
+            add_product(x, rows, block, p[columns], heavy=self._is_heavy)
         return x
 
     def adjoint(self, y: FloatArray) -> FloatArray:
         """Return W~^T y, (m, 3), for *y* (n, 3) on the mesh."""
         p = np.empty((self.n_columns, y.shape[1]))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
-            p[columns] = adjoint_product(rows, block, y)
+            p[columns] = adjoint_product(rows, block, y, heavy=self._is_heavy)
         return p
 
     def at(self, vertices: IntArray) -> FloatArray:

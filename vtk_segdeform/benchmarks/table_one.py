@@ -11,9 +11,8 @@ a step into that and the rest.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import partial
 from statistics import median
 from typing import Any
 
@@ -67,7 +66,7 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
                 progress(0.5 * k + 0.25 * (n_regions == 3), f"table 1, {name}, {n_regions} regions")
             extra = {**options, "as_printed": bool(options) and n_regions > 1}
             readies.append(bound(task, n_regions, n, **extra))
-        products = [partial(_products, ready, plain=bool(options)) for ready in readies]
+        products = [_products(ready, plain=bool(options)) for ready in readies]
         of_w = by_turns(products, _ROUNDS * scale.repeats)
         one, three = (
             replace(case_of(ready, task, scale, plain=bool(options)), of_w=1e3 * seconds)
@@ -122,12 +121,18 @@ def case_of(ready: Bound, task: Task, scale: Scale, *, plain: bool) -> Case:
     )
 
 
-def _products(ready: Bound, *, plain: bool) -> None:
-    """Do what a step does with W: x = W p, the volume's direction beside it, and W^T y."""
-    subspace = ready.deformer.subspace
-    subspace.map(np.ones((subspace.n_columns, 3 if plain else 6)))
-    for _ in range(2 if plain else 1):  # of J_g, and of b where every vertex turns
-        subspace.adjoint(np.ones((subspace.n_vertices, 3)))
+def _products(ready: Bound, *, plain: bool) -> Callable[[], None]:
+    """Return what a step does with W: x = W p, the volume's direction beside it, and W^T y."""
+    subspace, columns = ready.deformer.subspace, 3 if plain else 6
+    p, x = np.ones((subspace.n_columns, columns)), np.zeros((subspace.n_vertices, columns))
+    y = np.ones((subspace.n_vertices, 3))
+
+    def products() -> None:
+        subspace.map(p, x)
+        for _ in range(2 if plain else 1):  # of J_g, and of b where every vertex turns
+            subspace.adjoint(y)
+
+    return products
 
 
 def _largest(changes: Iterable[float]) -> float:
