@@ -150,7 +150,7 @@ def timers():
     """Return how many timers of Qt there are, and how many of them run."""
     tops = [application(), *application().topLevelWidgets()]
     every = {id(each): each for top in tops for each in top.findChildren(QtCore.QTimer)}
-    every |= {id(each): each for each in gc.get_objects() if isinstance(each, QtCore.QTimer)}
+    every |= {id(each): each for each in gc.get_objects() if issubclass(type(each), QtCore.QTimer)}
     running = []
     for each in every.values():
         with contextlib.suppress(RuntimeError):  # Qt has deleted what Python still has a name for
