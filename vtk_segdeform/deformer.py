@@ -30,7 +30,7 @@ from .cages import Cage
 from .constraints import VolumeConstraint, region_volumes, total_volume
 from .errors import ArgumentError, CageError, ConstraintError, RegionError
 from .iteration import Iteration, SolverOptions
-from .landing import along, scaled
+from .landing import along, scaled, widened
 from .mesh import Mesh, require_mesh
 from .passengers import Passengers, board
 from .positions import checked_constraints, checked_targets, connected_sets, position_term
@@ -354,8 +354,7 @@ class Deformer:
         is rounded.
         """
         moves = p - self._rest_cages * self._size
-        rest = self._here.vertices
-        start = np.hstack([rest, np.zeros((len(rest), 3 * len(directions)))])
+        start = widened(self._here.vertices, 3 * len(directions))
         return self.subspace.map(np.hstack([moves, *directions]), start)
 
     def _placed(self, x: FloatArray) -> FloatArray:

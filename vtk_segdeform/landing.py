@@ -17,7 +17,7 @@ from .arrays import FloatArray
 from .constraints import VolumeConstraint, moved, restore
 from .threads import in_parallel
 
-_CACHED = 1 << 14  # vertices scaled at a time
+_CACHED = 1 << 14  # vertices at a time
 
 
 def along(
@@ -29,6 +29,18 @@ def along(
     """
     steps = restore(constraints, paths)
     return steps, moved(paths, steps)
+
+
+def widened(x: FloatArray, columns: int) -> FloatArray:
+    """Return a copy of *x* (n, 3) with so many *columns* of zeros beside it."""
+    wide = np.empty((len(x), 3 + columns))
+
+    def work(start: int, stop: int) -> None:
+        wide[start:stop, :3] = x[start:stop]
+        wide[start:stop, 3:] = 0.0
+
+    in_parallel(work, len(x), 4 * _CACHED)
+    return wide
 
 
 def scaled(constraint: VolumeConstraint, x: FloatArray, centre: FloatArray) -> float:
