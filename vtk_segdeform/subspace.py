@@ -230,4 +230,4 @@ def _check_cages(regions: Regions, cages: Sequence[Cage]) -> None:
                 "and hardly moves it; make it fit more tightly"
             )
         members = mesh.vertices[regions.membership[r]]
-        cage.require_encloses(members, f"region {r}")
+        cage.require_encloses(members, f"vertices of region {r}")

@@ -170,7 +170,8 @@ def fitting_cages(
     if len(cages) != regions.n_regions:
         raise CageError(f"{regions.n_regions} regions need as many cages; got {len(cages)}")
     for r, cage in enumerate(cages):
-        cage.require_encloses(regions.mesh.vertices[regions.membership[r]], called(names, r))
+        members = regions.mesh.vertices[regions.membership[r]]
+        cage.require_encloses(members, f"vertices of {called(names, r)}")
     return tuple(cages)
 
 
