@@ -10,7 +10,7 @@ import gc
 import resource
 import sys
 import time
-from weakref import WeakSet
+from weakref import WeakValueDictionary
 
 import numpy as np
 import pytest
@@ -18,7 +18,6 @@ from hands import Hand, plain_view
 from scenes import sausage
 
 from vtk_segdeform import Session
-from vtk_segdeform.editing.state import Pose
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.volume import signed_volume
 from vtk_segdeform.widgets.editing.bindings import BINDINGS
@@ -57,8 +56,9 @@ class Monkey:
         self.place = np.array(SIZE) / 2.0
         self.frames = self.posed = self.free = self.refused = 0
         self.worst = 0.0
-        # Poses made while the volume was free, or of a file; as long as the session has them.
-        self.loose: WeakSet[Pose] = WeakSet()
+        # Of poses made while the volume was free, or of a file: where their cages are, which they
+        # share with the poses that marking handles makes of them; while the session has them.
+        self.loose: WeakValueDictionary[int, np.ndarray] = WeakValueDictionary()
         self.met = session
         self.view.renderer.AddObserver("EndEvent", self.sees)
 
@@ -82,9 +82,10 @@ class Monkey:
         is_free = not session.options.preserve_volume or session is not self.met
         self.met = session
         self.free += is_free
-        if is_free and pose is not None:
-            self.loose.add(pose)
-        if pose in self.loose:
+        cage = None if pose is None else pose.cage_vertices[0]
+        if is_free and cage is not None:
+            self.loose[id(cage)] = cage
+        if cage is not None and self.loose.get(id(cage)) is cage:
             faces, rest = session.mesh.faces, session.mesh.vertices
             change = signed_volume(session.vertices, faces) / signed_volume(rest, faces) - 1.0
             assert abs(session.volume_change - change) < 1e-12
