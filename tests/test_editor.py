@@ -498,6 +498,21 @@ def test_escape_cancels_a_job_and_nothing_is_changed(bare):
     assert bare.session.regions is not None
 
 
+def test_cages_for_regions_that_another_window_has_changed_are_not_taken(bare):
+    bare.type("g")
+    bare.settle()
+    bare.hand.key("f")
+    assert bare.editor.is_busy
+    bare.session.paint_region(bare.session.regions.n_regions, np.arange(40))
+    bare.settle()
+    assert not bare.session.cages
+    assert isinstance(bare.hand.failures.pop(), RegionError)
+    assert "regions changed while cages were fitted" in bare.editor.status
+    bare.type("f")
+    bare.settle()
+    assert len(bare.session.cages) == bare.session.regions.n_regions
+
+
 def test_a_job_that_fails_says_so_and_the_editor_goes_on(desk):
     desk.session.change_options(n_cage_vertices=8, offset=1e-9)
     desk.type("f")

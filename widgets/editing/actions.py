@@ -96,11 +96,13 @@ def segment(desk: Desk) -> None:
 
 def fit_cages(desk: Desk) -> None:
     """Fit cages to the regions."""
-    session = desk.session
-    if session.regions is None:
+    session, regions = desk.session, desk.session.regions
+    if regions is None:
         raise RegionError("there are no regions to fit cages to: G finds some, or paint them")
 
     def keep(cages: Any) -> None:
+        if session.regions is not regions:  # by another window of the same session
+            raise RegionError("regions changed while cages were fitted to them: F fits them anew")
         session.set_cages(cages, label="fit cages")
         total = sum(cage.n_vertices for cage in cages)
         desk.say(f"{_count(len(cages), 'cage')} fitted, {total} vertices in all")
