@@ -18,6 +18,7 @@ from scenes import sausage
 from scipy.spatial.transform import Rotation
 
 from vtk_segdeform import Session, load_session, models, save_session
+from vtk_segdeform.errors import RegionError
 from vtk_segdeform.volume import signed_volume
 from vtk_segdeform.widgets.dragging.gizmo_shapes import Part, Way
 from vtk_segdeform.widgets.editing.bindings import BINDINGS
