@@ -77,10 +77,9 @@ def test_the_whole_story_in_qt(qt):
         return not editor.is_busy
 
     hand.key("g")
-    assert editor.is_busy
-    until(is_done, "regions")
+    until(lambda: is_done() and session.regions is not None, "regions")
     hand.key("f")
-    until(is_done, "cages")
+    until(lambda: is_done() and session.cages, "cages")
     assert sum("%" in text for text in said) > 2  # it told how far it was, meanwhile
     assert len(session.cages) == session.regions.n_regions
 
