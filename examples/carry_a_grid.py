@@ -4,6 +4,7 @@ Run it with a folder's name to have both grids written there.
 """
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pyvista as pv
@@ -34,5 +35,6 @@ bent.points = deformer.carry(grid.points)
 sizes = bent.compute_cell_sizes()["Volume"] / grid.compute_cell_sizes()["Volume"]
 print(f"{grid.n_cells} hexahedra, the most squeezed to {sizes.min():.2f} of itself")
 if len(sys.argv) > 1:
+    Path(sys.argv[1]).mkdir(parents=True, exist_ok=True)
     grid.save(f"{sys.argv[1]}/grid.vtu")
     bent.save(f"{sys.argv[1]}/bent.vtu")

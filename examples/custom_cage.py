@@ -44,6 +44,7 @@ print(f"dragged aside:       volume changed by {session.volume_change:.0e} of it
 if len(sys.argv) > 1:
     from vtk_segdeform.pictures import picture_before_after, picture_regions_and_cages
 
+    Path(sys.argv[1]).mkdir(parents=True, exist_ok=True)
     folder, ends = Path(sys.argv[1]), {"fixed": session.fixed, "handle": session.handles["top"]}
     picture_regions_and_cages(folder / "custom-cage.png", mesh, [[True] * mesh.n_vertices], [cage])
     picture_before_after(folder / "custom-cage-twisted.png", mesh, by_hand[1], **ends)

@@ -38,5 +38,6 @@ print(f"volume changed by {session.volume_change:.0e} of itself")
 if len(sys.argv) > 1:
     from vtk_segdeform.pictures import picture_regions_and_cages
 
+    Path(sys.argv[1]).mkdir(parents=True, exist_ok=True)
     path = Path(sys.argv[1]) / "custom-regions.png"
     picture_regions_and_cages(path, mesh, session.regions.membership, session.cages)

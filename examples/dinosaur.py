@@ -45,6 +45,7 @@ if len(sys.argv) > 1:
     from vtk_segdeform.pictures import picture_before_after, picture_regions_and_cages
 
     folder = Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
     regions, both = session.regions, np.concatenate([head, tail])
     picture_regions_and_cages(
         folder / "dinosaur-cages.png", mesh, regions.membership, session.cages

@@ -7,6 +7,7 @@ dragged aside and turned by the ring of its gizmo.
 """
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pyvista as pv
@@ -55,6 +56,7 @@ def around(vertices):
 def picture(name):
     """Keep what is seen, if a folder was named."""
     if len(sys.argv) > 1:
+        Path(sys.argv[1]).mkdir(parents=True, exist_ok=True)
         plotter.screenshot(f"{sys.argv[1]}/{name}.png")
 
 

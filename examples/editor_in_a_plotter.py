@@ -5,6 +5,7 @@ does.  Run it with the word "show" to work in it yourself.
 """
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pyvista as pv
@@ -43,6 +44,7 @@ if not show:
     ]
     replay(plotter, recording, busy=lambda: editor.is_busy)
     if len(sys.argv) > 1:
+        Path(sys.argv[1]).mkdir(parents=True, exist_ok=True)
         plotter.screenshot(f"{sys.argv[1]}/editor.png")
 
 moved = np.linalg.norm(session.vertices - session.mesh.vertices, axis=1).max()

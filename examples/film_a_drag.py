@@ -30,6 +30,7 @@ changes = []
 session.on_change(lambda _: changes.append(session.volume_change))
 with tempfile.TemporaryDirectory() as here:
     path = Path(sys.argv[1] if len(sys.argv) > 1 else here) / "bend.gif"
+    path.parent.mkdir(parents=True, exist_ok=True)
     film(path, session, targets, fps=12, size=(480, 480))
     print(f"{len(targets)} pictures, {path.stat().st_size // 1024} kB")
 print(f"volume never changed by more than {max(map(abs, changes)):.0e} of itself")

@@ -35,6 +35,7 @@ for n_regions in (1, 5):
     if len(sys.argv) > 1:
         from vtk_segdeform.pictures import picture_before_after, picture_regions_and_cages
 
+        Path(sys.argv[1]).mkdir(parents=True, exist_ok=True)
         stem = f"{Path(sys.argv[1])}/{n_regions}-cages"
         picture_regions_and_cages(f"{stem}.png", mesh, regions.membership, cages)
         picture_before_after(f"{stem}-bent.png", mesh, solution.vertices, fixed=foot, handle=tip)

@@ -57,6 +57,14 @@ def test_the_example_runs_and_its_number_is_right(name, monkeypatch):
     assert RIGHT[name](runpy.run_path(str(EXAMPLES / f"{name}.py")))
 
 
+def test_an_example_makes_the_folder_it_is_given(monkeypatch, tmp_path):
+    monkeypatch.setattr("sys.argv", ["carry_a_grid", str(tmp_path / "some" / "where")])
+    runpy.run_path(str(EXAMPLES / "carry_a_grid.py"))
+    assert sorted(path.name for path in (tmp_path / "some" / "where").iterdir()) == [
+        "bent.vtu", "grid.vtu",
+    ]  # fmt: skip
+
+
 def test_the_readme_shows_the_first_example_as_it_is():
     readme = (EXAMPLES.parent / "README.md").read_text()
     code = (EXAMPLES / "bend_the_cactus.py").read_text().split("\n", 2)[2].strip()
