@@ -230,10 +230,10 @@ def remove_handle(desk: Desk) -> None:
 
 
 def _require_regions(desk: Desk, verb: str) -> None:
-    if desk.stage.selector.region >= desk.stage.n_regions:
+    region = desk.stage.selector.region
+    if region >= desk.stage.n_regions:
         raise RegionError(
-            f"{desk.session.region_name(desk.stage.selector.region)} is still to be painted; "
-            f"N chooses one to {verb}"
+            f"{desk.session.region_name(region)} is still to be painted; N chooses one to {verb}"
             if desk.stage.n_regions
             else f"there are no regions to {verb} yet: G finds some, or paint them"
         )
