@@ -230,13 +230,12 @@ def remove_handle(desk: Desk) -> None:
 
 
 def _require_regions(desk: Desk, verb: str) -> None:
-    region = desk.stage.selector.region
-    if region >= desk.stage.n_regions:
-        raise RegionError(
-            f"{desk.session.region_name(region)} is still to be painted; N chooses one to {verb}"
-            if desk.stage.n_regions
-            else f"there are no regions to {verb} yet: G finds some, or paint them"
-        )
+    region, count = desk.stage.selector.region, desk.stage.n_regions
+    if not count:
+        raise RegionError(f"there are no regions to {verb} yet: G finds some, or paint them")
+    if region >= count:
+        name = desk.session.region_name(region)
+        raise RegionError(f"{name} is still to be painted; N chooses one to {verb}")
 
 
 def _names(desk: Desk) -> list[str]:
