@@ -35,20 +35,19 @@ from .mesh import Mesh, require_mesh
 from .progress import Progress, part
 from .regions import Regions
 from .surface.inside import distance_to_surface
+from .threads import n_threads
 
 _OFFSET = 0.4  # of sqrt(area of the region / vertices of its cage)
 _STEP = 0.27  # of the same: about thirty contour vertices for one of the cage
 _LARGER = 1.25  # attempt k = 0, 1, ... is made at 1.25^(k (k + 1) / 2) times the offset:
 _ATTEMPTS = 8  # 1, 1.25, 2, 4, 9, 28, 108, 517
-_ROUND = 0.2  # or more is the worst face of a good cage
-_NEAR = 0.2  # of the offset, or more, is the skin from a good cage
+_ROUND, _NEAR = 0.2, 0.2  # or more: a good cage's worst face; the skin from it, in offsets
 _NODES, _NODES_PER_VERTEX = 3e5, 1e3  # of the grid: the larger is the most it may have
 _FEWEST, _MOST = 8, 2000  # vertices of a cage
 _SHELL = 6  # vertices, at least, of each part of a cage that is in parts
 _FLOOR = 12  # vertices that every region gets before the rest is shared out
 _CLEARANCE = 0.5  # of the offset: the least distance from the skin that faces are pushed to
-_PUSHES = 30  # rounds
-_NEAREST = 200  # vertices of the region whose distance from the cage is measured
+_PUSHES, _NEAREST = 30, 200  # rounds; vertices whose distance from the cage is measured
 _SAMPLES = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6.0  # of a face
 
 _log = logging.getLogger(__name__)
@@ -244,7 +243,8 @@ def _cleared(vertices: FloatArray, faces: IntArray, field: SolidField) -> FloatA
 
 def _quality(vertices: FloatArray, faces: IntArray, field: SolidField) -> float:
     """Return 1 or more for a cage without needles that nowhere comes close to the skin."""
-    gap = np.asarray(cKDTree((_SAMPLES @ vertices[faces]).reshape(-1, 3)).query(field.members)[0])
+    tree = cKDTree((_SAMPLES @ vertices[faces]).reshape(-1, 3))
+    gap, _ = tree.query(field.members, workers=n_threads())
     nearest = field.members[np.argsort(gap, kind="stable")[:_NEAREST]]
     skin = distance_to_surface(nearest, vertices, faces).min() / field.offset
     return float(min(roundness(vertices, faces).min() / _ROUND, skin / _NEAR))

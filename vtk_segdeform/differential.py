@@ -22,21 +22,27 @@ import numpy as np
 from scipy import sparse
 
 from .arrays import FloatArray, IntArray
+from .threads import in_parallel
 
+_PIECE = 50_000  # faces to a thread
 _MAX_COTANGENT = 1e3
 _MIN_AREA = 1e-6  # share of the mean vertex area; keeps 1/A finite beside degenerate triangles
 
 
 def corner_cotangents(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return (m, 3): the cotangent of the angle at each corner of each face."""
-    a, b, c = vertices[faces.T]
-    sides = c - b, a - c, b - a  # opposite their corners
-    sine = np.linalg.norm(np.cross(sides[1], sides[2]), axis=1)  # twice the area: of all three
-    cotangents = np.empty(faces.shape)
-    for corner in range(3):
-        cosine = -np.einsum("ij,ij->i", sides[corner - 1], sides[corner - 2])
-        bound = np.maximum(sine, np.abs(cosine) / _MAX_COTANGENT)
-        cotangents[:, corner] = np.divide(cosine, bound, where=bound > 0, out=np.zeros(len(faces)))
+    cotangents = np.zeros(faces.shape)
+
+    def work(start: int, stop: int) -> None:
+        a, b, c = vertices[faces[start:stop].T]
+        sides = c - b, a - c, b - a  # opposite their corners
+        sine = np.linalg.norm(np.cross(sides[1], sides[2]), axis=1)  # twice the area: of all three
+        for corner in range(3):
+            cosine = -np.einsum("ij,ij->i", sides[corner - 1], sides[corner - 2])
+            bound = np.maximum(sine, np.abs(cosine) / _MAX_COTANGENT)
+            np.divide(cosine, bound, where=bound > 0, out=cotangents[start:stop, corner])
+
+    in_parallel(work, len(faces), _PIECE)
     return cotangents
 
 
@@ -93,10 +99,15 @@ def area_gradients(
     if cotangents is None:
         cotangents = corner_cotangents(vertices, faces)
     half = 0.5 * cotangents
-    x = vertices[faces]
     gradients = np.empty((len(faces), 3, 3))
-    for corner in range(3):
-        after, last = (corner + 1) % 3, (corner + 2) % 3
-        gradients[:, corner] = half[:, [last]] * (x[:, corner] - x[:, after])
-        gradients[:, corner] += half[:, [after]] * (x[:, corner] - x[:, last])
+
+    def work(start: int, stop: int) -> None:
+        x, share = vertices[faces[start:stop]], half[start:stop]
+        here = gradients[start:stop]
+        for corner in range(3):
+            after, last = (corner + 1) % 3, (corner + 2) % 3
+            here[:, corner] = share[:, [last]] * (x[:, corner] - x[:, after])
+            here[:, corner] += share[:, [after]] * (x[:, corner] - x[:, last])
+
+    in_parallel(work, len(faces), _PIECE)
     return gradients

@@ -46,7 +46,7 @@ from .mesh import Mesh
 from .rotations import closest_rotations
 from .subspace import Subspace
 
-_CHUNK = 200_000  # faces
+_CHUNK = 400_000  # faces
 
 
 @dataclass(frozen=True, eq=False)

@@ -170,13 +170,16 @@ class Regions:
         if not is_whole(rings, 0):
             raise RegionError(f"rings must be a whole number, 0 or more; got {rings}")
         membership = self.membership.copy()
-        i, j = self.mesh.edges.T
+        graph, (i, j) = self.mesh.adjacency, self.mesh.edges.T
         for members in membership:
+            border = members[i] != members[j]
+            last = np.unique(np.where(members[i[border]], i[border], j[border]))
             for _ in range(int(rings)):
-                touched = members[i] != members[j]
-                if not touched.any():
+                near = graph[last].indices
+                last = np.unique(near[~members[near]])
+                if not len(last):
                     break
-                members[i[touched]] = members[j[touched]] = True
+                members[last] = True
         return Regions(self.mesh, membership, self.smoothness)
 
 

@@ -125,11 +125,15 @@ class Subspace:
         squares, plain, masses = np.zeros((m, m)), np.zeros((m, m)), np.zeros((m, m))
         for vertices in self._neighbourhoods():
             ring = laplacian[vertices]
-            used = np.union1d(ring.indices, vertices)
-            place = np.searchsorted(used, ring.indices)
+            reached = np.zeros(self.n_vertices, dtype=bool)
+            reached[ring.indices] = reached[vertices] = True
+            used = np.flatnonzero(reached)
+            place = np.cumsum(reached, dtype=np.int32) - 1  # of each vertex among those used
             columns, w = self._dense(used)
-            compact = sparse.csr_array((ring.data, place, ring.indptr), (len(vertices), len(used)))
-            product, here = compact @ w, w[np.searchsorted(used, vertices)]
+            compact = sparse.csr_array(
+                (ring.data, place[ring.indices], ring.indptr), (len(vertices), len(used))
+            )
+            product, here = compact @ w, w[place[vertices]]
             block = np.ix_(columns, columns)
             squares[block] += (product.T * strength[vertices]) @ product
             plain[block] += here.T @ product
@@ -148,9 +152,12 @@ class Subspace:
         """Return the columns of W~ that reach *vertices*, in order, and W~ there (k, c)."""
         reached = []
         for rows, block, own in zip(self.rows, self.blocks, self.columns, strict=True):
-            mine = np.flatnonzero(np.isin(vertices, rows, assume_unique=True))
+            if not len(rows):
+                continue
+            found = np.searchsorted(rows, vertices).clip(max=len(rows) - 1)
+            mine = np.flatnonzero(rows[found] == vertices)
             if len(mine):
-                reached.append((mine, np.searchsorted(rows, vertices[mine]), block, own))
+                reached.append((mine, found[mine], block, own))
         widths = [block.shape[1] for _, _, block, _ in reached]
         w = np.zeros((len(vertices), sum(widths)))
         ends = np.cumsum(widths)

@@ -49,23 +49,25 @@ def in_parallel(
             if progress is not None:
                 progress(stop / n, message)
         return
-    waiting = [_pool().submit(work, *piece) for piece in pieces]
-    try:
-        for piece, future in zip(pieces, waiting, strict=True):
-            future.result()
-            if progress is not None:
-                progress(piece[1] / n, message)
-    finally:
-        unfinished = [future for future in waiting if not future.cancel()]
-        for future in unfinished:  # nothing writes on after this has returned
-            future.exception()
+    with one_blas_thread():
+        waiting = [_pool().submit(work, *piece) for piece in pieces]
+        try:
+            for piece, future in zip(pieces, waiting, strict=True):
+                future.result()
+                if progress is not None:
+                    progress(piece[1] / n, message)
+        finally:
+            unfinished = [future for future in waiting if not future.cancel()]
+            for future in unfinished:  # nothing writes on after this has returned
+                future.exception()
 
 
 def one_blas_thread() -> contextlib.AbstractContextManager[object]:
     """Return a context in which BLAS stays in the caller's thread, where threadpoolctl is there.
 
-    A solver's step is many products too small to share out: waking another thread for each takes
-    longer than the product, and while it waits for more it holds the core that we are to use.
+    Threads of its own fight with ours where we have several.  And a solver's step is many products
+    too small to share out: waking another thread for each takes longer than the product, and
+    while it waits for more it holds the core that we are to use.
     """
     controller = _controller()
     if controller is None:
