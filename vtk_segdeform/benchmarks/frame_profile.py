@@ -1,9 +1,9 @@
 """One drag at one size, measured part by part.
 
-    begin     of a frame: how the energy curves where it starts, what holds the handles
+    begin     the rest of a frame: how the energy curves where it starts, what holds the handles
     step      one more step of the solver; must not depend on the size of the mesh
-    map       x = W p, and the direction in which the volume is restored beside it
-    volume    the exact volume of the whole mesh: one cubic, one check
+    map       x = W p
+    volume    that of the whole mesh, once
     normals   by VTK;  render: off the screen, by whatever OpenGL there is
 
 Handles move by 1 % of the diagonal a frame; a frame is as many steps as `drags` says.
@@ -84,8 +84,7 @@ def profiled(size: int, scale: Scale) -> Profile:
         again = timed(lambda: deformer_of(task, *what, cache=cache))[1]
     drag = list(frames(deformer, way_of(task, scale.frames)))[1:]
     pose = drag[-1].solution.vertices
-    directions = np.random.default_rng(0).random((deformer.subspace.n_columns, 6))
-    path = np.hstack([task.mesh.vertices, pose - task.mesh.vertices])
+    cages = drag[-1].solution.cage_vertices
     whole = total_volume(task.mesh)
     try:
         normals, render = drawing_seconds(task.mesh, pose, scale.repeats)
@@ -101,9 +100,8 @@ def profiled(size: int, scale: Scale) -> Profile:
         frame=1e3 * median(frame.seconds for frame in drag),
         steps=int(median(frame.steps for frame in drag)),
         step=1e3 * seconds_per_step(deformer, task, scale.repeats),
-        map=1e3 * median_seconds(lambda: deformer.subspace.map(directions), scale.repeats),
-        volume=1e3
-        * median_seconds(lambda: (whole.exact_step(path), whole.violation(pose)), scale.repeats),
+        map=1e3 * median_seconds(lambda: deformer.surface(cages), scale.repeats),
+        volume=1e3 * median_seconds(lambda: whole.violation(pose), scale.repeats),
         normals=1e3 * normals,
         render=1e3 * render,
         stream=1e3 * median_seconds(lambda: _stream(deformer.subspace), scale.repeats),
