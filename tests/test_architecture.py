@@ -21,19 +21,19 @@ STORY = [
     # a checked mesh
     "errors", "arrays", "progress", "threads", "compiled.volumes", "compiled.products",
     "compiled.rotations", "compiled.coordinates", "fast", "surface.topology",
-    "surface.manifold", "surface.inside",
+    "surface.manifold", "surface.inside", "surface.columns",
     "surface.intersections", "surface.report", "surface.shells", "faults", "mesh", "surface.holes",
     "surface.splitting", "surface.repair_steps", "repair",
     # what a deformation keeps
     "volume", "local_volume", "distortion", "differential", "rotations",
     # regions and their cages
     "blending", "regions", "segmenting.coarse", "segmenting.necks", "segmenting.slices",
-    "segmentation", "mean_value", "blocks", "cages", "caging.columns", "caging.region_solid",
+    "segmentation", "mean_value", "blocks", "cages", "caging.region_solid",
     "caging.cage_simplify", "cage_fit",
     # the solver
     "subspace", "passengers", "energy", "cage_stiffness", "curvature", "constraints", "stand_in",
-    "binding", "landing", "positions", "acceleration", "solution", "iteration", "solver",
-    "stiffening", "targets", "deformer", "pipeline",
+    "binding", "landing", "device", "gpu", "positions", "acceleration", "solution", "iteration",
+    "solver", "stiffening", "targets", "deformer", "pipeline",
     # a deformation in the making
     "editing.listeners", "editing.naming", "editing.state", "editing.history", "editing.painting",
     "editing.handles", "editing.posing", "session", "editing.archive", "store",
@@ -105,6 +105,7 @@ PROGRAM = {
 }  # fmt: skip
 GRANTED = {
     "threads": {"threadpoolctl"},
+    "gpu": {"cupy", "torch"},
     **{f"compiled.{name}": {"numba"} for name in KERNELS},
     "cage_fit": VTK,
     "modelling.implicit": VTK,
