@@ -27,8 +27,8 @@ STORY = [
     # what a deformation keeps
     "volume", "local_volume", "distortion", "differential", "rotations",
     # regions and their cages
-    "blending", "regions", "segmenting.coarse", "segmenting.necks", "segmenting.slices",
-    "segmentation", "mean_value", "blocks", "cages", "caging.region_solid",
+    "blending", "regions", "segmenting.coarse", "segmenting.borders", "segmenting.necks",
+    "segmenting.slices", "segmentation", "mean_value", "blocks", "cages", "caging.region_solid",
     "caging.cage_simplify", "cage_fit",
     # the solver
     "subspace", "passengers", "energy", "cage_stiffness", "curvature", "constraints", "stand_in",

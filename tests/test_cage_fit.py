@@ -12,7 +12,7 @@ from vtk_segdeform import cage_fit
 from vtk_segdeform.cage_fit import _contour, fit_cage, fit_cages
 from vtk_segdeform.cages import Cage, cage_faults
 from vtk_segdeform.caging.cage_simplify import roundness, simplify
-from vtk_segdeform.caging.columns import inside_nodes, inside_points
+from vtk_segdeform.surface.columns import inside_nodes, inside_points
 from vtk_segdeform.caging.region_solid import Patch, Skin, _filled, principal_axes
 from vtk_segdeform.errors import CageError, Cancelled, RegionError
 from vtk_segdeform.mesh import Mesh

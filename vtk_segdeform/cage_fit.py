@@ -28,12 +28,12 @@ from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 from .arrays import FloatArray, IntArray, as_ids, is_number, is_whole
 from .cages import Cage, cage_faults
 from .caging.cage_simplify import roundness, simplify
-from .caging.columns import inside_points
 from .caging.region_solid import Patch, Skin, SolidField, solid_field
 from .errors import CageError, RegionError
 from .mesh import Mesh, require_mesh
 from .progress import Progress, part
 from .regions import Regions
+from .surface.columns import inside_points
 from .surface.inside import distance_to_surface
 from .threads import n_threads
 

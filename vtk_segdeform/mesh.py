@@ -101,7 +101,14 @@ class Mesh:
         i, j = self.edges.T
         length = np.linalg.norm(self.vertices[i] - self.vertices[j], axis=1)
         length = np.maximum(length, np.finfo(float).tiny)  # csgraph reads a zero as "no edge"
-        half = sparse.coo_array((length, (i, j)), shape=(self.n_vertices,) * 2)
+        at = self._edge_numbers
+        return sparse.csr_array((length[at.data - 1], at.indices, at.indptr), at.shape)
+
+    @cached_property
+    def _edge_numbers(self) -> sparse.csr_array:
+        """(n, n) symmetric sparse: 1 + the number of the edge between neighbouring vertices."""
+        numbers = np.arange(1, len(self.edges) + 1, dtype=np.int32)
+        half = sparse.coo_array((numbers, tuple(self.edges.T)), shape=(self.n_vertices,) * 2)
         return (half + half.T).tocsr()
 
     @cached_property
@@ -129,7 +136,8 @@ class Mesh:
             )
         posed = object.__new__(Mesh)
         posed.__setstate__((points.copy(), self.faces))
-        for name in ("edges", "components"):  # the same at every pose: hand on what is known
+        # the same at every pose: hand on what is known
+        for name in ("edges", "components", "_edge_numbers"):
             if name in self.__dict__:
                 posed.__dict__[name] = self.__dict__[name]
         return posed

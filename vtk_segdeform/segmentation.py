@@ -6,28 +6,20 @@ there are limbs, the largest are cut into slices of about equal area (`slices`).
 All this happens on a coarse copy (`coarse`), so that it costs about the same for every mesh, and
 the parts hardly depend on how finely the shape is meshed.
 
-On the mesh itself the parts' borders are then shortened, as the borders of soap films are, by
-spreading each part's indicator and giving every vertex to the part with the most [MBO].  It spreads
-slowly across concave edges, so that a border near a crease stays in the crease.
-
-Source
-------
-[MBO] B. Merriman, J. Bence, S. Osher, "Diffusion generated motion by mean curvature",
-      Computational Crystal Growers Workshop, 73-83, 1992.
+On the mesh itself the parts' borders are then shortened, and drawn into creases (`borders`).
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from .arrays import FloatArray, IntArray, is_whole
 from .errors import RegionError
 from .mesh import Mesh, require_mesh
 from .progress import Progress
 from .regions import Regions
-from .segmenting.coarse import Surface, coarsen, nearest_of, symmetric
+from .segmenting.borders import connected_parts, smooth_borders
+from .segmenting.coarse import Surface, coarsen
 from .segmenting.necks import Neck, best_neck
 from .segmenting.slices import fair_slice, quotas
 
@@ -35,9 +27,6 @@ _POINTS = 3000  # of the coarse copy, about
 _POINTS_PER_REGION = 16  # at least
 _TYPICAL = 6  # where the number is open, a region's share is the whole over this
 _OVERLAP = 0.1  # of a region's width, counted in edges
-_CREASE = 0.06  # of the square root of the area: a concave edge as sharp as this radius halves
-_ROUNDS = 3  # of spreading
-_MOST_STEPS = 60  # in a round
 _TIE_BREAK = 1e-3  # of an edge
 
 
@@ -97,7 +86,7 @@ def segment(
         cell, surface = coarsen(shape, points, np.random.default_rng(seed))
         labels = _parts(surface, n_regions, progress)[cell]
         _tell(progress, 0.8, "smoothing borders")
-        labels = _connected(shape, _smooth(shape, labels))
+        labels = connected_parts(shape, smooth_borders(shape, labels))
     _tell(progress, 0.95, "growing regions")
     if overlap is None:
         overlap = max(2, round(_OVERLAP * np.sqrt(n / (labels.max() + 1))))
@@ -172,77 +161,6 @@ def _merged_components(mesh: Mesh, n_regions: int) -> IntArray:
     nearest = np.linalg.norm(centres[:, None] - centres[large], axis=2).argmin(axis=1)
     nearest[large] = np.arange(n_regions)
     return np.asarray(nearest[component])
-
-
-def _smooth(mesh: Mesh, labels: IntArray) -> IntArray:
-    """Return labels with short borders that keep to creases; none shrinks by half in a round."""
-    spread = _spreading(mesh)
-    area = mesh.face_areas.sum()
-    edge = np.median(mesh.adjacency.data)
-    steps = int(np.clip(np.ceil(4.0 * area / _POINTS / edge**2), 4, _MOST_STEPS))
-    rings = int(np.ceil(np.sqrt(steps))) + 1
-    for _ in range(_ROUNDS):
-        most, smooth = np.zeros(len(labels)), labels.copy()
-        for part in range(labels.max() + 1):
-            near = _within(spread, np.flatnonzero(labels == part), rings)
-            here = spread[near][:, near]
-            amount = (labels[near] == part).astype(float)
-            for _ in range(steps):
-                amount = here @ amount
-            more = amount > most[near]
-            most[near[more]] = amount[more]
-            smooth[near[more]] = part
-        before = np.bincount(labels)
-        shrunk = np.bincount(smooth, minlength=len(before)) < before / 2
-        labels = np.where(shrunk[labels], labels, smooth)
-    return labels
-
-
-def _within(graph: sparse.csr_array, ids: IntArray, rings: int) -> IntArray:
-    """Return the vertices up to *rings* edges away from *ids*, in order."""
-    reached = np.zeros(graph.shape[0], dtype=bool)
-    reached[ids] = True
-    for _ in range(rings):
-        others = graph[ids].indices
-        ids = np.unique(others[~reached[others]])
-        reached[ids] = True
-    return np.flatnonzero(reached)
-
-
-def _spreading(mesh: Mesh) -> sparse.csr_array:
-    """Return the (n, n) matrix of one step: half stays, half goes to neighbours, less over creases.
-
-    An edge's bend is its normal curvature, (n_j - n_i).(x_j - x_i) / |x_j - x_i|^2, negative where
-    the surface is concave.
-    """
-    a, b, c = mesh.vertices[mesh.faces.T]
-    cross = np.repeat(np.cross(b - a, c - a), 3, axis=0)
-    n, corner = mesh.n_vertices, mesh.faces.ravel()
-    normal = np.stack([np.bincount(corner, axis, minlength=n) for axis in cross.T], axis=1)
-    normal = normal / np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
-    i, j = mesh.edges.T
-    along = mesh.vertices[j] - mesh.vertices[i]
-    size = np.maximum(np.einsum("ij,ij->i", along, along), np.finfo(float).tiny)
-    bend = np.einsum("ij,ij->i", normal[j] - normal[i], along) / size
-    hollow = _CREASE * np.sqrt(mesh.face_areas.sum()) * np.maximum(-bend, 0.0)
-    usual = np.median(size)  # longer edges carry less, so that it spreads evenly in space
-    share = symmetric(mesh.edges, np.minimum(1.0, usual / size) / (1.0 + hollow**2), n)
-    degree = np.diff(share.indptr)
-    moves = sparse.diags_array(0.5 / degree) @ share
-    return sparse.csr_array(moves + sparse.diags_array(1.0 - moves.sum(axis=1)))
-
-
-def _connected(mesh: Mesh, labels: IntArray) -> IntArray:
-    """Return labels of which each is connected: stray pieces go to the nearest other vertex."""
-    i, j = mesh.edges.T
-    same = mesh.edges[labels[i] == labels[j]]
-    graph = symmetric(same, np.ones(len(same)), len(labels))
-    _, piece = csgraph.connected_components(graph, directed=False)
-    size = np.bincount(piece)
-    order = np.argsort(-size[piece], kind="stable")
-    _, first = np.unique(labels[order], return_index=True)
-    settled = np.flatnonzero(np.isin(piece, piece[order[first]]))
-    return np.asarray(labels[nearest_of(mesh, settled)])
 
 
 def _tell(progress: Progress | None, fraction: float, message: str) -> None:

@@ -27,7 +27,7 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..mesh import Mesh
-from .columns import count_up, inside_nodes
+from ..surface.columns import count_up, inside_nodes
 
 _STEPS_PER_OFFSET = 1.5  # at least: every point of S then has a node within the offset surface
 _MARGIN = 3.7183  # steps from the offset surface to the end; odd, so that no extreme is on a tie

@@ -1,1 +1,1 @@
-"""How `segmentation` finds limbs: a coarse copy, the necks in it, fair slices of the rest."""
+"""How `segmentation` finds limbs: a coarse copy, necks, fair slices, borders."""

@@ -20,6 +20,7 @@ from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..mesh import Mesh
+from ..surface.columns import count_up
 
 _LOOPS, _ENDS = 4, 12  # ends that distances are taken from
 _TIE_BREAK = 1e-6  # of an edge's length
@@ -60,9 +61,7 @@ class Surface:
 
     def distance(self, start: IntArray, limit: float = np.inf) -> FloatArray:
         """Return (k,) float: distance to the nearest of *start*; infinite beyond *limit*."""
-        return np.asarray(
-            csgraph.dijkstra(self.graph, directed=False, indices=start, min_only=True, limit=limit)
-        )
+        return np.asarray(csgraph.dijkstra(self.graph, indices=start, min_only=True, limit=limit))
 
     def pieces(self, members: BoolArray) -> list[IntArray]:
         """Return the connected pieces of the points in *members*, the largest area first."""
@@ -102,17 +101,21 @@ class Surface:
         return [d for d in fields if d.max() > 0.0]
 
     def level_lengths(self, faces: IntArray, d: FloatArray, levels: FloatArray) -> FloatArray:
-        """Return the length of each level set {d = level} within *faces*."""
+        """Return the length of each level set {d = level} within *faces*, for rising *levels*."""
         order = np.argsort(d[faces], axis=1)
         corners = np.take_along_axis(faces, order, axis=1)
-        low, middle, high = (column[:, None] for column in d[corners].T)
+        low, middle, high = d[corners].T
         a, b, c = (self.vertices[column] for column in corners.T)
         least = max(1e-12 * float(np.max(levels, initial=0.0)), float(np.finfo(float).tiny))
-        opposite = a + (middle - low) / np.maximum(high - low, least) * (c - a)
+        opposite = a + ((middle - low) / np.maximum(high - low, least))[:, None] * (c - a)
         longest = np.linalg.norm(b - opposite, axis=1)
-        rise = (levels - low) / np.maximum(middle - low, least)
-        fall = (high - levels) / np.maximum(high - middle, least)
-        return np.asarray(longest @ np.clip(np.minimum(rise, fall), 0.0, 1.0))
+        first, end = np.searchsorted(levels, low, "right"), np.searchsorted(levels, high)
+        f, k = count_up(end - np.minimum(first, end))
+        k += first[f]
+        rise = (levels[k] - low[f]) / np.maximum(middle - low, least)[f]
+        fall = (high[f] - levels[k]) / np.maximum(high - middle, least)[f]
+        piece = longest[f] * np.minimum(np.minimum(rise, fall), 1.0)
+        return np.asarray(np.bincount(k, piece, minlength=len(levels)))
 
 
 def coarsen(mesh: Mesh, n_points: int, rng: np.random.Generator) -> tuple[IntArray, Surface]:
@@ -121,7 +124,7 @@ def coarsen(mesh: Mesh, n_points: int, rng: np.random.Generator) -> tuple[IntArr
     The copy has roughly *n_points*, or all vertices where there are fewer.  Every cell is
     connected, and every component of the mesh keeps at least one.
     """
-    x = mesh.vertices
+    x, lengths = mesh.vertices, distinct_lengths(mesh)
     spacing = 0.8 * np.sqrt(mesh.face_areas.sum() / n_points)
     kept = cell = np.arange(mesh.n_vertices)
     edges = mesh.edges
@@ -133,24 +136,26 @@ def coarsen(mesh: Mesh, n_points: int, rng: np.random.Generator) -> tuple[IntArr
         kept = kept[_independent(short, len(kept), rng)]
         number = np.empty(mesh.n_vertices, dtype=np.int64)
         number[kept] = np.arange(len(kept))
-        cell = number[nearest_of(mesh, kept)]
+        cell = number[nearest_of(lengths, kept)]
         edges = _unique_edges(cell[mesh.edges], len(kept))
     return cell, _surface(mesh, cell, kept, edges)
 
 
-def nearest_of(mesh: Mesh, start: IntArray) -> IntArray:
-    """Return (n,) int: for each vertex the nearest of *start*, over edges.
+def distinct_lengths(mesh: Mesh) -> sparse.csr_array:
+    """Return (n, n) lengths of the edges, such that no two paths are equally long.
 
-    On a regular mesh many are equally near.  Every vertex makes the edges at it a little longer,
-    by an amount of its own: so which one it is does not hang on rounding.
+    On a regular mesh many are.  Every vertex makes the edges at it a little longer, by an amount
+    of its own: so which of several is the nearest does not hang on rounding.
     """
-    graph = sparse.csr_array(mesh.adjacency)
+    graph = mesh.adjacency
     favour = _TIE_BREAK * np.random.default_rng(0).random(mesh.n_vertices)
     ends = np.repeat(favour, np.diff(graph.indptr)) + favour[graph.indices]
-    lengths = sparse.csr_array((graph.data * (1.0 + ends), graph.indices, graph.indptr))
-    _, _, source = csgraph.dijkstra(
-        lengths, directed=False, indices=start, return_predecessors=True, min_only=True
-    )
+    return sparse.csr_array((graph.data * (1.0 + ends), graph.indices, graph.indptr), graph.shape)
+
+
+def nearest_of(lengths: sparse.csr_array, start: IntArray) -> IntArray:
+    """Return (n,) int: for each vertex the nearest of *start*, over the edges of a graph."""
+    _, _, source = csgraph.dijkstra(lengths, indices=start, return_predecessors=True, min_only=True)
     return np.asarray(source, dtype=np.int64)
 
 
@@ -162,16 +167,24 @@ def symmetric(edges: IntArray, values: FloatArray, n: int) -> sparse.csr_array:
 
 
 def _independent(edges: IntArray, n: int, rng: np.random.Generator) -> IntArray:
-    """Return points, in order, no two of them joined and every other joined to one."""
-    neighbours = symmetric(edges, np.ones(len(edges)), n)
-    start, others = neighbours.indptr, neighbours.indices
-    free = np.ones(n, dtype=bool)
-    chosen = np.zeros(n, dtype=bool)
-    for i in rng.permutation(n):
-        if free[i]:
-            chosen[i] = True
-            free[others[start[i] : start[i + 1]]] = False
-    return np.flatnonzero(chosen)
+    """Return points, in order, no two of them joined and every other joined to one.
+
+    As if they were met in a random order, and each chosen that is not joined to one chosen before.
+    All that need not wait for an earlier neighbour are chosen at once, and so on.
+    """
+    turn = np.empty(n, dtype=np.int64)
+    turn[rng.permutation(n)] = np.arange(n)
+    one, other = edges.T
+    swap = turn[one] > turn[other]
+    earlier, later = np.where(swap, other, one), np.where(swap, one, other)
+    out = np.zeros(n, dtype=bool)
+    while len(earlier):
+        waiting = np.zeros(n, dtype=bool)
+        waiting[later] = True
+        out[later[~waiting[earlier]]] = True
+        left = ~(out[earlier] | out[later])
+        earlier, later = earlier[left], later[left]
+    return np.flatnonzero(~out)
 
 
 def _surface(mesh: Mesh, cell: IntArray, kept: IntArray, edges: IntArray) -> Surface:
@@ -180,15 +193,12 @@ def _surface(mesh: Mesh, cell: IntArray, kept: IntArray, edges: IntArray) -> Sur
     areas = np.bincount(corners.ravel(), np.repeat(mesh.face_areas / 3.0, 3), k).astype(float)
     # The border between two cells crosses each edge between them, from one triangle's centre
     # over the edge's middle to the other's.
-    sides = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    between = cell[sides]
-    crossing = np.flatnonzero(between[:, 0] != between[:, 1])
-    centres = mesh.vertices[mesh.faces[crossing // 3]].mean(axis=1)
-    width = np.linalg.norm(mesh.vertices[sides[crossing]].mean(axis=1) - centres, axis=1)
-    contact = symmetric(between[crossing], _STRAIGHT * width, k)
-
-    distinct = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
-    faces = corners[distinct]
+    face, side = np.nonzero(corners != corners[:, [1, 2, 0]])
+    ends = np.stack([mesh.faces[face, side], mesh.faces[face, (side + 1) % 3]], axis=1)
+    centres = mesh.vertices[mesh.faces[face]].mean(axis=1)
+    width = np.linalg.norm(mesh.vertices[ends].mean(axis=1) - centres, axis=1)
+    contact = symmetric(cell[ends], _STRAIGHT * width, k)
+    faces = corners[np.bincount(face, minlength=len(corners)) == 3]
     length = np.linalg.norm(np.subtract(*x[edges.T]), axis=1)
     shortcuts, straight = _shortcuts(x, faces)
     lines, lengths = np.concatenate([edges, shortcuts]), np.concatenate([length, straight])
@@ -226,7 +236,7 @@ def _shortcuts(x: FloatArray, faces: IntArray) -> tuple[IntArray, FloatArray]:
 
 
 def _unique_edges(edges: IntArray, n: int) -> IntArray:
-    low, high = np.minimum(*edges.T), np.maximum(*edges.T)
-    keys = np.sort((low * n + high)[low != high])
+    i, j = edges[edges[:, 0] != edges[:, 1]].T
+    keys = np.sort(np.minimum(i, j) * n + np.maximum(i, j))
     keys = keys[np.diff(keys, prepend=-1) > 0]
     return np.stack(np.divmod(keys, n), axis=1)
