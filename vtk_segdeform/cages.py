@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from .arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
 from .errors import CageError
+from .surface.columns import inside_points
 from .surface.inside import distance_to_surface, winding_number
 from .surface.intersections import flat_faces, self_intersections
 from .surface.manifold import components, connectivity_faults, counted
@@ -84,7 +85,7 @@ class Cage:
         x = as_points(points, "points")
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
         inside = ((x >= low) & (x <= high)).all(axis=1)
-        inside[inside] = winding_number(x[inside], self.vertices, self.faces) > 0.5
+        inside[inside] = inside_points(x[inside], self.vertices, self.faces)
         return np.asarray(inside)
 
     def require_encloses(self, points: ArrayLike, name: str) -> None:

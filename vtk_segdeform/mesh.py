@@ -17,6 +17,9 @@ from scipy.sparse import csgraph
 from .arrays import FloatArray, IntArray, as_points
 from .errors import ArgumentError, MeshError
 from .faults import as_soup, find_faults
+from .threads import in_parallel
+
+_PIECE = 20_000  # faces to a thread; what they need stays in the cache
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -120,8 +123,13 @@ class Mesh:
     @cached_property
     def face_areas(self) -> FloatArray:
         """(m,) float: the triangles' areas."""
-        a, b, c = self.vertices[self.faces.T]
-        areas: FloatArray = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        areas = np.empty(self.n_faces)
+
+        def work(start: int, stop: int) -> None:
+            a, b, c = self.vertices[self.faces[start:stop].T]
+            areas[start:stop] = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+        in_parallel(work, self.n_faces, _PIECE)
         return areas
 
     def with_vertices(self, vertices: ArrayLike) -> Mesh:

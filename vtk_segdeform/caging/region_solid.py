@@ -20,6 +20,7 @@ shape is symmetric the numbering of the vertices settles axes and signs (`princi
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import ndimage
@@ -28,30 +29,44 @@ from scipy.spatial import ConvexHull, cKDTree
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..mesh import Mesh
 from ..surface.columns import count_up, inside_nodes
+from ..threads import in_parallel
 
 _STEPS_PER_OFFSET = 1.5  # at least: every point of S then has a node within the offset surface
 _MARGIN = 3.7183  # steps from the offset surface to the end; odd, so that no extreme is on a tie
 _BLUR = 0.5  # standard deviation, as a share of the offset
 _FIRST_OF_EQUALS = 1.0 - 1e-6 * np.arange(3)  # decides for equal sides, which rounding must not
+_PIECE = 20_000  # faces to a thread
 _SPACING = 0.7  # steps between samples of a face, so that it leaves no gap
 
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """The mesh about its centre, with the tree of its vertices; made once for all regions."""
+    """The mesh about its centre; made once for all regions."""
 
     points: FloatArray
     faces: IntArray
     face_areas: FloatArray
+    longest: FloatArray  # (m,): the longest side of each face
     centre: FloatArray
-    tree: cKDTree
 
     @classmethod
     def of(cls, mesh: Mesh) -> Skin:
         """Return the skin of *mesh*."""
         centre = mesh.vertices.mean(axis=0)
-        points = mesh.vertices - centre
-        return cls(points, mesh.faces, mesh.face_areas, centre, cKDTree(points))
+        longest = np.empty(mesh.n_faces)
+
+        def work(start: int, stop: int) -> None:
+            x = mesh.vertices[mesh.faces[start:stop]]
+            square = ((x - x[:, [1, 2, 0]]) ** 2).sum(axis=2).max(axis=1)
+            longest[start:stop] = np.sqrt(square)
+
+        in_parallel(work, mesh.n_faces, _PIECE)
+        return cls(mesh.vertices - centre, mesh.faces, mesh.face_areas, longest, centre)
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """The tree of the vertices."""
+        return cKDTree(self.points, balanced_tree=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,8 +185,8 @@ def solid_field(patch: Patch, offset: float, step: float, *, most_nodes: float) 
     grid = Grid((low - pad) @ patch.axes, patch.axes, step, (nx, ny, nz))
 
     nodes = grid.to_nodes(skin.points)
-    own_faces = nodes[skin.faces[members[skin.faces].all(axis=1)]]
-    samples = np.concatenate([nodes[members], _samples(own_faces)])
+    large = skin.faces[skin.longest > 0.99 * _SPACING * step]  # the others need no samples
+    samples = np.concatenate([nodes[members], _samples(nodes[large[members[large].all(axis=1)]])])
     inside = np.argwhere(inside_nodes(nodes, skin.faces, grid.shape))
     inside = inside[((inside >= pad / step) & (inside <= np.array(grid.shape) - pad / step)).all(1)]
     if not members.all():

@@ -16,8 +16,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from ..threads import in_parallel
 
 _BLOCK = 1 << 20  # pairs of face and column held at once
+_BAND = 1 << 14  # points to a thread
+
+Column = FloatArray | IntArray  # coordinates of columns, (k,)
 
 
 def inside_nodes(vertices: FloatArray, faces: IntArray, shape: tuple[int, int, int]) -> BoolArray:
@@ -27,6 +31,7 @@ def inside_nodes(vertices: FloatArray, faces: IntArray, shape: tuple[int, int, i
     itself twice is inside too.
     """
     nx, ny, nz = shape
+    faces = faces[_between(vertices[:, :2], faces, nx, ny)]
     low, high = _boxes(vertices[:, :2], faces)
     first = np.ceil(low).clip(0).astype(np.int64)
     last = np.floor(high).clip(max=[nx - 1, ny - 1]).astype(np.int64)
@@ -34,7 +39,7 @@ def inside_nodes(vertices: FloatArray, faces: IntArray, shape: tuple[int, int, i
     change = np.zeros(nx * ny * (nz + 1))
     for f, k in _pairs(extent.prod(axis=1)):
         column = first[f] + np.stack([k // extent[f, 1], k % extent[f, 1]], axis=1)
-        met, height, turn = _crossings(vertices, faces[f], column)
+        met, height, turn = _crossings(vertices, faces[f], *column.T)
         above = np.ceil(height).clip(0, nz).astype(np.int64)
         place = (column[met] @ [ny, 1]) * (nz + 1) + above
         change += np.bincount(place, turn, minlength=len(change))
@@ -46,19 +51,25 @@ def inside_points(points: FloatArray, vertices: FloatArray, faces: IntArray) -> 
     """Return which of (n, 3) *points* are inside a closed, outward oriented surface."""
     low, high = _boxes(vertices[:, :2], faces)
     order = np.argsort(points[:, 0], kind="stable")
-    x = points[order, 0]
-    first = np.searchsorted(x, low[:, 0], side="left")
-    last = np.searchsorted(x, high[:, 0], side="right")
-    winding = np.zeros(len(points))
-    for f, k in _pairs(last - first):
-        point = order[first[f] + k]
-        y = points[point, 1]
-        near = (y >= low[f, 1]) & (y <= high[f, 1])
-        f, point = f[near], point[near]
-        met, height, turn = _crossings(vertices, faces[f], points[point, :2])
-        below = height < points[point[met], 2]
-        winding += np.bincount(point[met][below], turn[below], minlength=len(points))
-    return np.asarray(winding > 0.5)
+    inside = np.empty(len(points), dtype=bool)
+
+    def work(start: int, stop: int) -> None:  # a band of x; in it, those in a face's reach of y
+        band = order[start:stop]
+        x_low, x_high = points[band[[0, -1]], 0]
+        band = band[np.argsort(points[band, 1], kind="stable")]
+        x, y, z = points[band].T.copy()
+        near = np.flatnonzero((low[:, 0] <= x_high) & (high[:, 0] >= x_low))
+        first = np.searchsorted(y, low[near, 1], side="left")
+        last = np.searchsorted(y, high[near, 1], side="right")
+        winding = np.zeros(len(band))
+        for f, i, j in zip(near, first, last, strict=True):
+            met, height, turn = _crossings(vertices, faces[f], x[i:j], y[i:j])
+            below = height < z[i:j][met]
+            winding[i + met[below]] += turn[below]
+        inside[band] = winding > 0.5
+
+    in_parallel(work, len(points), _BAND)
+    return inside
 
 
 def count_up(counts: IntArray) -> tuple[IntArray, IntArray]:
@@ -71,6 +82,19 @@ def count_up(counts: IntArray) -> tuple[IntArray, IntArray]:
     """
     i = np.repeat(np.arange(len(counts)), counts)
     return i, np.arange(len(i)) - np.repeat(counts.cumsum() - counts, counts)
+
+
+def _between(xy: FloatArray, faces: IntArray, nx: int, ny: int) -> BoolArray:
+    """Return which faces may meet a column: those whose corners are not all between the same two.
+
+    A corner's place is even on a column and odd between two; beyond the grid it is next to it.
+    """
+    near = xy.clip(-0.5, [nx - 0.5, ny - 0.5])
+    place = (np.floor(near) + np.ceil(near)).astype(np.int32)
+    between = (place % 2 == 1).any(axis=1)
+    code = place @ np.array([2 * ny + 1, 1], dtype=np.int32)
+    a, b, c = code[faces.T]
+    return np.asarray((a != b) | (b != c) | ~between[faces[:, 0]])
 
 
 def _boxes(xy: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]:
@@ -89,26 +113,26 @@ def _pairs(counts: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
 
 
 def _crossings(
-    vertices: FloatArray, faces: IntArray, columns: FloatArray | IntArray
+    vertices: FloatArray, faces: IntArray, x: Column, y: Column
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return which pairs of a face (k, 3) and a column (k, 2) meet, where, and which way.
+    """Return which of k columns meet their face, where, and which way; *faces* (k, 3) or one (3,).
 
     Where: the height z.  Which way: +1 if the face looks down, so that going up leads inside.
     """
-    side = np.stack([_side(vertices, faces[:, c], faces[:, c - 2], columns) for c in range(3)])
-    met = np.flatnonzero(((side > 0) == (side[0] > 0)).all(axis=0))
+    corners = faces.T
+    side = np.stack([_side(vertices, corners[c], corners[c - 2], x, y) for c in range(3)])
+    up = side > 0
+    met = np.flatnonzero((up[0] == up[1]) & (up[0] == up[2]))
     side = side[:, met]
-    z = vertices[faces[met], 2]
-    height = (side * z[:, [2, 0, 1]].T).sum(axis=0) / side.sum(axis=0)
+    z = vertices[corners, 2]
+    z = z[:, met] if z.ndim == 2 else z[:, None]
+    height = (side * z[[2, 0, 1]]).sum(axis=0) / side.sum(axis=0)
     return met, height, np.where(side[0] > 0, -1.0, 1.0)
 
 
-def _side(
-    vertices: FloatArray, tail: IntArray, head: IntArray, columns: FloatArray | IntArray
-) -> FloatArray:
+def _side(vertices: FloatArray, tail: IntArray, head: IntArray, x: Column, y: Column) -> FloatArray:
     """Return twice the signed area of tail, head, column; for head, tail its exact opposite."""
-    a, b = vertices[np.minimum(tail, head)], vertices[np.maximum(tail, head)]
-    x, y = columns.T
-    area = (b[:, 0] - a[:, 0]) * (y - a[:, 1]) - (b[:, 1] - a[:, 1]) * (x - a[:, 0])
+    a, b = vertices[np.minimum(tail, head), :2].T, vertices[np.maximum(tail, head), :2].T
+    area = (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])
     area[area == 0.0] = np.finfo(float).tiny
     return np.asarray(np.where(tail < head, area, -area))
