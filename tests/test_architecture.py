@@ -29,7 +29,7 @@ STORY = [
     # regions and their cages
     "blending", "regions", "segmenting.coarse", "segmenting.borders", "segmenting.necks",
     "segmenting.slices", "segmentation", "mean_value", "blocks", "cages", "caging.region_solid",
-    "caging.cage_simplify", "cage_fit",
+    "caging.contour", "caging.cage_simplify", "cage_fit",
     # the solver
     "subspace", "passengers", "energy", "cage_stiffness", "curvature", "constraints", "stand_in",
     "binding", "landing", "device", "gpu", "positions", "acceleration", "solution", "iteration",
@@ -107,7 +107,7 @@ GRANTED = {
     "threads": {"threadpoolctl"},
     "gpu": {"cupy", "torch"},
     **{f"compiled.{name}": {"numba"} for name in KERNELS},
-    "cage_fit": VTK,
+    "caging.contour": VTK,
     "modelling.implicit": VTK,
     "formats.polygons": VTK | {"pyvista"},
     "formats.off": {"pyvista"},

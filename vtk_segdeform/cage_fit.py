@@ -21,13 +21,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import ndimage
 from scipy.spatial import cKDTree
-from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-from vtkmodules.vtkCommonDataModel import vtkImageData
-from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 
 from .arrays import FloatArray, IntArray, as_ids, is_number, is_whole
 from .cages import Cage, cage_faults
 from .caging.cage_simplify import roundness, simplify
+from .caging.contour import contour_surface
 from .caging.region_solid import Patch, Skin, SolidField, solid_field
 from .errors import CageError, RegionError
 from .mesh import Mesh, require_mesh
@@ -160,7 +158,7 @@ def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) 
         if _SHELL * field.n_shells > n:
             fault = f"it falls into {field.n_shells} parts"
             continue
-        vertices, faces = simplify(*_contour(field.smooth, field.offset), n)
+        vertices, faces = simplify(*contour_surface(field.smooth, field.offset), n)
         vertices = _cleared(vertices, faces, field)
         fault = _fault(vertices, faces, field, n)
         if fault:
@@ -184,35 +182,6 @@ def _fault(vertices: FloatArray, faces: IntArray, field: SolidField, n: int) -> 
     if not faults and not inside_points(field.members, vertices, faces).all():
         return "part of the region is outside"
     return "; ".join(faults)
-
-
-def _contour(values: FloatArray, level: float) -> tuple[FloatArray, IntArray]:
-    """Return the outward surface values = level on the unit grid."""
-    image = vtkImageData()
-    image.SetDimensions(*values.shape)
-    image.GetPointData().SetScalars(numpy_to_vtk(values.ravel(order="F")))
-    contour = vtkFlyingEdges3D()
-    contour.SetInputData(image)
-    contour.SetValue(0, level)
-    contour.ComputeNormalsOff()
-    contour.ComputeScalarsOff()
-    contour.Update()
-    surface = contour.GetOutput()
-    points = vtk_to_numpy(surface.GetPoints().GetData()).astype(np.float64)
-    faces = vtk_to_numpy(surface.GetPolys().GetConnectivityArray()).reshape(-1, 3)
-
-    # VTK rounds to float32.  Each point is on an edge of the grid: cut that again in float64.
-    rows, axis = np.arange(len(points)), np.abs(points - np.rint(points)).argmax(axis=1)
-    low = np.rint(points).astype(np.int64)
-    low[rows, axis] = np.floor(points[rows, axis]).astype(np.int64)
-    high = low.copy()
-    high[rows, axis] += 1
-    at_low, at_high = values[tuple(low.T)] - level, values[tuple(high.T)] - level
-    points = low.astype(np.float64)
-    points[rows, axis] += at_low / (at_low - at_high)
-    a, b, c = (points - points.mean(axis=0))[faces.T]
-    outward = np.einsum("fi,fi", a, np.cross(b, c)) > 0.0
-    return points, (faces if outward else faces[:, ::-1]).astype(np.int64)
 
 
 def _cleared(vertices: FloatArray, faces: IntArray, field: SolidField) -> FloatArray:
