@@ -239,6 +239,19 @@ def test_a_library_is_taken_only_if_it_counts_right(monkeypatch, capsys):
     assert capsys.readouterr() == ("", "")
 
 
+@pytest.mark.parametrize(
+    ("status", "number", "expected"), [(0, 2, True), (0, 0, False), (100, 1, False)]
+)
+def test_it_is_the_driver_that_knows(monkeypatch, status, number, expected):
+    def tell(place):
+        place._obj.value = number
+        return 0
+
+    driver = types.SimpleNamespace(cuInit=lambda flags: status, cuDeviceGetCount=tell)
+    monkeypatch.setattr(gpu.ctypes, "CDLL", lambda name: driver)
+    assert gpu._driver_has_a_gpu() is expected
+
+
 def test_whoever_wants_no_gpu_gets_none(monkeypatch):
     monkeypatch.setattr(gpu, "_found", lambda: np)
     assert gpu_arrays() is np
