@@ -6,6 +6,7 @@ Each chapter may import the ones before it in the story, and only the libraries 
 from __future__ import annotations
 
 import ast
+import functools
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,9 +28,9 @@ STORY = [
     # what a deformation keeps
     "volume", "local_volume", "distortion", "differential", "rotations",
     # regions and their cages
-    "blending", "regions", "segmenting.coarse", "segmenting.borders", "segmenting.necks",
-    "segmenting.slices", "segmentation", "mean_value", "blocks", "cages", "caging.region_solid",
-    "caging.contour", "caging.cage_simplify", "cage_fit",
+    "blending", "regions", "segmenting.thinning", "segmenting.coarse", "segmenting.borders",
+    "segmenting.necks", "segmenting.slices", "segmentation", "mean_value", "blocks", "cages",
+    "caging.region_solid", "caging.contour", "caging.cage_simplify", "cage_fit",
     # the solver
     "subspace", "passengers", "energy", "cage_stiffness", "curvature", "constraints", "stand_in",
     "binding", "landing", "device", "gpu", "positions", "acceleration", "solution", "iteration",
@@ -151,10 +152,16 @@ NAMES = [name for name in FILES if not name.endswith("__init__")]
 CHAPTERS = [name for name in STORY if name in NAMES]
 
 
+@functools.cache
+def tree_of(name: str) -> ast.Module:
+    """Return a file as it is parsed; nobody changes it."""
+    return ast.parse(FILES[name].read_text())
+
+
 def imports(name: str) -> Iterator[tuple[str, bool]]:
     """Yield (module, is ours) for every import anywhere in a file, inside functions too."""
     folder = name.split(".")[:-1]
-    for node in ast.walk(ast.parse(FILES[name].read_text())):
+    for node in ast.walk(tree_of(name)):
         if isinstance(node, ast.Import):
             yield from ((alias.name.partition(".")[0], False) for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.level:
@@ -198,20 +205,20 @@ def test_a_chapter_imports_only_the_libraries_it_is_granted(name):
 def test_a_chapter_is_short_enough_to_read_at_once(name):
     text = FILES[name].read_text()
     lines = text.count("\n")
-    reason = "Long because" in (ast.get_docstring(ast.parse(text)) or "")
+    reason = "Long because" in (ast.get_docstring(tree_of(name)) or "")
     assert lines <= LONGEST or reason, f"{lines} lines; say 'Long because ...' or split it"
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_a_chapter_begins_by_saying_what_it_is(name):
-    assert ast.get_docstring(ast.parse(FILES[name].read_text()))
+    assert ast.get_docstring(tree_of(name))
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_only_the_command_line_prints_or_exits(name):
     if name in MAY_PRINT_AND_EXIT:
         return
-    tree = ast.parse(FILES[name].read_text())
+    tree = tree_of(name)
     calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
     named = {call.id for call in calls if isinstance(call, ast.Name)}
     raised = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
@@ -223,7 +230,7 @@ def test_only_the_command_line_prints_or_exits(name):
 
 @pytest.mark.parametrize("name", FILES)
 def test_a_chapter_changes_no_global_state_and_evaluates_no_text(name):
-    tree = ast.parse(FILES[name].read_text())
+    tree = tree_of(name)
     calls = {ast.unparse(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     forbidden = {
         "eval", "exec", "compile", "np.random.seed", "np.seterr", "warnings.filterwarnings",
@@ -235,7 +242,7 @@ def test_a_chapter_changes_no_global_state_and_evaluates_no_text(name):
 
 @pytest.mark.parametrize("name", FILES)
 def test_public_functions_take_at_most_four_positional_arguments(name):
-    for node in ast.walk(ast.parse(FILES[name].read_text())):
+    for node in ast.walk(tree_of(name)):
         kernel = name.startswith("compiled.")  # numba wants arguments by position
         if isinstance(node, ast.FunctionDef) and not (kernel or node.name.startswith("_")):
             positional = [a.arg for a in node.args.posonlyargs + node.args.args]

@@ -9,6 +9,7 @@ from solids import OCTAHEDRON, icosphere, rotation, torus, two_components
 from vtk_segdeform.errors import Cancelled, RegionError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.segmentation import segment
+from vtk_segdeform.segmenting import borders, thinning
 from vtk_segdeform.segmenting.coarse import coarsen
 from vtk_segdeform.segmenting.slices import quotas
 
@@ -159,6 +160,46 @@ def test_the_coarse_copy_keeps_the_area_and_connected_cells():
     assert surface.areas.sum() == pytest.approx(mesh.face_areas.sum())
     assert 100 < len(surface.areas) < 800
     assert all(pieces(mesh, cell == k) == 1 for k in range(0, len(surface.areas), 7))
+
+
+def test_thinning_chooses_what_a_walk_in_random_order_would():
+    mesh = Mesh(*icosphere(3))
+    chosen: set[int] = set()
+    for i in np.random.default_rng(4).permutation(mesh.n_vertices):
+        if not chosen.intersection(mesh.adjacency[[i]].indices):
+            chosen.add(i)
+    found = thinning._independent(mesh.edges, mesh.n_vertices, np.random.default_rng(4))
+    np.testing.assert_array_equal(found, sorted(chosen))
+
+
+def test_what_goes_joins_its_nearest_neighbour_that_stays():
+    mesh = limbed()
+    stay = thinning._independent(mesh.edges, mesh.n_vertices, np.random.default_rng(0))
+    length = np.linalg.norm(np.subtract(*mesh.vertices[mesh.edges.T]), axis=1)
+    joined = stay[thinning._nearest_neighbour(mesh.edges, length, stay, mesh.n_vertices)]
+    assert set(joined) == set(stay)
+    for i in range(0, mesh.n_vertices, 17):
+        row = mesh.adjacency[[i]]
+        there = np.isin(row.indices, stay)
+        wanted = row.data[there].min() if there.any() else 0.0
+        assert np.linalg.norm(mesh.vertices[i] - mesh.vertices[joined[i]]) == pytest.approx(wanted)
+
+
+def test_borders_are_smoothed_alike_whether_or_not_the_rest_is_looked_at(monkeypatch):
+    mesh = limbed(64, 200)
+    x, y, z = mesh.vertices.T
+    x = z + 2.0 * np.sin(3.0 * np.arctan2(y, x))  # a wave that the smoothing levels
+    labels = (x > np.quantile(x, 0.7)).astype(int)
+    near = borders.smooth_borders(mesh, labels)
+    everything = np.arange(mesh.n_vertices)
+    within = borders._within
+
+    def wide(graph, ids, rings):
+        return everything if graph is mesh.adjacency else within(graph, ids, rings)
+
+    monkeypatch.setattr(borders, "_within", wide)
+    np.testing.assert_array_equal(near, borders.smooth_borders(mesh, labels))
+    assert (near != labels).any()
 
 
 def test_distance_on_the_coarse_copy_is_nearly_geodesic():

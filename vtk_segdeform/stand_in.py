@@ -24,7 +24,7 @@ from scipy import sparse
 from .arrays import FloatArray, IntArray
 from .constraints import VolumeConstraint, Volumes
 from .mesh import Mesh
-from .segmenting.coarse import coarsen
+from .segmenting.thinning import cells as cells_of
 from .subspace import Subspace
 
 _POINTS = 2000  # about how many cells
@@ -58,7 +58,7 @@ class StandIn:
         n = mesh.n_vertices
         if n <= _LARGE or whole:
             return cls(subspace)
-        cells, _ = coarsen(mesh, _POINTS, np.random.default_rng(0))
+        _, cells = cells_of(mesh, _POINTS, np.random.default_rng(0))
         areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), n)
         shares = areas / np.bincount(cells, areas)[cells]
         return cls(subspace.averaged(_matrix(cells, shares)), cells, shares)

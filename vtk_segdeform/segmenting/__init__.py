@@ -1,1 +1,1 @@
-"""How `segmentation` finds limbs: a coarse copy, necks, fair slices, borders."""
+"""How `segmentation` finds limbs: thinning, a coarse copy, necks, fair slices, borders."""

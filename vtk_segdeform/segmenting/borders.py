@@ -18,7 +18,8 @@ from scipy import sparse
 from ..arrays import IntArray
 from ..mesh import Mesh
 from ..surface.topology import connected
-from .coarse import distinct_lengths, nearest_of, symmetric
+from .coarse import symmetric
+from .thinning import distinct_lengths, nearest_of
 
 _CREASE = 0.06  # of the square root of the area: a concave edge as sharp as this radius halves
 _SCALE = 3000  # borders are smoothed at the scale of so many vertices to the whole

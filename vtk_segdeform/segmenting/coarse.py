@@ -1,9 +1,8 @@
 """A shape told by about a thousand points: a coarse copy of a mesh, for questions about its parts.
 
-Neighbouring vertices are thinned out until no two that remain are closer than a spacing which
-depends on the shape alone.  Every vertex of the mesh then belongs to the nearest remaining one, its
-cell.  The copy's triangles are those of the mesh whose corners lie in three different cells; its
-areas are the cells' own areas, so nothing is lost in the sum.
+Its points are the vertices that remain when neighbours are thinned out; every vertex belongs to
+the cell of the nearest (`thinning`).  The copy's triangles are those of the mesh whose corners lie
+in three different cells; its areas are the cells' own areas, so nothing is lost in the sum.
 
     d           distance along the surface, over edges and over the straight line between the far
                 corners of two triangles unfolded into a plane (edges alone are 15 % too long)
@@ -21,9 +20,9 @@ from scipy.sparse import csgraph
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..mesh import Mesh
 from ..surface.columns import count_up
+from .thinning import cells, unique_edges
 
 _LOOPS, _ENDS = 4, 12  # ends that distances are taken from
-_TIE_BREAK = 1e-6  # of an edge's length
 _STRAIGHT = np.pi / 4  # mean of length over steps, for a straight line walked in steps
 
 
@@ -124,39 +123,8 @@ def coarsen(mesh: Mesh, n_points: int, rng: np.random.Generator) -> tuple[IntArr
     The copy has roughly *n_points*, or all vertices where there are fewer.  Every cell is
     connected, and every component of the mesh keeps at least one.
     """
-    x, lengths = mesh.vertices, distinct_lengths(mesh)
-    spacing = 0.8 * np.sqrt(mesh.face_areas.sum() / n_points)
-    kept = cell = np.arange(mesh.n_vertices)
-    edges = mesh.edges
-    while True:
-        length = np.linalg.norm(np.subtract(*x[kept[edges.T]]), axis=1)
-        short = edges[length < spacing]
-        if mesh.n_vertices <= n_points or len(short) <= 0.01 * len(kept):
-            break
-        kept = kept[_independent(short, len(kept), rng)]
-        number = np.empty(mesh.n_vertices, dtype=np.int64)
-        number[kept] = np.arange(len(kept))
-        cell = number[nearest_of(lengths, kept)]
-        edges = _unique_edges(cell[mesh.edges], len(kept))
-    return cell, _surface(mesh, cell, kept, edges)
-
-
-def distinct_lengths(mesh: Mesh) -> sparse.csr_array:
-    """Return (n, n) lengths of the edges, such that no two paths are equally long.
-
-    On a regular mesh many are.  Every vertex makes the edges at it a little longer, by an amount
-    of its own: so which of several is the nearest does not hang on rounding.
-    """
-    graph = mesh.adjacency
-    favour = _TIE_BREAK * np.random.default_rng(0).random(mesh.n_vertices)
-    ends = np.repeat(favour, np.diff(graph.indptr)) + favour[graph.indices]
-    return sparse.csr_array((graph.data * (1.0 + ends), graph.indices, graph.indptr), graph.shape)
-
-
-def nearest_of(lengths: sparse.csr_array, start: IntArray) -> IntArray:
-    """Return (n,) int: for each vertex the nearest of *start*, over the edges of a graph."""
-    _, _, source = csgraph.dijkstra(lengths, indices=start, return_predecessors=True, min_only=True)
-    return np.asarray(source, dtype=np.int64)
+    kept, cell = cells(mesh, n_points, rng)
+    return cell, _surface(mesh, cell, kept, unique_edges(cell[mesh.edges], len(kept)))
 
 
 def symmetric(edges: IntArray, values: FloatArray, n: int) -> sparse.csr_array:
@@ -164,27 +132,6 @@ def symmetric(edges: IntArray, values: FloatArray, n: int) -> sparse.csr_array:
     i, j = edges.T
     half = sparse.coo_array((values, (i, j)), shape=(n, n)).tocsr()
     return sparse.csr_array(half + half.T)
-
-
-def _independent(edges: IntArray, n: int, rng: np.random.Generator) -> IntArray:
-    """Return points, in order, no two of them joined and every other joined to one.
-
-    As if they were met in a random order, and each chosen that is not joined to one chosen before.
-    All that need not wait for an earlier neighbour are chosen at once, and so on.
-    """
-    turn = np.empty(n, dtype=np.int64)
-    turn[rng.permutation(n)] = np.arange(n)
-    one, other = edges.T
-    swap = turn[one] > turn[other]
-    earlier, later = np.where(swap, other, one), np.where(swap, one, other)
-    out = np.zeros(n, dtype=bool)
-    while len(earlier):
-        waiting = np.zeros(n, dtype=bool)
-        waiting[later] = True
-        out[later[~waiting[earlier]]] = True
-        left = ~(out[earlier] | out[later])
-        earlier, later = earlier[left], later[left]
-    return np.flatnonzero(~out)
 
 
 def _surface(mesh: Mesh, cell: IntArray, kept: IntArray, edges: IntArray) -> Surface:
@@ -233,10 +180,3 @@ def _shortcuts(x: FloatArray, faces: IntArray) -> tuple[IntArray, FloatArray]:
     hits = (where > 0.0) & (where < size) & (c[one] != c[two])
     lines = np.sort(np.stack([c[one], c[two]], axis=1)[hits], axis=1)
     return lines, np.hypot(s - t, height + depth)[hits]
-
-
-def _unique_edges(edges: IntArray, n: int) -> IntArray:
-    i, j = edges[edges[:, 0] != edges[:, 1]].T
-    keys = np.sort(np.minimum(i, j) * n + np.maximum(i, j))
-    keys = keys[np.diff(keys, prepend=-1) > 0]
-    return np.stack(np.divmod(keys, n), axis=1)
