@@ -9,9 +9,10 @@ from real_meshes import read_off
 from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
 
 from vtk_segdeform import cage_fit
-from vtk_segdeform.cage_fit import _contour, fit_cage, fit_cages
+from vtk_segdeform.cage_fit import fit_cage, fit_cages
 from vtk_segdeform.cages import Cage, cage_faults
 from vtk_segdeform.caging.cage_simplify import roundness, simplify
+from vtk_segdeform.caging.contour import contour_surface
 from vtk_segdeform.surface.columns import inside_nodes, inside_points
 from vtk_segdeform.caging.region_solid import Patch, Skin, _filled, principal_axes
 from vtk_segdeform.errors import CageError, Cancelled, RegionError
@@ -264,7 +265,7 @@ def test_simplifying_a_rough_surface_folds_no_face_over():
 
 def test_the_contour_is_exact_beyond_single_precision():
     x, y, z = np.indices((7, 8, 9)).astype(float)
-    points, _ = _contour(x + 0.3 * y - 0.7 * z, 1.2345678901234)
+    points, _ = contour_surface(x + 0.3 * y - 0.7 * z, 1.2345678901234)
     assert_allclose(points @ [1.0, 0.3, -0.7], 1.2345678901234, atol=1e-13)
 
 
