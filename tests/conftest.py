@@ -1,7 +1,11 @@
-"""What every test runs under: no window, one thread per worker, no user settings."""
+"""What every test runs under: no window, one thread per worker, no user settings.
+
+A cactus or a dinosaur of as many vertices is the same each time, and frozen: it is made once.
+"""
 
 from __future__ import annotations
 
+import functools
 import os
 import sys
 
@@ -9,9 +13,15 @@ import sys
 # several threads each would fight for the cores, and sums in another order change last digits.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
+os.environ.setdefault("LP_NUM_THREADS", "0")  # Mesa's, beside the one that asks it to draw
 os.environ["PYVISTA_OFF_SCREEN"] = "true"
 os.environ["SEGDEFORM_CACHE"] = "0"  # nothing is left in the user's folders
 os.environ.setdefault("SEGDEFORM_THREADS", "1")
 if sys.platform == "linux" and not os.environ.get("DISPLAY"):
     # Without a screen VTK warns once per window that X cannot be reached; EGL needs none.
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+from vtk_segdeform import models  # noqa: E402 - reads what is set above
+
+models.cactus = functools.cache(models.cactus)  # the one that makes it anew is its __wrapped__
+models.dinosaur = functools.cache(models.dinosaur)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from dataclasses import dataclass
 
@@ -14,7 +15,7 @@ from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.regions import Regions
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scene:
     """Everything a `Deformer` needs."""
 
@@ -29,6 +30,11 @@ class Scene:
         return Deformer(
             self.mesh, self.regions, self.cages, fixed=self.fixed, handle=self.handle, **options
         )
+
+    def held(self, **volumes) -> Deformer:
+        """Return the same, with options of `Deformer.hold` only; the cages are bound but once."""
+        bound = _bound(self.mesh, self.regions, self.cages)
+        return bound.hold(fixed=self.fixed, handle=self.handle, **volumes)
 
     def turned(self, degrees: float, axis=(0.0, 1.0, 0.0), about=(0.0, 0.0, 0.0)) -> np.ndarray:
         """Return targets: the handle turned about a line."""
@@ -48,8 +54,17 @@ class Scene:
         return Scene(mesh, regions, cages, self.fixed, self.handle)
 
 
+@functools.lru_cache(maxsize=8)
+def _bound(mesh: Mesh, regions: Regions, cages: tuple[Cage, ...]) -> Deformer:
+    return Deformer(mesh, regions, cages)
+
+
+@functools.cache
 def sausage(n_regions: int = 2) -> Scene:
-    """Return an ellipsoid along x with bumps, in *n_regions* overlapping cages of 66 vertices."""
+    """Return an ellipsoid along x with bumps, in *n_regions* overlapping cages of 66 vertices.
+
+    All tests of a process get the very same, and nobody changes it.
+    """
     sphere, faces = icosphere(4)
     bumps = 1.0 + 0.03 * np.sin(9 * sphere[:, :1]) * np.cos(5 * sphere[:, 1:2])
     mesh = Mesh(sphere * bumps * [3.0, 0.8, 0.8], faces)
@@ -65,4 +80,6 @@ def sausage(n_regions: int = 2) -> Scene:
         masks.append(mask)
     regions = Regions.from_masks(mesh, np.array(masks))
     fixed, handle = np.flatnonzero(x < -2.4), np.flatnonzero(x > 2.4)
+    for ids in (fixed, handle):
+        ids.setflags(write=False)
     return Scene(mesh, regions, tuple(cages), fixed, handle)

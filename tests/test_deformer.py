@@ -40,7 +40,7 @@ def test_moving_every_handle_rigidly_and_fixing_nothing_moves_the_mesh_rigidly()
 def test_turning_and_scaling_the_scene_turns_and_scales_the_answer(scale):
     turn = rotation([1, 2, 3], 1.2)
     targets = SCENE.turned(50)
-    plain = SCENE.deformer().solve(targets)
+    plain = SCENE.held().solve(targets)
     moved = SCENE.transformed(turn, scale).deformer().solve(scale * targets @ turn.T)
     error = moved.vertices / scale - plain.vertices @ turn.T
     assert np.abs(error).max() < 1e-6 * SCENE.mesh.diagonal
@@ -50,7 +50,7 @@ def test_turning_and_scaling_the_scene_turns_and_scales_the_answer(scale):
 def test_far_from_the_origin_only_the_digits_of_the_coordinates_are_lost():
     shift = 1e4 * SCENE.mesh.diagonal * np.array([0.6, -0.8, 0.0])
     targets = SCENE.turned(50)
-    plain = SCENE.deformer().solve(targets)
+    plain = SCENE.held().solve(targets)
     moved = SCENE.transformed(shift=shift).deformer().solve(targets + shift)
     error = np.abs(moved.vertices - shift - plain.vertices).max() / SCENE.mesh.diagonal
     assert error < 1e-6
@@ -128,7 +128,7 @@ def test_one_cage_around_everything_works_as_well():
 
 
 def test_stopping_early_says_so_and_goes_on_next_time():
-    deformer = SCENE.deformer()
+    deformer = SCENE.held()
     first = deformer.solve(SCENE.turned(20), max_steps=2)
     assert first.status is Status.STEP_LIMIT
     assert "solve again" in str(first.status)
@@ -138,7 +138,7 @@ def test_stopping_early_says_so_and_goes_on_next_time():
 def test_one_step_at_a_time_is_the_same_way_as_all_at_once():
     targets = SCENE.turned(4)  # near: nothing in between
     at_once = SCENE.deformer().solve(targets)
-    deformer = SCENE.deformer()
+    deformer = SCENE.held()
     way = [deformer.solve(targets, max_steps=1)]
     while way[-1].status is Status.STEP_LIMIT and len(way) < 3 * at_once.steps:
         way.append(deformer.solve(targets, max_steps=1))
@@ -148,7 +148,7 @@ def test_one_step_at_a_time_is_the_same_way_as_all_at_once():
 
 
 def test_after_a_reset_nothing_is_known_of_what_was_before():
-    deformer = SCENE.deformer()
+    deformer = SCENE.held()
     deformer.solve(SCENE.turned(20), max_steps=3)
     deformer.solve(SCENE.turned(10), max_steps=3)
     deformer.reset()
@@ -191,7 +191,7 @@ def test_wrong_constraints_are_named(change, says):
     ],
 )
 def test_wrong_targets_are_named_and_leave_the_pose_as_it_was(targets, says):
-    deformer = SCENE.deformer()
+    deformer = SCENE.held()
     with pytest.raises(ConstraintError, match=says):
         deformer.solve(targets)
     assert_allclose(deformer.solve(REST).vertices, VERTICES, atol=1e-9)
@@ -214,9 +214,7 @@ def test_the_printed_blend_can_be_compared_and_nonsense_is_refused():
     printed = cage_distance_weights(SCENE.regions, SCENE.cages)
     solution = SCENE.deformer(blend=printed).solve(SCENE.turned(30))
     assert abs(solution.volume_change) < 1e-13
-    assert (
-        np.abs(solution.vertices - SCENE.deformer().solve(SCENE.turned(30)).vertices).max() > 1e-4
-    )
+    assert np.abs(solution.vertices - SCENE.held().solve(SCENE.turned(30)).vertices).max() > 1e-4
     with pytest.raises(RegionError, match="sum to 1"):
         SCENE.deformer(blend=0.5 * printed)
 
@@ -254,9 +252,9 @@ def test_options_that_make_no_sense_are_refused_by_name(option, says):
 
 def test_a_target_in_another_unit_is_asked_about():
     with pytest.raises(ConstraintError, match="are both in the same unit"):
-        SCENE.deformer().solve(1e6 * REST)
+        SCENE.held().solve(1e6 * REST)
     with pytest.raises(ConstraintError, match="are both in the same unit"):
-        SCENE.deformer().solve(REST + 1e200)
+        SCENE.held().solve(REST + 1e200)
 
 
 def test_a_cage_so_large_that_it_moves_nothing_is_refused():
@@ -305,7 +303,7 @@ def test_binding_reports_its_progress_and_can_be_cancelled():
 
 
 def test_a_copy_goes_on_as_the_deformer_would_and_leaves_it_where_it_is():
-    deformer = SCENE.deformer()
+    deformer = SCENE.held()
     deformer.solve(SCENE.turned(20), max_steps=3)
     ahead = deformer.copy().solve(SCENE.turned(30))
     other = deformer.copy()

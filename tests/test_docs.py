@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import doctest
+import linecache
 import re
 import shlex
 from pathlib import Path
@@ -150,6 +151,7 @@ def test_the_examples_on_a_page_print_what_they_say(page, monkeypatch, tmp_path)
             require_offscreen()
         except MissingDependencyError as missing:
             pytest.skip(str(missing))
+    linecache.clearcache()  # else doctest looks after every file in it first
     failed, tried = doctest.testfile(
         str(DOCS / f"{page}.rst"), module_relative=False, optionflags=doctest.NORMALIZE_WHITESPACE
     )

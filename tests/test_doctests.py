@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import importlib
+import linecache
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,7 @@ def test_the_examples_print_what_they_say(name, monkeypatch, tmp_path):
     if name.startswith(("vtk_segdeform.widgets.qt", "vtk_segdeform.widgets.panel")):
         pytest.importorskip("pyvistaqt", exc_type=ImportError)
     module = importlib.import_module(name)
+    linecache.clearcache()  # else doctest looks after every file in it, before each docstring
     failed, _ = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
     assert not failed
 

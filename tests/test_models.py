@@ -68,7 +68,9 @@ def test_the_default_cactus_is_as_large_as_the_papers():
 
 
 def test_the_same_call_gives_the_same_mesh():
-    one, two = models.cactus(700), models.cactus(700)
+    make = models.cactus.__wrapped__  # not the tests' own, that makes it once
+    one, two = make(700), make(700)
+    assert one is not two
     assert_array_equal(one.vertices, two.vertices)
     assert_array_equal(one.faces, two.faces)
 
@@ -76,13 +78,13 @@ def test_the_same_call_gives_the_same_mesh():
 def test_more_vertices_are_the_same_body():
     volumes = [
         signed_volume(mesh.vertices, mesh.faces)
-        for mesh in (models.cactus(4000), models.cactus(21_000))
+        for mesh in (models.cactus(4000), models.cactus(20_003))
     ]
     assert volumes[0] == pytest.approx(volumes[1], rel=0.01)
 
 
 def test_the_ribs_run_along_the_trunk():
-    mesh = models.cactus(7000)
+    mesh = models.cactus(5430)
     belt = mesh.vertices[(mesh.vertices[:, 2] > 0.15) & (mesh.vertices[:, 2] < 0.25)]
     angle = np.arctan2(belt[:, 1], belt[:, 0])
     radius = np.hypot(belt[:, 0], belt[:, 1])

@@ -20,7 +20,7 @@ INSIDE = MESH.vertices[RNG.integers(0, MESH.n_vertices, 400)] * RNG.uniform(0.0,
 
 @pytest.fixture(scope="module")
 def bent():
-    deformer = SCENE.deformer()
+    deformer = SCENE.held()
     return deformer, deformer.solve(SCENE.turned(50))
 
 

@@ -104,13 +104,13 @@ def test_volume_is_exact_and_the_merit_never_rises(options):
 
 
 def test_volume_is_exact_after_every_single_step():
-    deformer = SCENE.deformer()
+    deformer = SCENE.held()
     for _ in range(12):
         assert abs(deformer.solve(SCENE.turned(90), max_steps=1).volume_change) < 1e-13
 
 
 def test_without_the_constraint_the_volume_does_change():
-    solution = SCENE.deformer(preserve_volume=False).solve(SCENE.turned(90))
+    solution = SCENE.held(preserve_volume=False).solve(SCENE.turned(90))
     assert abs(solution.volume_change) > 1e-3
 
 
@@ -124,10 +124,10 @@ def test_the_papers_linearised_multiplier_leaves_a_small_error():
 
 def test_region_volumes_hold_each():
     scene = sausage(3)
-    solution = scene.deformer(preserve_region_volumes=True).solve(scene.turned(60))
+    solution = scene.held(preserve_region_volumes=True).solve(scene.turned(60))
     assert np.abs(solution.region_volume_change).max() < 1e-12
     assert abs(solution.volume_change) < 1e-12
-    free = scene.deformer().solve(scene.turned(60))
+    free = scene.held().solve(scene.turned(60))
     assert np.abs(free.region_volume_change).max() > 1e-4
 
 
@@ -144,7 +144,7 @@ def test_acceleration_finds_the_plain_iterations_answer_in_fewer_steps():
 def test_groups_stay_close_to_one_rotation_per_vertex():
     targets = SCENE.turned(30)
     fine = SCENE.deformer(rotation_groups=None).solve(targets)
-    assert distance(SCENE.deformer().solve(targets), fine) < 0.01
+    assert distance(SCENE.held().solve(targets), fine) < 0.01
 
 
 def test_at_the_end_the_slope_is_a_multiple_of_the_volume_gradient():

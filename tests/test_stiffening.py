@@ -38,17 +38,17 @@ def away(a, b):
 
 @pytest.fixture(scope="module")
 def direct():
-    return SCENE.deformer().solve(MIDDLE)
+    return SCENE.held().solve(MIDDLE)
 
 
 def test_what_is_missed_gets_more_weight_and_is_met():
-    loose, firm = SCENE.deformer(hold_tolerance=1.0), SCENE.deformer()
+    loose, firm = SCENE.deformer(hold_tolerance=1.0), SCENE.held()
     assert firm.solve(FAR).handle_error < 5e-4 < loose.solve(FAR).handle_error
     assert strength(firm) > strength(loose) == 1.0
 
 
 def test_the_pose_is_the_same_from_where_less_weight_was_due_and_from_where_more_was(direct):
-    deformer, weights = SCENE.deformer(), []
+    deformer, weights = SCENE.held(), []
     for way in (NEAR, MIDDLE, FAR, MIDDLE):
         solution = deformer.solve(way)
         weights.append(strength(deformer))
@@ -62,7 +62,7 @@ def test_the_pose_is_the_same_from_where_less_weight_was_due_and_from_where_more
 
 @pytest.mark.parametrize("steps", [1, 2, 3, 8])
 def test_however_few_steps_an_event_is_given_it_ends_in_the_same_pose(direct, steps):
-    deformer = SCENE.deformer()
+    deformer = SCENE.held()
     for degrees in (5.0, 10.0, 15.0, 20.0, 20.0, 20.0, 15.0, 10.0):
         solution = deformer.solve(bent(degrees), max_steps=steps)
         assert abs(solution.volume_change) <= 1e-12
@@ -70,7 +70,7 @@ def test_however_few_steps_an_event_is_given_it_ends_in_the_same_pose(direct, st
 
 
 def test_under_a_moving_pointer_the_weight_stays_and_no_pose_is_called_final():
-    deformer = SCENE.deformer()
+    deformer = SCENE.held()
     deformer.solve(FAR)
     before = strength(deformer)
     for degrees in (18.0, 16.0, 14.0):
@@ -80,7 +80,7 @@ def test_under_a_moving_pointer_the_weight_stays_and_no_pose_is_called_final():
 
 
 def test_a_copy_climbs_by_itself():
-    deformer = SCENE.deformer()
+    deformer = SCENE.held()
     deformer.solve(FAR)
     other = deformer.copy()
     assert strength(other) == strength(deformer)
