@@ -19,8 +19,9 @@ def as_points(points: ArrayLike, name: str) -> FloatArray:
     array = _as_numbers(points, name)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ArgumentError(f"{name} must have shape (n, 3); got {array.shape}")
-    bad = np.count_nonzero(~np.isfinite(array).all(axis=1))
-    if bad:
+    finite = np.isfinite(array)
+    if not finite.all():
+        bad = np.count_nonzero(~finite.all(axis=1))
         raise ArgumentError(
             f"{name} holds {bad} points with NaN or infinite coordinates; all must be finite"
         )

@@ -27,9 +27,19 @@ def is_heavy(blocks: Sequence[FloatArray]) -> bool:
 
 
 def add_product(
-    x: FloatArray, rows: IntArray, block: FloatArray, p: FloatArray, *, heavy: bool
+    x: FloatArray,
+    rows: IntArray,
+    block: FloatArray,
+    p: FloatArray,
+    *,
+    heavy: bool,
+    base: FloatArray | None = None,
 ) -> None:
-    """Add block @ p to the *rows* of x, in double precision whatever the block is in."""
+    """Add block @ p to the *rows* of x, in double precision whatever the block is in.
+
+    With *base* (n, 3), x (n, k) is set to that first, and to 0 beyond its three columns: piece by
+    piece, while it is at hand.
+    """
     kernels = compiled() if heavy and p.shape[1] % 3 == 0 else None
     size = max(_CACHED // block.shape[1], 1)
     if kernels:
@@ -37,11 +47,18 @@ def add_product(
         size = max(8 * size, -(-len(rows) // _PIECES))
 
     def add(start: int, stop: int) -> None:
+        if base is not None:
+            first = rows[start] if start else 0
+            last = rows[stop] if stop < len(rows) else len(x)
+            x[first:last, :3] = base[first:last, : x.shape[1]]
+            x[first:last, 3:] = 0.0
         if kernels:
             kernels.add_product(x, *arguments, start, stop)
         else:
             x[rows[start:stop]] += double(block[start:stop]) @ p
 
+    if base is not None and not len(rows):
+        x[:, :3], x[:, 3:] = base[:, : x.shape[1]], 0.0
     in_parallel(add, len(rows), size)
 
 

@@ -24,12 +24,13 @@ Trans. Graph. 38(1), 2019: the twist modes of the rotation's derivative.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import linalg
-from scipy.linalg import blas
+from scipy.linalg import blas, lapack
 
 from .arrays import FloatArray
 from .energy import Energy
@@ -57,8 +58,8 @@ class Factor:
 
     def solve_all(self, ys: Sequence[FloatArray]) -> list[FloatArray]:
         """Return H^-1 y for each y (m, 3)."""
-        right = [y.T.reshape(-1, 1) for y in ys] if self.coupled else ys
-        solved = linalg.cho_solve((self.triangle, True), np.hstack(right), check_finite=False)
+        right = np.hstack([y.T.reshape(-1, 1) for y in ys] if self.coupled else ys)
+        solved, _ = lapack.dpotrs(self.triangle, right, lower=1)  # half the time of cho_solve
         if self.coupled:
             return [column.reshape(3, -1).T for column in solved.T]
         return np.split(solved, len(ys), axis=1)
@@ -100,11 +101,16 @@ def _rotations_part(energy: Energy, p: FloatArray) -> FloatArray:
     total = np.zeros((3 * m, 3 * m))  # its upper half; the transpose is in BLAS's order
     twists = _twists(energy.covariances(p))
     for groups, columns, reduced in energy.fitted_rows(_CHUNK):
-        c = len(columns)
-        rows = (twists[groups] @ reduced).reshape(-1, 3 * c)  # T^T, turned into the axes of M
+        rows = (twists[groups] @ reduced).reshape(-1, 3 * reduced.shape[2])  # T^T in M's own axes
         part = blas.dsyrk(1.0, rows.T, lower=1).T
-        stacked = (np.arange(3)[:, None] * m + columns).ravel()
-        total[np.ix_(stacked, stacked)] += part
+        places = [slice(a * m + own.start, a * m + own.stop) for a in range(3) for own in columns]
+        ends = np.cumsum([place.stop - place.start for place in places])
+        both = [
+            (place, slice(end - place.stop + place.start, end))
+            for place, end in zip(places, ends, strict=True)
+        ]
+        for (i, from_i), (j, from_j) in itertools.combinations_with_replacement(both, 2):
+            total[i, j] += part[from_i, from_j]
     return total.T
 
 

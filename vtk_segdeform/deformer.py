@@ -14,7 +14,6 @@ Long because every option of the method meets here, and each is told in the docs
 from __future__ import annotations
 
 import copy
-import math
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -30,10 +29,16 @@ from .cages import Cage
 from .constraints import VolumeConstraint, region_volumes, total_volume
 from .errors import ArgumentError, CageError, ConstraintError, RegionError
 from .iteration import Iteration, SolverOptions
-from .landing import along, scaled, widened
+from .landing import along, scaled
 from .mesh import Mesh, require_mesh
 from .passengers import Passengers, board
-from .positions import checked_constraints, checked_targets, connected_sets, position_term
+from .positions import (
+    checked_constraints,
+    checked_targets,
+    connected_sets,
+    errors_at,
+    position_term,
+)
 from .progress import Progress
 from .regions import Regions
 from .solution import Solution, Status
@@ -238,7 +243,7 @@ class Deformer:
             If *targets* has the wrong shape or holds NaN or infinite coordinates.
         """
         goal = self._inward(checked_targets(targets, len(self.handle)))
-        if np.abs(goal).max(initial=0.0) > _FAR:
+        if max(goal.max(initial=0.0), -goal.min(initial=0.0)) > _FAR:
             raise ConstraintError(
                 f"a target is {np.abs(goal).max():.0e} times the mesh's size away from it; "
                 "are both in the same unit?"
@@ -252,8 +257,9 @@ class Deformer:
         *way, _ = waypoints(self._targets, goal, self._handles)
         on_the_way = replace(options, tolerance=_LEG_TOLERANCE, max_steps=_LEG_STEPS)
         steps = sum(self._ladder.hurry(self._places(leg), on_the_way).steps for leg in way)
-        is_in_haste = max_steps is not None and not np.array_equal(goal, self._targets)
-        move = self._ladder.hurry if is_in_haste and self._ladder.is_climbed else self._ladder.move
+        can_hurry = max_steps is not None and self._ladder.is_climbed
+        is_in_haste = can_hurry and not np.array_equal(goal, self._targets)
+        move = self._ladder.hurry if is_in_haste else self._ladder.move
         result = move(self._places(goal), options)
         self._targets = goal
         steps += result.steps
@@ -354,8 +360,7 @@ class Deformer:
         is rounded.
         """
         moves = p - self._rest_cages * self._size
-        start = widened(self._here.vertices, 3 * len(directions))
-        return self.subspace.map(np.hstack([moves, *directions]), start)
+        return self.subspace.map(np.hstack([moves, *directions]), self._here.vertices)
 
     def _placed(self, x: FloatArray) -> FloatArray:
         return x + self._origin if self._origin.any() else x
@@ -363,35 +368,31 @@ class Deformer:
     def _solution(self, result: Iteration, x: FloatArray, steps: int) -> Solution:
         p = self._p * self._size
         near, x = x, self._placed(x)
-        targets = self._outward(self._targets)
-        places = targets, self._rest_of_fixed
-        missed = (
-            _farthest(np.take(x, ids, axis=0), u)
-            for ids, u in zip((self.handle, self.fixed), places, strict=True)
-        )
-        errors = np.array(list(missed)) / self.mesh.diagonal
+        errors = partial(self._errors, self._targets)
         status = result.status
-        if status is Status.CONVERGED and errors.max() > _MET:
+        if status is Status.CONVERGED and max(errors(x)) > _MET:
             status = Status.MISSED
         return Solution(
             vertices=x,
             cage_vertices=tuple(p[columns] + self._centre for columns in self.subspace.columns),
-            handle_error=float(errors[0]),
-            fixed_error=float(errors[1]),
             steps=steps,
             status=status,
             merits=result.merits,
+            errors=errors,
             volume=partial(self._total_volume.relative, near),  # before a far place rounds it
             region_volumes=self._region_volume_changes,
         )
 
+    def _errors(self, targets: FloatArray, x: FloatArray) -> tuple[float, ...]:
+        places = self._outward(targets), self._rest_of_fixed
+        return errors_at((self.handle, self.fixed), places, self.mesh.diagonal, x)
+
     def _inward(self, points: FloatArray) -> FloatArray:
-        return np.asarray((points - self._centre) / self._size)
+        inside = points - self._centre
+        inside /= self._size
+        return inside
 
     def _outward(self, points: FloatArray) -> FloatArray:
-        return np.asarray(points * self._size + self._centre)
-
-
-def _farthest(x: FloatArray, places: FloatArray) -> float:
-    away = x - places
-    return math.sqrt(np.einsum("ij,ij->i", away, away).max(initial=0.0))
+        outside = points * self._size
+        outside += self._centre
+        return outside

@@ -81,35 +81,33 @@ class Energy:
         fitted = self.fit @ (self.subspace.map(p) if self.turns_vertices else p)
         return np.asarray(fitted).reshape(-1, 3, 3)
 
-    def fitted_rows(self, count: int) -> Iterator[tuple[IntArray, IntArray, FloatArray]]:
+    def fitted_rows(self, count: int) -> Iterator[tuple[IntArray, list[slice], FloatArray]]:
         """Yield K, what rotations are fitted to as rows on p, some *count* groups at a time.
 
-        As (groups, columns, rows): these groups (g,), the cage vertices (c,) that reach them, and
-        (g, 3, c).
+        As (groups, columns, rows): these groups (g,), the cages whose vertices reach them, c
+        vertices in all, and (g, 3, c).
         """
         if not sparse.issparse(self.fit):
             yield from self._reaches
             return
-        every = np.arange(self.subspace.n_columns)
+        every = [slice(0, self.subspace.n_columns)]
         for start in range(0, self.fit.shape[0] // 3, count):
             rows = self.subspace.left(self.fit[3 * start : 3 * (start + count)])
             groups = np.arange(start, start + len(rows) // 3)
             yield groups, every, rows.reshape(len(groups), 3, -1)
 
     @cached_property
-    def _reaches(self) -> list[tuple[IntArray, IntArray, FloatArray]]:
+    def _reaches(self) -> list[tuple[IntArray, list[slice], FloatArray]]:
         """K without its zeros: the groups that the same cages reach, together."""
         cages, rows = self.subspace.columns, np.asarray(self.fit).reshape(-1, 3, self.fit.shape[1])
         reached = np.stack([rows[:, :, own].any(axis=(1, 2)) for own in cages], axis=1)
         blocks = []
         for pattern in np.unique(reached, axis=0):
-            own = [np.arange(cages[r].start, cages[r].stop) for r in np.flatnonzero(pattern)]
+            own = [cages[r] for r in np.flatnonzero(pattern)]
             if own:
-                groups, columns = (
-                    np.flatnonzero((reached == pattern).all(axis=1)),
-                    np.concatenate(own),
-                )
-                blocks.append((groups, columns, np.ascontiguousarray(rows[groups][:, :, columns])))
+                groups = np.flatnonzero((reached == pattern).all(axis=1))
+                here = np.concatenate([rows[groups][:, :, columns] for columns in own], axis=2)
+                blocks.append((groups, own, here))
         return blocks
 
     def local_step(self, p: FloatArray, x: FloatArray) -> tuple[float, FloatArray]:

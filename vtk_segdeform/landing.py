@@ -15,7 +15,6 @@ import numpy as np
 
 from .arrays import FloatArray
 from .constraints import VolumeConstraint, moved, restore
-from .threads import in_parallel
 
 _CACHED = 1 << 14  # vertices at a time
 
@@ -31,18 +30,6 @@ def along(
     return steps, moved(paths, steps)
 
 
-def widened(x: FloatArray, columns: int) -> FloatArray:
-    """Return a copy of *x* (n, 3) with so many *columns* of zeros beside it."""
-    wide = np.empty((len(x), 3 + columns))
-
-    def work(start: int, stop: int) -> None:
-        wide[start:stop, :3] = x[start:stop]
-        wide[start:stop, 3:] = 0.0
-
-    in_parallel(work, len(x), 4 * _CACHED)
-    return wide
-
-
 def scaled(constraint: VolumeConstraint, x: FloatArray, centre: FloatArray) -> float:
     """Scale *x* (n, 3) in place about *centre* (3,) onto the volume; return by how much.
 
@@ -53,13 +40,9 @@ def scaled(constraint: VolumeConstraint, x: FloatArray, centre: FloatArray) -> f
         return 1.0
     scale = float(np.cbrt(1.0 / (1.0 + ratio)))
 
-    offsets = np.tile((1.0 - scale) * centre, _CACHED)
-    flat = x.reshape(-1)
-
-    def work(start: int, stop: int) -> None:
-        piece = flat[3 * start : 3 * stop]
+    offsets, flat = np.tile((1.0 - scale) * centre, _CACHED), x.reshape(-1)
+    for start in range(0, len(flat), len(offsets)):  # other threads would take longer to wake
+        piece = flat[start : start + len(offsets)]
         piece *= scale
         piece += offsets[: len(piece)]
-
-    in_parallel(work, len(x), _CACHED)
     return scale

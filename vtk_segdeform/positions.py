@@ -11,6 +11,8 @@ raises the weight of the sets that are off by too much.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -104,6 +106,17 @@ def _places(points: FloatArray) -> IntArray:
     if len(points) <= _MANY:
         return np.arange(len(points))
     return group_by_position(points, _PLACES)
+
+
+def errors_at(
+    ids: Sequence[IntArray], places: Sequence[FloatArray], unit: float, x: FloatArray
+) -> tuple[float, ...]:
+    """Return, for each list of vertices of *x* (n, 3), how far its farthest is from its place.
+
+    Over *unit*; 0 where none is listed.
+    """
+    ways = [np.take(x, own, axis=0) - there for own, there in zip(ids, places, strict=True)]
+    return tuple(math.sqrt(np.einsum("ij,ij->i", way, way).max(initial=0.0)) / unit for way in ways)
 
 
 def checked_constraints(

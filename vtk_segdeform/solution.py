@@ -33,20 +33,32 @@ class Solution:
     """(n, 3) float: the deformed mesh."""
     cage_vertices: tuple[FloatArray, ...]
     """One (m_r, 3) float per region: the cages that move it there."""
-    handle_error: float
-    """Distance of the farthest handle vertex from its target, in diagonals of the mesh."""
-    fixed_error: float
-    """Distance of the farthest fixed vertex from its place, likewise."""
     steps: int
     """Gauss-Newton steps, those on the way to a far target included."""
     status: Status
     """Why the iteration ended; ``str(status)`` is advice."""
     merits: tuple[float, ...]
     """The objective at the start of the last leg and after each of its steps; it never rises."""
+    errors: Callable[[FloatArray], tuple[float, ...]] = field(repr=False)
+    """What measures `handle_error` and `fixed_error`."""
     volume: Callable[[], float] = field(repr=False)
     """What measures `volume_change`."""
     region_volumes: Callable[[FloatArray], FloatArray] = field(repr=False)
     """What measures `region_volume_change`."""
+
+    @cached_property
+    def _errors(self) -> tuple[float, ...]:
+        return self.errors(self.vertices)
+
+    @property
+    def handle_error(self) -> float:
+        """Distance of the farthest handle vertex from its target, in diagonals; on demand."""
+        return self._errors[0]
+
+    @property
+    def fixed_error(self) -> float:
+        """Distance of the farthest fixed vertex from its place, likewise."""
+        return self._errors[1]
 
     @cached_property
     def volume_change(self) -> float:

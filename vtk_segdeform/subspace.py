@@ -56,10 +56,15 @@ class Subspace:
         return is_heavy(self.blocks)
 
     def map(self, p: FloatArray, start: FloatArray | None = None) -> FloatArray:
-        """Return x = W~ p, (n, k), for stacked cage vertices *p* (m, k), added to *start*."""
-        x = np.zeros((self.n_vertices, p.shape[1])) if start is None else start
+        """Return x = W~ p, (n, k), for stacked cage vertices *p* (m, k).
+
+        With *start* (n, 3) that is added to the first three columns.
+        """
+        make = np.zeros if start is None else np.empty
+        x = make((self.n_vertices, p.shape[1]))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
-            add_product(x, rows, block, p[columns], heavy=self._is_heavy)
+            add_product(x, rows, block, p[columns], heavy=self._is_heavy, base=start)
+            start = None
         return x
 
     def adjoint(self, y: FloatArray) -> FloatArray:
