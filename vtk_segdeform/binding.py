@@ -107,7 +107,8 @@ class Binder:
         n = self.rest.n_vertices
         if self.n_groups is None or self.n_groups >= n:
             return None if self.n_groups is None else np.arange(n)
-        parts = np.unique(self.regions.labels * n + self.rest.components, return_inverse=True)[1]
+        component = self.regions.mesh.components
+        parts = self.regions.labels * (int(component.max()) + 1) + component
         return rotation_groups(self.rest.vertices, parts, self.n_groups)
 
     def _name(self) -> str:

@@ -388,11 +388,11 @@ class Deformer:
         return errors_at((self.handle, self.fixed), places, self.mesh.diagonal, x)
 
     def _inward(self, points: FloatArray) -> FloatArray:
-        inside = points - self._centre
+        inside: FloatArray = points - self._centre
         inside /= self._size
         return inside
 
     def _outward(self, points: FloatArray) -> FloatArray:
-        outside = points * self._size
+        outside: FloatArray = points * self._size
         outside += self._centre
         return outside

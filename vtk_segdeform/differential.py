@@ -69,16 +69,22 @@ def mixed_voronoi_areas(
     """Return (n,): each vertex's mixed Voronoi area; they sum to the mesh's area."""
     if cotangents is None:
         cotangents = corner_cotangents(vertices, faces)
-    a, b, c = vertices[faces.T]
-    sides = c - b, a - c, b - a  # opposite their corners
-    square = np.stack([np.einsum("ij,ij->i", side, side) for side in sides], axis=1)
-    area = 0.5 * np.linalg.norm(np.cross(sides[0], sides[1]), axis=1)[:, None]
-    # Voronoi part of corner a: (|ab|^2 cot c + |ac|^2 cot b) / 8.
-    share = square * cotangents / 8.0
-    voronoi = share.sum(axis=1, keepdims=True) - share
-    # An obtuse triangle's circumcentre lies outside it: half to its obtuse corner, a quarter each.
-    obtuse = cotangents < 0.0
-    parts = np.where(obtuse.any(axis=1, keepdims=True), np.where(obtuse, 0.5, 0.25) * area, voronoi)
+    parts = np.empty(faces.shape)
+
+    def work(start: int, stop: int) -> None:
+        a, b, c = vertices[faces[start:stop].T]
+        sides = c - b, a - c, b - a  # opposite their corners
+        square = np.stack([np.einsum("ij,ij->i", side, side) for side in sides], axis=1)
+        area = 0.5 * np.linalg.norm(np.cross(sides[0], sides[1]), axis=1)[:, None]
+        # Voronoi part of corner a: (|ab|^2 cot c + |ac|^2 cot b) / 8.
+        share = square * cotangents[start:stop] / 8.0
+        voronoi = share.sum(axis=1, keepdims=True) - share
+        # An obtuse triangle's circumcentre is outside: half to its obtuse corner, a quarter each.
+        obtuse = cotangents[start:stop] < 0.0
+        split = np.where(obtuse, 0.5, 0.25) * area
+        parts[start:stop] = np.where(obtuse.any(axis=1, keepdims=True), split, voronoi)
+
+    in_parallel(work, len(faces), _PIECE)
     areas = np.bincount(faces.ravel(), parts.ravel(), minlength=len(vertices))
     return np.asarray(np.maximum(areas, _MIN_AREA * areas.mean()))
 

@@ -42,6 +42,7 @@ from .differential import (
     mixed_voronoi_areas,
 )
 from .errors import ArgumentError
+from .grams import grams
 from .mesh import Mesh
 from .rotations import closest_rotations
 from .subspace import Subspace
@@ -141,7 +142,8 @@ def shape_energy(mesh: Mesh, subspace: Subspace, stretch: float, groups: IntArra
     per_vertex = groups is None
     shape = surface_operators(mesh, np.arange(mesh.n_vertices) if groups is None else groups)
     areas = shape.areas
-    bending, stretching, mass = subspace.grams(shape.laplacian, 0.25 / areas, areas / areas.sum())
+    strength, share = 0.25 / areas, areas / areas.sum()
+    bending, stretching, mass = grams(subspace, shape.laplacian, strength, share, near=groups)
     unit = np.trace(bending) / np.trace(stretching)
     pull = shape.detail + (stretch * unit) * shape.fans
     fit = pull if stretch > 0.0 else shape.detail + unit * shape.fans
@@ -201,13 +203,20 @@ def _fans(gradients: FloatArray, faces: IntArray, groups: IntArray) -> sparse.cs
 
     *gradients* (m, 3, 3) are thirds of `area_gradients`: every corner sees the whole face.
     """
-    shape = (3 * (int(groups.max()) + 1), len(groups))
-    fans = sparse.csr_array(shape)
-    for start in range(0, len(faces), _CHUNK):
-        corners, share = faces[start : start + _CHUNK], gradients[start : start + _CHUNK]
-        for seen in range(3):
-            rows = 3 * groups[corners[:, seen], None, None] + np.arange(3)  # (m, 1, axis)
-            rows = np.broadcast_to(rows, share.shape).ravel()
-            columns = np.repeat(corners, 3)
-            fans = fans + sparse.coo_array((share.ravel(), (rows, columns)), shape).tocsr()
+    n, shape = len(groups), (3 * (int(groups.max()) + 1), len(groups))
+    seen_from = groups[faces]
+    alike = (seen_from[:, :, None] == seen_from[:, None]).sum(axis=1)  # corners in each one's group
+    axes = (
+        np.bincount(faces.ravel(), (alike * g).ravel(), n) for g in np.moveaxis(gradients, 2, 0)
+    )
+    fans = _grouped(np.stack(list(axes), axis=1), groups)
+    border = np.flatnonzero((alike < 3).any(axis=1))  # what is left: corners of other groups
+    for start in range(0, len(border), _CHUNK):
+        some = border[start : start + _CHUNK]
+        here = seen_from[some]
+        face, seen, corner = np.nonzero(here[:, :, None] != here[:, None])
+        rows = 3 * here[face, seen][:, None] + np.arange(3)
+        columns = np.repeat(faces[some[face], corner], 3)
+        share = gradients[some[face], corner]
+        fans = fans + sparse.coo_array((share.ravel(), (rows.ravel(), columns)), shape).tocsr()
     return sparse.csr_array(fans)

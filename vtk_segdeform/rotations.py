@@ -18,15 +18,16 @@ O. Sorkine, M. Alexa, "As-rigid-as-possible surface modeling", SGP 2007.  Eqs. (
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from .arrays import FloatArray, IntArray, is_whole
 from .errors import ArgumentError
 from .fast import compiled, inputs
-from .threads import in_parallel
+from .threads import n_threads
 
 _TIMES = 40  # as long as a face of a volume takes each
 _MANY = 50_000  # positions
-_CACHED = 1 << 17  # distances at a time
+_EQUAL = 4  # nearest centres among which the favoured one is found
 _TIE_BREAK = 1e-6  # relative: of equal distances one is preferred, the same in every frame
 
 
@@ -83,10 +84,13 @@ def group_by_position(positions: FloatArray, n_groups: int, *, rounds: int = 5) 
 
 
 def rotation_groups(positions: FloatArray, parts: IntArray, n_groups: int) -> IntArray:
-    """Return (n,) int: about *n_groups* clusters of position, none of which spans two *parts*."""
+    """Return (n,) int: about *n_groups* clusters of position, none of which spans two *parts*.
+
+    *parts* (n,) are numbers from 0 on; not all need be there.
+    """
     if not is_whole(n_groups, 1):
         raise ArgumentError(f"rotation groups must be a whole number, 1 or more; got {n_groups!r}")
-    groups = np.empty(len(positions), dtype=np.int64)
+    parts, groups = _numbered(parts), np.empty(len(positions), dtype=np.int64)
     used = 0
     for k in range(int(parts.max()) + 1):
         here = parts == k
@@ -99,12 +103,16 @@ def rotation_groups(positions: FloatArray, parts: IntArray, n_groups: int) -> In
 
 def _farthest_points(positions: FloatArray, count: int, favour: FloatArray) -> IntArray:
     chosen = np.empty(count, dtype=np.int64)
-    distance = np.linalg.norm(positions - positions.mean(axis=0), axis=1)
+    distance = _squares(positions - positions.mean(axis=0))
     for k in range(count):
         chosen[k] = np.argmax(distance * favour)
-        towards = np.linalg.norm(positions - positions[chosen[k]], axis=1)
+        towards = _squares(positions - positions[chosen[k]])
         distance = towards if k == 0 else np.minimum(distance, towards)
     return chosen
+
+
+def _squares(ways: FloatArray) -> FloatArray:
+    return np.asarray(np.einsum("ij,ij->i", ways, ways))
 
 
 def _numbered(labels: IntArray) -> IntArray:
@@ -113,17 +121,10 @@ def _numbered(labels: IntArray) -> IntArray:
 
 
 def _nearest(positions: FloatArray, centres: FloatArray, favour: FloatArray) -> IntArray:
-    nearest = np.empty(len(positions), dtype=np.int64)
-    squares = np.einsum("ij,ij->i", centres, centres)
-
-    def work(start: int, stop: int) -> None:
-        chunk = positions[start:stop]
-        own = np.einsum("ij,ij->i", chunk, chunk)[:, None]
-        distance = (own + squares - 2.0 * chunk @ centres.T) * favour[: len(centres)]
-        nearest[start:stop] = distance.argmin(axis=1)
-
-    in_parallel(work, len(positions), max(1, _CACHED // len(centres)))
-    return nearest
+    few = min(_EQUAL, len(centres))
+    distance, which = cKDTree(centres).query(positions, k=[*range(1, few + 1)], workers=n_threads())
+    best = (distance**2 * favour[which]).argmin(axis=1)
+    return np.asarray(np.take_along_axis(which, best[:, None], axis=1)[:, 0], dtype=np.int64)
 
 
 def _turn_onto(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -29,6 +29,7 @@ from .progress import Progress, part
 from .regions import Regions
 
 _LARGEST = 1e3  # mesh diagonals a cage may measure
+_BOUND = 1 << 15  # vertices at a time
 _SINGLE = 8_000_000  # numbers in a block times regions beyond which W~ is kept in single precision
 
 
@@ -118,59 +119,6 @@ class Subspace:
                 out[:, columns] += member @ double(block[piece]) ** 2
         return out
 
-    def grams(
-        self, laplacian: sparse.csr_array, strength: FloatArray, mass: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return W~^T C diag(strength) C W~, W~^T C W~ and W~^T diag(mass) W~, (m, m) each.
-
-        For a symmetric sparse C (n, n).  Cages that reach no common piece of the mesh have a zero
-        block: this is where several beat one.
-        """
-        m = self.n_columns
-        squares, plain, masses = np.zeros((m, m)), np.zeros((m, m)), np.zeros((m, m))
-        for vertices in self._neighbourhoods():
-            ring = laplacian[vertices]
-            reached = np.zeros(self.n_vertices, dtype=bool)
-            reached[ring.indices] = reached[vertices] = True
-            used = np.flatnonzero(reached)
-            place = np.cumsum(reached, dtype=np.int32) - 1  # of each vertex among those used
-            columns, w = self._dense(used)
-            compact = sparse.csr_array(
-                (ring.data, place[ring.indices], ring.indptr), (len(vertices), len(used))
-            )
-            product, here = compact @ w, w[place[vertices]]
-            block = np.ix_(columns, columns)
-            squares[block] += (product.T * strength[vertices]) @ product
-            plain[block] += here.T @ product
-            masses[block] += (here.T * mass[vertices]) @ here
-        return 0.5 * (squares + squares.T), 0.5 * (plain + plain.T), 0.5 * (masses + masses.T)
-
-    def _neighbourhoods(self) -> list[IntArray]:
-        """Return all vertices in pieces, region by region: few cages reach into each."""
-        owner = np.zeros(self.n_vertices, dtype=np.int64)
-        for r, rows in enumerate(self.rows):
-            owner[rows] = r
-        order = np.argsort(owner, kind="stable")
-        return [order[piece] for piece in pieces(self.n_vertices, self.n_columns)]
-
-    def _dense(self, vertices: IntArray) -> tuple[IntArray, FloatArray]:
-        """Return the columns of W~ that reach *vertices*, in order, and W~ there (k, c)."""
-        reached = []
-        for rows, block, own in zip(self.rows, self.blocks, self.columns, strict=True):
-            if not len(rows):
-                continue
-            found = np.searchsorted(rows, vertices).clip(max=len(rows) - 1)
-            mine = np.flatnonzero(rows[found] == vertices)
-            if len(mine):
-                reached.append((mine, found[mine], block, own))
-        widths = [block.shape[1] for _, _, block, _ in reached]
-        w = np.zeros((len(vertices), sum(widths)))
-        ends = np.cumsum(widths)
-        for (mine, found, block, _), end in zip(reached, ends, strict=True):
-            w[mine, end - block.shape[1] : end] = block[found]
-        columns = [np.arange(own.start, own.stop) for *_, own in reached]
-        return np.concatenate(columns), w
-
 
 def bind(
     regions: Regions,
@@ -208,10 +156,14 @@ def bind(
         share = part(progress, r / len(cages), (r + 1) / len(cages))
         members = np.flatnonzero(weights[r] > 0.0)
         points = regions.mesh.vertices[members]
-        block = mean_value_coordinates(points, cage.vertices, cage.faces, progress=share)
-        block *= weights[r, members][:, None]
-        if np.count_nonzero(weights) * cage.n_vertices > _SINGLE:
-            block = block.astype(np.float32)
+        is_large = np.count_nonzero(weights) * cage.n_vertices > _SINGLE
+        block = np.empty((len(members), cage.n_vertices), np.float32 if is_large else np.float64)
+        for start in range(0, len(members), _BOUND):
+            piece = slice(start, min(start + _BOUND, len(members)))
+            ways = part(share, start / len(members), piece.stop / len(members))
+            w = mean_value_coordinates(points[piece], cage.vertices, cage.faces, progress=ways)
+            w *= weights[r, members[piece]][:, None]
+            block[piece] = w
         rows.append(members)
         blocks.append(block)
     return Subspace(regions.mesh.n_vertices, tuple(rows), tuple(blocks))

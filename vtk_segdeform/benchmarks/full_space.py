@@ -17,6 +17,7 @@ from scipy.sparse.linalg import splu
 
 from ..arrays import FloatArray
 from ..energy import surface_operators
+from ..grams import grams
 from ..rotations import closest_rotations
 from ..subspace import Subspace
 from ..volume import signed_volume, step_to_volume, volume_along, volume_gradient
@@ -55,7 +56,7 @@ def _factored(task: Task, subspace: Subspace) -> tuple[Any, Any, float]:
     mesh = task.mesh
     shape = surface_operators(mesh, np.arange(mesh.n_vertices))
     areas, laplacian = shape.areas, shape.laplacian
-    inside, between, _ = subspace.grams(laplacian, 0.25 / areas, areas)
+    inside, between, _ = grams(subspace, laplacian, 0.25 / areas, areas)
     share = _STRETCH * float(np.trace(inside) / np.trace(between))
     matrix = laplacian.T @ sparse.diags_array(0.25 / areas) @ laplacian + share * laplacian
     weight = _HOLD * float(matrix.diagonal().mean())

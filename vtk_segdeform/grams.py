@@ -1,0 +1,88 @@
+"""Products W~^T A W~ of the subspace with operators of the mesh: what makes the energy small.
+
+A piece of the mesh at a time, of vertices that lie together: few cages reach it and its
+neighbours, so the dense matrix of their weights is narrow, and small enough to stay in the cache.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from scipy import sparse
+
+from .arrays import FloatArray, IntArray
+from .subspace import Subspace
+from .threads import in_parallel
+
+_TOGETHER, _BATCH = 1 << 19, 32  # numbers of W~ multiplied at a time, and so many pieces at once
+
+
+def grams(
+    subspace: Subspace,
+    laplacian: sparse.csr_array,
+    strength: FloatArray,
+    mass: FloatArray,
+    *,
+    near: IntArray | None = None,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return W~^T C diag(strength) C W~, W~^T C W~ and W~^T diag(mass) W~, (m, m) each.
+
+    For a symmetric sparse C (n, n).  Cages that reach no common piece of the mesh have a zero
+    block: this is where several beat one.  Vertices with the same number in *near* (n,) lie
+    together and in one region; it only saves time.
+    """
+    m = subspace.n_columns
+    order = np.argsort(_last_region(subspace) if near is None else near, kind="stable")
+    size = max(_TOGETHER // m, 1)
+    found: dict[int, tuple[IntArray, list[FloatArray]]] = {}
+
+    def work(first: int, start: int, stop: int) -> None:
+        vertices = order[first + start : first + stop]
+        ring = laplacian[vertices]
+        used, place = np.unique(np.concatenate([ring.indices, vertices]), return_inverse=True)
+        columns, w = _dense(subspace, used)
+        places = place[: ring.nnz].astype(np.int32), ring.indptr.astype(np.int32)
+        compact = sparse.csr_array((ring.data, *places), (len(vertices), len(used)))
+        product, here = compact @ w, w[place[ring.nnz :]]
+        squares = (product * strength[vertices][:, None]).T @ product
+        plain, masses = here.T @ product, (here * mass[vertices][:, None]).T @ here
+        found[start] = columns, [squares, plain, masses]
+
+    totals = np.zeros((3, m, m))
+    for first in range(0, subspace.n_vertices, _BATCH * size):  # and added up in one order
+        stop = min(first + _BATCH * size, subspace.n_vertices)
+        in_parallel(partial(work, first), stop - first, size)
+        for start in sorted(found):
+            columns, products = found.pop(start)
+            for total, product in zip(totals, products, strict=True):
+                total[np.ix_(columns, columns)] += product
+    squares, plain, masses = 0.5 * (totals + np.swapaxes(totals, 1, 2))
+    return squares, plain, masses
+
+
+def _last_region(subspace: Subspace) -> IntArray:
+    """Return the last region that has each vertex, (n,)."""
+    region = np.zeros(subspace.n_vertices, dtype=np.int64)
+    for r, rows in enumerate(subspace.rows):
+        region[rows] = r
+    return region
+
+
+def _dense(subspace: Subspace, vertices: IntArray) -> tuple[IntArray, FloatArray]:
+    """Return the columns of W~ that reach *vertices*, in order, and W~ there (k, c)."""
+    reached = []
+    for rows, block, own in zip(subspace.rows, subspace.blocks, subspace.columns, strict=True):
+        if not len(rows):
+            continue
+        found = np.searchsorted(rows, vertices).clip(max=len(rows) - 1)
+        mine = np.flatnonzero(rows[found] == vertices)
+        if len(mine):
+            reached.append((mine, found[mine], block, own))
+    widths = [block.shape[1] for _, _, block, _ in reached]
+    w = np.zeros((len(vertices), sum(widths)))
+    ends = np.cumsum(widths)
+    for (mine, found, block, _), end in zip(reached, ends, strict=True):
+        w[mine, end - block.shape[1] : end] = block[found]
+    columns = [np.arange(own.start, own.stop) for *_, own in reached]
+    return np.concatenate(columns), w
