@@ -33,9 +33,8 @@ STORY = [
     "caging.region_solid", "caging.contour", "caging.cage_simplify", "cage_fit",
     # the solver
     "subspace", "passengers", "grams", "energy", "cage_stiffness", "curvature", "constraints",
-    "stand_in", "binding", "landing", "device", "gpu", "positions", "acceleration", "solution",
-    "iteration",
-    "solver", "stiffening", "targets", "deformer", "pipeline",
+    "stand_in", "binding", "device", "gpu", "landing", "positions", "acceleration", "solution",
+    "iteration", "solver", "stiffening", "targets", "deformer", "pipeline",
     # a deformation in the making
     "editing.listeners", "editing.naming", "editing.state", "editing.history", "editing.painting",
     "editing.handles", "editing.posing", "session", "editing.archive", "store",

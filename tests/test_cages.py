@@ -12,6 +12,7 @@ from vtkmodules.vtkCommonDataModel import vtkTriangle
 
 from vtk_segdeform.cages import Cage, cage_faults, self_intersections, winding_number
 from vtk_segdeform.errors import CageError
+from vtk_segdeform.surface.inside import distance_to_surface
 from vtk_segdeform.surface.intersections import _overlapping_boxes
 
 TURN = rotation([1, 2, 3], 0.7)
@@ -295,3 +296,17 @@ def test_the_number_of_pairs_looked_at_grows_like_the_number_of_faces():
         return sum(len(pairs) for pairs in _overlapping_boxes(*boxes)) / len(corners)
 
     assert pairs_per_face(icosphere(4)) < 1.5 * pairs_per_face(icosphere(2))
+
+
+@pytest.mark.parametrize("level", [0, 1, 2])
+def test_points_straight_above_corners_and_edges_of_a_cage_are_told_as_any_others(level):
+    vertices, faces = icosphere(level)
+    middles = 0.5 * (vertices[faces] + vertices[np.roll(faces, 1, axis=1)]).reshape(-1, 3)
+    columns = np.concatenate([vertices, middles]) * [1.0, 1.0, 0.0]
+    points = np.concatenate([columns + [0.0, 0.0, z] for z in (-0.3, 0.1, 0.4)])
+    winding = winding_number(points, vertices, faces)
+    clear = np.abs(winding - np.round(winding)) < 1e-9
+    clear &= distance_to_surface(points, vertices, faces) > 1e-9
+    assert np.count_nonzero(clear) > 10
+    inside = Cage(vertices, faces).contains(points[clear])
+    assert_array_equal(inside, winding[clear] > 0.5)

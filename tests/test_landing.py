@@ -9,8 +9,9 @@ from scenes import sausage
 from solids import icosphere, rotation
 
 from vtk_segdeform import deformer as chapter
-from vtk_segdeform import stand_in
+from vtk_segdeform import landing, stand_in
 from vtk_segdeform.constraints import total_volume
+from vtk_segdeform.device import DeviceError, DeviceSurface
 from vtk_segdeform.landing import scaled
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.solution import Status
@@ -102,3 +103,35 @@ def test_a_turned_and_shifted_scene_is_landed_alike():
 def test_volumes_of_regions_are_still_landed_one_by_one():
     solution = SCENE.deformer(preserve_region_volumes=True).solve(TARGETS)
     assert np.abs(solution.region_volume_change).max() < 1e-12
+
+
+@pytest.mark.usefixtures("wide")
+def test_a_gpu_lands_a_mesh_where_the_processor_does(monkeypatch):
+    here = SCENE.deformer().solve(TARGETS)
+    monkeypatch.setattr(landing, "gpu_arrays", lambda: np)  # the lines that a GPU runs
+    used = []
+    monkeypatch.setattr(
+        DeviceSurface,
+        "map",
+        lambda *given, plain=DeviceSurface.map: used.append(1) or plain(*given),
+    )
+    there = SCENE.deformer().solve(TARGETS)
+    assert used
+    assert_allclose(there.vertices, here.vertices, rtol=0, atol=1e-12)
+    assert abs(there.volume_change) < 1e-14
+
+
+@pytest.mark.usefixtures("wide")
+@pytest.mark.parametrize("when", ["__init__", "map", "scaled", "host"])
+def test_a_gpu_that_fails_is_gone_on_without(monkeypatch, when):
+    here = SCENE.deformer().solve(TARGETS)
+    monkeypatch.setattr(landing, "gpu_arrays", lambda: np)
+
+    def failing(*_):
+        raise DeviceError("out of memory")
+
+    monkeypatch.setattr(DeviceSurface, when, failing)
+    deformer = SCENE.deformer()
+    there = deformer.solve(TARGETS)
+    assert_array_equal(there.vertices, here.vertices)
+    assert deformer._large._device is None

@@ -29,7 +29,7 @@ from .cages import Cage
 from .constraints import VolumeConstraint, region_volumes, total_volume
 from .errors import ArgumentError, CageError, ConstraintError, RegionError
 from .iteration import Iteration, SolverOptions
-from .landing import along, scaled
+from .landing import LargeSurface, along
 from .mesh import Mesh, require_mesh
 from .passengers import Passengers, board
 from .positions import (
@@ -162,6 +162,7 @@ class Deformer:
         binding = Binder(*what, stretch, rotation_groups).bound(cache, progress)
         self._own_blend, self._energy, self._stand_in = own, binding.energy, binding.stand_in
         self._total_volume = total_volume(self._here)
+        self._large = LargeSurface(self.subspace, self._here.vertices, self._total_volume)
         self._keep(preserve_volume, preserve_region_volumes)
         self._take_hold(fixed, handle)
         if progress:
@@ -340,8 +341,8 @@ class Deformer:
         if not directions or not self._options.exact_volume:
             return self._surface(self._p * self._size), 0.0
         if self._is_wide:
-            x = self._surface(self._p * self._size)
-            scale = scaled(self._constraints[0], x, self._centre - self._origin + self._anchor)
+            moves = (self._p - self._rest_cages) * self._size
+            x, scale = self._large.landed(moves, self._centre - self._origin + self._anchor)
             anchor = self._anchor / self._size
             self._p = anchor + scale * (self._p - anchor)
             missed = abs(scale - 1.0)

@@ -9,13 +9,19 @@ Mean value coordinates follow scaling: the cages are scaled alike, and x = W~ p 
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
 from .arrays import FloatArray
 from .constraints import VolumeConstraint, moved, restore
+from .device import DeviceError, DeviceSurface
+from .gpu import gpu_arrays
+from .subspace import Subspace
 
+_log = logging.getLogger(__name__)
 _CACHED = 1 << 14  # vertices at a time
 
 
@@ -46,3 +52,47 @@ def scaled(constraint: VolumeConstraint, x: FloatArray, centre: FloatArray) -> f
         piece *= scale
         piece += offsets[: len(piece)]
     return scale
+
+
+class LargeSurface:
+    """A large mesh as it moves by its cages, landed by its size: on a GPU where there is one.
+
+    Parameters
+    ----------
+    subspace : Subspace
+        W~.
+    rest : (n, 3) float
+        Where the mesh is while no cage vertex has moved.
+    constraint : VolumeConstraint
+        The total volume, kept.
+    """
+
+    def __init__(self, subspace: Subspace, rest: FloatArray, constraint: VolumeConstraint) -> None:
+        self._subspace, self._rest, self._constraint = subspace, rest, constraint
+
+    def landed(self, moves: FloatArray, centre: FloatArray) -> tuple[FloatArray, float]:
+        """Return the mesh (n, 3) for *moves* (m, 3) of the cages, and the scale about *centre*."""
+        if self._device is not None:
+            try:
+                there = self._device.map(moves)
+                scale = self._device.scaled(there, self._constraint.target, centre)
+                return self._device.host(there), scale
+            except DeviceError as fault:
+                self._give_up(fault)
+        x = self._subspace.map(moves, self._rest)
+        return x, scaled(self._constraint, x, centre)
+
+    @cached_property
+    def _device(self) -> DeviceSurface | None:
+        arrays = gpu_arrays()
+        if arrays is None:
+            return None
+        try:
+            return DeviceSurface(self._subspace, self._rest, self._constraint.faces, arrays)
+        except DeviceError as fault:
+            self._give_up(fault)
+            return None
+
+    def _give_up(self, fault: DeviceError) -> None:
+        _log.info("going on without the GPU: %s", fault)
+        self._device = None

@@ -3,7 +3,8 @@
 The winding number of a point is the number of faces below it, one that looks down counted +1
 and one that looks up -1.  A face is below if the column meets its projection, which means to
 pass its three edges on the same side.  The two faces at an edge compute that side from the same
-numbers in the same order, so no column slips between them, whatever the rounding.
+numbers in the same order, so no column slips between them, whatever the rounding.  A column
+through an edge or a corner counts as one next to it, on the same side for all of them.
 
 For n points or nodes this costs n times the few faces whose box a column meets, not n times all
 faces as the sum of solid angles does.
@@ -133,6 +134,10 @@ def _crossings(
 def _side(vertices: FloatArray, tail: IntArray, head: IntArray, x: Column, y: Column) -> FloatArray:
     """Return twice the signed area of tail, head, column; for head, tail its exact opposite."""
     a, b = vertices[np.minimum(tail, head), :2].T, vertices[np.maximum(tail, head), :2].T
-    area = (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])
-    area[area == 0.0] = np.finfo(float).tiny
+    along, across = b[0] - a[0], b[1] - a[1]
+    area = along * (y - a[1]) - across * (x - a[0])
+    if len(on := np.flatnonzero(area == 0.0)):  # moved on in x by next to nothing; in y, by less
+        along, across = (np.broadcast_to(way, area.shape)[on] for way in (along, across))
+        shift = np.where(across == 0.0, along, -across)
+        area[on] = np.copysign(np.finfo(float).tiny, shift)
     return np.asarray(np.where(tail < head, area, -area))
