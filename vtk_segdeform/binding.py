@@ -100,7 +100,7 @@ class Binder:
         if groups is not None and energy.exact:
             faces = [cage.faces for cage in self.cages]
             energy = with_cage_stiffness(energy, self.rest_cages, faces, groups)
-        stand_in = StandIn.of(self.rest, subspace, whole=energy.turns_vertices)
+        stand_in = StandIn.of(self.regions.mesh, subspace, whole=energy.turns_vertices)
         return Binding(energy, stand_in)
 
     def _groups(self) -> IntArray | None:
