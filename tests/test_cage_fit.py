@@ -13,11 +13,11 @@ from vtk_segdeform.cage_fit import fit_cage, fit_cages
 from vtk_segdeform.cages import Cage, cage_faults
 from vtk_segdeform.caging.cage_simplify import roundness, simplify
 from vtk_segdeform.caging.contour import contour_surface
-from vtk_segdeform.surface.columns import inside_nodes, inside_points
 from vtk_segdeform.caging.region_solid import Patch, Skin, _filled, principal_axes
 from vtk_segdeform.errors import CageError, Cancelled, RegionError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.regions import Regions
+from vtk_segdeform.surface.columns import inside_nodes, inside_points
 from vtk_segdeform.surface.inside import distance_to_surface, winding_number
 
 TURN = rotation([1.0, 2.0, -0.5], 1.234)

@@ -78,7 +78,8 @@ def simplify(vertices: FloatArray, faces: IntArray, n_vertices: int) -> tuple[Fl
         while left > n_vertices:
             edges, cost, place = _priced(surface)
             key = edges @ [len(vertices), 1]
-            cost[np.isin(key, refused)] = np.inf
+            at = np.searchsorted(key, refused).clip(max=len(key) - 1)
+            cost[at[key[at] == refused]] = np.inf
             chosen = _apart(edges, cost, len(vertices))[: left - n_vertices]
             if len(chosen):
                 done = _collapse(surface, edges[chosen], place[chosen], roundness)
@@ -101,7 +102,7 @@ def roundness(vertices: FloatArray, faces: IntArray) -> FloatArray:
 def _gather(vertices: FloatArray, faces: IntArray) -> _Surface:
     """Return the surface with a third of each face's quadric and area in each corner."""
     corners = vertices[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     twice_area = np.linalg.norm(normal, axis=1)
     normal /= np.maximum(twice_area, np.finfo(float).tiny)[:, None]
     level = np.einsum("fi,fi->f", normal, corners[:, 0])
@@ -122,8 +123,9 @@ def _priced(s: _Surface) -> tuple[IntArray, FloatArray, FloatArray]:
     """Return all edges i < j, what collapsing each costs (infinite: it may not), and where to."""
     tail, head, apex = (s.faces[:, k].ravel() for k in ([0, 1, 2], [1, 2, 0], [2, 0, 1]))
     up = tail < head
-    order = np.lexsort((head[up], tail[up]))
-    reverse = np.lexsort((tail[~up], head[~up]))
+    n = len(s.points)
+    order = np.argsort(tail[up] * n + head[up])
+    reverse = np.argsort(head[~up] * n + tail[~up])
     i, j = tail[up][order], head[up][order]
     middle = 0.5 * (s.points[i] + s.points[j])
     A, b, c = s.A[i] + s.A[j], s.b[i] + s.b[j], s.c[i] + s.c[j]
@@ -131,8 +133,8 @@ def _priced(s: _Surface) -> tuple[IntArray, FloatArray, FloatArray]:
     # (A + k I)(p - m) = b - A m, by the rule of cross products for a symmetric matrix
     pull = b - np.einsum("eij,ej->ei", A, middle)
     x, y, z = (A + stiffness[:, None, None] * np.eye(3)).transpose(1, 0, 2)
-    yz = np.cross(y, z)
-    inverse = np.stack([yz, np.cross(z, x), np.cross(x, y)], axis=1)
+    yz = _cross(y, z)
+    inverse = np.stack([yz, _cross(z, x), _cross(x, y)], axis=1)
     place = middle + np.einsum("eij,ej->ei", inverse, pull) / np.einsum("ei,ei->e", x, yz)[:, None]
     error = np.einsum("eij,ei,ej->e", A, place, place) - 2 * np.einsum("ei,ei->e", b, place) + c
     squared_length = ((s.points[i] - s.points[j]) ** 2).sum(axis=1)
@@ -220,8 +222,16 @@ def _collapse(s: _Surface, edges: IntArray, place: FloatArray, roundness: float)
 def _normals(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the unit normals of triangles and their roundness."""
     a, b, c = corners.transpose(1, 0, 2)
-    normal = np.cross(b - a, c - a)
+    normal = _cross(b - a, c - a)
     twice_area = np.linalg.norm(normal, axis=1)
     edges = ((b - a) ** 2 + (c - b) ** 2 + (a - c) ** 2).sum(axis=1)
     normal /= np.maximum(twice_area, np.finfo(float).tiny)[:, None]
     return normal, 2.0 * np.sqrt(3.0) * twice_area / np.maximum(edges, np.finfo(float).tiny)
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return `numpy.cross` of (n, 3) vectors; in a third of its time where they are few."""
+    out = np.empty_like(a)
+    for k in range(3):
+        out[:, k] = a[:, k - 2] * b[:, k - 1] - a[:, k - 1] * b[:, k - 2]
+    return out

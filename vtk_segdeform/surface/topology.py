@@ -140,11 +140,12 @@ def connected(n: int, one: IntArray, other: IntArray) -> IntArray:
     if n == 0:
         return np.empty(0, dtype=np.int64)
     links = sparse.coo_array((np.ones(len(one), bool), (one, other)), shape=(n, n))
-    _, found = csgraph.connected_components(links, directed=False)
-    _, first, label = np.unique(found, return_index=True, return_inverse=True)
-    rank = np.empty(len(first), np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return rank[label]
+    count, found = csgraph.connected_components(links, directed=False)
+    first = np.empty(count, np.int64)
+    first[found[::-1]] = np.arange(n)[::-1]  # of all that are written, the last one stays
+    rank = np.empty(count, np.int64)
+    rank[np.argsort(first)] = np.arange(count)
+    return rank[found]
 
 
 def first_of_group(group: IntArray) -> IntArray:
