@@ -33,8 +33,12 @@ demo: $(VENV)/installed
 bench: $(VENV)/installed
 	$(BIN)/segdeform bench -o bench-output
 
+# Each worker takes the next tests when it has done its own: files stay together, and what is made
+# once for a file is.  Where the environment forbids to keep bytecode, every worker, and every
+# program that a test starts, would compile all anew.
+test: export PYTHONDONTWRITEBYTECODE :=
 test: $(VENV)/installed-test
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 # In a real ParaView, whose own numpy and scipy may be too old: newer ones are put beside it.
 test-paraview: $(VENV)/installed-test
