@@ -7,7 +7,6 @@ of those poses to the last bit, no older than the last that was kept.
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import os
 import random
@@ -84,19 +83,15 @@ def programs():
     here = Path(__file__)
     forks = subprocess.Popen(
         [sys.executable, here.parent / "app_hands.py"], stdin=subprocess.PIPE, text=True,
-        env={**os.environ, "PYTHONPATH": str(here.parent.parent)},
+        env={**os.environ, "PYTHONPATH": str(here.parent.parent)}, start_new_session=True,
     )  # fmt: skip
-    started = []
 
     def start(what: str, folder: Path) -> Program:
         print(what, folder, file=forks.stdin, flush=True)
-        started.append(Program(folder))
-        return started[-1]
+        return Program(folder)
 
     yield start
-    for program in started:
-        with contextlib.suppress(ProcessLookupError):
-            program.kill()
+    os.killpg(forks.pid, signal.SIGKILL)  # and all it started, also what was too late to be told
     forks.stdin.close()
     forks.wait()
 
