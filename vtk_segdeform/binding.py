@@ -33,7 +33,7 @@ from .rotations import rotation_groups
 from .stand_in import StandIn
 from .subspace import Subspace, bind
 
-_FORMAT = 1  # raise it whenever what is bound changes
+_FORMAT = 2  # raise it whenever what is bound changes
 _MOST = 4 << 30  # bytes in a folder
 _ENDING = ".bound.npz"
 

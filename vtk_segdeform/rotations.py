@@ -26,7 +26,7 @@ from .fast import compiled, inputs
 from .threads import n_threads
 
 _TIMES = 40  # as long as a face of a volume takes each
-_MANY = 50_000  # positions
+_MANY = 20_000  # positions
 _EQUAL = 4  # nearest centres among which the favoured one is found
 _TIE_BREAK = 1e-6  # relative: of equal distances one is preferred, the same in every frame
 

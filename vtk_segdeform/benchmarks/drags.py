@@ -17,12 +17,13 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..deformer import Deformer
-from ..solution import Solution
+from ..solution import Solution, Status
 from .measuring import timed
 from .tasks import NEAR, Task
 
 _MOST_STEPS = 300
-_FEW, _MANY = 2, 10  # steps between which the cost of one is measured
+_FEW, _MANY = 2, 12  # steps between which the cost of one is measured
+_FAR = 18  # moves of a frame at once: a target that takes more steps than that
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,11 +66,11 @@ def way_of(task: Task, moves: int) -> list[FloatArray]:
 
 
 def seconds_per_step(deformer: Deformer, task: Task, repeats: int) -> float:
-    """Return what one more step of a frame costs: the slope between few steps and many.
+    """Return what one more step costs: the slope between few steps and many to a far target.
 
-    NaN if the frame needs no more, or if the machine is too busy to tell.
+    Both stop short of it: what arrives is landed again.  NaN if the machine is too busy to tell.
     """
-    first, second = way_of(task, 2)
+    first, *_, second = way_of(task, _FAR)
     deformer.reset()
     begin = deformer.solve(first, max_steps=_MANY).cage_vertices
 
@@ -77,10 +78,12 @@ def seconds_per_step(deformer: Deformer, task: Task, repeats: int) -> float:
         deformer.resume(begin, first)
         return deformer.solve(second, max_steps=steps)
 
-    few, many = run(_FEW).steps, run(_MANY).steps
-    if many == few:
+    limits = range(_MANY, _FEW, -1)
+    most = next((k for k in limits if run(k).status is Status.STEP_LIMIT), None)
+    if most is None:
         return float("nan")
+    few, many = run(_FEW).steps, run(most).steps
     # Long and short by turns: what else the machine does slows both.
-    short, long = (partial(timed, partial(run, steps)) for steps in (_FEW, _MANY))
+    short, long = (partial(timed, partial(run, steps)) for steps in (_FEW, most))
     slope = median(long()[1] - short()[1] for _ in range(3 * repeats)) / (many - few)
     return slope if slope > 0.0 else float("nan")

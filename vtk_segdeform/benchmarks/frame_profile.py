@@ -11,6 +11,7 @@ Handles move by 1 % of the diagonal a frame; a frame is as many steps as `drags`
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from statistics import median
 from tempfile import TemporaryDirectory
@@ -30,6 +31,7 @@ from .tasks import bent_cactus, bound, deformer_of, warm_up
 
 _NAN = float("nan")
 _PIECE = 1 << 18
+_SETTLING = 0.5  # seconds, in which BLAS's threads give up waiting for more after the set-up
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,7 @@ def profiled(size: int, scale: Scale) -> Profile:
         deformer = ready.deformer
         what = deformer.regions, deformer.cages
         again = timed(lambda: deformer_of(task, *what, cache=cache))[1]
+    time.sleep(_SETTLING)
     drag = list(frames(deformer, way_of(task, scale.frames)))[1:]
     pose = drag[-1].solution.vertices
     cages = drag[-1].solution.cage_vertices
