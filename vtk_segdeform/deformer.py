@@ -314,7 +314,8 @@ class Deformer:
         self._to_places = gathered[:, : len(self.handle)].tocsr()
         self._fixed_places = gathered[:, len(self.handle) :] @ self._rest.vertices[self.fixed]
         self._volumes = self._stand_in.volumes(self._constraints, self._rest.vertices)
-        self._at_rest = GaussNewton(self._energy, positions, self._volumes)
+        with one_blas_thread():
+            self._at_rest = GaussNewton(self._energy, positions, self._volumes)
         one = len(self._constraints) == 1 and self._keeps == (True, False)
         self._is_wide = one and self._stand_in.cells is not None and mesh.n_vertices > _WIDE
         held = self._rest.vertices[self.fixed] if len(self.fixed) else np.zeros((1, 3))

@@ -103,16 +103,19 @@ def rotation_groups(positions: FloatArray, parts: IntArray, n_groups: int) -> In
 
 def _farthest_points(positions: FloatArray, count: int, favour: FloatArray) -> IntArray:
     chosen = np.empty(count, dtype=np.int64)
-    distance = _squares(positions - positions.mean(axis=0))
+    x = np.ascontiguousarray(positions.T)
+    way, towards = np.empty_like(x), np.empty(len(positions))
+
+    def squares(centre: FloatArray) -> FloatArray:
+        np.subtract(x, centre[:, None], out=way)
+        return np.asarray(np.add.reduce(np.multiply(way, way, out=way), axis=0, out=towards))
+
+    distance = squares(x.mean(axis=1)).copy()
     for k in range(count):
         chosen[k] = np.argmax(distance * favour)
-        towards = _squares(positions - positions[chosen[k]])
-        distance = towards if k == 0 else np.minimum(distance, towards)
+        near = squares(x[:, chosen[k]])
+        distance = near.copy() if k == 0 else np.minimum(distance, near, out=distance)
     return chosen
-
-
-def _squares(ways: FloatArray) -> FloatArray:
-    return np.asarray(np.einsum("ij,ij->i", ways, ways))
 
 
 def _numbered(labels: IntArray) -> IntArray:

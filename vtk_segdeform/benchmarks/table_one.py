@@ -124,12 +124,12 @@ def case_of(ready: Bound, task: Task, scale: Scale, *, plain: bool) -> Case:
 def _products(ready: Bound, *, plain: bool) -> Callable[[], None]:
     """Return what a step does with W: x = W p, the volume's direction beside it, and W^T y."""
     subspace, columns = ready.deformer.subspace, 3 if plain else 6
-    p, x = np.ones((subspace.n_columns, columns)), np.ones((subspace.n_vertices, 3))
+    p, y = np.ones((subspace.n_columns, columns)), np.ones((subspace.n_vertices, 3))
 
     def products() -> None:
-        subspace.map(p, x)
+        subspace.map(p)
         for _ in range(2 if plain else 1):  # of J_g, and of b where every vertex turns
-            subspace.adjoint(x)
+            subspace.adjoint(y)
 
     return products
 
