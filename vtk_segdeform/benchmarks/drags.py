@@ -22,8 +22,8 @@ from .measuring import timed
 from .tasks import NEAR, Task
 
 _MOST_STEPS = 300
-_FEW, _MANY = 2, 12  # steps between which the cost of one is measured
-_FAR = 18  # moves of a frame at once: a target that takes more steps than that
+_FEW, _MANY = 1, 12  # steps between which the cost of one is measured
+_FAR, _LONG = 18, 2  # moves of a frame at once; its first steps, after which curvature is kept
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,22 +68,26 @@ def way_of(task: Task, moves: int) -> list[FloatArray]:
 def seconds_per_step(deformer: Deformer, task: Task, repeats: int) -> float:
     """Return what one more step costs: the slope between few steps and many to a far target.
 
-    Both stop short of it: what arrives is landed again.  NaN if the machine is too busy to tell.
+    Both take up the curvature once, and stop short of the target: what arrives is landed again.
+    NaN if the machine is too busy to tell.
     """
-    first, *_, second = way_of(task, _FAR)
+    far = way_of(task, _FAR)[-1]
     deformer.reset()
-    begin = deformer.solve(first, max_steps=_MANY).cage_vertices
+    begin = deformer.solve(far, max_steps=_LONG).cage_vertices
 
     def run(steps: int) -> Solution:
-        deformer.resume(begin, first)
-        return deformer.solve(second, max_steps=steps)
+        deformer.resume(begin, far)
+        return deformer.solve(far, max_steps=steps)
 
-    limits = range(_MANY, _FEW, -1)
-    most = next((k for k in limits if run(k).status is Status.STEP_LIMIT), None)
+    most = max((k for k in range(_FEW + 1, _MANY) if _is_on_its_way(run(k), k)), default=None)
     if most is None:
         return float("nan")
-    few, many = run(_FEW).steps, run(most).steps
     # Long and short by turns: what else the machine does slows both.
     short, long = (partial(timed, partial(run, steps)) for steps in (_FEW, most))
-    slope = median(long()[1] - short()[1] for _ in range(3 * repeats)) / (many - few)
+    slope = median(long()[1] - short()[1] for _ in range(3 * repeats)) / (most - _FEW)
     return slope if slope > 0.0 else float("nan")
+
+
+def _is_on_its_way(solution: Solution, steps: int) -> bool:
+    """Tell whether a solve took all its steps, and those of one weight only."""
+    return solution.status is Status.STEP_LIMIT and solution.steps == steps

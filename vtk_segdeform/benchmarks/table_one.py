@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
+from ..blocks import add_product, is_heavy
 from ..progress import Progress
 from ..rotations import closest_rotations
 from ..volume import signed_volume, volume_gradient
@@ -124,10 +125,13 @@ def case_of(ready: Bound, task: Task, scale: Scale, *, plain: bool) -> Case:
 def _products(ready: Bound, *, plain: bool) -> Callable[[], None]:
     """Return what a step does with W: x = W p, the volume's direction beside it, and W^T y."""
     subspace, columns = ready.deformer.subspace, 3 if plain else 6
-    p, y = np.ones((subspace.n_columns, columns)), np.ones((subspace.n_vertices, 3))
+    p, x = np.ones((subspace.n_columns, columns)), np.zeros((subspace.n_vertices, columns))
+    y = np.ones((subspace.n_vertices, 3))
+    heavy = is_heavy(subspace.blocks)
 
     def products() -> None:
-        subspace.map(p)
+        for rows, block, own in zip(subspace.rows, subspace.blocks, subspace.columns, strict=True):
+            add_product(x, rows, block, p[own], heavy=heavy)
         for _ in range(2 if plain else 1):  # of J_g, and of b where every vertex turns
             subspace.adjoint(y)
 
