@@ -8,9 +8,10 @@ from numpy.testing import assert_allclose
 from scenes import sausage
 from solids import rotation
 
+from vtk_segdeform import blocks
 from vtk_segdeform.energy import shape_energy
 from vtk_segdeform.solution import Status
-from vtk_segdeform.subspace import bind
+from vtk_segdeform.subspace import Subspace, bind
 
 SCENE = sausage(2)
 SUBSPACE = bind(SCENE.regions, SCENE.cages)
@@ -45,6 +46,27 @@ def test_the_adjoint_is_the_adjoint():
 def test_single_rows_agree_with_the_map():
     ids = np.array([5, 900, 17])
     assert_allclose(SUBSPACE.at(ids) @ wobble(), SUBSPACE.map(wobble())[ids], atol=1e-12)
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("directions", [0, 1])
+def test_a_map_sets_every_vertex_to_where_it_starts_before_it_adds(
+    monkeypatch, compiled, directions
+):
+    """Vertices of several blocks, of one, and of none; more of them than a piece takes."""
+    monkeypatch.setattr(blocks, "_CACHED", 200)
+    rng, n = np.random.default_rng(3), 5000
+    rows = tuple(np.sort(rng.permutation(n - 10)[:k]) for k in (900, 2500))
+    subspace = Subspace(n, rows, tuple(rng.normal(size=(len(own), 7)) for own in rows))
+    subspace.__dict__["_is_heavy"] = compiled
+    start, p = rng.normal(size=(n, 3)), rng.normal(size=(14, 3 + 3 * directions))
+    expected = np.zeros((n, p.shape[1]))
+    expected[:, :3] = start
+    for own, block, columns in zip(rows, subspace.blocks, subspace.columns, strict=True):
+        expected[own] += block @ p[columns]
+    before = start.copy()
+    assert_allclose(subspace.map(p, start), expected, atol=1e-13)
+    assert_allclose(start, before, atol=0)
 
 
 def test_cages_that_share_no_vertex_do_not_couple():

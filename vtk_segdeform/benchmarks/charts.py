@@ -51,7 +51,7 @@ def line_plot(
             axis.set_yscale("log")
             axis.yaxis.set_major_formatter("{x:g}")
             axis.set_xticks([], minor=True)
-            axis.set_xticks(list(x), [f"{size:,.0f}" for size in x])
+            axis.set_xticks(list(x), [_short(size) for size in x])
         else:
             axis.set_ylim(0.0, 1.1 * max(max(values) for values in lines.values()))
             axis.set_xticks(list(x))
@@ -61,6 +61,12 @@ def line_plot(
         elif len(lines) > 1:
             axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
     figure.savefig(path)
+
+
+def _short(size: float) -> str:
+    """Return *size* in a few letters, so that neighbours on an axis do not meet."""
+    unit, letter = (1e6, "M") if size >= 1e6 else (1e3, "k") if size >= 1e3 else (1.0, "")
+    return f"{size / unit:.3g}{letter}"
 
 
 def stack_plot(
