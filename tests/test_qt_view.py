@@ -6,6 +6,7 @@ import gc
 import os
 import subprocess
 import sys
+import time
 import weakref
 
 import numpy as np
@@ -14,7 +15,8 @@ from qt_hands import Qt, QtHand, QtWidgets, application, until
 
 import pyvistaqt  # isort: skip
 import vtk_segdeform.plugin  # noqa: F401 - pyvistaqt does not ask pyvista's entry points
-from vtk_segdeform import models
+from vtk_segdeform import Regions, models
+from vtk_segdeform.widgets.editing import actions
 from vtk_segdeform.widgets.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.view import View
 
@@ -112,9 +114,19 @@ def test_the_whole_story_in_qt(qt):
     assert abs(session.volume_change) < 1e-12
 
 
-def test_a_job_is_stopped_by_escape_while_qt_runs(qt):
+def test_a_job_is_stopped_by_escape_while_qt_runs(qt, monkeypatch):
     _, editor, hand, _ = qt
+    end = time.monotonic() + 60.0
+
+    def endless(mesh, *, progress):  # the real one may be done before the key is down
+        while time.monotonic() < end:
+            progress(0.5, "looking everywhere")
+            time.sleep(0.001)
+        return Regions.single(mesh)
+
+    monkeypatch.setattr(actions, "segmented", endless)
     hand.key("g")
+    until(lambda: "looking everywhere" in editor.status, "the job")
     hand.key("Escape")
     until(lambda: not editor.is_busy, "the end")
     assert editor.session.regions is None
