@@ -3,6 +3,7 @@
     W~              `subspace.bind`
     E(p)            `energy.shape_energy`, `cage_stiffness`
     the stand-in    `stand_in.StandIn`
+    W~ in patches   `patches.Patches`, of a large mesh
 
 With a *cache*, a folder, it is kept there under a name made from all that it depends on, so that
 the same mesh with the same cages is bound once: opening a million vertices again takes seconds.
@@ -16,7 +17,7 @@ import secrets
 import sys
 import zipfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -27,15 +28,17 @@ from .cage_stiffness import with_cage_stiffness
 from .cages import Cage
 from .energy import Energy, shape_energy
 from .mesh import Mesh
+from .patches import Patches
 from .progress import Progress, part
 from .regions import Regions
 from .rotations import rotation_groups
 from .stand_in import StandIn
 from .subspace import Subspace, bind
 
-_FORMAT = 2  # raise it whenever what is bound changes
+_FORMAT = 3  # raise it whenever what is bound changes
 _MOST = 4 << 30  # bytes in a folder
 _ENDING = ".bound.npz"
+_LARGE = 100_000  # vertices beyond which what every frame maps by is kept in patches
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +47,12 @@ class Binding:
 
     energy: Energy
     stand_in: StandIn
+    patches: Patches | None = None
+
+    @property
+    def mapping(self) -> Subspace | Patches:
+        """What maps the cages to the mesh: W~, or W~ in patches."""
+        return self.patches or self.energy.subspace
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +110,10 @@ class Binder:
             faces = [cage.faces for cage in self.cages]
             energy = with_cage_stiffness(energy, self.rest_cages, faces, groups)
         stand_in = StandIn.of(self.regions.mesh, subspace, whole=energy.turns_vertices)
-        return Binding(energy, stand_in)
+        patches = None
+        if self.rest.n_vertices > _LARGE:
+            patches = Patches.of(subspace, self.rest.vertices, self.rest_cages)
+        return Binding(energy, stand_in, patches)
 
     def _groups(self) -> IntArray | None:
         n = self.rest.n_vertices
@@ -136,10 +148,13 @@ class Binder:
                 if "cells" in file:
                     surface = _subspace(file, "s", int(file["n_cells"]))
                     stand_in = StandIn(surface, file["cells"], file["shares"])
+                patches = None
+                if "patch_starts" in file:
+                    patches = Patches(*(file["patch_" + each.name] for each in fields(Patches)))
             os.utime(path)  # used: among the last to be thrown away
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
             return None
-        return Binding(energy, stand_in)
+        return Binding(energy, stand_in, patches)
 
 
 def cache_folder() -> Path | None:
@@ -170,6 +185,8 @@ def _write(path: Path, binding: Binding) -> None:
         arrays |= {"cells": stand_in.cells, "shares": stand_in.shares}
         arrays |= {"n_cells": np.array(stand_in.surface.n_vertices)}
         arrays |= _arrays(stand_in.surface, "s")
+    if patches := binding.patches:
+        arrays |= {"patch_" + each.name: getattr(patches, each.name) for each in fields(Patches)}
     draft = path.with_name(f".{secrets.token_hex(8)}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -161,8 +161,10 @@ class Deformer:
         what = self._rest, regions, self.cages, self._rest_cages, own
         binding = Binder(*what, stretch, rotation_groups).bound(cache, progress)
         self._own_blend, self._energy, self._stand_in = own, binding.energy, binding.stand_in
+        self._mapping = binding.mapping
         self._total_volume = total_volume(self._here)
-        self._large = LargeSurface(self.subspace, self._here.vertices, self._total_volume)
+        here = self._here.vertices
+        self._large = LargeSurface(self.subspace, self._mapping, here, self._total_volume)
         self._keep(preserve_volume, preserve_region_volumes)
         self._take_hold(fixed, handle)
         if progress:
@@ -362,7 +364,7 @@ class Deformer:
         is rounded.
         """
         moves = p - self._rest_cages * self._size
-        return self.subspace.map(np.hstack([moves, *directions]), self._here.vertices)
+        return self._mapping.map(np.hstack([moves, *directions]), self._here.vertices)
 
     def _placed(self, x: FloatArray) -> FloatArray:
         return x + self._origin if self._origin.any() else x

@@ -41,7 +41,7 @@ def grams(
         vertices = order[first + start : first + stop]
         ring = laplacian[vertices]
         used, place = np.unique(np.concatenate([ring.indices, vertices]), return_inverse=True)
-        columns, w = _dense(subspace, used)
+        columns, w = weights_at(subspace, used)
         places = place[: ring.nnz].astype(np.int32), ring.indptr.astype(np.int32)
         compact = sparse.csr_array((ring.data, *places), (len(vertices), len(used)))
         product, here = compact @ w, w[place[ring.nnz :]]
@@ -69,7 +69,7 @@ def _last_region(subspace: Subspace) -> IntArray:
     return region
 
 
-def _dense(subspace: Subspace, vertices: IntArray) -> tuple[IntArray, FloatArray]:
+def weights_at(subspace: Subspace, vertices: IntArray) -> tuple[IntArray, FloatArray]:
     """Return the columns of W~ that reach *vertices*, in order, and W~ there (k, c)."""
     reached = []
     for rows, block, own in zip(subspace.rows, subspace.blocks, subspace.columns, strict=True):

@@ -19,6 +19,7 @@ from .arrays import FloatArray
 from .constraints import VolumeConstraint, moved, restore
 from .device import DeviceError, DeviceSurface
 from .gpu import gpu_arrays
+from .patches import Patches
 from .subspace import Subspace
 
 _log = logging.getLogger(__name__)
@@ -61,14 +62,23 @@ class LargeSurface:
     ----------
     subspace : Subspace
         W~.
+    mapping : Subspace or Patches
+        W~ as it is mapped by where there is no GPU.
     rest : (n, 3) float
         Where the mesh is while no cage vertex has moved.
     constraint : VolumeConstraint
         The total volume, kept.
     """
 
-    def __init__(self, subspace: Subspace, rest: FloatArray, constraint: VolumeConstraint) -> None:
-        self._subspace, self._rest, self._constraint = subspace, rest, constraint
+    def __init__(
+        self,
+        subspace: Subspace,
+        mapping: Subspace | Patches,
+        rest: FloatArray,
+        constraint: VolumeConstraint,
+    ) -> None:
+        self._subspace, self._mapping = subspace, mapping
+        self._rest, self._constraint = rest, constraint
 
     def landed(self, moves: FloatArray, centre: FloatArray) -> tuple[FloatArray, float]:
         """Return the mesh (n, 3) for *moves* (m, 3) of the cages, and the scale about *centre*."""
@@ -79,7 +89,7 @@ class LargeSurface:
                 return self._device.host(there), scale
             except DeviceError as fault:
                 self._give_up(fault)
-        x = self._subspace.map(moves, self._rest)
+        x = self._mapping.map(moves, self._rest)
         return x, scaled(self._constraint, x, centre)
 
     @cached_property
