@@ -14,6 +14,7 @@ from vtk_segdeform.blocks import add_product, adjoint_product
 from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.mean_value import mean_value_coordinates
 from vtk_segdeform.rotations import closest_rotations
+from vtk_segdeform.subspace import Subspace
 from vtk_segdeform.volume import signed_volume, volume_along, volume_gradient
 
 MESH = models.torus(3000)
@@ -159,3 +160,22 @@ def test_mean_value_coordinates_agree_wherever_the_point_is(twin):
     quick, plain = twin(lambda: mean_value_coordinates(points, p, cage.faces))
     assert_allclose(quick, plain, atol=1e-11)
     assert_allclose(quick @ p, points, atol=1e-11)
+
+
+@pytest.mark.parametrize("columns", [3, 6, 9])
+def test_a_small_subspace_multiplied_in_one_call_is_the_sum_over_its_regions(twin, columns):
+    rows = [np.sort(RNG.permutation(4001)[:count]) for count in (3000, 1801, 0, 7)]
+    blocks = [RNG.normal(size=(len(own), m)) for own, m in zip(rows, (50, 33, 20, 12), strict=True)]
+    subspace = Subspace(4001, tuple(rows), tuple(blocks))
+    reached = subspace.reached_alike()
+    assert 5 <= len(reached) <= 8  # by none, by one, by two, by three
+    assert_array_equal(np.sort(np.concatenate(reached)), np.arange(4001))
+    p, start, y = (RNG.normal(size=(k, c)) for k, c in ((115, columns), (4001, 3), (4001, 3)))
+    for call in (
+        lambda: subspace.map(p),
+        lambda: subspace.map(p, start),
+        lambda: subspace.adjoint(y),
+    ):
+        quick, plain = twin(call)
+        assert subspace._is_small
+        assert_allclose(quick, plain, rtol=1e-12, atol=1e-11)

@@ -8,6 +8,8 @@ exact, as ever, while half as much memory is read.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from .threads import in_parallel
 _CACHED = 1 << 17  # numbers of a block that are multiplied at a time: a megabyte
 _ROW = 48  # numbers that take as long as a face of a volume
 _PIECES = 16  # of a block at most, for compiled kernels: to hand one over takes its time
+_NOTHING = inputs(np.empty((0, 3)))[0]
 _DENSE = 1 << 22  # numbers in a dense piece: 32 megabytes
 
 
@@ -83,3 +86,46 @@ def pieces(n: int, width: int) -> list[slice]:
     """Return 0..n in slices of rows whose dense arrays of *width* columns stay small."""
     size = max(_DENSE // width, 1)
     return [slice(start, min(start + size, n)) for start in range(0, n, size)]
+
+
+@dataclass(frozen=True, eq=False)
+class Groups:
+    """A small W~ end to end, so that one call of a kernel multiplies by all of it.
+
+    Vertices that the same cages reach are a group, a dense block of its own: each vertex is met
+    once, and nothing is handed over per region.
+
+    Parameters
+    ----------
+    rows, columns, weights : (n,) int, (sum c,) int, (sum k c,) float
+        For each group its vertices, the cage vertices that reach them, and W~ there.
+    starts : (groups + 1, 3) int
+        Where each begins in these.
+    """
+
+    rows: IntArray
+    columns: IntArray
+    weights: FloatArray
+    starts: IntArray
+
+    @classmethod
+    def of(cls, groups: Sequence[tuple[IntArray, IntArray, FloatArray]]) -> Groups:
+        """Return *groups* of (rows (k,), columns (c,), weights (k, c)) end to end."""
+        sizes = [[array.size for array in arrays] for arrays in groups]
+        starts = np.concatenate([np.zeros((1, 3), dtype=np.int64), np.cumsum(sizes, axis=0)])
+        parts = (np.concatenate([a.ravel() for a in each]) for each in zip(*groups, strict=True))
+        return cls(*inputs(*parts, starts))
+
+    def map(self, p: FloatArray, start: FloatArray | None, kernels: Any) -> FloatArray:
+        """Return `Subspace.map` of *p* (m, k), k a multiple of 3."""
+        x = np.empty((len(self.rows), p.shape[1]))
+        base, p = (_NOTHING, *inputs(p)) if start is None else inputs(start, p)
+        kernels.put_groups(x, base, p, self.rows, self.columns, self.weights, self.starts)
+        return x
+
+    def adjoint(self, y: FloatArray, n_columns: int, kernels: Any) -> FloatArray:
+        """Return `Subspace.adjoint` of *y* (n, 3)."""
+        p = np.zeros((3, n_columns))
+        (y,) = inputs(y)
+        kernels.add_groups_adjoint(p, y, self.rows, self.columns, self.weights, self.starts)
+        return p.T

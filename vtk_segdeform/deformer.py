@@ -26,7 +26,7 @@ from scipy import sparse
 from .arrays import FloatArray, as_points, is_number, is_whole
 from .binding import Binder
 from .cages import Cage
-from .constraints import VolumeConstraint, region_volumes, total_volume
+from .constraints import VolumeConstraint, Volumes, region_volumes, total_volume
 from .errors import ArgumentError, CageError, ConstraintError, RegionError
 from .iteration import Iteration, SolverOptions
 from .landing import LargeSurface, along
@@ -201,6 +201,11 @@ class Deformer:
     def subspace(self) -> Subspace:
         """W~, from which ``subspace.map`` makes mesh vertices of stacked cage vertices."""
         return self._energy.subspace
+
+    @property
+    def step_volumes(self) -> Volumes:
+        """What the solver's steps hold: the volumes, and the surface they are taken over."""
+        return self._volumes
 
     def passengers(self, points: ArrayLike, *, progress: Progress | None = None) -> Passengers:
         """Bind other points (k, 3) to the cages, to be moved with them; see `passengers`."""

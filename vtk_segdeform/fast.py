@@ -29,7 +29,7 @@ def inputs(*arrays: NDArray[Any]) -> tuple[NDArray[Any], ...]:
     """Return *arrays* in the one form that kernels are compiled for: contiguous and read-only."""
     plain = [np.ascontiguousarray(array).view() for array in arrays]
     for array in plain:
-        array.flags.writeable = False
+        array.setflags(write=False)
     return tuple(plain)
 
 

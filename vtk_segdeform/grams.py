@@ -41,7 +41,7 @@ def grams(
         vertices = order[first + start : first + stop]
         ring = laplacian[vertices]
         used, place = np.unique(np.concatenate([ring.indices, vertices]), return_inverse=True)
-        columns, w = weights_at(subspace, used)
+        columns, w = subspace.reaching(used)
         places = place[: ring.nnz].astype(np.int32), ring.indptr.astype(np.int32)
         compact = sparse.csr_array((ring.data, *places), (len(vertices), len(used)))
         product, here = compact @ w, w[place[ring.nnz :]]
@@ -67,22 +67,3 @@ def _last_region(subspace: Subspace) -> IntArray:
     for r, rows in enumerate(subspace.rows):
         region[rows] = r
     return region
-
-
-def weights_at(subspace: Subspace, vertices: IntArray) -> tuple[IntArray, FloatArray]:
-    """Return the columns of W~ that reach *vertices*, in order, and W~ there (k, c)."""
-    reached = []
-    for rows, block, own in zip(subspace.rows, subspace.blocks, subspace.columns, strict=True):
-        if not len(rows):
-            continue
-        found = np.searchsorted(rows, vertices).clip(max=len(rows) - 1)
-        mine = np.flatnonzero(rows[found] == vertices)
-        if len(mine):
-            reached.append((mine, found[mine], block, own))
-    widths = [block.shape[1] for _, _, block, _ in reached]
-    w = np.zeros((len(vertices), sum(widths)))
-    ends = np.cumsum(widths)
-    for (mine, found, block, _), end in zip(reached, ends, strict=True):
-        w[mine, end - block.shape[1] : end] = block[found]
-    columns = [np.arange(own.start, own.stop) for *_, own in reached]
-    return np.concatenate(columns), w

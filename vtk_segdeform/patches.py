@@ -25,7 +25,6 @@ import numpy as np
 
 from .arrays import FloatArray, IntArray
 from .fast import compiled, inputs
-from .grams import weights_at
 from .progress import Progress
 from .subspace import Subspace
 from .threads import in_parallel
@@ -73,12 +72,12 @@ class Patches:
         *rest* (n, 3) and *rest_cages* (m, 3) are the mesh and the stacked cages at rest, size
         about 1.
         """
-        patches = [ids for some in _reached_alike(subspace) for ids in _split(some, rest)]
+        patches = [ids for some in subspace.reached_alike() for ids in _split(some, rest)]
         parts: dict[int, tuple[IntArray, IntArray, FloatArray, FloatArray]] = {}
 
         def work(first: int, last: int) -> None:
             for k, ids in enumerate(patches[first:last], first):
-                own, w = weights_at(subspace, ids)
+                own, w = subspace.reaching(ids)
                 affine = np.column_stack([np.ones(len(own)), rest_cages[own]])
                 parts[k] = ids, own, *_factors(w, affine)
 
@@ -128,17 +127,6 @@ class Patches:
             a, b, c, d = (slice(i, j) for i, j in zip(here, after, strict=True))
             ids, own = self.vertices[a], self.columns[b]
             yield ids, own, self.left[c].reshape(-1, len(ids)), self.right[d].reshape(-1, len(own))
-
-
-def _reached_alike(subspace: Subspace) -> list[IntArray]:
-    """Return all vertices, those together that the same cages reach."""
-    label = np.zeros(subspace.n_vertices, dtype=np.int64)
-    for rows in subspace.rows:
-        reached = np.zeros(subspace.n_vertices, dtype=bool)
-        reached[rows] = True
-        label = np.unique(2 * label + reached, return_inverse=True)[1]
-    order = np.argsort(label, kind="stable")
-    return np.split(order, np.cumsum(np.bincount(label))[:-1])
 
 
 def _split(ids: IntArray, positions: FloatArray) -> list[IntArray]:

@@ -21,15 +21,17 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from .arrays import FloatArray, IntArray
-from .blocks import add_product, adjoint_product, double, is_heavy, pieces
+from .blocks import Groups, add_product, adjoint_product, double, is_heavy, pieces
 from .cages import Cage
 from .errors import CageError, RegionError
+from .fast import compiled
 from .mean_value import mean_value_coordinates
 from .progress import Progress, part
 from .regions import Regions
 
 _LARGEST = 1e3  # mesh diagonals a cage may measure
 _BOUND = 1 << 15  # vertices at a time
+_AT_ONCE = 1 << 20  # numbers in all blocks that one thread multiplies in one call
 _SINGLE = 8_000_000  # numbers in a block times regions beyond which W~ is kept in single precision
 
 
@@ -56,11 +58,21 @@ class Subspace:
     def _is_heavy(self) -> bool:
         return is_heavy(self.blocks)
 
+    @cached_property
+    def _is_small(self) -> bool:
+        return self._is_heavy and 0 < sum(block.size for block in self.blocks) <= _AT_ONCE
+
+    @cached_property
+    def _groups(self) -> Groups:
+        return Groups.of([(ids, *self.reaching(ids)) for ids in self.reached_alike()])
+
     def map(self, p: FloatArray, start: FloatArray | None = None) -> FloatArray:
         """Return x = W~ p, (n, k), for stacked cage vertices *p* (m, k).
 
         With *start* (n, 3) that is added to the first three columns.
         """
+        if self._is_small and p.shape[1] % 3 == 0 and (kernels := compiled()):
+            return self._groups.map(p, start, kernels)
         make = np.zeros if start is None else np.empty
         x = make((self.n_vertices, p.shape[1]))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
@@ -70,6 +82,8 @@ class Subspace:
 
     def adjoint(self, y: FloatArray) -> FloatArray:
         """Return W~^T y, (m, 3), for *y* (n, 3) on the mesh."""
+        if self._is_small and y.shape[1] == 3 and (kernels := compiled()):
+            return self._groups.adjoint(y, self.n_columns, kernels)
         p = np.empty((self.n_columns, y.shape[1]))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
             p[columns] = adjoint_product(rows, block, y, heavy=self._is_heavy)
@@ -85,6 +99,34 @@ class Subspace:
             found = place[vertices]
             out[found >= 0, columns] = block[found[found >= 0]]
         return out
+
+    def reaching(self, vertices: IntArray) -> tuple[IntArray, FloatArray]:
+        """Return the columns of W~ that reach *vertices* (k,), in order, and W~ there (k, c)."""
+        reached = []
+        for rows, block, own in zip(self.rows, self.blocks, self.columns, strict=True):
+            if not len(rows):
+                continue
+            found = np.searchsorted(rows, vertices).clip(max=len(rows) - 1)
+            mine = np.flatnonzero(rows[found] == vertices)
+            if len(mine):
+                reached.append((mine, found[mine], block, own))
+        w = np.zeros((len(vertices), sum(own.stop - own.start for *_, own in reached)))
+        end = 0
+        for mine, found, block, own in reached:
+            begin, end = end, end + own.stop - own.start
+            w[mine, begin:end] = block[found]
+        columns = [np.arange(own.start, own.stop) for *_, own in reached]
+        return np.concatenate([np.arange(0), *columns]), w
+
+    def reached_alike(self) -> list[IntArray]:
+        """Return all vertices, those together that the same cages reach."""
+        label = np.zeros(self.n_vertices, dtype=np.int64)
+        for rows in self.rows:
+            reached = np.zeros(self.n_vertices, dtype=np.int64)
+            reached[rows] = 1
+            label = np.unique(2 * label + reached, return_inverse=True)[1]
+        order = np.argsort(label, kind="stable")
+        return np.split(order, np.cumsum(np.bincount(label))[:-1])
 
     def left(self, operator: sparse.csr_array) -> FloatArray:
         """Return operator @ W~, dense (k, m), for a sparse *operator* (k, n) with few rows."""

@@ -1,7 +1,8 @@
 """The inner loops in compiled form, by numba; each does what a twin in numpy does, to rounding.
 
     volumes       `volume.signed_volume`, `volume.volume_along_path`, `volume.volume_gradient`
-    products      `blocks.add_product`, `blocks.add_adjoint`, `patches.Patches.map`
+    products      `blocks.add_product`, `blocks.adjoint_product`, `blocks.Groups`,
+                  `patches.Patches`
     coordinates   `mean_value.mean_value_coordinates`
     rotations     `rotations.closest_rotations`
 
@@ -10,13 +11,15 @@ at a time.  Their arguments are positional, as numba wants it, and outputs come 
 """
 
 from .coordinates import weights
-from .products import add_adjoint, add_product, put_patches
+from .products import add_adjoint, add_groups_adjoint, add_product, put_groups, put_patches
 from .rotations import rotations
 from .volumes import volume_along_sums, volume_gradient, volume_sums
 
 __all__ = [
     "add_adjoint",
+    "add_groups_adjoint",
     "add_product",
+    "put_groups",
     "put_patches",
     "rotations",
     "volume_along_sums",

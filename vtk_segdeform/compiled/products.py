@@ -1,6 +1,6 @@
 """Products of W~ with a few columns, for `blocks` and `patches`; single precision is widened.
 
-Four rows at a time: what is read of the columns then serves all of them.
+Several rows at a time: what is read of the columns then serves all of them.
 """
 
 from __future__ import annotations
@@ -9,59 +9,83 @@ import numba
 import numpy as np
 
 _compile = numba.njit(nogil=True, cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
+_IN_A_ROW = 1 << 14  # numbers that are read forwards, so that they are fetched ahead
 
 
 @_compile
 def add_product(x, rows, block, p, start, stop):
     """Add block @ p.T to the *rows* start..stop of *x*, for *p* (k, m) with k a multiple of 3."""
-    k, m = p.shape
-    four = start + (stop - start) // 4 * 4
-    for i in range(start, four, 4):
-        b0, b1, b2, b3 = block[i], block[i + 1], block[i + 2], block[i + 3]
-        r0, r1, r2, r3 = rows[i], rows[i + 1], rows[i + 2], rows[i + 3]
-        for c in range(0, k, 3):
-            px, py, pz = p[c], p[c + 1], p[c + 2]
-            x0 = y0 = z0 = x1 = y1 = z1 = x2 = y2 = z2 = x3 = y3 = z3 = 0.0
-            for j in range(m):
-                u, v, w = px[j], py[j], pz[j]
-                t = float(b0[j])
-                x0 += t * u
-                y0 += t * v
-                z0 += t * w
-                t = float(b1[j])
-                x1 += t * u
-                y1 += t * v
-                z1 += t * w
-                t = float(b2[j])
-                x2 += t * u
-                y2 += t * v
-                z2 += t * w
-                t = float(b3[j])
-                x3 += t * u
-                y3 += t * v
-                z3 += t * w
-            for r, a, b, d in (
-                (r0, x0, y0, z0),
-                (r1, x1, y1, z1),
-                (r2, x2, y2, z2),
-                (r3, x3, y3, z3),
-            ):
-                x[r, c] += a
-                x[r, c + 1] += b
-                x[r, c + 2] += d
-    for i in range(four, stop):
-        b0, r0 = block[i], rows[i]
-        for c in range(0, k, 3):
-            px, py, pz = p[c], p[c + 1], p[c + 2]
-            x0 = y0 = z0 = 0.0
-            for j in range(m):
-                t = float(b0[j])
-                x0 += t * px[j]
-                y0 += t * py[j]
-                z0 += t * pz[j]
-            x[r0, c] += x0
-            x[r0, c + 1] += y0
-            x[r0, c + 2] += z0
+    if len(p) == 6:
+        _add_six(x, rows, block, p, start, stop)
+        return
+    two = start + (stop - start) // 2 * 2
+    for i in range(start, two, 2):
+        b, d, q, r = block[i], block[i + 1], rows[i], rows[i + 1]
+        for c in range(0, len(p), 3):
+            p0, p1, p2 = p[c], p[c + 1], p[c + 2]
+            s0 = s1 = s2 = t0 = t1 = t2 = 0.0
+            for j in range(len(b)):
+                u0, u1, u2 = p0[j], p1[j], p2[j]
+                v, w = float(b[j]), float(d[j])
+                s0 += v * u0
+                s1 += v * u1
+                s2 += v * u2
+                t0 += w * u0
+                t1 += w * u1
+                t2 += w * u2
+            for row, d0, d1, d2 in ((q, s0, s1, s2), (r, t0, t1, t2)):
+                x[row, c] += d0
+                x[row, c + 1] += d1
+                x[row, c + 2] += d2
+    for i in range(two, stop):
+        _add_row(x[rows[i]], block[i], p)
+
+
+@_compile
+def _add_six(x, rows, block, p, start, stop):
+    """Do `add_product` for six columns, and read a block once: all sums are in registers still."""
+    p0, p1, p2, p3, p4, p5 = p[0], p[1], p[2], p[3], p[4], p[5]
+    two = start + (stop - start) // 2 * 2
+    for i in range(start, two, 2):
+        b, c, q, r = block[i], block[i + 1], rows[i], rows[i + 1]
+        s0 = s1 = s2 = s3 = s4 = s5 = t0 = t1 = t2 = t3 = t4 = t5 = 0.0
+        for j in range(len(b)):
+            u0, u1, u2, u3, u4, u5 = p0[j], p1[j], p2[j], p3[j], p4[j], p5[j]
+            v, w = float(b[j]), float(c[j])
+            s0 += v * u0
+            s1 += v * u1
+            s2 += v * u2
+            s3 += v * u3
+            s4 += v * u4
+            s5 += v * u5
+            t0 += w * u0
+            t1 += w * u1
+            t2 += w * u2
+            t3 += w * u3
+            t4 += w * u4
+            t5 += w * u5
+        for row, d0, d1, d2, d3, d4, d5 in (
+            (q, s0, s1, s2, s3, s4, s5),
+            (r, t0, t1, t2, t3, t4, t5),
+        ):
+            x[row, 0] += d0
+            x[row, 1] += d1
+            x[row, 2] += d2
+            x[row, 3] += d3
+            x[row, 4] += d4
+            x[row, 5] += d5
+    for i in range(two, stop):
+        _add_row(x[rows[i]], block[i], p)
+
+
+@_compile
+def _add_row(x, b, p):
+    """Add p @ b to *x* (k,)."""
+    for c in range(len(p)):
+        q, s = p[c], 0.0
+        for j in range(len(b)):
+            s += float(b[j]) * q[j]
+        x[c] += s
 
 
 @_compile
@@ -90,6 +114,59 @@ def add_adjoint(p, rows, block, y):
             px[j] += t * x0
             py[j] += t * y0
             pz[j] += t * z0
+
+
+@_compile
+def put_groups(x, base, p, rows, columns, weights, starts):
+    """Put W~ @ p into *x* for all groups of `blocks.Groups`; *p* is (m, k), k by threes.
+
+    To the first three columns *base* (n, 3) is added; or (0, 3), which is nothing.
+    """
+    here, k = np.empty(p.size), p.shape[1]
+    for g in range(len(starts) - 1):
+        ids = rows[starts[g, 0] : starts[g + 1, 0]]
+        own = columns[starts[g, 1] : starts[g + 1, 1]]
+        n, c = len(ids), len(own)
+        block = weights[starts[g, 2] : starts[g + 1, 2]].reshape((n, c))
+        some = here[: k * c].reshape((k, c))
+        for j in range(c):
+            for d in range(k):
+                some[d, j] = p[own[j], d]
+        _start(x, base, ids)
+        add_product(x, ids, block, some, 0, n)
+
+
+@_compile
+def _start(x, base, rows):
+    """Set *rows* of *x* to those of *base*, and to zero beyond its columns."""
+    for r in rows:
+        x[r] = 0.0
+        if len(base) > 0:
+            x[r, 0], x[r, 1], x[r, 2] = base[r, 0], base[r, 1], base[r, 2]
+
+
+@_compile
+def add_groups_adjoint(p, y, rows, columns, weights, starts):
+    """Add (W~.T @ y).T to *p* (3, m), for *y* (n, 3).
+
+    From the last group to the first, and in each from its last rows on: these are what
+    `put_groups` has left in the cache, as this leaves it the first.
+    """
+    here = np.empty(p.size)
+    for g in range(len(starts) - 2, -1, -1):
+        ids = rows[starts[g, 0] : starts[g + 1, 0]]
+        own = columns[starts[g, 1] : starts[g + 1, 1]]
+        n, c = len(ids), len(own)
+        block = weights[starts[g, 2] : starts[g + 1, 2]].reshape((n, c))
+        some = here[: 3 * c].reshape((3, c))
+        some[:] = 0.0
+        step = max(_IN_A_ROW // c, 4)
+        for k in range((n - 1) // step, -1, -1):
+            piece = slice(k * step, min((k + 1) * step, n))
+            add_adjoint(some, ids[piece], block[piece], y)
+        for d in range(3):
+            for j in range(c):
+                p[d, own[j]] += some[d, j]
 
 
 @_compile
@@ -124,15 +201,13 @@ def put_patches(x, base, p, vertices, columns, left, right, starts, first, last)
                     q2 += w * here[2, j]
                 turned[0, k], turned[1, k], turned[2, k] = q0, q1, q2
             _add_rows(sums, u, turned, n, rank)
-            if a == 0 and len(base) > 0:
-                for i in range(n):
-                    r = ids[i]
+            for i in range(n):
+                r = ids[i]
+                if a == 0 and len(base) > 0:
                     x[r, 0] = base[r, 0] + sums[0, i]
                     x[r, 1] = base[r, 1] + sums[1, i]
                     x[r, 2] = base[r, 2] + sums[2, i]
-            else:
-                for i in range(n):
-                    r = ids[i]
+                else:
                     x[r, a], x[r, a + 1], x[r, a + 2] = sums[0, i], sums[1, i], sums[2, i]
 
 
