@@ -21,12 +21,12 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 STORY = [
     # a checked mesh
     "errors", "arrays", "progress", "threads", "compiled.volumes", "compiled.products",
-    "compiled.rotations", "compiled.coordinates", "fast", "surface.topology",
+    "compiled.normals", "compiled.rotations", "compiled.coordinates", "fast", "surface.topology",
     "surface.manifold", "surface.inside", "surface.columns",
     "surface.intersections", "surface.report", "surface.shells", "faults", "mesh", "surface.holes",
     "surface.splitting", "surface.repair_steps", "repair",
     # what a deformation keeps
-    "volume", "local_volume", "distortion", "differential", "rotations",
+    "volume", "normals", "local_volume", "distortion", "differential", "rotations",
     # regions and their cages
     "blending", "regions", "segmenting.thinning", "segmenting.coarse", "segmenting.borders",
     "segmenting.necks", "segmenting.slices", "segmentation", "mean_value", "blocks", "cages",
@@ -98,7 +98,7 @@ STORY = [
 
 NUMERIC = {"numpy", "scipy"}
 VTK = {"vtkmodules"}
-KERNELS = {"volumes", "products", "rotations", "coordinates"}
+KERNELS = ("volumes", "products", "normals", "rotations", "coordinates")
 PANEL = {"controls", "modes", "painting", "regions", "handles", "options", "foot", "log", "panel"}
 PROGRAM = {
     "keeper", "opening", "start_page", "drops", "pages", "asking", "saving", "menus", "window",

@@ -1,8 +1,7 @@
 """The mesh of a session, in its pose, as one actor that every widget shares.
 
-Positions are written in place and normals computed anew at every change of the pose; colours are
-layers, of which the one that came last is seen.  VTK's `vtkPolyDataNormals` would keep the
-normals it finds, so `vtkTriangleMeshPointNormals` computes them.
+Positions and normals are written in place at every change of the pose; colours are layers, of which
+the one that came last is seen.
 """
 
 from __future__ import annotations
@@ -12,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-from vtkmodules.vtkFiltersCore import vtkTriangleMeshPointNormals
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from vtk_segdeform.editing.listeners import Change
 from vtk_segdeform.formats.polygons import polydata_of
+from vtk_segdeform.normals import VertexNormals
 from vtk_segdeform.palette import BODY, rgb
 from vtk_segdeform.session import Session
 
@@ -42,10 +41,13 @@ class SurfaceDisplay:
         corners = np.full(len(faces), 3)
         self.polydata = polydata_of(session.vertices.copy(), corners, faces.ravel())
         self._points: NDArray[np.float64] = vtk_to_numpy(self.polydata.GetPoints().GetData())
-        self._normals = vtkTriangleMeshPointNormals()
-        self._normals.SetInputData(self.polydata)
+        self._vertex_normals = VertexNormals(session.mesh)
+        self._normals = self._vertex_normals.of(self._points)
+        self._normal_array = numpy_to_vtk(self._normals)
+        self._normal_array.SetName("Normals")
+        self.polydata.GetPointData().SetNormals(self._normal_array)
         self._mapper = vtkPolyDataMapper()
-        self._mapper.SetInputConnection(self._normals.GetOutputPort())
+        self._mapper.SetInputData(self.polydata)
         self._mapper.SetScalarVisibility(False)
         self._mapper.SetResolveCoincidentTopologyToPolygonOffset()  # wires on it stay visible
         self.actor = vtkActor()
@@ -86,11 +88,13 @@ class SurfaceDisplay:
         self._points[:] = self.session.vertices
         self.polydata.GetPoints().GetData().Modified()
         self.polydata.GetPoints().Modified()
+        self.update_normals()
         self.view.touch()
 
     def update_normals(self) -> None:
-        """Compute the normals now rather than when the view is next drawn."""
-        self._normals.Update()
+        """Compute the normals of the pose that is drawn; done by itself at every change."""
+        self._vertex_normals.of(self._points, self._normals)
+        self._normal_array.Modified()
 
     def remove(self) -> None:
         """Take the mesh out of the view, for good."""

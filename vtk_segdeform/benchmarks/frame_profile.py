@@ -4,7 +4,7 @@
     step      one more step of the solver; must not depend on the size of the mesh
     map       x = W p
     volume    that of the whole mesh, once
-    normals   by VTK;  render: off the screen, by whatever OpenGL there is
+    normals   at all vertices;  render: off the screen, by whatever OpenGL there is
 
 Handles move by 1 % of the diagonal a frame; a frame is as many steps as `drags` says.
 """

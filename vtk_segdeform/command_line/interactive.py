@@ -104,13 +104,13 @@ def _row(size: int, n_cage_vertices: int, moves: int, progress: Progress | None)
             _send(view.interactor, "MouseMoveEvent", start + [across, 0.0])
             ended = time.perf_counter()
             solved, mapped, told = stamps[:3]
-            # The event has computed normals while it drew; once more, to know how long that took.
-            surface.polydata.GetPoints().Modified()
+            # The event has computed normals, too; once more, to know how long that took.
             again = time.perf_counter()
             surface.update_normals()
             normals = time.perf_counter() - again
-            spent = (solved - began, mapped - solved, told - mapped, normals)
-            for stage, seconds in zip(_STAGES, (*spent, ended - told - normals), strict=True):
+            shown = max(mapped - solved - normals, 0.0)
+            spent = (solved - began, shown, told - mapped, normals, ended - told)
+            for stage, seconds in zip(_STAGES, spent, strict=True):
                 times[stage].append(1e3 * seconds)
             times["event"].append(1e3 * (ended - began))
             times["steps"].append(session.solution.steps if session.solution else 0)

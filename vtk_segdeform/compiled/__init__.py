@@ -4,6 +4,7 @@
     products      `blocks.add_product`, `blocks.adjoint_product`, `blocks.Groups`,
                   `patches.Patches`
     coordinates   `mean_value.mean_value_coordinates`
+    normals       `normals.VertexNormals`
     rotations     `rotations.closest_rotations`
 
 They let go of the interpreter and call no threads of their own; `threads.in_parallel` runs several
@@ -11,6 +12,7 @@ at a time.  Their arguments are positional, as numba wants it, and outputs come 
 """
 
 from .coordinates import weights
+from .normals import ring_normals, rings
 from .products import add_adjoint, add_groups_adjoint, add_product, put_groups, put_patches
 from .rotations import rotations
 from .volumes import volume_along_sums, volume_gradient, volume_sums
@@ -21,6 +23,8 @@ __all__ = [
     "add_product",
     "put_groups",
     "put_patches",
+    "ring_normals",
+    "rings",
     "rotations",
     "volume_along_sums",
     "volume_gradient",

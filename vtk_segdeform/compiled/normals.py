@@ -1,0 +1,54 @@
+"""Rings of neighbours, and cross products summed around them, for `normals`."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+_compile = numba.njit(nogil=True, cache=True, error_model="numpy")
+
+
+@_compile
+def rings(ring, faces, starts):
+    """Put the neighbours of each vertex into *ring* (3m,), in the order that goes around it."""
+    n = len(starts) - 1
+    fill, pairs, after = (
+        starts[:-1].copy(),
+        np.empty((len(ring), 2), np.int32),
+        np.empty(n, np.int32),
+    )
+    for f in range(len(faces)):
+        for corner in range(3):
+            i = faces[f, corner]
+            pairs[fill[i], 0] = faces[f, (corner + 1) % 3]
+            pairs[fill[i], 1] = faces[f, (corner + 2) % 3]
+            fill[i] += 1
+    for i in range(n):
+        for t in range(starts[i], starts[i + 1]):
+            after[pairs[t, 0]] = pairs[t, 1]
+        j = pairs[starts[i], 0]
+        for t in range(starts[i], starts[i + 1]):
+            j = after[j]
+            ring[t] = j
+
+
+@_compile
+def ring_normals(out, x, ring, starts, scale, first, last):
+    """Put the unit normals of vertices first..last of *x* times *scale* into *out* (n, 3)."""
+    for i in range(first, last):
+        end = starts[i + 1] - 1
+        ox, oy, oz = x[i, 0], x[i, 1], x[i, 2]
+        j = ring[end]
+        ex, ey, ez = scale * (x[j, 0] - ox), scale * (x[j, 1] - oy), scale * (x[j, 2] - oz)
+        nx = ny = nz = 0.0
+        for t in range(starts[i], end + 1):
+            j = ring[t]
+            gx, gy, gz = scale * (x[j, 0] - ox), scale * (x[j, 1] - oy), scale * (x[j, 2] - oz)
+            nx += ey * gz - ez * gy
+            ny += ez * gx - ex * gz
+            nz += ex * gy - ey * gx
+            ex, ey, ez = gx, gy, gz
+        length = np.sqrt(nx * nx + ny * ny + nz * nz)
+        if not length > 0.0:
+            nx, ny, nz, length = 0.0, 0.0, 0.0, 1.0
+        out[i, 0], out[i, 1], out[i, 2] = nx / length, ny / length, nz / length
