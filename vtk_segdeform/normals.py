@@ -62,7 +62,7 @@ class VertexNormals:
         return out
 
     @cached_property
-    def _rings(self) -> tuple[IntArray, IntArray]:
+    def _rings(self) -> tuple[NDArray[np.int32], IntArray]:
         """(3m,) and (n + 1,): the neighbours of all vertices, and where each one's begin."""
         starts = np.concatenate([[0], np.cumsum(np.bincount(self._faces.ravel()))])
         ring = np.empty(self._faces.size, dtype=np.int32)
