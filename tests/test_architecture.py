@@ -32,8 +32,8 @@ STORY = [
     "segmenting.necks", "segmenting.slices", "segmentation", "mean_value", "blocks", "cages",
     "caging.region_solid", "caging.contour", "caging.cage_simplify", "cage_fit",
     # the solver
-    "subspace", "passengers", "grams", "patches", "energy", "cage_stiffness", "curvature",
-    "constraints", "stand_in", "binding", "device", "gpu", "landing", "positions", "acceleration",
+    "subspace", "passengers", "sampling", "grams", "patches", "energy", "cage_stiffness",
+    "curvature", "constraints", "stand_in", "binding", "device", "gpu", "landing", "positions", "acceleration",
     "solution", "iteration", "solver", "stiffening", "targets", "deformer", "pipeline",
     # a deformation in the making
     "editing.listeners", "editing.naming", "editing.state", "editing.history", "editing.painting",

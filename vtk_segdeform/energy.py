@@ -16,7 +16,8 @@ For given R the energy is quadratic.  Both lines see R through one 3 x 3 matrix 
 
     E(p) = min_R  tr(p^T Q p) - 2 sum_g tr(R_g S_g) + c,        S_g = K_g p  (linear in p)
 
-Q (m, m) and K (3 G, m) are computed once, so a step costs nothing that grows with the mesh.
+Q (m, m) and K (3 G, m) are computed once, so a step costs nothing that grows with the mesh; of
+a large mesh few vertices are asked for them (`sampling`).
 
 Source
 ------
@@ -45,6 +46,7 @@ from .errors import ArgumentError
 from .grams import grams
 from .mesh import Mesh
 from .rotations import closest_rotations
+from .sampling import Sample
 from .subspace import Subspace
 
 _CHUNK = 400_000  # faces
@@ -139,24 +141,33 @@ def shape_energy(mesh: Mesh, subspace: Subspace, stretch: float, groups: IntArra
     """
     if not is_number(stretch, 0.0):
         raise ArgumentError(f"stretch must be a number, 0 or more; got {stretch!r}")
-    per_vertex = groups is None
-    shape = surface_operators(mesh, np.arange(mesh.n_vertices) if groups is None else groups)
-    areas = shape.areas
-    strength, share = 0.25 / areas, areas / areas.sum()
-    bending, stretching, mass = grams(subspace, shape.laplacian, strength, share, near=groups)
+    surface: Mesh | Sample = mesh
+    rows, near = subspace, groups
+    if groups is not None and (sample := Sample.of(mesh, groups)):
+        surface, rows, near = sample, sample.rows(subspace), groups[sample.ids]
+    shape = surface_operators(surface, np.arange(mesh.n_vertices) if near is None else near)
+    bending, stretching, mass = grams(
+        rows,
+        shape.laplacian,
+        0.25 * shape.counts / shape.areas,
+        shape.counts * shape.areas / (shape.counts @ shape.areas),
+        stiffness=shape.stiffness,
+        near=near,
+    )
     unit = np.trace(bending) / np.trace(stretching)
     pull = shape.detail + (stretch * unit) * shape.fans
     fit = pull if stretch > 0.0 else shape.detail + unit * shape.fans
-    if not per_vertex:
+    if groups is not None:
         fit, pull = (
-            (reduced := subspace.left(pull), reduced)
+            (reduced := rows.left(pull), reduced)
             if fit is pull
-            else (subspace.left(fit), subspace.left(pull))
+            else (rows.left(fit), rows.left(pull))
         )
-    rest = float(areas @ (shape.delta**2).sum(axis=1))
+    curved = float((shape.counts * shape.areas) @ (shape.delta**2).sum(axis=1))
+    flat = float(np.vdot(surface.vertices, shape.stiffness @ surface.vertices))  # twice the area
     return Energy(
         quadratic=bending + stretch * unit * stretching,
-        constant=rest + 2.0 * stretch * unit * float(mesh.face_areas.sum()),
+        constant=curved + stretch * unit * flat,
         mass=mass,
         fit=fit,
         pull=pull,
@@ -165,28 +176,38 @@ def shape_energy(mesh: Mesh, subspace: Subspace, stretch: float, groups: IntArra
 
 
 class SurfaceOperators(NamedTuple):
-    """What both lines of E are made of, over the vertices of a mesh."""
+    """What both lines of E are made of, over the vertices of a mesh or of a sample of it."""
 
-    laplacian: sparse.csr_array  # C, (n, n)
+    counts: FloatArray  # c, (n,): how often what a vertex says is counted; 1 over a whole mesh
     areas: FloatArray  # A, (n,)
     delta: FloatArray  # (n, 3), eq. (5)
+    laplacian: sparse.csr_array  # C, (n, n)
+    stiffness: sparse.csr_array  # C of triangles that count as often as their corners, (n, n)
     detail: sparse.csr_array  # K of the first line, (3 G, n): 3 x 3 matrices S_g by rows
     fans: sparse.csr_array  # K of the second, over s
 
 
-def surface_operators(mesh: Mesh, groups: IntArray) -> SurfaceOperators:
-    """Return the operators of *mesh* for the rotation group of each vertex, *groups* (n,)."""
-    vertices, faces = mesh.vertices, mesh.faces
+def surface_operators(surface: Mesh | Sample, groups: IntArray) -> SurfaceOperators:
+    """Return the operators of *surface* for the rotation group of each vertex, *groups* (n,)."""
+    vertices, faces = surface.vertices, surface.faces
     cotangents = corner_cotangents(vertices, faces)
     areas = mixed_voronoi_areas(vertices, faces, cotangents=cotangents)
-    laplacian = cotangent_laplacian(vertices, faces, cotangents=cotangents)
+    laplacian = stiffness = cotangent_laplacian(vertices, faces, cotangents=cotangents)
+    counts = np.ones(len(vertices))
+    if isinstance(surface, Sample):
+        counts = surface.counts
+        shared = cotangents * counts[faces].mean(axis=1, keepdims=True)
+        stiffness = cotangent_laplacian(vertices, faces, cotangents=shared)
     delta = (laplacian @ vertices) / (2.0 * areas)[:, None]  # the left side of (5) is C x / (2 A)
+    thirds = area_gradients(vertices, faces, cotangents=cotangents) / 3.0
     return SurfaceOperators(
-        laplacian=laplacian,
+        counts=counts,
         areas=areas,
         delta=delta,
-        detail=_grouped(0.5 * delta, groups) @ laplacian,
-        fans=_fans(area_gradients(vertices, faces, cotangents=cotangents) / 3.0, faces, groups),
+        laplacian=laplacian,
+        stiffness=stiffness,
+        detail=_grouped(0.5 * counts[:, None] * delta, groups) @ laplacian,
+        fans=_fans(thirds, faces, groups, counts),
     )
 
 
@@ -198,25 +219,26 @@ def _grouped(values: FloatArray, groups: IntArray) -> sparse.csr_array:
     return sparse.coo_array(entries, (3 * (int(groups.max()) + 1), n)).tocsr()
 
 
-def _fans(gradients: FloatArray, faces: IntArray, groups: IntArray) -> sparse.csr_array:
-    """Return (3 G, n): row 3 g + a is axis a of sum_{i in g} sum_{T at i} A_T / 3 J_T^T.
+def _fans(
+    gradients: FloatArray, faces: IntArray, groups: IntArray, counts: FloatArray
+) -> sparse.csr_array:
+    """Return (3 G, n): row 3 g + a is axis a of sum_{i in g} c_i sum_{T at i} A_T / 3 J_T^T.
 
     *gradients* (m, 3, 3) are thirds of `area_gradients`: every corner sees the whole face.
     """
     n, shape = len(groups), (3 * (int(groups.max()) + 1), len(groups))
-    seen_from = groups[faces]
-    alike = (seen_from[:, :, None] == seen_from[:, None]).sum(axis=1)  # corners in each one's group
-    axes = (
-        np.bincount(faces.ravel(), (alike * g).ravel(), n) for g in np.moveaxis(gradients, 2, 0)
-    )
+    seen_from, asked = groups[faces], counts[faces]
+    alike = seen_from[:, :, None] == seen_from[:, None]
+    own = (alike * asked[:, None]).sum(axis=2)  # counts of the corners in each one's group
+    axes = (np.bincount(faces.ravel(), (own * g).ravel(), n) for g in np.moveaxis(gradients, 2, 0))
     fans = _grouped(np.stack(list(axes), axis=1), groups)
-    border = np.flatnonzero((alike < 3).any(axis=1))  # what is left: corners of other groups
+    border = np.flatnonzero(~alike.all(axis=(1, 2)))  # what is left: corners of other groups
     for start in range(0, len(border), _CHUNK):
         some = border[start : start + _CHUNK]
-        here = seen_from[some]
-        face, seen, corner = np.nonzero(here[:, :, None] != here[:, None])
-        rows = 3 * here[face, seen][:, None] + np.arange(3)
+        other = ~alike[some] & (asked[some] > 0.0)[:, :, None]
+        face, seen, corner = np.nonzero(other)
+        rows = 3 * seen_from[some[face], seen][:, None] + np.arange(3)
         columns = np.repeat(faces[some[face], corner], 3)
-        share = gradients[some[face], corner]
+        share = gradients[some[face], corner] * asked[some[face], seen][:, None]
         fans = fans + sparse.coo_array((share.ravel(), (rows.ravel(), columns)), shape).tocsr()
     return sparse.csr_array(fans)

@@ -24,14 +24,16 @@ def grams(
     strength: FloatArray,
     mass: FloatArray,
     *,
+    stiffness: sparse.csr_array | None = None,
     near: IntArray | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return W~^T C diag(strength) C W~, W~^T C W~ and W~^T diag(mass) W~, (m, m) each.
+    """Return W~^T C diag(strength) C W~, W~^T B W~ and W~^T diag(mass) W~, (m, m) each.
 
-    For a symmetric sparse C (n, n).  Cages that reach no common piece of the mesh have a zero
-    block: this is where several beat one.  Vertices with the same number in *near* (n,) lie
-    together and in one region; it only saves time.
+    For symmetric sparse C and B (n, n), *laplacian* and *stiffness*; B is C where it is not given.
+    Cages that reach no common piece of the mesh have a zero block: this is where several beat one.
+    Vertices with the same number in *near* (n,) lie together and in one region; it only saves time.
     """
+    both = [laplacian] if stiffness is None or stiffness is laplacian else [laplacian, stiffness]
     m = subspace.n_columns
     order = np.argsort(_last_region(subspace) if near is None else near, kind="stable")
     size = max(_TOGETHER // m, 1)
@@ -39,14 +41,17 @@ def grams(
 
     def work(first: int, start: int, stop: int) -> None:
         vertices = order[first + start : first + stop]
-        ring = laplacian[vertices]
-        used, place = np.unique(np.concatenate([ring.indices, vertices]), return_inverse=True)
+        rings = [each[vertices] for each in both]
+        met = [vertices, *(ring.indices.astype(np.int64) for ring in rings)]
+        used, place = np.unique(np.concatenate(met), return_inverse=True)
         columns, w = subspace.reaching(used)
-        places = place[: ring.nnz].astype(np.int32), ring.indptr.astype(np.int32)
-        compact = sparse.csr_array((ring.data, *places), (len(vertices), len(used)))
-        product, here = compact @ w, w[place[ring.nnz :]]
-        squares = (product * strength[vertices][:, None]).T @ product
-        plain, masses = here.T @ product, (here * mass[vertices][:, None]).T @ here
+        own, *places = np.split(place.astype(np.int32), np.cumsum([len(ids) for ids in met[:-1]]))
+        here, products = w[own], []
+        for ring, at in zip(rings, places, strict=True):
+            compact = ring.data, at, ring.indptr.astype(np.int32)
+            products.append(sparse.csr_array(compact, (len(vertices), len(used))) @ w)
+        squares = (products[0] * strength[vertices][:, None]).T @ products[0]
+        plain, masses = here.T @ products[-1], (here * mass[vertices][:, None]).T @ here
         found[start] = columns, [squares, plain, masses]
 
     totals = np.zeros((3, m, m))
