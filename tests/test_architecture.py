@@ -33,8 +33,9 @@ STORY = [
     "caging.region_solid", "caging.contour", "caging.cage_simplify", "cage_fit",
     # the solver
     "subspace", "passengers", "sampling", "grams", "patches", "energy", "cage_stiffness",
-    "curvature", "constraints", "stand_in", "binding", "device", "gpu", "landing", "positions", "acceleration",
-    "solution", "iteration", "solver", "stiffening", "targets", "deformer", "pipeline",
+    "curvature", "constraints", "stand_in", "binding", "device", "gpu", "landing", "positions",
+    "acceleration", "solution", "iteration", "solver", "stiffening", "targets", "deformer",
+    "pipeline",
     # a deformation in the making
     "editing.listeners", "editing.naming", "editing.state", "editing.history", "editing.painting",
     "editing.handles", "editing.posing", "session", "editing.archive", "store",
