@@ -31,12 +31,17 @@ from scipy.spatial import cKDTree
 from .arrays import FloatArray, IntArray, as_points
 from .errors import ArgumentError
 from .mesh import Mesh
+from .segmenting.thinning import cells as cells_of
+from .segmenting.thinning import unique_edges
 from .volume import corner_and_edges, volume_gradient
 
 _MOST_SHRINKS = 30
 _NARROWEST = np.cos(np.radians(40.0))  # a ball touching under a smaller angle sees its own skin
 _WIDTH = 0.25  # of the median ball's diameter
 _MOST_ROUNDS = 100
+_LARGE, _CELLS = 20_000, 8_000  # vertices beyond which, and about how many, cells stand for them
+_REACH = 1.6  # distances of neighbouring cells
+_AT_ONCE = 1 << 16  # vertices
 _LEAST = 0.05  # share of the mean flesh under which a quotient is not trusted
 
 
@@ -46,21 +51,22 @@ class LocalVolume:
     Parameters
     ----------
     mesh : Mesh
-        The rest shape, n vertices.
+        The rest shape, n vertices.  Of a large one it is the change of some thousand cells of
+        neighbouring vertices, each as one point at their mean, spread over the vertices again.
     """
 
     def __init__(self, mesh: Mesh) -> None:
-        self._faces, self._shape = mesh.faces, mesh.vertices.shape
-        self._opposite, diameter = _opposite_vertices(mesh)
-        n, m = mesh.n_vertices, mesh.n_faces
-        corners = mesh.faces.ravel(), np.repeat(np.arange(m), 3)
-        self._around = sparse.coo_array((np.ones(3 * m), corners), (n, m)).tocsr()
-        ring = (mesh.adjacency > 0).astype(float) + sparse.eye_array(n)
-        self._average = (sparse.diags_array(1.0 / ring.sum(axis=1)) @ ring).tocsr()
-        edge = float(np.median(mesh.adjacency.data)) if mesh.adjacency.nnz else 1.0
-        rounds = (_WIDTH * float(np.median(diameter)) / edge) ** 2
-        self._rounds = int(np.clip(round(rounds), 1, _MOST_ROUNDS))
-        self._rest = self._smoothed(mesh.vertices)
+        self._shape = mesh.vertices.shape
+        points, faces = mesh.vertices, mesh.faces
+        self._means = self._spread = None
+        if mesh.n_vertices > _LARGE:
+            _, cells = cells_of(mesh, _CELLS, np.random.default_rng(0))
+            self._means = _means(cells)
+            points, corners = self._means @ points, cells[faces]
+            faces = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
+            self._spread = _spread(mesh.vertices, cells, points, _edges(faces, len(points)))
+        self._flesh = _Flesh(points, faces)
+        self._rest = self._flesh.smoothed(points)
         floor = _LEAST * np.abs(self._rest).mean()
         self._trusted = self._rest > floor
 
@@ -69,13 +75,33 @@ class LocalVolume:
 
         Vertices over (almost) no flesh at rest, on the rim of a thin plate say, get 0.
         """
-        vertices = as_points(vertices, "vertices")
-        if vertices.shape != self._shape:
-            raise ArgumentError(f"vertices must have shape {self._shape}; got {vertices.shape}")
-        now = self._smoothed(vertices)
-        return np.divide(now - self._rest, self._rest, where=self._trusted, out=np.zeros(len(now)))
+        x = as_points(vertices, "vertices")
+        if x.shape != self._shape:
+            raise ArgumentError(f"vertices must have shape {self._shape}; got {x.shape}")
+        now = self._flesh.smoothed(x if self._means is None else self._means @ x)
+        s = np.divide(now - self._rest, self._rest, where=self._trusted, out=np.zeros(len(now)))
+        return s if self._spread is None else np.asarray(self._spread @ s)
 
-    def _smoothed(self, x: FloatArray) -> FloatArray:
+
+class _Flesh:
+    """L over a closed surface (k, 3), (m, 3), and what smoothes it."""
+
+    def __init__(self, points: FloatArray, faces: IntArray) -> None:
+        self._faces = faces
+        self._opposite, diameter = _opposite_vertices(points, faces)
+        n, m = len(points), len(faces)
+        corners = faces.ravel(), np.repeat(np.arange(m), 3)
+        self._around = sparse.coo_array((np.ones(3 * m), corners), (n, m)).tocsr()
+        i, j = _edges(faces, n).T
+        joined = sparse.coo_array((np.ones(len(i)), (i, j)), (n, n))
+        ring = joined + joined.T + sparse.eye_array(n)
+        self._average = (sparse.diags_array(1.0 / ring.sum(axis=1)) @ ring).tocsr()
+        edge = float(np.median(np.linalg.norm(points[i] - points[j], axis=1)))
+        rounds = (_WIDTH * float(np.median(diameter)) / edge) ** 2
+        self._rounds = int(np.clip(round(rounds), 1, _MOST_ROUNDS))
+
+    def smoothed(self, x: FloatArray) -> FloatArray:
+        """Return sum_j k_ij L_j(x), (k,)."""
         x = x - x.mean(axis=0)
         a, e, f = corner_and_edges(x, self._faces)
         normals = np.cross(e, f)
@@ -102,14 +128,53 @@ def local_volume_change(mesh: Mesh, vertices: FloatArray) -> FloatArray:
     return LocalVolume(mesh).change(vertices)
 
 
-def _opposite_vertices(mesh: Mesh) -> tuple[IntArray, FloatArray]:
+def _means(cells: IntArray) -> sparse.csr_array:
+    """Return (k, n), from vertices to the means of their *cells* (n,)."""
+    share = (1.0 / np.bincount(cells))[cells]
+    return sparse.coo_array((share, (cells, np.arange(len(cells))))).tocsr()
+
+
+def _spread(
+    x: FloatArray, cells: IntArray, points: FloatArray, edges: IntArray
+) -> sparse.csr_array:
+    """Return (n, k), from cells at *points* (k, 3) to vertices *x*: weights that sum to one.
+
+    Each vertex takes part of the cells within reach that lie at most two away from its own along
+    the surface, the nearer the more: so it is smooth, and stays on its side of a thin body.
+    """
+    i, j = edges.T
+    reach = _REACH * float(np.median(np.linalg.norm(points[i] - points[j], axis=1)))
+    joined = sparse.coo_array((np.ones(len(i)), (i, j)), (len(points), len(points)))
+    once = (joined + joined.T + sparse.eye_array(len(points))).tocsr()
+    twice = (once @ once).tocsr()
+    parts = []
+    for start in range(0, len(x), _AT_ONCE):
+        own = cells[start : start + _AT_ONCE]
+        candidates = twice[own]
+        vertex, near = (
+            np.repeat(np.arange(len(own)), np.diff(candidates.indptr)),
+            candidates.indices,
+        )
+        away = np.square(x[start + vertex] - points[near]).sum(axis=1) / reach**2
+        weight = (1.0 - away.clip(max=1.0)) ** 2 + 1e-9 * (near == own[vertex])
+        weight /= np.bincount(vertex, weight)[vertex]
+        some = sparse.csr_array((weight, near, candidates.indptr), candidates.shape)
+        some.eliminate_zeros()
+        parts.append(some)
+    return sparse.csr_array(sparse.vstack(parts, format="csr"))
+
+
+def _edges(faces: IntArray, n: int) -> IntArray:
+    return unique_edges(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), n)
+
+
+def _opposite_vertices(x: FloatArray, faces: IntArray) -> tuple[IntArray, FloatArray]:
     """Return o (n,) and the diameters (n,) of the inner balls that touch vertices i and o(i)."""
-    x = mesh.vertices
-    inward = -volume_gradient(x, mesh.faces)
+    inward = -volume_gradient(x, faces)
     length = np.linalg.norm(inward, axis=1, keepdims=True)
     inward = np.divide(inward, length, where=length > 0, out=np.zeros_like(inward))
     tree = cKDTree(x)
-    radius = np.full(len(x), mesh.diagonal)
+    radius = np.full(len(x), np.linalg.norm(np.ptp(x, axis=0)))
     opposite = np.asarray(tree.query(x + radius[:, None] * inward)[1], dtype=np.int64)
     active = np.arange(len(x))
     for _ in range(_MOST_SHRINKS):
