@@ -26,9 +26,10 @@ STORY = [
     "surface.intersections", "surface.report", "surface.shells", "faults", "mesh", "surface.holes",
     "surface.splitting", "surface.repair_steps", "repair",
     # what a deformation keeps
-    "volume", "normals", "local_volume", "distortion", "differential", "rotations",
+    "volume", "normals", "segmenting.thinning", "local_volume", "distortion", "differential",
+    "rotations",
     # regions and their cages
-    "blending", "regions", "segmenting.thinning", "segmenting.coarse", "segmenting.borders",
+    "blending", "regions", "segmenting.coarse", "segmenting.borders",
     "segmenting.necks", "segmenting.slices", "segmentation", "mean_value", "blocks", "cages",
     "caging.region_solid", "caging.contour", "caging.cage_simplify", "cage_fit",
     # the solver

@@ -27,7 +27,10 @@ from .volume import signed_volume, step_to_volume, volume_along_path, volume_gra
 
 @dataclass(frozen=True, eq=False)
 class VolumeConstraint:
-    """The volume inside closed *faces* over the points ``extension @ x`` stays at *target*."""
+    """The volume inside closed *faces* over the points ``extension @ x`` stays at *target*.
+
+    These are the points *x* and some more.
+    """
 
     faces: IntArray
     target: float
@@ -51,7 +54,9 @@ class VolumeConstraint:
         return step_to_volume(volume_along_path(self._extended(path), self.faces), self.target)
 
     def _extended(self, x: FloatArray) -> FloatArray:
-        return x if self.extension is None else self.extension @ x
+        if self.extension is None:
+            return x
+        return np.concatenate([x, self.extension[len(x) :] @ x])  # its upper part is the identity
 
 
 @dataclass(frozen=True, eq=False)

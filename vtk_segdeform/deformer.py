@@ -300,7 +300,7 @@ class Deformer:
         return region_volumes(self._here, self.regions.labels)
 
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:
-        x = x - self._origin
+        x = x - self._origin if self._origin.any() else x
         return np.array([each.relative(x) for each in self._region_volumes])
 
     def _take_hold(self, fixed: ArrayLike, handle: ArrayLike) -> None:

@@ -33,6 +33,7 @@ from .errors import ArgumentError
 from .mesh import Mesh
 from .segmenting.thinning import cells as cells_of
 from .segmenting.thinning import unique_edges
+from .threads import in_parallel
 from .volume import corner_and_edges, volume_gradient
 
 _MOST_SHRINKS = 30
@@ -41,7 +42,7 @@ _WIDTH = 0.25  # of the median ball's diameter
 _MOST_ROUNDS = 100
 _LARGE, _CELLS = 20_000, 8_000  # vertices beyond which, and about how many, cells stand for them
 _REACH = 1.6  # distances of neighbouring cells
-_AT_ONCE = 1 << 16  # vertices
+_AT_ONCE = 1 << 15  # vertices
 _LEAST = 0.05  # share of the mean flesh under which a quotient is not trusted
 
 
@@ -58,7 +59,8 @@ class LocalVolume:
     def __init__(self, mesh: Mesh) -> None:
         self._shape = mesh.vertices.shape
         points, faces = mesh.vertices, mesh.faces
-        self._means = self._spread = None
+        self._means: sparse.csr_array | None = None
+        self._spread: list[sparse.csr_array] = []
         if mesh.n_vertices > _LARGE:
             _, cells = cells_of(mesh, _CELLS, np.random.default_rng(0))
             self._means = _means(cells)
@@ -80,7 +82,16 @@ class LocalVolume:
             raise ArgumentError(f"vertices must have shape {self._shape}; got {x.shape}")
         now = self._flesh.smoothed(x if self._means is None else self._means @ x)
         s = np.divide(now - self._rest, self._rest, where=self._trusted, out=np.zeros(len(now)))
-        return s if self._spread is None else np.asarray(self._spread @ s)
+        if self._means is None:
+            return s
+        out = np.empty(len(x))
+
+        def work(first: int, last: int) -> None:
+            for k, weights in enumerate(self._spread[first:last], first):
+                out[k * _AT_ONCE : (k + 1) * _AT_ONCE] = weights @ s
+
+        in_parallel(work, len(self._spread), 1)
+        return out
 
 
 class _Flesh:
@@ -136,11 +147,12 @@ def _means(cells: IntArray) -> sparse.csr_array:
 
 def _spread(
     x: FloatArray, cells: IntArray, points: FloatArray, edges: IntArray
-) -> sparse.csr_array:
-    """Return (n, k), from cells at *points* (k, 3) to vertices *x*: weights that sum to one.
+) -> list[sparse.csr_array]:
+    """Return (n, k), from cells at *points* (k, 3) to vertices *x*, some rows at a time.
 
-    Each vertex takes part of the cells within reach that lie at most two away from its own along
-    the surface, the nearer the more: so it is smooth, and stays on its side of a thin body.
+    Weights sum to one.  Each vertex takes part of the cells within reach that lie at most two
+    away from its own along the surface, the nearer the more: so it is smooth, and stays on its
+    side of a thin body.
     """
     i, j = edges.T
     reach = _REACH * float(np.median(np.linalg.norm(points[i] - points[j], axis=1)))
@@ -161,7 +173,7 @@ def _spread(
         some = sparse.csr_array((weight, near, candidates.indptr), candidates.shape)
         some.eliminate_zeros()
         parts.append(some)
-    return sparse.csr_array(sparse.vstack(parts, format="csr"))
+    return parts
 
 
 def _edges(faces: IntArray, n: int) -> IntArray:

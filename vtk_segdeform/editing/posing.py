@@ -11,9 +11,9 @@ the same to the last bit.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from types import MappingProxyType
 
 import numpy as np
@@ -53,7 +53,7 @@ class Posing:
         self._bound: tuple[tuple[State, Deformer], ...] = ()  # newest first
         self._holding: tuple[Deformer, State, Deformer] | None = None
         self._at: Pose | None = None  # where the holding deformer is; None if elsewhere
-        self._shape: tuple[Pose, FloatArray, float] | None = None
+        self._shape: tuple[Pose, FloatArray, Callable[[], float]] | None = None
 
     @cached_property
     def _rest_volume(self) -> float:
@@ -93,7 +93,7 @@ class Posing:
 
     def volume_change(self, state: State, pose: Pose) -> float:
         """Return (V - V0) / V0 of *pose*, signed."""
-        return self._evaluated(state, pose)[1]
+        return self._evaluated(state, pose)[1]()
 
     def solve(
         self, state: State, targets: Mapping[str, FloatArray], max_steps: int | None
@@ -118,7 +118,7 @@ class Posing:
         pose = Pose(solution.cage_vertices, targets)
         self._at = pose
         x, change = self._evaluated(state, pose)
-        return pose, replace(solution, vertices=x, volume=partial(float, change))
+        return pose, replace(solution, vertices=x, volume=change)
 
     def free_form(self, state: State, cage_vertices: Sequence[FloatArray]) -> Pose:
         """Return the pose of *cage_vertices* (m_r, 3), cage by cage, with the volume of rest.
@@ -178,16 +178,18 @@ class Posing:
         if state.options.preserve_region_volumes and state.regions is not None:
             constraints = region_volumes(self._mesh, state.regions.labels)
             return all(abs(c.relative(x)) <= _SAME_VOLUME for c in constraints)
-        return not state.options.preserve_volume or abs(change) <= _SAME_VOLUME
+        return not state.options.preserve_volume or abs(change()) <= _SAME_VOLUME
 
-    def _evaluated(self, state: State, pose: Pose) -> tuple[FloatArray, float]:
-        """Return x = W~ p and its volume change."""
+    def _evaluated(self, state: State, pose: Pose) -> tuple[FloatArray, Callable[[], float]]:
+        """Return x = W~ p and what measures its volume change, once."""
         if self._shape is None or self._shape[0] is not pose:
             x = self.bind(state).surface(pose.cage_vertices)
             frozen(x)
-            change = signed_volume(x, self._mesh.faces) / self._rest_volume - 1.0
-            self._shape = pose, x, change
+            self._shape = pose, x, cache(partial(self._volume_change, x))
         return self._shape[1:]
+
+    def _volume_change(self, x: FloatArray) -> float:
+        return signed_volume(x, self._mesh.faces) / self._rest_volume - 1.0
 
 
 def _stacked(targets: Mapping[str, FloatArray]) -> FloatArray:

@@ -59,8 +59,8 @@ def colours_of(shares: FloatArray, half_range: float) -> NDArray[np.uint8]:
            [226, 226, 226],
            [138,  58,   2]], dtype=uint8)
     """
-    place = np.floor((shares / half_range + 1.0) * (0.5 * _N))
-    return _COLOURS[np.clip(place, 0, _N - 1).astype(np.intp)]
+    place = (shares / half_range + 1.0) * (0.5 * _N)
+    return np.take(_COLOURS, place.clip(0, _N - 1, out=place).astype(np.intp), axis=0)
 
 
 def lookup_table(half_range: float) -> Any:
