@@ -9,6 +9,7 @@ from scenes import sausage
 
 from vtk_segdeform import binding, fast, patches
 from vtk_segdeform import deformer as chapter
+from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.patches import Patches
 from vtk_segdeform.subspace import Subspace
 
@@ -108,3 +109,23 @@ def test_a_large_mesh_is_posed_by_its_patches_and_keeps_its_volume(
         assert (pose.vertices != whole.vertices).any()
         poses.append(pose.vertices)
     assert_array_equal(*poses)
+
+
+def test_making_them_tells_how_far_it_is_and_can_be_cancelled(monkeypatch):
+    monkeypatch.setattr(binding, "_LARGE", 1000)
+    told = []
+
+    def listen(share, message):
+        told.append((share, message))
+
+    SCENE.deformer(progress=listen)
+    shares = [share for share, _ in told]
+    assert shares == sorted(shares)
+    assert {message for _, message in told} >= {"making patches"}
+
+    def stop(share, message):
+        if message == "making patches":
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        SCENE.deformer(progress=stop)

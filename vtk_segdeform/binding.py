@@ -109,10 +109,13 @@ class Binder:
         if groups is not None and energy.exact:
             faces = [cage.faces for cage in self.cages]
             energy = with_cage_stiffness(energy, self.rest_cages, faces, groups)
+        if progress:
+            progress(0.85, "standing in")
         stand_in = StandIn.of(self.regions.mesh, subspace, whole=energy.turns_vertices)
         patches = None
         if self.rest.n_vertices > _LARGE:
-            patches = Patches.of(subspace, self.rest.vertices, self.rest_cages)
+            share = part(progress, 0.9, 1.0)
+            patches = Patches.of(subspace, self.rest.vertices, self.rest_cages, progress=share)
         return Binding(energy, stand_in, patches)
 
     def _groups(self) -> IntArray | None:

@@ -81,7 +81,7 @@ class Patches:
                 affine = np.column_stack([np.ones(len(own)), rest_cages[own]])
                 parts[k] = ids, own, *_factors(w, affine)
 
-        in_parallel(work, len(patches), _HANDED, progress=progress, message="factoring")
+        in_parallel(work, len(patches), _HANDED, progress=progress, message="making patches")
         in_order = [parts[k] for k in range(len(patches))]
         sizes = [[array.size for array in arrays] for arrays in in_order]
         starts = np.concatenate([np.zeros((1, 4), dtype=np.int64), np.cumsum(sizes, axis=0)])
