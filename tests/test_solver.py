@@ -10,6 +10,7 @@ from solids import rotation
 
 from vtk_segdeform import blocks
 from vtk_segdeform.energy import shape_energy
+from vtk_segdeform.positions import PositionTerm
 from vtk_segdeform.solution import Status
 from vtk_segdeform.subspace import Subspace, bind
 
@@ -189,3 +190,24 @@ def test_a_strong_pull_against_the_volume_neither_diverges_nor_breaks():
     solution = scene.deformer().solve(0.5 * SCENE.mesh.vertices)
     assert np.isfinite(solution.vertices).all()
     assert abs(solution.volume_change) < 1e-12
+
+
+def test_many_vertices_of_a_set_pull_as_few_rows_do():
+    rng = np.random.default_rng(6)
+    rows = rng.normal(size=(500, 40)) * (np.arange(40) < 12)  # reaches 12 of the cage vertices
+    rows = np.vstack([rows, rng.normal(size=(7, 40))])
+    set_of = np.repeat([0, 1], [500, 7])
+    base, strength = np.where(set_of == 0, 0.3, 2.0), np.array([5.0, 1.0])
+    term = PositionTerm(rows, set_of, base, strength)
+    p, u = rng.normal(size=(40, 3)), rng.normal(size=(507, 3))
+    pull = term.toward(u)
+    assert len(pull.rows) == 12 + 7
+    away = rows @ p - u
+    value, slope = pull.value_and_slope(p)
+    assert value == pytest.approx((term.weights * np.square(away).sum(axis=1)).sum(), rel=1e-13)
+    assert_allclose(slope, rows.T @ (term.weights[:, None] * away), rtol=1e-11, atol=1e-10)
+    other = term.stiffened(np.where(set_of == 0, 1.0, 0.0), 0.5)
+    assert_allclose(other.strength, [50.0, 1.0])
+    value, slope = other.value_and_slope(p, u)
+    assert value == pytest.approx((other.weights * np.square(away).sum(axis=1)).sum(), rel=1e-13)
+    assert_allclose(slope, rows.T @ (other.weights[:, None] * away), rtol=1e-11, atol=1e-9)

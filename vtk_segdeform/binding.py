@@ -35,7 +35,7 @@ from .rotations import rotation_groups
 from .stand_in import StandIn
 from .subspace import Subspace, bind
 
-_FORMAT = 4  # raise it whenever what is bound changes
+_FORMAT = 5  # raise it whenever what is bound changes
 _MOST = 4 << 30  # bytes in a folder
 _ENDING = ".bound.npz"
 _LARGE = 100_000  # vertices beyond which what every frame maps by is kept in patches

@@ -13,7 +13,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,32 +31,93 @@ from .subspace import Subspace
 _MANY, _PLACES = 1000, 500  # vertices of a set beyond which it has so many places
 _STIFFER = 10.0
 _STIFFEST = 1e4  # times the weight it started with
+_Set: TypeAlias = tuple[slice, FloatArray | None, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Pull:
+    """The term for targets that stay, as r rows: sum_i omega_i |rows_i p - aims_i|^2 + beyond."""
+
+    rows: FloatArray  # (r, m)
+    aims: FloatArray  # (r, 3)
+    weights: FloatArray  # (r,)
+    beyond: float
+
+    def value_and_slope(self, p: FloatArray) -> tuple[float, FloatArray]:
+        """Return the term at *p* (m, 3) and half its gradient (m, 3)."""
+        away = self.rows @ p - self.aims
+        pull = away * self.weights[:, None]
+        return self.beyond + float(np.vdot(away, pull)), self.rows.T @ pull
 
 
 @dataclass(frozen=True, eq=False)
 class PositionTerm:
-    """The term for k vertices in sets; `strength` (s,) multiplies the weight of each set."""
+    """The term for k vertices in sets; `strength` (s,) multiplies the weight of each set.
+
+    A set of many vertices reaches few cage vertices: its rows Q R count as R, with targets Q^T u.
+    What of the targets is beyond Q no pose can meet, and it says nothing of where to go.
+    """
 
     rows: FloatArray  # W~ at the k places, (k, m)
-    set_of: IntArray  # (k,)
-    base: FloatArray  # omega before strength, (k,)
+    set_of: IntArray  # (k,), in order
+    base: FloatArray  # omega before strength, (k,), the same within a set
     strength: FloatArray
     mean: sparse.csr_array | None = None  # (k, v), from the vertices held to the places
+    known: list[_Set] | None = None  # what `_sets` is, if it is known
 
     @property
     def weights(self) -> FloatArray:
         """omega, (k,)."""
         return self.base * self.strength[self.set_of]
 
+    @cached_property
+    def _sets(self) -> list[_Set]:
+        """For each set its places, Q if it is worth it, and R; or else its rows."""
+        if self.known is not None:
+            return self.known
+        size = np.bincount(self.set_of, minlength=len(self.strength))
+        ends = np.cumsum(size)
+        sets: list[_Set] = []
+        for start, end in zip(ends - size, ends, strict=True):
+            rows = self.rows[start:end]
+            reached = np.flatnonzero(rows.any(axis=0))
+            if len(rows) <= len(reached):
+                sets.append((slice(start, end), None, rows))
+                continue
+            q, r = np.linalg.qr(rows[:, reached])
+            short = np.zeros((len(r), rows.shape[1]))
+            short[:, reached] = r
+            sets.append((slice(start, end), q, short))
+        return sets
+
     def quadratic(self) -> FloatArray:
         """Return rows^T omega rows, (m, m)."""
         return (self.rows.T * self.weights) @ self.rows
 
+    def toward(self, u: FloatArray) -> Pull:
+        """Return the term for targets *u* (k, 3)."""
+        aims, beyond, omega = [np.empty((0, 3))], 0.0, self.weights
+        for places, q, _ in self._sets:
+            aim = u[places]
+            if q is not None:
+                aim = q.T @ u[places]
+                left = u[places] - q @ aim
+                beyond += float(omega[places.start] * np.vdot(left, left))
+            aims.append(aim)
+        rows, weights = self._short
+        return Pull(rows, np.concatenate(aims), weights, beyond)
+
+    @cached_property
+    def _short(self) -> tuple[FloatArray, FloatArray]:
+        """The rows of all sets, (r, m), and their weights (r,)."""
+        omega = self.weights
+        rows = [np.empty((0, self.rows.shape[1])), *(r for *_, r in self._sets)]
+        weights = [np.full(len(r), omega[places.start]) for places, _, r in self._sets]
+        return np.concatenate(rows), np.concatenate([np.empty(0), *weights])
+
     def value_and_slope(self, p: FloatArray, u: FloatArray) -> tuple[float, FloatArray]:
         """Return the term at *p* and half its gradient (m, 3), for targets *u* (k, 3)."""
-        away = self.rows @ p - u
-        pull = away * self.weights[:, None]
-        return float(np.vdot(away, pull)), self.rows.T @ pull
+        return self.toward(u).value_and_slope(p)
 
     def stiffened(self, errors: FloatArray, tolerance: float) -> PositionTerm | None:
         """Return the term with more weight where *errors* (k,) pass *tolerance*, or None.
@@ -66,7 +129,8 @@ class PositionTerm:
         raised = (worst > tolerance) & (self.strength < _STIFFEST)
         if not raised.any():
             return None
-        return replace(self, strength=np.where(raised, self.strength * _STIFFER, self.strength))
+        strength = np.where(raised, self.strength * _STIFFER, self.strength)
+        return PositionTerm(self.rows, self.set_of, self.base, strength, self.mean, self._sets)
 
 
 def position_term(

@@ -47,7 +47,7 @@ from .curvature import Factor, curved_factor, factored
 from .energy import Energy
 from .errors import CageError
 from .iteration import Course, Iteration, SolverOptions
-from .positions import PositionTerm
+from .positions import PositionTerm, Pull
 from .solution import Status
 
 _RISE = 1e-13  # relative rise of the merit that counts as rounding
@@ -119,7 +119,8 @@ class GaussNewton:
             course = course.for_other_targets(options)
         multipliers = np.zeros(len(self.volumes.constraints))
         directions: list[FloatArray] = []
-        here = self._taken_up(p, targets)
+        pull = self.positions.toward(targets)
+        here = self._taken_up(p, pull)
         merits = [here.merit]
         status = Status.STEP_LIMIT
         curved = bool(options.window) and self.energy.exact
@@ -139,14 +140,14 @@ class GaussNewton:
             if options.window:
                 residual = self._factor.triangle.T @ step
                 guess = course.memory.extrapolate(here.p, step, residual)
-                ahead = self._retract(guess, directions, targets, options)
+                ahead = self._retract(guess, directions, pull, options)
                 if not self._improves(ahead, here):
                     course.memory.forget()
                     ahead = None
                     if curved and course.age > 1:  # look again before giving way to the plain step
                         course.doubt_factor()
                         continue
-            ahead = ahead or self._shortened(here, step, directions, targets, options)
+            ahead = ahead or self._shortened(here, step, directions, pull, options)
             if ahead is None:
                 status = Status.STALLED
                 break
@@ -185,51 +186,51 @@ class GaussNewton:
         self,
         p: FloatArray,
         directions: Sequence[FloatArray],
-        targets: FloatArray,
+        pull: Pull,
         options: SolverOptions,
     ) -> _Point:
         """Return *p* moved along *directions* onto the constraints, and the objective there."""
         if not np.isfinite(p).all():
             return _Point(p, p, np.inf, p, np.inf, p)
         if not directions or not options.exact_volume:
-            return self._evaluate(p, self._surface(p), targets)
+            return self._evaluate(p, self._surface(p), pull)
         paths = self.volumes.surface.map(np.hstack([p, *directions]))
         t = restore(self.volumes.constraints, paths)
         p = p + sum(tk * z for tk, z in zip(t, directions, strict=True))
-        return self._evaluate(p, moved(paths, t), targets)
+        return self._evaluate(p, moved(paths, t), pull)
 
     def _surface(self, p: FloatArray) -> FloatArray:
         asked = self.volumes.constraints or self.energy.turns_vertices
         return self.volumes.surface.map(p) if asked else _NOTHING
 
-    def _evaluate(self, p: FloatArray, x: FloatArray, targets: FloatArray) -> _Point:
-        return self._pulled(p, x, self.energy.local_step(p, x), targets)
+    def _evaluate(self, p: FloatArray, x: FloatArray, pull: Pull) -> _Point:
+        return self._pulled(p, x, self.energy.local_step(p, x), pull)
 
-    def _taken_up(self, p: FloatArray, targets: FloatArray) -> _Point:
+    def _taken_up(self, p: FloatArray, pull: Pull) -> _Point:
         """Return the point at *p*; where the last call ended, most of it is known."""
         last = self._last
         if last is None or last.p is not p:
-            return self._evaluate(p, self._surface(p), targets)
-        return self._pulled(p, last.x, (last.shape, last.shape_slope), targets)
+            return self._evaluate(p, self._surface(p), pull)
+        return self._pulled(p, last.x, (last.shape, last.shape_slope), pull)
 
     def _pulled(
-        self, p: FloatArray, x: FloatArray, shape: tuple[float, FloatArray], targets: FloatArray
+        self, p: FloatArray, x: FloatArray, shape: tuple[float, FloatArray], pull: Pull
     ) -> _Point:
-        pull, pull_slope = self.positions.value_and_slope(p, targets)
-        return _Point(p, x, shape[0] + pull, shape[1] + pull_slope, *shape)
+        value, slope = pull.value_and_slope(p)
+        return _Point(p, x, shape[0] + value, shape[1] + slope, *shape)
 
     def _shortened(
         self,
         here: _Point,
         step: FloatArray,
         directions: Sequence[FloatArray],
-        targets: FloatArray,
+        pull: Pull,
         options: SolverOptions,
     ) -> _Point | None:
         """Return the longest of the steps h, h/2, h/4 ... that lowers the objective, or None."""
         epsilon = 1.0
         while epsilon >= _SHORTEST:
-            ahead = self._retract(here.p + epsilon * step, directions, targets, options)
+            ahead = self._retract(here.p + epsilon * step, directions, pull, options)
             comparable = self.energy.exact and options.exact_volume
             if self._improves(ahead, here) or (not comparable and np.isfinite(ahead.merit)):
                 return ahead

@@ -28,7 +28,7 @@ from .segmenting.thinning import cells as cells_of
 from .subspace import Subspace
 
 _POINTS = 2000  # about how many cells
-_LARGE = 4_000  # vertices beyond which a mesh has a stand-in
+_LARGE = 3_000  # vertices beyond which a mesh has a stand-in
 
 
 @dataclass(frozen=True, eq=False)
