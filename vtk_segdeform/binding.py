@@ -27,6 +27,7 @@ from .arrays import FloatArray, IntArray
 from .cage_stiffness import with_cage_stiffness
 from .cages import Cage
 from .energy import Energy, shape_energy
+from .grouping import join_rotations
 from .mesh import Mesh
 from .patches import Patches
 from .progress import Progress, part
@@ -35,7 +36,8 @@ from .rotations import rotation_groups
 from .stand_in import StandIn
 from .subspace import Subspace, bind
 
-_FORMAT = 5  # raise it whenever what is bound changes
+_FORMAT = 6  # raise it whenever what is bound changes
+_BITS, _EACH = 2000, 6  # rotations at first: so many, or more, for each one asked for
 _MOST = 4 << 30  # bytes in a folder
 _ENDING = ".bound.npz"
 _LARGE = 100_000  # vertices beyond which what every frame maps by is kept in patches
@@ -109,6 +111,7 @@ class Binder:
         if groups is not None and energy.exact:
             faces = [cage.faces for cage in self.cages]
             energy = with_cage_stiffness(energy, self.rest_cages, faces, groups)
+            energy = self._joined(energy, groups)
         if progress:
             progress(0.85, "standing in")
         stand_in = StandIn.of(self.regions.mesh, subspace, whole=energy.turns_vertices)
@@ -119,12 +122,31 @@ class Binder:
         return Binding(energy, stand_in, patches)
 
     def _groups(self) -> IntArray | None:
-        n = self.rest.n_vertices
-        if self.n_groups is None or self.n_groups >= n:
-            return None if self.n_groups is None else np.arange(n)
+        """Return the rotation of each vertex; more than asked for, where `_joined` follows."""
+        n, count = self.rest.n_vertices, self.n_groups
+        if count is None:
+            return None
+        many = self.stretch > 0.0
+        count = max(_BITS, _EACH * count) if many else count
+        if count >= n:
+            return np.arange(n)
+        return rotation_groups(self.rest.vertices, self._parts, count, quick=many)
+
+    @property
+    def _parts(self) -> IntArray:
         component = self.regions.mesh.components
-        parts = self.regions.labels * (int(component.max()) + 1) + component
-        return rotation_groups(self.rest.vertices, parts, self.n_groups)
+        return np.asarray(self.regions.labels * (int(component.max()) + 1) + component)
+
+    def _joined(self, energy: Energy, groups: IntArray) -> Energy:
+        """Return *energy* with as many rotations as asked for."""
+        assert self.n_groups is not None
+        counts = np.bincount(groups)
+        if len(counts) <= self.n_groups:
+            return energy
+        means = np.stack([np.bincount(groups, x) / counts for x in self.rest.vertices.T], axis=1)
+        parts = np.zeros(len(counts), dtype=np.int64)
+        parts[groups] = self._parts
+        return join_rotations(energy, self.rest_cages, (means, parts, counts), self.n_groups)[0]
 
     def _name(self) -> str:
         """Return a name that is the same exactly when the binding is."""
