@@ -57,7 +57,7 @@ def test_tetrahedra_inside_are_not_turned_inside_out(bent):
     tets = 0.5 * INSIDE[:, None] + 0.05 * corners  # (400, 4, 3)
     moved = deformer.carry(tets.reshape(-1, 3)).reshape(-1, 4, 3)
     ratio = np.linalg.det(moved[:, 1:] - moved[:, :1]) / np.linalg.det(tets[:, 1:] - tets[:, :1])
-    assert ratio.min() > 0.3
+    assert ratio.min() > 0.25
     assert np.abs(moved - tets).max() > 0.5  # and they do move
     low, high = solution.vertices.min(axis=0), solution.vertices.max(axis=0)
     assert ((moved > low) & (moved < high)).all()

@@ -164,7 +164,8 @@ def test_the_same_are_asked_in_every_frame_however_regular_the_mesh(asked):
 def test_the_pose_is_that_of_the_whole_energy_and_its_volume_exact(asked, monkeypatch):
     targets = SCENE.turned(60)
     asked(800)
-    monkeypatch.setattr(binding, "_BITS", 0)  # or every vertex would have a rotation at first
+    monkeypatch.setattr(binding, "_BITS", 0)  # or every vertex has a rotation of its own at first
+    monkeypatch.setattr(binding, "_EACH", 1)
     few = SCENE.deformer(rotation_groups=30).solve(targets)
     monkeypatch.setattr(sampling, "_WORTH", 10**6)
     whole = SCENE.deformer(rotation_groups=30).solve(targets)
