@@ -21,8 +21,8 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 STORY = [
     # a checked mesh
     "errors", "arrays", "progress", "threads", "compiled.volumes", "compiled.products",
-    "compiled.normals", "compiled.rotations", "compiled.coordinates", "fast", "surface.topology",
-    "surface.manifold", "surface.inside", "surface.columns",
+    "compiled.normals", "compiled.rotations", "compiled.coordinates", "fast", "surface.counting",
+    "surface.topology", "surface.manifold", "surface.inside", "surface.columns",
     "surface.intersections", "surface.report", "surface.shells", "faults", "mesh", "surface.holes",
     "surface.splitting", "surface.repair_steps", "repair",
     # what a deformation keeps

@@ -7,9 +7,11 @@ import pytest
 from real_meshes import path_of, read_off
 from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
 
+from vtk_segdeform import faults as search
 from vtk_segdeform.faults import find_faults
+from vtk_segdeform.surface import shells, topology
 from vtk_segdeform.surface.report import Kind
-from vtk_segdeform.surface.topology import Sides
+from vtk_segdeform.surface.topology import Sides, first_equal_row
 
 SPHERE = icosphere(2)
 N = len(SPHERE[0])
@@ -213,6 +215,108 @@ def test_random_triangles_agree_with_counting_by_hand():
         turned = sum(len(s) == 2 and s[0] == s[1] for s in at.values())
         assert report.count(Kind.TURNED_EDGE) == turned
         assert report.count(Kind.UNREFERENCED) == 8 - len(set(faces.ravel().tolist()))
+
+
+def damaged(vertices, faces, rng):
+    """Return a closed mesh with up to three things done to it; many leave it closed."""
+    vertices, faces = vertices.copy(), faces.copy()
+    for _ in range(rng.integers(0, 4)):
+        one, other = rng.choice(len(vertices), 2, replace=False)
+        face = rng.integers(len(faces))
+        match rng.integers(7):
+            case 0:
+                faces[faces == one] = other  # a pinch, if they are far apart
+            case 1:
+                faces = np.delete(faces, face, axis=0)
+            case 2:
+                faces = np.append(faces, faces[[face], ::-1], axis=0)
+            case 3:
+                faces[face] = faces[face, ::-1]
+            case 4:
+                vertices[one] = vertices[other]
+            case 5:
+                more = faces[face] + [[0], [0]]  # a pillow of two faces, at vertices of its own
+                vertices, faces = (
+                    np.append(vertices, vertices[more[0]] + 9.0, axis=0),
+                    np.append(faces, len(vertices) + np.array([[0, 1, 2], [0, 2, 1]]), axis=0),
+                )
+            case 6:
+                faces[face, 0] = other
+    return vertices, faces
+
+
+def groups(things, links):
+    """Return how many groups *things* fall into by *links*; a plain union-find."""
+    parent = {thing: thing for thing in things}
+
+    def root(thing):
+        while parent[thing] != thing:
+            thing = parent[thing]
+        return thing
+
+    for one, other in links:
+        parent[root(one)] = root(other)
+    return sum(parent[thing] == thing for thing in things)
+
+
+def test_closed_surfaces_that_were_damaged_agree_with_counting_by_hand():
+    rng = np.random.default_rng(5)
+    bodies = [*SOLIDS.values(), together(CUBE, (CUBE[0] + 1.0, CUBE[1])), two_components()]
+    bodies = [body for body in bodies if len(body[1]) < 100]
+    pinches = 0
+    for _ in range(300):
+        vertices, faces = damaged(*bodies[rng.integers(len(bodies))], rng)
+        report = find_faults(vertices, faces)
+        whole = [f for f in faces.tolist() if len(set(f)) == 3]
+        once = {}
+        for f in whole:
+            once.setdefault(frozenset(f), f)
+        assert report.count(Kind.DUPLICATE_FACE) == len(whole) - len(once)
+        seen = {tuple(v) for v in vertices.tolist()}
+        assert report.count(Kind.COINCIDENT) == len(vertices) - len(seen)
+        at = {}
+        for f in once:
+            for v in f:
+                at.setdefault(f - {v}, []).append(f)
+        touching = [(fs[0], f) for fs in at.values() for f in fs[1:]]
+        assert report.n_components == groups(once, touching)
+        crowded = set().union(*(edge for edge, fs in at.items() if len(fs) > 2))
+        pairs = [(edge, fs) for edge, fs in at.items() if len(fs) == 2]
+        pinched = sum(
+            groups([f for f in once if v in f], [fs for edge, fs in pairs if v in edge]) > 1
+            for v in range(len(vertices))
+            if v not in crowded
+        )
+        assert report.count(Kind.NON_MANIFOLD_VERTEX) == pinched
+        pinches += pinched > 0 and not report.count(Kind.OPEN_EDGE)
+    assert pinches > 20  # of closed surfaces, too
+
+
+def test_what_is_found_does_not_depend_on_pieces_or_on_how_many_faces_meet(monkeypatch):
+    pinched = together(CUBE, (CUBE[0] + 1.0, CUBE[1]))
+    flat = SPHERE[0].copy()
+    flat[SPHERE[1][0, 0]] = flat[SPHERE[1][0, 1]]
+    cavity = together(SPHERE, (0.5 * SPHERE[0], SPHERE[1][:, ::-1]))
+    meshes = [SPHERE, pinched, (flat, SPHERE[1]), cavity, (SPHERE[0], SPHERE[1][:, ::-1])]
+    before = [find_faults(*mesh) for mesh in meshes]
+    for module in (search, shells):
+        monkeypatch.setattr(module, "_PIECE", 7)
+    monkeypatch.setattr(topology, "_ROUNDS", 4)  # at most corners more faces meet
+    assert [find_faults(*mesh) for mesh in meshes] == before
+
+
+def test_equal_rows_are_equal_numbers_whatever_their_bits():
+    rows = np.array([[0.0, 1.0], [-0.0, 1.0], [np.nan, 1.0], [np.nan, 1.0], [1.0, 0.0], [0.0, 1.0]])
+    assert first_equal_row(rows).tolist() == [0, 0, 2, 3, 4, 0]
+    assert first_equal_row(rows.astype(np.float32)).tolist() == [0, 0, 2, 3, 4, 0]
+    assert first_equal_row(rows[:0]).tolist() == []
+    rng = np.random.default_rng(3)
+    for dtype in (np.int64, np.float64):
+        many = rng.integers(-4, 4, (400, 3)).astype(dtype)
+        seen = {}
+        assert first_equal_row(many).tolist() == [
+            seen.setdefault(tuple(row), i) for i, row in enumerate(many.tolist())
+        ]
 
 
 def test_on_a_manifold_edges_fans_and_genus_agree():

@@ -12,14 +12,16 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import FloatArray, IntArray, plain
+from .arrays import BoolArray, FloatArray, IntArray, plain
 from .errors import ArgumentError
 from .surface.report import Fault, Id, Kind, MeshReport
-from .surface.shells import without_volume, wrong_way_round
+from .surface.shells import corner_columns, cross, judged, norm
 from .surface.topology import Sides, connected, first_equal_row, repeats_face, repeats_vertex
+from .threads import in_parallel
 
 HOPELESS = (Kind.EMPTY, Kind.BAD_INDEX, Kind.TOO_LARGE, Kind.TOO_SMALL)  # nothing else is asked
 _EXAMPLES = 4
+_PIECE = 10_000  # faces to a thread; what they need stays in the cache
 _LARGEST, _SMALLEST = 1e70, 1e-70  # fourth powers of lengths must be numbers
 _FLAT = 1e-12  # a face of less height than this share of its longest edge has no area
 
@@ -57,10 +59,12 @@ def find_faults(vertices: ArrayLike, faces: ArrayLike) -> MeshReport:
     n_components = 0
     found = list(_number_faults(points, triangles))
     if not any(fault.kind in HOPELESS for fault in found):
-        sound = ~repeats_vertex(triangles) & ~repeats_face(triangles)
-        sides = Sides(triangles[sound], len(points))
+        degenerate, duplicate, sides = _unlike_faces(triangles, len(points))
         n_components = int(sides.shells.max(initial=-1)) + 1
-        found += _face_faults(points, triangles)
+        found += _some(Kind.DEGENERATE, np.flatnonzero(degenerate))
+        found += _some(Kind.DUPLICATE_FACE, np.flatnonzero(duplicate & ~degenerate))
+        flat = _flat_faces(points, triangles)
+        found += _some(Kind.ZERO_AREA, flat[~degenerate[flat]])
         found += _edge_faults(sides)
         found += _inward_shells(points, sides)
         coincident = first_equal_row(points) != np.arange(len(points))
@@ -100,28 +104,59 @@ def as_soup(vertices: ArrayLike, faces: ArrayLike) -> tuple[FloatArray, IntArray
 def _number_faults(points: FloatArray, faces: IntArray) -> Iterator[Fault]:
     if not len(faces):
         yield Fault(Kind.EMPTY, 1)
-    yield from _some(Kind.NON_FINITE, np.flatnonzero(~np.isfinite(points).all(axis=1)))
-    bad = ((faces < 0) | (faces >= len(points))).any(axis=1)
+    finite, far = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
+    if not (np.abs(points) <= _LARGEST).all():  # one cheap question, before several
+        finite = _finite(points)
+        far[:] = (np.isfinite(points) & (np.abs(points) > _LARGEST)).any(axis=1)
+    yield from _some(Kind.NON_FINITE, np.flatnonzero(~finite))
+    bad = np.zeros(len(faces), dtype=bool)
+    if len(faces) and (faces.min() < 0 or faces.max() >= len(points)):
+        bad[:] = ((faces < 0) | (faces >= len(points))).any(axis=1)
     yield from _some(Kind.BAD_INDEX, np.flatnonzero(bad))
-    finite = points[np.isfinite(points).all(axis=1)]
-    far = np.where(np.isfinite(points), np.abs(points), 0.0).max(axis=1, initial=0.0) > _LARGEST
     yield from _some(Kind.TOO_LARGE, np.flatnonzero(far))
-    if len(finite) and not far.any() and 0.0 < np.ptp(finite, axis=0).max() < _SMALLEST:
-        yield Fault(Kind.TOO_SMALL, 1)
+    if finite.any() and not far.any():
+        columns = points.T if finite.all() else points[finite].T
+        if 0.0 < max(np.ptp(column) for column in columns) < _SMALLEST:
+            yield Fault(Kind.TOO_SMALL, 1)
     used = np.zeros(len(points), dtype=bool)
-    used[faces[~bad]] = True
+    used[faces[~bad] if bad.any() else faces] = True
     yield from _some(Kind.UNREFERENCED, np.flatnonzero(~used))
 
 
-def _face_faults(points: FloatArray, faces: IntArray) -> Iterator[Fault]:
+def _finite(points: FloatArray) -> BoolArray:
+    return np.asarray(np.isfinite(points).all(axis=1))
+
+
+def _unlike_faces(faces: IntArray, n_vertices: int) -> tuple[BoolArray, BoolArray, Sides]:
+    """Return which faces repeat a vertex, which an earlier face, and the sides of the others.
+
+    Two faces on the same three vertices share three edges.  Where every edge has its two faces,
+    each face is therefore asked only for its neighbours: whether two of them are the same.
+    """
     degenerate = repeats_vertex(faces)
-    yield from _some(Kind.DEGENERATE, np.flatnonzero(degenerate))
-    yield from _some(Kind.DUPLICATE_FACE, np.flatnonzero(repeats_face(faces) & ~degenerate))
-    with np.errstate(invalid="ignore", over="ignore"):
-        a, b, c = points[faces].transpose(1, 0, 2)
-        area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-        longest = np.max([np.einsum("ij,ij->i", e, e) for e in (b - a, c - b, a - c)], axis=0)
-    yield from _some(Kind.ZERO_AREA, np.flatnonzero((area <= _FLAT * longest) & ~degenerate))
+    if not degenerate.any():
+        sides = Sides(faces, n_vertices)
+        if sides.neighbours is not None:
+            one, other, _ = sides.neighbours.T
+            if not (one == other).any():
+                return degenerate, degenerate, sides
+    duplicate = repeats_face(faces)
+    return degenerate, duplicate, Sides(faces[~degenerate & ~duplicate], n_vertices)
+
+
+def _flat_faces(points: FloatArray, faces: IntArray) -> IntArray:
+    """Return the faces without area, (k,) int."""
+    flat = np.zeros(len(faces), dtype=bool)
+
+    def work(start: int, stop: int) -> None:
+        with np.errstate(invalid="ignore", over="ignore"):
+            a, b, c = corner_columns(points, faces[start:stop])
+            area = norm(cross(b - a, c - a))
+            longest = np.max([(e * e).sum(axis=0) for e in (b - a, c - b, a - c)], axis=0)
+            flat[start:stop] = area <= _FLAT * longest
+
+    in_parallel(work, len(faces), _PIECE)
+    return np.flatnonzero(flat)
 
 
 def _edge_faults(sides: Sides) -> Iterator[Fault]:
@@ -129,6 +164,9 @@ def _edge_faults(sides: Sides) -> Iterator[Fault]:
         ends = np.stack([sides.tail[some], sides.head[some]], axis=1)
         return tuple((a, b) for a, b in np.sort(ends, axis=1).tolist())
 
+    if sides.partner is not None:  # nothing else can be wrong
+        yield from _some(Kind.NON_MANIFOLD_VERTEX, sides.pinched)
+        return
     yield from _some(Kind.OPEN_EDGE, sides.open, edges)
     ends = np.stack([sides.tail[sides.open], sides.head[sides.open]], axis=1)
     corners, ends = np.unique(ends, return_inverse=True)
@@ -142,18 +180,22 @@ def _edge_faults(sides: Sides) -> Iterator[Fault]:
 
 def _inward_shells(points: FloatArray, sides: Sides) -> Iterator[Fault]:
     """Ask the shells whose every edge joins two faces that face the same side."""
-    good = np.ones(int(sides.shells.max(initial=-1)) + 1, dtype=bool)
-    good[sides.shells[sides.open // 3]] = False
-    good[sides.shells[sides.order[sides.first[sides.n_sides > 2]] // 3]] = False
-    good[sides.shells[sides.pairs[sides.turned, 0] // 3]] = False
-    asked = good[sides.shells] & np.isfinite(points[sides.faces]).all(axis=(1, 2))
-    if asked.any():
-        _, shells = np.unique(sides.shells[asked], return_inverse=True)
-        wrong = wrong_way_round(points, sides.faces[asked], shells)
-        flat = without_volume(points, sides.faces[asked], shells)
-        _, first = np.unique(shells, return_index=True)
-        yield from _some(Kind.INWARD, sides.faces[asked][first[wrong & ~flat], 0])
-        yield from _some(Kind.NO_VOLUME, sides.faces[asked][first[flat], 0])
+    asked = np.ones(len(sides.faces), dtype=bool)
+    if sides.partner is None:
+        good = np.ones(int(sides.shells.max(initial=-1)) + 1, dtype=bool)
+        good[sides.shells[sides.open // 3]] = False
+        good[sides.shells[sides.order[sides.first[sides.n_sides > 2]] // 3]] = False
+        good[sides.shells[sides.pairs[sides.turned, 0] // 3]] = False
+        asked = good[sides.shells]
+    if not (finite := _finite(points)).all():
+        asked &= finite[sides.faces].all(axis=1)
+    faces, shells = sides.faces, sides.shells
+    if not asked.all():
+        faces, (_, shells) = faces[asked], np.unique(shells[asked], return_inverse=True)
+    if len(faces):
+        wrong, flat, first = judged(points, faces, shells)
+        yield from _some(Kind.INWARD, faces[first[wrong & ~flat], 0])
+        yield from _some(Kind.NO_VOLUME, faces[first[flat], 0])
 
 
 def _some(
