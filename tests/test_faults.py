@@ -297,7 +297,8 @@ def test_what_is_found_does_not_depend_on_pieces_or_on_how_many_faces_meet(monke
     flat = SPHERE[0].copy()
     flat[SPHERE[1][0, 0]] = flat[SPHERE[1][0, 1]]
     cavity = together(SPHERE, (0.5 * SPHERE[0], SPHERE[1][:, ::-1]))
-    apart = together(SPHERE, (CUBE[0] + 1e15, CUBE[1]))  # a volume only about its own corner
+    far = [(CUBE[0] + at, CUBE[1]) for at in (1e15, -1e15)]
+    apart = together(SPHERE, *far)  # they have volumes only about corners of their own
     meshes = [SPHERE, pinched, (flat, SPHERE[1]), cavity, apart, (SPHERE[0], SPHERE[1][:, ::-1])]
     before = [find_faults(*mesh) for mesh in meshes]
     for module in (search, shells):
