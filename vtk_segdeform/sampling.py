@@ -35,7 +35,7 @@ from .arrays import FloatArray, IntArray
 from .mesh import Mesh
 from .subspace import Subspace
 
-_ASKED, _OF_GROUP = 12_000, 6  # vertices in all, or in the mean group if that is more
+_ASKED, _OF_GROUP = 36_000, 18  # vertices in all, or in the mean group if that is more
 _WORTH = 8  # times as many make a mesh worth it: each one asked has six neighbours
 _OFFSET = 0.381966  # of the way from one asked to the next: nowhere regular meshes have a step
 _BITS = 10  # of a place on each axis
