@@ -34,6 +34,17 @@ class Hit:
     """The corner of the face that is nearest to the point."""
 
 
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """What is known of one pose, seen in one way."""
+
+    posed: int
+    marks: FloatArray  # where the corners of the mesh's box are seen
+    places: FloatArray  # (n, 3) of each vertex in the display
+    known: BoolArray  # (n,) the vertices that were looked at, filled in bit by bit
+    seen: BoolArray  # (n,) those of them that are seen
+
+
 class Picker:
     """Look-ups in the mesh of a surface.
 
@@ -54,7 +65,7 @@ class Picker:
         self._locator = vtkStaticCellLocator()
         self._locator.SetDataSet(self._data)
         self._distance: SurfaceDistance | None = None
-        self._seen: tuple[int, FloatArray, BoolArray] | None = None
+        self._look: _Look | None = None
         # Where these are seen tells where the camera is; not how far it sees, which changes
         # whenever something else is drawn.
         ends = np.stack([self._mesh.vertices.min(axis=0), self._mesh.vertices.max(axis=0)])
@@ -102,17 +113,31 @@ class Picker:
         """Return where each vertex is in the display, (n, 3) float, as `Sight.to_display`."""
         return self._view.to_display(self._surface.points)
 
-    def seen(self) -> BoolArray:
-        """Return the vertices that the mesh does not hide from the camera, (n,) bool."""
+    def seen(self, among: BoolArray | None = None) -> BoolArray:
+        """Return the vertices that the mesh does not hide from the camera, (n,) bool.
+
+        Asked for those *among* some, (n,) bool, it looks at no others, and at each only once.
+        """
+        look = self._look_now()
+        asked = ~look.known if among is None else among & ~look.known
+        if asked.any():
+            look.seen[seen_vertices(look.places, self._mesh.faces, asked)] = True
+            look.known[asked] = True
+        return look.seen if among is None else look.seen & among
+
+    def _look_now(self) -> _Look:
         posed = self._data.GetPoints().GetMTime()
-        looks = self._view.to_display(self._landmarks)[:, :2]
+        marks = self._view.to_display(self._landmarks)[:, :2]
+        look = self._look
         if (
-            self._seen is None
-            or self._seen[0] != posed
-            or not np.array_equal(self._seen[1], looks, equal_nan=True)
+            look is None
+            or look.posed != posed
+            or not np.array_equal(look.marks, marks, equal_nan=True)
         ):
-            self._seen = posed, looks, seen_vertices(self.places(), self._mesh.faces)
-        return self._seen[2]
+            nothing = np.zeros(self._mesh.n_vertices, dtype=bool)
+            look = _Look(posed, marks, self.places(), nothing, nothing.copy())
+            self._look = look
+        return look
 
     def _hit(self, point: FloatArray, face: int) -> Hit:
         corners = self._mesh.faces[face]

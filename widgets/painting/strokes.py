@@ -78,7 +78,7 @@ class Brush:
             self._gap = max(1.0, _APART * self._radius / self._picker.pixel_at(hits[-1]))
         reached = self._picker.distances(hits, self._radius) <= self._radius
         reached[[hit.vertex for hit in hits]] = True
-        return reached if self._through else reached & self._picker.seen()
+        return reached if self._through else self._picker.seen(reached)
 
 
 class Lasso:
@@ -90,7 +90,7 @@ class Lasso:
 
     def __init__(self, picker: Picker, press: Pointer, *, through: bool) -> None:
         self._x, self._y, _ = picker.places().T
-        self._allowed = np.ones(len(self._x), dtype=bool) if through else picker.seen()
+        self._picker, self._through = picker, through
         self._corners = [press.position]
         self._odd = np.zeros(len(self._x), dtype=bool)
 
@@ -103,7 +103,8 @@ class Lasso:
     def mask(self) -> BoolArray:
         """(n,) bool: what the line goes round."""
         inside = self._odd ^ self._crossed(self._corners[-1], self._corners[0])
-        return np.asarray(inside & self._allowed & _is_meant(self.outline))
+        inside &= _is_meant(self.outline)
+        return inside if self._through else self._picker.seen(inside)
 
     @property
     def outline(self) -> FloatArray:
@@ -123,8 +124,8 @@ class Rectangle:
     """What is between the press and the pointer."""
 
     def __init__(self, picker: Picker, press: Pointer, *, through: bool) -> None:
-        self._places = picker.places()[:, :2]
-        self._allowed = np.ones(len(self._places), dtype=bool) if through else picker.seen()
+        self._x, self._y, _ = picker.places().T
+        self._picker, self._through = picker, through
         self._ends = np.array([press.position, press.position])
 
     def extend(self, pointer: Pointer) -> None:
@@ -134,9 +135,10 @@ class Rectangle:
     @property
     def mask(self) -> BoolArray:
         """(n,) bool: what is inside; NaN, behind the camera, is not."""
-        low, high = self._ends.min(axis=0), self._ends.max(axis=0)
-        inside = ((self._places >= low) & (self._places <= high)).all(axis=1)
-        return np.asarray(inside & self._allowed & _is_meant(self._ends))
+        (left, low), (right, high) = self._ends.min(axis=0), self._ends.max(axis=0)
+        x, y = self._x, self._y
+        inside = (x >= left) & (x <= right) & (y >= low) & (y <= high) & _is_meant(self._ends)
+        return np.asarray(inside if self._through else self._picker.seen(inside))
 
     @property
     def outline(self) -> FloatArray:

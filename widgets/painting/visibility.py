@@ -6,7 +6,8 @@ buffer would be neither.  Display coordinates are projective, so a triangle is f
 its depth linear.
 
 To compare few pairs, the display is cut into square cells about as large as a triangle; a vertex
-is compared with the triangles whose bounding box touches its cell.
+is compared with the triangles whose bounding box touches its cell.  Those that face the camera
+come first: they hide nearly all there is to hide, and what is hidden is compared no more.
 """
 
 from __future__ import annotations
@@ -18,10 +19,13 @@ from vtk_segdeform.arrays import BoolArray, FloatArray, IntArray
 _NEARER = 1e-9  # of the depth that the camera sees; less is rounding
 _CELLS = 16  # for each triangle, at most, on average
 _FINEST = 4096  # cells across
+_MOST = 4  # cells in all, for each triangle and vertex
 _AT_ONCE = 300_000  # pairs, to bound the memory
 
 
-def seen_vertices(display: FloatArray, faces: IntArray) -> BoolArray:
+def seen_vertices(
+    display: FloatArray, faces: IntArray, among: BoolArray | None = None
+) -> BoolArray:
     """Return (n,) bool: the vertices that no triangle hides.
 
     Parameters
@@ -31,52 +35,85 @@ def seen_vertices(display: FloatArray, faces: IntArray) -> BoolArray:
         and hides nothing; what is beside the window counts as seen.
     faces : (m, 3) int
         Triangles; both sides hide.
+    among : (n,) bool, optional
+        The vertices that are asked for; none of the others is called seen.
     """
-    seen = np.asarray(np.isfinite(display).all(axis=1))
-    triangles = faces[seen[faces].all(axis=1)]
-    vertices = np.flatnonzero(seen)
-    if not len(triangles):
+    there = np.asarray(np.isfinite(display).all(axis=1))
+    seen = there if among is None else there & among
+    if not seen.any():
         return seen
-    size = _cell_size(display[:, :2], triangles)
-    origin = display[vertices, :2].min(axis=0)
-    row, column = (((display[vertices, :2] - origin) // size).astype(np.int64)).T
-    n_columns = column.max() + 1
-    home = row * n_columns + column
-    order = np.argsort(home, kind="stable")
-    vertices, home = vertices[order], home[order]
-
-    # One entry for each cell that a triangle may touch, and how many vertices are in it.
-    first, last = _boxes((display[:, :2] - origin) // size, triangles)
-    first, wide = first.astype(np.int64), (last - first).astype(np.int64) + 1
-    triangle, step = _spread(wide.prod(axis=1))
-    down, along = np.divmod(step, wide[triangle, 1])
-    cell = (first[triangle, 0] + down) * n_columns + first[triangle, 1] + along
-    begin = np.searchsorted(home, cell, side="left")
-    count = np.searchsorted(home, cell, side="right") - begin
-
-    some = np.flatnonzero(count)
-    batches = np.flatnonzero(np.diff(np.cumsum(count[some]) // _AT_ONCE)) + 1
-    for batch in np.split(some, batches):
-        entry, step = _spread(count[batch])
-        vertex = vertices[begin[batch][entry] + step]
-        corners = triangles[triangle[batch][entry]]
-        seen[vertex[_hides(display, corners, vertex)]] = False
+    triangles = faces[_touching(display, faces, seen, there)]
+    (ax, ay), (bx, by), (cx, cy) = (display[k, :2].T for k in triangles.T)
+    to_camera = (bx - ax) * (cy - ay) > (by - ay) * (cx - ax)
+    for some in (triangles[to_camera], triangles[~to_camera]):
+        if len(some) and seen.any():
+            _hide(display, some, seen)
     return seen
 
 
-def _cell_size(places: FloatArray, triangles: IntArray) -> float:
+def _touching(
+    display: FloatArray, faces: IntArray, asked: BoolArray, there: BoolArray
+) -> BoolArray:
+    """Tell which triangles are all *there* and touch the box around the vertices *asked* for."""
+    places = display[:, :2]
+    low, high = places[asked].min(axis=0), places[asked].max(axis=0)
+    bits = np.column_stack([places < low, places > high]) @ np.array([1, 2, 4, 8], dtype=np.uint8)
+    a, b, c = bits[faces.T]
+    touching = np.asarray((a & b & c) == 0)
+    return touching if there.all() else touching & there[faces].all(axis=1)
+
+
+def _hide(display: FloatArray, triangles: IntArray, seen: BoolArray) -> None:
+    """Take out of *seen* what the triangles hide."""
+    vertices = np.flatnonzero(seen)
+    places = display[vertices, :2]
+    origin = places.min(axis=0)
+    low, high = _boxes(display, triangles)
+    size = _cell_size(low, high, places)
+    row, column = ((places - origin) // size).astype(np.int64).T
+    n_rows, n_columns = row.max() + 1, column.max() + 1
+    home = row * n_columns + column
+    order = np.argsort(home, kind="stable")
+    vertices, home = vertices[order], home[order]
+    count_at = np.bincount(home, minlength=n_rows * n_columns)
+    first_at = np.cumsum(count_at) - count_at
+    farthest_at = np.full(len(count_at), -np.inf)
+    used = np.flatnonzero(count_at)
+    farthest_at[used] = np.maximum.reduceat(display[vertices, 2], first_at[used])
+
+    # One entry for each cell that a triangle may touch, unless all there is nearer than it.
+    last = [n_rows - 1, n_columns - 1]
+    first = np.clip((low[:, :2] - origin) // size, 0, last).astype(np.int64)
+    wide = np.clip((high[:, :2] - origin) // size, 0, last).astype(np.int64) - first + 1
+    triangle, step = _spread(wide[:, 0] * wide[:, 1])
+    down, along = np.divmod(step, wide[triangle, 1])
+    cell = (first[triangle, 0] + down) * n_columns + first[triangle, 1] + along
+    some = np.flatnonzero(farthest_at[cell] > low[triangle, 2])
+    triangle, begin, count = triangle[some], first_at[cell[some]], count_at[cell[some]]
+
+    batches = np.flatnonzero(np.diff(np.cumsum(count) // _AT_ONCE)) + 1
+    for batch in np.split(np.arange(len(count)), batches):
+        entry, step = _spread(count[batch])
+        vertex, over = vertices[begin[batch][entry] + step], triangle[batch][entry]
+        behind = np.flatnonzero(seen[vertex] & (display[vertex, 2] > low[over, 2]))
+        vertex, corners = vertex[behind], triangles[over[behind]]
+        seen[vertex[_hides(display, corners, vertex)]] = False
+
+
+def _cell_size(low: FloatArray, high: FloatArray, places: FloatArray) -> float:
     """Return a side such that triangles touch a few cells each, and not too many in all."""
-    low, high = _boxes(places, triangles)
-    across = float((high.max(axis=0) - low.min(axis=0)).max())
-    size = max(float(np.median((high - low).max(axis=1))), across / _FINEST, 1e-9)
-    while ((high - low) // size + 1.0).prod(axis=1).sum() > _CELLS * len(triangles):
+    wide = (high - low)[:, :2]
+    across = np.ptp(places, axis=0)
+    least = np.sqrt(across.prod() / (_MOST * (len(low) + len(places))))
+    size = max(float(np.median(wide.max(axis=1))), across.max() / _FINEST, float(least), 1e-9)
+    while (wide // size + 1.0).prod(axis=1).sum() > _CELLS * len(low):
         size *= 2.0
     return size
 
 
 def _boxes(places: FloatArray, triangles: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return the lower left and upper right corners of what is around each triangle, (m, 2)."""
-    a, b, c = places[triangles.T]
+    """Return the least and the greatest coordinates of each triangle, (m, 3)."""
+    a, b, c = (places[k] for k in triangles.T)
     return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
