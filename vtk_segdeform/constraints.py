@@ -18,7 +18,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from .arrays import FloatArray, IntArray
+from .arrays import BoolArray, FloatArray, IntArray
 from .mesh import Mesh
 from .subspace import Subspace
 from .threads import in_parallel
@@ -86,9 +86,12 @@ def region_volumes(mesh: Mesh, labels: IntArray) -> tuple[VolumeConstraint, ...]
     owns no face has no constraint.
     """
     face_labels = _face_labels(labels[mesh.faces])
-    halves = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)  # directed edges, 3 a face
-    owner = np.repeat(face_labels, 3)
     n = mesh.n_vertices
+    of_several = _of_several(face_labels, mesh.faces, n)
+    near = of_several[mesh.faces].any(axis=1)
+    halves = mesh.faces[near][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)  # directed edges, 3 a face
+    inner = of_several[halves].all(axis=1)  # those at a border, and their opposites, are among them
+    halves, owner = halves[inner], np.repeat(face_labels[near], 3)[inner]
     key, opposite = halves[:, 0] * n + halves[:, 1], halves[:, 1] * n + halves[:, 0]
     order = np.argsort(key)
     across = owner[order[np.searchsorted(key, opposite, sorter=order)]]
@@ -152,6 +155,15 @@ def _in_order(faces: IntArray) -> IntArray:
 
 def _face_labels(corners: IntArray) -> IntArray:
     return np.where(corners[:, 1] == corners[:, 2], corners[:, 1], corners[:, 0])
+
+
+def _of_several(face_labels: IntArray, faces: IntArray, n: int) -> BoolArray:
+    """Tell which of n vertices are corners of faces with different labels."""
+    least, most = np.full(n, face_labels.max()), np.full(n, face_labels.min())
+    for corner in faces.T:
+        np.minimum.at(least, corner, face_labels)
+        np.maximum.at(most, corner, face_labels)
+    return np.asarray(least != most)
 
 
 def _with_centres(edges: IntArray, n: int) -> tuple[sparse.csr_array, IntArray]:
