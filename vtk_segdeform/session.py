@@ -101,6 +101,7 @@ class Session(Timeline):
         self._posing = Posing(mesh)
         self._solution: tuple[Pose, Solution] | None = None
         self._effort = Effort(0, 0.0)
+        self._fitted: tuple[Regions | None, Sequence[Cage] | None] = None, None  # and fit, for sure
         self._put: tuple[Pose | None, list[FloatArray]] = None, []  # where `move_cage` put cages
 
     # What there is.
@@ -280,7 +281,10 @@ class Session(Timeline):
 
     def set_cages(self, cages: Sequence[Cage], *, label: str = "set cages") -> None:
         """Take *cages*, one around each region; CageError if they do not fit."""
-        self._set_cages(fitting_cages(self.regions, cages, self._state.region_names), label)
+        regions, fitted = self._fitted
+        if cages is not fitted or self.regions is not regions:  # else they do
+            cages = fitting_cages(self.regions, cages, self._state.region_names)
+        self._set_cages(tuple(cages), label)
 
     def fitted_cages(self, progress: Progress | None = None) -> tuple[Cage, ...]:
         """Return cages for the regions, by the options, and change nothing.
@@ -290,7 +294,10 @@ class Session(Timeline):
         if self.regions is None:
             raise RegionError("there are no regions to fit cages to; segment or paint them first")
         number, offset = self.options.n_cage_vertices, self.options.offset
-        return fit_cages(self.mesh, self.regions, number, offset=offset, progress=progress)
+        regions = self.regions
+        cages = fit_cages(self.mesh, regions, number, offset=offset, progress=progress)
+        self._fitted = regions, cages
+        return cages
 
     def fit_cages(self, progress: Progress | None = None) -> None:
         """Take cages as `fitted_cages` makes them; cancelled, everything is as it was."""
@@ -298,7 +305,7 @@ class Session(Timeline):
 
     def bind(self, progress: Progress | None = None) -> None:
         """Do ahead of time what the first move would have to wait for; see `is_bound`."""
-        self._posing.bind(self._state, progress)
+        self._posing.prepare(self._state, progress)
 
     # Fixed vertices and handles.
 

@@ -129,7 +129,10 @@ class RegionSelector(Widget):
         """Return the region that weighs most where the pointer is; None beside the mesh."""
         hit = self._picker.hit(self.view.pointer(Phase.HOVER))
         regions = self.session.regions
-        return None if hit is None or regions is None else int(regions.labels[hit.vertex])
+        if hit is None or regions is None:
+            return None
+        own = np.flatnonzero(regions.membership[:, hit.vertex])
+        return int(own[0] if len(own) == 1 else regions.labels[hit.vertex])
 
     def remove(self) -> None:
         """Take everything out of the view, for good."""

@@ -34,10 +34,18 @@ class Sight:
 
     def to_display(self, points: FloatArray) -> FloatArray:
         """Return (k, 3) display coordinates of (k, 3) world *points*; NaN behind the camera."""
-        homogeneous = np.column_stack([points, np.ones(len(points))]) @ self._projection().T
+        projection = self._projection()
+        homogeneous = points @ projection[:, :3].T
+        homogeneous += projection[:, 3]
         w = homogeneous[:, 3:]
-        clip = np.divide(homogeneous[:, :3], w, out=np.full((len(w), 3), np.nan), where=w > 0.0)
-        return np.asarray(self._origin() + 0.5 * (clip + 1.0) * self._extent())
+        if len(w) and w.min() > 0.0:
+            display = homogeneous[:, :3] / w
+        else:
+            nowhere = np.full((len(w), 3), np.nan)
+            display = np.divide(homogeneous[:, :3], w, out=nowhere, where=w > 0.0)
+        display *= 0.5 * self._extent()
+        display += self._origin() + 0.5 * self._extent()
+        return np.asarray(display)
 
     def to_world(self, display: FloatArray) -> FloatArray:
         """Return (k, 3) world points of (k, 3) *display* coordinates; NaN if a camera sees none."""

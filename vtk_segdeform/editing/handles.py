@@ -145,12 +145,19 @@ def checked_targets(
 
 def require_near(mesh: Mesh, points: FloatArray, name: str) -> None:
     """Raise a ConstraintError if some of *points* are senselessly far from *mesh*."""
-    away = np.abs(points - mesh.vertices.mean(axis=0)).max(initial=0.0) / mesh.diagonal
+    if _farthest(points, mesh.vertices[0]) / mesh.diagonal <= _FARTHEST - 1.0:
+        return  # surely, without the middle of many vertices: none is a diagonal away from it
+    away = _farthest(points, mesh.vertices.mean(axis=0)) / mesh.diagonal
     if not away <= _FARTHEST:
         raise ConstraintError(
             f"{name} are {away:.3g} diagonals of the mesh away; "
             f"at most {_FARTHEST:.0f} are allowed: move less"
         )
+
+
+def _farthest(points: FloatArray, place: FloatArray) -> float:
+    """Return how far points are from a *place* (3,), along x, y or z."""
+    return float(np.abs(points - place).max(initial=0.0))
 
 
 def moved(points: FloatArray, matrix: ArrayLike) -> FloatArray:

@@ -20,11 +20,11 @@ import numpy as np
 
 from ..arrays import FloatArray, frozen
 from ..binding import cache_folder
-from ..constraints import region_volumes, total_volume
+from ..constraints import VolumeConstraint, region_volumes, total_volume
 from ..deformer import Deformer
 from ..errors import CageError, ConstraintError
 from ..mesh import Mesh
-from ..progress import Progress
+from ..progress import Progress, part
 from ..solution import Solution
 from ..volume import signed_volume, volume_gradient
 from .handles import targets_at
@@ -33,6 +33,7 @@ from .state import Pose, State
 
 _DEAR = 20_000  # vertices of a mesh whose binding is kept on disk as well
 _KEPT = 3  # bound deformers: undo past a change of cages or options, and back, binds nothing anew
+_MOST_OF_IT = 0.95  # of what has to be done before a drag; the rest is to take hold
 _SAME_VOLUME = 1e-9  # relative: a pose off by more does not meet a constraint it was not made for
 _BINDING = "stretch", "rotation_groups"  # options that a bound deformer has for good
 _HOLDING = "preserve_volume", "preserve_region_volumes"  # and those that `Deformer.hold` changes
@@ -59,6 +60,10 @@ class Posing:
     def _rest_volume(self) -> float:
         return signed_volume(self._mesh.vertices, self._mesh.faces)
 
+    @cached_property
+    def _total_volume(self) -> VolumeConstraint:
+        return total_volume(self._mesh)
+
     def is_bound(self, state: State) -> bool:
         """Tell whether `bind` has nothing to do."""
         return any(_bind_alike(state, other) for other, _ in self._bound)
@@ -82,6 +87,14 @@ class Posing:
         own = State(state.regions, state.cages, options=state.options)
         self._bound = ((own, deformer), *self._bound)[:_KEPT]
         return deformer
+
+    def prepare(self, state: State, progress: Progress | None = None) -> None:
+        """Bind, and take hold of the fixed vertices and handles of *state* if there are any."""
+        self.bind(state, part(progress, 0.0, _MOST_OF_IT))
+        if len(state.fixed) or state.handles:
+            self._hold(state)
+        if progress:
+            progress(1.0, "ready")
 
     def forget(self) -> None:
         """Let the next `solve` start from its pose alone, as if that had just been loaded."""
@@ -143,7 +156,7 @@ class Posing:
         outward /= max(np.abs(outward).max(), np.finfo(float).tiny)
         deformer = self.bind(state)
         path = np.hstack([deformer.surface(cage_vertices), deformer.subspace.map(outward)])
-        p = np.concatenate(cage_vertices) + total_volume(self._mesh).exact_step(path) * outward
+        p = np.concatenate(cage_vertices) + self._total_volume.exact_step(path) * outward
         return tuple(p[columns] for columns in deformer.subspace.columns)
 
     def _hold(self, state: State) -> Deformer:

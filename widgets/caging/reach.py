@@ -11,6 +11,7 @@ import numpy as np
 from vtk_segdeform.arrays import FloatArray, IntArray
 
 from ..gestures import Pointer
+from ..painting.visibility import touching
 from ..sight import Sight
 
 _REACH = 8.0  # pixels
@@ -56,7 +57,8 @@ def under_pointer(
 
 def _is_hidden(point: FloatArray, vertices: FloatArray, faces: IntArray) -> bool:
     """Tell whether a triangle is in front of *point*, all in display coordinates."""
-    a, b, c = (vertices - point)[faces.T]
+    near = faces[touching(vertices[:, :2], faces, point[:2], point[:2])]
+    a, b, c = (vertices[corner] - point for corner in near.T)
     # Twice the areas of the triangles that the point makes with each side.
     u, v, w = (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] for p, q in ((b, c), (c, a), (a, b)))
     around = ((u >= 0) & (v >= 0) & (w >= 0)) | ((u <= 0) & (v <= 0) & (w <= 0))

@@ -99,8 +99,9 @@ def contour(vertices: FloatArray, faces: IntArray, values: FloatArray, level: fl
 
     Each triangle with corners both up to *level* and above it has one of them.
     """
-    below = values[faces] <= level
-    faces = faces[below.any(axis=1) & ~below.all(axis=1)]
+    below = values <= level
+    a, b, c = (below[corner] for corner in faces.T)
+    faces = faces[(a != b) | (b != c)]
     i, j = faces, faces[:, [1, 2, 0]]
     crossed = (values[i] <= level) != (values[j] <= level)  # two sides of each triangle
     i, j = i[crossed], j[crossed]

@@ -12,6 +12,7 @@ virtual source propagation", Computer Graphics Forum 40(5), 247-260, 2021.
 from __future__ import annotations
 
 import numpy as np
+from scipy import sparse
 
 from vtk_segdeform.arrays import FloatArray, IntArray
 
@@ -32,10 +33,12 @@ class SurfaceDistance:
 
     def __init__(self, n_vertices: int, faces: IntArray) -> None:
         self._faces = faces
-        corners = faces.ravel()
-        self._around = np.argsort(corners, kind="stable") // 3  # triangles, vertex by vertex
-        self._count = np.bincount(corners, minlength=n_vertices)
-        self._first = np.cumsum(self._count) - self._count
+        ends, corners = np.arange(0, faces.size + 1, 3), faces.ravel()
+        ones = np.ones(faces.size, dtype=np.int8)
+        shape = len(faces), n_vertices
+        by_vertex = sparse.csr_array((ones, corners, ends), shape).tocsc()
+        self._around = by_vertex.indices  # triangles, vertex by vertex
+        self._first, self._count = by_vertex.indptr[:-1], np.diff(by_vertex.indptr)
 
     def within(
         self, vertices: FloatArray, points: FloatArray, triangles: IntArray, radius: float
@@ -58,10 +61,10 @@ class SurfaceDistance:
         if not len(points):
             return distance
         start = self._faces[triangles]
-        direct = np.linalg.norm(vertices[start] - points[:, None], axis=2)
+        direct = _length(vertices[start] - points[:, None])
         np.minimum.at(distance, start, direct)
         # Nearest first, a few at once: what goes on too early goes on again.
-        sides = np.linalg.norm(vertices[start] - vertices[start[:, [1, 2, 0]]], axis=2)
+        sides = _length(vertices[start] - vertices[start[:, [1, 2, 0]]])
         stride = max(2.0 * float(sides.mean()), radius / _STRIDES)
         waiting = np.unique(start)
         while len(waiting):
@@ -81,12 +84,16 @@ class SurfaceDistance:
         return np.unique(self._around[np.repeat(self._first[vertices], count) + place])
 
 
+def _length(ways: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.einsum("...j,...j->...", ways, ways)))
+
+
 def _handed_on(corners: FloatArray, from_a: FloatArray, from_b: FloatArray) -> FloatArray:
     """Return how far v is, given how far a and b are, for k triangles with *corners* v, a, b."""
     v, a, b = corners
-    to_a, to_b = np.linalg.norm(v - a, axis=1), np.linalg.norm(v - b, axis=1)
+    to_a, to_b = _length(v - a), _length(v - b)
     found = np.minimum(from_a + to_a, from_b + to_b)  # round a corner
-    side = np.linalg.norm(b - a, axis=1)
+    side = _length(b - a)
     flat = np.flatnonzero(np.isfinite(from_a + from_b) & (side > 0.0))
     side, along_a, along_b, to_a = side[flat], from_a[flat], from_b[flat], to_a[flat]
 

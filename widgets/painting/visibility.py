@@ -42,7 +42,10 @@ def seen_vertices(
     seen = there if among is None else there & among
     if not seen.any():
         return seen
-    triangles = faces[_touching(display, faces, seen, there)]
+    low, high = display[seen, :2].min(axis=0), display[seen, :2].max(axis=0)
+    triangles = faces[touching(display[:, :2], faces, low, high)]
+    if not there.all():
+        triangles = triangles[there[triangles].all(axis=1)]
     (ax, ay), (bx, by), (cx, cy) = (display[k, :2].T for k in triangles.T)
     to_camera = (bx - ax) * (cy - ay) > (by - ay) * (cx - ax)
     for some in (triangles[to_camera], triangles[~to_camera]):
@@ -51,16 +54,24 @@ def seen_vertices(
     return seen
 
 
-def _touching(
-    display: FloatArray, faces: IntArray, asked: BoolArray, there: BoolArray
-) -> BoolArray:
-    """Tell which triangles are all *there* and touch the box around the vertices *asked* for."""
-    places = display[:, :2]
-    low, high = places[asked].min(axis=0), places[asked].max(axis=0)
-    bits = np.column_stack([places < low, places > high]) @ np.array([1, 2, 4, 8], dtype=np.uint8)
-    a, b, c = bits[faces.T]
-    touching = np.asarray((a & b & c) == 0)
-    return touching if there.all() else touching & there[faces].all(axis=1)
+def touching(places: FloatArray, faces: IntArray, low: FloatArray, high: FloatArray) -> BoolArray:
+    """Tell which triangles are not plainly beside a box: all on one side of it.
+
+    Parameters
+    ----------
+    places : (n, 2) float
+        Of the vertices.
+    faces : (m, 3) int
+        Triangles.
+    low, high : (2,) float
+        The box, which may be a point.
+    """
+    beside = np.zeros(len(places), dtype=np.uint8)  # a bit for each side that a vertex is on
+    for k, coordinate in enumerate(places.T):
+        beside |= (coordinate < low[k]).view(np.uint8) << (2 * k)
+        beside |= (coordinate > high[k]).view(np.uint8) << (2 * k + 1)
+    a, b, c = (beside[corner] for corner in faces.T)
+    return np.asarray((a & b & c) == 0)
 
 
 def _hide(display: FloatArray, triangles: IntArray, seen: BoolArray) -> None:
@@ -104,8 +115,8 @@ def _cell_size(low: FloatArray, high: FloatArray, places: FloatArray) -> float:
     """Return a side such that triangles touch a few cells each, and not too many in all."""
     wide = (high - low)[:, :2]
     across = np.ptp(places, axis=0)
-    least = np.sqrt(across.prod() / (_MOST * (len(low) + len(places))))
-    size = max(float(np.median(wide.max(axis=1))), across.max() / _FINEST, float(least), 1e-9)
+    least = float(np.sqrt(across.prod() / (_MOST * (len(low) + len(places)))))
+    size = max(float(np.median(wide.max(axis=1))), float(across.max()) / _FINEST, least, 1e-9)
     while (wide // size + 1.0).prod(axis=1).sum() > _CELLS * len(low):
         size *= 2.0
     return size
