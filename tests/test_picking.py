@@ -282,6 +282,24 @@ def test_what_is_seen_is_looked_at_again_when_the_camera_or_the_pose_has_changed
     assert np.array_equal(picker.seen(), now())
 
 
+@pytest.mark.parametrize("parallel", [False, True])
+def test_asked_about_some_vertices_it_tells_of_them_what_it_would_tell_of_all(parallel):
+    mesh = models.cactus(1500)
+    view, _, surface, picker = over(mesh, parallel=parallel)
+    view.camera.Zoom(3.0)  # some are beside the window
+    everything = seen_vertices(view.to_display(surface.points), mesh.faces)
+    assert 0.2 < everything.mean() < 0.8
+    nowhere = np.zeros(mesh.n_vertices, dtype=bool)
+    assert not picker.seen(nowhere).any()
+    for share in (0.002, 0.1, 0.5):
+        some = RNG.random(mesh.n_vertices) < share
+        assert np.array_equal(picker.seen(some), everything & some)
+    near = view.to_display(surface.points)
+    near = np.hypot(*(near - near[7])[:, :2].T) < 25.0
+    assert np.array_equal(Picker(surface).seen(near), everything & near)
+    assert np.array_equal(picker.seen(), everything)
+
+
 def test_what_is_drawn_in_front_of_the_mesh_hides_none_of_it():
     view, session, surface, picker = over(models.sphere(300))
     before = picker.seen()

@@ -12,6 +12,7 @@ from scenes import sausage
 from solids import icosphere, rotation
 
 from vtk_segdeform.cages import Cage
+from vtk_segdeform.deformer import Deformer
 from vtk_segdeform.editing.history import History
 from vtk_segdeform.editing.listeners import Change
 from vtk_segdeform.editing.state import Options, State
@@ -353,6 +354,48 @@ def test_a_volume_that_was_let_go_comes_back_with_the_option():
     assert_array_equal(session.vertices, loose)
     session.refine()
     assert volume_error(session) < 1e-13
+
+
+def test_binding_takes_hold_of_what_is_fixed_and_dragged_so_that_the_first_move_need_not(
+    monkeypatch,
+):
+    holds = []
+    hold = Deformer.hold
+
+    def counted(*args, **kwargs):
+        holds.append(kwargs)
+        return hold(*args, **kwargs)
+
+    monkeypatch.setattr(Deformer, "hold", counted)
+    session, other = ready(), ready()
+    shares: list[float] = []
+    session.bind(lambda share, _: shares.append(share))
+    assert len(holds) == 1
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    session.drag(SCENE.turned(20))
+    assert len(holds) == 1
+    other.drag(SCENE.turned(20))
+    assert len(holds) == 2
+    assert_array_equal(session.vertices, other.vertices)
+
+
+def test_cages_just_fitted_are_taken_as_they_are_but_not_for_other_regions(monkeypatch):
+    session = ready()
+    cages = session.fitted_cages()
+    asked = []
+    enclose = Cage.require_encloses
+    monkeypatch.setattr(
+        Cage, "require_encloses", lambda *args: (asked.append(args), enclose(*args))[1]
+    )
+    session.set_cages(cages)
+    assert not asked
+    assert session.cages == cages
+    session.set_cages(list(cages))
+    assert len(asked) == len(cages)
+    session.set_regions(Regions.single(session.mesh))
+    with pytest.raises(CageError, match="1 regions need"):
+        session.set_cages(cages)
 
 
 def test_options_of_fitting_need_no_new_binding_and_others_do():

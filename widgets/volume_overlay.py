@@ -114,9 +114,10 @@ class VolumeOverlay:
     def prepare(self) -> None:
         """Do ahead of time what the first `show` would have to wait for.
 
-        It depends on the mesh alone and draws nothing: another thread may do it.
+        It depends on the mesh and its regions alone and draws nothing: another thread may do it.
         """
         self._prepared()
+        self._regions.prepare()
 
     def show(self) -> None:
         """Show it, and keep it up to date."""

@@ -145,8 +145,10 @@ class Posing:
         for vertices in p:
             frozen(vertices)
         pose = Pose(p, MappingProxyType({}))
-        here = targets_at(state.handles, self.vertices(state, pose))
-        return replace(pose, targets=here)
+        x, change = self._evaluated(state, pose)
+        pose = replace(pose, targets=targets_at(state.handles, x))
+        self._shape = pose, x, change  # the same with targets
+        return pose
 
     def _with_volume_of_rest(
         self, state: State, cage_vertices: tuple[FloatArray, ...]

@@ -29,12 +29,11 @@ class RegionVolumes:
 
         Nothing where there is one region, whose volume is the whole.
         """
-        session, regions = self._session, self._session.regions
-        if regions is None or regions.n_regions == 1:
+        session = self._session
+        owned = self._owned()
+        if not owned:
             return []
-        if self._volumes is None or self._volumes[0] is not regions:
-            self._volumes = regions, _owned_volumes(session.mesh, regions)
-        owners, volumes = zip(*self._volumes[1], strict=True)
+        owners, volumes = zip(*owned, strict=True)
         if session.state.pose is None:
             return [(owner, 0.0) for owner in owners]
         if session.solution is not None:  # the solver has them already
@@ -43,6 +42,18 @@ class RegionVolumes:
             x = session.vertices
             shares = [volume.violation(x) / volume.target for volume in volumes]
         return list(zip(owners, shares, strict=True))
+
+    def prepare(self) -> None:
+        """Do ahead of time what the first `changes` would have to wait for."""
+        self._owned()
+
+    def _owned(self) -> list[tuple[int, VolumeConstraint]]:
+        mesh, regions = self._session.mesh, self._session.regions
+        if regions is None or regions.n_regions == 1:
+            return []
+        if self._volumes is None or self._volumes[0] is not regions:
+            self._volumes = regions, _owned_volumes(mesh, regions)
+        return self._volumes[1]
 
 
 def _owned_volumes(mesh: Mesh, regions: Regions) -> list[tuple[int, VolumeConstraint]]:
