@@ -28,7 +28,7 @@ from .gestures import Gesture, Phase, Pointer
 from .painting.brush_ring import BrushRing
 from .painting.outline import Outline
 from .painting.region_colours import RegionColours
-from .painting.roles import Paint, Role
+from .painting.roles import Paint, Role, heaviest
 from .painting.strokes import Brush, Component, Lasso, Rectangle, Stroke, Tool, under
 from .picking import Picker
 from .surface_display import SurfaceDisplay
@@ -129,10 +129,7 @@ class RegionSelector(Widget):
         """Return the region that weighs most where the pointer is; None beside the mesh."""
         hit = self._picker.hit(self.view.pointer(Phase.HOVER))
         regions = self.session.regions
-        if hit is None or regions is None:
-            return None
-        own = np.flatnonzero(regions.membership[:, hit.vertex])
-        return int(own[0] if len(own) == 1 else regions.labels[hit.vertex])
+        return None if hit is None or regions is None else heaviest(regions, hit.vertex)
 
     def remove(self) -> None:
         """Take everything out of the view, for good."""

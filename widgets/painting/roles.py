@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from vtk_segdeform.arrays import BoolArray
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.palette import FIXED, HANDLE, of_region, rgb
+from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
 
 
@@ -25,6 +26,12 @@ class Paint(enum.Enum):
     REGION = enum.auto()
     FIXED = enum.auto()
     HANDLE = enum.auto()
+
+
+def heaviest(regions: Regions, vertex: int) -> int:
+    """Return the region that weighs most at *vertex*; one that is there alone needs no weights."""
+    own = np.flatnonzero(regions.membership[:, vertex])
+    return int(own[0] if len(own) == 1 else regions.labels[vertex])
 
 
 @dataclass(frozen=True)
