@@ -150,7 +150,9 @@ _CACHED = 1 << 14  # vertices moved at a time
 
 def _in_order(faces: IntArray) -> IntArray:
     """Return *faces* sorted by vertex, in short integers: summed up in a third of the time."""
-    return faces[np.argsort(faces.min(axis=1), kind="stable")].astype(np.int32)
+    a, b, c = np.ascontiguousarray(faces.T, dtype=np.int32)
+    least = np.minimum(np.minimum(a, b), c)
+    return np.stack([a, b, c], axis=1)[np.argsort(least, kind="stable")]
 
 
 def _face_labels(corners: IntArray) -> IntArray:

@@ -83,7 +83,8 @@ def _coarse(constraint: VolumeConstraint, cells: IntArray) -> VolumeConstraint:
     n, count, extension = len(cells), int(cells.max()) + 1, constraint.extension
     added = 0 if extension is None else extension.shape[0] - n
     corners = np.concatenate([cells, count + np.arange(added)])[constraint.faces]
-    distinct = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    a, b, c = corners.T
+    distinct = (a != b) & (b != c) & (c != a)
     if extension is not None:
         member = sparse.csr_array((np.ones(n), cells, np.arange(n + 1)), (n, count))
         extension = sparse.csr_array(

@@ -131,10 +131,12 @@ class Subspace:
     def left(self, operator: sparse.csr_array) -> FloatArray:
         """Return operator @ W~, dense (k, m), for a sparse *operator* (k, n) with few rows."""
         by_column = operator.tocsc()
+        is_met = np.diff(by_column.indptr) > 0
         out = np.zeros((operator.shape[0], self.n_columns))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
-            for piece in pieces(len(rows), block.shape[1]):
-                out[:, columns] += by_column[:, rows[piece]] @ double(block[piece])
+            met = np.flatnonzero(is_met[rows])
+            for piece in pieces(len(met), block.shape[1]):
+                out[:, columns] += by_column[:, rows[met[piece]]] @ double(block[met[piece]])
         return out
 
     def averaged(self, mean: sparse.csr_array) -> Subspace:
