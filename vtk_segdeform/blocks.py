@@ -20,7 +20,6 @@ from .threads import in_parallel
 _CACHED = 1 << 17  # numbers of a block that are multiplied at a time: a megabyte
 _ROW = 48  # numbers that take as long as a face of a volume
 _PIECES = 16  # of a block at most, for compiled kernels: to hand one over takes its time
-_NOTHING = inputs(np.empty((0, 3)))[0]
 _DENSE = 1 << 22  # numbers in a dense piece: 32 megabytes
 
 
@@ -118,9 +117,11 @@ class Groups:
 
     def map(self, p: FloatArray, start: FloatArray | None, kernels: Any) -> FloatArray:
         """Return `Subspace.map` of *p* (m, k), k a multiple of 3."""
-        x = np.empty((len(self.rows), p.shape[1]))
-        base, p = (_NOTHING, *inputs(p)) if start is None else inputs(start, p)
-        kernels.put_groups(x, base, p, self.rows, self.columns, self.weights, self.starts)
+        x = np.zeros((len(self.rows), p.shape[1]))
+        if start is not None:
+            x[:, :3] = start
+        (p,) = inputs(p)
+        kernels.add_groups(x, p, self.rows, self.columns, self.weights, self.starts)
         return x
 
     def adjoint(self, y: FloatArray, n_columns: int, kernels: Any) -> FloatArray:

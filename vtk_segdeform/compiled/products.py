@@ -117,11 +117,8 @@ def add_adjoint(p, rows, block, y):
 
 
 @_compile
-def put_groups(x, base, p, rows, columns, weights, starts):
-    """Put W~ @ p into *x* for all groups of `blocks.Groups`; *p* is (m, k), k by threes.
-
-    To the first three columns *base* (n, 3) is added; or (0, 3), which is nothing.
-    """
+def add_groups(x, p, rows, columns, weights, starts):
+    """Add W~ @ p to *x* for all groups of `blocks.Groups`; *p* is (m, k), k by threes."""
     here, k = np.empty(p.size), p.shape[1]
     for g in range(len(starts) - 1):
         ids = rows[starts[g, 0] : starts[g + 1, 0]]
@@ -132,17 +129,7 @@ def put_groups(x, base, p, rows, columns, weights, starts):
         for j in range(c):
             for d in range(k):
                 some[d, j] = p[own[j], d]
-        _start(x, base, ids)
         add_product(x, ids, block, some, 0, n)
-
-
-@_compile
-def _start(x, base, rows):
-    """Set *rows* of *x* to those of *base*, and to zero beyond its columns."""
-    for r in rows:
-        x[r] = 0.0
-        if len(base) > 0:
-            x[r, 0], x[r, 1], x[r, 2] = base[r, 0], base[r, 1], base[r, 2]
 
 
 @_compile
@@ -150,7 +137,7 @@ def add_groups_adjoint(p, y, rows, columns, weights, starts):
     """Add (W~.T @ y).T to *p* (3, m), for *y* (n, 3).
 
     From the last group to the first, and in each from its last rows on: these are what
-    `put_groups` has left in the cache, as this leaves it the first.
+    `add_groups` has left in the cache, as this leaves it the first.
     """
     here = np.empty(p.size)
     for g in range(len(starts) - 2, -1, -1):
