@@ -149,6 +149,8 @@ class Deformer:
         self._here = mesh.with_vertices(mesh.vertices - self._origin) if is_far else mesh
         if not is_number(hold_tolerance, 0.0):
             raise ArgumentError(f"hold_tolerance must be 0 or more; got {hold_tolerance!r}")
+        if not is_number(stretch, 0.0):
+            raise ArgumentError(f"stretch must be a number, 0 or more; got {stretch!r}")
         if rotation_groups is not None and not is_whole(rotation_groups, 1):
             raise ArgumentError(
                 f"rotation groups must be a whole number, 1 or more; got {rotation_groups!r}"
