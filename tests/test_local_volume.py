@@ -87,3 +87,20 @@ def test_across_a_thin_plate_cells_of_one_side_say_nothing_of_the_other(monkeypa
     high = np.abs(ball[rows, 2]) > 0.7
     assert np.count_nonzero(high) > 3000
     assert (np.sign(height[high]) == np.sign(ball[rows[high], 2])).all()
+
+
+@pytest.mark.parametrize("with_a_body", [False, True])
+def test_crumbs_are_answered_and_hide_no_body_beside_them(monkeypatch, with_a_body):
+    corners = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+    places = 4.0 * np.stack(np.meshgrid(*[np.arange(8.0)] * 3), axis=-1).reshape(-1, 3)
+    x = (places[:, None] + 0.1 * corners).reshape(-1, 3)
+    faces = (4 * np.arange(len(places))[:, None, None] + triangles).reshape(-1, 3)
+    if with_a_body:
+        ball, more = icosphere(4)
+        x, faces = np.vstack([x, 9.0 * ball - 50.0]), np.vstack([faces, len(x) + more])
+    monkeypatch.setattr(local_volume, "_LARGE", 100)
+    monkeypatch.setattr(local_volume, "_CELLS", 900)
+    change = local_volume_change(Mesh(x, faces), x * [1.0, 1.0, 1.1])
+    assert np.isfinite(change).all()
+    assert_allclose(change[4 * len(places) :] if with_a_body else change, 0.1, atol=1e-9)

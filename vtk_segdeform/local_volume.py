@@ -32,7 +32,7 @@ from .arrays import FloatArray, IntArray, as_points
 from .errors import ArgumentError
 from .mesh import Mesh
 from .segmenting.thinning import cells as cells_of
-from .segmenting.thinning import unique_edges
+from .segmenting.thinning import faces_between, unique_edges
 from .threads import in_parallel
 from .volume import corner_and_edges, volume_gradient
 
@@ -63,10 +63,11 @@ class LocalVolume:
         self._spread: list[sparse.csr_array] = []
         if mesh.n_vertices > _LARGE:
             _, cells = cells_of(mesh, _CELLS, np.random.default_rng(0))
-            self._means = _means(cells)
-            points, corners = self._means @ points, cells[faces]
-            faces = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
-            self._spread = _spread(mesh.vertices, cells, points, _edges(faces, len(points)))
+            between = faces_between(cells, faces)
+            if len(between):  # none is left of a heap of crumbs, which have no cells to spare
+                self._means, faces = _means(cells), between
+                points = self._means @ points
+                self._spread = _spread(mesh.vertices, cells, points, _edges(faces, len(points)))
         self._flesh = _Flesh(points, faces)
         self._rest = self._flesh.smoothed(points)
         floor = _LEAST * np.abs(self._rest).mean()
@@ -163,10 +164,8 @@ def _spread(
     for start in range(0, len(x), _AT_ONCE):
         own = cells[start : start + _AT_ONCE]
         candidates = twice[own]
-        vertex, near = (
-            np.repeat(np.arange(len(own)), np.diff(candidates.indptr)),
-            candidates.indices,
-        )
+        near = candidates.indices
+        vertex = np.repeat(np.arange(len(own)), np.diff(candidates.indptr))
         away = np.square(x[start + vertex] - points[near]).sum(axis=1) / reach**2
         weight = (1.0 - away.clip(max=1.0)) ** 2 + 1e-9 * (near == own[vertex])
         weight /= np.bincount(vertex, weight)[vertex]

@@ -25,6 +25,7 @@ from .arrays import FloatArray, IntArray
 from .constraints import VolumeConstraint, Volumes
 from .mesh import Mesh
 from .segmenting.thinning import cells as cells_of
+from .segmenting.thinning import faces_between
 from .subspace import Subspace
 
 _POINTS = 2000  # about how many cells
@@ -82,15 +83,14 @@ def _coarse(constraint: VolumeConstraint, cells: IntArray) -> VolumeConstraint:
     """Return *constraint* over the cells."""
     n, count, extension = len(cells), int(cells.max()) + 1, constraint.extension
     added = 0 if extension is None else extension.shape[0] - n
-    corners = np.concatenate([cells, count + np.arange(added)])[constraint.faces]
-    a, b, c = corners.T
-    distinct = (a != b) & (b != c) & (c != a)
+    places = np.concatenate([cells, count + np.arange(added)])
     if extension is not None:
         member = sparse.csr_array((np.ones(n), cells, np.arange(n + 1)), (n, count))
         extension = sparse.csr_array(
             sparse.vstack([sparse.eye_array(count), extension[n:] @ member])
         )
-    return VolumeConstraint(corners[distinct], constraint.target, extension)
+    faces = faces_between(places, constraint.faces)
+    return VolumeConstraint(faces, constraint.target, extension)
 
 
 def _matrix(cells: IntArray, shares: FloatArray) -> sparse.csr_array:

@@ -39,6 +39,16 @@ def cells(mesh: Mesh, n_points: int, rng: np.random.Generator) -> tuple[IntArray
     return kept, number[nearest_of(distinct_lengths(mesh), kept)]
 
 
+def faces_between(cells: IntArray, faces: IntArray) -> IntArray:
+    """Return the *faces* (m, 3) whose corners lie in three *cells*, over these, (k, 3).
+
+    What is left of a closed surface is closed.
+    """
+    corners = cells[faces]
+    a, b, c = corners.T
+    return np.asarray(corners[(a != b) & (b != c) & (c != a)])
+
+
 def distinct_lengths(mesh: Mesh) -> sparse.csr_array:
     """Return (n, n) lengths of the edges, such that no two paths are equally long.
 
