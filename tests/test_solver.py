@@ -70,6 +70,20 @@ def test_a_map_sets_every_vertex_to_where_it_starts_before_it_adds(
     assert_allclose(start, before, atol=0)
 
 
+def test_arrays_of_any_form_are_multiplied_alike():
+    rng = np.random.default_rng(4)
+    subspace = Subspace(5000, (np.arange(5000),), (rng.normal(size=(5000, 7)),))
+    subspace.__dict__["_is_heavy"] = True  # by kernels, which are compiled for one form
+    p, y, start = (rng.normal(size=(k, 6))[:, :3] for k in (7, 5000, 5000))
+    p.setflags(write=False)
+    expected = subspace.map(p.copy(), start.copy()), subspace.adjoint(y.copy())
+    start.setflags(write=False)
+    assert_allclose(expected[0], subspace.blocks[0] @ p + start, atol=1e-13)
+    assert_allclose(expected[1], subspace.blocks[0].T @ y, atol=1e-11)
+    assert (subspace.map(p, start) == expected[0]).all()
+    assert (subspace.adjoint(np.asfortranarray(y)) == expected[1]).all()
+
+
 def test_cages_that_share_no_vertex_do_not_couple():
     scene = sausage(3)
     subspace = bind(scene.regions, scene.cages)

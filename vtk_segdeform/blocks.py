@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 
 from .arrays import FloatArray, IntArray
-from .fast import WORTHWHILE, compiled, inputs
+from .fast import WORTHWHILE, compiled, inputs, plain
 from .threads import in_parallel
 
 _CACHED = 1 << 17  # numbers of a block that are multiplied at a time: a megabyte
 _ROW = 48  # numbers that take as long as a face of a volume
 _PIECES = 16  # of a block at most, for compiled kernels: to hand one over takes its time
 _DENSE = 1 << 22  # numbers in a dense piece: 32 megabytes
+_NOTHING = inputs(np.empty((0, 3)))
 
 
 def is_heavy(blocks: Sequence[FloatArray]) -> bool:
@@ -117,16 +118,13 @@ class Groups:
 
     def map(self, p: FloatArray, start: FloatArray | None, kernels: Any) -> FloatArray:
         """Return `Subspace.map` of *p* (m, k), k a multiple of 3."""
-        x = np.zeros((len(self.rows), p.shape[1]))
-        if start is not None:
-            x[:, :3] = start
-        (p,) = inputs(p)
-        kernels.add_groups(x, p, self.rows, self.columns, self.weights, self.starts)
+        x = np.empty((len(self.rows), p.shape[1]))
+        (base,) = _NOTHING if start is None else inputs(start)
+        kernels.put_groups(x, base, plain(p), self.rows, self.columns, self.weights, self.starts)
         return x
 
     def adjoint(self, y: FloatArray, n_columns: int, kernels: Any) -> FloatArray:
         """Return `Subspace.adjoint` of *y* (n, 3)."""
         p = np.zeros((3, n_columns))
-        (y,) = inputs(y)
-        kernels.add_groups_adjoint(p, y, self.rows, self.columns, self.weights, self.starts)
+        kernels.add_groups_adjoint(p, plain(y), self.rows, self.columns, self.weights, self.starts)
         return p.T

@@ -33,6 +33,15 @@ def inputs(*arrays: NDArray[Any]) -> tuple[NDArray[Any], ...]:
     return tuple(plain)
 
 
+def plain(array: NDArray[Any]) -> NDArray[Any]:
+    """Return *array*, contiguous and writable: as new arrays are, which are handed over as such.
+
+    For kernels of some microseconds: after each has gone over what does not fit in a cache, Python
+    starts cold, and `inputs` takes as long as they do.
+    """
+    return array if array.flags.carray else np.array(array, order="C")
+
+
 @functools.cache
 def _kernels() -> Any:
     if os.environ.get("SEGDEFORM_NUMBA", "1") == "0":

@@ -43,7 +43,7 @@ class Subspace:
     rows: tuple[IntArray, ...]
     blocks: tuple[FloatArray, ...]
 
-    @property
+    @cached_property
     def n_columns(self) -> int:
         """Number of cage vertices in all cages, m."""
         return sum(block.shape[1] for block in self.blocks)

@@ -13,15 +13,15 @@ at a time.  Their arguments are positional, as numba wants it, and outputs come 
 
 from .coordinates import weights
 from .normals import ring_normals, rings
-from .products import add_adjoint, add_groups, add_groups_adjoint, add_product, put_patches
+from .products import add_adjoint, add_groups_adjoint, add_product, put_groups, put_patches
 from .rotations import rotations
 from .volumes import volume_along_sums, volume_gradient, volume_sums
 
 __all__ = [
     "add_adjoint",
-    "add_groups",
     "add_groups_adjoint",
     "add_product",
+    "put_groups",
     "put_patches",
     "ring_normals",
     "rings",

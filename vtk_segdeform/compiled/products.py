@@ -18,26 +18,37 @@ def add_product(x, rows, block, p, start, stop):
     if len(p) == 6:
         _add_six(x, rows, block, p, start, stop)
         return
-    two = start + (stop - start) // 2 * 2
-    for i in range(start, two, 2):
-        b, d, q, r = block[i], block[i + 1], rows[i], rows[i + 1]
+    four = start + (stop - start) // 4 * 4
+    for i in range(start, four, 4):
+        b0, b1, b2, b3 = block[i], block[i + 1], block[i + 2], block[i + 3]
         for c in range(0, len(p), 3):
             p0, p1, p2 = p[c], p[c + 1], p[c + 2]
-            s0 = s1 = s2 = t0 = t1 = t2 = 0.0
-            for j in range(len(b)):
-                u0, u1, u2 = p0[j], p1[j], p2[j]
-                v, w = float(b[j]), float(d[j])
-                s0 += v * u0
-                s1 += v * u1
-                s2 += v * u2
-                t0 += w * u0
-                t1 += w * u1
-                t2 += w * u2
-            for row, d0, d1, d2 in ((q, s0, s1, s2), (r, t0, t1, t2)):
-                x[row, c] += d0
-                x[row, c + 1] += d1
-                x[row, c + 2] += d2
-    for i in range(two, stop):
+            q0 = q1 = q2 = r0 = r1 = r2 = s0 = s1 = s2 = t0 = t1 = t2 = 0.0
+            for j in range(len(b0)):
+                d0, d1, d2 = p0[j], p1[j], p2[j]
+                q, r, s, t = float(b0[j]), float(b1[j]), float(b2[j]), float(b3[j])
+                q0 += q * d0
+                q1 += q * d1
+                q2 += q * d2
+                r0 += r * d0
+                r1 += r * d1
+                r2 += r * d2
+                s0 += s * d0
+                s1 += s * d1
+                s2 += s * d2
+                t0 += t * d0
+                t1 += t * d1
+                t2 += t * d2
+            for k, d0, d1, d2 in (
+                (rows[i], q0, q1, q2),
+                (rows[i + 1], r0, r1, r2),
+                (rows[i + 2], s0, s1, s2),
+                (rows[i + 3], t0, t1, t2),
+            ):
+                x[k, c] += d0
+                x[k, c + 1] += d1
+                x[k, c + 2] += d2
+    for i in range(four, stop):
         _add_row(x[rows[i]], block[i], p)
 
 
@@ -117,8 +128,11 @@ def add_adjoint(p, rows, block, y):
 
 
 @_compile
-def add_groups(x, p, rows, columns, weights, starts):
-    """Add W~ @ p to *x* for all groups of `blocks.Groups`; *p* is (m, k), k by threes."""
+def put_groups(x, base, p, rows, columns, weights, starts):
+    """Put W~ @ p into *x* for all groups of `blocks.Groups`; *p* is (m, k), k by threes.
+
+    To the first three columns *base* (n, 3) is added; or (0, 3), which is nothing.
+    """
     here, k = np.empty(p.size), p.shape[1]
     for g in range(len(starts) - 1):
         ids = rows[starts[g, 0] : starts[g + 1, 0]]
@@ -129,6 +143,12 @@ def add_groups(x, p, rows, columns, weights, starts):
         for j in range(c):
             for d in range(k):
                 some[d, j] = p[own[j], d]
+        for i in ids:
+            for d in range(k):
+                x[i, d] = 0.0
+        if len(base) > 0:
+            for i in ids:
+                x[i, 0], x[i, 1], x[i, 2] = base[i, 0], base[i, 1], base[i, 2]
         add_product(x, ids, block, some, 0, n)
 
 
@@ -137,7 +157,7 @@ def add_groups_adjoint(p, y, rows, columns, weights, starts):
     """Add (W~.T @ y).T to *p* (3, m), for *y* (n, 3).
 
     From the last group to the first, and in each from its last rows on: these are what
-    `add_groups` has left in the cache, as this leaves it the first.
+    `put_groups` has left in the cache, as this leaves it the first.
     """
     here = np.empty(p.size)
     for g in range(len(starts) - 2, -1, -1):
