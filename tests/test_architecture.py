@@ -34,8 +34,8 @@ STORY = [
     "caging.region_solid", "caging.contour", "caging.cage_simplify", "cage_fit",
     # the solver
     "subspace", "passengers", "sampling", "grams", "patches", "energy", "cage_stiffness",
-    "curvature", "grouping", "constraints", "stand_in", "binding", "device", "gpu", "landing",
-    "positions",
+    "curvature", "grouping", "constraints", "stand_in", "bound", "binding", "device", "gpu",
+    "landing", "positions",
     "acceleration", "solution", "iteration", "solver", "stiffening", "targets", "deformer",
     "pipeline",
     # a deformation in the making

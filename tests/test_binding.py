@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from scenes import sausage
 
-from vtk_segdeform import Deformer, Mesh, Regions, Session, binding, stand_in
+from vtk_segdeform import Deformer, Mesh, Regions, Session, binding, bound, stand_in
 from vtk_segdeform.editing import posing
 from vtk_segdeform.errors import Cancelled
 
@@ -88,15 +88,27 @@ def test_what_does_not_matter_to_it_finds_the_same(tmp_path, counted):
     assert len(counted) == 1
 
 
-@pytest.mark.parametrize("damage", ["cut", "empty", "other", "flipped"])
+@pytest.mark.parametrize(
+    "damage", ["cut", "empty", "other", "flipped", "an array", "encrypted", "compressed", "header"]
+)
 def test_a_damaged_file_is_as_good_as_none(tmp_path, counted, damage):
     sound = SCENE.deformer(cache=tmp_path).solve(TARGETS)
     (path,) = tmp_path.iterdir()
     content = bytearray(path.read_bytes())
     if damage == "flipped":
         content[len(content) // 2] ^= 255
+    directory = content.index(b"PK\x01\x02")
+    if damage == "encrypted":
+        content[directory + 8] |= 1
+    if damage == "compressed":
+        content[directory + 10] = 99
+    if damage == "header":
+        content[content.index(b"{'descr'")] = ord("(")
     made = {"cut": content[: len(content) // 2], "empty": b"", "other": b"PK nothing"}
     path.write_bytes(made.get(damage, bytes(content)))
+    if damage == "an array":
+        with open(path, "wb") as file:
+            np.save(file, np.eye(3))
     again = SCENE.deformer(cache=tmp_path).solve(TARGETS)
     assert len(counted) == 2
     assert_array_equal(again.vertices, sound.vertices)
@@ -125,7 +137,7 @@ def test_what_was_not_used_for_longest_goes_first(tmp_path, monkeypatch):
         (kept[stretch],) = set(tmp_path.iterdir()) - set(kept.values())
         os.utime(kept[stretch], (1e9 + k, 1e9 + k))
     SCENE.deformer(cache=tmp_path, stretch=1.0)  # used again
-    monkeypatch.setattr(binding, "_MOST", int(3.5 * kept[1.0].stat().st_size))
+    monkeypatch.setattr(bound, "_MOST", int(3.5 * kept[1.0].stat().st_size))
     SCENE.deformer(cache=tmp_path, stretch=4.0)
     assert [path.exists() for path in kept.values()] == [True, False, True]
 
@@ -140,4 +152,4 @@ def test_a_session_over_a_large_mesh_keeps_its_binding(tmp_path, counted, monkey
         session.bind()
     assert len(counted) == 1
     monkeypatch.setenv("SEGDEFORM_CACHE", "0")
-    assert binding.cache_folder() is None
+    assert bound.cache_folder() is None

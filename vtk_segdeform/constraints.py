@@ -150,9 +150,13 @@ _CACHED = 1 << 14  # vertices moved at a time
 
 def _in_order(faces: IntArray) -> IntArray:
     """Return *faces* sorted by vertex, in short integers: summed up in a third of the time."""
-    a, b, c = np.ascontiguousarray(faces.T, dtype=np.int32)
-    least = np.minimum(np.minimum(a, b), c)
-    return np.stack([a, b, c], axis=1)[np.argsort(least, kind="stable")]
+    short = faces.astype(np.int32)
+    key = np.minimum(short[:, 0], short[:, 1]).astype(np.int64)
+    np.minimum(key, short[:, 2], out=key)
+    key <<= 32  # numbers of their own below it: sorted, they say from where
+    key |= np.arange(len(key))
+    key.sort()
+    return np.take(short, key & 0xFFFFFFFF, axis=0)
 
 
 def _face_labels(corners: IntArray) -> IntArray:

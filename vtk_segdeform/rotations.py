@@ -26,7 +26,7 @@ from .fast import compiled, inputs
 from .threads import n_threads
 
 _TIMES = 40  # as long as a face of a volume takes each
-_MANY = 20_000  # positions
+_MANY, _EACH = 8000, 10  # positions: so many tell where clusters are, or so many for each
 _EQUAL = 4  # nearest centres among which the favoured one is found
 _TIE_BREAK = 1e-6  # relative: of equal distances one is preferred, the same in every frame
 
@@ -77,8 +77,9 @@ def group_by_position(
     rng = np.random.default_rng(0)
     favour = 1.0 + _TIE_BREAK * rng.random(len(positions))
     some = positions  # of many, these tell where the clusters are
-    if len(positions) > _MANY:
-        some = positions[np.sort(rng.permutation(len(positions))[:_MANY])]
+    enough = max(_MANY, _EACH * n_groups)
+    if len(positions) > enough:
+        some = positions[np.sort(rng.permutation(len(positions))[:enough])]
     if seeded:
         centres = some[_farthest_points(some, n_groups, favour[: len(some)])]
     else:

@@ -19,7 +19,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ..arrays import FloatArray, frozen
-from ..binding import cache_folder
+from ..bound import cache_folder
 from ..constraints import VolumeConstraint, region_volumes, total_volume
 from ..deformer import Deformer
 from ..errors import CageError, ConstraintError

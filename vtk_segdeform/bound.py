@@ -1,0 +1,142 @@
+"""What a mesh, its regions and its cages are bound to, and how that is kept on disk.
+
+A folder holds one file for each binding, an ``.npz`` under a name that says all it was made from
+(`binding`).  A million vertices are some 400 megabytes: what takes its time is memory that nobody
+has had yet, so all cores read.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+import sys
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .energy import Energy
+from .patches import Patches
+from .stand_in import StandIn
+from .subspace import Subspace
+from .threads import in_parallel
+
+ENDING = ".bound.npz"
+_MOST = 4 << 30  # bytes in a folder
+
+
+@dataclass(frozen=True, eq=False)
+class Binding:
+    """What a `Deformer` solves with."""
+
+    energy: Energy
+    stand_in: StandIn
+    patches: Patches | None = None
+
+    @property
+    def mapping(self) -> Subspace | Patches:
+        """What maps the cages to the mesh: W~, or W~ in patches."""
+        return self.patches or self.energy.subspace
+
+    @classmethod
+    def read(cls, path: Path, n_vertices: int) -> Binding | None:
+        """Return what is in a file; None if there is none, or none that can be believed."""
+        try:
+            arrays = _read(path)
+            subspace = _subspace(arrays, "w", n_vertices)
+            pull = arrays["pull"]
+            energy = Energy(
+                arrays["quadratic"], float(arrays["constant"]), arrays["mass"], pull, pull, subspace
+            )
+            stand_in = StandIn(subspace)
+            if "cells" in arrays:
+                surface = _subspace(arrays, "s", int(arrays["n_cells"]))
+                stand_in = StandIn(surface, arrays["cells"], arrays["shares"])
+            patches = None
+            if "patch_starts" in arrays:
+                patches = Patches(*(arrays["patch_" + each.name] for each in fields(Patches)))
+            os.utime(path)  # used: among the last to be thrown away
+        except Exception:  # noqa: BLE001 - damage is an error of a dozen kinds
+            return None
+        return cls(energy, stand_in, patches)
+
+    def write(self, path: Path) -> None:
+        """Keep it in a file, whole or not at all; without room for it, it is not kept."""
+        energy, stand_in = self.energy, self.stand_in
+        arrays: dict[str, Any] = {
+            "quadratic": energy.quadratic,
+            "constant": np.array(energy.constant),
+            "mass": energy.mass,
+            "pull": energy.pull,
+            **_arrays(energy.subspace, "w"),
+        }
+        if stand_in.cells is not None:
+            arrays |= {"cells": stand_in.cells, "shares": stand_in.shares}
+            arrays |= {"n_cells": np.array(stand_in.surface.n_vertices)}
+            arrays |= _arrays(stand_in.surface, "s")
+        if patches := self.patches:
+            arrays |= {
+                "patch_" + each.name: getattr(patches, each.name) for each in fields(Patches)
+            }
+        draft = path.with_name(f".{secrets.token_hex(8)}.part")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                with open(draft, "xb") as file:
+                    np.savez(file, allow_pickle=False, **arrays)
+                os.replace(draft, path)
+            finally:
+                draft.unlink(missing_ok=True)
+            _make_room(path.parent)
+        except OSError:  # a full disk or a folder that cannot be written: then without
+            return
+
+
+def cache_folder() -> Path | None:
+    """Return where this user's programs keep bindings; None if ``SEGDEFORM_CACHE`` is 0."""
+    chosen = os.environ.get("SEGDEFORM_CACHE", "")
+    if chosen:
+        return None if chosen == "0" else Path(chosen)
+    if sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "segdeform" / "bound"
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """Return all arrays of a file by name."""
+    arrays: dict[str, Any] = {}
+    with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
+        names = file.files
+
+    def some(start: int, stop: int) -> None:
+        with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
+            arrays.update({name: file[name] for name in names[start:stop]})
+
+    in_parallel(some, len(names), 1)
+    return arrays
+
+
+def _make_room(folder: Path) -> None:
+    """Throw away what has not been used for longest, until the folder is small enough."""
+    files = [(path.stat(), path) for path in folder.glob("*" + ENDING)]
+    files.sort(key=lambda each: each[0].st_mtime, reverse=True)
+    used = np.cumsum([stat.st_size for stat, _ in files])
+    for (_, path), size in zip(files, used, strict=True):
+        if size > _MOST:
+            path.unlink(missing_ok=True)
+
+
+def _arrays(subspace: Subspace, name: str) -> dict[str, Any]:
+    parts = enumerate(zip(subspace.rows, subspace.blocks, strict=True))
+    return {f"{name}{r}{kind}": a for r, pair in parts for kind, a in zip("rb", pair, strict=True)}
+
+
+def _subspace(arrays: dict[str, Any], name: str, n: int) -> Subspace:
+    count = sum(key.startswith(name) and key[1:-1].isdigit() for key in arrays) // 2
+    rows, blocks = ([arrays[f"{name}{r}{kind}"] for r in range(count)] for kind in "rb")
+    return Subspace(n, tuple(rows), tuple(blocks))
