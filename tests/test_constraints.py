@@ -50,6 +50,23 @@ def test_gradients_are_right_to_second_order():
         assert_allclose(errors[0] / errors[1], 4.0, rtol=0.1)
 
 
+def test_curvature_is_the_derivative_of_the_gradient():
+    x, dx = MESH.vertices + wobble(3), wobble(4, 1.0)
+    for constraint in (total_volume(MESH), *region_volumes(MESH, SCENE.regions.labels)):
+        halves = (
+            constraint.curvature(x).reshape(3 * len(x), len(x)).toarray().reshape(3, len(x), -1)
+        )
+        bends = [half @ dx - half.T @ dx for half in halves]  # M_c dx
+        product = np.stack(
+            [bends[2][:, 1] - bends[1][:, 2], bends[0][:, 2] - bends[2][:, 0]]
+            + [bends[1][:, 0] - bends[0][:, 1]],
+            axis=1,
+        )
+        # The gradient is quadratic: its central difference is no approximation.
+        exact = 0.5 * (constraint.gradient(x + dx) - constraint.gradient(x - dx))
+        assert_allclose(product, exact, atol=1e-12)
+
+
 def test_one_region_is_the_whole():
     (constraint,) = region_volumes(MESH, np.zeros(MESH.n_vertices, dtype=int))
     assert_allclose(constraint.target, total_volume(MESH).target, rtol=1e-14)

@@ -85,6 +85,20 @@ def test_the_factor_solves_in_both_of_its_forms():
     assert_allclose(back, y, atol=2e-3 * np.abs(y).max())  # a thousandth of the part is kept back
 
 
+def test_how_volumes_curve_is_added_where_it_belongs():
+    energy, p, m = energy_of(40), bent(REST), len(REST)
+    held = energy.quadratic + np.eye(m) * np.trace(energy.quadratic)
+    g = 1e-3 * np.trace(energy.quadratic) / m * RNG.normal(size=(3, m, m))
+    g -= np.swapaxes(g, 1, 2)
+    with_it, without = (curved_factor(held, energy, p, of) for of in (g, None))
+    added = with_it.triangle @ with_it.triangle.T - without.triangle @ without.triangle.T
+    blocks = added.reshape(3, m, 3, m)
+    for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        assert_allclose(blocks[a, :, b], g[c], atol=1e-9 * np.abs(g).max())
+        assert_allclose(blocks[b, :, a], -g[c], atol=1e-9 * np.abs(g).max())
+        assert np.abs(blocks[a, :, a]).max() < 1e-9 * np.abs(g).max()
+
+
 def test_what_is_not_convex_has_no_factor():
     assert factored(-np.eye(4)) is None
     energy = energy_of(40)

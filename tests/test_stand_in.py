@@ -49,6 +49,37 @@ def test_its_volumes_change_as_those_of_the_mesh(constraints):
         assert cosine > 0.995
 
 
+def curvature(volumes, p, multipliers, dp):
+    """Return G, as the solver adds it, times *dp* (m, 3)."""
+    g, m = volumes.curve(p, np.array(multipliers)), len(p)
+    whole = np.zeros((3, m, 3, m))
+    for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        whole[a, :, b], whole[b, :, a] = g[c], -g[c]
+    return (whole.reshape(3 * m, 3 * m) @ dp.T.ravel()).reshape(3, m).T
+
+
+@pytest.mark.parametrize(("few", "error"), [(10_000, 1e-4), (700, 0.05)])
+@pytest.mark.parametrize("constraints", [total_volume, region_volumes])
+def test_how_volumes_curve_is_the_derivative_of_their_pull(monkeypatch, constraints, few, error):
+    monkeypatch.setattr(stand_in, "_FEW", few)
+    mesh, rng = SCENE.mesh, np.random.default_rng(6)
+    held = (total_volume(mesh),)
+    if constraints is region_volumes:
+        held = region_volumes(mesh, SCENE.regions.labels)
+    volumes = StandIn.of(mesh, SUBSPACE).volumes(held, mesh.vertices)
+    assert len(volumes.curve.weights) == min(few, mesh.n_vertices)
+    p = P0 + 0.02 * rng.normal(size=P0.shape)
+    dp, multipliers = rng.normal(size=P0.shape), rng.normal(size=len(held))
+
+    def pull(p):
+        gradients = [c.gradient(volumes.surface.map(p)) for c in volumes.constraints]
+        return SUBSPACE.adjoint(np.tensordot(multipliers, gradients, axes=1))
+
+    exact = 0.5 * (pull(p + dp) - pull(p - dp))  # quadratic: no approximation
+    guess = curvature(volumes, p, multipliers, dp)
+    assert np.linalg.norm(guess - exact) < error * np.linalg.norm(exact)
+
+
 @pytest.mark.usefixtures("coarse")
 def test_it_is_closed_wherever_the_mesh_is():
     # A closed surface has the same volume about any origin.

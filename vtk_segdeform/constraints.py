@@ -11,7 +11,7 @@ means of mesh vertices, so each V_c is the volume (8) of a few more triangles ov
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,6 +49,22 @@ class VolumeConstraint:
         gradient = volume_gradient(self._extended(x), self.faces)
         return gradient if self.extension is None else self.extension.T @ gradient
 
+    def curvature(self, x: FloatArray) -> sparse.csr_array:
+        """Return U_c for each axis c, (3n, n) one below the other, at *x* (n, 3).
+
+        They make the Hessian, d^2 g / dx_ia dx_jb = sum_c eps_abc (U_c - U_c^T)_ij: of
+        det(x_i, x_j, x_k) / 6 it is the axis c of x_k / 6.
+        """
+        i, j, k = (np.concatenate(np.roll(self.faces.T, -turn, axis=0)) for turn in range(3))
+        points = self._extended(x) / 6.0
+        halves = [
+            sparse.coo_array((axis[k], (i, j)), (len(points), len(points))).tocsr()
+            for axis in points.T
+        ]
+        if self.extension is not None:
+            halves = [self.extension.T @ half @ self.extension for half in halves]
+        return sparse.csr_array(sparse.vstack(halves))
+
     def exact_step(self, path: FloatArray) -> float:
         """Return the smallest t with g(x + t d) = 0, to rounding; x and d side by side (n, 6)."""
         return step_to_volume(volume_along_path(self._extended(path), self.faces), self.target)
@@ -61,10 +77,15 @@ class VolumeConstraint:
 
 @dataclass(frozen=True, eq=False)
 class Volumes:
-    """Constraints as functions of the cage vertices: over ``surface.map(p)``."""
+    """Constraints as functions of the cage vertices: over ``surface.map(p)``.
+
+    How they *curve*, if it is known, is a function of p and their multipliers: G (3, m, m), of
+    sum_k lambda_k d^2 g_k / dp_ia dp_jb = sum_c eps_abc G_cij.
+    """
 
     surface: Subspace
     constraints: tuple[VolumeConstraint, ...]
+    curve: Callable[[FloatArray, FloatArray], FloatArray] | None = None
 
     def held_at(self, p: FloatArray) -> Volumes:
         """Return the same that are held as they are with cage vertices at *p* (m, 3)."""

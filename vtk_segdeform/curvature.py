@@ -36,7 +36,7 @@ from .arrays import FloatArray
 from .energy import Energy
 from .rotations import closest_rotations
 
-_SHARES = (0.999, 0.8, 0.5)  # of the rotations' part; the largest that leaves H convex
+_SHARES = 0.999, 0.99, 0.96, 0.8, 0.5  # of the rotations' part; the largest that leaves H convex
 _SOFTEST = 1e-3  # least stiffness of a group about an axis, as a share of its largest
 _CHUNK = 1000  # groups at a time
 # eps_kic as (k, c, i), axis of turning, column of dp, row of R S; k and c side by side.
@@ -73,10 +73,13 @@ def factored(hessian: FloatArray) -> Factor | None:
         return None
 
 
-def curved_factor(hessian: FloatArray, energy: Energy, p: FloatArray) -> Factor | None:
+def curved_factor(
+    hessian: FloatArray, energy: Energy, p: FloatArray, volumes: FloatArray | None = None
+) -> Factor | None:
     """Return the factor of *hessian* (m, m) less the rotations' part at *p* (m, 3).
 
-    None where no share of that part leaves it convex.
+    With that of *volumes* held added, G (3, m, m) of `constraints.Volumes`.  None where no share of
+    the rotations' part leaves it convex.
     """
     m = len(p)
     part = _rotations_part(energy, p)
@@ -85,6 +88,10 @@ def curved_factor(hessian: FloatArray, energy: Energy, p: FloatArray) -> Factor 
         for axis in range(3):
             block = slice(axis * m, (axis + 1) * m)
             curved[block, block] += hessian
+        if volumes is not None:  # below the diagonal: eps_abc G_c for a > b
+            curved[m : 2 * m, :m] -= volumes[2]
+            curved[2 * m :, :m] += volumes[1]
+            curved[2 * m :, m : 2 * m] -= volumes[0]
         try:
             return Factor(
                 linalg.cholesky(curved, lower=True, overwrite_a=True, check_finite=False),

@@ -17,10 +17,10 @@ Four things are added, each told by a number from the cactus bent by 60 degrees:
 1. *Exact volume.*  Along Z = H^-1 G^T the volume is a cubic of the step length; its root is the
    last operation of every step.  |dV| / V is then about 1e-15; (21) alone leaves 1e-4.
 2. *Curvature* (`curvature`).  (21) lets rotations follow one step behind: hundreds of steps, and
-   a small one says little of how far there is to go.  With their part in H it is Newton's step
-   for the shape, and about as long as the way that is left.
-3. *Anderson acceleration* (`acceleration`) of (21) as a fixed-point map p -> q(p), for what H
-   still lacks: the curvature of the constraints, and of what has turned since it was factored.
+   a small one says little of how far there is to go.  With their part in H, and that of the
+   volumes held, it is Newton's step, and about as long as the way that is left.
+3. *Anderson acceleration* (`acceleration`) of (21) as a fixed-point map p -> q(p), for what has
+   turned since H was factored.
 4. *Safeguard.*  All iterates meet the constraints, so the objective itself is the merit: an
    accelerated step that raises it is thrown away for the plain one, and a plain step that raises
    it is shortened, epsilon of section 3.3.
@@ -126,7 +126,7 @@ class GaussNewton:
         curved = bool(options.window) and self.energy.exact
         while len(merits) <= options.max_steps:
             if curved and (course.factor_is_old):
-                course.renew(curved_factor(self._hessian, self.energy, here.p) or self._factor)
+                course.renew(self._curved(here) or self._factor)
             course.age += 1
             step, multipliers, directions = self._step(here, course.factor)
             course.size = self._size(step)
@@ -164,6 +164,11 @@ class GaussNewton:
             shape=here.shape,
             merits=tuple(merits),
         )
+
+    def _curved(self, here: _Point) -> Factor | None:
+        curve = self.volumes.curve
+        of_volumes = curve and curve(here.p, self._step(here, self._factor)[1])
+        return curved_factor(self._hessian, self.energy, here.p, of_volumes)
 
     def _step(
         self, here: _Point, factor: Factor

@@ -24,12 +24,15 @@ from scipy import sparse
 from .arrays import FloatArray, IntArray
 from .constraints import VolumeConstraint, Volumes
 from .mesh import Mesh
+from .rotations import group_by_position
 from .segmenting.thinning import cells as cells_of
 from .segmenting.thinning import faces_between
 from .subspace import Subspace
 
 _POINTS = 2000  # about how many cells
 _LARGE = 3_000  # vertices beyond which a mesh has a stand-in
+_FEW = 700  # points that tell how the volume curves
+_SIDES = 0.1  # of the mesh's size: how far apart opposite sides count
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +77,42 @@ class StandIn:
             constraints = [_coarse(each, self.cells) for each in constraints]
             points = _matrix(self.cells, self.shares) @ rest
         free = [replace(each, target=0.0) for each in constraints]
-        return Volumes(
-            self.surface, tuple(replace(each, target=each.violation(points)) for each in free)
-        )
+        held = tuple(replace(each, target=each.violation(points)) for each in free)
+        return Volumes(self.surface, held, _Curve.of(self.surface, held, points) if held else None)
+
+
+@dataclass(frozen=True, eq=False)
+class _Curve:
+    """How volumes curve with the cages, told by few points; called as `Volumes.curve`."""
+
+    weights: FloatArray  # (k, m), W~ of these points; rough, as all of this only tells a direction
+    constraints: tuple[VolumeConstraint, ...]
+
+    @classmethod
+    def of(
+        cls, surface: Subspace, constraints: Sequence[VolumeConstraint], points: FloatArray
+    ) -> _Curve:
+        """Return that of *constraints* on *surface*, which is at *points* (n, 3) at rest.
+
+        Neighbours that face the same way are one point, so that thin parts keep both their sides.
+        """
+        cells, shares = np.arange(len(points)), np.ones(len(points))
+        if len(points) > _FEW:
+            outward = np.sum([each.gradient(points) for each in constraints], axis=0)
+            areas = np.linalg.norm(outward, axis=1) + np.finfo(float).tiny
+            cells = group_by_position(np.hstack([points, _SIDES * outward / areas[:, None]]), _FEW)
+            shares = areas / np.bincount(cells, areas)[cells]
+        weights = surface.left(_matrix(cells, shares)).astype(np.float32)
+        return cls(weights, tuple(_coarse(each, cells) for each in constraints))
+
+    def __call__(self, p: FloatArray, multipliers: FloatArray) -> FloatArray:
+        """Return G (3, m, m) at *p* (m, 3)."""
+        x = self.weights @ p
+        each = zip(multipliers, self.constraints, strict=True)
+        halves = sum(multiplier * constraint.curvature(x) for multiplier, constraint in each)
+        half = (halves.astype(np.float32) @ self.weights).reshape(3, len(x), -1)
+        reduced = self.weights.T @ half
+        return np.asarray(reduced - np.swapaxes(reduced, 1, 2), dtype=np.float64)
 
 
 def _coarse(constraint: VolumeConstraint, cells: IntArray) -> VolumeConstraint:
