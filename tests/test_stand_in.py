@@ -67,7 +67,6 @@ def test_how_volumes_curve_is_the_derivative_of_their_pull(monkeypatch, constrai
     if constraints is region_volumes:
         held = region_volumes(mesh, SCENE.regions.labels)
     volumes = StandIn.of(mesh, SUBSPACE).volumes(held, mesh.vertices)
-    assert len(volumes.curve.weights) == min(few, mesh.n_vertices)
     p = P0 + 0.02 * rng.normal(size=P0.shape)
     dp, multipliers = rng.normal(size=P0.shape), rng.normal(size=len(held))
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -78,41 +79,43 @@ class StandIn:
             points = _matrix(self.cells, self.shares) @ rest
         free = [replace(each, target=0.0) for each in constraints]
         held = tuple(replace(each, target=each.violation(points)) for each in free)
-        return Volumes(self.surface, held, _Curve.of(self.surface, held, points) if held else None)
+        return Volumes(self.surface, held, _Curve(self.surface, held, points) if held else None)
 
 
 @dataclass(frozen=True, eq=False)
 class _Curve:
     """How volumes curve with the cages, told by few points; called as `Volumes.curve`."""
 
-    weights: FloatArray  # (k, m), W~ of these points; rough, as all of this only tells a direction
+    surface: Subspace
     constraints: tuple[VolumeConstraint, ...]
-
-    @classmethod
-    def of(
-        cls, surface: Subspace, constraints: Sequence[VolumeConstraint], points: FloatArray
-    ) -> _Curve:
-        """Return that of *constraints* on *surface*, which is at *points* (n, 3) at rest.
-
-        Neighbours that face the same way are one point, so that thin parts keep both their sides.
-        """
-        cells, shares = np.arange(len(points)), np.ones(len(points))
-        if len(points) > _FEW:
-            outward = np.sum([each.gradient(points) for each in constraints], axis=0)
-            areas = np.linalg.norm(outward, axis=1) + np.finfo(float).tiny
-            cells = group_by_position(np.hstack([points, _SIDES * outward / areas[:, None]]), _FEW)
-            shares = areas / np.bincount(cells, areas)[cells]
-        weights = surface.left(_matrix(cells, shares)).astype(np.float32)
-        return cls(weights, tuple(_coarse(each, cells) for each in constraints))
+    points: FloatArray  # (n, 3), where the surface is at rest
 
     def __call__(self, p: FloatArray, multipliers: FloatArray) -> FloatArray:
         """Return G (3, m, m) at *p* (m, 3)."""
-        x = self.weights @ p
-        each = zip(multipliers, self.constraints, strict=True)
+        weights, constraints = self._of_few
+        x = weights @ p
+        each = zip(multipliers, constraints, strict=True)
         halves = sum(multiplier * constraint.curvature(x) for multiplier, constraint in each)
-        half = (halves.astype(np.float32) @ self.weights).reshape(3, len(x), -1)
-        reduced = self.weights.T @ half
+        half = (halves.astype(np.float32) @ weights).reshape(3, len(x), -1)
+        reduced = weights.T @ half
         return np.asarray(reduced - np.swapaxes(reduced, 1, 2), dtype=np.float64)
+
+    @cached_property
+    def _of_few(self) -> tuple[FloatArray, tuple[VolumeConstraint, ...]]:
+        """W~ (k, m) of few points, in single precision, and the constraints over them.
+
+        Neighbours that face the same way are one point, so that thin parts keep both their sides.
+        """
+        n = len(self.points)
+        cells, shares = np.arange(n), np.ones(n)
+        if n > _FEW:
+            outward = np.sum([each.gradient(self.points) for each in self.constraints], axis=0)
+            areas = np.linalg.norm(outward, axis=1) + np.finfo(float).tiny
+            places = np.hstack([self.points, _SIDES * outward / areas[:, None]])
+            cells = group_by_position(places, _FEW, rounds=3, seeded=False)
+            shares = areas / np.bincount(cells, areas)[cells]
+        weights = self.surface.left(_matrix(cells, shares)).astype(np.float32)
+        return weights, tuple(_coarse(each, cells) for each in self.constraints)
 
 
 def _coarse(constraint: VolumeConstraint, cells: IntArray) -> VolumeConstraint:
