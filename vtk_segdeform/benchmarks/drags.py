@@ -22,8 +22,8 @@ from .measuring import timed
 from .tasks import NEAR, Task
 
 _MOST_STEPS = 300
-_FEW, _MANY = 1, 12  # steps between which the cost of one is measured
-_FAR, _LONG = 18, 2  # moves of a frame at once; its first steps, after which curvature is kept
+_FEW, _MANY = 1, 4  # steps between which the cost of one is measured
+_WARM = 2  # frames before that
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,28 +66,19 @@ def way_of(task: Task, moves: int) -> list[FloatArray]:
 
 
 def seconds_per_step(deformer: Deformer, task: Task, repeats: int) -> float:
-    """Return what one more step costs: the slope between few steps and many to a far target.
+    """Return what one more step of a drag's frame costs: the slope between few steps and many.
 
-    Both take up the curvature once, and stop short of the target: what arrives is landed again.
-    NaN if the machine is too busy to tell.
+    NaN if no frame takes that many, or the machine is too busy to tell.
     """
-    far = way_of(task, _FAR)[-1]
     deformer.reset()
-    begin = deformer.solve(far, max_steps=_LONG).cage_vertices
-
-    def run(steps: int) -> Solution:
-        deformer.resume(begin, far)
-        return deformer.solve(far, max_steps=steps)
-
-    most = max((k for k in range(_FEW + 1, _MANY) if _is_on_its_way(run(k), k)), default=None)
-    if most is None:
-        return float("nan")
-    # Long and short by turns: what else the machine does slows both.
-    short, long = (partial(timed, partial(run, steps)) for steps in (_FEW, most))
-    slope = median(long()[1] - short()[1] for _ in range(3 * repeats)) / (most - _FEW)
+    slopes = []
+    for goal in way_of(task, _WARM + 3 * repeats):
+        # Copies begin alike; short and long by turns, as what else the machine does slows both.
+        (_, short), (pose, long) = (
+            timed(partial(deformer.copy().solve, goal, max_steps=steps)) for steps in (_FEW, _MANY)
+        )
+        if pose.status is Status.STEP_LIMIT and pose.steps == _MANY:
+            slopes.append((long - short) / (_MANY - _FEW))
+        deformer.solve(goal, max_steps=_MANY)
+    slope = median(slopes[_WARM:] or [0.0])
     return slope if slope > 0.0 else float("nan")
-
-
-def _is_on_its_way(solution: Solution, steps: int) -> bool:
-    """Tell whether a solve took all its steps, and those of one weight only."""
-    return solution.status is Status.STEP_LIMIT and solution.steps == steps
