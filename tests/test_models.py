@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from vtk_segdeform import models
+from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.modelling.implicit import Limb, implicit_surface
 from vtk_segdeform.volume import signed_volume
@@ -153,13 +154,24 @@ def test_a_straight_limb_is_a_capsule():
     np.testing.assert_allclose(limb(x), [0.05, -0.05, 0.02, 0.03, 0.1], atol=1e-12)
 
 
-def test_too_few_vertices_are_refused_with_advice():
+def test_what_makes_no_model_is_refused_with_advice():
     for call in (
         lambda: models.cactus(20),
+        lambda: models.cactus("many"),
+        lambda: models.cactus(np.nan),
+        lambda: models.dinosaur(None),
+        lambda: models.dinosaur(1000.5),
+        lambda: models.sphere([100, 200]),
+        lambda: models.sphere(100, radius=0.0),
+        lambda: models.torus(100, minor="thin"),
+        lambda: models.bar(5430),
+        lambda: models.bar((1.0, np.nan, 1.0)),
+        lambda: models.bar(divisions=(2, 2)),
+        lambda: models.bar(divisions=(1.5, 2, 2)),
         lambda: models.sphere(3),
         lambda: models.torus(29),
         lambda: models.torus(100, major=1.0, minor=1.5),
         lambda: models.bar(divisions=(0, 1, 1)),
     ):
-        with pytest.raises(ValueError, match=r"must be|needs"):
+        with pytest.raises(ArgumentError, match=r"must be|needs"):
             call()

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import FloatArray, IntArray
-from .fast import WORTHWHILE, compiled, inputs, plain
+from .fast import WORTHWHILE, compiled, inputs, writable
 from .threads import in_parallel
 
 _CACHED = 1 << 17  # numbers of a block that are multiplied at a time: a megabyte
@@ -120,11 +120,13 @@ class Groups:
         """Return `Subspace.map` of *p* (m, k), k a multiple of 3."""
         x = np.empty((len(self.rows), p.shape[1]))
         (base,) = _NOTHING if start is None else inputs(start)
-        kernels.put_groups(x, base, plain(p), self.rows, self.columns, self.weights, self.starts)
+        kernels.put_groups(x, base, writable(p), self.rows, self.columns, self.weights, self.starts)
         return x
 
     def adjoint(self, y: FloatArray, n_columns: int, kernels: Any) -> FloatArray:
         """Return `Subspace.adjoint` of *y* (n, 3)."""
         p = np.zeros((3, n_columns))
-        kernels.add_groups_adjoint(p, plain(y), self.rows, self.columns, self.weights, self.starts)
+        kernels.add_groups_adjoint(
+            p, writable(y), self.rows, self.columns, self.weights, self.starts
+        )
         return p.T

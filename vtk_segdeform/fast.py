@@ -33,8 +33,8 @@ def inputs(*arrays: NDArray[Any]) -> tuple[NDArray[Any], ...]:
     return tuple(plain)
 
 
-def plain(array: NDArray[Any]) -> NDArray[Any]:
-    """Return *array*, contiguous and writable: as new arrays are, which are handed over as such.
+def writable(array: NDArray[Any]) -> NDArray[Any]:
+    """Return *array*, contiguous and writable: as new ones are, which are handed over as they are.
 
     For kernels of some microseconds: after each has gone over what does not fit in a cache, Python
     starts cold, and `inputs` takes as long as they do.

@@ -9,10 +9,12 @@ Nothing here is random: the same call gives the same mesh.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from .arrays import IntArray
+from .arrays import IntArray, is_number, is_whole
 from .errors import ArgumentError
 from .mesh import Mesh
 from .modelling.implicit import Limb, standing_body
@@ -52,7 +54,7 @@ def cactus(n_vertices: int = 5430) -> Mesh:
         height=0.075,
     )
     _require(n_vertices, 500)
-    return standing_body([trunk, left, right], n_vertices, blend=0.035)
+    return standing_body([trunk, left, right], int(n_vertices), blend=0.035)
 
 
 def dinosaur(n_vertices: int = 8000) -> Mesh:
@@ -91,7 +93,7 @@ def dinosaur(n_vertices: int = 8000) -> Mesh:
         ]
     ]  # fmt: skip
     _require(n_vertices, 1000)
-    return standing_body([spine, head, *legs, *plates], n_vertices, blend=0.035)
+    return standing_body([spine, head, *legs, *plates], int(n_vertices), blend=0.035)
 
 
 def bar(
@@ -107,8 +109,11 @@ def bar(
     divisions : (a, b, c) int
         How often each edge is divided: 2 (ab + bc + ca) + 2 vertices.
     """
-    if min(divisions) < 1 or min(size) <= 0:
-        raise ArgumentError(f"size and divisions must be positive; got {size} and {divisions}")
+    if not (_are_three(size) and all(is_number(each) and each > 0 for each in size)):
+        raise ArgumentError(f"size must be three positive numbers; got {size!r}")
+    if not (_are_three(divisions) and all(is_whole(each, 1) for each in divisions)):
+        raise ArgumentError(f"divisions must be three whole numbers, 1 or more; got {divisions!r}")
+    divisions = int(divisions[0]), int(divisions[1]), int(divisions[2])
     sides, faces, count = [], [], 0
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3
@@ -135,11 +140,10 @@ def torus(n_vertices: int = 3000, *, major: float = 1.0, minor: float = 0.35) ->
     major, minor : float
         Radius of the ring and of the tube.
     """
-    if n_vertices < 30 or not 0 < minor < major:
-        raise ArgumentError(
-            "a torus needs n_vertices >= 30 and 0 < minor < major; "
-            f"got {n_vertices}, minor {minor}, major {major}"
-        )
+    _require(n_vertices, 30)
+    if not (is_number(minor) and is_number(major) and 0 < minor < major):
+        raise ArgumentError(f"a torus needs 0 < minor < major; got {minor!r} and {major!r}")
+    n_vertices = int(n_vertices)
     around = max(3, round(np.sqrt(n_vertices * minor / major)))  # vertices in one winding
     k = np.arange(n_vertices)
     a = 2 * np.pi * k / n_vertices
@@ -156,7 +160,9 @@ def torus(n_vertices: int = 3000, *, major: float = 1.0, minor: float = 0.35) ->
 def sphere(n_vertices: int = 2562, *, radius: float = 1.0) -> Mesh:
     """Return a sphere about the origin: points along a spiral of golden angles, their hull."""
     _require(n_vertices, 4)
-    k = np.arange(n_vertices)
+    if not (is_number(radius) and radius > 0):
+        raise ArgumentError(f"radius must be a positive number; got {radius!r}")
+    k = np.arange(int(n_vertices))
     z = 1.0 - (2.0 * k + 1.0) / n_vertices
     ring = np.sqrt(1.0 - z**2)
     vertices = np.stack([ring * np.cos(_GOLDEN * k), ring * np.sin(_GOLDEN * k), z], axis=-1)
@@ -168,8 +174,14 @@ def sphere(n_vertices: int = 2562, *, radius: float = 1.0) -> Mesh:
 
 
 def _require(n_vertices: int, least: int) -> None:
-    if n_vertices < least:
-        raise ArgumentError(f"n_vertices must be {least} or more; got {n_vertices}")
+    if not is_whole(n_vertices, least):
+        raise ArgumentError(
+            f"n_vertices must be a whole number, {least} or more; got {n_vertices!r}"
+        )
+
+
+def _are_three(values: object) -> bool:
+    return isinstance(values, Sequence | np.ndarray) and len(values) == 3
 
 
 def _chequered(p: int, q: int) -> IntArray:

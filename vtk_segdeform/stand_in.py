@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from .arrays import FloatArray, IntArray
@@ -101,7 +102,7 @@ class _Curve:
         return np.asarray(reduced - np.swapaxes(reduced, 1, 2), dtype=np.float64)
 
     @cached_property
-    def _of_few(self) -> tuple[FloatArray, tuple[VolumeConstraint, ...]]:
+    def _of_few(self) -> tuple[NDArray[np.float32], tuple[VolumeConstraint, ...]]:
         """W~ (k, m) of few points, in single precision, and the constraints over them.
 
         Neighbours that face the same way are one point, so that thin parts keep both their sides.
