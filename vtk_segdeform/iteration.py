@@ -14,6 +14,7 @@ from .errors import ArgumentError
 from .solution import Status
 
 _OLD, _LONG = 20, 1e-2  # steps after which the curvature is looked at again; or after one as long
+_FAR = 2e-2  # a step so long that how volumes curve here says nothing of where it leads
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,11 @@ class Course:
     def factor_is_old(self) -> bool:
         """Whether the curvature should be looked at again."""
         return self.age >= _OLD or self.size > _LONG
+
+    @property
+    def is_near(self) -> bool:
+        """Whether the last step, if there was one, was not much longer than a frame of a drag."""
+        return not _FAR < self.size < math.inf
 
     @property
     def is_astray(self) -> bool:

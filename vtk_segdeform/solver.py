@@ -21,9 +21,8 @@ Four things are added, each told by a number from the cactus bent by 60 degrees:
    volumes held, it is Newton's step, and about as long as the way that is left.
 3. *Anderson acceleration* (`acceleration`) of (21) as a fixed-point map p -> q(p), for what has
    turned since H was factored.
-4. *Safeguard.*  All iterates meet the constraints, so the objective itself is the merit: an
-   accelerated step that raises it is thrown away for the plain one, and a plain step that raises
-   it is shortened, epsilon of section 3.3.
+4. *Safeguard.*  All iterates meet the constraints, so the objective itself is the merit: where it
+   rises an accelerated step gives way to the plain one, and that is shortened (epsilon, 3.3).
 
 Source
 ------
@@ -52,6 +51,7 @@ from .solution import Status
 
 _RISE = 1e-13  # relative rise of the merit that counts as rounding
 _DAMPING = 1e-9  # of the mean diagonal of H
+_CLOSE = 1e-2  # the paper's step, to where multipliers tell how volumes curve
 _SHORTEST = 1.0 / 64.0  # epsilon of section 3.3 below which a step is given up
 _NOTHING = np.empty((0, 3))
 
@@ -126,7 +126,7 @@ class GaussNewton:
         curved = bool(options.window) and self.energy.exact
         while len(merits) <= options.max_steps:
             if curved and (course.factor_is_old):
-                course.renew(self._curved(here) or self._factor)
+                course.renew(self._curved(here, course) or self._factor)
             course.age += 1
             step, multipliers, directions = self._step(here, course.factor)
             course.size = self._size(step)
@@ -165,9 +165,10 @@ class GaussNewton:
             merits=tuple(merits),
         )
 
-    def _curved(self, here: _Point) -> Factor | None:
-        curve = self.volumes.curve
-        of_volumes = curve and curve(here.p, self._step(here, self._factor)[1])
+    def _curved(self, here: _Point, course: Course) -> Factor | None:
+        curve = self.volumes.curve if course.is_near else None
+        step, multipliers, _ = self._step(here, self._factor)
+        of_volumes = curve(here.p, multipliers) if curve and self._size(step) < _CLOSE else None
         return curved_factor(self._hessian, self.energy, here.p, of_volumes)
 
     def _step(
