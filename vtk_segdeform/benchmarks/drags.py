@@ -23,7 +23,7 @@ from .tasks import NEAR, Task
 
 _MOST_STEPS = 300
 _FEW, _MANY = 1, 4  # steps between which the cost of one is measured
-_WARM = 2  # frames before that
+_WARM, _TURNS = 2, 4  # frames before that; how often each is taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,13 +72,16 @@ def seconds_per_step(deformer: Deformer, task: Task, repeats: int) -> float:
     """
     deformer.reset()
     slopes = []
-    for goal in way_of(task, _WARM + 3 * repeats):
-        # Copies begin alike; short and long by turns, as what else the machine does slows both.
-        (_, short), (pose, long) = (
-            timed(partial(deformer.copy().solve, goal, max_steps=steps)) for steps in (_FEW, _MANY)
-        )
+    way = way_of(task, _WARM + 3 * repeats)
+    for goal in [*way, *way[-2::-1]]:  # there and back
+        # Copies begin alike, short and long by turns; of each the quickest, as what the map takes
+        # beside the steps varies by more than one of them.
+        seconds = dict.fromkeys((_FEW, _MANY), np.inf)
+        for steps in _TURNS * [*seconds]:
+            pose, once = timed(partial(deformer.copy().solve, goal, max_steps=steps))
+            seconds[steps] = min(seconds[steps], once)
         if pose.status is Status.STEP_LIMIT and pose.steps == _MANY:
-            slopes.append((long - short) / (_MANY - _FEW))
+            slopes.append((seconds[_MANY] - seconds[_FEW]) / (_MANY - _FEW))
         deformer.solve(goal, max_steps=_MANY)
     slope = median(slopes[_WARM:] or [0.0])
     return slope if slope > 0.0 else float("nan")
