@@ -53,9 +53,7 @@ def test_gradients_are_right_to_second_order():
 def test_curvature_is_the_derivative_of_the_gradient():
     x, dx = MESH.vertices + wobble(3), wobble(4, 1.0)
     for constraint in (total_volume(MESH), *region_volumes(MESH, SCENE.regions.labels)):
-        halves = (
-            constraint.curvature(x).reshape(3 * len(x), len(x)).toarray().reshape(3, len(x), -1)
-        )
+        halves = constraint.curvature(x).toarray().reshape(3, len(x), -1)
         bends = [half @ dx - half.T @ dx for half in halves]  # M_c dx
         product = np.stack(
             [bends[2][:, 1] - bends[1][:, 2], bends[0][:, 2] - bends[2][:, 0]]
