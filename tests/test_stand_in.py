@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -77,6 +79,21 @@ def test_how_volumes_curve_is_the_derivative_of_their_pull(monkeypatch, constrai
     exact = 0.5 * (pull(p + dp) - pull(p - dp))  # quadratic: no approximation
     guess = curvature(volumes, p, multipliers, dp)
     assert np.linalg.norm(guess - exact) < error * np.linalg.norm(exact)
+
+
+def test_a_pulled_body_takes_few_steps_because_the_solver_knows_how_its_volume_curves():
+    scene, steps, poses = sausage(2), [], []
+    for knows in (True, False):
+        deformer = scene.deformer()
+        if not knows:
+            deformer._volumes = replace(deformer._volumes, curve=None)
+            deformer.reset()
+        at_rest, way = scene.mesh.vertices[deformer.handle], [0.18, 0.0, 0.0]
+        solutions = [deformer.solve(at_rest + k * np.array(way)) for k in range(1, 7)]
+        steps.append(sum(solution.steps for solution in solutions))
+        poses.append(solutions[-1].vertices)
+    assert steps[0] < 0.4 * steps[1]
+    assert_allclose(poses[0], poses[1], atol=1e-4 * scene.mesh.diagonal)
 
 
 @pytest.mark.usefixtures("coarse")
