@@ -21,8 +21,8 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 STORY = [
     # a checked mesh
     "errors", "arrays", "progress", "threads", "compiled.volumes", "compiled.products",
-    "compiled.normals", "compiled.rotations", "compiled.coordinates", "fast", "surface.counting",
-    "surface.topology", "surface.manifold", "surface.inside", "surface.columns",
+    "compiled.normals", "compiled.rotations", "compiled.triangles", "compiled.coordinates", "fast",
+    "surface.counting", "surface.topology", "surface.manifold", "surface.inside", "surface.columns",
     "surface.intersections", "surface.report", "surface.shells", "faults", "mesh", "surface.holes",
     "surface.splitting", "surface.repair_steps", "repair",
     # what a deformation keeps
@@ -33,11 +33,10 @@ STORY = [
     "segmenting.necks", "segmenting.slices", "segmentation", "mean_value", "blocks", "cages",
     "caging.region_solid", "caging.contour", "caging.cage_simplify", "cage_fit",
     # the solver
-    "subspace", "passengers", "sampling", "grams", "patches", "energy", "cage_stiffness",
-    "curvature", "grouping", "constraints", "stand_in", "bound", "binding", "device", "gpu",
-    "landing", "positions",
-    "acceleration", "solution", "iteration", "solver", "stiffening", "targets", "deformer",
-    "pipeline",
+    "subspace", "passengers", "sampling", "operators", "grams", "patches", "energy",
+    "cage_stiffness", "curvature", "grouping", "constraints", "stand_in", "bound", "binding",
+    "device", "gpu", "landing", "positions", "acceleration", "solution", "iteration",
+    "solver", "stiffening", "targets", "deformer", "pipeline",
     # a deformation in the making
     "editing.listeners", "editing.naming", "editing.state", "editing.history", "editing.painting",
     "editing.handles", "editing.posing", "session", "editing.archive", "store",
@@ -101,7 +100,7 @@ STORY = [
 
 NUMERIC = {"numpy", "scipy"}
 VTK = {"vtkmodules"}
-KERNELS = ("volumes", "products", "normals", "rotations", "coordinates")
+KERNELS = ("volumes", "products", "normals", "rotations", "triangles", "coordinates")
 PANEL = {"controls", "modes", "painting", "regions", "handles", "options", "foot", "log", "panel"}
 PROGRAM = {
     "keeper", "opening", "start_page", "drops", "pages", "asking", "saving", "menus", "window",

@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from vtk_segdeform import fast, models, threads
 from vtk_segdeform.blocks import add_product, adjoint_product
+from vtk_segdeform.curvature import Factor
 from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.mean_value import mean_value_coordinates
 from vtk_segdeform.rotations import closest_rotations
@@ -96,6 +97,21 @@ def test_products_agree_and_are_taken_in_double_precision(twin, dtype, columns):
     quick, plain = twin(lambda: adjoint_product(rows, block, y, heavy=True))
     assert_allclose(quick, plain, atol=1e-10)
     assert_allclose(plain, block.astype(np.float64).T @ y[rows], atol=1e-10)
+
+
+@pytest.mark.parametrize(("coupled", "n"), [(True, 3 * 60), (False, 180)])
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_triangles_are_solved_alike(twin, coupled, n, count):
+    spread = RNG.normal(size=(n, n))
+    hessian = spread @ spread.T + np.eye(n)
+    factor = Factor(np.linalg.cholesky(hessian), coupled)
+    ys = [RNG.normal(size=(n // 3 if coupled else n, 3)) for _ in range(count)]
+    exact = np.linalg.inv(hessian)
+    for quick, plain, y in zip(*twin(lambda: factor.solve_all(ys)), ys, strict=True):
+        solved = (exact @ y.T.ravel()).reshape(3, -1).T if coupled else exact @ y
+        assert quick.shape == plain.shape == y.shape
+        assert_allclose(plain, solved, atol=1e-9 * np.abs(solved).max())
+        assert_allclose(quick, solved, atol=1e-9 * np.abs(solved).max())
 
 
 def test_results_do_not_depend_on_how_many_threads_there_are(monkeypatch):

@@ -55,6 +55,21 @@ def test_it_is_the_derivative_of_the_gradient_to_second_order(n_groups):
     assert errors[1] < 0.02 * errors[0]  # slope 2: ten times closer, a hundred times better
 
 
+@pytest.mark.parametrize("stretch", [10.0, 0.0])
+def test_energy_and_gradient_are_those_of_the_dense_operators(stretch):
+    subspace, p = bind(SCENE.regions, SCENE.cages), bent(REST)
+    groups = group_by_position(SCENE.mesh.vertices, 250)
+    energy = shape_energy(SCENE.mesh, subspace, stretch, groups)
+    assert energy.fit.size > 60_000  # as many as are multiplied without their zeros
+    u, _, vt = np.linalg.svd((energy.fit @ p).reshape(-1, 3, 3))
+    pulled = energy.pull.T @ (u @ vt).reshape(-1, 3)
+    product = energy.quadratic @ p
+    value, half = energy.local_step(p, subspace.map(p))
+    exact = np.vdot(p, product) - 2.0 * np.vdot(p, pulled) + energy.constant
+    assert abs(value - exact) < 1e-12 * energy.constant
+    assert_allclose(half, product - pulled, atol=1e-12 * np.abs(product).max())
+
+
 def test_turning_the_whole_costs_nothing():
     energy = energy_of(40)
     for axis in np.eye(3):

@@ -18,7 +18,7 @@ from .fast import WORTHWHILE, compiled, inputs, writable
 from .threads import in_parallel
 
 _CACHED = 1 << 17  # numbers of a block that are multiplied at a time: a megabyte
-_ROW = 48  # numbers that take as long as a face of a volume
+_ROW = 24  # numbers that take as long as a face of a volume
 _PIECES = 16  # of a block at most, for compiled kernels: to hand one over takes its time
 _DENSE = 1 << 22  # numbers in a dense piece: 32 megabytes
 _NOTHING = inputs(np.empty((0, 3)))

@@ -34,11 +34,14 @@ from scipy.linalg import blas, lapack
 
 from .arrays import FloatArray
 from .energy import Energy
+from .fast import compiled
 from .rotations import closest_rotations
 
 _SHARES = 0.999, 0.99, 0.96, 0.8, 0.5  # of the rotations' part; the largest that leaves H convex
 _SOFTEST = 1e-3  # least stiffness of a group about an axis, as a share of its largest
 _CHUNK = 1000  # groups at a time
+_TIMES = 10  # numbers of a triangle that take as long as a face of a volume
+_RIGHT = 8  # right-hand sides beyond which LAPACK is as quick
 # eps_kic as (k, c, i), axis of turning, column of dp, row of R S; k and c side by side.
 _EPSILON = np.zeros((9, 3))
 for _k, _i, _j in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
@@ -49,7 +52,7 @@ for _k, _i, _j in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
 class Factor:
     """A factored Hessian: (m, m), the same for all three axes, or (3m, 3m)."""
 
-    triangle: FloatArray
+    triangle: FloatArray  # in LAPACK's order; zero above its diagonal
     coupled: bool
 
     def solve(self, y: FloatArray) -> FloatArray:
@@ -58,11 +61,14 @@ class Factor:
 
     def solve_all(self, ys: Sequence[FloatArray]) -> list[FloatArray]:
         """Return H^-1 y for each y (m, 3)."""
-        right = np.hstack([y.T.reshape(-1, 1) for y in ys] if self.coupled else ys)
-        solved, _ = lapack.dpotrs(self.triangle, right, lower=1)  # half the time of cho_solve
-        if self.coupled:
-            return [column.reshape(3, -1).T for column in solved.T]
-        return np.split(solved, len(ys), axis=1)
+        n = len(self.triangle)
+        solved = np.concatenate([y.T for y in ys]).reshape(-1, n)
+        kernels = compiled(n * n // _TIMES) if len(solved) <= _RIGHT else None
+        if kernels:
+            kernels.solve_factored(np.ascontiguousarray(self.triangle.T), solved)
+        else:
+            solved = lapack.dpotrs(self.triangle, solved.T, lower=1)[0].T  # half of cho_solve
+        return [own.T for own in solved.reshape(len(ys), 3, -1)]
 
 
 def factored(hessian: FloatArray) -> Factor | None:

@@ -27,29 +27,21 @@ geometric model for elastic deformations", SIGGRAPH 2010 (spokes and rims).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 
 from .arrays import FloatArray, IntArray, is_number
-from .differential import (
-    area_gradients,
-    corner_cotangents,
-    cotangent_laplacian,
-    mixed_voronoi_areas,
-)
 from .errors import ArgumentError
 from .grams import grams
 from .mesh import Mesh
+from .operators import surface_operators
 from .rotations import closest_rotations
 from .sampling import Sample
 from .subspace import Subspace
-
-_CHUNK = 400_000  # faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +73,11 @@ class Energy:
 
     def covariances(self, p: FloatArray) -> FloatArray:
         """Return S_g = K_g p of every group, (G, 3, 3)."""
-        fitted = self.fit @ (self.subspace.map(p) if self.turns_vertices else p)
-        return np.asarray(fitted).reshape(-1, 3, 3)
+        return self._covariances(p, self.subspace.map(p) if self.turns_vertices else p)
+
+    def _covariances(self, p: FloatArray, x: FloatArray) -> FloatArray:
+        stacked = self.fit @ x if self.turns_vertices else self._fitted.map(p)
+        return np.asarray(stacked).reshape(-1, 3, 3)
 
     def fitted_rows(self, count: int) -> Iterator[tuple[IntArray, list[slice], FloatArray]]:
         """Yield K, what rotations are fitted to as rows on p, some *count* groups at a time.
@@ -91,7 +86,7 @@ class Energy:
         vertices in all, and (g, 3, c).
         """
         if not sparse.issparse(self.fit):
-            yield from self._reaches
+            yield from self._reached
             return
         every = [slice(0, self.subspace.n_columns)]
         for start in range(0, self.fit.shape[0] // 3, count):
@@ -100,29 +95,47 @@ class Energy:
             yield groups, every, rows.reshape(len(groups), 3, -1)
 
     @cached_property
-    def _reaches(self) -> list[tuple[IntArray, list[slice], FloatArray]]:
+    def _reached(self) -> list[tuple[IntArray, list[slice], FloatArray]]:
         """K without its zeros: the groups that the same cages reach, together."""
-        cages, rows = self.subspace.columns, np.asarray(self.fit).reshape(-1, 3, self.fit.shape[1])
-        reached = np.stack([rows[:, :, own].any(axis=(1, 2)) for own in cages], axis=1)
         blocks = []
-        for pattern in np.unique(reached, axis=0):
-            own = [cages[r] for r in np.flatnonzero(pattern)]
-            if own:
-                groups = np.flatnonzero((reached == pattern).all(axis=1))
-                here = np.concatenate([rows[groups][:, :, columns] for columns in own], axis=2)
-                blocks.append((groups, own, here))
+        for ids in self._fitted.reached_alike():
+            columns, rows = self._fitted.reaching(ids)
+            cages = [own for own in self.subspace.columns if own.start in columns]
+            if cages:
+                blocks.append((ids[::3] // 3, cages, rows.reshape(-1, 3, len(columns))))
         return blocks
+
+    @cached_property
+    def _fitted(self) -> Subspace:
+        return _by_cages(np.asarray(self.fit), self.subspace.columns)
+
+    @cached_property
+    def _pulled(self) -> Subspace:
+        return (
+            self._fitted if self.exact else _by_cages(np.asarray(self.pull), self.subspace.columns)
+        )
 
     def local_step(self, p: FloatArray, x: FloatArray) -> tuple[float, FloatArray]:
         """Return E(p) and half its gradient (m, 3), with the local rotations at x = W~ p."""
-        stacked = self.fit @ (x if self.turns_vertices else p)
-        turned = np.swapaxes(closest_rotations(stacked.reshape(-1, 3, 3)), 1, 2).reshape(-1, 3)
-        reduced = self.pull.T @ turned
+        rotations = closest_rotations(self._covariances(p, x))
+        turned = np.swapaxes(rotations, 1, 2).reshape(-1, 3)
         if self.turns_vertices:
-            reduced = self.subspace.adjoint(reduced)
+            reduced = self.subspace.adjoint(self.pull.T @ turned)
+        else:
+            reduced = self._pulled.adjoint(turned)
         product = self.quadratic @ p
         value = np.vdot(p, product) - 2.0 * np.vdot(p, reduced) + self.constant
         return float(value), product - reduced
+
+
+def _by_cages(k: FloatArray, cages: Sequence[slice]) -> Subspace:
+    """Return K (3G, m) in blocks as W~ is: for each cage, the groups that it reaches."""
+    rows, blocks = [], []
+    for own in cages:
+        reached = k[:, own].reshape(-1, 3, own.stop - own.start).any(axis=(1, 2))
+        rows.append(np.flatnonzero(np.repeat(reached, 3)))
+        blocks.append(k[rows[-1], own])
+    return Subspace(len(k), tuple(rows), tuple(blocks))
 
 
 def shape_energy(mesh: Mesh, subspace: Subspace, stretch: float, groups: IntArray | None) -> Energy:
@@ -173,72 +186,3 @@ def shape_energy(mesh: Mesh, subspace: Subspace, stretch: float, groups: IntArra
         pull=pull,
         subspace=subspace,
     )
-
-
-class SurfaceOperators(NamedTuple):
-    """What both lines of E are made of, over the vertices of a mesh or of a sample of it."""
-
-    counts: FloatArray  # c, (n,): how often what a vertex says is counted; 1 over a whole mesh
-    areas: FloatArray  # A, (n,)
-    delta: FloatArray  # (n, 3), eq. (5)
-    laplacian: sparse.csr_array  # C, (n, n)
-    stiffness: sparse.csr_array  # C of triangles that count as often as their corners, (n, n)
-    detail: sparse.csr_array  # K of the first line, (3 G, n): 3 x 3 matrices S_g by rows
-    fans: sparse.csr_array  # K of the second, over s
-
-
-def surface_operators(surface: Mesh | Sample, groups: IntArray) -> SurfaceOperators:
-    """Return the operators of *surface* for the rotation group of each vertex, *groups* (n,)."""
-    vertices, faces = surface.vertices, surface.faces
-    cotangents = corner_cotangents(vertices, faces)
-    areas = mixed_voronoi_areas(vertices, faces, cotangents=cotangents)
-    laplacian = stiffness = cotangent_laplacian(vertices, faces, cotangents=cotangents)
-    counts = np.ones(len(vertices))
-    if isinstance(surface, Sample):
-        counts = surface.counts
-        shared = cotangents * counts[faces].mean(axis=1, keepdims=True)
-        stiffness = cotangent_laplacian(vertices, faces, cotangents=shared)
-    delta = (laplacian @ vertices) / (2.0 * areas)[:, None]  # the left side of (5) is C x / (2 A)
-    thirds = area_gradients(vertices, faces, cotangents=cotangents) / 3.0
-    return SurfaceOperators(
-        counts=counts,
-        areas=areas,
-        delta=delta,
-        laplacian=laplacian,
-        stiffness=stiffness,
-        detail=_grouped(0.5 * counts[:, None] * delta, groups) @ laplacian,
-        fans=_fans(thirds, faces, groups, counts),
-    )
-
-
-def _grouped(values: FloatArray, groups: IntArray) -> sparse.csr_array:
-    """Return (3 G, n): row 3 g + a has ``values[i, a]`` at each vertex i of group g."""
-    n = len(groups)
-    rows = (3 * groups[:, None] + np.arange(3)).ravel()
-    entries = (values.ravel(), (rows, np.repeat(np.arange(n), 3)))
-    return sparse.coo_array(entries, (3 * (int(groups.max()) + 1), n)).tocsr()
-
-
-def _fans(
-    gradients: FloatArray, faces: IntArray, groups: IntArray, counts: FloatArray
-) -> sparse.csr_array:
-    """Return (3 G, n): row 3 g + a is axis a of sum_{i in g} c_i sum_{T at i} A_T / 3 J_T^T.
-
-    *gradients* (m, 3, 3) are thirds of `area_gradients`: every corner sees the whole face.
-    """
-    n, shape = len(groups), (3 * (int(groups.max()) + 1), len(groups))
-    seen_from, asked = groups[faces], counts[faces]
-    alike = seen_from[:, :, None] == seen_from[:, None]
-    own = (alike * asked[:, None]).sum(axis=2)  # counts of the corners in each one's group
-    axes = (np.bincount(faces.ravel(), (own * g).ravel(), n) for g in np.moveaxis(gradients, 2, 0))
-    fans = _grouped(np.stack(list(axes), axis=1), groups)
-    border = np.flatnonzero(~alike.all(axis=(1, 2)))  # what is left: corners of other groups
-    for start in range(0, len(border), _CHUNK):
-        some = border[start : start + _CHUNK]
-        other = ~alike[some] & (asked[some] > 0.0)[:, :, None]
-        face, seen, corner = np.nonzero(other)
-        rows = 3 * seen_from[some[face], seen][:, None] + np.arange(3)
-        columns = np.repeat(faces[some[face], corner], 3)
-        share = gradients[some[face], corner] * asked[some[face], seen][:, None]
-        fans = fans + sparse.coo_array((share.ravel(), (rows.ravel(), columns)), shape).tocsr()
-    return sparse.csr_array(fans)

@@ -16,8 +16,8 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from ..arrays import FloatArray
-from ..energy import surface_operators
 from ..grams import grams
+from ..operators import surface_operators
 from ..rotations import closest_rotations
 from ..subspace import Subspace
 from ..volume import signed_volume, step_to_volume, volume_along, volume_gradient

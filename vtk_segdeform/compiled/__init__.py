@@ -6,6 +6,7 @@
     coordinates   `mean_value.mean_value_coordinates`
     normals       `normals.VertexNormals`
     rotations     `rotations.closest_rotations`
+    triangles     `curvature.Factor`
 
 They let go of the interpreter and call no threads of their own; `threads.in_parallel` runs several
 at a time.  Their arguments are positional, as numba wants it, and outputs come in as arrays.
@@ -15,6 +16,7 @@ from .coordinates import weights
 from .normals import ring_normals, rings
 from .products import add_adjoint, add_groups_adjoint, add_product, put_groups, put_patches
 from .rotations import rotations
+from .triangles import solve_factored
 from .volumes import volume_along_sums, volume_gradient, volume_sums
 
 __all__ = [
@@ -26,6 +28,7 @@ __all__ = [
     "ring_normals",
     "rings",
     "rotations",
+    "solve_factored",
     "volume_along_sums",
     "volume_gradient",
     "volume_sums",
