@@ -21,12 +21,14 @@ from vtk_segdeform.benchmarks import (
     segmentation_study,
     table_one,
 )
-from vtk_segdeform.benchmarks.drags import frames, steps_to_rest, way_of
+from vtk_segdeform.benchmarks.drags import frames, seconds_per_step, steps_to_rest, way_of
 from vtk_segdeform.benchmarks.full_space import full_space
+from vtk_segdeform.benchmarks.measuring import clocked
 from vtk_segdeform.benchmarks.scale import Scale
 from vtk_segdeform.benchmarks.sections import Figure, Ratio, Section, Table
 from vtk_segdeform.benchmarks.tasks import NEAR, bent_cactus, bound
 from vtk_segdeform.errors import MissingDependencyError
+from vtk_segdeform.solver import GaussNewton
 from vtk_segdeform.volume import signed_volume
 
 TINY = Scale(
@@ -60,7 +62,7 @@ def without_peers(monkeypatch):
 def steady(monkeypatch):
     """Let no other work of the machine into the cost of a step, which may then be unknown."""
     for module in (segmentation_study, table_one, frame_profile):
-        monkeypatch.setattr(module, "seconds_per_step", lambda *_: 1e-3)
+        monkeypatch.setattr(module, "seconds_per_step", lambda cases, _: [1e-3] * len(cases))
 
 
 def numbers(table):
@@ -84,6 +86,18 @@ def test_a_frame_ends_where_the_next_step_moves_hardly_anything(task, deformer):
 
 
 @pytest.mark.usefixtures("steady")
+def test_the_clock_of_a_step_leaves_the_solver_and_the_drag_as_they_were(task, deformer):
+    before = GaussNewton.minimise
+    costs = seconds_per_step([(deformer, task), (deformer.copy(), task)], 1)
+    assert len(costs) == 2
+    assert all(math.isnan(cost) or 0.0 < cost < 60.0 for cost in costs)
+    assert GaussNewton.minimise is before
+    with pytest.raises(RuntimeError), clocked(GaussNewton, "minimise"):
+        raise RuntimeError
+    assert GaussNewton.minimise is before
+    deformer.reset()
+
+
 def test_the_drag_profile_has_finite_times_and_names_arap_when_it_is_absent():
     section = drag_profile.run(TINY)
     frame, set_up = section.tables

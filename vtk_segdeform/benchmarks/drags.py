@@ -7,6 +7,7 @@ steps, and that is what is timed.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -18,12 +19,13 @@ import numpy as np
 from ..arrays import FloatArray
 from ..deformer import Deformer
 from ..solution import Solution, Status
-from .measuring import timed
+from ..solver import GaussNewton
+from .measuring import clocked, timed
 from .tasks import NEAR, Task
 
 _MOST_STEPS = 300
 _FEW, _MANY = 1, 4  # steps between which the cost of one is measured
-_WARM, _TURNS = 2, 4  # frames before that; how often each is taken
+_WARM, _TURNS = 2, 2  # frames before that; how often each is taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,23 +67,34 @@ def way_of(task: Task, moves: int) -> list[FloatArray]:
     return [rest + (k + 1) * aside for k in range(moves)]
 
 
-def seconds_per_step(deformer: Deformer, task: Task, repeats: int) -> float:
-    """Return what one more step of a drag's frame costs: the slope between few steps and many.
+def seconds_per_step(cases: Sequence[tuple[Deformer, Task]], repeats: int) -> list[float]:
+    """Return what one more step of a drag's frame costs in each of *cases*.
 
-    NaN if no frame takes that many, or the machine is too busy to tell.
+    It is the slope between frames of few steps and of many, as the solver alone takes them.  The
+    cases drag by turns, so that all meet the same load, and the same caches: each has just seen
+    another's mesh go through them.  NaN where no frame takes that many steps, or the machine is
+    too busy to tell.
     """
-    deformer.reset()
-    slopes = []
-    way = way_of(task, _WARM + 3 * repeats)
-    for goal in [*way, *way[-2::-1]]:  # there and back
-        # Copies begin alike, short and long by turns; of each the quickest, as what the map takes
-        # beside the steps varies by more than one of them.
-        seconds = dict.fromkeys((_FEW, _MANY), np.inf)
-        for steps in _TURNS * [*seconds]:
-            pose, once = timed(partial(deformer.copy().solve, goal, max_steps=steps))
-            seconds[steps] = min(seconds[steps], once)
-        if pose.status is Status.STEP_LIMIT and pose.steps == _MANY:
-            slopes.append((seconds[_MANY] - seconds[_FEW]) / (_MANY - _FEW))
-        deformer.solve(goal, max_steps=_MANY)
-    slope = median(slopes[_WARM:] or [0.0])
-    return slope if slope > 0.0 else float("nan")
+    slopes: list[list[float]] = [[] for _ in cases]
+    ways = []
+    for deformer, task in cases:
+        deformer.reset()
+        way = way_of(task, _WARM + 3 * repeats)
+        ways.append([*way, *way[-2::-1]])  # there and back
+    with clocked(GaussNewton, "minimise") as spent:
+        for goals in zip(*ways, strict=True):
+            times = [{_FEW: math.inf, _MANY: math.inf} for _ in cases]
+            for steps in _TURNS * [_FEW, _MANY]:
+                for (deformer, _), goal, quickest in zip(cases, goals, times, strict=True):
+                    spent.clear()
+                    pose = deformer.copy().solve(goal, max_steps=steps)
+                    is_whole = pose.status is Status.STEP_LIMIT and pose.steps == steps
+                    once = sum(spent) if is_whole else math.nan
+                    quickest[steps] = min(quickest[steps], once)
+            for (deformer, _), goal, quickest, own in zip(cases, goals, times, slopes, strict=True):
+                slope = (quickest[_MANY] - quickest[_FEW]) / (_MANY - _FEW)
+                if math.isfinite(slope):
+                    own.append(slope)
+                deformer.solve(goal, max_steps=_MANY)
+    found = [median(own[_WARM:] or [math.nan]) for own in slopes]
+    return [slope if slope > 0.0 else math.nan for slope in found]

@@ -1,7 +1,8 @@
 """One drag at one size, measured part by part.
 
     begin     the rest of a frame: how the energy curves where it starts, what holds the handles
-    step      one more step of the solver; must not depend on the size of the mesh
+    step      one more step of the solver; must not depend on the size of the mesh, so that it is
+              taken by turns with steps of the smallest one
     map       x = W p
     volume    that of the whole mesh, once
     normals   at all vertices;  render: off the screen, by whatever OpenGL there is
@@ -47,6 +48,7 @@ class Profile:
     frame: float
     steps: int
     step: float
+    beside: float  # a step of the smallest mesh, by turns with it
     map: float
     volume: float
     normals: float
@@ -84,11 +86,14 @@ def profiled(size: int, scale: Scale) -> Profile:
         deformer = ready.deformer
         what = deformer.regions, deformer.cages
         again = timed(lambda: deformer_of(task, *what, cache=cache))[1]
+        smallest = bent_cactus(scale.drag_sizes[0])
+        beside = bound(smallest, 3, scale.n_cage_vertices).deformer, smallest
     time.sleep(_SETTLING)
     drag = list(frames(deformer, way_of(task, scale.frames)))[1:]
     pose = drag[-1].solution.vertices
     cages = drag[-1].solution.cage_vertices
     whole = total_volume(task.mesh)
+    steps = seconds_per_step([beside, (deformer, task)], scale.repeats)
     try:
         normals, render = drawing_seconds(task.mesh, pose, scale.repeats)
     except MissingDependencyError:
@@ -102,7 +107,8 @@ def profiled(size: int, scale: Scale) -> Profile:
         memory=memory,
         frame=1e3 * median(frame.seconds for frame in drag),
         steps=int(median(frame.steps for frame in drag)),
-        step=1e3 * seconds_per_step(deformer, task, scale.repeats),
+        step=1e3 * steps[1],
+        beside=1e3 * steps[0],
         map=1e3 * median_seconds(lambda: deformer.surface(cages), scale.repeats),
         volume=1e3 * median_seconds(lambda: whole.violation(pose), scale.repeats),
         normals=1e3 * normals,

@@ -12,12 +12,12 @@ import platform
 import statistics
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 import scipy
@@ -38,6 +38,23 @@ def timed(work: Callable[[], _T]) -> tuple[_T, float]:
     start = time.perf_counter()
     result = work()
     return result, time.perf_counter() - start
+
+
+@contextlib.contextmanager
+def clocked(owner: type, method: str) -> Iterator[list[float]]:
+    """Let it be known how many seconds every call of a method takes in this context."""
+    untimed, spent = getattr(owner, method), list[float]()
+
+    def clocking(*args: Any, **kwargs: Any) -> Any:
+        result, seconds = timed(lambda: untimed(*args, **kwargs))
+        spent.append(seconds)
+        return result
+
+    setattr(owner, method, clocking)
+    try:
+        yield spent
+    finally:
+        setattr(owner, method, untimed)
 
 
 def median_seconds(work: Callable[[], object], repeats: int) -> float:

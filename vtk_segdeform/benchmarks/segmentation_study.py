@@ -56,7 +56,8 @@ def row_of(task: Task, n_regions: int, n_vertices: int, scale: Scale) -> tuple[C
     deformer = bound(task, n_regions, n_vertices).deformer
     printed = deformer_of(task, deformer.regions, deformer.cages, **PAPER)
     drag = list(frames(deformer, way_of(task, scale.frames)))[1:]
-    step = seconds_per_step(deformer, task, scale.repeats)
+    (step,) = seconds_per_step([(deformer, task)], scale.repeats)
+    (as_printed,) = seconds_per_step([(printed, task)], min(scale.repeats, 3))
     deformer.reset()
     solution = deformer.solve(task.targets)
     return (
@@ -64,7 +65,7 @@ def row_of(task: Task, n_regions: int, n_vertices: int, scale: Scale) -> tuple[C
         sum(cage.n_vertices for cage in deformer.cages),
         sum(block.size for block in deformer.subspace.blocks),
         1e3 * step,
-        1e3 * seconds_per_step(printed, task, min(scale.repeats, 3)),
+        1e3 * as_printed,
         int(median(frame.steps for frame in drag)),
         1e3 * median(frame.seconds for frame in drag),
         distortion(task.mesh, solution.vertices),
