@@ -70,7 +70,8 @@ def _frame_table(profiles: list[Profile]) -> Table:
     rows = [
         (
             p.vertices, p.frame, p.steps, p.step, p.beside, p.begin, p.map, p.volume,
-            p.normals, p.render, p.stream, p.arap, p.frame / p.arap, p.processors, p.arap_processors, p.change,
+            p.normals, p.render, p.stream, p.arap, p.frame / p.arap,
+            p.processors, p.arap_processors, p.change,
         )
         for p in profiles
     ]  # fmt: skip

@@ -70,7 +70,7 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
         of_w = by_turns(products, _ROUNDS * scale.repeats)
         steps = seconds_per_step([(ready.deformer, task) for ready in readies], scale.repeats)
         one, three = (
-            case_of(ready, task, scale, step, seconds / _STEPS, plain=bool(options))
+            case_of(ready, task, scale, plain=bool(options), taken=(step, seconds / _STEPS))
             for ready, step, seconds in zip(readies, steps, of_w, strict=True)
         )
         tables.append(_table(name, one, three))
@@ -91,11 +91,11 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
 
 
 def case_of(
-    ready: Bound, task: Task, scale: Scale, step: float, of_w: float, *, plain: bool
+    ready: Bound, task: Task, scale: Scale, *, plain: bool, taken: tuple[float, float]
 ) -> Case:
     """Return the measurements of a deformer; *plain* is the paper's formulation.
 
-    Seconds of a *step*, and of its products with W, were measured by turns with another's.
+    The seconds *taken* by a step and by its products with W were measured by turns with another's.
     """
     deformer, mesh, repeats = ready.deformer, task.mesh, scale.repeats
     surface, (volume, *_) = deformer.step_volumes.surface, deformer.step_volumes.constraints
@@ -114,11 +114,11 @@ def case_of(
     drag = list(frames(deformer, way_of(task, scale.frames)))[1:]
     return Case(
         nonzeros=sum(int(np.count_nonzero(block)) for block in surface.blocks),
-        step=1e3 * step,
+        step=1e3 * taken[0],
         steps=int(median(frame.steps for frame in drag)),
         frame=1e3 * median(frame.seconds for frame in drag),
         volume=_largest(frame.solution.volume_change for frame in drag),
-        of_w=1e3 * of_w,
+        of_w=1e3 * taken[1],
         volume_pass=ms(lambda: volume.gradient(y)) + 2 * ms(lambda: volume.violation(y)),
         rotations=ms(lambda: closest_rotations(turns)),
         bind=1e3 * ready.bind,
