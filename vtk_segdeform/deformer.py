@@ -166,7 +166,10 @@ class Deformer:
         self._mapping = binding.mapping
         self._total_volume = total_volume(self._here)
         here = self._here.vertices
-        self._large = LargeSurface(self.subspace, self._mapping, here, self._total_volume)
+        self._start = self._mapping.start(here)
+        self._large = LargeSurface(
+            self.subspace, self._mapping, here, self._total_volume, start=self._start
+        )
         self._keep(preserve_volume, preserve_region_volumes)
         self._take_hold(fixed, handle)
         if progress:
@@ -371,7 +374,7 @@ class Deformer:
         is rounded.
         """
         moves = p - self._rest_cages * self._size
-        return self._mapping.map(np.hstack([moves, *directions]), self._here.vertices)
+        return self._mapping.map(np.hstack([moves, *directions]), self._start)
 
     def _placed(self, x: FloatArray) -> FloatArray:
         return x + self._origin if self._origin.any() else x

@@ -21,9 +21,11 @@ from .device import DeviceError, DeviceSurface
 from .gpu import gpu_arrays
 from .patches import Patches
 from .subspace import Subspace
+from .threads import in_parallel
 
 _log = logging.getLogger(__name__)
 _CACHED = 1 << 14  # vertices at a time
+_SHARES = 4  # that threads are handed: to wake for each piece would take as long
 
 
 def along(
@@ -48,10 +50,15 @@ def scaled(constraint: VolumeConstraint, x: FloatArray, centre: FloatArray) -> f
     scale = float(np.cbrt(1.0 / (1.0 + ratio)))
 
     offsets, flat = np.tile((1.0 - scale) * centre, _CACHED), x.reshape(-1)
-    for start in range(0, len(flat), len(offsets)):  # other threads would take longer to wake
-        piece = flat[start : start + len(offsets)]
-        piece *= scale
-        piece += offsets[: len(piece)]
+
+    def work(first: int, last: int) -> None:
+        for start in range(first, last, len(offsets)):
+            piece = flat[start : min(start + len(offsets), last)]
+            piece *= scale
+            piece += offsets[: len(piece)]
+
+    share = -(-len(flat) // (_SHARES * len(offsets)))
+    in_parallel(work, len(flat), share * len(offsets))
     return scale
 
 
@@ -64,8 +71,8 @@ class LargeSurface:
         W~.
     mapping : Subspace or Patches
         W~ as it is mapped by where there is no GPU.
-    rest : (n, 3) float
-        Where the mesh is while no cage vertex has moved.
+    rest, start : (n, 3) float
+        Where the mesh is while no cage vertex has moved; and that as *mapping* begins with it.
     constraint : VolumeConstraint
         The total volume, kept.
     """
@@ -76,9 +83,11 @@ class LargeSurface:
         mapping: Subspace | Patches,
         rest: FloatArray,
         constraint: VolumeConstraint,
+        *,
+        start: FloatArray,
     ) -> None:
         self._subspace, self._mapping = subspace, mapping
-        self._rest, self._constraint = rest, constraint
+        self._rest, self._start, self._constraint = rest, start, constraint
 
     def landed(self, moves: FloatArray, centre: FloatArray) -> tuple[FloatArray, float]:
         """Return the mesh (n, 3) for *moves* (m, 3) of the cages, and the scale about *centre*."""
@@ -89,7 +98,7 @@ class LargeSurface:
                 return self._device.host(there), scale
             except DeviceError as fault:
                 self._give_up(fault)
-        x = self._mapping.map(moves, self._rest)
+        x = self._mapping.map(moves, self._start)
         return x, scaled(self._constraint, x, centre)
 
     @cached_property

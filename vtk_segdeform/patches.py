@@ -93,10 +93,14 @@ class Patches:
         )
         return cls(vertices, columns, left, right, starts)
 
+    def start(self, points: FloatArray) -> FloatArray:
+        """Return *points* (n, 3) of the mesh as `map` begins with them: patch by patch."""
+        return points[self.vertices]
+
     def map(self, p: FloatArray, start: FloatArray | None = None) -> FloatArray:
         """Return x = W~ p, (n, k), for stacked cage vertices *p* (m, k), k a multiple of 3.
 
-        With *start* (n, 3) that is added to the first three columns.
+        With `start` of some points these are added to the first three columns.
         """
         x = np.empty((len(self.vertices), p.shape[1]))
         base = np.empty((0, 3)) if start is None else start
@@ -109,10 +113,12 @@ class Patches:
             if kernels:
                 kernels.put_patches(x, *arguments, first, last)
                 return
+            place = self.starts[first, 0]
             for ids, own, left, right in self._parts(first, last):
                 x[ids] = left.T.astype(np.float64) @ (right.astype(np.float64) @ p[own])
                 if start is not None:
-                    x[ids, :3] += start[ids]
+                    x[ids, :3] += start[place : place + len(ids)]
+                place += len(ids)
 
         in_parallel(put, n_patches, -(-n_patches // _PIECES))
         return x

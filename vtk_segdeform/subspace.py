@@ -66,10 +66,14 @@ class Subspace:
     def _groups(self) -> Groups:
         return Groups.of([(ids, *self.reaching(ids)) for ids in self.reached_alike()])
 
+    def start(self, points: FloatArray) -> FloatArray:
+        """Return *points* (n, 3) of the mesh as `map` begins with them: as they are."""
+        return points
+
     def map(self, p: FloatArray, start: FloatArray | None = None) -> FloatArray:
         """Return x = W~ p, (n, k), for stacked cage vertices *p* (m, k).
 
-        With *start* (n, 3) that is added to the first three columns.
+        With `start` of some points these are added to the first three columns.
         """
         if self._is_small and p.shape[1] % 3 == 0 and (kernels := compiled()):
             return self._groups.map(p, start, kernels)

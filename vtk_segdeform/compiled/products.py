@@ -180,7 +180,7 @@ def add_groups_adjoint(p, y, rows, columns, weights, starts):
 def put_patches(x, base, p, vertices, columns, left, right, starts, first, last):
     """Put W~ @ p.T into *x* for some patches of `patches.Patches`; *p* is (k, m), k by threes.
 
-    To the first three columns *base* (n, 3) is added; or (0, 3), which is nothing.
+    To the first three columns *base* (n, 3), patch by patch, is added; or (0, 3), which is nothing.
     """
     most = 0
     for t in range(first, last):
@@ -188,7 +188,8 @@ def put_patches(x, base, p, vertices, columns, left, right, starts, first, last)
     sums = np.empty((3, most + 72))  # 72: rows a power of two apart would share cache lines
     here = np.empty((3, p.shape[1]))
     for t in range(first, last):
-        ids = vertices[starts[t, 0] : starts[t + 1, 0]]
+        first_row = starts[t, 0]
+        ids = vertices[first_row : starts[t + 1, 0]]
         own = columns[starts[t, 1] : starts[t + 1, 1]]
         n, c = len(ids), len(own)
         rank = (starts[t + 1, 3] - starts[t, 3]) // c
@@ -211,9 +212,9 @@ def put_patches(x, base, p, vertices, columns, left, right, starts, first, last)
             for i in range(n):
                 r = ids[i]
                 if a == 0 and len(base) > 0:
-                    x[r, 0] = base[r, 0] + sums[0, i]
-                    x[r, 1] = base[r, 1] + sums[1, i]
-                    x[r, 2] = base[r, 2] + sums[2, i]
+                    x[r, 0] = base[first_row + i, 0] + sums[0, i]
+                    x[r, 1] = base[first_row + i, 1] + sums[1, i]
+                    x[r, 2] = base[first_row + i, 2] + sums[2, i]
                 else:
                     x[r, a], x[r, a + 1], x[r, a + 2] = sums[0, i], sums[1, i], sums[2, i]
 
