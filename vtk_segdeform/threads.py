@@ -14,7 +14,7 @@ import contextlib
 import functools
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from typing import Any
 
 from .progress import Progress
@@ -52,6 +52,8 @@ def in_parallel(
     with one_blas_thread():
         waiting = [_pool().submit(work, *piece) for piece in pieces]
         try:
+            if progress is None:  # to wake for each piece would take a core from the others
+                wait(waiting, return_when=FIRST_EXCEPTION)
             for piece, future in zip(pieces, waiting, strict=True):
                 future.result()
                 if progress is not None:

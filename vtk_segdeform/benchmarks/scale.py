@@ -28,6 +28,7 @@ QUICK = Scale("quick", frames=3, repeats=3, regions=(1, 3, 6, 12, 24), most_iter
 USUAL = Scale("usual", drag_sizes=(5430, 50_000, 500_000), peer_sizes=(5430, 50_000))
 FULL = Scale(
     "full",
+    frames=12,
     drag_sizes=(5430, 50_000, 500_000, 1_000_000),
     peer_sizes=(5430, 50_000, 500_000, 1_000_000),
     cage_sizes=(5430, 50_000),
