@@ -23,7 +23,7 @@ from ..arrays import FloatArray
 from ..constraints import total_volume
 from ..errors import MissingDependencyError
 from ..subspace import Subspace
-from ..threads import in_parallel
+from ..threads import in_parallel, one_blas_thread
 from .drags import frames, seconds_per_step, way_of
 from .drawing import drawing_seconds
 from .measuring import forget_peak, median_seconds, peak_memory, timed
@@ -131,4 +131,5 @@ def _stream(subspace: Subspace) -> None:
         def read(start: int, stop: int, flat: FloatArray = flat) -> None:
             np.dot(flat[start:stop], flat[start:stop])
 
-        in_parallel(read, len(flat), _PIECE)
+        with one_blas_thread():  # others would go on spinning through what is timed next
+            in_parallel(read, len(flat), _PIECE)
