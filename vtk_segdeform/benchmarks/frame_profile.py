@@ -89,11 +89,9 @@ def profiled(size: int, scale: Scale) -> Profile:
         smallest = bent_cactus(scale.drag_sizes[0])
         beside = bound(smallest, 3, scale.n_cage_vertices).deformer, smallest
     time.sleep(_SETTLING)
-    drag, streams = [], []
-    for frame in frames(deformer, way_of(task, scale.frames)):
-        drag.append(frame)
-        streams.append(timed(lambda: _stream(deformer.subspace))[1])  # by turns: at the same load
-    del drag[0], streams[0]
+    streams = [timed(lambda: _stream(deformer.subspace))[1] for _ in range(scale.repeats)]
+    drag = list(frames(deformer, way_of(task, scale.frames)))[1:]
+    streams += [timed(lambda: _stream(deformer.subspace))[1] for _ in range(scale.repeats)]
     pose = drag[-1].solution.vertices
     cages = drag[-1].solution.cage_vertices
     whole = total_volume(task.mesh)
