@@ -218,7 +218,7 @@ def test_bench_leaves_a_report_and_says_what_does_not_hold(tmp_path, capsys):
     assert "800 vertices, 60 cage vertices" in written
     told = capsys.readouterr().out.splitlines()
     assert told[-1].endswith("report.md")
-    assert sum("gain of what depends on W" in line for line in told) == 2
+    assert sum("gain of the products with W" in line for line in told) == 2
 
 
 @pytest.mark.parametrize(

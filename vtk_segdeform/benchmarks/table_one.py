@@ -6,9 +6,8 @@
 *As printed*: one rotation per vertex, detail only (5), volume linearised (14), blend of eq. (4),
 and plain steps.  *Ours*: stretch, rotations by groups, exact volume, curvature and acceleration.
 The two cases differ in the non-zeros of W, so only what multiplies by W can gain; the table splits
-a step into that and the rest, to which belongs what a product takes whatever W is.  Each
-formulation is measured over what its own steps go over: the mesh itself as printed, the stand-in
-of a few thousand points in ours.
+a step into that and the rest.  Each formulation is measured over what its own steps go over: the
+mesh itself as printed, the stand-in of a few thousand points in ours.
 """
 
 from __future__ import annotations
@@ -16,17 +15,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from statistics import median
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from scipy import linalg
 
-from ..arrays import FloatArray
-from ..blocks import Groups
-from ..fast import compiled
 from ..progress import Progress
 from ..rotations import closest_rotations
-from ..subspace import Subspace
 from .drags import frames, seconds_per_step, way_of
 from .measuring import by_turns, median_seconds
 from .scale import Scale
@@ -35,7 +30,6 @@ from .tasks import PAPER, Bound, Task, bent_cactus, bound
 
 _PRINTED = 0.55 / 0.2
 _GROUPS = 300  # rotations of ours
-_Product: TypeAlias = Callable[[FloatArray], FloatArray]
 _STEPS, _ROUNDS = 20, 3  # in a row of products with W, and such rows for each repeat
 
 
@@ -48,7 +42,7 @@ class Case:
     steps: int
     frame: float
     volume: float  # relative change, the largest of the drag
-    of_w: float  # of a step: what in its products with W depends on W
+    of_w: float  # of a step: products with W
     volume_pass: float  # of a step: volume and its gradient over the triangles
     rotations: float
     substitution: float  # of a step: two triangular solves
@@ -72,11 +66,8 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
                 progress(0.5 * k + 0.25 * (n_regions == 3), f"table 1, {name}, {n_regions} regions")
             extra = {**options, "as_printed": bool(options) and n_regions > 1}
             readies.append(bound(task, n_regions, n, **extra))
-        surfaces = [ready.deformer.step_volumes.surface for ready in readies]
-        products = [_products(surface, plain=bool(options)) for surface in surfaces]
-        calls = [_products(surface, plain=bool(options), hollow=True) for surface in surfaces]
-        whole = by_turns([*products, *calls], _ROUNDS * scale.repeats)
-        of_w = [all_of_it - call for all_of_it, call in zip(whole[:2], whole[2:], strict=True)]
+        products = [_products(ready, plain=bool(options)) for ready in readies]
+        of_w = by_turns(products, _ROUNDS * scale.repeats)
         steps = seconds_per_step([(ready.deformer, task) for ready in readies], scale.repeats)
         one, three = (
             case_of(ready, task, scale, plain=bool(options), taken=(step, seconds / _STEPS))
@@ -87,10 +78,9 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
         words.append(
             f"Formulation {name}: a step with three regions is {one.step / three.step:.2f} times "
             f"as fast as with one cage, where the paper has {_PRINTED:.2f}. W has {fewer:.2f} "
-            f"times fewer non-zeros, and its products are {whole[0] / whole[1]:.2f} times as fast; "
-            f"{faster:.2f} times, less what the same calls take where W has no columns."
+            f"times fewer non-zeros, and its products are {faster:.2f} times as fast."
         )
-        what = f"gain of what depends on W over that of its non-zeros, {name}"
+        what = f"gain of the products with W over that of their non-zeros, {name}"
         ratios.append(Ratio(what, faster / fewer, 1.0, at_most=False))
     words.append(
         f"{task.mesh.n_vertices} vertices, {n} cage vertices. The drag is the one of the other "
@@ -136,35 +126,22 @@ def case_of(
     )
 
 
-def _products(surface: Subspace, *, plain: bool, hollow: bool = False) -> Callable[[], None]:
+def _products(ready: Bound, *, plain: bool) -> Callable[[], None]:
     """Return what steps do with W: x = W p, the volume's direction beside it, and W^T y.
 
     Several steps, as they follow each other in a drag: a W that stays in the cache gains by it.
-    *hollow* does all that does not depend on W: it calls, and reads and writes vertices.
     """
+    surface = ready.deformer.step_volumes.surface
     p = np.ones((surface.n_columns, 3 if plain else 6))
     y = np.ones((surface.n_vertices, 3))
-    map_, adjoint = _without_columns(surface) if hollow else (surface.map, surface.adjoint)
 
     def products() -> None:
         for _ in range(_STEPS):
-            map_(p)
+            surface.map(p)
             for _ in range(2 if plain else 1):  # of J_g, and of b where every vertex turns
-                adjoint(y)
+                surface.adjoint(y)
 
     return products
-
-
-def _without_columns(surface: Subspace) -> tuple[_Product, _Product]:
-    """Return the products with a W that has the vertices of *surface*, and no columns."""
-    kernels, alike = compiled(), surface.reached_alike()
-    if kernels is None:  # numpy's own part is not known
-        return (lambda p: p), (lambda y: y)
-    groups = Groups.of([(ids, ids[:0], np.empty((len(ids), 0))) for ids in alike])
-    return (
-        lambda p: groups.map(p[:0], None, kernels),
-        lambda y: groups.adjoint(y, surface.n_columns, kernels),
-    )
 
 
 def _largest(changes: Iterable[float]) -> float:
