@@ -21,7 +21,8 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 STORY = [
     # a checked mesh
     "errors", "arrays", "progress", "threads", "compiled.volumes", "compiled.products",
-    "compiled.normals", "compiled.rotations", "compiled.triangles", "compiled.coordinates", "fast",
+    "compiled.patch_products", "compiled.normals", "compiled.rotations", "compiled.triangles",
+    "compiled.coordinates", "fast",
     "surface.counting", "surface.topology", "surface.manifold", "surface.inside", "surface.columns",
     "surface.intersections", "surface.report", "surface.shells", "faults", "mesh", "surface.holes",
     "surface.splitting", "surface.repair_steps", "repair",
@@ -100,7 +101,9 @@ STORY = [
 
 NUMERIC = {"numpy", "scipy"}
 VTK = {"vtkmodules"}
-KERNELS = ("volumes", "products", "normals", "rotations", "triangles", "coordinates")
+KERNELS = (
+    "volumes", "products", "patch_products", "normals", "rotations", "triangles", "coordinates",
+)  # fmt: skip
 PANEL = {"controls", "modes", "painting", "regions", "handles", "options", "foot", "log", "panel"}
 PROGRAM = {
     "keeper", "opening", "start_page", "drops", "pages", "asking", "saving", "menus", "window",

@@ -191,7 +191,11 @@ def test_a_small_subspace_multiplied_in_one_call_is_the_sum_over_its_regions(twi
         lambda: subspace.map(p),
         lambda: subspace.map(p, start),
         lambda: subspace.adjoint(y),
+        lambda: subspace.adjoints([y]),
+        lambda: subspace.adjoints([y, y[::-1]]),
+        lambda: subspace.adjoints([y, 2.0 * y, -y]),
     ):
         quick, plain = twin(call)
         assert subspace._is_small
         assert_allclose(quick, plain, rtol=1e-12, atol=1e-11)
+    assert subspace.adjoints([]) == []

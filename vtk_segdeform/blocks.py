@@ -46,7 +46,7 @@ def add_product(
     kernels = compiled() if heavy and p.shape[1] % 3 == 0 else None
     size = max(_CACHED // block.shape[1], 1)
     if kernels:
-        arguments = inputs(rows, block, p.T)
+        arguments = inputs(x, rows, block, p.T)
         size = max(8 * size, -(-len(rows) // _PIECES))
 
     def add(start: int, stop: int) -> None:
@@ -123,10 +123,15 @@ class Groups:
         kernels.put_groups(x, base, writable(p), self.rows, self.columns, self.weights, self.starts)
         return x
 
-    def adjoint(self, y: FloatArray, n_columns: int, kernels: Any) -> FloatArray:
-        """Return `Subspace.adjoint` of *y* (n, 3)."""
-        p = np.zeros((3, n_columns))
-        kernels.add_groups_adjoint(
-            p, writable(y), self.rows, self.columns, self.weights, self.starts
-        )
-        return p.T
+    def adjoints(self, ys: Sequence[FloatArray], n_columns: int, kernels: Any) -> list[FloatArray]:
+        """Return `Subspace.adjoint` of each of *ys* (n, 3), two at a time."""
+        result = []
+        for k in range(0, len(ys), 2):
+            y, z = ys[k], (ys[k + 1] if k + 1 < len(ys) else None)
+            p = np.zeros((6 if z is not None else 3, n_columns))
+            beside = None if z is None else writable(z)
+            kernels.add_groups_adjoint(
+                p, writable(y), beside, self.rows, self.columns, self.weights, self.starts
+            )
+            result += [p[d : d + 3].T for d in range(0, len(p), 3)]
+        return result

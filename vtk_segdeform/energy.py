@@ -110,22 +110,30 @@ class Energy:
         return _by_cages(np.asarray(self.fit), self.subspace.columns)
 
     @cached_property
-    def _pulled(self) -> Subspace:
+    def _pulling(self) -> Subspace:
         return (
             self._fitted if self.exact else _by_cages(np.asarray(self.pull), self.subspace.columns)
         )
 
     def local_step(self, p: FloatArray, x: FloatArray) -> tuple[float, FloatArray]:
         """Return E(p) and half its gradient (m, 3), with the local rotations at x = W~ p."""
+        pulled = self.pulled(p, x)
+        return self.settled(p, self.subspace.adjoint(pulled) if self.turns_vertices else pulled)
+
+    def pulled(self, p: FloatArray, x: FloatArray) -> FloatArray:
+        """Return K^T R for the local rotations at x = W~ p: on the cages (m, 3).
+
+        Where every vertex turns it is on the vertices (n, 3), and W~^T is left to the caller.
+        """
         rotations = closest_rotations(self._covariances(p, x))
         turned = np.swapaxes(rotations, 1, 2).reshape(-1, 3)
-        if self.turns_vertices:
-            reduced = self.subspace.adjoint(self.pull.T @ turned)
-        else:
-            reduced = self._pulled.adjoint(turned)
+        return self.pull.T @ turned if self.turns_vertices else self._pulling.adjoint(turned)
+
+    def settled(self, p: FloatArray, pulled: FloatArray) -> tuple[float, FloatArray]:
+        """Return E(p) and half its gradient (m, 3), for the rotations' *pulled* on the cages."""
         product = self.quadratic @ p
-        value = np.vdot(p, product) - 2.0 * np.vdot(p, reduced) + self.constant
-        return float(value), product - reduced
+        value = np.vdot(p, product) - 2.0 * np.vdot(p, pulled) + self.constant
+        return float(value), product - pulled
 
 
 def _by_cages(k: FloatArray, cages: Sequence[slice]) -> Subspace:

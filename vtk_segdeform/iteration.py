@@ -11,6 +11,7 @@ from .acceleration import Anderson
 from .arrays import FloatArray, is_number, is_whole
 from .curvature import Factor
 from .errors import ArgumentError
+from .positions import Pull
 from .solution import Status
 
 _OLD, _LONG = 20, 1e-2  # steps after which the curvature is looked at again; or after one as long
@@ -35,6 +36,24 @@ class SolverOptions:
                 raise ArgumentError(
                     f"{name} must be a whole number, {least} or more; got {value!r}"
                 )
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A pose on the way, and what the objective and the constraints are there."""
+
+    p: FloatArray
+    x: FloatArray  # the surface that volumes are taken over; empty where nothing asks for it
+    shape: float  # E
+    shape_slope: FloatArray  # half its gradient
+    rows: tuple[FloatArray, ...]  # of G, one (m, 3) for each constraint
+    merit: float  # E, and what the targets pull
+    slope: FloatArray  # d
+
+    def toward(self, pull: Pull) -> Point:
+        """Return the same for other targets."""
+        value, slope = pull.value_and_slope(self.p)
+        return replace(self, merit=self.shape + value, slope=self.shape_slope + slope)
 
 
 @dataclass(eq=False)

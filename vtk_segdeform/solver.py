@@ -45,7 +45,7 @@ from .constraints import Volumes, moved, restore
 from .curvature import Factor, curved_factor, factored
 from .energy import Energy
 from .errors import CageError
-from .iteration import Course, Iteration, SolverOptions
+from .iteration import Course, Iteration, Point, SolverOptions
 from .positions import PositionTerm, Pull
 from .solution import Status
 
@@ -54,16 +54,6 @@ _DAMPING = 1e-9  # of the mean diagonal of H
 _CLOSE = 1e-2  # the paper's step, to where multipliers tell how volumes curve
 _SHORTEST = 1.0 / 64.0  # epsilon of section 3.3 below which a step is given up
 _NOTHING = np.empty((0, 3))
-
-
-@dataclass(frozen=True, eq=False)
-class _Point:
-    p: FloatArray
-    x: FloatArray  # the surface that `volumes` are taken over; empty where nothing asks for it
-    merit: float
-    slope: FloatArray  # d
-    shape: float
-    shape_slope: FloatArray  # the part of d that targets have no say in
 
 
 @dataclass(eq=False)
@@ -76,7 +66,7 @@ class GaussNewton:
     _hessian: FloatArray = field(init=False, repr=False)
     _factor: Factor = field(init=False, repr=False)
     _left: Course | None = field(init=False, repr=False, default=None)
-    _last: _Point | None = field(init=False, repr=False, default=None)
+    _last: Point | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         hessian = self.energy.quadratic + self.positions.quadratic()
@@ -165,18 +155,15 @@ class GaussNewton:
             merits=tuple(merits),
         )
 
-    def _curved(self, here: _Point, course: Course) -> Factor | None:
+    def _curved(self, here: Point, course: Course) -> Factor | None:
         curve = self.volumes.curve if course.is_near else None
         step, multipliers, _ = self._step(here, self._factor)
         of_volumes = curve(here.p, multipliers) if curve and self._size(step) < _CLOSE else None
         return curved_factor(self._hessian, self.energy, here.p, of_volumes)
 
-    def _step(
-        self, here: _Point, factor: Factor
-    ) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
+    def _step(self, here: Point, factor: Factor) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
         """Return h and lambda of (21), and the directions Z in which the volume is restored."""
-        constraints, surface = self.volumes.constraints, self.volumes.surface
-        rows = [surface.adjoint(c.gradient(here.x)) for c in constraints]
+        constraints, rows = self.volumes.constraints, here.rows
         h, *directions = factor.solve_all([-here.slope, *rows])
         if not constraints:
             return h, np.zeros(0), []
@@ -194,10 +181,10 @@ class GaussNewton:
         directions: Sequence[FloatArray],
         pull: Pull,
         options: SolverOptions,
-    ) -> _Point:
+    ) -> Point:
         """Return *p* moved along *directions* onto the constraints, and the objective there."""
         if not np.isfinite(p).all():
-            return _Point(p, p, np.inf, p, np.inf, p)
+            return Point(p, p, math.inf, p, (), math.inf, p)
         if not directions or not options.exact_volume:
             return self._evaluate(p, self._surface(p), pull)
         paths = self.volumes.surface.map(np.hstack([p, *directions]))
@@ -209,30 +196,31 @@ class GaussNewton:
         asked = self.volumes.constraints or self.energy.turns_vertices
         return self.volumes.surface.map(p) if asked else _NOTHING
 
-    def _evaluate(self, p: FloatArray, x: FloatArray, pull: Pull) -> _Point:
-        return self._pulled(p, x, self.energy.local_step(p, x), pull)
+    def _evaluate(self, p: FloatArray, x: FloatArray, pull: Pull) -> Point:
+        pulled = self.energy.pulled(p, x)
+        forces = [c.gradient(x) for c in self.volumes.constraints]
+        if self.energy.turns_vertices:  # they, too, are on the surface: in one pass over W~
+            pulled, *rows = self.volumes.surface.adjoints([pulled, *forces])
+        else:
+            rows = self.volumes.surface.adjoints(forces)
+        value, slope = self.energy.settled(p, pulled)
+        return Point(p, x, value, slope, tuple(rows), value, slope).toward(pull)
 
-    def _taken_up(self, p: FloatArray, pull: Pull) -> _Point:
+    def _taken_up(self, p: FloatArray, pull: Pull) -> Point:
         """Return the point at *p*; where the last call ended, most of it is known."""
         last = self._last
         if last is None or last.p is not p:
             return self._evaluate(p, self._surface(p), pull)
-        return self._pulled(p, last.x, (last.shape, last.shape_slope), pull)
-
-    def _pulled(
-        self, p: FloatArray, x: FloatArray, shape: tuple[float, FloatArray], pull: Pull
-    ) -> _Point:
-        value, slope = pull.value_and_slope(p)
-        return _Point(p, x, shape[0] + value, shape[1] + slope, *shape)
+        return last.toward(pull)
 
     def _shortened(
         self,
-        here: _Point,
+        here: Point,
         step: FloatArray,
         directions: Sequence[FloatArray],
         pull: Pull,
         options: SolverOptions,
-    ) -> _Point | None:
+    ) -> Point | None:
         """Return the longest of the steps h, h/2, h/4 ... that lowers the objective, or None."""
         epsilon = 1.0
         while epsilon >= _SHORTEST:
@@ -243,7 +231,7 @@ class GaussNewton:
             epsilon *= 0.5
         return None
 
-    def _improves(self, ahead: _Point, here: _Point) -> bool:
+    def _improves(self, ahead: Point, here: Point) -> bool:
         return ahead.merit <= here.merit + _RISE * (self.energy.constant + abs(here.merit))
 
     def _size(self, step: FloatArray) -> float:

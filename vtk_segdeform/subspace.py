@@ -87,11 +87,17 @@ class Subspace:
     def adjoint(self, y: FloatArray) -> FloatArray:
         """Return W~^T y, (m, 3), for *y* (n, 3) on the mesh."""
         if self._is_small and y.shape[1] == 3 and (kernels := compiled()):
-            return self._groups.adjoint(y, self.n_columns, kernels)
+            return self._groups.adjoints([y], self.n_columns, kernels)[0]
         p = np.empty((self.n_columns, y.shape[1]))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
             p[columns] = adjoint_product(rows, block, y, heavy=self._is_heavy)
         return p
+
+    def adjoints(self, ys: Sequence[FloatArray]) -> list[FloatArray]:
+        """Return `adjoint` of each of *ys* (n, 3); W~ is read once for two of them."""
+        if self._is_small and (kernels := compiled()):
+            return self._groups.adjoints(ys, self.n_columns, kernels)
+        return [self.adjoint(y) for y in ys]
 
     def at(self, vertices: IntArray) -> FloatArray:
         """Return the rows of W~ for some mesh *vertices*, dense (k, m)."""
@@ -145,8 +151,7 @@ class Subspace:
 
     def averaged(self, mean: sparse.csr_array) -> Subspace:
         """Return the subspace of the points mean @ x, for sparse weights *mean* (k, n)."""
-        rows, blocks = [], []
-        by_column = mean.tocsc()
+        rows, blocks, by_column = [], [], mean.tocsc()
         for members, block in zip(self.rows, self.blocks, strict=True):
             own = np.unique(by_column[:, members].indices).astype(np.int64)
             averages = np.zeros((len(own), block.shape[1]))

@@ -127,9 +127,11 @@ def case_of(
 
 
 def _products(ready: Bound, *, plain: bool) -> Callable[[], None]:
-    """Return what steps do with W: x = W p, the volume's direction beside it, and W^T y.
+    """Return what steps do with W: x = W p and W^T y.
 
-    Several steps, as they follow each other in a drag: a W that stays in the cache gains by it.
+    Beside p goes the direction in which the volume is restored, where it is exact; and W^T is
+    taken of J_g and, where every vertex turns, of what the rotations pull.  Several steps, as they
+    follow each other in a drag: a W that stays in the cache gains by it.
     """
     surface = ready.deformer.step_volumes.surface
     p = np.ones((surface.n_columns, 3 if plain else 6))
@@ -138,8 +140,7 @@ def _products(ready: Bound, *, plain: bool) -> Callable[[], None]:
     def products() -> None:
         for _ in range(_STEPS):
             surface.map(p)
-            for _ in range(2 if plain else 1):  # of J_g, and of b where every vertex turns
-                surface.adjoint(y)
+            surface.adjoints([y, y] if plain else [y])
 
     return products
 
