@@ -62,7 +62,7 @@ def without_peers(monkeypatch):
 def steady(monkeypatch):
     """Let no other work of the machine into the cost of a step, which may then be unknown."""
     for module in (segmentation_study, table_one, frame_profile):
-        monkeypatch.setattr(module, "seconds_per_step", lambda cases, _: [1e-3] * len(cases))
+        monkeypatch.setattr(module, "seconds_per_step", lambda cases, *_, **__: [1e-3] * len(cases))
 
 
 def numbers(table):

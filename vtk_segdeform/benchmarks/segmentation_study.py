@@ -13,7 +13,7 @@ from ..distortion import distortion
 from ..errors import CageError
 from ..progress import Progress
 from . import charts
-from .drags import frames, seconds_per_step, way_of
+from .drags import AS_PRINTED, frames, seconds_per_step, way_of
 from .scale import Scale
 from .sections import Cell, Figure, Section, Table
 from .tasks import PAPER, Task, bent_cactus, bound, deformer_of, divided
@@ -57,7 +57,7 @@ def row_of(task: Task, n_regions: int, n_vertices: int, scale: Scale) -> tuple[C
     printed = deformer_of(task, deformer.regions, deformer.cages, **PAPER)
     drag = list(frames(deformer, way_of(task, scale.frames)))[1:]
     (step,) = seconds_per_step([(deformer, task)], scale.repeats)
-    (as_printed,) = seconds_per_step([(printed, task)], min(scale.repeats, 3))
+    (as_printed,) = seconds_per_step([(printed, task)], min(scale.repeats, 3), AS_PRINTED)
     deformer.reset()
     solution = deformer.solve(task.targets)
     return (

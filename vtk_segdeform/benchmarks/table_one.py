@@ -22,7 +22,7 @@ from scipy import linalg
 
 from ..progress import Progress
 from ..rotations import closest_rotations
-from .drags import frames, seconds_per_step, way_of
+from .drags import AS_PRINTED, frames, seconds_per_step, way_of
 from .measuring import by_turns, median_seconds
 from .scale import Scale
 from .sections import Ratio, Section, Table
@@ -68,7 +68,9 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
             readies.append(bound(task, n_regions, n, **extra))
         products = [_products(ready, plain=bool(options)) for ready in readies]
         of_w = by_turns(products, _ROUNDS * scale.repeats)
-        steps = seconds_per_step([(ready.deformer, task) for ready in readies], scale.repeats)
+        drags = [(ready.deformer, task) for ready in readies]
+        many = {"many": AS_PRINTED} if options else {}
+        steps = seconds_per_step(drags, scale.repeats, **many)
         one, three = (
             case_of(ready, task, scale, plain=bool(options), taken=(step, seconds / _STEPS))
             for ready, step, seconds in zip(readies, steps, of_w, strict=True)
