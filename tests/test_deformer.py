@@ -11,11 +11,14 @@ from scenes import sausage
 from solids import icosphere, rotation
 
 from vtk_segdeform.acceleration import Anderson
+from vtk_segdeform.cage_fit import fit_cages
 from vtk_segdeform.cages import Cage
 from vtk_segdeform.deformer import Deformer
 from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionError
 from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.models import cactus
 from vtk_segdeform.regions import Regions, cage_distance_weights
+from vtk_segdeform.segmentation import segment
 from vtk_segdeform.solution import Status
 
 SCENE = sausage(2)
@@ -301,6 +304,28 @@ def test_binding_reports_its_progress_and_can_be_cancelled():
 
     with pytest.raises(Cancelled, match="enough"):
         SCENE.deformer(progress=stop)
+
+
+def test_set_up_says_what_it_does_and_stops_at_whatever_it_says():
+    mesh = cactus(4000)
+    regions = segment(mesh, 2)
+    cages = fit_cages(mesh, regions, 60)
+    for work, least in (
+        (lambda told: segment(mesh, 2, progress=told), 4),
+        (lambda told: fit_cages(mesh, regions, 60, progress=told), 4),
+        (lambda told: Deformer(mesh, regions, cages, handle=[0], progress=told), 6),
+    ):
+        seen = []
+        work(lambda _, message, seen=seen: seen.append(message))
+        assert len(set(seen)) >= least
+        for last in dict.fromkeys(seen):
+
+            def stop(_, message, last=last):
+                if message == last:
+                    raise Cancelled(last)
+
+            with pytest.raises(Cancelled, match=last):
+                work(stop)
 
 
 def test_a_copy_goes_on_as_the_deformer_would_and_leaves_it_where_it_is():

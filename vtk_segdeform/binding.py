@@ -27,7 +27,7 @@ from .energy import Energy, shape_energy
 from .grouping import join_rotations
 from .mesh import Mesh
 from .patches import Patches
-from .progress import Progress, part
+from .progress import Progress, part, tell
 from .regions import Regions
 from .rotations import rotation_groups
 from .stand_in import StandIn
@@ -83,19 +83,19 @@ class Binder:
         return binding
 
     def _make(self, progress: Progress | None) -> Binding:
+        tell(progress, 0.0, "checking cages")
         blend, share = self.blend, part(progress, 0.0, 0.8)
         subspace = bind(self.regions, self.cages, blend=blend, progress=share)
-        if progress:
-            progress(0.8, "factoring")
+        tell(progress, 0.8, "grouping rotations")
         groups = self._groups()
-        energy = shape_energy(self.rest, subspace, self.stretch, groups)
+        share = part(progress, 0.82, 0.85)
+        energy = shape_energy(self.rest, subspace, self.stretch, groups, progress=share)
         if groups is not None and energy.exact:
             faces = [cage.faces for cage in self.cages]
             energy = with_cage_stiffness(energy, self.rest_cages, faces, groups)
             energy = self._joined(energy, groups)
-        if progress:
-            progress(0.85, "standing in")
-        stand_in = StandIn.of(self.regions.mesh, subspace, whole=energy.turns_vertices)
+        share, whole = part(progress, 0.86, 0.9), energy.turns_vertices
+        stand_in = StandIn.of(self.regions.mesh, subspace, whole=whole, progress=share)
         patches = None
         if self.rest.n_vertices > _LARGE:
             share = part(progress, 0.9, 1.0)

@@ -29,7 +29,7 @@ from .caging.contour import contour_surface
 from .caging.region_solid import Patch, Skin, SolidField, solid_field
 from .errors import CageError, RegionError
 from .mesh import Mesh, require_mesh
-from .progress import Progress, part
+from .progress import Progress, part, tell
 from .regions import Regions
 from .surface.columns import inside_points
 from .surface.inside import distance_to_surface
@@ -46,6 +46,7 @@ _SHELL = 6  # vertices, at least, of each part of a cage that is in parts
 _FLOOR = 12  # vertices that every region gets before the rest is shared out
 _CLEARANCE = 0.5  # of the offset: the least distance from the skin that faces are pushed to
 _PUSHES, _NEAREST = 30, 200  # rounds; vertices whose distance from the cage is measured
+_MEASURED = 0.25  # of the work: regions are measured
 _SIEVE = 16  # one vertex in so many is measured first
 _SAMPLES = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6.0  # of a face
 
@@ -89,15 +90,19 @@ def fit_cages(
         If *n_vertices* is too small or *offset* is not positive.
     """
     require_mesh(mesh)
+    patches, n_regions = [], regions.n_regions
+    tell(progress, 0.0, "measuring regions")
     skin = Skin.of(mesh)
-    patches = [Patch.of(skin, members) for members in regions.membership]
+    for r, members in enumerate(regions.membership):
+        tell(progress, _MEASURED * r / n_regions, "measuring regions")
+        patches.append(Patch.of(skin, members))
     numbers = _share_out(patches, n_vertices)
     cages = []
     for r, (patch, number) in enumerate(zip(patches, numbers, strict=True)):
-        piece = part(progress, r / len(patches), (r + 1) / len(patches))
+        ends = _MEASURED + (1.0 - _MEASURED) * np.array([r, r + 1]) / n_regions
+        piece = part(progress, *map(float, ends))
         cages.append(_fit(patch, int(number), offset, piece))
-    if progress is not None:
-        progress(1.0, "cages ready")
+    tell(progress, 1.0, "cages ready")
     return tuple(cages)
 
 
@@ -150,11 +155,12 @@ def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) 
     offset = _OFFSET * length if offset is None else offset
     valid: list[tuple[float, FloatArray, IntArray]] = []
     for attempt in range(_ATTEMPTS):
-        if progress is not None:
-            progress(attempt / _ATTEMPTS, f"a cage of {n} vertices, attempt {attempt + 1}")
+        doing = f"a cage of {n} vertices, attempt {attempt + 1}"
+        tell(progress, attempt / _ATTEMPTS, doing)
         larger = _LARGER ** (attempt * (attempt + 1) / 2)
         nodes = max(_NODES, _NODES_PER_VERTEX * n)
         field = solid_field(patch, offset * larger, _STEP * length * larger, most_nodes=nodes)
+        tell(progress, (attempt + 0.5) / _ATTEMPTS, doing)
         if _SHELL * field.n_shells > n:
             fault = f"it falls into {field.n_shells} parts"
             continue

@@ -39,7 +39,7 @@ from .positions import (
     errors_at,
     position_term,
 )
-from .progress import Progress
+from .progress import Progress, tell
 from .regions import Regions
 from .solution import Solution, Status
 from .solver import GaussNewton
@@ -172,8 +172,7 @@ class Deformer:
         )
         self._keep(preserve_volume, preserve_region_volumes)
         self._take_hold(fixed, handle)
-        if progress:
-            progress(1.0, "ready")
+        tell(progress, 1.0, "ready")
 
     def hold(
         self,

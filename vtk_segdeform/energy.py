@@ -39,6 +39,7 @@ from .errors import ArgumentError
 from .grams import grams
 from .mesh import Mesh
 from .operators import surface_operators
+from .progress import Progress, tell
 from .rotations import closest_rotations
 from .sampling import Sample
 from .subspace import Subspace
@@ -146,7 +147,14 @@ def _by_cages(k: FloatArray, cages: Sequence[slice]) -> Subspace:
     return Subspace(len(k), tuple(rows), tuple(blocks))
 
 
-def shape_energy(mesh: Mesh, subspace: Subspace, stretch: float, groups: IntArray | None) -> Energy:
+def shape_energy(
+    mesh: Mesh,
+    subspace: Subspace,
+    stretch: float,
+    groups: IntArray | None,
+    *,
+    progress: Progress | None = None,
+) -> Energy:
     """Return the energy of *mesh*, whose size should be about 1, in *subspace*.
 
     Parameters
@@ -159,14 +167,18 @@ def shape_energy(mesh: Mesh, subspace: Subspace, stretch: float, groups: IntArra
         Trace of the stretch term in the subspace, as a multiple of that of the detail term.
     groups : (n,) int or None
         The rotation group of each vertex; None gives each vertex its own rotation.
+    progress : callable, optional
+        Called with the fraction done and what is going on; may raise `Cancelled`.
     """
     if not is_number(stretch, 0.0):
         raise ArgumentError(f"stretch must be a number, 0 or more; got {stretch!r}")
+    tell(progress, 0.0, "asking vertices")
     surface: Mesh | Sample = mesh
     rows, near = subspace, groups
     if groups is not None and (sample := Sample.of(mesh, groups)):
         surface, rows, near = sample, sample.rows(subspace), groups[sample.ids]
     shape = surface_operators(surface, np.arange(mesh.n_vertices) if near is None else near)
+    tell(progress, 0.5, "summing up their energy")
     bending, stretching, mass = grams(
         rows,
         shape.laplacian,
@@ -175,6 +187,7 @@ def shape_energy(mesh: Mesh, subspace: Subspace, stretch: float, groups: IntArra
         stiffness=shape.stiffness,
         near=near,
     )
+    tell(progress, 0.9, "factoring")
     unit = np.trace(bending) / np.trace(stretching)
     pull = shape.detail + (stretch * unit) * shape.fans
     fit = pull if stretch > 0.0 else shape.detail + unit * shape.fans

@@ -16,7 +16,7 @@ import numpy as np
 from .arrays import FloatArray, IntArray, is_whole
 from .errors import RegionError
 from .mesh import Mesh, require_mesh
-from .progress import Progress
+from .progress import Progress, part, tell
 from .regions import Regions
 from .segmenting.borders import connected_parts, smooth_borders
 from .segmenting.coarse import Surface, coarsen
@@ -76,22 +76,25 @@ def segment(
     n = mesh.n_vertices
     if n_regions is not None and not is_whole(n_regions, 1, n):
         raise RegionError(f"n_regions must be a whole number in 1..{n}; got {n_regions!r}")
-    _tell(progress, 0.0, "thinning out vertices")
+    tell(progress, 0.0, "thinning out vertices")
     shape = _without_ties(mesh)
     if n_regions is not None and n_regions <= mesh.components.max() + 1:
         labels = _merged_components(shape, int(n_regions))
     else:
         n_regions = None if n_regions is None else int(n_regions)
         points = max(_POINTS, _POINTS_PER_REGION * (n_regions or 1))
-        cell, surface = coarsen(shape, points, np.random.default_rng(seed))
+        thinning = part(progress, 0.02, 0.1)
+        cell, surface = coarsen(shape, points, np.random.default_rng(seed), thinning)
         labels = _parts(surface, n_regions, progress)[cell]
-        _tell(progress, 0.8, "smoothing borders")
-        labels = connected_parts(shape, smooth_borders(shape, labels))
-    _tell(progress, 0.95, "growing regions")
+        tell(progress, 0.8, "smoothing borders")
+        labels = smooth_borders(shape, labels)
+        tell(progress, 0.9, "smoothing borders")
+        labels = connected_parts(shape, labels)
+    tell(progress, 0.95, "growing regions")
     if overlap is None:
         overlap = max(2, round(_OVERLAP * np.sqrt(n / (labels.max() + 1))))
     regions = Regions.from_labels(mesh, labels, overlap)
-    _tell(progress, 1.0, "regions found")
+    tell(progress, 1.0, "regions found")
     return regions
 
 
@@ -133,7 +136,7 @@ def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -
         labels[np.flatnonzero(labels == label)[neck.inside]] = len(necks)
         necks[label] = best_neck(*alone(label)[1:], share)
         necks.append(best_neck(*alone(len(necks))[1:], share))
-        _tell(progress, 0.1 + 0.4 * min(1.0, len(necks) / min(wanted, 20)), "cutting off limbs")
+        tell(progress, 0.1 + 0.4 * min(1.0, len(necks) / min(wanted, 20)), "cutting off limbs")
 
     count = len(necks)
     areas = np.bincount(labels, surface.areas).astype(float)
@@ -148,7 +151,7 @@ def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -
             there = int(np.clip(quota // 2, quota - (len(ids) - size), size))
             waiting += [(label, quota - there), (count, there)]
             count += 1
-            _tell(progress, 0.5 + 0.3 * count / (n_regions or count), "slicing the rest")
+            tell(progress, 0.5 + 0.3 * count / (n_regions or count), "slicing the rest")
     return labels
 
 
@@ -161,8 +164,3 @@ def _merged_components(mesh: Mesh, n_regions: int) -> IntArray:
     nearest = np.linalg.norm(centres[:, None] - centres[large], axis=2).argmin(axis=1)
     nearest[large] = np.arange(n_regions)
     return np.asarray(nearest[component])
-
-
-def _tell(progress: Progress | None, fraction: float, message: str) -> None:
-    if progress is not None:
-        progress(fraction, message)

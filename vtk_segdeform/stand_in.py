@@ -26,6 +26,7 @@ from scipy import sparse
 from .arrays import FloatArray, IntArray
 from .constraints import VolumeConstraint, Volumes
 from .mesh import Mesh
+from .progress import Progress
 from .rotations import group_by_position
 from .segmenting.thinning import cells as cells_of
 from .segmenting.thinning import faces_between
@@ -56,7 +57,14 @@ class StandIn:
     shares: FloatArray | None = None
 
     @classmethod
-    def of(cls, mesh: Mesh, subspace: Subspace, *, whole: bool = False) -> StandIn:
+    def of(
+        cls,
+        mesh: Mesh,
+        subspace: Subspace,
+        *,
+        whole: bool = False,
+        progress: Progress | None = None,
+    ) -> StandIn:
         """Return the stand-in of a *mesh* at rest that moves by *subspace*.
 
         A small mesh stands for itself; with *whole*, a large one as well.
@@ -64,7 +72,7 @@ class StandIn:
         n = mesh.n_vertices
         if n <= _LARGE or whole:
             return cls(subspace)
-        _, cells = cells_of(mesh, _POINTS, np.random.default_rng(0))
+        _, cells = cells_of(mesh, _POINTS, np.random.default_rng(0), progress)
         areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), n)
         shares = areas / np.bincount(cells, areas)[cells]
         return cls(subspace.averaged(_matrix(cells, shares)), cells, shares)

@@ -24,7 +24,7 @@ from ..constraints import VolumeConstraint, region_volumes, total_volume
 from ..deformer import Deformer
 from ..errors import CageError, ConstraintError
 from ..mesh import Mesh
-from ..progress import Progress, part
+from ..progress import Progress, part, tell
 from ..solution import Solution
 from ..volume import signed_volume, volume_gradient
 from .handles import targets_at
@@ -93,8 +93,7 @@ class Posing:
         self.bind(state, part(progress, 0.0, _MOST_OF_IT))
         if len(state.fixed) or state.handles:
             self._hold(state)
-        if progress:
-            progress(1.0, "ready")
+        tell(progress, 1.0, "ready")
 
     def forget(self) -> None:
         """Let the next `solve` start from its pose alone, as if that had just been loaded."""

@@ -19,6 +19,7 @@ from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..mesh import Mesh
+from ..progress import Progress
 from ..surface.columns import count_up
 from .thinning import cells, unique_edges
 
@@ -117,13 +118,15 @@ class Surface:
         return np.asarray(np.bincount(k, piece, minlength=len(levels)))
 
 
-def coarsen(mesh: Mesh, n_points: int, rng: np.random.Generator) -> tuple[IntArray, Surface]:
+def coarsen(
+    mesh: Mesh, n_points: int, rng: np.random.Generator, progress: Progress | None = None
+) -> tuple[IntArray, Surface]:
     """Return (n,) int, the cell of each vertex, and the coarse copy with one point per cell.
 
     The copy has roughly *n_points*, or all vertices where there are fewer.  Every cell is
     connected, and every component of the mesh keeps at least one.
     """
-    kept, cell = cells(mesh, n_points, rng)
+    kept, cell = cells(mesh, n_points, rng, progress)
     return cell, _surface(mesh, cell, kept, unique_edges(cell[mesh.edges], len(kept)))
 
 

@@ -12,11 +12,14 @@ from scipy.sparse import csgraph
 
 from ..arrays import FloatArray, IntArray
 from ..mesh import Mesh
+from ..progress import Progress, tell
 
 _TIE_BREAK = 1e-6  # of an edge's length
 
 
-def cells(mesh: Mesh, n_points: int, rng: np.random.Generator) -> tuple[IntArray, IntArray]:
+def cells(
+    mesh: Mesh, n_points: int, rng: np.random.Generator, progress: Progress | None = None
+) -> tuple[IntArray, IntArray]:
     """Return the vertices that remain, (k,) int in order, and the cell of each vertex, (n,) int.
 
     While vertices are thinned out, those that go join a neighbour that stays; so each round is a
@@ -25,6 +28,7 @@ def cells(mesh: Mesh, n_points: int, rng: np.random.Generator) -> tuple[IntArray
     kept, edges, favour = np.arange(mesh.n_vertices), mesh.edges, _favour(mesh.n_vertices)
     spacing = 0.8 * np.sqrt(mesh.face_areas.sum() / n_points)
     while mesh.n_vertices > n_points:
+        tell(progress, 0.8 * (1.0 - len(kept) / mesh.n_vertices), "thinning out vertices")
         i, j = kept[edges.T]
         length = np.linalg.norm(mesh.vertices[i] - mesh.vertices[j], axis=1)
         length *= 1.0 + favour[i] + favour[j]
@@ -34,6 +38,7 @@ def cells(mesh: Mesh, n_points: int, rng: np.random.Generator) -> tuple[IntArray
         stay = _independent(edges[short], len(kept), rng)
         number = _nearest_neighbour(edges[short], length[short], stay, len(kept))
         kept, edges = kept[stay], unique_edges(number[edges], len(stay))
+    tell(progress, 0.8, "thinning out vertices")
     number = np.empty(mesh.n_vertices, dtype=np.int64)
     number[kept] = np.arange(len(kept))
     return kept, number[nearest_of(distinct_lengths(mesh), kept)]
