@@ -255,10 +255,36 @@ def test_options_that_make_no_sense_are_refused_by_name(option, says):
 
 
 def test_a_target_in_another_unit_is_asked_about():
-    with pytest.raises(ConstraintError, match="are both in the same unit"):
+    with pytest.raises(ConstraintError, match="both in the same unit"):
         SCENE.held().solve(1e6 * REST)
-    with pytest.raises(ConstraintError, match="are both in the same unit"):
+    with pytest.raises(ConstraintError, match="both in the same unit"):
         SCENE.held().solve(REST + 1e200)
+
+
+@pytest.mark.parametrize("way", [(1.0, 0.9, -0.8), (0.0, 1.0, 0.0)])
+def test_the_volume_stays_however_far_apart_targets_may_be(way):
+    both = np.concatenate([SCENE.fixed, SCENE.handle])
+    scene = replace(SCENE, fixed=both[:0], handle=both)
+    deformer = scene.deformer()
+    rest = scene.mesh.vertices[deformer.handle]
+    side = np.where(np.isin(deformer.handle, SCENE.handle), 1.0, -1.0)[:, None]
+    far = scene.mesh.diagonal * side * way
+    for distance in np.linspace(1.0, 9.4, 6):
+        solution = deformer.solve(rest + distance * far, max_steps=8)
+        assert abs(solution.volume_change) <= 1e-12
+    assert np.ptp(solution.vertices, axis=0).max() > 18.0 * scene.mesh.diagonal
+    with pytest.raises(ConstraintError, match="at most 20 are allowed"):
+        deformer.solve(rest + 10.5 * far)
+
+
+def test_a_mesh_may_go_far_as_a_whole():
+    scene = replace(SCENE, fixed=SCENE.fixed[:0])
+    away = np.array([0.0, 100.0, 0.0]) * SCENE.mesh.diagonal
+    solution = scene.deformer().solve(REST + away)
+    assert abs(solution.volume_change) <= 1e-12
+    assert_allclose(solution.vertices, SCENE.mesh.vertices + away, atol=1e-6 * SCENE.mesh.diagonal)
+    with pytest.raises(ConstraintError, match="at most 20 are allowed"):
+        SCENE.held().solve(REST + away)
 
 
 def test_a_cage_so_large_that_it_moves_nothing_is_refused():

@@ -38,6 +38,7 @@ from .positions import (
     connected_sets,
     errors_at,
     position_term,
+    require_together,
 )
 from .progress import Progress, tell
 from .regions import Regions
@@ -252,7 +253,8 @@ class Deformer:
         Raises
         ------
         ConstraintError
-            If *targets* has the wrong shape or holds NaN or infinite coordinates.
+            If *targets* has the wrong shape, holds NaN or infinite coordinates, or is so far away,
+            from the mesh or from what is fixed, that it must be in another unit.
         """
         goal = self._inward(checked_targets(targets, len(self.handle)))
         if max(goal.max(initial=0.0), -goal.min(initial=0.0)) > _FAR:
@@ -260,6 +262,7 @@ class Deformer:
                 f"a target is {np.abs(goal).max():.0e} times the mesh's size away from it; "
                 "are both in the same unit?"
             )
+        require_together(self._rest, goal, self._ends_of_fixed)
         with one_blas_thread():
             return self._solve(goal, max_steps)
 
@@ -330,6 +333,7 @@ class Deformer:
         one = len(self._constraints) == 1 and self._keeps == (True, False)
         self._is_wide = one and self._stand_in.cells is not None and mesh.n_vertices > _WIDE
         held = self._rest.vertices[self.fixed] if len(self.fixed) else np.zeros((1, 3))
+        self._ends_of_fixed = np.stack([held.min(axis=0), held.max(axis=0)])[: 2 * len(self.fixed)]
         self._anchor = held.mean(axis=0) * self._size  # stays where it is when the mesh is scaled
         self.reset()
 

@@ -28,6 +28,11 @@ from .mesh import Mesh
 from .rotations import group_by_position
 from .subspace import Subspace
 
+FARTHEST_APART = 20.0
+"""Diagonals of a mesh between places of what it is held by.
+
+So far apart, volumes are rounded to a few 1e-13 of themselves; it grows with the cube of that."""
+
 _MANY, _PLACES = 1000, 500  # vertices of a set beyond which it has so many places
 _STIFFER = 10.0
 _STIFFEST = 1e4  # times the weight it started with
@@ -213,6 +218,21 @@ def checked_targets(targets: ArrayLike, n_handle: int) -> FloatArray:
             f"got shape {array.shape}"
         )
     return array
+
+
+def require_together(mesh: Mesh, *places: FloatArray) -> None:
+    """Raise a ConstraintError if *places* (k, 3), targets and fixed, are senselessly far apart."""
+    held = [points for points in places if len(points)]
+    if not held:
+        return
+    low = np.min([points.min(axis=0) for points in held], axis=0)
+    high = np.max([points.max(axis=0) for points in held], axis=0)
+    apart = float((high - low).max()) / mesh.diagonal
+    if not apart <= FARTHEST_APART:
+        raise ConstraintError(
+            f"targets and fixed vertices are {apart:.3g} diagonals of the mesh apart; at most "
+            f"{FARTHEST_APART:.0f} are allowed: are both in the same unit?"
+        )
 
 
 def connected_sets(mesh: Mesh, ids: IntArray) -> list[IntArray]:

@@ -16,14 +16,14 @@ from numpy.typing import ArrayLike
 from ..arrays import FloatArray, IntArray, as_points, frozen, plain
 from ..errors import ConstraintError
 from ..mesh import Mesh
-from ..positions import checked_constraints
+from ..positions import FARTHEST_APART, checked_constraints
 from .naming import fault_of
 from .state import Pose, State, pieces
 
 Handles = Mapping[str, IntArray]
 Targets = Mapping[str, FloatArray]
 
-_FARTHEST = 30.0  # diagonals of the mesh from its centre; on the way there are legs of a fifth
+_FARTHEST = FARTHEST_APART / 2.0  # diagonals of the mesh from its centre
 
 
 def with_handle(mesh: Mesh, state: State, name: str, vertices: ArrayLike) -> Handles:
