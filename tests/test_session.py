@@ -524,6 +524,29 @@ def test_a_cage_vertex_can_be_moved_freely_and_the_volume_stays():
         session.move_cage(0, places[:1])
 
 
+def test_a_cage_put_anywhere_keeps_the_volume_or_is_refused_and_nothing_flies_off():
+    session, rng, refused = ready(), np.random.default_rng(0), []
+    rest, diagonal = session.cage_vertices, session.mesh.diagonal
+    for _ in range(60):
+        region = int(rng.integers(2))
+        places = rest[region].copy()
+        some = rng.permutation(len(places))[: rng.integers(1, len(places))]
+        places[some] += rng.normal(size=3) * diagonal * 10.0 ** rng.uniform(-1.0, 0.6)
+        try:
+            session.move_cage(region, places)
+        except ConstraintError as error:
+            refused.append(str(error))
+        else:
+            assert volume_error(session) < 1e-12
+            assert np.ptp(session.vertices, axis=0).max() < 20.0 * diagonal
+            session.commit()
+            session.undo()
+        assert not session.is_dragging
+        assert_array_equal(session.vertices, VERTICES)
+    assert 0 < len(refused) < 10
+    assert all("at most 10 are allowed" in error for error in refused)
+
+
 def test_what_to_do_next_is_said_at_every_stage():
     session = Session(SCENE.mesh)
     said = [session.what_next]

@@ -27,7 +27,7 @@ from ..mesh import Mesh
 from ..progress import Progress, part, tell
 from ..solution import Solution
 from ..volume import signed_volume, volume_gradient
-from .handles import targets_at
+from .handles import require_near, targets_at
 from .listeners import Change
 from .state import Pose, State
 
@@ -137,6 +137,11 @@ class Posing:
 
         The cages are blown up or shrunk for it, along the gradients of their own volumes, unless
         the options let the volume go.  Handles are to stay where they then are.
+
+        Raises
+        ------
+        ConstraintError
+            If that takes the cages senselessly far away.
         """
         p = tuple(cage_vertices)
         if state.options.preserve_volume or state.options.preserve_region_volumes:
@@ -158,6 +163,7 @@ class Posing:
         deformer = self.bind(state)
         path = np.hstack([deformer.surface(cage_vertices), deformer.subspace.map(outward)])
         p = np.concatenate(cage_vertices) + self._total_volume.exact_step(path) * outward
+        require_near(self._mesh, p, "cage vertices that keep the volume")
         return tuple(p[columns] for columns in deformer.subspace.columns)
 
     def _hold(self, state: State) -> Deformer:
