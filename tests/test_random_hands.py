@@ -179,8 +179,8 @@ class Monkey:
 @pytest.mark.parametrize(
     ("seed", "count"),
     [
-        (1, 500),
-        (2, 500),
+        (1, 300),
+        (2, 300),
         pytest.param(3, 10_000, marks=pytest.mark.campaign),
     ],
 )
