@@ -145,7 +145,7 @@ GRANTED = {
 }
 
 MAY_PRINT_AND_EXIT = {"cli", "__main__", "paraview_plugin"}
-LONGEST = 250
+LONGEST = 400
 FILES = {
     ".".join(path.relative_to(PACKAGE).with_suffix("").parts): path
     for path in sorted(PACKAGE.rglob("*.py"))
