@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from vtk_segdeform import Session, models
+from vtk_segdeform import Session, lock, models
 from vtk_segdeform.errors import SessionError
-from vtk_segdeform.widgets.app import autosave, lock
+from vtk_segdeform.lock import hold
+from vtk_segdeform.widgets.app import autosave
 from vtk_segdeform.widgets.app.autosave import About, Autosaves, user_folder
-from vtk_segdeform.widgets.app.lock import hold
 
 BALL = models.sphere(300)
 ABOUT = About("ball.ply", "/saved/ball.segdeform", "/meshes/ball.ply")
@@ -116,7 +116,7 @@ def test_what_is_left_is_offered_until_it_is_removed_and_the_latest_first(folder
 def test_removing_leaves_nothing_and_what_a_killed_write_left_goes_too(folder):
     slot = Autosaves(folder).new(ABOUT)
     slot.write(work())
-    (slot.path.parent / ".segdeform-0123.part").write_bytes(b"half")
+    (slot.path.parent / ".segdeform-0123456789abcdef.part").write_bytes(b"half")
     slot.remove()
     assert list(folder.iterdir()) == []
 

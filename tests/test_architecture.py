@@ -20,7 +20,8 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 # One line per part of the story; a new file takes its place here.
 STORY = [
     # a checked mesh
-    "errors", "arrays", "progress", "threads", "compiled.volumes", "compiled.products",
+    "errors", "arrays", "progress", "lock", "regular_file", "atomic", "threads",
+    "compiled.volumes", "compiled.products",
     "compiled.patch_products", "compiled.normals", "compiled.rotations", "compiled.triangles",
     "compiled.coordinates", "fast",
     "surface.counting", "surface.topology", "surface.manifold", "surface.inside", "surface.columns",
@@ -82,7 +83,7 @@ STORY = [
     "widgets.panel.options", "widgets.panel.foot", "widgets.panel.log", "widgets.panel.panel",
     "widgets.qt",
     # the desktop program
-    "widgets.app.lock", "widgets.app.autosave", "widgets.app.documents", "widgets.app.recent",
+    "widgets.app.autosave", "widgets.app.documents", "widgets.app.recent",
     "widgets.app.keeper", "widgets.app.opening", "widgets.app.start_page", "widgets.app.drops",
     "widgets.app.pages", "widgets.app.asking", "widgets.app.saving", "widgets.app.menus",
     "widgets.app.window", "widgets.app.none_count",

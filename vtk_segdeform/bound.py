@@ -1,29 +1,41 @@
 """What a mesh, its regions and its cages are bound to, and how that is kept on disk.
 
 A folder holds one file for each binding, an ``.npz`` under a name that says all it was made from
-(`binding`).  A million vertices are some 400 megabytes: what takes its time is memory that nobody
-has had yet, so all cores read.
+(`binding`), and which is in it again: a file that was renamed is not what its name says.  Files of
+other users, links and pipes are not read either, and never replaced.  Whatever is not read is
+logged, once for each file, and done without.
+
+A million vertices are some 400 megabytes: what takes its time is memory that nobody has had yet,
+so all cores read.
 """
 
 from __future__ import annotations
 
+import functools
+import logging
 import os
-import secrets
+import re
 import sys
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from .atomic import replacing
 from .energy import Energy
 from .patches import Patches
+from .regular_file import fault_of, open_regular
 from .stand_in import StandIn
 from .subspace import Subspace
 from .threads import in_parallel
 
 ENDING = ".bound.npz"
 _MOST = 4 << 30  # bytes in a folder
+_OURS = re.compile(r"[0-9a-f]{40}" + re.escape(ENDING))
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +69,10 @@ class Binding:
             if "patch_starts" in arrays:
                 patches = Patches(*(arrays["patch_" + each.name] for each in fields(Patches)))
             os.utime(path)  # used: among the last to be thrown away
-        except Exception:  # noqa: BLE001 - damage is an error of a dozen kinds
+        except FileNotFoundError:
+            return None
+        except Exception as fault:  # noqa: BLE001 - damage is an error of a dozen kinds
+            _tell_once(path, str(getattr(fault, "strerror", None) or fault))
             return None
         return cls(energy, stand_in, patches)
 
@@ -65,6 +80,7 @@ class Binding:
         """Keep it in a file, whole or not at all; without room for it, it is not kept."""
         energy, stand_in = self.energy, self.stand_in
         arrays: dict[str, Any] = {
+            "key": np.array(_key(path)),
             "quadratic": energy.quadratic,
             "constant": np.array(energy.constant),
             "mass": energy.mass,
@@ -79,18 +95,16 @@ class Binding:
             arrays |= {
                 "patch_" + each.name: getattr(patches, each.name) for each in fields(Patches)
             }
-        draft = path.with_name(f".{secrets.token_hex(8)}.part")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            try:
-                with open(draft, "xb") as file:
-                    np.savez(file, allow_pickle=False, **arrays)
-                os.replace(draft, path)
-            finally:
-                draft.unlink(missing_ok=True)
+            with suppress(FileNotFoundError):
+                if fault := fault_of(os.lstat(path), own=True):
+                    raise OSError(f"is {fault}")
+            with replacing(path, follow=False, durable=False) as draft, open(draft, "wb") as file:
+                np.savez(file, allow_pickle=False, **arrays)
             _make_room(path.parent)
-        except OSError:  # a full disk or a folder that cannot be written: then without
-            return
+        except OSError as fault:  # a full disk or a folder that cannot be written: then without
+            _tell_once(path, f"not written: {fault.strerror or fault}")
 
 
 def cache_folder() -> Path | None:
@@ -109,23 +123,42 @@ def cache_folder() -> Path | None:
 
 def _read(path: Path) -> dict[str, Any]:
     """Return all arrays of a file by name."""
+    with open_regular(path, own=True) as raw, np.load(raw, allow_pickle=False) as file:
+        first, names = os.fstat(raw.fileno()), list(file.files)
+        key = str(file["key"]) if "key" in names else ""
+    if key != _key(path):
+        raise ValueError(f"it holds what {key or 'an older program'} names; the file was renamed")
     arrays: dict[str, Any] = {}
-    with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
-        names = file.files
 
     def some(start: int, stop: int) -> None:
-        with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
+        with open_regular(path, own=True) as raw, np.load(raw, allow_pickle=False) as file:
+            if not os.path.samestat(first, os.fstat(raw.fileno())):
+                raise ValueError("it was exchanged while it was read")
             arrays.update({name: file[name] for name in names[start:stop]})
 
     in_parallel(some, len(names), 1)
     return arrays
 
 
+def _key(path: Path) -> str:
+    """Return what a file's name says of its content."""
+    return path.name.removesuffix(ENDING)
+
+
+@functools.lru_cache(maxsize=256)  # once for each file and reason
+def _tell_once(path: Path, reason: str) -> None:
+    _log.warning("%s is not used: %s", path, reason)
+
+
 def _make_room(folder: Path) -> None:
     """Throw away what has not been used for longest, until the folder is small enough."""
-    files = [(path.stat(), path) for path in folder.glob("*" + ENDING)]
+    files = [
+        (status, path)
+        for path in folder.iterdir()
+        if _OURS.fullmatch(path.name) and not fault_of(status := os.lstat(path), own=True)
+    ]
     files.sort(key=lambda each: each[0].st_mtime, reverse=True)
-    used = np.cumsum([stat.st_size for stat, _ in files])
+    used = np.cumsum([status.st_size for status, _ in files])
     for (_, path), size in zip(files, used, strict=True):
         if size > _MOST:
             path.unlink(missing_ok=True)

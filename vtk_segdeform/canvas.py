@@ -9,21 +9,21 @@ edges on any renderer.
 from __future__ import annotations
 
 import functools
-import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyvista as pv
-from vtkmodules.util.numpy_support import numpy_to_vtk
+from numpy.typing import NDArray
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkIOImage import vtkPNGWriter
 
 from .arrays import FloatArray
+from .atomic import replacing, require_place
 from .errors import MeshError, MissingDependencyError
 from .palette import INK, PAPER
 
@@ -54,6 +54,25 @@ def require_offscreen() -> None:
             "cannot render pictures here: VTK finds no OpenGL to draw with. On Debian or Ubuntu: "
             "apt-get install --no-install-recommends libegl1 libgl1"
         )
+
+
+def require_picture(path: str | Path) -> None:
+    """Raise what drawing a picture to a file would, before the work that it is to show.
+
+    Raises
+    ------
+    MissingDependencyError
+        If nothing can be rendered here.
+    MeshError
+        If the file is no .png or cannot be written.
+    """
+    if Path(path).suffix.lower() != ".png":
+        raise MeshError(f"{path}: a picture must be a .png file")
+    try:
+        require_place(path)
+    except OSError as fault:
+        raise MeshError(f"{path}: {fault.strerror or fault}") from fault
+    require_offscreen()
 
 
 def require_screen() -> None:
@@ -124,12 +143,9 @@ def write_panels(
     MissingDependencyError
         If nothing can be rendered here.
     MeshError
-        If the file is no .png or its folder is not there.
+        If the file is no .png or cannot be written.
     """
-    path = Path(path)
-    if path.suffix.lower() != ".png" or not path.parent.is_dir():
-        raise MeshError(f"{path}: must be a .png file in a folder that exists")
-    require_offscreen()
+    require_picture(path)
     seen = points @ view.T
     low, high = seen.min(axis=0), seen.max(axis=0)
     width, height, _ = np.maximum(high - low, 1e-9 * np.ptp(seen))
@@ -166,7 +182,11 @@ def write_panels(
         image = np.asarray(plotter.screenshot(return_img=True))
     finally:
         plotter.close()
-    _write_png(path, image)
+    try:
+        with replacing(path) as draft:
+            draft.write_bytes(png_of(_averaged(image)))
+    except OSError as fault:
+        raise MeshError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
 
 
 def add_surface(plotter: pv.Plotter, surface: pv.PolyData, **colouring: Any) -> Any:
@@ -196,18 +216,22 @@ def add_surface(plotter: pv.Plotter, surface: pv.PolyData, **colouring: Any) -> 
     return actor
 
 
-def _write_png(path: Path, image: Any) -> None:
-    """Average 2 by 2 pixels of *image* (h, w, 3) and write the rest."""
+def png_of(pixels: NDArray[np.uint8]) -> bytes:
+    """Return a picture, (h, w, 3), upper row first, as the content of a PNG file."""
+    height, width, _ = pixels.shape
+    image = vtkImageData()
+    image.SetDimensions(width, height, 1)
+    rows = np.ascontiguousarray(pixels[::-1]).reshape(-1, 3)
+    image.GetPointData().SetScalars(numpy_to_vtk(rows))
+    writer = vtkPNGWriter()  # into memory: on a full disk it says nothing
+    writer.WriteToMemoryOn()
+    writer.SetInputData(image)
+    writer.Write()
+    return bytes(vtk_to_numpy(writer.GetResult()))
+
+
+def _averaged(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return *image* (h, w, 3) at half its size, a mean of 2 by 2 pixels each."""
     h, w = (side // 2 for side in image.shape[:2])
     small = image[: 2 * h, : 2 * w].reshape(h, 2, w, 2, 3).mean(axis=(1, 3))
-    data = vtkImageData()
-    data.SetDimensions(w, h, 1)
-    pixels = np.ascontiguousarray(np.round(small[::-1]).astype(np.uint8).reshape(-1, 3))
-    data.GetPointData().SetScalars(numpy_to_vtk(pixels, deep=True))
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".segdeform-") as folder:
-        draft = Path(folder) / path.name
-        writer = vtkPNGWriter()
-        writer.SetFileName(str(draft))
-        writer.SetInputData(data)
-        writer.Write()
-        os.replace(draft, path)
+    return np.asarray(np.round(small), dtype=np.uint8)

@@ -12,8 +12,6 @@ triangles in single precision, whose equal corners are merged on reading.
 from __future__ import annotations
 
 import logging
-import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -23,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from . import meshlab
 from .arrays import as_points
+from .atomic import replacing, require_place
 from .errors import ArgumentError, MeshError
 from .formats.off import read_off, write_off
 from .formats.ply import read_ply, write_ply
@@ -117,7 +116,9 @@ def read_polydata(path: str | Path) -> pv.PolyData:
 
 
 def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
-    """Write a mesh; the file appears whole or, if anything fails, not at all.
+    """Write a mesh; the file appears whole or, if anything fails, what was there stays.
+
+    A file that is replaced keeps its mode; of a link, the file it points to is replaced.
 
     Parameters
     ----------
@@ -130,25 +131,21 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
     Raises
     ------
     MeshError
-        If the suffix is not known, the folder is not there, or the disk is full.
+        If the suffix is not known, the folder is not there, what has that name is no file, or the
+        disk is full.
     """
     path = Path(path)
     require_writable(path)
     surface = to_polydata(mesh) if isinstance(mesh, Mesh) else mesh
     suffix = path.suffix.lower()
     try:
-        # Beside the target, so that os.replace is a rename on one file system.
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".segdeform-") as folder:
-            draft = Path(folder) / path.name
+        with replacing(path) as draft:
             if suffix in _WRITERS:
                 _WRITERS[suffix](draft, surface)
             elif suffix in _VTK_WRITES:
                 write_with_vtk(draft, surface)
             else:
                 _write_with_meshlab(draft, mesh if isinstance(mesh, Mesh) else from_polydata(mesh))
-            with open(draft, "rb") as file:
-                os.fsync(file.fileno())
-            os.replace(draft, path)
     except OSError as fault:
         reason = fault.strerror or str(fault)
         raise MeshError(
@@ -175,15 +172,13 @@ def require_writable(path: str | Path, *, arrays: bool = False) -> None:
     path = Path(path)
     suffix = path.suffix.lower()
     known = {*_HOLD_ARRAYS} if arrays else {*_WRITERS, *_VTK_WRITES, *meshlab.WRITES}
-    if path.is_dir():
-        raise MeshError(f"{path}: a folder is there; name a file")
     if suffix not in known:
         what = "arrays and colours to " if arrays else ""
         raise MeshError(f"{path}: cannot write {what}{suffix or 'no suffix'}; can {_listed(known)}")
-    if not path.parent.is_dir():
-        raise MeshError(f"{path}: there is no folder {path.parent}")
-    if not os.access(path.parent, os.W_OK):
-        raise MeshError(f"{path}: the folder {path.parent} may not be written to")
+    try:
+        require_place(path)
+    except OSError as fault:
+        raise MeshError(f"{path}: {fault.strerror or fault}") from fault
 
 
 def to_polydata(mesh: Mesh) -> pv.PolyData:

@@ -6,18 +6,17 @@
 PyMeshLab is not needed.  MeshLab keeps a selection in a PLY file as bit 32 of the property
 ``flags``; here it is the array "selection", as `formats.meshlab_layers` has it.
 
-A project may come from anywhere, so only files in its own folder and below are read, and entities
-are not expanded.  Writing puts new files next to the old ones and .mlp last: whatever happens, it
-names layers that belong together.  Nothing but *path* and the folder of its layers is touched,
-and in that folder only files with names that are made here.
+A project may come from anywhere, so only files in its own folder and below are read, a thousand
+layers and four gigabytes at most, and entities are not expanded.  Writing puts new files next to
+the old ones and .mlp last: whatever happens, it names layers that belong together.  Nothing but
+*path* and the folder of its layers is touched, and in that folder only files with names that are
+made here.
 """
 
 from __future__ import annotations
 
 import hashlib
-import os
 import re
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from xml.etree import ElementTree
@@ -26,15 +25,18 @@ import numpy as np
 import pyvista as pv
 
 from .arrays import FloatArray
+from .atomic import replacing, require_place
 from .convert import read_polydata, with_vertices, write_mesh
 from .errors import MeshError
 from .formats.meshlab_layers import Surface, as_layers, free_name
+from .regular_file import open_regular
 from .session import Session
 
 _SELECTED = 0x20  # of MeshLab's flags
 _OURS = re.compile(r"\d+-[0-9a-f]{12}\.ply")
 _HEAD = "<!DOCTYPE MeshLabDocument>\n"
 _LARGEST = 10_000_000  # bytes; projects are lists
+_MOST_LAYERS, _MOST_BYTES = 1000, 4 << 30  # of all of them, however often a file is named
 _IDENTITY = "\n1 0 0 0 \n0 1 0 0 \n0 0 1 0 \n0 0 0 1 \n"
 
 
@@ -49,14 +51,23 @@ def read_project(path: str | Path) -> dict[str, pv.PolyData]:
     Raises
     ------
     MeshError
-        If it is no such file; or names a layer outside its folder, or one that cannot be read.
+        If it is no such file; or names a layer outside its folder, or one that cannot be read, or
+        more than 1000 layers or 4 GB of them.
     MissingDependencyError
         If only PyMeshLab reads a layer's format, and it is not installed.
     """
     path = Path(path)
     layers: dict[str, pv.PolyData] = {}
-    for element in _parsed(path).iterfind("MeshGroup/MLMesh"):
-        file = _inside(path, element.get("filename", ""))
+    elements = _parsed(path).findall("MeshGroup/MLMesh")
+    if len(elements) > _MOST_LAYERS:
+        raise MeshError(f"{path}: names {len(elements)} layers; {_MOST_LAYERS} at most are read")
+    files = [_inside(path, element.get("filename", "")) for element in elements]
+    total = sum(file.stat().st_size for file in files)
+    if total > _MOST_BYTES:
+        raise MeshError(
+            f"{path}: its layers have {total:.3g} bytes; {_MOST_BYTES:.3g} at most are read"
+        )
+    for element, file in zip(elements, files, strict=True):
         surface = read_polydata(file)
         for attributes in (surface.point_data, surface.cell_data):
             if "flags" in attributes:
@@ -92,41 +103,53 @@ def write_project(path: str | Path, what: Surface | Session | Mapping[str, Surfa
     if path.suffix.lower() != ".mlp":
         raise MeshError(f"{path}: the name of a MeshLab project ends in .mlp")
     folder = path.with_suffix(".layers")
-    if not (path.parent.is_dir() and os.access(path.parent, os.W_OK)):
-        raise MeshError(f"{path}: there is no folder {path.parent} that may be written to")
-    if path.is_dir() or folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-        raise MeshError(f"{path}: {folder.name} or {path.name} is something else already")
+    try:
+        require_place(path)
+    except OSError as fault:
+        raise MeshError(f"{path}: {fault.strerror or fault}") from fault
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise MeshError(f"{path}: {folder.name} is something else already")
     layers = as_layers(what)
     project = ElementTree.Element("MeshLabProject")
     group = ElementTree.SubElement(project, "MeshGroup")
     try:
         folder.mkdir(exist_ok=True)
         names = set()
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".segdeform-") as drafts:
-            for number, (label, surface) in enumerate(layers.items()):
-                draft = Path(drafts) / "layer.ply"
-                write_mesh(draft, _with_flags(surface))
-                name = f"{number}-{hashlib.sha256(draft.read_bytes()).hexdigest()[:12]}.ply"
-                os.replace(draft, folder / name)
-                names.add(name)
-                place = {"label": _printable(label), "visible": "1"}
-                place["filename"] = f"{folder.name}/{name}"
-                mesh = ElementTree.SubElement(group, "MLMesh", place)
-                ElementTree.SubElement(mesh, "MLMatrix44").text = _IDENTITY
-            ElementTree.SubElement(project, "RasterGroup")
-            ElementTree.indent(project, " ")
-            text = _HEAD + ElementTree.tostring(project, encoding="unicode") + "\n"
-            draft = Path(drafts) / "project.mlp"
+        for number, (label, surface) in enumerate(layers.items()):
+            name = f"{number}-{_digest(surface)}.ply"
+            write_mesh(folder / name, _with_flags(surface))
+            names.add(name)
+            place = {"label": _printable(label), "visible": "1"}
+            place["filename"] = f"{folder.name}/{name}"
+            mesh = ElementTree.SubElement(group, "MLMesh", place)
+            ElementTree.SubElement(mesh, "MLMatrix44").text = _IDENTITY
+        ElementTree.SubElement(project, "RasterGroup")
+        ElementTree.indent(project, " ")
+        text = _HEAD + ElementTree.tostring(project, encoding="unicode") + "\n"
+        with replacing(path) as draft:
             draft.write_text(text, encoding="utf-8")
-            os.replace(draft, path)
         for file in folder.iterdir():
-            if _OURS.fullmatch(file.name) and file.name not in names:
+            if _OURS.fullmatch(file.name) and file.name not in names and not file.is_symlink():
                 file.unlink()
     except OSError as fault:
         reason = fault.strerror or str(fault)
         raise MeshError(
             f"{path}: cannot be written ({reason}); make room, or choose another place"
         ) from fault
+
+
+def _digest(surface: pv.PolyData) -> str:
+    """Return twelve digits that are the same for the same surface only."""
+    texture = surface.GetPointData().GetTCoords()
+    seen = hashlib.sha256(repr(texture and texture.GetName()).encode())
+    arrays = {"points": surface.points, "corners": surface.faces, "strips": surface.strips}
+    for kind, attributes in (("p", surface.point_data), ("c", surface.cell_data)):
+        arrays |= {f"{kind} {name}": values for name, values in attributes.items()}
+    for name, values in arrays.items():
+        array = np.ascontiguousarray(values)
+        seen.update(repr((name, array.shape, array.dtype.str)).encode())
+        seen.update(array.tobytes())
+    return seen.hexdigest()[:12]
 
 
 def _with_flags(surface: pv.PolyData) -> pv.PolyData:
@@ -144,11 +167,13 @@ def _printable(text: str) -> str:
 
 
 def _parsed(path: Path) -> ElementTree.Element:
-    if not path.is_file():
-        raise MeshError(f"{path}: there is no such file")
-    if path.stat().st_size > _LARGEST:
+    try:
+        with open_regular(path) as file:
+            data = file.read(_LARGEST + 1)
+    except OSError as fault:
+        raise MeshError(f"{path}: {fault.strerror or fault}") from fault
+    if len(data) > _LARGEST:
         raise MeshError(f"{path}: too large for a MeshLab project")
-    data = path.read_bytes()
     if b"<!ENTITY" in data.upper() or b"\0" in data:
         raise MeshError(f"{path}: is no MeshLab project, it declares entities or is not text")
     try:

@@ -19,22 +19,22 @@ checked as if they had come from a caller.
 from __future__ import annotations
 
 import os
-import secrets
 import struct
 import zipfile
 from collections.abc import Mapping
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from .atomic import replacing
 from .cages import Cage
 from .editing.archive import Archive, write_archive
 from .editing.state import Options, Pose, State, pieces
 from .errors import SessionError
 from .mesh import Mesh
 from .regions import Regions
+from .regular_file import open_regular
 from .session import Session
 
 FORMAT = "vtk_segdeform session"
@@ -62,26 +62,10 @@ def save_session(path: str | os.PathLike[str], session: Session) -> None:
         name is a folder or a device.
     """
     try:
-        target = Path(os.path.realpath(path))  # what a link points to, as open() would
-    except ValueError as fault:
-        raise SessionError(f"{path!r}: is no name for a file ({fault})") from fault
-    if os.path.lexists(target) and not target.is_file():  # replacing a device would be its end
-        raise SessionError(f"{path}: is {_kind(target)}, not a file; choose another name")
-    draft = target.with_name(f".segdeform-{secrets.token_hex(8)}.part")
-    try:
-        try:
-            with open(draft, "xb") as file:
-                _write(file, session)
-                file.flush()
-                os.fsync(file.fileno())
-            if target.exists():
-                draft.chmod(target.stat().st_mode & 0o777)
-            os.replace(draft, target)
-        finally:
-            draft.unlink(missing_ok=True)
+        with replacing(path) as draft, open(draft, "wb") as file:
+            _write(file, session)
     except OSError as fault:
         raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
-    _settle(target.parent)
 
 
 def load_session(path: str | os.PathLike[str]) -> Session:
@@ -96,22 +80,17 @@ def load_session(path: str | os.PathLike[str]) -> Session:
         If there is no such file, it is no session, is damaged, or is of a newer version; the text
         names the file and the fault.
     """
-    if not os.path.isfile(path):
-        what = f"is {_kind(path)}, not a file" if os.path.lexists(path) else "there is no such file"
-        raise SessionError(f"{path}: {what}")
     try:
-        with open(path, "rb") as file, zipfile.ZipFile(file) as archive:
-            mesh, state = _read(Archive(archive, os.path.getsize(path)))
+        file = open_regular(path)
+    except OSError as fault:
+        raise SessionError(f"{path}: cannot be read ({fault.strerror or fault})") from fault
+    try:
+        with file:
+            mesh, state = _read(Archive(file))
         return Session(mesh, state=state)
     except _FAULTS as fault:
         reason = str(fault) or type(fault).__name__
         raise SessionError(f"{path}: is no readable session file: {reason}") from fault
-
-
-def _kind(path: str | os.PathLike[str]) -> str:
-    if os.path.islink(path):
-        return "a broken link"
-    return "a folder" if os.path.isdir(path) else "a device or a pipe"
 
 
 def _write(file: Any, session: Session) -> None:
@@ -193,17 +172,6 @@ def _checked_header(header: Any) -> Mapping[str, Any]:
     if version < 1:
         raise SessionError(f"there never was a version {version}")
     return header
-
-
-def _settle(folder: Path) -> None:
-    """Have the new name of a file survive a power cut, where folders can be written out."""
-    if os.name != "posix":
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def _plain(value: Any) -> Any:

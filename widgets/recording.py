@@ -35,6 +35,7 @@ from typing import Any, TextIO
 from vtkmodules.vtkCommonCore import vtkVersion
 
 from vtk_segdeform import __version__
+from vtk_segdeform.atomic import replacing, require_place
 from vtk_segdeform.errors import SessionError
 
 from .dragging.pace import on_steps, order_steps
@@ -107,8 +108,11 @@ class Recorder:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write what was recorded so far to a text file; SessionError if that cannot be."""
-        with _opened(path) as file:
-            file.write("".join(f"{line}\n" for line in self.lines))
+        try:
+            with replacing(path) as draft:
+                draft.write_text("".join(f"{line}\n" for line in self.lines), encoding="utf-8")
+        except OSError as fault:
+            raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
 
     def _watch(self, name: str) -> int:
         def called(*_: object) -> None:
@@ -211,7 +215,8 @@ def _is_closed(window: Any) -> bool:
 
 
 def _opened(path: str | os.PathLike[str]) -> TextIO:
+    """Return a new file, or an old one that is begun anew, which gets line by line at once."""
     try:
-        return open(path, "w", encoding="utf-8", buffering=1)  # line by line
+        return open(require_place(path), "w", encoding="utf-8", buffering=1)
     except OSError as fault:
         raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..atomic import replacing
 from ..errors import MissingDependencyError
 from ..palette import COLOURS, INK
 
@@ -60,7 +61,8 @@ def line_plot(
             axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
         elif len(lines) > 1:
             axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
-    figure.savefig(path)
+    with replacing(path) as draft:
+        figure.savefig(draft)
 
 
 def _short(size: float) -> str:
@@ -93,7 +95,8 @@ def stack_plot(
     axis.set_xlim(0.0, 100.0)
     axis.invert_yaxis()
     figure.legend(loc="outside lower center", ncols=len(parts), frameon=False)
-    figure.savefig(path)
+    with replacing(path) as draft:
+        figure.savefig(draft)
 
 
 def _figure(n_panels: int) -> tuple[Any, Any]:

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from ..atomic import replacing
 from ..errors import Cancelled, MissingDependencyError, SegDeformError
 from ..progress import Progress, part
 from . import (
@@ -79,7 +80,8 @@ def write_report(
             f"scale *{scale.name}*; {time.perf_counter() - began:.0f} s so far; loading, and at "
             f"the first run compiling, kernels took {kernels:.1f} s and counts nowhere",
         ]
-        (folder / NAME).write_text(markdown(sections, head), encoding="utf-8")
+        with replacing(folder / NAME) as draft:
+            draft.write_text(markdown(sections, head), encoding="utf-8")
     return sections
 
 

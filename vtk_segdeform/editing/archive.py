@@ -1,13 +1,14 @@
 """Arrays and a header in one file, an uncompressed zip that ``numpy.load`` reads as any .npz.
 
 Nothing in a file is believed.  An array is read only once its shape and type are those that the
-caller expects, and not before its bytes are known to be in the file; checksums are compared.
-Nothing in a file is run either: no pickle.
+caller expects, and not before its bytes are known to be in the file, which for all arrays together
+are two gigabytes at most; checksums are compared.  Nothing in a file is run either: no pickle.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import zipfile
 from collections.abc import Mapping
 from io import BytesIO
@@ -19,12 +20,25 @@ from numpy.lib import format as npy
 _HEADER = "header.json"
 _LONGEST_HEADER = 1 << 20  # bytes
 _LONGEST_NPY_HEADER = 1 << 12  # bytes, more than any array needs
+_LONGEST_LIST = 1 << 16  # bytes, of all names
+_LARGEST = 2 << 30  # bytes of a file; a million vertices take some eighty million
+_END = b"PK\5\6"  # begins the last 22 bytes of a zip file without a comment, ...
+_END_64 = b"PK\6\7"  # ... and this the 20 before them, of one too large for us
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # what is the same is the same file
 _TYPES = {"f": np.dtype("<f8"), "i": np.dtype("<i8"), "b": np.dtype("|b1")}
 
 
 def write_archive(file: IO[bytes], header: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
-    """Write a *header*, plain enough for JSON, and *arrays* of float64, int64 or bool."""
+    """Write a *header*, plain enough for JSON, and *arrays* of float64, int64 or bool.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written, or is larger than what can be read.
+    """
+    total = sum(array.nbytes for array in arrays.values())
+    if total + _LONGEST_HEADER > _LARGEST:
+        raise OSError(f"{total:.3g} bytes, more than the {_LARGEST:.3g} that are read again")
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(zipfile.ZipInfo(_HEADER, _EPOCH), json.dumps(header, indent=1))
         for name, array in arrays.items():
@@ -38,19 +52,25 @@ class Archive:
 
     Parameters
     ----------
-    archive : zipfile.ZipFile
+    file : binary file
         Open for reading.
-    size : int
-        Bytes of the whole file.
+
+    Raises
+    ------
+    ValueError, OSError, zipfile.BadZipFile
+        If it is no such file, or a larger one than any that this program writes.
     """
 
-    def __init__(self, archive: zipfile.ZipFile, size: int) -> None:
-        self._archive = archive
+    def __init__(self, file: IO[bytes]) -> None:
+        size = os.fstat(file.fileno()).st_size  # of this file: another may have its name by now
+        _require_short_list(file, size)
+        self._archive = zipfile.ZipFile(file)
         self._left = size  # bytes: members may not overlap to make more of the file than it is
 
     def header(self) -> Any:
         """Return what ``header.json`` says."""
-        return json.loads(self._bytes(_HEADER, _LONGEST_HEADER))
+        with self._open(_HEADER, _LONGEST_HEADER) as content:
+            return json.loads(content.read())
 
     def array(self, name: str, kind: str, shape: tuple[int, ...]) -> Any:
         """Return the array *name*, of *kind* "f", "i" or "b", if it has the *shape*.
@@ -64,23 +84,25 @@ class Archive:
         size = dtype.itemsize
         for count in shape:  # plain integers, which do not overflow
             size *= count
-        content = BytesIO(self._bytes(f"{name}.npy", size + _LONGEST_NPY_HEADER))
-        if npy.read_magic(content) != (1, 0):
-            raise ValueError(f"{name} has another layout than this program writes")
-        found, fortran, kept = npy.read_array_header_1_0(
-            content, max_header_size=_LONGEST_NPY_HEADER
-        )
-        if (found, kept) != (shape, dtype):
-            raise ValueError(f"{name} must be {dtype} of shape {shape}; it is {kept} of {found}")
-        data = content.read()
+        with self._open(f"{name}.npy", size + _LONGEST_NPY_HEADER) as content:
+            if npy.read_magic(content) != (1, 0):
+                raise ValueError(f"{name} has another layout than this program writes")
+            found, fortran, kept = npy.read_array_header_1_0(
+                content, max_header_size=_LONGEST_NPY_HEADER
+            )
+            if (found, kept) != (shape, dtype):
+                raise ValueError(
+                    f"{name} must be {dtype} of shape {shape}; it is {kept} of {found}"
+                )
+            data = content.read()  # to the end, where the checksum is compared
         if len(data) != size:
             raise ValueError(f"{name} must hold {size} bytes; it holds {len(data)}")
-        if kind == "b" and max(data, default=0) > 1:
+        if kind == "b" and (np.frombuffer(data, np.uint8) > 1).any():
             raise ValueError(f"{name} holds bytes that are neither true nor false")
         array = np.frombuffer(data, dtype).reshape(shape, order="F" if fortran else "C")
         return array.astype(dtype.newbyteorder("="))
 
-    def _bytes(self, name: str, limit: int) -> bytes:
+    def _open(self, name: str, limit: int) -> IO[bytes]:
         if name not in self._archive.namelist():
             raise ValueError(f"{name} is missing")
         info = self._archive.getinfo(name)
@@ -90,4 +112,15 @@ class Archive:
         if size > min(limit, self._left):
             raise ValueError(f"{name} is larger than it can be: {size} bytes")
         self._left -= size
-        return self._archive.read(info)  # and compares the checksum
+        return self._archive.open(info)
+
+
+def _require_short_list(file: IO[bytes], size: int) -> None:
+    """Raise ValueError if reading the list of all members, which zipfile does at once, is long."""
+    if size > _LARGEST:
+        raise ValueError(f"it has {size:.3g} bytes; the largest session has {_LARGEST:.3g}")
+    file.seek(max(size - 42, 0))
+    more, end = file.read(20), file.read(22)
+    is_plain = end.startswith(_END) and end.endswith(b"\0\0") and not more.startswith(_END_64)
+    if not is_plain or int.from_bytes(end[12:16], "little") > _LONGEST_LIST:
+        raise ValueError("it does not end as this program ends its files; it may be cut off")

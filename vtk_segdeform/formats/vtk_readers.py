@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import base64
 import re
+import shutil
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -81,8 +83,15 @@ def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
         return
     try:
         with pv.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
-            surface.save(path)
-        again = read_with_vtk(path) if path.suffix == ".vtkhdf" else surface
+            if path.suffix != ".vtkhdf":
+                surface.save(path)
+                again = surface
+            else:  # HDF5 locks what it writes, and so does whoever named this place
+                with tempfile.TemporaryDirectory() as folder:
+                    whole = Path(folder) / path.name
+                    surface.save(whole)
+                    again = read_with_vtk(whole)
+                    shutil.copyfile(whole, path)
     except (RuntimeError, MeshError) as error:
         raise OSError(_said(error)) from None
     if not np.array_equal(again.points, surface.points, equal_nan=True):

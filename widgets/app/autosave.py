@@ -7,13 +7,19 @@
 Each document has a slot of its own from its first change until it is saved or given up.  A slot
 that nobody holds belongs to nobody any more: its program has crashed, or was killed.  Who asks
 for what is `left` holds it from then on, so that of several programs only one offers it.
+
+A folder is a slot only if its name has 16 hexadecimal digits and its lock the mark of this
+program; in it, only these three files and drafts of them (`atomic`) are ever deleted, and the
+folder itself if that was all.  Links are not followed: they are nobody's slot, and no file of it.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import secrets
+import stat
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
@@ -21,15 +27,20 @@ from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 
+from vtk_segdeform.atomic import is_draft, replacing
 from vtk_segdeform.errors import SessionError
+from vtk_segdeform.lock import hold
 from vtk_segdeform.progress import Progress
+from vtk_segdeform.regular_file import fault_of, is_ours, open_regular
 from vtk_segdeform.session import Session
 from vtk_segdeform.store import save_session
 
 from ..editing.session_file import read_bound
-from .lock import hold
 
 _LOCK, _ABOUT, _SESSION = "lock", "about.json", "session.segdeform"
+_NAME = re.compile(r"[0-9a-f]{16}")
+_MARK = b"vtk_segdeform: unsaved work, held while the program runs\n"
+_LONGEST_ABOUT = 1 << 20  # bytes
 _TRIES = 5
 
 
@@ -102,11 +113,13 @@ class Slot:
 
     def remove(self) -> None:
         """Delete it, the work first: half of it gone is no work left."""
-        self.path.unlink(missing_ok=True)
+        if _is_file(self.path):
+            self.path.unlink(missing_ok=True)
         self.release()  # where open files cannot be deleted
-        with suppress(OSError):  # somebody else who found it empty deletes it too
+        with suppress(OSError):  # somebody else who found it empty deletes it too; or it is not
             for path in list(self._folder.iterdir()):
-                path.unlink(missing_ok=True)
+                if (path.name in (_LOCK, _ABOUT) or is_draft(path.name)) and _is_file(path):
+                    path.unlink(missing_ok=True)
             self._folder.rmdir()
 
 
@@ -151,6 +164,7 @@ class Autosaves:
                 with suppress(FileNotFoundError):  # one who tidies up found it empty
                     handle = hold(folder / _LOCK)
                     if handle is not None:
+                        os.write(handle, _MARK)
                         _write_about(folder, about)
                         return Slot(folder, handle, about)
         except OSError as fault:
@@ -174,26 +188,53 @@ class Autosaves:
         for folder in folders:
             handle = None
             with suppress(OSError):  # gone meanwhile, or not ours to open
-                handle = hold(folder / _LOCK)
+                handle = _hold(folder)
             if handle is None:
                 continue
             slot = Slot(folder, handle, _read_about(folder))
-            if slot.path.is_file():
+            if _is_file(slot.path):
                 yield slot
+            elif slot.path.exists() or slot.path.is_symlink():
+                slot.release()  # what has the name of the work is nothing that we wrote
             else:
                 slot.remove()  # it ended before there was anything to keep
 
 
+def _hold(folder: Path) -> int | None:
+    """Hold a folder if it is a slot, by its name and its mark; nothing else is even touched."""
+    status = os.lstat(folder)
+    named = _NAME.fullmatch(folder.name) and stat.S_ISDIR(status.st_mode) and is_ours(status)
+    if not (named and _is_file(folder / _LOCK)):
+        return None
+    handle = hold(folder / _LOCK)
+    if handle is None:
+        return None
+    mark = os.read(handle, len(_MARK) + 1)
+    by_earlier = not mark and (_is_file(folder / _SESSION) or _read_about(folder) != About())
+    if mark == _MARK or by_earlier:  # versions that left the lock empty
+        return handle
+    os.close(handle)
+    return None
+
+
+def _is_file(path: Path) -> bool:
+    """Tell whether it is a file of this user, and no link."""
+    try:
+        return not fault_of(os.lstat(path), own=True)
+    except OSError:
+        return False
+
+
 def _write_about(folder: Path, about: About) -> None:
-    draft = folder / f"{_ABOUT}.part"
-    draft.write_text(json.dumps(asdict(about)), encoding="utf-8")
-    os.replace(draft, folder / _ABOUT)
+    with replacing(folder / _ABOUT) as draft:
+        draft.write_text(json.dumps(asdict(about)), encoding="utf-8")
 
 
 def _read_about(folder: Path) -> About:
     """Return what is told of the work; without it, or where it is damaged, there is still work."""
     try:
-        told = json.loads((folder / _ABOUT).read_text(encoding="utf-8"))
+        with open_regular(folder / _ABOUT, own=True) as file:
+            told = json.loads(file.read(_LONGEST_ABOUT))
         return About(str(told["name"]), str(told["session"]), str(told["mesh"]))
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return About()

@@ -5,14 +5,13 @@ Every function takes the `Window` and returns whether the file is there.
 
 from __future__ import annotations
 
-import os
-import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from qtpy import QtWidgets
 
+from vtk_segdeform.atomic import replacing
 from vtk_segdeform.errors import SessionError
 
 from ..editing.actions import Action
@@ -120,9 +119,12 @@ def _draw(window: Any, desk: Desk, path: Path) -> None:
     desk.mode = mode
     dragger = desk.stage.dragger
     dragger.refine_while_resting = dragger.refine_while_resting  # go on, if that was so
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".segdeform-") as folder:
-        draft = os.path.join(folder, path.name)
-        if not picture.save(draft):
-            raise SessionError(f"{path}: cannot be written as a picture; name a .png or a .jpg")
-        os.replace(draft, path)
+    if path.suffix.lower() not in (".png", ".jpg", ".jpeg"):
+        raise SessionError(f"{path}: cannot be written as a picture; name a .png or a .jpg")
+    try:
+        with replacing(path) as draft:
+            if not picture.save(str(draft)):
+                raise OSError("the disk may be full")
+    except OSError as fault:
+        raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
     desk.say(f"picture written to {path}")

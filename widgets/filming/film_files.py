@@ -8,16 +8,14 @@ from __future__ import annotations
 
 import importlib
 import os
-import tempfile
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from vtkmodules.util.numpy_support import numpy_to_vtk
-from vtkmodules.vtkCommonDataModel import vtkImageData
-from vtkmodules.vtkIOImage import vtkPNGWriter
 
+from vtk_segdeform.atomic import replacing, require_place
+from vtk_segdeform.canvas import png_of
 from vtk_segdeform.errors import MissingDependencyError, SessionError
 
 Picture = NDArray[np.uint8]  # (h, w, 3), upper row first, all of one size
@@ -46,11 +44,11 @@ def write_film(path: str | os.PathLike[str], pictures: Pictures, fps: float) -> 
     if not len(pictures):
         raise SessionError("there is nothing to see in a film without pictures")
     write = {".gif": _write_gif, ".mp4": _write_mp4}.get(path.suffix.lower(), _write_folder)
-    # Beside the target, so that os.replace is a rename on one file system.
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".segdeform-") as folder:
-        draft = Path(folder) / path.name
-        write(draft, pictures, fps)
-        os.replace(draft, path)
+    try:
+        with replacing(path, folder=not path.suffix) as draft:
+            write(draft, pictures, fps)
+    except OSError as fault:
+        raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
 
 
 def require_film(path: str | os.PathLike[str], fps: float = 20.0) -> None:
@@ -61,12 +59,12 @@ def require_film(path: str | os.PathLike[str], fps: float = 20.0) -> None:
         raise SessionError(f"{path}: a film is a .gif, an .mp4 or, without a suffix, a folder")
     if not 0.1 <= fps <= 100.0:
         raise SessionError(f"fps must be 0.1 to 100 pictures in a second; got {fps}")
-    if path.is_dir() or (not suffix and path.exists()):
+    if os.path.isdir(path) or (not suffix and os.path.lexists(path)):
         raise SessionError(f"{path}: is there already; name another")
-    if not path.parent.is_dir():
-        raise SessionError(f"{path}: there is no folder {path.parent}")
-    if not os.access(path.parent, os.W_OK):
-        raise SessionError(f"{path}: the folder {path.parent} may not be written to")
+    try:
+        require_place(path)
+    except OSError as fault:
+        raise SessionError(f"{path}: {fault.strerror or fault}") from fault
     if suffix in _NEEDS:
         _library(suffix)
 
@@ -98,17 +96,8 @@ def _write_mp4(path: Path, pictures: Pictures, fps: float) -> None:
 
 def _write_folder(path: Path, pictures: Pictures, fps: float) -> None:
     del fps
-    path.mkdir()
-    height, width, _ = pictures[0].shape
     for k in range(len(pictures)):
-        image = vtkImageData()
-        image.SetDimensions(width, height, 1)
-        rows = np.ascontiguousarray(pictures[k][::-1]).reshape(-1, 3)
-        image.GetPointData().SetScalars(numpy_to_vtk(rows, deep=True))
-        writer = vtkPNGWriter()
-        writer.SetFileName(str(path / f"{k:04d}.png"))
-        writer.SetInputData(image)
-        writer.Write()
+        (path / f"{k:04d}.png").write_bytes(png_of(pictures[k]))
 
 
 def _library(suffix: str) -> Any:

@@ -40,12 +40,20 @@ def hold(path: Path) -> int | None:
     handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
     is_held = False
     try:
-        _lock(handle)
-        # Somebody who held it before may have deleted it since it was opened.
-        is_held = os.path.samestat(os.fstat(handle), os.stat(path))
-    except OSError:
-        pass
+        is_held = holds(handle, path)
     finally:
         if not is_held:
             os.close(handle)
     return handle if is_held else None
+
+
+def holds(handle: int, path: Path) -> bool:
+    """Lock an open file; tell whether that worked, and *path* still names this file.
+
+    It may not: somebody who held it before may have deleted it since it was opened.
+    """
+    try:
+        _lock(handle)
+        return os.path.samestat(os.fstat(handle), os.lstat(path))
+    except OSError:
+        return False
