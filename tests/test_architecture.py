@@ -67,8 +67,9 @@ STORY = [
     "widgets.colouring.diverging", "widgets.colouring.legend", "widgets.colouring.region_volumes",
     "widgets.volume_overlay",
     # recordings and films
-    "widgets.filming.words", "widgets.filming.transcript", "widgets.filming.reading",
-    "widgets.recording", "widgets.filming.film_files", "widgets.filming.off_screen", "widgets.film",
+    "widgets.filming.words", "widgets.filming.transcript", "widgets.filming.limits",
+    "widgets.filming.confinement", "widgets.filming.reading", "widgets.recording",
+    "widgets.filming.film_files", "widgets.filming.off_screen", "widgets.film",
     # the editor
     "widgets.editing.jobs", "widgets.editing.status_line", "widgets.editing.help_card",
     "widgets.editing.voice", "widgets.editing.log", "widgets.editing.work", "widgets.editing.stage",

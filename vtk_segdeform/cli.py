@@ -39,6 +39,12 @@ selections (SEL):
   z>80%&x<10%      both
 """
 
+_REPLAYS = """\
+A recording may come from anybody. Its keys read and write files only below --folder, and it is
+refused or stopped, with exit code 1, where it has more events or takes more seconds than allowed,
+or a window of more than 16 million pixels.
+"""
+
 _EXAMPLES = """\
 examples:
   segdeform demo -o demo-output
@@ -169,10 +175,17 @@ def _parser() -> argparse.ArgumentParser:
     sub = command("app", application, "open the desktop program, with a mesh, a session or nothing")
     sub.add_argument("input", type=Path, nargs="?", metavar="FILE", help="a mesh or a session")
 
-    sub = command("replay", replay_command, "do again what was recorded in a window by Ctrl+R")
+    text = "do again what was recorded in a window by Ctrl+R"
+    sub = command("replay", replay_command, text, _REPLAYS)
     sub.add_argument("recording", type=Path, metavar="RECORDING", help="NAME.recording.txt")
     _input_output(sub, required=False)
     sub.add_argument("--film", type=Path, metavar="OUT", help="off-screen, to a .gif or an .mp4")
+    text = "where what its keys save goes; without it, nothing is saved"
+    sub.add_argument("--folder", type=Path, metavar="FOLDER", help=text)
+    text = "at most so many events and timer ticks (200000)"
+    sub.add_argument("--events", type=_count, default=200_000, metavar="N", help=text)
+    text = "stop with an error after so many seconds (300)"
+    sub.add_argument("--seconds", type=_count, default=300, metavar="S", help=text)
 
     sub = command("check", commands.check, "report the faults of a mesh, and repair them")
     _input_output(sub, required=False)

@@ -12,6 +12,7 @@ triangles in single precision, whose equal corners are merged on reading.
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -90,9 +91,9 @@ def read_polydata(path: str | Path) -> pv.PolyData:
         If only PyMeshLab reads such files, and it is not installed.
     """
     path = Path(path)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise MeshError(
-            f"{path}: {'a folder, not a' if path.is_dir() else 'there is no such'} file"
+            f"{path}: {'a folder, not a' if os.path.isdir(path) else 'there is no such'} file"
         )
     suffix = path.suffix.lower()
     if not is_mesh_file(path):

@@ -17,6 +17,7 @@ from .cage_display import CageDisplay
 from .editing.stage import Mode
 from .editor import DeformEditor
 from .film import film
+from .filming.limits import ReplayLimits
 from .handle_dragger import HandleDragger
 from .recording import Recorder, replay
 from .region_selector import Paint, RegionSelector, Tool
@@ -32,6 +33,7 @@ __all__ = [
     "Paint",
     "Recorder",
     "RegionSelector",
+    "ReplayLimits",
     "SurfaceDisplay",
     "Tool",
     "View",

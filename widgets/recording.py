@@ -30,6 +30,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any, TextIO
 
 from vtkmodules.vtkCommonCore import vtkVersion
@@ -39,7 +40,9 @@ from vtk_segdeform.atomic import replacing, require_place
 from vtk_segdeform.errors import SessionError
 
 from .dragging.pace import on_steps, order_steps
-from .filming.reading import read_recording
+from .filming.confinement import confined
+from .filming.limits import Clock, ReplayLimits
+from .filming.reading import Moment, read_recording
 from .filming.transcript import EVENTS, TITLE, Camera, Entry, Input, Steps, Ticks, Window
 from .view import View
 
@@ -167,6 +170,8 @@ def replay(
     view: Any,
     source: str | os.PathLike[str] | Iterable[str],
     *,
+    folder: str | os.PathLike[str] | None = None,
+    limits: ReplayLimits | None = None,
     pace: float = 0.0,
     busy: Callable[[], bool] | None = None,
 ) -> None:
@@ -175,12 +180,20 @@ def replay(
     The whole of it is read and checked before the first event is sent.  It ends early if one of
     the events closes the window.
 
+    A recording may come from anybody, so its keys read and write files only below *folder*,
+    whatever `DeformEditor.path` is, and it may do as much as *limits* allow.
+
     Parameters
     ----------
     view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
         Where; with the same session as when it was recorded.
     source : path or iterable of str
         The file, or its lines.
+    folder : path, optional
+        A folder that is there, for what :kbd:`Ctrl+S`, :kbd:`Ctrl+R` and :kbd:`Ctrl+M` write and
+        :kbd:`Ctrl+O` opens; without one these keys fail.
+    limits : ReplayLimits, optional
+        200,000 events, 300 seconds and windows of 16 million pixels unless given.
     pace : float
         1 for as fast as it was, 0.5 for twice as fast, long pauses cut short; 0 waits for nothing.
     busy : callable, optional
@@ -190,23 +203,45 @@ def replay(
     Raises
     ------
     SessionError
-        If there is no such file, or a line makes no sense: the text has its number.
+        If there is no such file or folder, a line makes no sense, or the limits are exceeded: the
+        text has the number of the line, and the limit.
     """
-    view = View.of(view)
+    view, limits = View.of(view), limits or ReplayLimits()
+    if folder is not None and not os.path.isdir(folder):
+        raise SessionError(f"{os.fsdecode(folder)}: there is no such folder to replay into")
+    moments = read_recording(source, limits)
+    _require_short(moments, pace, limits.seconds)
+    clock, tick = Clock(limits.seconds), Ticks(1)
     before = 0.0
-    for moment, entry, steps in read_recording(source):
-        while busy is not None and busy():
-            Ticks(1).send(view)
-            time.sleep(0.005)
-        time.sleep(min(max(0.0, moment - before), _LONGEST_PAUSE) * pace)
-        before = moment
-        if _is_closed(view.window):
-            return
-        order_steps(view.interactor, steps)
-        try:
-            entry.send(view)
-        finally:
-            order_steps(view.interactor, ())
+    with confined(view.interactor, None if folder is None else Path(folder)):
+        for moment, entry, steps in moments:
+            if busy is not None:
+                clock.wait_while(busy, lambda: tick.send(view))
+            time.sleep(_pause(before, moment) * pace)
+            before = moment
+            order_steps(view.interactor, steps)
+            try:
+                for each in [tick] * entry.times if isinstance(entry, Ticks) else [entry]:
+                    clock.check()
+                    if _is_closed(view.window):
+                        return
+                    each.send(view)
+            finally:
+                order_steps(view.interactor, ())
+
+
+def _require_short(moments: list[Moment], pace: float, seconds: float) -> None:
+    """Raise SessionError if the pauses alone take longer than the limit."""
+    times = [0.0, *(moment for moment, _, _ in moments)]
+    planned = pace * sum(itertools.starmap(_pause, itertools.pairwise(times)))
+    if planned > seconds:
+        raise SessionError(
+            f"the replay would take {planned:.0f} seconds; its limit is {seconds:g} seconds"
+        )
+
+
+def _pause(before: float, moment: float) -> float:
+    return min(max(0.0, moment - before), _LONGEST_PAUSE)
 
 
 def _is_closed(window: Any) -> bool:

@@ -18,7 +18,7 @@ from .. import convert, plugin
 from ..arrays import FloatArray, IntArray
 from ..cage_fit import fit_cages
 from ..cages import Cage
-from ..canvas import require_screen
+from ..canvas import require_picture, require_screen
 from ..deformer import Deformer
 from ..errors import ConstraintError, MeshError
 from ..faults import find_faults
@@ -58,6 +58,8 @@ def demo(options: Namespace, say: Say, progress: Progress) -> bool:
 def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     """Move the handles of a mesh and write it, all its arrays and texture coordinates kept."""
     convert.require_writable(options.output)
+    if options.picture is not None:
+        require_picture(options.picture)
     surface, mesh = _read(options.input)
     fixed = parse_selection(options.fixed, mesh, point_arrays=surface.point_data, role="fixed")
     handle, targets = _handles(options.handles, surface, mesh, fixed)

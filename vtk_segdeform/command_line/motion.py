@@ -16,6 +16,7 @@ Degrees are for people and end here; everything behind this door is in radians.
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 
 import numpy as np
@@ -66,7 +67,7 @@ def parse_rotation(text: str) -> tuple[FloatArray, float]:
 
 def read_matrix(path: str | Path) -> FloatArray:
     """Return the (4, 4) matrix in a text file of 16 numbers, row by row; # begins a comment."""
-    if not Path(path).is_file():  # a device would be read for ever
+    if not os.path.isfile(path):  # a device would be read for ever
         raise ConstraintError(f"matrix {path}: there is no such file; give one of 16 numbers")
     try:
         matrix = np.loadtxt(path, ndmin=2)

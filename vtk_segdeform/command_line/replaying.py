@@ -1,9 +1,14 @@
-"""The command that does again what somebody recorded: in a window, or off-screen as a film."""
+"""The command that does again what somebody recorded: in a window, or off-screen as a film.
+
+Whoever recorded it may be a stranger: its keys write below ``--folder`` or not at all, and its
+length has a limit.
+"""
 
 from __future__ import annotations
 
 from argparse import Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pyvista as pv
 
@@ -14,18 +19,27 @@ from ..session import Session
 from .commands import opened
 from .outputs import Say
 
+if TYPE_CHECKING:
+    from ..widgets.filming.limits import ReplayLimits
+
 
 def replay_command(options: Namespace, say: Say, progress: Progress) -> bool:
     """Replay a recording over the session or mesh that it began with; tell what became of it."""
     from ..widgets.filming.film_files import require_film
+    from ..widgets.filming.limits import ReplayLimits
 
+    limits = ReplayLimits(events=options.events, seconds=options.seconds)
     if options.output is not None:
         convert.require_writable(options.output)
     if options.film is not None:
         require_film(options.film)
     surface, session = opened(options.input)
+    if options.folder is not None:
+        options.folder.mkdir(parents=True, exist_ok=True)
     progress(0.0, "replaying")
-    session, faults, pictures = replayed(options.recording, session, film=options.film)
+    session, faults, pictures = replayed(
+        options.recording, session, film=options.film, folder=options.folder, limits=limits
+    )
     for fault in faults:
         say(f"said            {fault}")
     say(f"replayed        {options.recording}")
@@ -39,7 +53,12 @@ def replay_command(options: Namespace, say: Say, progress: Progress) -> bool:
 
 
 def replayed(
-    recording: Path, session: Session, *, film: Path | None = None
+    recording: Path,
+    session: Session,
+    *,
+    film: Path | None = None,
+    folder: Path | None = None,
+    limits: ReplayLimits | None = None,
 ) -> tuple[Session, list[Exception], int]:
     """Do again what *recording* tells, over *session*.
 
@@ -52,6 +71,10 @@ def replayed(
     film : Path, optional
         Off-screen, with all that is drawn written to this file.  Else in a window, as fast as it
         was recorded; it stays open for whoever wants to go on.
+    folder : Path, optional
+        For what the recorded keys save; without one they do not.
+    limits : ReplayLimits, optional
+        How much may be replayed.
 
     Returns
     -------
@@ -61,13 +84,19 @@ def replayed(
     Raises
     ------
     SessionError
-        If the recording is damaged; the text has the line.  Or if the film cannot be written.
+        If the recording is damaged or beyond the limits; the text has the line or the limit.  Or if
+        the film cannot be written.
     MissingDependencyError
         If there is no screen, or nothing can be rendered.
     """
     from ..widgets.editor import DeformEditor
     from ..widgets.film import Film
+    from ..widgets.filming.limits import Clock, ReplayLimits
+    from ..widgets.filming.reading import read_recording
     from ..widgets.recording import replay
+
+    limits = limits or ReplayLimits()
+    read_recording(recording, limits)  # before a window opens
 
     unseen = film is not None or pv.OFF_SCREEN
     if unseen:
@@ -83,7 +112,13 @@ def replayed(
         plotter.show(auto_close=False, interactive=False, interactive_update=not unseen)
         taken = Film(editor.view)
         stop = taken.watch() if film is not None else None
-        replay(plotter, recording, pace=0.0 if unseen else 1.0, busy=lambda: editor.is_busy)
+        clock, pace = Clock(limits.seconds), 0.0 if unseen else 1.0
+        replay(
+            plotter, recording, folder=folder, limits=limits, pace=pace,
+            busy=lambda: editor.is_busy,
+        )  # fmt: skip
+        hands = editor.view.interactor
+        clock.wait_while(lambda: editor.is_busy, lambda: hands.InvokeEvent("TimerEvent"))
         editor.wait()
         if film is not None and stop is not None:
             stop()

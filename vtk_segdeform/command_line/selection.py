@@ -21,6 +21,7 @@ Source
 from __future__ import annotations
 
 import operator
+import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -32,6 +33,7 @@ from numpy.typing import ArrayLike
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..errors import ConstraintError
 from ..mesh import Mesh
+from ..regular_file import open_regular
 
 Role = Literal["fixed", "handle"]
 
@@ -86,12 +88,12 @@ def parse_selection(
     array([1])
     """
     chosen = np.ones(mesh.n_vertices, dtype=bool)
-    whole_is_a_file = bool(text.strip()) and Path(text.strip()).is_file()
+    whole_is_a_file = os.path.isfile(text.strip())  # which asks of any text, however long
     for term in [text] if whole_is_a_file else text.split("&"):
         chosen &= _term(term.strip(), mesh, dict(point_arrays or {}), role)
     if not chosen.any():
         raise ConstraintError(
-            f"{role or 'selection'} {text!r} selects none of the {mesh.n_vertices} vertices; "
+            f"{role or 'selection'} {_short(text)} selects none of the {mesh.n_vertices} vertices; "
             f"the mesh spans {_extent(mesh)}"
         )
     return np.flatnonzero(chosen).astype(np.int64)
@@ -108,14 +110,14 @@ def _term(term: str, mesh: Mesh, arrays: Mapping[str, ArrayLike], role: Role | N
         return np.asarray(_COMPARE[sign](along, limit), dtype=bool)
     name, wanted = term, None
     equals = _EQUALS.fullmatch(term)
-    if equals and term not in arrays and not Path(term).is_file():
+    if equals and term not in arrays and not os.path.isfile(term):
         name, wanted = equals[1], float(equals[2])
     if name in arrays:
         return _array(name, arrays[name], wanted, mesh.n_vertices)
-    if name and Path(name).is_file():
+    if os.path.isfile(name):
         return _file(Path(name), wanted, mesh.n_vertices, role)
     known = f"; point arrays here: {', '.join(sorted(arrays))}" if arrays else ""
-    raise ConstraintError(f"cannot read the selection {term!r}: {GRAMMAR}{known}")
+    raise ConstraintError(f"cannot read the selection {_short(term)}: {GRAMMAR}{known}")
 
 
 def _array(name: str, values: ArrayLike, wanted: float | None, n: int) -> BoolArray:
@@ -155,11 +157,17 @@ def _file(path: Path, wanted: float | None, n: int, role: Role | None) -> BoolAr
 def _numbers(path: Path) -> FloatArray:
     """Return all numbers of a text file; from a # to the end of its line is a comment."""
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        with open_regular(path) as file:
+            lines = file.read().decode("utf-8").splitlines()
         words = " ".join(line.partition("#")[0] for line in lines).replace(",", " ").split()
         return np.array([float(word) for word in words])
     except ValueError as error:  # a word that is no number, or bytes that are no text
         raise ConstraintError(f"{path} must hold numbers and nothing else: {error}") from None
+
+
+def _short(text: str) -> str:
+    """Return *text* in quotes, the end of a long one left out."""
+    return repr(text if len(text) <= 200 else f"{text[:200]}...")
 
 
 def _extent(mesh: Mesh) -> str:

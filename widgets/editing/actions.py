@@ -69,14 +69,15 @@ def reset(desk: Desk) -> None:
 
 def save(desk: Desk) -> None:
     """Save to the editor's file; one that is somebody else's only when asked twice."""
-    file = desk.file
-    if file.is_ours or desk.voice.confirms(f"{file.path} is there already: again to replace it"):
+    place = desk.place
+    question = f"{place} is there already: again to replace it"
+    if desk.file.may_replace(place) or desk.voice.confirms(question):
         desk.save()
 
 
 def open_file(desk: Desk) -> None:
     """Open the editor's file; what is not saved is given up only when asked twice."""
-    path = desk.file.path
+    path = desk.place
     question = f"what was done is not saved: again to open {path} all the same"
     if not desk.file.is_behind(desk.session) or desk.voice.confirms(question):
         desk.open(path)

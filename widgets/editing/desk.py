@@ -15,6 +15,7 @@ from vtk_segdeform.editing.listeners import Change
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
+from ..filming.confinement import place_of
 from ..view import View
 from ..widget import Widget
 from .help_card import HelpCard, Section
@@ -226,10 +227,16 @@ class Desk:
 
     # Files.
 
+    @property
+    def place(self) -> Path:
+        """Where `file` is, or what stands for it in a replay; SessionError if nothing does."""
+        return place_of(self.view.interactor, self.file.path)
+
     def save(self) -> None:
         """Write the session to the file."""
-        self.file.write(self.session)
-        self.say(f"saved to {self.file.path}")
+        place = self.place
+        self.file.write(self.session, place)
+        self.say(f"saved to {place}")
 
     def open(self, path: Path) -> None:
         """Go on, when the job is done, with the session or the mesh in *path*."""

@@ -43,7 +43,11 @@ class SessionFile:
     @property
     def is_ours(self) -> bool:
         """Whether nothing of others is lost by writing: it was written or read before."""
-        return self._ours == self.path or not os.path.isfile(self.path)
+        return self.may_replace(self.path)
+
+    def may_replace(self, place: Path) -> bool:
+        """Tell whether nothing of others is lost by writing to *place*."""
+        return self._ours == place or not os.path.isfile(place)
 
     def is_behind(self, session: Session) -> bool:
         """Tell whether something would be lost if *session* were given up now."""
@@ -73,10 +77,10 @@ class SessionFile:
             return to_polydata(session.mesh.with_vertices(vertices))
         return with_vertices(self.surface, vertices)
 
-    def write(self, session: Session) -> None:
-        """Save *session*; see `save_session`."""
-        save_session(self.path, session)
-        self.keeps(session)
+    def write(self, session: Session, place: Path) -> None:
+        """Save *session* to *place*, of a replay perhaps; see `save_session`."""
+        save_session(place, session)
+        self._ours, self._kept = place, session.state
 
     def keeps(self, session: Session) -> None:
         """Remember that *session* is what the file holds."""

@@ -18,7 +18,7 @@ def record(desk: Desk) -> None:
         return
     selector = desk.stage.selector
     keys = f"3{_KEY_OF[selector.tool]}" + "v" * selector.through + str(desk.mode.value)
-    path = takes.record(desk.file.path, desk.session, keys)
+    path = takes.record(desk.place, desk.session, keys)
     desk.say(f"recording to {path}, Ctrl+R ends it")
 
 
@@ -26,12 +26,12 @@ def film(desk: Desk) -> None:
     """Begin to film what the deform mode shows, or end it and write the film as a job."""
     takes = desk.takes
     if not takes.is_filming:
-        film_place(desk.file.path)  # what cannot be written is better said now
+        film_place(desk.place)  # what cannot be written is better said now
         takes.take(lambda: desk.mode is Mode.DEFORM and not desk.is_busy)
         here = "" if desk.mode is Mode.DEFORM else ", in mode 4"
         desk.say(f"filming what is drawn{here}; Ctrl+M ends it")
         return
-    path, taken = film_place(desk.file.path), takes.end_film()
+    path, taken = film_place(desk.place), takes.end_film()
     if not len(taken):
         desk.say("nothing filmed: in mode 4 nothing was drawn meanwhile")
         return

@@ -7,6 +7,7 @@ it, and its first lines are the keys that lead to the mode and the tool of that 
 from __future__ import annotations
 
 import itertools
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -123,7 +124,7 @@ def free_place(beside: Path, ending: str) -> Path:
     for number in itertools.count(1):
         count = f"-{number}" if number > 1 else ""
         path = beside.with_name(f"{beside.stem}{first}{count}.{suffix}")
-        if not path.exists():
+        if not os.path.lexists(path):
             return path
     raise AssertionError  # there is always another number
 

@@ -4,55 +4,81 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from pathlib import Path
 
 from vtk_segdeform.errors import SessionError
+from vtk_segdeform.regular_file import open_regular
 
-from .transcript import TITLE, Entry, Steps, read_entry
+from .limits import LARGEST_FILE, ReplayLimits
+from .transcript import TITLE, Entry, Steps, Ticks, Window, read_entry
 
 Moment = tuple[float, Entry, tuple[int, ...]]
 """When, in seconds; what; and how many steps each solve was given at it."""
 
 
-def read_recording(source: str | os.PathLike[str] | Iterable[str]) -> list[Moment]:
+def read_recording(
+    source: str | os.PathLike[str] | Iterable[str], limits: ReplayLimits | None = None
+) -> list[Moment]:
     """Return what happened, line by line, for those that say something.
 
     Parameters
     ----------
     source : path or iterable of str
         The file, or its lines.
+    limits : ReplayLimits, optional
+        How much it may be.
 
     Raises
     ------
     SessionError
-        If there is no such file, or a line makes no sense: the text has its number.
+        If there is no such file, or a line makes no sense or goes beyond the limits: the text has
+        its number.
     """
-    name = "recording"
-    lines: Iterable[str]
-    if isinstance(source, str | os.PathLike):
-        name = os.fspath(source)
-        if not os.path.isfile(source):  # a device would be read for ever
-            raise SessionError(f"{name}: cannot be read; it is no file, or not there")
-        try:
-            lines = Path(source).read_bytes().decode(errors="replace").splitlines()
-        except OSError as fault:
-            raise SessionError(f"{name}: cannot be read ({fault.strerror or fault})") from fault
-    else:
-        lines = source
+    name = os.fsdecode(source) if isinstance(source, str | os.PathLike) else "recording"
+    lines = _lines(source) if isinstance(source, str | os.PathLike) else source
+    limits = limits or ReplayLimits()
     entries: list[tuple[float, Entry]] = []
     began = False
+    events = 0
     for number, line in enumerate(lines, start=1):
         try:
             text = line.strip()
+            events += 1
             if not began:
                 began = _is_title(text)
             elif text and not text.startswith("#"):
                 entries.append(read_entry(text))
+                events += _size(entries[-1][1], limits.pixels) - 1
+            if events > limits.events:
+                raise ValueError(f"a replay has at most {limits.events:,} events and ticks")
         except ValueError as fault:
             raise SessionError(f"{name}, line {number}: {fault}") from None
     if not began:
         raise SessionError(f"{name}: is empty; a recording begins with {TITLE!r}")
     return _with_steps(entries)
+
+
+def _lines(path: str | os.PathLike[str]) -> list[str]:
+    try:
+        with open_regular(path) as file:
+            content = file.read(LARGEST_FILE + 1)
+    except OSError as fault:
+        name = os.fsdecode(path)
+        raise SessionError(f"{name}: cannot be read ({fault.strerror or fault})") from fault
+    if len(content) > LARGEST_FILE:
+        raise SessionError(
+            f"{os.fsdecode(path)}: has more than {LARGEST_FILE:,} bytes, the most that is read"
+        )
+    return content.decode(errors="replace").splitlines()
+
+
+def _size(entry: Entry, pixels: int) -> int:
+    """Return for how many events an entry counts; ValueError if it is too large a window."""
+    if isinstance(entry, Window) and entry.width * entry.height > pixels:
+        raise ValueError(
+            f"a window of a replay has at most {pixels:,} pixels, not {entry.width} x "
+            f"{entry.height}"
+        )
+    return entry.times if isinstance(entry, Ticks) else 1
 
 
 def _is_title(text: str) -> bool:
