@@ -255,3 +255,53 @@ def test_public_functions_take_at_most_four_positional_arguments(name):
             positional = [a.arg for a in node.args.posonlyargs + node.args.args]
             positional = [arg for arg in positional if arg not in ("self", "cls")]
             assert len(positional) <= 4, f"{node.name}({', '.join(positional)}): use keywords"
+
+
+# Given a draft to write to; the log of a recording, which grows event by event; and /proc.
+WRITE_TO_WHAT_THEY_ARE_GIVEN = {
+    "formats.off", "formats.ply", "formats.wavefront", "formats.vtk_readers",
+    "widgets.filming.film_files", "widgets.recording", "benchmarks.measuring",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_files_are_replaced_in_one_place_and_written_only_there(name):
+    if name == "atomic":
+        return
+    tree = tree_of(name)
+    within = {
+        id(call)
+        for block in ast.walk(tree)
+        if isinstance(block, ast.With)
+        and any(_called(item.context_expr) == "replacing" for item in block.items)
+        for call in ast.walk(block)
+    }
+    for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
+        what = _called(call)
+        assert what not in {
+            "os.replace", "os.rename", "os.renames", "os.link", "shutil.move", "tempfile.mkstemp",
+            "tempfile.mktemp", "tempfile.NamedTemporaryFile", "NamedTemporaryFile", "mkstemp",
+        }, f"{what}: use atomic.replacing"  # fmt: skip
+        renames = what.endswith((".rename", ".replace")) and len(call.args) == 1
+        assert not renames or call.keywords, f"{what}: use atomic.replacing"
+        if id(call) not in within and name not in WRITE_TO_WHAT_THEY_ARE_GIVEN:
+            assert not _writes(what, call), f"{ast.unparse(call)}: write to a draft of replacing"
+
+
+def _called(node: ast.expr) -> str:
+    """Return the dotted name that a call calls."""
+    if isinstance(node, ast.Call):
+        return _called(node.func)
+    if isinstance(node, ast.Attribute):
+        return f"{_called(node.value)}.{node.attr}"
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def _writes(what: str, call: ast.Call) -> bool:
+    """Tell whether a call writes a file."""
+    if what.endswith((".write_text", ".write_bytes", ".savefig", ".SetFileName", "np.savez")):
+        return True
+    texts = [*call.args, *(word.value for word in call.keywords)]
+    modes = [str(text.value) for text in texts if isinstance(text, ast.Constant)]
+    opens = what == "open" or what.endswith(".open")
+    return opens and any(set(mode) <= set("wxabt+") and set(mode) & set("wxa") for mode in modes)

@@ -75,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def say(line: str) -> None:
         bar.clear()
-        print(line, flush=True)
+        print(_printable(line), flush=True)
 
     try:
         return DONE if options.run(options, say, bar) else FAILED
@@ -89,7 +89,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         bar.clear()
         if options.debug:
             raise
-        print(f"segdeform {options.command}: {_told(error)}", file=sys.stderr)
+        told = _printable(_told(error))
+        print(f"segdeform {options.command}: {told}", file=sys.stderr)
         return MISUSED if isinstance(error, ConstraintError) else FAILED
 
 
@@ -97,6 +98,12 @@ def _draw_without_a_screen() -> None:
     """Lead VTK to EGL where there is no X server: it would warn of that with every picture."""
     if sys.platform == "linux" and not os.environ.get("DISPLAY") and find_library("EGL"):
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+
+def _printable(line: str) -> str:
+    """Return *line* with escapes for what cannot be printed: names of files may be any bytes."""
+    encoding = sys.stdout.encoding or "utf-8"
+    return line.encode(encoding, "backslashreplace").decode(encoding)
 
 
 def _told(error: Exception) -> str:

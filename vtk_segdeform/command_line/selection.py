@@ -42,6 +42,7 @@ GRAMMAR = (
     "numbers or a .sel file; join with & what must hold together"
 )
 _ROLE_NUMBER = {"fixed": 0, "handle": 2}
+_LARGEST_FILE = 1 << 28  # bytes
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _HALF_SPACE = re.compile(rf"([xyzXYZ])\s*(<=|>=|<|>)\s*({_NUMBER})\s*(%?)")
 _EQUALS = re.compile(rf"(.+?)\s*=\s*({_NUMBER})")
@@ -158,7 +159,10 @@ def _numbers(path: Path) -> FloatArray:
     """Return all numbers of a text file; from a # to the end of its line is a comment."""
     try:
         with open_regular(path) as file:
-            lines = file.read().decode("utf-8").splitlines()
+            content = file.read(_LARGEST_FILE + 1)
+        if len(content) > _LARGEST_FILE:
+            raise ValueError(f"it has more than {_LARGEST_FILE:,} bytes")
+        lines = content.decode("utf-8").splitlines()
         words = " ".join(line.partition("#")[0] for line in lines).replace(",", " ").split()
         return np.array([float(word) for word in words])
     except ValueError as error:  # a word that is no number, or bytes that are no text
