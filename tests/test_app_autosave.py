@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import threading
@@ -94,8 +95,6 @@ def test_of_two_that_ask_at_once_one_gets_it(folder):
 
 
 def test_what_is_left_is_offered_until_it_is_removed_and_the_latest_first(folder):
-    import os
-
     for name, seconds in (("old", 1000.0), ("new", 3000.0), ("older", 2000.0)):
         path = crash(folder, about=About(name)) / "session.segdeform"
         os.utime(path, (seconds, seconds))
@@ -177,8 +176,6 @@ def test_where_nothing_can_be_kept_that_is_said(tmp_path, monkeypatch):
 
 
 def test_a_lock_is_held_once_and_not_on_a_file_that_went(tmp_path):
-    import os
-
     path = tmp_path / "lock"
     first = hold(path)
     assert first is not None
@@ -228,3 +225,118 @@ def test_a_session_can_be_kept_by_another_thread_while_it_is_changed(folder):
     done.set()
     thread.join()
     assert {tuple(ids) for ids in kept} <= set(known)
+
+
+SLOT = "0123456789abcdef"
+posix = pytest.mark.skipif(os.name != "posix", reason="links, pipes and owners of files")
+
+
+def tree_of(folder):
+    """Return all there is below a folder, links not followed, with what is in it."""
+    return {
+        str(path.relative_to(folder)): (
+            os.readlink(path) if path.is_symlink() else path.is_file() and path.read_bytes()
+        )
+        for path in sorted(folder.rglob("*"))
+    }
+
+
+def ask(folder):
+    """Ask for what is left, twice, and let all of it go."""
+    for _ in range(2):
+        for slot in Autosaves(folder).left():
+            slot.release()
+
+
+@pytest.mark.parametrize("name", ["photos", SLOT, "notes.txt", "8f31"])
+@pytest.mark.parametrize(
+    "inside", [["a.txt"], ["lock"], ["lock", "about.json"], [], ["lock", "x/y"]]
+)
+def test_a_folder_of_somebody_else_is_left_as_it_is(folder, name, inside):
+    for each in inside:
+        path = folder / name / each
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("mine")
+    (folder / name).mkdir(parents=True, exist_ok=True)
+    before = tree_of(folder)
+    ask(folder)
+    assert tree_of(folder) == before
+
+
+@posix
+def test_links_are_never_followed(folder, tmp_path):
+    outside = tmp_path / "outside"
+    slot = crash(folder)
+    (folder / "copy").mkdir()
+    slot.rename(outside)  # a whole slot, with its mark, but somewhere else
+    (folder / SLOT).symlink_to(outside)
+    (folder / "fedcba9876543210").symlink_to("nowhere")
+    (folder / "circle").symlink_to("circle")
+    linked = crash(folder)
+    (linked / "session.segdeform").unlink()
+    (linked / "session.segdeform").symlink_to(outside / "session.segdeform")
+    empty = Autosaves(folder).new(ABOUT)
+    empty.release()
+    lock = empty.path.with_name("lock")
+    lock.unlink()
+    lock.symlink_to(outside / "lock")
+    before = tree_of(tmp_path)
+    assert Autosaves(folder).left() == []
+    ask(folder)
+    assert tree_of(tmp_path) == before
+
+
+@posix
+def test_pipes_and_folders_with_names_of_ours_are_neither_waited_for_nor_deleted(folder):
+    for number, name in enumerate(("lock", "about.json", "session.segdeform")):
+        for make, digit in ((os.mkfifo, "a"), (os.mkdir, "b")):
+            slot = Autosaves(folder).new(ABOUT)
+            slot.release()
+            path = slot.path.with_name(name)
+            path.unlink(missing_ok=True)
+            make(path)
+            slot.path.parent.rename(folder / f"{digit}{number:015d}")
+    ask(folder)
+    left = {path for path in tree_of(folder) if path.count("/")}
+    for number, name in enumerate(("lock", "about.json", "session.segdeform")):
+        assert {f"{digit}{number:015d}/{name}" for digit in "ab"} <= left
+
+
+def test_a_file_dropped_into_a_slot_of_ours_stays_and_so_does_the_folder(folder):
+    slot = Autosaves(folder).new(ABOUT)
+    slot.write(work())
+    mine = slot.path.with_name("precious.ply")
+    mine.write_text("mine")
+    deeper = slot.path.parent / "more" / "precious.ply"
+    deeper.parent.mkdir()
+    deeper.write_text("mine")
+    slot.remove()
+    assert tree_of(slot.path.parent) == {
+        "more": False, "more/precious.ply": b"mine", "precious.ply": b"mine",
+    }  # fmt: skip
+    ask(folder)
+    assert mine.read_text() == deeper.read_text() == "mine"
+
+
+def test_what_earlier_versions_left_is_found_and_swept_too(folder):
+    path = crash(folder)
+    begun = Autosaves(folder).new(ABOUT)
+    begun.release()
+    for each in (path, begun.path.parent):  # they left the lock empty
+        (each / "lock").write_bytes(b"")
+    (slot,) = Autosaves(folder).left()
+    assert slot.about == ABOUT
+    slot.remove()
+    assert list(folder.iterdir()) == []
+
+
+@posix
+@pytest.mark.skipif(os.name == "posix" and os.geteuid() != 0, reason="only root gives files away")
+def test_what_another_user_owns_is_left_as_it_is(folder):
+    path = crash(folder)
+    os.chown(path, 12345, 12345)
+    assert Autosaves(folder).left() == []
+    os.chown(path, 0, 0)
+    os.chown(path / "session.segdeform", 12345, 12345)
+    assert Autosaves(folder).left() == []
+    assert (path / "session.segdeform").exists()

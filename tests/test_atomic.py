@@ -25,6 +25,21 @@ def write(path, text="new", **options):
         draft.write_text(text)
 
 
+def break_off(path, fault, **options):
+    """Begin to replace a file, or a folder of pictures, and raise *fault* half way."""
+    with replacing(path, **options) as draft:
+        (draft / "0000.png" if draft.is_dir() else draft).write_text("half")
+        raise fault
+
+
+def fill_the_disk(path):
+    """Write a file where there is no room."""
+    with replacing(path) as draft:
+        draft.unlink()
+        draft.symlink_to("/dev/full")
+        draft.write_text("new")
+
+
 def names(folder):
     """Return the names of all that is in a folder."""
     return sorted(os.listdir(folder))
@@ -34,9 +49,8 @@ def names(folder):
 def test_whatever_goes_wrong_the_old_file_stays_and_nothing_else(tmp_path, fault):
     path = tmp_path / "a.txt"
     path.write_text("old")
-    with pytest.raises(type(fault)), replacing(path) as draft:
-        draft.write_text("half")
-        raise fault
+    with pytest.raises(type(fault)):
+        break_off(path, fault)
     assert path.read_text() == "old"
     assert names(tmp_path) == ["a.txt"]
 
@@ -58,10 +72,8 @@ def test_whichever_call_fails_the_old_file_stays_and_nothing_else(tmp_path, monk
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is full")
 def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path):
-    with pytest.raises(OSError, match="No space left"), replacing(tmp_path / "a.txt") as draft:
-        draft.unlink()
-        draft.symlink_to("/dev/full")
-        draft.write_text("new")
+    with pytest.raises(OSError, match="No space left"):
+        fill_the_disk(tmp_path / "a.txt")
     assert names(tmp_path) == []
     assert os.path.exists("/dev/full")
 
@@ -147,7 +159,14 @@ def test_a_folder_that_may_not_be_written_to_is_named(tmp_path, monkeypatch):
 @posix
 @pytest.mark.parametrize(
     "name",
-    [b"n" * 255, b"n" + b"." + b"s" * 253, b"\xff\xfe.ply", "Körper 身体.ply".encode(), b" ", b"-n"],
+    [
+        b"n" * 255,
+        b"n" + b"." + b"s" * 253,
+        b"\xff\xfe.ply",
+        "Körper 身体.ply".encode(),
+        b" ",
+        b"-n",
+    ],
 )
 def test_every_name_that_the_system_allows_can_be_written(tmp_path, name):
     path = tmp_path / os.fsdecode(name)
@@ -203,7 +222,7 @@ def test_nothing_is_swept_but_drafts_of_ours(tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "precious").write_text("mine")
     for name in (
-        ".segdeform-0123.part", ".segdeform-0123456789ABCDEF.part", "x.part", ".part", ".segdeform-",
+        ".segdeform-0123.part", ".segdeform-0123456789ABCDEF.part", "x.part", ".segdeform-",
         "segdeform-0123456789abcdef.part", f"{DRAFT}.bak.txt", ".0123456789abcdef.part",
     ):  # fmt: skip
         (tmp_path / name).write_text("mine")
@@ -256,9 +275,8 @@ def test_a_folder_of_pictures_appears_whole_or_not_at_all(tmp_path):
         (draft / "0000.png").write_text("picture")
         assert names(tmp_path) == [draft.name]
     assert names(tmp_path / "film") == ["0000.png"]
-    with pytest.raises(ValueError, match="no"), replacing(tmp_path / "b", folder=True) as draft:
-        (draft / "0000.png").write_text("picture")
-        raise ValueError("no")
+    with pytest.raises(ValueError, match="no"):
+        break_off(tmp_path / "b", ValueError("no"), folder=True)
     assert names(tmp_path) == ["film"]
 
 

@@ -373,3 +373,95 @@ def test_a_pickle_in_a_file_is_never_run(tmp_path):
     trap = np.array([[Trap()] * 3] * 6, dtype=object)
     refuse(rewritten(saved(TINY, tmp_path), mesh_vertices=trap), tmp_path)
     assert not (tmp_path / "trapped").exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="forks")
+def test_a_file_that_is_saved_meanwhile_is_read_whole_the_old_or_the_new(tmp_path):
+    path = tmp_path / "saved.npz"
+    save_session(path, TINY)
+    writer = subprocess.Popen([sys.executable, "-c", _SAVER, path], stdout=subprocess.PIPE)
+    try:
+        writer.stdout.readline()  # it has begun
+        sizes = {load_session(path).mesh.n_vertices for _ in range(300)}
+    finally:
+        writer.kill()
+        writer.communicate()
+    assert sizes == {4, 642}  # or nothing was tested
+
+
+_SAVER = """
+import itertools, sys
+import vtk_segdeform as sd
+vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+tiny = sd.Session(sd.Mesh(vertices, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+sessions = tiny, sd.Session(sd.models.sphere(642))
+sd.save_session(sys.argv[1], tiny)
+print("begun", flush=True)
+for turn in itertools.count():
+    sd.save_session(sys.argv[1], sessions[turn % 2])
+"""
+
+
+def test_the_size_is_that_of_the_file_which_is_open(tmp_path, monkeypatch):
+    path, other = tmp_path / "saved.npz", tmp_path / "other.npz"
+    save_session(path, POSED)
+    save_session(other, TINY)
+    real = zipfile.ZipFile
+
+    def exchanged(file, *options):
+        if other.exists():
+            os.replace(other, path)  # another process saves at this moment
+        return real(file, *options)
+
+    monkeypatch.setattr(zipfile, "ZipFile", exchanged)
+    assert same(load_session(path), POSED)
+
+
+def sparse(path, size, n):
+    """Write a session of *n* vertices whose arrays are a hole of *size* bytes in the file."""
+    save_session(path, TINY)
+    with zipfile.ZipFile(path) as archive:
+        header = json.loads(archive.read("header.json"))
+    header |= {"n_vertices": n}
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("header.json", json.dumps(header))
+    head = path.read_bytes()
+    with open(path, "wb") as file:
+        file.truncate(size)
+        file.seek(size - len(head))
+        file.write(head)
+
+
+@pytest.mark.parametrize("size", [45_000_000_000, 2_200_000_000])
+def test_a_file_that_is_a_hole_of_gigabytes_is_refused_before_it_is_read(
+    tmp_path, monkeypatch, size
+):
+    sparse(tmp_path / "saved.npz", size, size // 48)
+    monkeypatch.setattr(zipfile, "ZipFile", None)
+    with pytest.raises(SessionError, match=r"saved\.npz: .*it has .*e\+\d\d bytes; the largest"):
+        load_session(tmp_path / "saved.npz")
+
+
+def test_an_archive_of_very_many_members_is_refused_before_they_are_listed(tmp_path, monkeypatch):
+    path = tmp_path / "saved.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        for number in range(1500):
+            archive.writestr(f"{number:050d}", b"")
+    monkeypatch.setattr(zipfile, "ZipFile", None)
+    with pytest.raises(SessionError, match=r"saved\.npz: .*does not end as"):
+        load_session(path)
+
+
+def test_what_could_not_be_read_again_is_not_written(tmp_path, monkeypatch):
+    monkeypatch.setattr("vtk_segdeform.editing.archive._LARGEST", (1 << 20) + 1000)
+    with pytest.raises(SessionError, match=r"saved\.npz: cannot be written \(.* bytes, more than"):
+        save_session(tmp_path / "saved.npz", POSED)
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no named pipes in folders here")
+def test_a_pipe_or_a_device_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", "/dev/zero"):
+        with pytest.raises(SessionError, match="a device or a pipe"):
+            load_session(path)

@@ -37,7 +37,7 @@ def hold(path: Path) -> int | None:
     OSError
         If the file cannot be opened.
     """
-    handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+    handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
     is_held = False
     try:
         is_held = holds(handle, path)
