@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 
 import numpy as np
 import pytest
@@ -153,3 +154,113 @@ def test_a_session_over_a_large_mesh_keeps_its_binding(tmp_path, counted, monkey
     assert len(counted) == 1
     monkeypatch.setenv("SEGDEFORM_CACHE", "0")
     assert bound.cache_folder() is None
+
+
+posix = pytest.mark.skipif(os.name != "posix", reason="links, pipes and owners of files")
+
+
+def bound_in(folder, **options):
+    """Return the one file that a deformer leaves in a folder that has none."""
+    before = set(folder.iterdir())
+    SCENE.deformer(cache=folder, **options)
+    (path,) = set(folder.iterdir()) - before
+    return path
+
+
+def exchanged(path):
+    """Put the binding of another mesh, or of other options, under this name."""
+    bound_in(path.parent, stretch=9.0).replace(path)
+
+
+def linked(path):
+    """Put a link to the very same content there."""
+    path.rename(path.with_name("elsewhere"))
+    path.symlink_to("elsewhere")
+
+
+def piped(path):
+    """Put a pipe there, which nobody ever writes to."""
+    path.unlink()
+    os.mkfifo(path)
+
+
+def in_a_folder(path):
+    """Put a folder there."""
+    path.unlink()
+    path.mkdir()
+
+
+def given_away(path):
+    """Give the file to somebody else."""
+    if os.geteuid() != 0:
+        pytest.skip("only root gives files away")
+    os.chown(path, 12345, 12345)
+
+
+@posix
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (exchanged, "was renamed"), (linked, "a link|symbolic links"),
+        (piped, "a device or a pipe"), (in_a_folder, "a folder"), (given_away, "another user's"),
+    ],
+)  # fmt: skip
+def test_what_is_not_what_its_name_says_is_ignored_and_said_once(
+    tmp_path, counted, caplog, change, says
+):
+    path = bound_in(tmp_path)
+    sound = SCENE.deformer().solve(TARGETS)
+    change(path)
+    before = os.lstat(path)
+    counted.clear()
+    caplog.clear()
+    again = SCENE.deformer(cache=tmp_path).solve(TARGETS)
+    assert len(counted) == 1
+    assert_array_equal(again.vertices, sound.vertices)
+    said = [record.getMessage() for record in caplog.records]
+    assert re.search(says, said[0])
+    assert path.name in said[0]
+    if change is exchanged:  # which was ours: by now it is what its name says
+        SCENE.deformer(cache=tmp_path)
+        assert len(counted) == 1
+    else:
+        assert os.path.samestat(os.lstat(path), before)
+    caplog.clear()
+    SCENE.deformer(cache=tmp_path)
+    assert caplog.records == []
+
+
+def test_a_file_that_is_exchanged_while_it_is_read_is_ignored(tmp_path, counted, monkeypatch):
+    path = bound_in(tmp_path)
+    other = bound_in(tmp_path, stretch=9.0)
+    whole = bound.in_parallel
+
+    def parallel(*arguments):
+        os.replace(other, path)
+        whole(*arguments)
+
+    monkeypatch.setattr(bound, "in_parallel", parallel)
+    assert bound.Binding.read(path, SCENE.mesh.n_vertices) is None
+
+
+@posix
+def test_making_room_deletes_only_bindings_of_ours(tmp_path, monkeypatch):
+    theirs = ["my.bound.npz", "0" * 39 + ".bound.npz", "precious.npz", ".bound.npz"]
+    for name in theirs:
+        (tmp_path / name).write_text("mine")
+    (tmp_path / ("1" * 40 + ".bound.npz")).symlink_to("precious.npz")
+    os.mkfifo(tmp_path / ("2" * 40 + ".bound.npz"))
+    (tmp_path / ("3" * 40 + ".bound.npz")).mkdir()
+    before = set(os.listdir(tmp_path))
+    monkeypatch.setattr(bound, "_MOST", 0)
+    SCENE.deformer(cache=tmp_path)
+    assert set(os.listdir(tmp_path)) == before
+
+
+@posix
+def test_what_cannot_be_kept_is_said_and_done_without(tmp_path, caplog):
+    (tmp_path / "file").write_text("in the way")
+    for _ in range(2):
+        SCENE.deformer(cache=tmp_path / "file" / "folder")
+    (said,) = [record.getMessage() for record in caplog.records if "written" in record.getMessage()]
+    assert "is not used: not written: " in said
