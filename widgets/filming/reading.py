@@ -42,14 +42,18 @@ def read_recording(
     for number, line in enumerate(lines, start=1):
         try:
             text = line.strip()
-            events += 1
             if not began:
                 began = _is_title(text)
-            elif text and not text.startswith("#"):
+                continue
+            events += 1  # also those that say nothing: there may be no end of them
+            if text and not text.startswith("#"):
                 entries.append(read_entry(text))
                 events += _size(entries[-1][1], limits.pixels) - 1
             if events > limits.events:
-                raise ValueError(f"a replay has at most {limits.events:,} events and ticks")
+                raise ValueError(
+                    f"a replay has at most {limits.events:,} events and timer ticks, unless more "
+                    "are allowed"
+                )
         except ValueError as fault:
             raise SessionError(f"{name}, line {number}: {fault}") from None
     if not began:
