@@ -26,11 +26,14 @@ class Recent:
         """The files; some may be gone."""
         self._settings.sync()
         kept = self._settings.value(_KEY) or []
-        return [Path(name) for name in ([kept] if isinstance(kept, str) else kept)]
+        names = kept if isinstance(kept, list) else [kept]
+        return [Path(name) for name in names if isinstance(name, str) and name]
 
     def add(self, path: Path) -> None:
-        """Put a file first."""
+        """Put a file first, unless its name is no text: settings could only keep another."""
         path = path.absolute()
+        if not _is_text(str(path)):
+            return
         self._keep([path, *(each for each in self.paths if each != path)][:_MOST])
 
     def drop(self, path: Path) -> None:
@@ -44,3 +47,11 @@ class Recent:
     def _keep(self, paths: list[Path]) -> None:
         self._settings.setValue(_KEY, [str(path) for path in paths])
         self._settings.sync()
+
+
+def _is_text(name: str) -> bool:
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True

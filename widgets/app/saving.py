@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from qtpy import QtWidgets
+from qtpy import QtCore, QtWidgets
 
 from vtk_segdeform.atomic import replacing
 from vtk_segdeform.errors import SessionError
@@ -21,6 +21,7 @@ from .asking import MESHES, Answer, ask_replace, ask_save, tell_failure
 from .documents import SUFFIX
 
 _SESSIONS = f"Sessions (*{SUFFIX})"
+_PICTURE = (".png", ".jpg", ".jpeg")
 _PICTURES = "Pictures (*.png *.jpg *.jpeg)"
 
 
@@ -119,12 +120,13 @@ def _draw(window: Any, desk: Desk, path: Path) -> None:
     desk.mode = mode
     dragger = desk.stage.dragger
     dragger.refine_while_resting = dragger.refine_while_resting  # go on, if that was so
-    if path.suffix.lower() not in (".png", ".jpg", ".jpeg"):
+    content = QtCore.QBuffer()
+    content.open(QtCore.QIODevice.OpenModeFlag.WriteOnly)
+    if path.suffix.lower() not in _PICTURE or not picture.save(content, path.suffix[1:].upper()):
         raise SessionError(f"{path}: cannot be written as a picture; name a .png or a .jpg")
     try:
         with replacing(path) as draft:
-            if not picture.save(str(draft)):
-                raise OSError("the disk may be full")
+            draft.write_bytes(bytes(content.data()))
     except OSError as fault:
         raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
     desk.say(f"picture written to {path}")

@@ -1,0 +1,35 @@
+"""The list of recent files, whatever its names are and whatever somebody put into the settings."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from app_hands import settings_in
+
+from vtk_segdeform.widgets.app.recent import Recent
+
+
+def test_names_are_kept_as_they_are(tmp_path):
+    paths = [tmp_path / name for name in ("a.ply", "Körper 身体.ply", 'a,b;"c\n.ply', "n" * 255)]
+    for path in paths:
+        Recent(settings_in(tmp_path)).add(path)
+    assert Recent(settings_in(tmp_path)).paths == paths[::-1]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names of any bytes")
+def test_a_name_that_is_no_text_is_left_out_and_never_another_one(tmp_path):
+    recent = Recent(settings_in(tmp_path))
+    recent.add(tmp_path / "a.ply")
+    recent.add(tmp_path / os.fsdecode(b"\xff\xfe.ply"))
+    assert Recent(settings_in(tmp_path)).paths == [tmp_path / "a.ply"]
+
+
+@pytest.mark.parametrize("value", [3, [1, 2], b"abc", [None, "x"], 4.5, "", {"a": 1}])
+def test_settings_that_make_no_sense_are_no_files(tmp_path, value):
+    settings = settings_in(tmp_path)
+    settings.setValue("recent files", value)
+    settings.sync()
+    assert Recent(settings_in(tmp_path)).paths in ([], [Path("x")])
+    assert Recent(settings).paths in ([], [Path("x")])
