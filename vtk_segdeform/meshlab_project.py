@@ -35,7 +35,7 @@ from .session import Session
 _SELECTED = 0x20  # of MeshLab's flags
 _OURS = re.compile(r"\d+-[0-9a-f]{12}\.ply")
 _HEAD = "<!DOCTYPE MeshLabDocument>\n"
-_LARGEST = 10_000_000  # bytes; projects are lists
+_LARGEST = 4_000_000  # bytes; projects are lists
 _MOST_LAYERS, _MOST_BYTES = 1000, 4 << 30  # of all of them, however often a file is named
 _IDENTITY = "\n1 0 0 0 \n0 1 0 0 \n0 0 1 0 \n0 0 0 1 \n"
 
