@@ -438,7 +438,7 @@ def test_a_file_that_is_a_hole_of_gigabytes_is_refused_before_it_is_read(
 ):
     sparse(tmp_path / "saved.npz", size, size // 48)
     monkeypatch.setattr(zipfile, "ZipFile", None)
-    with pytest.raises(SessionError, match=r"saved\.npz: .*it has .*e\+\d\d bytes; the largest"):
+    with pytest.raises(SessionError, match=r"saved\.npz: .*it has .*e\+\d\d bytes; the limit is"):
         load_session(tmp_path / "saved.npz")
 
 
@@ -448,13 +448,13 @@ def test_an_archive_of_very_many_members_is_refused_before_they_are_listed(tmp_p
         for number in range(1500):
             archive.writestr(f"{number:050d}", b"")
     monkeypatch.setattr(zipfile, "ZipFile", None)
-    with pytest.raises(SessionError, match=r"saved\.npz: .*does not end as"):
+    with pytest.raises(SessionError, match=r"saved\.npz: .*the directory of the archive"):
         load_session(path)
 
 
 def test_what_could_not_be_read_again_is_not_written(tmp_path, monkeypatch):
     monkeypatch.setattr("vtk_segdeform.editing.archive._LARGEST", (1 << 20) + 1000)
-    with pytest.raises(SessionError, match=r"saved\.npz: cannot be written \(.* bytes, more than"):
+    with pytest.raises(SessionError, match=r"saved\.npz: cannot be written \(.* bytes exceed"):
         save_session(tmp_path / "saved.npz", POSED)
     assert os.listdir(tmp_path) == []
 

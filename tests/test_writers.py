@@ -118,8 +118,13 @@ def test_a_project_of_a_layer_many_times_or_a_huge_one_is_refused_at_once(tmp_pa
     for count in (1001, 100_000):
         group = f"<MeshGroup>{one * count}</MeshGroup>"
         path.write_text(f"<MeshLabProject>{group}</MeshLabProject>")
-        with pytest.raises(sd.errors.MeshError, match=rf"work\.mlp: names {count} layers; 1000"):
+        with pytest.raises(
+            sd.errors.MeshError, match=rf"work\.mlp: has {count} layers; the limit is 1000"
+        ):
             read_project(path)
+    path.write_text("<MeshLabProject>" + "<a>" * 1_000_000)
+    with pytest.raises(sd.errors.MeshError, match=r"work\.mlp: .*more than 32 elements within"):
+        read_project(path)
     os.truncate(layer, 45_000_000_000)
     path.write_text(f"<MeshLabProject><MeshGroup>{one}</MeshGroup></MeshLabProject>")
     with pytest.raises(sd.errors.MeshError, match=r"work\.mlp: its layers have 4\.5e\+10 bytes"):

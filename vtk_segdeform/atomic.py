@@ -1,13 +1,13 @@
-"""Files that appear whole or not at all: written beside their place under another name, renamed.
+"""Atomic replacement of files: write to a temporary file in the same folder, then rename it.
 
     with replacing(path) as draft, open(draft, "wb") as file:
         file.write(...)
 
-Until the block has ended without an error the file at *path* is what it was, and after an error
-nothing else is left.  A process that is killed leaves its draft, ``.segdeform-<16 digits>.part``;
-the next one that writes to this folder deletes it.  Drafts are locked by those who write them
-(`lock`), so that a draft which can be locked is nobody's any more; where files cannot be locked, as
-on Windows, one that nobody has touched for a day.  Nothing else is ever deleted.
+The file at *path* is replaced when the block ends without an error; otherwise it stays unchanged
+and the draft is deleted.  A process that is killed leaves its draft behind, a file named
+``.segdeform-<16 digits>.part``; the next write to the same folder deletes it.  Writers lock their
+drafts (`lock`), so a draft that can be locked is abandoned.  On Windows, where a lock would block
+the writer itself, a draft is abandoned after a day without changes.  Nothing else is ever deleted.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from .lock import holds
 from .regular_file import fault_of, is_ours, name_of
 
 _DRAFT = re.compile(r"\.segdeform-[0-9a-f]{16}\.part(\.\w{1,8})?")
-_IN_FOLDER = re.compile(r"\d{4,}\.png")  # all that a folder is ever filled with
-_LOCKS = sys.platform != "win32"  # there a locked file keeps out also who writes it
+_IN_FOLDER = re.compile(r"\d{4,}\.png")  # the only files written to a folder
+_LOCKS = sys.platform != "win32"  # a locked file cannot be written through another handle there
 _A_DAY = 86_400.0  # seconds
 _TRIES = 5
 
@@ -41,23 +41,24 @@ def replacing(
     follow: bool = True,
     durable: bool = True,
 ) -> Iterator[Path]:
-    """Yield an empty file to write to, which takes the place of *path* if that succeeds.
+    """Yield an empty file to write to; it replaces *path* when the block succeeds.
 
     Parameters
     ----------
     path : path
-        What is replaced keeps its mode; a link stays, and the file it points to is replaced.
+        The new file keeps the mode of the old one.  If *path* is a symbolic link, its target is
+        replaced.
     folder : bool
-        Whether it is a folder, to be filled with numbered pictures; there must be none yet.
+        Create a folder of numbered pictures instead; *path* must not exist yet.
     follow : bool
-        False: a link is replaced itself.
+        If False, replace a symbolic link itself.
     durable : bool
-        Whether it is on the disk before the old file goes.
+        Flush the new file to the disk before it replaces the old one.
 
     Raises
     ------
     OSError
-        If it cannot be written; ``strerror`` says why.
+        If the file cannot be written; ``strerror`` gives the reason.
     """
     target = require_place(path, follow=follow)
     _sweep(target.parent)
@@ -71,22 +72,22 @@ def replacing(
             draft.chmod(mode)
         os.replace(draft, target)
     finally:
-        with suppress(OSError):  # what went wrong before says more
+        with suppress(OSError):  # do not hide the error that led here
             _delete(draft)
         if handle is not None:
             os.close(handle)
     if durable:
-        with suppress(OSError):  # not every system writes out folders
+        with suppress(OSError):  # folders cannot be flushed on every system
             _flush(target.parent)
 
 
 def require_place(path: str | os.PathLike[str], *, follow: bool = True) -> Path:
-    """Return the file that *path* names, links followed, if a file can be written there.
+    """Return the file that *path* names, symbolic links resolved, if it can be written.
 
     Raises
     ------
     OSError
-        If not: no such folder, no permission, or what has that name is no file.
+        If its folder does not exist or is not writable, or *path* exists and is not a regular file.
     """
     name = name_of(path)
     target = Path(os.path.realpath(name)) if follow else Path(os.path.abspath(name))
@@ -105,12 +106,12 @@ def require_place(path: str | os.PathLike[str], *, follow: bool = True) -> Path:
 
 
 def is_draft(name: str) -> bool:
-    """Tell whether a file has the name of a draft."""
+    """Return whether *name* is that of a draft."""
     return _DRAFT.fullmatch(name) is not None
 
 
 def _begun(target: Path, folder: bool, mode: int) -> tuple[Path, int | None]:
-    """Return a new draft, and what holds it; None where nothing can."""
+    """Return a new draft and the handle that locks it; None where locks do not work."""
     suffix = target.suffix if re.fullmatch(r"\.\w{1,8}", target.suffix) else ""
     for last in (*[False] * (_TRIES - 1), True):
         draft = target.with_name(f".segdeform-{secrets.token_hex(8)}.part{suffix}")
@@ -125,13 +126,13 @@ def _begun(target: Path, folder: bool, mode: int) -> tuple[Path, int | None]:
             os.close(handle)
         if last or not _LOCKS:
             return draft, None
-        _delete(draft)  # or somebody has, who took it for abandoned before it was held
-    raise AssertionError  # the last one is returned
+        _delete(draft)  # a sweep was faster than the lock: try another one
+    raise AssertionError  # the last attempt returns
 
 
 def _sweep(folder: Path) -> None:
-    """Delete drafts whose writers are gone."""
-    # A folder that cannot be read can still be written to; and of two that sweep, one is late.
+    """Delete the abandoned drafts in a folder."""
+    # The folder may be writable but not readable, and another process may sweep at the same time.
     with suppress(OSError), os.scandir(folder) as entries:
         for draft in [folder / entry.name for entry in entries if is_draft(entry.name)]:
             with suppress(OSError):
@@ -149,7 +150,7 @@ def _sweep_one(draft: Path) -> None:
     handle = _opened(draft, os.O_RDONLY if stat.S_ISDIR(status.st_mode) else os.O_RDWR)
     try:
         if holds(handle, draft):
-            _delete(draft)  # while it is held
+            _delete(draft)  # while the lock is held
     finally:
         os.close(handle)
 
@@ -159,7 +160,7 @@ def _opened(draft: Path, how: int) -> int:
 
 
 def _delete(draft: Path) -> None:
-    """Delete a draft; of a folder the pictures, and then itself if that was all."""
+    """Delete a draft; of a folder, its pictures, and the folder once it is empty."""
     if not draft.is_dir():
         draft.unlink(missing_ok=True)
         return
@@ -179,7 +180,7 @@ def _mode_of(target: Path) -> int | None:
 
 
 def _flush(path: Path) -> None:
-    """Write a file, or the names in a folder, to the disk."""
+    """Flush a file, or the entries of a folder, to the disk."""
     handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
     try:
         os.fsync(handle)

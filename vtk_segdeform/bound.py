@@ -1,9 +1,9 @@
 """What a mesh, its regions and its cages are bound to, and how that is kept on disk.
 
-A folder holds one file for each binding, an ``.npz`` under a name that says all it was made from
-(`binding`), and which is in it again: a file that was renamed is not what its name says.  Files of
-other users, links and pipes are not read either, and never replaced.  Whatever is not read is
-logged, once for each file, and done without.
+A folder holds one file for each binding, an ``.npz`` whose name is a digest of all that it was
+computed from (`binding`).  The file contains this digest as well, so that a renamed file is
+detected.  Files of other users, symbolic links and pipes are neither read nor replaced.  A file
+that is ignored is logged, once for each reason.
 
 A million vertices are some 400 megabytes: what takes its time is memory that nobody has had yet,
 so all cores read.
@@ -72,7 +72,7 @@ class Binding:
         except FileNotFoundError:
             return None
         except Exception as fault:  # noqa: BLE001 - damage is an error of a dozen kinds
-            _tell_once(path, str(getattr(fault, "strerror", None) or fault))
+            _warn_once(path, f"ignored, {getattr(fault, 'strerror', None) or fault}")
             return None
         return cls(energy, stand_in, patches)
 
@@ -104,7 +104,7 @@ class Binding:
                 np.savez(file, allow_pickle=False, **arrays)
             _make_room(path.parent)
         except OSError as fault:  # a full disk or a folder that cannot be written: then without
-            _tell_once(path, f"not written: {fault.strerror or fault}")
+            _warn_once(path, f"not written, {fault.strerror or fault}")
 
 
 def cache_folder() -> Path | None:
@@ -127,13 +127,13 @@ def _read(path: Path) -> dict[str, Any]:
         first, names = os.fstat(raw.fileno()), list(file.files)
         key = str(file["key"]) if "key" in names else ""
     if key != _key(path):
-        raise ValueError(f"it holds what {key or 'an older program'} names; the file was renamed")
+        raise ValueError(f"it was renamed; its content is {key or 'of an older version'}")
     arrays: dict[str, Any] = {}
 
     def some(start: int, stop: int) -> None:
         with open_regular(path, own=True) as raw, np.load(raw, allow_pickle=False) as file:
             if not os.path.samestat(first, os.fstat(raw.fileno())):
-                raise ValueError("it was exchanged while it was read")
+                raise ValueError("it was replaced while it was read")
             arrays.update({name: file[name] for name in names[start:stop]})
 
     in_parallel(some, len(names), 1)
@@ -141,13 +141,13 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _key(path: Path) -> str:
-    """Return what a file's name says of its content."""
+    """Return the digest in the name of a file."""
     return path.name.removesuffix(ENDING)
 
 
 @functools.lru_cache(maxsize=256)  # once for each file and reason
-def _tell_once(path: Path, reason: str) -> None:
-    _log.warning("%s is not used: %s", path, reason)
+def _warn_once(path: Path, reason: str) -> None:
+    _log.warning("cached binding %s: %s", path, reason)
 
 
 def _make_room(folder: Path) -> None:

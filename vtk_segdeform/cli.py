@@ -40,9 +40,8 @@ selections (SEL):
 """
 
 _REPLAYS = """\
-A recording may come from anybody. Its keys read and write files only below --folder, and it is
-refused or stopped, with exit code 1, where it has more events or takes more seconds than allowed,
-or a window of more than 16 million pixels.
+A recording may come from a stranger. Its keys read and write files only in --folder. It is refused
+or stopped with exit code 1 if it exceeds --events, --seconds or a window of 16 million pixels.
 """
 
 _EXAMPLES = """\
@@ -101,7 +100,7 @@ def _draw_without_a_screen() -> None:
 
 
 def _printable(line: str) -> str:
-    """Return *line* with escapes for what cannot be printed: names of files may be any bytes."""
+    """Return *line* with unprintable characters escaped: file names may be any bytes."""
     encoding = sys.stdout.encoding or "utf-8"
     return line.encode(encoding, "backslashreplace").decode(encoding)
 
@@ -187,11 +186,11 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("recording", type=Path, metavar="RECORDING", help="NAME.recording.txt")
     _input_output(sub, required=False)
     sub.add_argument("--film", type=Path, metavar="OUT", help="off-screen, to a .gif or an .mp4")
-    text = "where what its keys save goes; without it, nothing is saved"
+    text = "folder for the files its keys save; without it, none are"
     sub.add_argument("--folder", type=Path, metavar="FOLDER", help=text)
-    text = "at most so many events and timer ticks (200000)"
+    text = "limit of events plus timer ticks (200000)"
     sub.add_argument("--events", type=_count, default=200_000, metavar="N", help=text)
-    text = "stop with an error after so many seconds (300)"
+    text = "time limit in seconds (300)"
     sub.add_argument("--seconds", type=_count, default=300, metavar="S", help=text)
 
     sub = command("check", commands.check, "report the faults of a mesh, and repair them")

@@ -48,9 +48,9 @@ def hold(path: Path) -> int | None:
 
 
 def holds(handle: int, path: Path) -> bool:
-    """Lock an open file; tell whether that worked, and *path* still names this file.
+    """Lock an open file; return whether that worked and *path* still names this file.
 
-    It may not: somebody who held it before may have deleted it since it was opened.
+    The previous holder may have deleted the file since it was opened.
     """
     try:
         _lock(handle)

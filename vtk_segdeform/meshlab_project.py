@@ -35,7 +35,8 @@ from .session import Session
 _SELECTED = 0x20  # of MeshLab's flags
 _OURS = re.compile(r"\d+-[0-9a-f]{12}\.ply")
 _HEAD = "<!DOCTYPE MeshLabDocument>\n"
-_LARGEST = 4_000_000  # bytes; projects are lists
+_LARGEST = 10_000_000  # bytes; projects are lists
+_DEEPEST = 32  # elements within elements; MeshLab's projects have four
 _MOST_LAYERS, _MOST_BYTES = 1000, 4 << 30  # of all of them, however often a file is named
 _IDENTITY = "\n1 0 0 0 \n0 1 0 0 \n0 0 1 0 \n0 0 0 1 \n"
 
@@ -60,12 +61,12 @@ def read_project(path: str | Path) -> dict[str, pv.PolyData]:
     layers: dict[str, pv.PolyData] = {}
     elements = _parsed(path).findall("MeshGroup/MLMesh")
     if len(elements) > _MOST_LAYERS:
-        raise MeshError(f"{path}: names {len(elements)} layers; {_MOST_LAYERS} at most are read")
+        raise MeshError(f"{path}: has {len(elements)} layers; the limit is {_MOST_LAYERS}")
     files = [_inside(path, element.get("filename", "")) for element in elements]
     total = sum(file.stat().st_size for file in files)
     if total > _MOST_BYTES:
         raise MeshError(
-            f"{path}: its layers have {total:.3g} bytes; {_MOST_BYTES:.3g} at most are read"
+            f"{path}: its layers have {total:.3g} bytes; the limit is {_MOST_BYTES:.3g}"
         )
     for element, file in zip(elements, files, strict=True):
         surface = read_polydata(file)
@@ -166,6 +167,24 @@ def _printable(text: str) -> str:
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
+class _Builder(ElementTree.TreeBuilder):
+    """Refuses deep trees, which are slow to build and to delete."""
+
+    _depth = 0
+
+    def start(self, tag: str, attributes: dict[str, str]) -> ElementTree.Element:
+        """Begin an element; ValueError if it is within too many others."""
+        self._depth += 1
+        if self._depth > _DEEPEST:
+            raise ValueError(f"more than {_DEEPEST} elements within each other")
+        return super().start(tag, attributes)
+
+    def end(self, tag: str) -> ElementTree.Element:
+        """End an element."""
+        self._depth -= 1
+        return super().end(tag)
+
+
 def _parsed(path: Path) -> ElementTree.Element:
     try:
         with open_regular(path) as file:
@@ -177,7 +196,9 @@ def _parsed(path: Path) -> ElementTree.Element:
     if b"<!ENTITY" in data.upper() or b"\0" in data:
         raise MeshError(f"{path}: is no MeshLab project, it declares entities or is not text")
     try:
-        root = ElementTree.fromstring(data)
+        parser = ElementTree.XMLParser(target=_Builder())
+        parser.feed(data)
+        root = parser.close()
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise MeshError(f"{path}: is no MeshLab project ({error})") from None
     if root.tag != "MeshLabProject":

@@ -1,6 +1,6 @@
-"""Open a file to read only if it is a regular one: a pipe would be waited for, a device never ends.
+"""Open a file for reading only if it is regular: a pipe would block, a device may never end.
 
-What has a name may be exchanged at any moment, so the questions are asked of the open file.
+A file can be replaced at any moment, so the checks are made on the open file, not on its name.
 """
 
 from __future__ import annotations
@@ -10,26 +10,26 @@ import os
 import stat
 from typing import BinaryIO
 
-# Windows lacks all but the first, which no other system has.
+# O_BINARY exists on Windows only, the others everywhere else.
 _READ = os.O_RDONLY | sum(
     getattr(os, flag, 0) for flag in ("O_BINARY", "O_CLOEXEC", "O_NONBLOCK", "O_NOCTTY")
 )
 
 
 def open_regular(path: str | os.PathLike[str], *, own: bool = False) -> BinaryIO:
-    """Return a regular file, open for reading bytes; it never waits.
+    """Open a regular file for reading bytes, without ever blocking.
 
     Parameters
     ----------
     path : path
-        Its name.
+        The file.
     own : bool
-        Whether it must be this user's, and no link to somewhere else.
+        Require that the current user owns it and that *path* is not a symbolic link.
 
     Raises
     ------
     OSError
-        If it cannot be opened or is no such file; ``strerror`` says what it is instead.
+        If it cannot be opened or is not a regular file; ``strerror`` gives the reason.
     """
     name = name_of(path)
     try:
@@ -46,15 +46,15 @@ def open_regular(path: str | os.PathLike[str], *, own: bool = False) -> BinaryIO
 
 
 def name_of(path: str | os.PathLike[str]) -> str:
-    """Return a path as text; OSError if it can be nobody's."""
+    """Return *path* as text; OSError if it contains a null character."""
     name = os.fsdecode(path)
     if "\0" in name:
-        raise OSError(errno.EINVAL, "no file can have a null character in its name", name)
+        raise OSError(errno.EINVAL, "a file name cannot contain a null character", name)
     return name
 
 
 def fault_of(status: os.stat_result, *, own: bool = False) -> str:
-    """Return what is not a regular file, or with *own* another user's, as words; "" if it is."""
+    """Return why a file is not regular, or with *own* not this user's, in words; "" if it is."""
     if stat.S_ISDIR(status.st_mode):
         return "a folder, not a file"
     if stat.S_ISLNK(status.st_mode):
@@ -65,5 +65,5 @@ def fault_of(status: os.stat_result, *, own: bool = False) -> str:
 
 
 def is_ours(status: os.stat_result) -> bool:
-    """Tell whether this user owns a file, where files have owners."""
+    """Return whether the current user owns the file; always True on Windows."""
     return not hasattr(os, "geteuid") or bool(status.st_uid == os.geteuid())

@@ -180,8 +180,8 @@ def replay(
     The whole of it is read and checked before the first event is sent.  It ends early if one of
     the events closes the window.
 
-    A recording may come from anybody, so its keys read and write files only below *folder*,
-    whatever `DeformEditor.path` is, and it may do as much as *limits* allow.
+    A recording may come from a stranger.  So its keys read and write files only in *folder*,
+    whatever `DeformEditor.path` is, and *limits* bound how long it runs.
 
     Parameters
     ----------
@@ -190,10 +190,10 @@ def replay(
     source : path or iterable of str
         The file, or its lines.
     folder : path, optional
-        A folder that is there, for what :kbd:`Ctrl+S`, :kbd:`Ctrl+R` and :kbd:`Ctrl+M` write and
-        :kbd:`Ctrl+O` opens; without one these keys fail.
+        An existing folder for the files that :kbd:`Ctrl+S`, :kbd:`Ctrl+R` and :kbd:`Ctrl+M` write
+        and :kbd:`Ctrl+O` opens.  Without one these keys fail with an error.
     limits : ReplayLimits, optional
-        200,000 events, 300 seconds and windows of 16 million pixels unless given.
+        By default 200,000 events, 300 seconds and windows of 16 million pixels.
     pace : float
         1 for as fast as it was, 0.5 for twice as fast, long pauses cut short; 0 waits for nothing.
     busy : callable, optional
@@ -203,8 +203,8 @@ def replay(
     Raises
     ------
     SessionError
-        If there is no such file or folder, a line makes no sense, or the limits are exceeded: the
-        text has the number of the line, and the limit.
+        If there is no such file or folder, a line is invalid, or a limit is exceeded; the text
+        gives the number of the line and the limit.
     """
     view, limits = View.of(view), limits or ReplayLimits()
     if folder is not None and not os.path.isdir(folder):
@@ -231,12 +231,13 @@ def replay(
 
 
 def _require_short(moments: list[Moment], pace: float, seconds: float) -> None:
-    """Raise SessionError if the pauses alone take longer than the limit."""
+    """Raise SessionError if the recorded pauses alone exceed the time limit."""
     times = [0.0, *(moment for moment, _, _ in moments)]
     planned = pace * sum(itertools.starmap(_pause, itertools.pairwise(times)))
     if planned > seconds:
         raise SessionError(
-            f"the replay would take {planned:.0f} seconds; its limit is {seconds:g} seconds"
+            f"the replay would take {planned:.0f} seconds, more than its limit of {seconds:g} "
+            "seconds; raise it to replay the recording"
         )
 
 
@@ -250,7 +251,7 @@ def _is_closed(window: Any) -> bool:
 
 
 def _opened(path: str | os.PathLike[str]) -> TextIO:
-    """Return a new file, or an old one that is begun anew, which gets line by line at once."""
+    """Open a text file, emptied if it exists, that is flushed after every line."""
     try:
         return open(require_place(path), "w", encoding="utf-8", buffering=1)
     except OSError as fault:

@@ -1,7 +1,7 @@
 """The command that does again what somebody recorded: in a window, or off-screen as a film.
 
-Whoever recorded it may be a stranger: its keys write below ``--folder`` or not at all, and its
-length has a limit.
+The recording may come from a stranger: its keys write in ``--folder`` or not at all, and its length
+is limited.
 """
 
 from __future__ import annotations
@@ -72,9 +72,9 @@ def replayed(
         Off-screen, with all that is drawn written to this file.  Else in a window, as fast as it
         was recorded; it stays open for whoever wants to go on.
     folder : Path, optional
-        For what the recorded keys save; without one they do not.
+        For the files that the recorded keys save; without one they fail.
     limits : ReplayLimits, optional
-        How much may be replayed.
+        Of events, time and window size.
 
     Returns
     -------
@@ -84,8 +84,8 @@ def replayed(
     Raises
     ------
     SessionError
-        If the recording is damaged or beyond the limits; the text has the line or the limit.  Or if
-        the film cannot be written.
+        If the recording is damaged or exceeds the limits, or the film cannot be written; the text
+        gives the line or the limit.
     MissingDependencyError
         If there is no screen, or nothing can be rendered.
     """

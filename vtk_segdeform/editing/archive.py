@@ -20,7 +20,7 @@ from numpy.lib import format as npy
 _HEADER = "header.json"
 _LONGEST_HEADER = 1 << 20  # bytes
 _LONGEST_NPY_HEADER = 1 << 12  # bytes, more than any array needs
-_LONGEST_LIST = 1 << 16  # bytes, of all names
+_LONGEST_LIST = 1 << 16  # bytes of the directory
 _LARGEST = 2 << 30  # bytes of a file; a million vertices take some eighty million
 _END = b"PK\5\6"  # begins the last 22 bytes of a zip file without a comment, ...
 _END_64 = b"PK\6\7"  # ... and this the 20 before them, of one too large for us
@@ -34,11 +34,11 @@ def write_archive(file: IO[bytes], header: Mapping[str, Any], arrays: Mapping[st
     Raises
     ------
     OSError
-        If it cannot be written, or is larger than what can be read.
+        If it cannot be written, or exceeds the size that can be read.
     """
     total = sum(array.nbytes for array in arrays.values())
     if total + _LONGEST_HEADER > _LARGEST:
-        raise OSError(f"{total:.3g} bytes, more than the {_LARGEST:.3g} that are read again")
+        raise OSError(f"{total:.3g} bytes exceed the limit of {_LARGEST:.3g}")
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(zipfile.ZipInfo(_HEADER, _EPOCH), json.dumps(header, indent=1))
         for name, array in arrays.items():
@@ -58,7 +58,7 @@ class Archive:
     Raises
     ------
     ValueError, OSError, zipfile.BadZipFile
-        If it is no such file, or a larger one than any that this program writes.
+        If it is not an archive, or exceeds the largest size.
     """
 
     def __init__(self, file: IO[bytes]) -> None:
@@ -116,11 +116,11 @@ class Archive:
 
 
 def _require_short_list(file: IO[bytes], size: int) -> None:
-    """Raise ValueError if reading the list of all members, which zipfile does at once, is long."""
+    """Raise ValueError if the file, or the directory that zipfile reads at once, is too large."""
     if size > _LARGEST:
-        raise ValueError(f"it has {size:.3g} bytes; the largest session has {_LARGEST:.3g}")
+        raise ValueError(f"it has {size:.3g} bytes; the limit is {_LARGEST:.3g}")
     file.seek(max(size - 42, 0))
     more, end = file.read(20), file.read(22)
     is_plain = end.startswith(_END) and end.endswith(b"\0\0") and not more.startswith(_END_64)
     if not is_plain or int.from_bytes(end[12:16], "little") > _LONGEST_LIST:
-        raise ValueError("it does not end as this program ends its files; it may be cut off")
+        raise ValueError("the directory of the archive is damaged; the file may be truncated")

@@ -8,9 +8,9 @@ Each document has a slot of its own from its first change until it is saved or g
 that nobody holds belongs to nobody any more: its program has crashed, or was killed.  Who asks
 for what is `left` holds it from then on, so that of several programs only one offers it.
 
-A folder is a slot only if its name has 16 hexadecimal digits and its lock the mark of this
-program; in it, only these three files and drafts of them (`atomic`) are ever deleted, and the
-folder itself if that was all.  Links are not followed: they are nobody's slot, and no file of it.
+A folder is a slot only if its name has 16 hexadecimal digits and its lock contains the mark of this
+program.  Only these three files and their drafts (`atomic`) are ever deleted in it, and the folder
+itself once it is empty.  Symbolic links are not followed.
 """
 
 from __future__ import annotations
@@ -195,13 +195,13 @@ class Autosaves:
             if _is_file(slot.path):
                 yield slot
             elif slot.path.exists() or slot.path.is_symlink():
-                slot.release()  # what has the name of the work is nothing that we wrote
+                slot.release()  # not a file that this program wrote
             else:
                 slot.remove()  # it ended before there was anything to keep
 
 
 def _hold(folder: Path) -> int | None:
-    """Hold a folder if it is a slot, by its name and its mark; nothing else is even touched."""
+    """Lock a folder if its name and its mark are those of a slot; else leave it untouched."""
     status = os.lstat(folder)
     named = _NAME.fullmatch(folder.name) and stat.S_ISDIR(status.st_mode) and is_ours(status)
     if not (named and _is_file(folder / _LOCK)):
@@ -218,7 +218,7 @@ def _hold(folder: Path) -> int | None:
 
 
 def _is_file(path: Path) -> bool:
-    """Tell whether it is a file of this user, and no link."""
+    """Return whether *path* is a regular file of this user, not a symbolic link."""
     try:
         return not fault_of(os.lstat(path), own=True)
     except OSError:

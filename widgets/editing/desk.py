@@ -229,7 +229,7 @@ class Desk:
 
     @property
     def place(self) -> Path:
-        """Where `file` is, or what stands for it in a replay; SessionError if nothing does."""
+        """The path of `file`, or its counterpart in a replay; see `place_of`."""
         return place_of(self.view.interactor, self.file.path)
 
     def save(self) -> None:

@@ -46,7 +46,7 @@ class SessionFile:
         return self.may_replace(self.path)
 
     def may_replace(self, place: Path) -> bool:
-        """Tell whether nothing of others is lost by writing to *place*."""
+        """Return whether writing to *place* loses no file of others."""
         return self._ours == place or not os.path.isfile(place)
 
     def is_behind(self, session: Session) -> bool:
@@ -78,7 +78,7 @@ class SessionFile:
         return with_vertices(self.surface, vertices)
 
     def write(self, session: Session, place: Path) -> None:
-        """Save *session* to *place*, of a replay perhaps; see `save_session`."""
+        """Save *session* to *place*, which differs from `path` in a replay; see `save_session`."""
         save_session(place, session)
         self._ours, self._kept = place, session.state
 

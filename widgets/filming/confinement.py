@@ -1,6 +1,6 @@
-"""Where the keys of a replay write to: below a folder that it is given, or nowhere.
+"""Confine a replay: its keys read and write files only below a given folder, or not at all.
 
-Whoever replays a recording has not typed its Ctrl+S.
+The user who replays a recording has not pressed its Ctrl+S.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _folders: WeakKeyDictionary[Any, Path | None] = WeakKeyDictionary()
 
 @contextmanager
 def confined(interactor: Any, folder: Path | None) -> Iterator[None]:
-    """Have all that is done through *interactor* write below *folder*; None: nowhere."""
+    """Confine file access of editors on *interactor* to *folder*; None forbids it."""
     was_confined, before = interactor in _folders, _folders.get(interactor)
     _folders[interactor] = folder
     try:
@@ -31,22 +31,22 @@ def confined(interactor: Any, folder: Path | None) -> Iterator[None]:
 
 
 def place_of(interactor: Any, path: Path) -> Path:
-    """Return where to write what belongs at *path*: there or, in a replay, below its folder.
+    """Return *path* or, during a replay, the path of the same name in the folder of the replay.
 
     Raises
     ------
     SessionError
-        In a replay that was given no folder, or where a link leads out of it.
+        If a replay has no folder, or a symbolic link leads out of it.
     """
     if interactor not in _folders:
         return path
     folder = _folders[interactor]
     if folder is None:
         raise SessionError(
-            f"{path.name}: left alone; a replay reads and writes files only below a folder that "
-            "it is given"
+            f"{path.name}: not accessed; a replay reads and writes files only in a folder that it "
+            "is given"
         )
     place = folder / path.name
     if not place.resolve().is_relative_to(folder.resolve()):
-        raise SessionError(f"{place}: leads out of the folder that the replay was given")
+        raise SessionError(f"{place}: is a link that leads out of the folder of the replay")
     return place

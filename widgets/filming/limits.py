@@ -1,4 +1,4 @@
-"""How much a replay may do: a recording may come from anybody, and ask for years of work."""
+"""Limits of a replay: a recording may come from a stranger, and ask for years of work."""
 
 from __future__ import annotations
 
@@ -8,26 +8,28 @@ from dataclasses import dataclass, fields
 
 from vtk_segdeform.errors import ArgumentError, SessionError
 
-LARGEST_FILE = 64 << 20  # bytes, some ten times what the events of the limit take
+LARGEST_FILE = 64 << 20  # bytes, about ten times the default number of events
 
 
 @dataclass(frozen=True)
 class ReplayLimits:
-    """How much a replay may do; more is refused, or ended, with a `SessionError`.
+    """Largest number of events, time and window size of a replay.
+
+    A replay that exceeds them is refused or stopped with a `SessionError`.
 
     Parameters
     ----------
     events : int
-        Lines of the recording, and ticks of its timers.
+        Lines of the recording plus timer ticks.
     seconds : float
-        From the first event to the last, by the clock.
+        Wall-clock time from the first event to the last.
     pixels : int
-        Of a window, width times height.
+        Width times height of the window.
 
     Raises
     ------
     ArgumentError
-        If one is no number above 0.
+        If a limit is not a positive number.
     """
 
     events: int = 200_000
@@ -38,16 +40,16 @@ class ReplayLimits:
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
-                raise ArgumentError(f"{field.name} must be a number above 0; got {value!r}")
+                raise ArgumentError(f"{field.name} must be a positive number; got {value!r}")
 
 
 class Clock:
-    """Tells when a replay has taken too long.
+    """Measures the time of a replay.
 
     Parameters
     ----------
     seconds : float
-        From now on.
+        Time limit, counted from now.
     """
 
     def __init__(self, seconds: float) -> None:
@@ -55,15 +57,15 @@ class Clock:
         self._start = time.monotonic()
 
     def check(self) -> None:
-        """Raise SessionError if the time is over."""
+        """Raise SessionError if the time limit is exceeded."""
         if time.monotonic() - self._start > self._seconds:
             raise SessionError(
-                f"the replay was stopped after {self._seconds:g} seconds, its limit; "
-                "allow more seconds to see all of it"
+                f"the replay was stopped at its limit of {self._seconds:g} seconds; raise it to "
+                "replay the whole recording"
             )
 
     def wait_while(self, busy: Callable[[], bool], tick: Callable[[], object]) -> None:
-        """Have timers *tick* as long as it is *busy*; SessionError if the time is over."""
+        """Call *tick* until no longer *busy*; SessionError if the time limit is exceeded."""
         while busy():
             self.check()
             tick()

@@ -30,8 +30,8 @@ def read_recording(
     Raises
     ------
     SessionError
-        If there is no such file, or a line makes no sense or goes beyond the limits: the text has
-        its number.
+        If there is no such file, or a line is invalid or exceeds the limits; the text gives its
+        number.
     """
     name = os.fsdecode(source) if isinstance(source, str | os.PathLike) else "recording"
     lines = _lines(source) if isinstance(source, str | os.PathLike) else source
@@ -45,14 +45,14 @@ def read_recording(
             if not began:
                 began = _is_title(text)
                 continue
-            events += 1  # also those that say nothing: there may be no end of them
+            events += 1  # comments too: an iterable may be endless
             if text and not text.startswith("#"):
                 entries.append(read_entry(text))
                 events += _size(entries[-1][1], limits.pixels) - 1
             if events > limits.events:
                 raise ValueError(
-                    f"a replay has at most {limits.events:,} events and timer ticks, unless more "
-                    "are allowed"
+                    f"the limit of {limits.events:,} events and timer ticks is exceeded; raise it "
+                    "to replay this recording"
                 )
         except ValueError as fault:
             raise SessionError(f"{name}, line {number}: {fault}") from None
@@ -69,18 +69,15 @@ def _lines(path: str | os.PathLike[str]) -> list[str]:
         name = os.fsdecode(path)
         raise SessionError(f"{name}: cannot be read ({fault.strerror or fault})") from fault
     if len(content) > LARGEST_FILE:
-        raise SessionError(
-            f"{os.fsdecode(path)}: has more than {LARGEST_FILE:,} bytes, the most that is read"
-        )
+        raise SessionError(f"{os.fsdecode(path)}: exceeds the limit of {LARGEST_FILE:,} bytes")
     return content.decode(errors="replace").splitlines()
 
 
 def _size(entry: Entry, pixels: int) -> int:
-    """Return for how many events an entry counts; ValueError if it is too large a window."""
+    """Return the number of events an entry counts as; ValueError if it is too large a window."""
     if isinstance(entry, Window) and entry.width * entry.height > pixels:
         raise ValueError(
-            f"a window of a replay has at most {pixels:,} pixels, not {entry.width} x "
-            f"{entry.height}"
+            f"a window of {entry.width} x {entry.height} exceeds the limit of {pixels:,} pixels"
         )
     return entry.times if isinstance(entry, Ticks) else 1
 
