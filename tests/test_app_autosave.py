@@ -287,6 +287,18 @@ def test_links_are_never_followed(folder, tmp_path):
 
 
 @posix
+def test_unsaved_work_is_not_written_through_a_link(folder, tmp_path):
+    slot = Autosaves(folder).new(ABOUT)
+    (tmp_path / "precious").write_text("mine")
+    slot.path.symlink_to(tmp_path / "precious")
+    with pytest.raises(SessionError, match="is a link"):
+        slot.write(work())
+    slot.remove()
+    assert (tmp_path / "precious").read_text() == "mine"
+    assert slot.path.is_symlink()
+
+
+@posix
 def test_pipes_and_folders_with_names_of_ours_are_neither_waited_for_nor_deleted(folder):
     for number, name in enumerate(("lock", "about.json", "session.segdeform")):
         for make, digit in ((os.mkfifo, "a"), (os.mkdir, "b")):

@@ -99,6 +99,8 @@ class Slot:
         SessionError
             If it cannot be written; what was kept before stays.
         """
+        if self.path.is_symlink():
+            raise SessionError(f"{self.path}: is a link, which unsaved work is not written through")
         save_session(self.path, session)
 
     def read(self, progress: Progress) -> Session:
