@@ -7,6 +7,7 @@ is limited.
 from __future__ import annotations
 
 from argparse import Namespace
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -105,8 +106,10 @@ def replayed(
         require_screen()
     plotter = pv.Plotter(off_screen=unseen, title=f"segdeform {recording.name}", notebook=False)
     faults: list[Exception] = []
-    try:
+    with ExitStack() as stack:
+        stack.callback(plotter.close)
         editor = DeformEditor(plotter, session)
+        stack.callback(editor.remove)  # which cancels a job, if the replay was stopped
         editor.view.on_failure(faults.append)
         editor.On()
         plotter.show(auto_close=False, interactive=False, interactive_update=not unseen)
@@ -126,7 +129,4 @@ def replayed(
         elif not unseen and editor.view.window is not None:
             plotter.iren.start()
         session = editor.session
-        editor.remove()
-    finally:
-        plotter.close()
     return session, faults, len(taken)
