@@ -109,6 +109,38 @@ def test_the_mode_is_kept_and_nobody_else_reads_what_is_half_written(tmp_path, m
 
 
 @posix
+def test_where_modes_cannot_be_changed_one_that_is_right_is_left_alone(tmp_path, monkeypatch):
+    def refused(*_, **__):
+        raise PermissionError(1, "Operation not permitted")
+
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    path.chmod(0o600)
+    monkeypatch.setattr(os, "chmod", refused)
+    write(path)
+    assert path.read_text() == "new"
+
+
+@pytest.mark.parametrize("folder", [False, True])
+def test_a_draft_that_is_swept_before_it_is_held_is_begun_anew(tmp_path, monkeypatch, folder):
+    swept = []
+
+    def hold(handle, draft):
+        if len(swept) < 2:
+            swept.append(draft)
+            atomic._delete(draft)
+            return False
+        return real(handle, draft)
+
+    real = atomic.holds
+    monkeypatch.setattr(atomic, "holds", hold)
+    with replacing(tmp_path / "a", folder=folder) as draft:
+        (draft / "0000.png" if folder else draft).write_text("new")
+    assert len(swept) == 2
+    assert names(tmp_path) == ["a"]
+
+
+@posix
 def test_links_stay_and_what_they_point_to_is_replaced(tmp_path):
     (tmp_path / "there").mkdir()
     (tmp_path / "there" / "a.txt").write_text("old")

@@ -68,8 +68,8 @@ def replacing(
         yield draft
         if durable and not folder:
             _flush(draft)
-        if mode is not None:
-            draft.chmod(mode)
+        if mode not in (None, _mode_of(draft)):  # some file systems have one mode for all
+            os.chmod(draft, mode)
         os.replace(draft, target)
     finally:
         with suppress(OSError):  # do not hide the error that led here
@@ -115,11 +115,14 @@ def _begun(target: Path, folder: bool, mode: int) -> tuple[Path, int | None]:
     suffix = target.suffix if re.fullmatch(r"\.\w{1,8}", target.suffix) else ""
     for last in (*[False] * (_TRIES - 1), True):
         draft = target.with_name(f".segdeform-{secrets.token_hex(8)}.part{suffix}")
-        if folder:
-            draft.mkdir()
-            handle = _opened(draft, os.O_RDONLY) if _LOCKS else None
-        else:
+        handle = None
+        if not folder:
             handle = os.open(draft, os.O_RDWR | os.O_CREAT | os.O_EXCL, mode)
+        else:
+            draft.mkdir()
+            if _LOCKS:
+                with suppress(FileNotFoundError):  # swept already
+                    handle = _opened(draft, os.O_RDONLY)
         if handle is not None and _LOCKS and holds(handle, draft):
             return draft, handle
         if handle is not None:
