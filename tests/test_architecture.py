@@ -253,3 +253,20 @@ def test_public_functions_take_at_most_four_positional_arguments(name):
             positional = [a.arg for a in node.args.posonlyargs + node.args.args]
             positional = [arg for arg in positional if arg not in ("self", "cls")]
             assert len(positional) <= 4, f"{node.name}({', '.join(positional)}): use keywords"
+
+
+TIMERS = {
+    "CreateTimer", "CreateOneShotTimer", "CreateRepeatingTimer", "DestroyTimer", "ResetTimer",
+    "add_timer_event", "create_timer", "destroy_timer",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_only_the_view_makes_and_ends_timers_of_vtk(name):
+    """Hosts may have one timer behind all of them, so a second owner would stop the first's."""
+    if name == "widgets.view":
+        return
+    tree = tree_of(name)
+    named = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    texts = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)}
+    assert not (named | texts) & TIMERS

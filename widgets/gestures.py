@@ -74,8 +74,8 @@ class Grab:
         return self._gesture is not None
 
     def begin(self, gesture: Gesture, press: Pointer) -> None:
-        """Run *gesture* up to where it waits for the next pointer; one still going is cancelled."""
-        self.cancel()
+        """Run *gesture* up to where it waits for the next pointer; finish one still going on."""
+        self.finish()
         self._gesture, self._last = gesture, press
         self._advance(None)
 
@@ -90,10 +90,17 @@ class Grab:
             self._gesture = None
             gesture.close()
 
+    def finish(self) -> None:
+        """End the gesture, if there is one, as if the button had been released."""
+        self._end(Phase.RELEASE)
+
     def cancel(self) -> None:
         """End the gesture, if there is one, as if it had never begun."""
+        self._end(Phase.CANCEL)
+
+    def _end(self, phase: Phase) -> None:
         if self._last is not None:
-            self.send(replace(self._last, phase=Phase.CANCEL))
+            self.send(replace(self._last, phase=phase))
 
     def _advance(self, pointer: Pointer | None) -> None:
         gesture = self._gesture
