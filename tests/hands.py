@@ -34,6 +34,11 @@ def plain_view(size: tuple[int, int] = (400, 400)) -> View:
     return View(renderer, interactor)
 
 
+# VTK's names of the keys that the editor's table has in lower case.
+KEYSYMS = {"escape": "Escape", "home": "Home", "f1": "F1", "tab": "Tab", "delete": "Delete",
+           "backspace": "BackSpace"}  # fmt: skip
+
+
 class OneTimerHost:
     """An event loop of one timer behind all of VTK's, as in pyvistaqt, and fired by hand.
 
@@ -149,6 +154,11 @@ class Hand:
         self.event("KeyPressEvent", position, key=key, **held)
         self.event("CharEvent", position, key=key, **held)
         self.event("KeyReleaseEvent", position, key=key, **held)
+
+    def types(self, key, position=None):
+        """Type a key as the editor's table has it: "z", "escape", "ctrl+shift+z"."""
+        *held, name = key.split("+")
+        self.key(KEYSYMS.get(name, name), position, control="ctrl" in held, shift="shift" in held)
 
     def tick(self, times=1):
         """Let the event loop's timers fire."""
