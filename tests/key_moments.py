@@ -17,6 +17,8 @@ from __future__ import annotations
 import shutil
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,6 +30,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from soaking import session_of, slender
 
 from vtk_segdeform import Session, save_session
+from vtk_segdeform.solution import Status
 from vtk_segdeform.widgets import DeformEditor, Mode, Paint, Tool
 from vtk_segdeform.widgets.dragging import live_solve
 from vtk_segdeform.widgets.editing.bindings import BINDINGS, binding_of
@@ -45,8 +48,11 @@ def table(*modes: Mode, campaign: bool = False) -> list:
     """Return every mode with every key, as parameters of a test.
 
     Those of keys that mean nothing in a mode, or with *campaign* all of them, are a campaign's.
+    Mode 3 paints as mode 1 does, so there only its own keys are for every day.
     """
     own = {mode: {k for b in BINDINGS if mode in b.modes for k in b.keys} for mode in modes}
+    if Mode.REGIONS in own and Mode.HANDLES in own:
+        own[Mode.HANDLES] -= own[Mode.REGIONS]
     return [
         pytest.param(
             mode, key, id=f"{mode.name}-{key}",
@@ -277,11 +283,10 @@ class Stand:
             is_final = story.done == dragged.done
             same_places(story.states[1], dragged.states[1], self.session, is_final=is_final)
 
-    def in_a_job(self, mode: Mode, key: str) -> None:
-        """Type *key* while another thread works; then let that end."""
-        self.begin(mode)
-        session, go_on, delivered = self.session, threading.Event(), []
-        before = session.state, session.undo_label, session.redo_label
+    @contextmanager
+    def job(self) -> Iterator[list[str]]:
+        """Have another thread at work meanwhile; yield a list of what will be delivered then."""
+        go_on, delivered = threading.Event(), []
 
         def work(progress):
             assert go_on.wait(LONGEST)
@@ -291,12 +296,55 @@ class Stand:
         self.editor.do(lambda desk: desk.start("counting", work, delivered.append))
         assert self.editor.is_busy
         try:
-            self.hand.types(key)
-            self.loop()
+            yield delivered
             assert self.editor.is_busy
+            assert delivered == []
         finally:
             go_on.set()
         self.settle()
+
+    def first_overlay(self, *, during: bool) -> None:
+        """Type O where volumes were never shown: they are measured in a job, beside a drag."""
+        self.begin(Mode.REGIONS)
+        self.editor.load(self.folder / "start.segdeform")
+        self.session.bind()  # else what is measured was measured with that
+        self.begin(Mode.DEFORM)
+        overlay, place = self.editor.stage.overlay, self.drag(Mode.DEFORM)
+        assert not overlay.is_prepared
+        self._meanwhile("o", place, during=during)
+        assert overlay.is_shown
+
+    def film_that_ends(self, *, during: bool) -> None:
+        """End a film, which a job then writes, beside a drag."""
+        self.begin(Mode.DEFORM)
+        self.hand.types("ctrl+m")
+        place = self.drag(Mode.DEFORM)
+        self.draw()
+        before = set(self.folder.glob("work.film*"))
+        self._meanwhile("ctrl+m", place, during=during)
+        assert len(set(self.folder.glob("work.film*")) - before) == 1
+
+    def _meanwhile(self, key: str, place: np.ndarray, *, during: bool) -> None:
+        """Begin a job by *key* before or after the release at *place*; nothing is lost by it."""
+        if not during:
+            self.hand.release(place)
+            assert self.editor.stage.dragger.is_refining
+        self.hand.types(key)
+        assert self.editor.is_busy
+        if during:
+            self.hand.release(place)
+        self.settle()
+        assert self.session.solution.status is Status.CONVERGED
+        assert Story.of(self.session).labels == [STEPS[Mode.DEFORM]]
+
+    def in_a_job(self, mode: Mode, key: str) -> None:
+        """Type *key* while another thread works; then let that end."""
+        self.begin(mode)
+        session = self.session
+        before = session.state, session.undo_label, session.redo_label
+        with self.job() as delivered:
+            self.hand.types(key)
+            self.loop()
         assert delivered == ["counted"] * (key != "escape")
         assert "cancelled" in self.editor.status or key != "escape"
         assert self.session is session

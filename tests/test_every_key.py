@@ -59,3 +59,13 @@ def test_while_the_pose_converges_in_a_plotter(plotter, mode, key):
 @pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, campaign=True))
 def test_during_a_job_in_a_plotter(plotter, mode, key):
     plotter.in_a_job(mode, key)
+
+
+@pytest.mark.parametrize("during", [True, False])
+def test_the_first_look_at_volumes(plain, during):
+    plain.first_overlay(during=during)
+
+
+@pytest.mark.parametrize("during", [True, False])
+def test_the_end_of_a_film(plain, during):
+    plain.film_that_ends(during=during)

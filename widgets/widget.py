@@ -154,6 +154,8 @@ class Widget(abc.ABC):
     def _press(self) -> bool:
         press = self.view.pointer(Phase.PRESS)
         self.finish()  # a release that never came
+        if self.is_grabbing:  # it is still at work, on an event that this one came within
+            return True
         gesture = self.begins(press) if self.view.contains(press) else None
         if gesture is None:
             return False
