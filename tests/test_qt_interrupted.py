@@ -121,7 +121,7 @@ def test_a_job_that_the_host_begins_finds_the_drag_done(stand, during):
         stand.hand.release(place)
         assert stand.session.state.pose is pose  # it is the job's meanwhile
     assert delivered == ["counted"]
-    is_kept(stand, place)
+    assert is_kept(stand, place).done == 1
 
 
 def test_cancel_twice_and_a_second_job_are_no_harm(stand):
@@ -189,7 +189,8 @@ def test_a_drag_that_loses_the_focus_or_its_release_is_kept(stand, what):
         stand.hand.press((5.0, 5.0))
         assert not stand.session.is_dragging
         stand.hand.release((5.0, 5.0))
-    assert is_kept(stand, place).labels == [DRAG]
+    story = is_kept(stand, place)
+    assert (story.labels, story.done) == ([DRAG], 1)
 
 
 def test_a_slot_that_lets_events_in_loses_no_drag(stand):
@@ -211,8 +212,8 @@ def test_a_slot_that_lets_events_in_loses_no_drag(stand):
         stand.hand.release(last)
     finally:
         stand.widget.deformed.disconnect(deformed)
-    is_kept(stand, last)
-    assert Story.of(stand.session).labels == [DRAG]
+    story = is_kept(stand, last)
+    assert (story.labels, story.done) == ([DRAG], 1)
     centre = stand.session.targets["tip"].mean(axis=0)
     assert np.linalg.norm(stand.hand.at(centre) - last) < 3.0
 
