@@ -639,6 +639,25 @@ def test_off_in_mid_drag_keeps_it_as_one_step_and_on_refines_it_further(bench):
     assert bench.session.state.pose is None
 
 
+def test_what_would_have_to_be_bound_first_is_not_refined_until_it_is(bench):
+    place = bench.aim(FREE)
+    bench.hand.drag([place, place + [-40.0, 60.0]])
+    assert bench.has_timer
+    pose = bench.session.state.pose
+    bench.session.change_options(stretch=3.0)
+    bench.hand.tick()
+    assert not bench.has_timer
+    assert not bench.session.is_bound
+    assert bench.session.state.pose is pose
+    bench.session.bind()
+    bench.dragger.Off()
+    bench.dragger.On()
+    assert bench.has_timer
+    bench.hand.tick(60)
+    assert bench.session.solution.status is Status.CONVERGED
+    assert bench.session.state.pose is not pose
+
+
 @pytest.mark.parametrize("fails", ["move_handle", "refine"])
 def test_a_solve_that_fails_takes_the_drag_back_and_is_told(fails, monkeypatch):
     bench = Bench()

@@ -205,7 +205,8 @@ class DeformEditor:
             desk.stage.finish()
         desk.voice.forget()
         action(desk)
-        desk.bind_if_ready()
+        if not while_busy:  # else Escape would begin anew what it has just cancelled
+            desk.bind_if_ready()
         desk.refresh()
 
 
