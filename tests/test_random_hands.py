@@ -176,7 +176,7 @@ class Monkey:
     ("seed", "count"),
     [
         (1, 300),
-        (2, 300),
+        (9, 300),
         pytest.param(3, 10_000, marks=pytest.mark.campaign),
     ],
 )
