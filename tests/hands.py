@@ -34,6 +34,44 @@ def plain_view(size: tuple[int, int] = (400, 400)) -> View:
     return View(renderer, interactor)
 
 
+# VTK's names of the keys that the editor's table has in lower case.
+KEYSYMS = {"escape": "Escape", "home": "Home", "f1": "F1", "tab": "Tab", "delete": "Delete",
+           "backspace": "BackSpace"}  # fmt: skip
+
+
+class OneTimerHost:
+    """An event loop of one timer behind all of VTK's, as in pyvistaqt, and fired by hand.
+
+    Any timer that is created starts it, and any that is destroyed stops it, whoever needs it still.
+
+    Attributes
+    ----------
+    is_running : bool
+        Whether it would fire.
+    made : list of int
+        The period of every timer that was created, in milliseconds.
+    """
+
+    def __init__(self, interactor):
+        self.is_running, self.made = False, []
+        self._interactor = interactor
+        interactor.AddObserver("CreateTimerEvent", self._create)
+        interactor.AddObserver("DestroyTimerEvent", self._destroy)
+
+    def tick(self, times: int = 1) -> None:
+        """Fire, if the timer is running."""
+        for _ in range(times):
+            if self.is_running:
+                self._interactor.TimerEvent()
+
+    def _create(self, *_):
+        self.is_running = True
+        self.made.append(self._interactor.GetTimerEventDuration())
+
+    def _destroy(self, *_):
+        self.is_running = False
+
+
 def picture(view: View) -> np.ndarray:
     """Return what is seen, (h, w, 3) uint8, upper row first."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
@@ -116,6 +154,11 @@ class Hand:
         self.event("KeyPressEvent", position, key=key, **held)
         self.event("CharEvent", position, key=key, **held)
         self.event("KeyReleaseEvent", position, key=key, **held)
+
+    def types(self, key, position=None):
+        """Type a key as the editor's table has it: "z", "escape", "ctrl+shift+z"."""
+        *held, name = key.split("+")
+        self.key(KEYSYMS.get(name, name), position, control="ctrl" in held, shift="shift" in held)
 
     def tick(self, times=1):
         """Let the event loop's timers fire."""

@@ -36,7 +36,7 @@ if not shutil.which("Xvfb"):
 Qt = QtCore.Qt
 TRIED = "SEGDEFORM_QT_TRIED"  # set where Qt was seen to work, for the programs started from there
 ONE_SCREEN = "SEGDEFORM_ONE_SCREEN"  # set where VTK is to have windows too, on the screen of Qt
-_SPECIAL = {"Escape": Qt.Key_Escape, "Home": Qt.Key_Home, "Delete": Qt.Key_Delete}
+_SPECIAL = {"bracketleft": Qt.Key_BracketLeft, "bracketright": Qt.Key_BracketRight}
 
 
 @functools.cache
@@ -142,10 +142,16 @@ class QtHand:
         self.release(positions[-1], held)
 
     def key(self, key: str, held=Qt.NoModifier) -> None:
-        """Type a letter, or "Escape"."""
-        code = _SPECIAL.get(key) or getattr(Qt, f"Key_{key.upper()}")
+        """Type a letter, a digit, or "Escape", "plus" and the like."""
+        code = _SPECIAL.get(key) or getattr(Qt, f"Key_{key.capitalize()}")
         QtTest.QTest.keyClick(self.widget, code, held)
         application().processEvents()
+
+    def types(self, key: str) -> None:
+        """Type a key as the editor's table has it: "z", "escape", "ctrl+shift+z"."""
+        *held, name = key.split("+")
+        control = Qt.ControlModifier if "ctrl" in held else Qt.NoModifier
+        self.key(name, control | (Qt.ShiftModifier if "shift" in held else Qt.NoModifier))
 
     def _pixel(self, position):
         """Return a place as Qt has it: device-independent, from the upper left corner."""

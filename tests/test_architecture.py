@@ -305,3 +305,20 @@ def _writes(what: str, call: ast.Call) -> bool:
     modes = [str(text.value) for text in texts if isinstance(text, ast.Constant)]
     opens = what == "open" or what.endswith(".open")
     return opens and any(set(mode) <= set("wxabt+") and set(mode) & set("wxa") for mode in modes)
+
+
+TIMERS = {
+    "CreateTimer", "CreateOneShotTimer", "CreateRepeatingTimer", "DestroyTimer", "ResetTimer",
+    "add_timer_event", "create_timer", "destroy_timer",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_only_the_view_makes_and_ends_timers_of_vtk(name):
+    """Hosts may have one timer behind all of them, so a second owner would stop the first's."""
+    if name == "widgets.view":
+        return
+    tree = tree_of(name)
+    named = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    texts = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)}
+    assert not (named | texts) & TIMERS

@@ -501,6 +501,19 @@ def test_escape_cancels_a_job_and_nothing_is_changed(bare):
     assert bare.session.regions is not None
 
 
+def test_escape_once_more_does_not_begin_anew_what_it_has_cancelled(desk):
+    desk.hand.key("4")
+    assert desk.editor.is_busy
+    for _ in range(3):
+        desk.hand.key("Escape")
+        desk.settle()
+    desk.hand.key("h")
+    assert not desk.editor.is_busy
+    assert not desk.session.is_bound
+    desk.type("4")
+    assert desk.session.is_bound
+
+
 def test_cages_for_regions_that_another_window_has_changed_are_not_taken(bare):
     bare.type("g")
     bare.settle()

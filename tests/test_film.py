@@ -13,7 +13,7 @@ from scenes import sausage
 
 from vtk_segdeform import Session, models
 from vtk_segdeform.canvas import require_offscreen
-from vtk_segdeform.errors import CageError, MissingDependencyError, SessionError
+from vtk_segdeform.errors import CageError, Cancelled, MissingDependencyError, SessionError
 from vtk_segdeform.widgets.film import Film, film
 from vtk_segdeform.widgets.filming.film_files import require_film
 from vtk_segdeform.widgets.recording import replay
@@ -146,6 +146,24 @@ def test_a_failure_leaves_no_file_and_the_session_as_it_was(tmp_path, session):
     with pytest.raises(SessionError, match="without pictures"):
         film(tmp_path / "a.gif", session, [], size=SIZE)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_film_that_is_cancelled_leaves_no_file(tmp_path, ball):
+    made, told = Film(ball), []
+    for _ in range(3):
+        made.snap()
+
+    def progress(fraction, text):
+        told.append((fraction, text))
+        if len(told) == 3:
+            raise Cancelled("enough")
+
+    with pytest.raises(Cancelled, match="enough"):
+        made.save(tmp_path / "ball.gif", progress=progress)
+    assert told[0] == (0.0, "picture 1")
+    assert list(tmp_path.iterdir()) == []
+    made.save(tmp_path / "ball.gif", progress=lambda *said: told.append(said))
+    assert max(fraction for fraction, _ in told) <= 1.0
 
 
 def test_what_cannot_be_written_is_refused_before_anything_is_done(tmp_path, ball):

@@ -620,14 +620,42 @@ def test_what_is_undone_is_not_refined(bench):
     assert not bench.has_timer
 
 
-def test_off_in_mid_drag_takes_it_back(bench):
+def test_off_in_mid_drag_keeps_it_as_one_step_and_on_refines_it_further(bench):
     place = bench.aim(FREE)
     bench.hand.press(place)
     bench.hand.move(place + [-40.0, 60.0])
+    pose = bench.session.state.pose
     bench.dragger.Off()
-    assert bench.session.state.pose is None
+    assert bench.session.state.pose is pose is not None
     assert not bench.session.is_dragging
+    assert not bench.has_timer
     assert bench.gizmo.centre is None
+    bench.dragger.On()
+    assert bench.has_timer
+    bench.hand.tick(60)
+    assert not bench.has_timer
+    assert bench.session.solution.status is Status.CONVERGED
+    assert bench.session.undo() == f"drag {TIP}"
+    assert bench.session.state.pose is None
+
+
+def test_what_would_have_to_be_bound_first_is_not_refined_until_it_is(bench):
+    place = bench.aim(FREE)
+    bench.hand.drag([place, place + [-40.0, 60.0]])
+    assert bench.has_timer
+    pose = bench.session.state.pose
+    bench.session.change_options(stretch=3.0)
+    bench.hand.tick()
+    assert not bench.has_timer
+    assert not bench.session.is_bound
+    assert bench.session.state.pose is pose
+    bench.session.bind()
+    bench.dragger.Off()
+    bench.dragger.On()
+    assert bench.has_timer
+    bench.hand.tick(60)
+    assert bench.session.solution.status is Status.CONVERGED
+    assert bench.session.state.pose is not pose
 
 
 @pytest.mark.parametrize("fails", ["move_handle", "refine"])

@@ -103,6 +103,19 @@ def test_what_the_delivery_raises_does_too_and_only_once():
     assert [type(failure) for failure in hand.failures] == [ZeroDivisionError]
 
 
+def test_a_watcher_that_fails_does_not_lose_the_result():
+    hand = Hand(plain_view())
+    delivered = []
+
+    def watch(job):
+        raise RuntimeError("a watch without hands")
+
+    job = Job(hand.view, lambda progress: "there", done=delivered.append, watch=watch)
+    tick_until_ended(hand, job)
+    assert delivered == ["there"]
+    assert [str(failure) for failure in hand.failures] == ["a watch without hands"]
+
+
 def test_a_cancelled_job_stops_at_its_next_report_and_delivers_nothing():
     hand = Hand(plain_view())
     delivered, stopped = [], []

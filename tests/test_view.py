@@ -128,6 +128,43 @@ def test_escape_and_the_right_button_cancel(scribble):
     assert scribble.strokes == []
 
 
+def test_a_press_without_a_release_before_finishes_what_was_in_hand(scribble):
+    hand = Hand(scribble.view)
+    hand.press((50, 50))
+    hand.move((60, 60))
+    hand.drag([(70, 70), (80, 80), (90, 90)])
+    assert scribble.strokes == [3, 3]  # a press comes with a move to where it is
+
+
+@pytest.mark.parametrize("end", ["finish", "Off"])
+def test_a_gesture_that_somebody_ends_is_finished_and_not_cancelled(scribble, end):
+    hand = Hand(scribble.view)
+    hand.press((50, 50))
+    hand.move((60, 60))
+    getattr(scribble, end)()
+    assert not scribble.is_grabbing
+    hand.move((70, 70))
+    hand.release((70, 70))
+    assert scribble.strokes == [2]
+    assert not scribble.finish()
+    assert hand.failures == []
+
+
+def test_a_gesture_that_fails_when_it_is_finished_does_not_keep_a_widget_on(scribble):
+    hand = Hand(scribble.view)
+
+    def stroke(press):
+        yield
+        raise RuntimeError("a pen without ink")
+
+    scribble.begins = stroke
+    hand.press((50, 50))
+    with pytest.raises(RuntimeError, match="without ink"):
+        scribble.Off()
+    assert not scribble.GetEnabled()
+    assert not scribble.is_grabbing
+
+
 def test_vtks_words_are_spoken_in_vtks_order(scribble):
     said = []
     for event in ("StartInteractionEvent", "InteractionEvent", "EndInteractionEvent"):
@@ -148,6 +185,34 @@ def test_an_exception_is_collected_and_leaves_no_grab(scribble):
     hand.release((60, 60))
     hand.drag([(50, 50), (60, 60)])
     assert scribble.strokes == [2]
+
+
+def test_an_event_within_an_event_waits_for_its_turn(scribble):
+    """As where a listener lets an event loop run: moves come, and the release."""
+    hand = Hand(scribble.view)
+    seen, inside = [], {20: ("move", 30), 40: ("release", 40), 50: ("press", 70)}
+
+    def stroke(press):
+        while (pointer := (yield)).phase is Phase.MOVE:
+            seen.append(pointer.x)
+            if pointer.x in inside:
+                what, x = inside[pointer.x]
+                getattr(hand, what)((x, 50))
+                assert scribble.is_grabbing
+        seen.append(pointer.phase)
+
+    scribble.begins = stroke
+    hand.press((10, 50))
+    hand.move((20, 50))
+    assert seen == [20, 30]
+    hand.move((40, 50))
+    assert seen == [20, 30, 40, Phase.RELEASE]
+    assert not scribble.is_grabbing
+    hand.press((10, 50))
+    hand.move((50, 50))
+    assert seen[4:] == [50, 70, Phase.RELEASE]  # a press can only mean that a release was lost
+    assert not scribble.is_grabbing
+    assert hand.failures == []
 
 
 def test_a_key_that_is_taken_stays_from_the_camera_and_others_do_not(scribble):

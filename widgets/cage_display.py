@@ -79,8 +79,8 @@ class CageDisplay(Widget):
             self._rebuild()
 
     def hide(self) -> None:
-        """Hide all cages; what is dragged is let go."""
-        self.cancel()
+        """Hide all cages; a drag that is going on is finished."""
+        self.finish()
         self._is_shown, self._grip = False, None
         self._rebuild()
 
@@ -167,7 +167,7 @@ class CageDisplay(Widget):
     # Dragging.
 
     def Off(self) -> None:  # noqa: N802 - VTK's word
-        """Stop listening; a drag that is going on is cancelled, and nothing is marked."""
+        """Stop listening; a drag that is going on is finished, and nothing is marked."""
         super().Off()
         self._point_at(None)
 

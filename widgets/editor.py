@@ -7,6 +7,9 @@ The line at the bottom says what to do next; H shows the keys, which `bindings` 
 `actions` tells.  What takes long, finding regions, fitting cages and binding, is a job in another
 thread: the camera works meanwhile, nothing else does, and Escape stops it.
 
+An action in the middle of a drag or a stroke finishes that first, as if the button had been
+released: it is one undo step.  Escape alone takes it back; the card of keys leaves it in hand.
+
 The camera style and pyvista's own keys are not touched.  The editor hears of keys after its
 widgets, so that x, y, z constrain a drag, but before VTK and pyvista, and keeps from them what
 means something to it.  With several editors in one window they go to the one the pointer is over.
@@ -111,7 +114,8 @@ class DeformEditor:
         action : callable
             ``action(desk)``.
         while_busy : bool
-            Whether it can be done beside a job; else, if there is one, that is said instead.
+            Whether it can be done beside a job, and beside a drag or a stroke that is going on.
+            Otherwise a job is said to be running instead, and a drag is finished first.
         """
         with self.view.guarded():
             self._do(action, while_busy)
@@ -147,7 +151,7 @@ class DeformEditor:
             self._desk.is_on = True
 
     def Off(self) -> None:  # noqa: N802
-        """Stop listening; a job or gesture that is going on is cancelled, what is shown stays."""
+        """Stop listening; a job is cancelled, a drag finished, and what is shown stays."""
         for stop in self._stops:
             stop()
         self._stops = []
@@ -186,16 +190,23 @@ class DeformEditor:
             self._do(binding.action, binding.while_busy)
             return
         places = ", ".join(f"{mode.value} ({what})" for mode, what in modes_of(key))
-        self._do(lambda desk: desk.say(f"{key_cap(key)} is a key of {places}"), False)
+        if self.is_busy:
+            self._desk.insist()
+        else:  # no action, so what is dragged stays in hand
+            self._desk.voice.forget()
+            self._desk.say(f"{key_cap(key)} is a key of {places}")
 
     def _do(self, action: Action, while_busy: bool) -> None:
         desk = self._desk
-        if desk.is_busy and not while_busy:
-            desk.insist()
-            return
+        if not while_busy:
+            if desk.is_busy:
+                desk.insist()
+                return
+            desk.stage.finish()
         desk.voice.forget()
         action(desk)
-        desk.bind_if_ready()
+        if not while_busy:  # else Escape would begin anew what it has just cancelled
+            desk.bind_if_ready()
         desk.refresh()
 
 

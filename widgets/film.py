@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 
+from vtk_segdeform.progress import Progress, tell
 from vtk_segdeform.session import Session
 
 from .filming.film_files import Picture, require_film, write_film
@@ -72,7 +73,13 @@ class Film:
         tag = window.AddObserver("EndEvent", called)
         return lambda: window.RemoveObserver(tag)
 
-    def save(self, path: str | os.PathLike[str], *, fps: float = 20.0) -> None:
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        fps: float = 20.0,
+        progress: Progress | None = None,
+    ) -> None:
         """Write the pictures; a file that is there is replaced, a folder is not.
 
         Parameters
@@ -81,6 +88,8 @@ class Film:
             A .gif, an .mp4, or without a suffix a new folder for 0000.png, 0001.png, ...
         fps : float
             Pictures in a second.
+        progress : Progress, optional
+            Called meanwhile; may cancel, and then nothing is written.
 
         Raises
         ------
@@ -89,7 +98,7 @@ class Film:
         MissingDependencyError
             If the library for such a film is absent.
         """
-        write_film(path, self, fps)
+        write_film(path, _Told(self, progress), fps)
 
     def _take(self) -> None:
         window = self.view.window
@@ -103,6 +112,21 @@ class Film:
         h, w = min(height, self._shape[0]), min(width, self._shape[1])
         whole[:h, :w] = picture[:h, :w]
         self._pictures.append(zlib.compress(whole.tobytes(), 1))
+
+
+class _Told:
+    """The pictures of a film, each of them reported when it is asked for."""
+
+    def __init__(self, film: Film, progress: Progress | None) -> None:
+        self._film, self._progress, self._count = film, progress, 0
+
+    def __len__(self) -> int:
+        return len(self._film)
+
+    def __getitem__(self, number: int, /) -> Picture:
+        tell(self._progress, min(1.0, self._count / len(self)), f"picture {number + 1}")
+        self._count += 1
+        return self._film[number]
 
 
 def film(

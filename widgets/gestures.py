@@ -21,6 +21,7 @@ The manner is that of napari's mouse callbacks (napari contributors, https://nap
 from __future__ import annotations
 
 import enum
+from collections import deque
 from collections.abc import Generator
 from dataclasses import dataclass, replace
 
@@ -62,11 +63,16 @@ class Grab:
     """The gesture that has the pointer, if any.
 
     A gesture that raises has lost the pointer; the exception goes on to whoever sent the event.
+
+    An event may come while the gesture is still at work on another one, where something that it
+    tells of lets the event loop run; it then waits until the gesture is ready for it.
     """
 
     def __init__(self) -> None:
         self._gesture: Gesture | None = None
         self._last: Pointer | None = None
+        self._waiting: deque[Pointer] = deque()
+        self._is_working = False
 
     @property
     def is_active(self) -> bool:
@@ -74,13 +80,27 @@ class Grab:
         return self._gesture is not None
 
     def begin(self, gesture: Gesture, press: Pointer) -> None:
-        """Run *gesture* up to where it waits for the next pointer; one still going is cancelled."""
-        self.cancel()
+        """Run *gesture* up to where it waits for the next pointer; finish one still going on."""
+        self.finish()
         self._gesture, self._last = gesture, press
         self._advance(None)
 
     def send(self, pointer: Pointer) -> None:
         """Tell the gesture of *pointer*; after a release or a cancel it has ended."""
+        if self._waiting and self._waiting[-1].phase is pointer.phase is Phase.MOVE:
+            self._waiting.pop()  # a later one says it all
+        self._waiting.append(pointer)
+        if self._is_working:
+            return
+        self._is_working = True
+        try:
+            while self._waiting:
+                self._pass_on(self._waiting.popleft())
+        finally:
+            self._waiting.clear()
+            self._is_working = False
+
+    def _pass_on(self, pointer: Pointer) -> None:
         if self._gesture is None:
             return
         self._last = pointer
@@ -90,10 +110,17 @@ class Grab:
             self._gesture = None
             gesture.close()
 
+    def finish(self) -> None:
+        """End the gesture, if there is one, as if the button had been released."""
+        self._end(Phase.RELEASE)
+
     def cancel(self) -> None:
         """End the gesture, if there is one, as if it had never begun."""
+        self._end(Phase.CANCEL)
+
+    def _end(self, phase: Phase) -> None:
         if self._last is not None:
-            self.send(replace(self._last, phase=Phase.CANCEL))
+            self.send(replace(self._last, phase=phase))
 
     def _advance(self, pointer: Pointer | None) -> None:
         gesture = self._gesture

@@ -84,7 +84,7 @@ class HandleDragger(Widget):
         if name is not None:
             require_handle(self.session.handles, name)
         if name != self._handle:
-            self.cancel()
+            self.finish()
             self._handle = name
             self._place()
 
@@ -115,17 +115,20 @@ class HandleDragger(Widget):
         return self._live.is_refining
 
     def On(self) -> None:  # noqa: N802 - VTK's word
-        """Listen to the view, and be seen."""
+        """Listen to the view, and be seen; a pose that had not converged is refined further."""
         super().On()
         self._marks.show(self.session.is_ready)
         self._place()
+        self._live.go_on()
 
     def Off(self) -> None:  # noqa: N802
-        """Stop listening and solving; a gesture that is going on is cancelled."""
-        super().Off()
-        self._live.rest()
-        self._marks.show(False)
-        self._place()
+        """Stop listening and solving; a gesture that is going on is finished."""
+        try:
+            super().Off()
+        finally:
+            self._live.rest()
+            self._marks.show(False)
+            self._place()
 
     def remove(self) -> None:
         """Take everything out of the view, for good."""

@@ -146,9 +146,11 @@ class RegionSelector(Widget):
             self._stops.append(self.view.observe("LeaveEvent", self._ring.hide))
 
     def Off(self) -> None:  # noqa: N802
-        """Stop listening; a stroke that is going on is cancelled."""
-        super().Off()
-        self._ring.hide()
+        """Stop listening; a stroke that is going on is finished."""
+        try:
+            super().Off()
+        finally:
+            self._ring.hide()
 
     def begins(self, press: Pointer) -> Gesture | None:
         """Begin a stroke with the tool; with Shift, or off the mesh, it is the camera's."""

@@ -5,6 +5,10 @@ pyvista, and be lost.  Here it reaches the listeners of `on_failure`: a status l
 
 While a camera style drags it keeps all mouse events to itself, so whoever has to follow the
 camera asks for `before_render` instead.
+
+All timers are one: `View.every` shares a single repeating timer among all views of an interactor,
+and nobody else in this package creates or destroys any.  Some hosts, pyvistaqt among them, drive
+every VTK timer from one timer of their own and stop that when any of them is destroyed.
 """
 
 from __future__ import annotations
@@ -13,6 +17,7 @@ import logging
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
+from weakref import WeakValueDictionary
 
 import vtkmodules.vtkRenderingFreeType
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - both: what renders, for whom pyvista is not
@@ -44,6 +49,7 @@ class View(Sight):
     def __init__(self, renderer: Any, interactor: Any) -> None:
         super().__init__(renderer)
         self.interactor = interactor
+        self._timer = _SharedTimer.of(interactor)
         self._failures: list[Callable[[Exception], None]] = []
         self._front: Front | None = None
         self._stop_front: Stop | None = None
@@ -152,24 +158,28 @@ class View(Sight):
     def every(self, milliseconds: int, callback: Callable[[], None]) -> Stop:
         """Call *callback* again and again from the event loop, until stopped.
 
+        All subscribers of an interactor share one timer, which has the shortest of their periods:
+        each is called at every tick, at least every so many *milliseconds*.  A callback may stop
+        itself and others; one that fails keeps no other from being called.
+
         Not while a camera style drags: it keeps the timer's events to itself as well; see `pulse`.
         """
 
-        def ticked() -> bool:
-            callback()
-            return False
+        def ticked(*_: object) -> None:
+            with self.guarded(), self._drawn_after():
+                callback()
 
-        timer = self.interactor.CreateRepeatingTimer(milliseconds)
-        stop = self.observe("TimerEvent", ticked)
+        tag = self.interactor.AddObserver("TimerEvent", ticked, ABOVE_CAMERA)
+        release = self._timer.require(milliseconds)
 
-        def stop_both() -> None:
-            stop()
-            self.interactor.DestroyTimer(timer)
+        def stop() -> None:
+            self.interactor.RemoveObserver(tag)
+            release()
 
-        return _once(stop_both)
+        return _once(stop)
 
     def pulse(self, callback: Callable[[], None]) -> Stop:
-        """Call *callback* at the ticks of all timers, also while a camera style drags.
+        """Call *callback* at every tick there is, also while a camera style drags.
 
         It may draw, but neither observe the interactor nor stop anything there.
         """
@@ -226,6 +236,74 @@ class View(Sight):
             if self._touched and not self._depth:
                 self._touched = False
                 self.render()
+
+
+class _SharedTimer:
+    """The one repeating timer of an interactor, running while somebody requires it.
+
+    Where the host stops it together with a timer of somebody else's, a hovering widget's or a
+    camera style's, it is started again.
+
+    Parameters
+    ----------
+    interactor : vtkRenderWindowInteractor
+        Whose timer; use `of` to share it.
+    """
+
+    _shared: WeakValueDictionary[int, _SharedTimer] = WeakValueDictionary()
+
+    def __init__(self, interactor: Any) -> None:
+        self._interactor = interactor
+        self._periods: list[int] = []
+        self._period: int | None = None  # of the timer that runs
+        self._id = self._tag = 0
+        self._is_changing = False
+
+    @classmethod
+    def of(cls, interactor: Any) -> _SharedTimer:
+        """Return the timer of *interactor*, the same one as long as anybody has it."""
+        # It keeps its interactor, so no other one can have the same number meanwhile.
+        return cls._shared.setdefault(id(interactor), cls(interactor))
+
+    def require(self, milliseconds: int) -> Stop:
+        """Run at least every so many *milliseconds*, until what is returned is called."""
+        self._periods.append(milliseconds)
+        self._update()
+
+        def release() -> None:
+            self._periods.remove(milliseconds)
+            self._update()
+
+        return release
+
+    def _update(self) -> None:
+        """Have a timer of the shortest period that is required, or none."""
+        period = min(self._periods, default=None)
+        if period == self._period:
+            return
+        self._is_changing = True
+        try:
+            if self._period is not None:
+                self._interactor.DestroyTimer(self._id)
+                self._interactor.RemoveObserver(self._tag)
+            if period is not None:
+                self._id = self._interactor.CreateRepeatingTimer(period)
+                # The lowest priority: after the host has stopped what it stops.
+                self._tag = self._interactor.AddObserver("DestroyTimerEvent", self._revive, -1.0)
+            self._period = period
+        finally:
+            self._is_changing = False
+
+    def _revive(self, *_: object) -> None:
+        """Start the timer again if the one that is destroyed now is another."""
+        interactor = self._interactor
+        destroyed = interactor.GetVTKTimerId(interactor.GetTimerEventPlatformId())
+        if destroyed != self._id and not self._is_changing:
+            self._is_changing = True
+            try:
+                interactor.ResetTimer(self._id)
+            finally:
+                self._is_changing = False
 
 
 def _once(action: Callable[[], object]) -> Stop:

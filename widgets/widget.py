@@ -2,7 +2,8 @@
 
 A widget says what a press begins (`begins`), and the rest is done here: the press is taken from
 the camera only if it begins something, moves and the release go to the gesture, Escape or the
-right button cancels it.  Outside its own things the camera works as ever.
+right button cancels it.  Whatever else ends it, such as another tool or a job, finishes it as a
+release would: nothing is lost.  Outside its own things the camera works as ever.
 
 VTK's words are kept: `On`, `Off`, `SetEnabled`, `GetEnabled`, and observers of
 ``StartInteractionEvent``, ``InteractionEvent`` and ``EndInteractionEvent``, called after whatever
@@ -95,11 +96,13 @@ class Widget(abc.ABC):
         ]
 
     def Off(self) -> None:  # noqa: N802
-        """Stop listening; a gesture that is going on is cancelled."""
-        self.cancel()
-        for stop in self._stops:
-            stop()
-        self._stops = []
+        """Stop listening; a gesture that is going on is finished."""
+        try:
+            self.finish()
+        finally:
+            for stop in self._stops:
+                stop()
+            self._stops = []
 
     def SetEnabled(self, enabled: bool) -> None:  # noqa: N802
         """Switch on or off."""
@@ -129,12 +132,19 @@ class Widget(abc.ABC):
         """Whether a gesture is going on."""
         return self._grab.is_active
 
+    def finish(self) -> bool:
+        """End the gesture as if the button had been released; False if there was none."""
+        return self._end(self._grab.finish)
+
     def cancel(self) -> bool:
         """End the gesture as if it had never begun; False if there was none."""
+        return self._end(self._grab.cancel)
+
+    def _end(self, end: Callable[[], None]) -> bool:
         if not self._grab.is_active:
             return False
         try:
-            self._grab.cancel()
+            end()
         finally:
             self._tell("EndInteractionEvent")
         return True
@@ -143,7 +153,9 @@ class Widget(abc.ABC):
 
     def _press(self) -> bool:
         press = self.view.pointer(Phase.PRESS)
-        self.cancel()  # a release that never came
+        self.finish()  # a release that never came
+        if self.is_grabbing:  # it is still at work, on an event that this one came within
+            return True
         gesture = self.begins(press) if self.view.contains(press) else None
         if gesture is None:
             return False

@@ -68,9 +68,13 @@ class LiveSolve:
         self.go_on()
 
     def go_on(self) -> None:
-        """Refine, if the present pose is one that was stopped early; or else rest."""
+        """Refine, if the present pose is one that was stopped early; or else rest.
+
+        Nor where other options or cages would have to be bound first, which takes long.
+        """
         solution = self._session.solution
-        if not self.refines or solution is None or solution.status is not Status.STEP_LIMIT:
+        is_final = solution is None or solution.status is not Status.STEP_LIMIT
+        if is_final or not self.refines or not self._session.is_bound:
             self.rest()
         elif self._stop is None:
             self._stop = self._view.every(_PERIOD, self._tick)

@@ -82,6 +82,7 @@ class Desk:
 
     @mode.setter
     def mode(self, mode: Mode) -> None:
+        self.stage.finish()
         self._mode = mode
         self.voice.forget()
         self._settle()
@@ -97,7 +98,7 @@ class Desk:
         try:
             if not on:
                 self.help.hide()
-                self.cancel()
+                self._work.cancel()
                 self.wait()
         finally:
             self._settle()
@@ -171,13 +172,17 @@ class Desk:
     def start(
         self, doing: str, work: Callable[[Progress], Any], done: Callable[[Any], object]
     ) -> None:
-        """Do *work* in another thread, then *done* here with what it returned; see `Work.start`."""
+        """Do *work* in another thread, then *done* here with what it returned; see `Work.start`.
 
-        def finish(result: Any) -> None:
+        What is dragged or painted is finished first: the work begins with it done.
+        """
+
+        def deliver(result: Any) -> None:
             done(result)
             self._settle()
 
-        self._work.start(doing, work, finish)
+        self.stage.finish()  # before there is a job: it may fail
+        self._work.start(doing, work, deliver)
         self.stage.rest()
         self.refresh()
 
@@ -186,11 +191,11 @@ class Desk:
         self._work.wait()
 
     def cancel(self) -> None:
-        """Stop the job, or else put away the card of keys."""
-        if self._work.job is not None:
-            self._work.job.cancel()
+        """Stop the job; or else take back what is in hand; or else put away the card of keys."""
+        if self.is_busy:
+            self._work.cancel()
             self.refresh()
-        else:
+        elif not self.stage.cancel():
             self.help.hide()
 
     def insist(self) -> None:

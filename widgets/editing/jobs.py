@@ -17,6 +17,7 @@ import logging
 import time
 from collections.abc import Callable
 from concurrent import futures
+from contextlib import ExitStack
 from typing import Generic, TypeVar
 
 from vtk_segdeform.errors import Cancelled
@@ -143,7 +144,11 @@ class Job(Generic[T]):
         self._ended = True
         error = self._future.exception()
         self._stopping |= isinstance(error, Cancelled)
-        self._tell()
+        with ExitStack() as told:  # a watcher that fails does not lose the result
+            told.callback(self._hand_over, error)
+            self._tell()
+
+    def _hand_over(self, error: BaseException | None) -> None:
         if not self._stopping:
             self._done(self._future.result())  # or raises what the work raised
         elif error is not None and not isinstance(error, Cancelled):

@@ -7,6 +7,7 @@ user wants it: `cages_wanted`, `overlay_wanted`.
 from __future__ import annotations
 
 import enum
+from contextlib import ExitStack
 
 import numpy as np
 
@@ -132,10 +133,20 @@ class Stage:
         progress(0.0, "")
         self.overlay.prepare()
 
-    def rest(self) -> None:
-        """Switch all widgets off; what is in hand is cancelled, what is shown stays."""
+    def finish(self) -> None:
+        """End the drag or stroke in hand as if the button had been released."""
         for widget in self.widgets:
-            widget.Off()
+            widget.finish()
+
+    def cancel(self) -> bool:
+        """End the drag or stroke in hand as if it had never begun; False if there was none."""
+        return any(widget.cancel() for widget in self.widgets)
+
+    def rest(self) -> None:
+        """Switch all widgets off; what is in hand is finished, what is shown stays."""
+        with ExitStack() as all_of_them:  # also after one that fails
+            for widget in self.widgets:
+                all_of_them.callback(widget.Off)
 
     def remove(self) -> None:
         """Take everything out of the view, for good."""

@@ -39,4 +39,4 @@ def film(desk: Desk) -> None:
     def written(_: object) -> None:
         desk.say(f"film of {len(taken)} pictures written to {path}")
 
-    desk.start(f"writing {path.name}", lambda _: taken.save(path), written)
+    desk.start(f"writing {path.name}", lambda p: taken.save(path, progress=p), written)

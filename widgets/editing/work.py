@@ -64,6 +64,11 @@ class Work:
         while self.job is not None:
             self.job.wait()
 
+    def cancel(self) -> None:
+        """Ask the job to stop, if there is one."""
+        if self.job is not None:
+            self.job.cancel()
+
     def insist(self) -> None:
         """Tell with emphasis that there is a job."""
         self._insists = True

@@ -1,0 +1,433 @@
+"""Every key of the editor at its worst moments: in mid-drag, while a pose converges, during a job.
+
+The keys are those of the editor's own table.  Whatever is pressed, in the end
+
+- the editor is idle: no job, no drag, no refinement, no timer;
+- the drag is one step of the history, the first, unless Escape took it back; a drag that a key
+  has ended is where the pointer was at that moment, and does not follow it any farther;
+- what the key does besides is what it does when it is pressed long after the drag;
+- undo leads back to the state before, redo to the very state at the end, and each state on the
+  way has the volume of rest.
+
+During a job a key changes nothing; Escape cancels the job.
+"""
+
+from __future__ import annotations
+
+import shutil
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+from hands import Hand, OneTimerHost, plain_view
+from numpy.testing import assert_allclose, assert_array_equal
+from soaking import session_of, slender
+
+from vtk_segdeform import Session, save_session
+from vtk_segdeform.solution import Status
+from vtk_segdeform.widgets import DeformEditor, Mode, Paint, Tool
+from vtk_segdeform.widgets.dragging import live_solve
+from vtk_segdeform.widgets.editing.bindings import BINDINGS, binding_of
+from vtk_segdeform.widgets.view import View
+
+KEYS = sorted({key for binding in BINDINGS for key in binding.keys})
+SIZE = (260, 200)
+LONGEST = 30.0  # seconds that anything may take, on a machine that has much else to do
+SAME_POSE = 2e-3  # of the diagonal: two ways to converge to one pose
+STEPS = {Mode.REGIONS: "paint region 1", Mode.CAGES: "drag the cage of region 1",
+         Mode.HANDLES: "mark tip", Mode.DEFORM: "drag tip"}  # fmt: skip
+
+
+def table(*modes: Mode, campaign: bool = False) -> list:
+    """Return every mode with every key, as parameters of a test.
+
+    Those of keys that mean nothing in a mode, or with *campaign* all of them, are a campaign's.
+    Mode 3 paints as mode 1 does, so there only its own keys are for every day.
+    """
+    own = {mode: {k for b in BINDINGS if mode in b.modes for k in b.keys} for mode in modes}
+    if Mode.REGIONS in own and Mode.HANDLES in own:
+        own[Mode.HANDLES] -= own[Mode.REGIONS]
+    return [
+        pytest.param(
+            mode, key, id=f"{mode.name}-{key}",
+            marks=[pytest.mark.campaign] * (campaign or key not in own[mode]),
+        )
+        for mode in modes for key in KEYS
+    ]  # fmt: skip
+
+
+def ends_the_drag(key: str, mode: Mode) -> bool:
+    """Tell whether *key* is to end a drag in *mode*; Escape takes it back besides."""
+    if any(b.action is None and key in b.keys and mode in b.modes for b in BINDINGS):
+        return False  # the widget that drags has it for itself
+    binding = binding_of(key, mode)
+    return key == "escape" or (binding is not None and not binding.while_busy)
+
+
+def slow_down(monkeypatch) -> None:
+    """Have every move and every tick make one step, so that there is a time of converging."""
+    for name in ("_MOST_STEPS", "_FEWEST_AT_REST"):
+        monkeypatch.setattr(live_solve, name, 1)
+
+
+@dataclass(frozen=True)
+class Story:
+    """What a session went through: the names of the steps, how many are done, and the states."""
+
+    labels: list[str]
+    done: int
+    states: list
+
+    @classmethod
+    def of(cls, session: Session) -> Story:
+        """Walk through the whole history of *session*, and leave it where it was."""
+        now, done = session.state, 0
+        while session.undo() is not None:
+            done += 1
+        labels, states = [], [session.state]
+        check_volume(session)
+        while (label := session.redo()) is not None:
+            labels.append(label)
+            states.append(session.state)
+            check_volume(session)
+        for _ in range(len(labels) - done):
+            session.undo()
+        assert session.state is now
+        return cls(labels, done, states)
+
+
+def check_volume(session: Session) -> None:
+    """See that the volume of rest is kept, where that is wanted."""
+    assert np.isfinite(session.vertices).all()
+    if session.options.preserve_volume:
+        assert abs(session.volume_change) < 1e-12
+
+
+def outline(state) -> tuple:
+    """Return what a state is but for where things are."""
+    regions = 0 if state.regions is None else state.regions.n_regions
+    handles = {name: len(ids) for name, ids in state.handles.items()}
+    cages = [cage.n_vertices for cage in state.cages]
+    return regions, cages, len(state.fixed), handles, state.options, state.pose is not None
+
+
+class Stand:
+    """An editor over a small session in some host, and a hand on it; to be used again and again.
+
+    Parameters
+    ----------
+    editor : DeformEditor
+        Over a session of `ready`.
+    hand : Hand or QtHand
+        In its view.
+    folder : Path
+        For the files that keys write.
+    """
+
+    def __init__(self, editor: DeformEditor, hand, folder: Path):
+        self.editor, self.hand, self.folder = editor, hand, folder
+        save_session(folder / "start.segdeform", editor.session)
+        self.session_before, self.start = editor.session, editor.session.state
+        self.references: dict[tuple, Story] = {}
+
+    # What differs from host to host.
+
+    def loop(self) -> None:
+        """Let the host's event loop run for a moment."""
+        raise NotImplementedError
+
+    def has_timers(self) -> bool:
+        """Whether any timer is running."""
+        raise NotImplementedError
+
+    def draw(self) -> None:
+        """See that what is to be grabbed is where it is seen."""
+        self.editor.view.render()
+
+    def close(self) -> None:
+        """End it."""
+        raise NotImplementedError
+
+    # What hands do.
+
+    @property
+    def session(self) -> Session:
+        return self.editor.session
+
+    def until(self, seen, what: str) -> None:
+        """Let the event loop run until *seen* returns something true."""
+        end = time.monotonic() + LONGEST
+        while not seen():
+            assert time.monotonic() < end, f"waited in vain for {what}: {self.editor.status}"
+            self.loop()
+
+    def settle(self) -> None:
+        """Wait until nothing is going on, and see that really nothing is."""
+        self.until(lambda: not self.editor.is_busy, "the job")
+        dragger = self.editor.stage.dragger
+        self.until(lambda: not dragger.is_refining, "the pose")
+        self.until(lambda: not self.has_timers(), "the timers")
+        assert not any(widget.is_grabbing for widget in self.editor.stage.widgets)
+        assert not self.session.is_dragging
+        assert self.hand.failures == []
+
+    def begin(self, mode: Mode) -> None:
+        """Begin anew, in *mode*."""
+        desk, stage = self.editor.desk, self.editor.stage
+        while self.session.undo() is not None:
+            pass
+        self.session_before, self.start = self.session, self.session.state
+        desk.takes.remove()
+        desk.help.hide()
+        desk.voice.forget()
+        stage.cages_wanted = stage.overlay_wanted = False
+        stage.selector.tool, stage.selector.through = Tool.BRUSH, False
+        shutil.copy(self.folder / "start.segdeform", self.folder / "work.segdeform")
+        self.editor.path = self.folder / "work.segdeform"
+        self.editor.mode = mode
+        self.settle()
+        selector = stage.selector
+        selector.region, selector.handle = 0, "tip"
+        selector.paints = Paint.REGION if mode is Mode.REGIONS else Paint.HANDLE
+        stage.dragger.handle = "tip"
+        self.hand.failures.clear()
+
+    def way(self, mode: Mode) -> list[np.ndarray]:
+        """Return places along which to drag in *mode*: a handle, a vertex of a cage, a brush."""
+        session = self.session
+        if mode is Mode.CAGES:
+            corners = session.cages[0].vertices
+            at = corners[corners[:, 2].argmax()]
+        else:
+            x = session.mesh.vertices[:, 0]
+            at = {Mode.REGIONS: [0.9, -0.7, 0.0], Mode.HANDLES: [-1.6, -0.6, 0.0]}.get(
+                mode, session.mesh.vertices[x > 2.2].mean(axis=0)
+            )
+        shift = np.array([6.0, 24.0] if mode in (Mode.CAGES, Mode.DEFORM) else [4.0, 2.0])
+        return [np.round(self.hand.at(at) + share * shift) for share in (0.0, 0.4, 0.7, 1.0)]
+
+    def drag(self, mode: Mode) -> np.ndarray:
+        """Press and drag, and return the place without letting go."""
+        self.draw()
+        first, *others = self.way(mode)
+        self.hand.press(first)
+        for place in others:
+            self.hand.move(place)
+        assert any(widget.is_grabbing for widget in self.editor.stage.widgets)
+        return others[-1]
+
+    # The moments.
+
+    def long_after(self, mode: Mode, *keys: str) -> Story:
+        """Return what becomes of a drag and keys that are typed when it has converged."""
+        if (mode, keys) not in self.references:
+            self.begin(mode)
+            self.hand.release(self.drag(mode))
+            self.settle()
+            for key in keys:
+                self.hand.types(key)
+            self.hand.failures.clear()  # what goes wrong is told, and not this test's business
+            self.settle()
+            self.references[mode, keys] = Story.of(self.session)
+        return self.references[mode, keys]
+
+    def during(self, mode: Mode, key: str) -> None:
+        """Type *key* in mid-drag, move on and let go."""
+        expected, dragged = self.long_after(mode, key), self.long_after(mode)
+        assert dragged.labels == [STEPS[mode]]
+        self.begin(mode)
+        place = self.drag(mode)
+        self.hand.types(key)
+        if ends_the_drag(key, mode):
+            self.hand.move(place + [-40.0, -30.0])  # which drags nothing any more
+            self.hand.move(place)
+        else:
+            assert any(widget.is_grabbing for widget in self.editor.stage.widgets)
+            expected = dragged
+        self.hand.release(place)
+        self._ends_as(mode, key, expected, dragged)
+
+    def just_after(self, mode: Mode, *keys: str) -> None:
+        """Type *keys* after a drag, while the pose still converges."""
+        expected, dragged = self.long_after(mode, *keys), self.long_after(mode)
+        self.begin(mode)
+        self.hand.release(self.drag(mode))
+        assert self.editor.stage.dragger.is_refining
+        for key in keys:
+            self.hand.types(key)
+        self._ends_as(mode, None, expected, dragged)
+
+    def _ends_as(self, mode: Mode, key: str | None, expected: Story, dragged: Story) -> None:
+        """See that all is as *expected*; *key* was typed in mid-drag, if it is not None."""
+        told = [str(failure) for failure in self.hand.failures]
+        self.hand.failures.clear()
+        self.settle()
+        self.editor.mode = mode  # where a pose that has not converged does so
+        self.settle()
+        story = Story.of(self.session)
+        if self.session is self.session_before:  # it opens another one
+            assert not story.states[0].changes(self.start)
+        if key == "escape":
+            assert (story.done, told) == (0, [])
+            return
+        assert (story.labels, story.done) == (expected.labels, expected.done), told
+        mine, its = (list(map(outline, each.states)) for each in (story, expected))
+        assert mine == its, (mine, its)
+        if story.labels == dragged.labels and key not in ("x", "y", "z"):  # which constrain it
+            is_final = story.done == dragged.done
+            same_places(story.states[1], dragged.states[1], self.session, is_final=is_final)
+
+    @contextmanager
+    def job(self) -> Iterator[list[str]]:
+        """Have another thread at work meanwhile; yield a list of what will be delivered then."""
+        go_on, delivered = threading.Event(), []
+
+        def work(progress):
+            assert go_on.wait(LONGEST)
+            progress(1.0, "counted")
+            return "counted"
+
+        self.editor.do(lambda desk: desk.start("counting", work, delivered.append))
+        assert self.editor.is_busy
+        try:
+            yield delivered
+            assert self.editor.is_busy
+            assert delivered == []
+        finally:
+            go_on.set()
+        self.settle()
+
+    def first_overlay(self, *, during: bool) -> None:
+        """Type O where volumes were never shown: they are measured in a job, beside a drag."""
+        self.begin(Mode.REGIONS)
+        self.editor.load(self.folder / "start.segdeform")
+        self.session.bind()  # else what is measured was measured with that
+        self.begin(Mode.DEFORM)
+        overlay, place = self.editor.stage.overlay, self.drag(Mode.DEFORM)
+        assert not overlay.is_prepared
+        self._meanwhile("o", place, during=during)
+        assert overlay.is_shown
+
+    def film_that_ends(self, *, during: bool) -> None:
+        """End a film, which a job then writes, beside a drag."""
+        self.begin(Mode.DEFORM)
+        self.hand.types("ctrl+m")
+        place = self.drag(Mode.DEFORM)
+        self.draw()
+        before = set(self.folder.glob("work.film*"))
+        self._meanwhile("ctrl+m", place, during=during)
+        assert len(set(self.folder.glob("work.film*")) - before) == 1
+
+    def _meanwhile(self, key: str, place: np.ndarray, *, during: bool) -> None:
+        """Begin a job by *key* before or after the release at *place*; nothing is lost by it."""
+        if not during:
+            self.hand.release(place)
+            assert self.editor.stage.dragger.is_refining
+        self.hand.types(key)
+        assert self.editor.is_busy
+        if during:
+            self.hand.release(place)
+        self.settle()
+        assert self.session.solution.status is Status.CONVERGED
+        assert Story.of(self.session).labels == [STEPS[Mode.DEFORM]]
+
+    def in_a_job(self, mode: Mode, key: str) -> None:
+        """Type *key* while another thread works; then let that end."""
+        self.begin(mode)
+        session = self.session
+        before = session.state, session.undo_label, session.redo_label
+        with self.job() as delivered:
+            self.hand.types(key)
+            self.loop()
+        assert delivered == ["counted"] * (key != "escape")
+        assert "cancelled" in self.editor.status or key != "escape"
+        assert self.session is session
+        assert (session.state, session.undo_label, session.redo_label) == before
+
+
+def same_places(state, expected, session: Session, *, is_final: bool) -> None:
+    """See that handles are exactly where they should be, and cages as good as, once converged."""
+    if expected.pose is None:
+        return
+    for name, places in expected.pose.targets.items():
+        assert_allclose(state.pose.targets[name], places, atol=1e-9)
+    for places, others in zip(state.pose.cage_vertices, expected.pose.cage_vertices, strict=True):
+        away = np.abs(places - others).max() / session.mesh.diagonal
+        assert away < SAME_POSE or not is_final, away
+    for mine, others in ((state.fixed, expected.fixed), *zip(
+        state.handles.values(), expected.handles.values(), strict=True
+    )):  # fmt: skip
+        assert_array_equal(mine, others)
+    assert_array_equal(state.regions.membership, expected.regions.membership)
+
+
+class SeldomDrawn(View):
+    """A view that is drawn when `draw` says so: nine tenths of the time would be spent on it."""
+
+    def render(self):
+        pass
+
+    def draw(self):
+        super().render()
+
+
+class HandStand(Stand):
+    """In a host of one timer that is fired by hand: `plain_view`, or an off-screen plotter."""
+
+    def __init__(self, view: View, folder: Path, close=lambda: None):
+        self._host, self._close = OneTimerHost(view.interactor), close
+        session, view = ready(), SeldomDrawn(view.renderer, view.interactor)
+        editor = DeformEditor(view, session)
+        aim(view)
+        editor.On()
+        super().__init__(editor, Hand(view), folder)
+
+    def loop(self):
+        self._host.tick()
+
+    def has_timers(self):
+        return self._host.is_running
+
+    def draw(self):
+        self.editor.view.draw()
+
+    def close(self):
+        self.editor.remove()
+        assert not self._host.is_running
+        self._close()
+
+
+def ready() -> Session:
+    """Return a small session that lacks nothing but a pose, bound."""
+    session = session_of(slender())
+    session.change_options(n_cage_vertices=40)
+    session = Session(session.mesh, state=session.state)  # without a history
+    session.bind()
+    return session
+
+
+def aim(view: View) -> None:
+    """Look from the front, z up, at all of it."""
+    view.camera.SetPosition(0.0, -9.0, 0.0)
+    view.camera.SetFocalPoint(0.0, 0.0, 0.0)
+    view.camera.SetViewUp(0.0, 0.0, 1.0)
+    view.renderer.ResetCamera()
+    view.window.Render()
+
+
+def plain_stand(folder: Path) -> HandStand:
+    """Return an editor in a window of VTK alone."""
+    return HandStand(plain_view(SIZE), folder)
+
+
+def pyvista_stand(folder: Path) -> HandStand:
+    """Return an editor in a plotter."""
+    plotter = pv.Plotter(off_screen=True, window_size=SIZE)
+    plotter.show(auto_close=False, interactive=False)
+    return HandStand(View.of(plotter), folder, plotter.close)

@@ -1,0 +1,71 @@
+"""Every key of the editor in mid-drag, while a pose converges, and during a job; see `key_moments`.
+
+In plain VTK and in a plotter; `test_qt_every_key` has the same in Qt.
+"""
+
+from __future__ import annotations
+
+import pytest
+from key_moments import plain_stand, pyvista_stand, slow_down, table
+
+from vtk_segdeform.widgets import Mode
+
+
+def stand_of(make, folder):
+    """Yield an editor that is used again and again."""
+    with pytest.MonkeyPatch.context() as patch:
+        slow_down(patch)
+        stand = make(folder)
+        yield stand
+        stand.close()
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    yield from stand_of(plain_stand, tmp_path_factory.mktemp("plain"))
+
+
+@pytest.fixture(scope="module")
+def plotter(tmp_path_factory):
+    yield from stand_of(pyvista_stand, tmp_path_factory.mktemp("plotter"))
+
+
+@pytest.mark.parametrize(("mode", "key"), table(*Mode))
+def test_in_mid_drag(plain, mode, key):
+    plain.during(mode, key)
+
+
+@pytest.mark.parametrize("times", [1, 2])
+@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM))
+def test_while_the_pose_converges(plain, mode, key, times):
+    plain.just_after(mode, *[key] * times)
+
+
+@pytest.mark.parametrize(("mode", "key"), table(Mode.REGIONS, Mode.DEFORM))
+def test_during_a_job(plain, mode, key):
+    plain.in_a_job(mode, key)
+
+
+@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM))
+def test_in_mid_drag_in_a_plotter(plotter, mode, key):
+    plotter.during(mode, key)
+
+
+@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, campaign=True))
+def test_while_the_pose_converges_in_a_plotter(plotter, mode, key):
+    plotter.just_after(mode, key)
+
+
+@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, campaign=True))
+def test_during_a_job_in_a_plotter(plotter, mode, key):
+    plotter.in_a_job(mode, key)
+
+
+@pytest.mark.parametrize("during", [True, False])
+def test_the_first_look_at_volumes(plain, during):
+    plain.first_overlay(during=during)
+
+
+@pytest.mark.parametrize("during", [True, False])
+def test_the_end_of_a_film(plain, during):
+    plain.film_that_ends(during=during)

@@ -1,0 +1,49 @@
+"""Every key of the editor in mid-drag, while a pose converges, and during a job, in Qt.
+
+What is seen to hold is told in `key_moments`; here the panel is to be there again as well.
+"""
+
+from __future__ import annotations
+
+import pytest
+from key_moments import slow_down, table
+from qt_moments import QtStand
+
+from vtk_segdeform.widgets import Mode
+
+
+@pytest.fixture(
+    scope="module", params=["seldom-drawn", pytest.param("drawn", marks=pytest.mark.campaign)]
+)
+def stand(request, tmp_path_factory):
+    """Yield an editor that is used again and again."""
+    with pytest.MonkeyPatch.context() as patch:
+        slow_down(patch)
+        stand = QtStand(tmp_path_factory.mktemp("qt"), is_drawn=request.param == "drawn")
+        yield stand
+        stand.close()
+
+
+@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM))
+def test_in_mid_drag(stand, mode, key):
+    stand.during(mode, key)
+
+
+@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM))
+def test_while_the_pose_converges(stand, mode, key):
+    stand.just_after(mode, key)
+
+
+@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM))
+def test_during_a_job(stand, mode, key):
+    stand.in_a_job(mode, key)
+
+
+@pytest.mark.parametrize("during", [True, False])
+def test_the_first_look_at_volumes(stand, during):
+    stand.first_overlay(during=during)
+
+
+@pytest.mark.parametrize("during", [True, False])
+def test_the_end_of_a_film(stand, during):
+    stand.film_that_ends(during=during)
