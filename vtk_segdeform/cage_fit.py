@@ -33,7 +33,7 @@ from .progress import Progress, part, tell
 from .regions import Regions
 from .surface.columns import inside_points
 from .surface.inside import distance_to_surface
-from .threads import n_threads
+from .threads import n_threads, one_blas_thread
 
 _OFFSET = 0.4  # of sqrt(area of the region / vertices of its cage)
 _STEP = 0.27  # of the same: about thirty contour vertices for one of the cage
@@ -53,6 +53,7 @@ _SAMPLES = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)])
 _log = logging.getLogger(__name__)
 
 
+@one_blas_thread()
 def fit_cages(
     mesh: Mesh,
     regions: Regions,

@@ -113,6 +113,7 @@ class Deformer:
     _p: FloatArray  # (m, 3), the cages of the last pose, in the frame of the mesh's own
     _targets: FloatArray  # (k, 3), what it was for
 
+    @one_blas_thread()
     def __init__(
         self,
         mesh: Mesh,
@@ -175,6 +176,7 @@ class Deformer:
         self._take_hold(fixed, handle)
         tell(progress, 1.0, "ready")
 
+    @one_blas_thread()
     def hold(
         self,
         *,
@@ -212,11 +214,13 @@ class Deformer:
         """What the solver's steps hold: the volumes, and the surface they are taken over."""
         return self._volumes
 
+    @one_blas_thread()
     def passengers(self, points: ArrayLike, *, progress: Progress | None = None) -> Passengers:
         """Bind other points (k, 3) to the cages, to be moved with them; see `passengers`."""
         blend = self.regions.weights if self._own_blend is None else self._own_blend
         return board(self.mesh, blend, self.cages, points, progress=progress)
 
+    @one_blas_thread()
     def carry(self, points: ArrayLike) -> FloatArray:
         """Return where other points (k, 3), given at rest, are in the last pose.
 
@@ -225,6 +229,7 @@ class Deformer:
         p = self._outward(self._p)
         return self.passengers(points).moved([p[columns] for columns in self.subspace.columns])
 
+    @one_blas_thread()
     def surface(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
         """Return the mesh (n, 3) with its cages at *cage_vertices*, (m_r, 3) each: x = W~ p."""
         return self._placed(self._surface(self._stacked(cage_vertices) - self._centre))
@@ -238,6 +243,7 @@ class Deformer:
         p = self._inward(self._stacked(cage_vertices))
         self._begin(p, self._inward(checked_targets(targets, len(self.handle))))
 
+    @one_blas_thread()
     def solve(self, targets: ArrayLike, *, max_steps: int | None = None) -> Solution:
         """Return the pose whose handle vertices are at *targets*.
 
@@ -263,8 +269,7 @@ class Deformer:
                 "are both in the same unit?"
             )
         require_together(self._rest, goal, self._ends_of_fixed)
-        with one_blas_thread():
-            return self._solve(goal, max_steps)
+        return self._solve(goal, max_steps)
 
     def _solve(self, goal: FloatArray, max_steps: int | None) -> Solution:
         limit = self._options.max_steps if max_steps is None else max_steps
@@ -328,8 +333,7 @@ class Deformer:
         self._to_places = gathered[:, : len(self.handle)].tocsr()
         self._fixed_places = gathered[:, len(self.handle) :] @ self._rest.vertices[self.fixed]
         self._volumes = self._stand_in.volumes(self._constraints, self._rest.vertices)
-        with one_blas_thread():
-            self._at_rest = GaussNewton(self._energy, positions, self._volumes)
+        self._at_rest = GaussNewton(self._energy, positions, self._volumes)
         one = len(self._constraints) == 1 and self._keeps == (True, False)
         self._is_wide = one and self._stand_in.cells is not None and mesh.n_vertices > _WIDE
         held = self._rest.vertices[self.fixed] if len(self.fixed) else np.zeros((1, 3))

@@ -22,6 +22,7 @@ from .segmenting.borders import connected_parts, smooth_borders
 from .segmenting.coarse import Surface, coarsen
 from .segmenting.necks import Neck, best_neck
 from .segmenting.slices import fair_slice, quotas
+from .threads import one_blas_thread
 
 _POINTS = 3000  # of the coarse copy, about
 _POINTS_PER_REGION = 16  # at least
@@ -30,6 +31,7 @@ _OVERLAP = 0.1  # of a region's width, counted in edges
 _TIE_BREAK = 1e-3  # of an edge
 
 
+@one_blas_thread()
 def segment(
     mesh: Mesh,
     n_regions: int | None = None,
