@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
-from solids import icosphere, rotation
+from solids import exact_volume_change, icosphere, rotation
 
 from vtk_segdeform.acceleration import Anderson
 from vtk_segdeform.cage_fit import fit_cages
@@ -20,6 +20,7 @@ from vtk_segdeform.models import cactus
 from vtk_segdeform.regions import Regions, cage_distance_weights
 from vtk_segdeform.segmentation import segment
 from vtk_segdeform.solution import Status
+from vtk_segdeform.volume import signed_volume
 
 SCENE = sausage(2)
 VERTICES = SCENE.mesh.vertices
@@ -58,6 +59,20 @@ def test_far_from_the_origin_only_the_digits_of_the_coordinates_are_lost():
     error = np.abs(moved.vertices - shift - plain.vertices).max() / SCENE.mesh.diagonal
     assert error < 1e-6
     assert abs(moved.volume_change) < 1e-12
+
+
+@pytest.mark.parametrize("diagonals", [0.0, 10.0, 1e3, 1e5, 1e7])
+def test_the_volume_change_is_that_of_the_vertices_returned_wherever_the_mesh_is(diagonals):
+    shift = diagonals * SCENE.mesh.diagonal * np.array([0.6, -0.64, 0.48])
+    scene = SCENE.transformed(shift=shift)
+    solution = scene.deformer().solve(SCENE.turned(50) + shift)
+    x, faces = solution.vertices, scene.mesh.faces
+    true = exact_volume_change(scene.mesh.vertices, x, faces)
+    print(f"{diagonals:g} diagonals away: {solution.volume_change:.2e}, truly {true:.2e}")
+    assert abs(solution.volume_change - true) < 1e-14
+    # Rounding moves a vertex by half an ulp along each axis at most: not more than a shell of that.
+    shell = 2.0**-52 * np.abs(x).max() * scene.mesh.with_vertices(x).face_areas.sum()
+    assert abs(true) <= shell / signed_volume(scene.mesh.vertices, faces) + 1e-14
 
 
 @pytest.mark.parametrize("degrees", [30, 70, 120, 180])

@@ -312,7 +312,6 @@ class Deformer:
         return region_volumes(self._here, self.regions.labels)
 
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:
-        x = x - self._origin if self._origin.any() else x
         return np.array([each.relative(x) for each in self._region_volumes])
 
     def _take_hold(self, fixed: ArrayLike, handle: ArrayLike) -> None:
@@ -388,7 +387,7 @@ class Deformer:
 
     def _solution(self, result: Iteration, x: FloatArray, steps: int) -> Solution:
         p = self._p * self._size
-        near, x = x, self._placed(x)
+        x = self._placed(x)
         errors = partial(self._errors, self._targets)
         status = result.status
         if status is Status.CONVERGED and max(errors(x)) > _MET:
@@ -400,7 +399,7 @@ class Deformer:
             status=status,
             merits=result.merits,
             errors=errors,
-            volume=partial(self._total_volume.relative, near),  # before a far place rounds it
+            volume=partial(self._total_volume.relative, x),
             region_volumes=self._region_volume_changes,
         )
 
