@@ -182,7 +182,11 @@ def test_turning_scaling_and_moving_the_scene_does_just_that_to_the_answer(name)
         error = np.abs(((moved.vertices - shift) @ turned / scale) - plain.vertices).max()
         print(f"{name}, scale {scale:g}, shift {np.linalg.norm(shift):g}: {error:.1e}")
         assert error <= 1e-6 * mesh.diagonal
-        assert abs(moved.volume_change) <= 1e-12
+        # Far away the vertices themselves are rounded; the wire's volume is small for its area.
+        area = scene.with_vertices(moved.vertices).face_areas.sum()
+        rounding = 2.0**-52 * np.abs(moved.vertices).max() * area
+        volume = signed_volume(scene.vertices, scene.faces)
+        assert abs(moved.volume_change) <= 1e-13 + rounding / volume
 
 
 @pytest.mark.campaign
