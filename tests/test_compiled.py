@@ -199,3 +199,25 @@ def test_a_small_subspace_multiplied_in_one_call_is_the_sum_over_its_regions(twi
         assert subspace._is_small
         assert_allclose(quick, plain, rtol=1e-12, atol=1e-11)
     assert subspace.adjoints([]) == []
+
+
+@pytest.mark.parametrize("regions", [1, 5, 70])
+def test_what_reaches_a_vertex_is_found_by_regions_however_many_there_are(regions):
+    n = 400
+    rows = [np.sort(RNG.permutation(n)[: RNG.integers(0, 30)]) for _ in range(regions)]
+    rows[0] = np.arange(n)
+    subspace = Subspace(n, tuple(rows), tuple(RNG.normal(size=(len(own), 2)) for own in rows))
+    dense = subspace.map(np.eye(2 * regions))
+    membership = np.array([np.isin(np.arange(n), own) for own in rows])
+    alike = subspace.reached_alike()
+    kinds = np.unique(membership.T, axis=0)  # in this order: by the first region, then the second
+    assert len(alike) == len(kinds)
+    for ids, kind in zip(alike, kinds, strict=True):
+        assert_array_equal(ids, np.flatnonzero((kind == membership.T).all(axis=1)))
+        columns, w = subspace.reaching(ids)
+        assert_array_equal(columns, np.flatnonzero(np.repeat(kind, 2)))
+        assert_array_equal(w, dense[np.ix_(ids, columns)])
+    some = np.sort(RNG.permutation(n)[:50])
+    columns, w = subspace.reaching(some)
+    assert_array_equal(columns, np.flatnonzero(np.repeat(membership[:, some].any(axis=1), 2)))
+    assert_array_equal(w, dense[np.ix_(some, columns)])

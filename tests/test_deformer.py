@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from solids import exact_volume_change, icosphere, rotation
 
+from vtk_segdeform import rotations
 from vtk_segdeform.acceleration import Anderson
 from vtk_segdeform.cage_fit import fit_cages
 from vtk_segdeform.cages import Cage
@@ -377,3 +379,61 @@ def test_a_copy_goes_on_as_the_deformer_would_and_leaves_it_where_it_is():
     other.reset()
     other.solve(SCENE.turned(-10))
     assert_array_equal(deformer.solve(SCENE.turned(30)).vertices, ahead.vertices)
+
+
+def test_cages_with_more_vertices_than_can_be_solved_with_are_refused():
+    ball, faces = icosphere(4)
+    big = tuple(Cage(ball * [9.0, 3.0, 3.0], faces) for _ in SCENE.cages)
+    with pytest.raises(CageError, match="the cages have 2052 vertices; at most 1600 can be solved"):
+        Deformer(SCENE.mesh, SCENE.regions, big)
+
+
+def test_a_cancelled_solve_leaves_the_pose_before_it():
+    plain, work = SCENE.held(), SCENE.held()
+    first, second = SCENE.turned(20), SCENE.turned(60)
+    for deformer in (plain, work):
+        deformer.solve(first)
+    fractions = []
+
+    def stop(fraction, message):
+        assert message == "solving"
+        fractions.append(fraction)
+        if len(fractions) == 4:
+            raise Cancelled("enough")
+
+    with pytest.raises(Cancelled, match="enough"):
+        work.solve(second, progress=stop)
+    assert 0.0 == fractions[0] < fractions[1] < fractions[2] < fractions[3] < 1.0
+    assert_array_equal(work.carry(VERTICES[:50]), plain.carry(VERTICES[:50]))
+    solution = work.solve(second)
+    assert solution.status is Status.CONVERGED
+    assert_allclose(solution.vertices, plain.solve(second).vertices, atol=1e-4)
+
+
+def test_many_bodies_are_one_mesh():
+    # As many rotation groups at least as bodies, and a region for each if it is wanted.
+    ball, faces = icosphere(1)
+    grid = np.stack(np.meshgrid(*3 * [3.0 * np.arange(3)]), axis=-1).reshape(-1, 3)
+    vertices = np.concatenate([ball + place for place in grid])
+    mesh = Mesh(vertices, np.concatenate([faces + k * len(ball) for k in range(len(grid))]))
+    lift = [0.0, 0.0, 0.4]
+    for n_regions, n_cage_vertices in ((3, 60), (None, 8 * len(grid))):
+        regions = segment(mesh, n_regions)
+        assert regions.n_regions == (n_regions or len(grid))
+        cages = fit_cages(mesh, regions, n_cage_vertices)
+        top = np.flatnonzero(vertices[:, 2] > 5.5)
+        deformer = Deformer(mesh, regions, cages, fixed=vertices[:, 2] < 0.5, handle=top)
+        solution = deformer.solve(vertices[top] + lift)
+        assert abs(solution.volume_change) < 1e-12
+        assert solution.handle_error < 1e-3
+        assert len(np.unique(mesh.components[top])) == 9
+
+
+def test_small_groups_of_vertices_are_told_apart_without_starting_threads(monkeypatch):
+    started = []
+    monkeypatch.setattr(threading.Thread, "start", started.append)
+    monkeypatch.setattr(rotations, "n_threads", lambda: 2)
+    parts = np.repeat(np.arange(200), 40)
+    groups = rotations.rotation_groups(np.random.default_rng(0).random((8000, 3)), parts, 300)
+    assert len(np.unique(groups)) >= 200
+    assert not started

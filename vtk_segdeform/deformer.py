@@ -14,6 +14,7 @@ Long because every option of the method meets here, and each is told in the docs
 from __future__ import annotations
 
 import copy
+import itertools
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -27,7 +28,7 @@ from .arrays import FloatArray, as_points, is_number, is_whole
 from .binding import Binder
 from .cages import Cage
 from .constraints import VolumeConstraint, Volumes, region_volumes, total_volume
-from .errors import ArgumentError, CageError, ConstraintError, RegionError
+from .errors import ArgumentError, CageError, Cancelled, ConstraintError, RegionError
 from .iteration import Iteration, SolverOptions
 from .landing import LargeSurface, along
 from .mesh import Mesh, require_mesh
@@ -55,6 +56,7 @@ _FAR = 1e3  # mesh sizes
 _NONE = np.zeros(0, dtype=np.int64)
 _WIDE = 20_000  # vertices beyond which mapping directions too is what takes long
 _LANDINGS, _NEAR, _SAME = 4, 3e-5, 1e-7  # times it is gone on to that scale; and one of rounding
+_LEFT = 0.97  # of a solve after a step, as progress tells it
 _MET = 1e-3  # diagonals within which a vertex counts as in its place
 
 
@@ -244,7 +246,13 @@ class Deformer:
         self._begin(p, self._inward(checked_targets(targets, len(self.handle))))
 
     @one_blas_thread()
-    def solve(self, targets: ArrayLike, *, max_steps: int | None = None) -> Solution:
+    def solve(
+        self,
+        targets: ArrayLike,
+        *,
+        max_steps: int | None = None,
+        progress: Progress | None = None,
+    ) -> Solution:
         """Return the pose whose handle vertices are at *targets*.
 
         Parameters
@@ -255,6 +263,8 @@ class Deformer:
         max_steps : int, optional
             Instead of the deformer's own limit, for the last leg: a drag may stop early and go
             on with the next event.
+        progress : Progress, optional
+            Called before every step; may cancel, and the pose is then the one before the call.
 
         Raises
         ------
@@ -269,11 +279,18 @@ class Deformer:
                 "are both in the same unit?"
             )
         require_together(self._rest, goal, self._ends_of_fixed)
-        return self._solve(goal, max_steps)
+        before = self._p, self._targets
+        try:
+            return self._solve(goal, max_steps, _counting(progress))
+        except Cancelled:
+            self._begin(*before)
+            raise
 
-    def _solve(self, goal: FloatArray, max_steps: int | None) -> Solution:
+    def _solve(
+        self, goal: FloatArray, max_steps: int | None, progress: Progress | None
+    ) -> Solution:
         limit = self._options.max_steps if max_steps is None else max_steps
-        options = replace(self._options, max_steps=limit)
+        options = replace(self._options, max_steps=limit, progress=progress)
         *way, _ = waypoints(self._targets, goal, self._handles)
         on_the_way = replace(options, tolerance=_LEG_TOLERANCE, max_steps=_LEG_STEPS)
         steps = sum(self._ladder.hurry(self._places(leg), on_the_way).steps for leg in way)
@@ -416,3 +433,15 @@ class Deformer:
         outside: FloatArray = points * self._size
         outside += self._centre
         return outside
+
+
+def _counting(progress: Progress | None) -> Progress | None:
+    """Return a progress for steps of which nobody knows how many there will be."""
+    if progress is None:
+        return None
+    steps = itertools.count()
+
+    def report(_: float, message: str) -> None:
+        progress(1.0 - _LEFT ** next(steps), message)
+
+    return report

@@ -128,7 +128,10 @@ def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -
     for label, ids in enumerate(components):
         labels[ids] = label
     necks: list[Neck | None]
-    necks = [best_neck(*alone(label)[1:], share) for label in range(len(components))]
+    necks = []
+    for label in range(len(components)):
+        necks.append(best_neck(*alone(label)[1:], share))
+        tell(progress, 0.1 + 0.2 * len(necks) / len(components), "looking for limbs")
     while len(necks) < wanted:
         ranks = [np.inf if neck is None else neck.rank for neck in necks]
         label = int(np.argmin(ranks))
@@ -138,7 +141,7 @@ def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -
         labels[np.flatnonzero(labels == label)[neck.inside]] = len(necks)
         necks[label] = best_neck(*alone(label)[1:], share)
         necks.append(best_neck(*alone(len(necks))[1:], share))
-        tell(progress, 0.1 + 0.4 * min(1.0, len(necks) / min(wanted, 20)), "cutting off limbs")
+        tell(progress, 0.3 + 0.2 * min(1.0, len(necks) / min(wanted, 20)), "cutting off limbs")
 
     count = len(necks)
     areas = np.bincount(labels, surface.areas).astype(float)
