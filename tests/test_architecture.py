@@ -20,9 +20,9 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 # One line per part of the story; a new file takes its place here.
 STORY = [
     # a checked mesh
-    "errors", "arrays", "progress", "threads", "compiled.volumes", "compiled.products",
-    "compiled.patch_products", "compiled.normals", "compiled.rotations", "compiled.triangles",
-    "compiled.coordinates", "fast",
+    "errors", "arrays", "progress", "threads", "compiled.kernels", "compiled.volumes",
+    "compiled.products", "compiled.patch_products", "compiled.normals", "compiled.rotations",
+    "compiled.triangles", "compiled.coordinates", "fast",
     "surface.counting", "surface.topology", "surface.manifold", "surface.inside", "surface.columns",
     "surface.intersections", "surface.report", "surface.shells", "faults", "mesh", "surface.holes",
     "surface.splitting", "surface.repair_steps", "repair",
@@ -101,9 +101,6 @@ STORY = [
 
 NUMERIC = {"numpy", "scipy"}
 VTK = {"vtkmodules"}
-KERNELS = (
-    "volumes", "products", "patch_products", "normals", "rotations", "triangles", "coordinates",
-)  # fmt: skip
 PANEL = {"controls", "modes", "painting", "regions", "handles", "options", "foot", "log", "panel"}
 PROGRAM = {
     "keeper", "opening", "start_page", "drops", "pages", "asking", "saving", "menus", "window",
@@ -112,7 +109,7 @@ PROGRAM = {
 GRANTED = {
     "threads": {"threadpoolctl"},
     "gpu": {"cupy", "torch"},
-    **{f"compiled.{name}": {"numba"} for name in KERNELS},
+    "compiled.kernels": {"numba"},
     "caging.contour": VTK,
     "modelling.implicit": VTK,
     "formats.polygons": VTK | {"pyvista"},

@@ -29,6 +29,7 @@ from .binding import Binder
 from .cages import Cage
 from .constraints import VolumeConstraint, Volumes, region_volumes, total_volume
 from .errors import ArgumentError, CageError, Cancelled, ConstraintError, RegionError
+from .fast import compiled
 from .iteration import Iteration, SolverOptions
 from .landing import LargeSurface, along
 from .mesh import Mesh, require_mesh
@@ -57,6 +58,7 @@ _NONE = np.zeros(0, dtype=np.int64)
 _WIDE = 20_000  # vertices beyond which mapping directions too is what takes long
 _LANDINGS, _NEAR, _SAME = 4, 3e-5, 1e-7  # times it is gone on to that scale; and one of rounding
 _LEFT = 0.97  # of a solve after a step, as progress tells it
+_TRIAL = 1e-4  # mesh sizes
 _MET = 1e-3  # diagonals within which a vertex counts as in its place
 
 
@@ -176,6 +178,9 @@ class Deformer:
         )
         self._keep(preserve_volume, preserve_region_volumes)
         self._take_hold(fixed, handle)
+        if compiled(mesh.n_vertices):
+            tell(progress, 0.99, "trying a step")
+            self._try_a_step()
         tell(progress, 1.0, "ready")
 
     @one_blas_thread()
@@ -308,6 +313,12 @@ class Deformer:
             steps += result.steps
             x, missed = self._landed(result)
         return self._solution(result, x, steps)
+
+    def _try_a_step(self) -> None:
+        """Load the kernels, or at their first use ever compile them, before the first frame."""
+        handle = [0]
+        targets = self.mesh.vertices[handle] + _TRIAL * self._size
+        self.hold(handle=handle).solve(targets, max_steps=1)
 
     def _stacked(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
         poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
