@@ -7,14 +7,16 @@ process compiles for itself.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numba
 
 
-def kernel(**options):
+def kernel(**options: Any) -> Any:
     """Return a decorator that compiles a function with numba's *options* at its first call."""
     options = {"nogil": True, "error_model": "numpy", **options}
 
-    def compiled(function):
+    def compiled(function: Any) -> Any:
         try:
             return numba.njit(cache=True, **options)(function)
         except RuntimeError:  # no folder to keep it in
