@@ -84,7 +84,7 @@ $(VENV)/installed: setup.cfg pyproject.toml | $(BIN)/python
 	@touch $@
 
 $(VENV)/installed-test: setup.cfg pyproject.toml | $(BIN)/python
-	$(PIP) install --editable '.[test,qt,meshlab,fast]'
+	$(PIP) install --editable '.[test,app,meshlab]'
 	@touch $@ $(VENV)/installed
 
 $(VENV)/installed-docs: setup.cfg pyproject.toml | $(BIN)/python

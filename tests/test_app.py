@@ -629,7 +629,7 @@ def test_without_qt_one_sentence_says_how_to_get_it(missing, monkeypatch, capsys
     monkeypatch.setitem(sys.modules, missing, None)
     assert main(["app"]) == 1
     (line,) = capsys.readouterr().err.splitlines()
-    assert "pip install 'vtk-segdeform[qt]' PySide6" in line
+    assert "pip install 'vtk-segdeform[app]'" in line
 
 
 def test_without_a_screen_that_is_said(capsys):

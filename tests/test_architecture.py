@@ -21,9 +21,8 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 STORY = [
     # a checked mesh
     "errors", "arrays", "progress", "lock", "regular_file", "atomic", "threads",
-    "compiled.volumes", "compiled.products",
-    "compiled.patch_products", "compiled.normals", "compiled.rotations", "compiled.triangles",
-    "compiled.coordinates", "fast",
+    "compiled.kernels", "compiled.volumes", "compiled.products", "compiled.patch_products",
+    "compiled.normals", "compiled.rotations", "compiled.triangles", "compiled.coordinates", "fast",
     "surface.counting", "surface.topology", "surface.manifold", "surface.inside", "surface.columns",
     "surface.intersections", "surface.report", "surface.shells", "faults", "mesh", "surface.holes",
     "surface.splitting", "surface.repair_steps", "repair",
@@ -103,9 +102,6 @@ STORY = [
 
 NUMERIC = {"numpy", "scipy"}
 VTK = {"vtkmodules"}
-KERNELS = (
-    "volumes", "products", "patch_products", "normals", "rotations", "triangles", "coordinates",
-)  # fmt: skip
 PANEL = {"controls", "modes", "painting", "regions", "handles", "options", "foot", "log", "panel"}
 PROGRAM = {
     "keeper", "opening", "start_page", "drops", "pages", "asking", "saving", "menus", "window",
@@ -114,7 +110,7 @@ PROGRAM = {
 GRANTED = {
     "threads": {"threadpoolctl"},
     "gpu": {"cupy", "torch"},
-    **{f"compiled.{name}": {"numba"} for name in KERNELS},
+    "compiled.kernels": {"numba"},
     "caging.contour": VTK,
     "modelling.implicit": VTK,
     "formats.polygons": VTK | {"pyvista"},

@@ -179,7 +179,7 @@ def test_the_ellipsoid_of_a_patch_is_a_cage_around_it(mesh, n):
 
 def test_what_makes_no_cage_is_refused_with_a_reason():
     mesh = Mesh(*icosphere(2))
-    with pytest.raises(CageError, match=r"at least 8 .* for each of 3 regions, 24 to 6000; got 23"):
+    with pytest.raises(CageError, match="24 to 1600, at least 8 for each of 3 regions; got 23"):
         fit_cages(mesh, thirds(mesh), 23)
     with pytest.raises(CageError, match="offset must be a positive length; got -1"):
         fit_cage(mesh, [0, 1, 2], 12, offset=-1.0)
@@ -280,3 +280,18 @@ def test_cavities_are_filled_and_islands_that_hold_nothing_are_sunk():
     assert_array_equal(filled < 1.5, expected)
     assert n_shells == 1
     assert _filled(values, 1.5, np.array([[3.0, 3.0, 3.0], [15.0, 4.0, 4.0]]))[1] == 2
+
+
+def test_more_cage_vertices_than_can_be_solved_with_are_refused_before_any_work():
+    mesh = Mesh(*icosphere(4))
+    reports = []
+
+    def progress(fraction, message):
+        reports.append(message)
+
+    with pytest.raises(CageError, match="n_vertices must be 24 to 1600, at least 8 for each of 3"):
+        fit_cages(mesh, thirds(mesh), 5000, progress=progress)
+    many = Regions.from_labels(mesh, np.arange(mesh.n_vertices) % 300, overlap=0)
+    with pytest.raises(CageError, match=r"300 regions need 2400 .* use 200 regions or fewer"):
+        fit_cages(mesh, many, 3000, progress=progress)
+    assert reports == []

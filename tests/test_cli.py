@@ -274,6 +274,25 @@ def test_debug_shows_where_an_error_came_from():
         main(["--debug", "check", "no-such-file.ply"])
 
 
+@pytest.mark.parametrize(
+    ("missing", "advice"),
+    [
+        (set(), ""),
+        ({"numba"}, "numba is not installed: frames take 3 to 6 times as long. pip install numba"),
+        (
+            {"numba", "threadpoolctl"},
+            "numba and threadpoolctl are not installed: frames take 3 to 6 times as long. "
+            "pip install numba threadpoolctl",
+        ),
+    ],
+)
+def test_version_says_what_speed_lacks(missing, advice, monkeypatch, capsys):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name in missing else name)
+    assert main(["--version"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines == [f"segdeform {vtk_segdeform.__version__}", *filter(None, [advice])]
+
+
 def test_version_and_help_end_well(capsys):
     assert main(["--version"]) == 0
     assert vtk_segdeform.__version__ in capsys.readouterr().out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import threading
 import time
 
@@ -11,9 +12,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from vtk_segdeform import fast, models, threads
 from vtk_segdeform.blocks import add_product, adjoint_product
+from vtk_segdeform.cage_fit import fit_cages
 from vtk_segdeform.curvature import Factor
+from vtk_segdeform.deformer import Deformer
 from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.mean_value import mean_value_coordinates
+from vtk_segdeform.regions import Regions
 from vtk_segdeform.rotations import closest_rotations
 from vtk_segdeform.subspace import Subspace
 from vtk_segdeform.volume import signed_volume, volume_along, volume_gradient
@@ -199,3 +203,56 @@ def test_a_small_subspace_multiplied_in_one_call_is_the_sum_over_its_regions(twi
         assert subspace._is_small
         assert_allclose(quick, plain, rtol=1e-12, atol=1e-11)
     assert subspace.adjoints([]) == []
+
+
+@pytest.mark.parametrize("regions", [1, 5, 70])
+def test_what_reaches_a_vertex_is_found_by_regions_however_many_there_are(regions):
+    n = 400
+    rows = [np.sort(RNG.permutation(n)[: RNG.integers(0, 30)]) for _ in range(regions)]
+    rows[0] = np.arange(n)
+    subspace = Subspace(n, tuple(rows), tuple(RNG.normal(size=(len(own), 2)) for own in rows))
+    dense = subspace.map(np.eye(2 * regions))
+    membership = np.array([np.isin(np.arange(n), own) for own in rows])
+    alike = subspace.reached_alike()
+    kinds = np.unique(membership.T, axis=0)  # in this order: by the first region, then the second
+    assert len(alike) == len(kinds)
+    for ids, kind in zip(alike, kinds, strict=True):
+        assert_array_equal(ids, np.flatnonzero((kind == membership.T).all(axis=1)))
+        columns, w = subspace.reaching(ids)
+        assert_array_equal(columns, np.flatnonzero(np.repeat(kind, 2)))
+        assert_array_equal(w, dense[np.ix_(ids, columns)])
+    some = np.sort(RNG.permutation(n)[:50])
+    columns, w = subspace.reaching(some)
+    assert_array_equal(columns, np.flatnonzero(np.repeat(membership[:, some].any(axis=1), 2)))
+    assert_array_equal(w, dense[np.ix_(some, columns)])
+
+
+def test_without_a_folder_to_keep_kernels_in_they_are_compiled_all_the_same(monkeypatch):
+    caching = pytest.importorskip("numba.core.caching")
+    kernels = importlib.import_module("vtk_segdeform.compiled.kernels")
+    monkeypatch.setattr(caching.CompileResultCacheImpl, "_locator_classes", [])
+    twice = kernels.kernel()(lambda x: x + x)
+    assert twice(1.5) == 3.0
+    assert twice.signatures
+
+
+def test_set_up_tries_a_step_so_that_the_first_frame_waits_for_no_kernel(monkeypatch):
+    pytest.importorskip("numba")
+    mesh = models.torus(3000)
+    regions = Regions.single(mesh)
+    cages = fit_cages(mesh, regions, 60)
+    loaded, messages = [], []
+    for name in fast._kernels().__all__:
+        own = getattr(fast._kernels(), name)
+
+        def called(*arguments, own=own):
+            loaded.append((own, *(type(each) for each in arguments)))
+            return own(*arguments)
+
+        monkeypatch.setattr(fast._kernels(), name, called)
+    deformer = Deformer(mesh, regions, cages, progress=lambda _, text: messages.append(text))
+    assert messages[-2:] == ["trying a step", "ready"]
+    before = set(loaded)
+    held = deformer.hold(fixed=mesh.vertices[:, 0] < -1.0, handle=[0, 1, 2])
+    assert held.solve(mesh.vertices[:3] + [0.1, 0.0, 0.0]).steps > 0
+    assert set(loaded) == before

@@ -31,6 +31,17 @@ def test_region_volumes_do_not_change_when_the_mesh_is_moved():
         assert abs(constraint.violation(moved)) < 1e-12 * constraint.target
 
 
+def test_region_volumes_keep_their_digits_far_from_the_origin():
+    # Coordinates of 30 binary digits, so that moving the mesh rounds nothing.
+    mesh = MESH.with_vertices(np.round(MESH.vertices * 2.0**28) / 2.0**28)
+    bent = np.round((mesh.vertices + wobble()) * 2.0**28) / 2.0**28
+    far = np.array([2.0**22, -(2.0**21), 2.0**22])
+    near = region_volumes(mesh, SCENE.regions.labels)
+    moved = region_volumes(mesh.with_vertices(mesh.vertices + far), SCENE.regions.labels)
+    expected = [each.relative(bent) for each in near]
+    assert_allclose([each.relative(bent + far) for each in moved], expected, atol=1e-14)
+
+
 def test_a_slab_has_the_volume_of_a_slab():
     # The middle region of a bar-like solid: cut by planes, its volume is known from the thirds.
     constraints = region_volumes(MESH, SCENE.regions.labels)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
-from solids import icosphere, rotation
+from solids import exact_volume_change, icosphere, rotation
 
+from vtk_segdeform import rotations
 from vtk_segdeform.acceleration import Anderson
 from vtk_segdeform.cage_fit import fit_cages
 from vtk_segdeform.cages import Cage
@@ -20,6 +22,7 @@ from vtk_segdeform.models import cactus
 from vtk_segdeform.regions import Regions, cage_distance_weights
 from vtk_segdeform.segmentation import segment
 from vtk_segdeform.solution import Status
+from vtk_segdeform.volume import signed_volume
 
 SCENE = sausage(2)
 VERTICES = SCENE.mesh.vertices
@@ -58,6 +61,20 @@ def test_far_from_the_origin_only_the_digits_of_the_coordinates_are_lost():
     error = np.abs(moved.vertices - shift - plain.vertices).max() / SCENE.mesh.diagonal
     assert error < 1e-6
     assert abs(moved.volume_change) < 1e-12
+
+
+@pytest.mark.parametrize("diagonals", [0.0, 10.0, 1e3, 1e5, 1e7])
+def test_the_volume_change_is_that_of_the_vertices_returned_wherever_the_mesh_is(diagonals):
+    shift = diagonals * SCENE.mesh.diagonal * np.array([0.6, -0.64, 0.48])
+    scene = SCENE.transformed(shift=shift)
+    solution = scene.deformer().solve(SCENE.turned(50) + shift)
+    x, faces = solution.vertices, scene.mesh.faces
+    true = exact_volume_change(scene.mesh.vertices, x, faces)
+    print(f"{diagonals:g} diagonals away: {solution.volume_change:.2e}, truly {true:.2e}")
+    assert abs(solution.volume_change - true) < 1e-14
+    # Rounding moves a vertex by half an ulp along each axis at most: not more than a shell of that.
+    shell = 2.0**-52 * np.abs(x).max() * scene.mesh.with_vertices(x).face_areas.sum()
+    assert abs(true) <= shell / signed_volume(scene.mesh.vertices, faces) + 1e-14
 
 
 @pytest.mark.parametrize("degrees", [30, 70, 120, 180])
@@ -362,3 +379,61 @@ def test_a_copy_goes_on_as_the_deformer_would_and_leaves_it_where_it_is():
     other.reset()
     other.solve(SCENE.turned(-10))
     assert_array_equal(deformer.solve(SCENE.turned(30)).vertices, ahead.vertices)
+
+
+def test_cages_with_more_vertices_than_can_be_solved_with_are_refused():
+    ball, faces = icosphere(4)
+    big = tuple(Cage(ball * [9.0, 3.0, 3.0], faces) for _ in SCENE.cages)
+    with pytest.raises(CageError, match="the cages have 2052 vertices; at most 1600 can be solved"):
+        Deformer(SCENE.mesh, SCENE.regions, big)
+
+
+def test_a_cancelled_solve_leaves_the_pose_before_it():
+    plain, work = SCENE.held(), SCENE.held()
+    first, second = SCENE.turned(20), SCENE.turned(60)
+    for deformer in (plain, work):
+        deformer.solve(first)
+    fractions = []
+
+    def stop(fraction, message):
+        assert message == "solving"
+        fractions.append(fraction)
+        if len(fractions) == 4:
+            raise Cancelled("enough")
+
+    with pytest.raises(Cancelled, match="enough"):
+        work.solve(second, progress=stop)
+    assert 0.0 == fractions[0] < fractions[1] < fractions[2] < fractions[3] < 1.0
+    assert_array_equal(work.carry(VERTICES[:50]), plain.carry(VERTICES[:50]))
+    solution = work.solve(second)
+    assert solution.status is Status.CONVERGED
+    assert_allclose(solution.vertices, plain.solve(second).vertices, atol=1e-4)
+
+
+def test_many_bodies_are_one_mesh():
+    # As many rotation groups at least as bodies, and a region for each if it is wanted.
+    ball, faces = icosphere(1)
+    grid = np.stack(np.meshgrid(*3 * [3.0 * np.arange(3)]), axis=-1).reshape(-1, 3)
+    vertices = np.concatenate([ball + place for place in grid])
+    mesh = Mesh(vertices, np.concatenate([faces + k * len(ball) for k in range(len(grid))]))
+    lift = [0.0, 0.0, 0.4]
+    for n_regions, n_cage_vertices in ((3, 60), (None, 8 * len(grid))):
+        regions = segment(mesh, n_regions)
+        assert regions.n_regions == (n_regions or len(grid))
+        cages = fit_cages(mesh, regions, n_cage_vertices)
+        top = np.flatnonzero(vertices[:, 2] > 5.5)
+        deformer = Deformer(mesh, regions, cages, fixed=vertices[:, 2] < 0.5, handle=top)
+        solution = deformer.solve(vertices[top] + lift)
+        assert abs(solution.volume_change) < 1e-12
+        assert solution.handle_error < 1e-3
+        assert len(np.unique(mesh.components[top])) == 9
+
+
+def test_small_groups_of_vertices_are_told_apart_without_starting_threads(monkeypatch):
+    started = []
+    monkeypatch.setattr(threading.Thread, "start", started.append)
+    monkeypatch.setattr(rotations, "n_threads", lambda: 2)
+    parts = np.repeat(np.arange(200), 40)
+    groups = rotations.rotation_groups(np.random.default_rng(0).random((8000, 3)), parts, 300)
+    assert len(np.unique(groups)) >= 200
+    assert not started

@@ -437,6 +437,17 @@ def test_the_card_of_keys_comes_and_goes(desk):
         assert_array_equal(picture(desk.view), without)
 
 
+def test_without_numba_the_line_says_so_until_something_is_done(monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "numba" else name)
+    made = Desk(plain_view((500, 400)), sausage().mesh)
+    said = "numba is not installed: frames take 3 to 6 times as long. pip install numba"
+    assert made.editor.status.startswith(said)
+    made.type("1")
+    assert made.editor.status
+    assert "numba" not in made.editor.status
+    made.editor.remove()
+
+
 def test_what_goes_wrong_is_said_until_something_succeeds(desk):
     desk.hand.click(desk.hand.at([-2.0, 0.0, 0.0]), control=True)  # out of the only region there
     assert "in no region but region 1" in desk.editor.status

@@ -46,11 +46,26 @@ def imported_by(folder: str) -> set[str]:
 
 def test_every_library_imported_is_declared(setup_cfg):
     declared = names_in(setup_cfg["options"]["install_requires"])
-    for extra in ("meshlab", "qt", "fast"):
+    for extra in ("meshlab", "qt"):
         declared |= names_in(setup_cfg["options.extras_require"][extra])
     used = imported_by("vtk_segdeform") | imported_by("widgets")
     used -= {"paraview"}  # where it is, it runs us; no package has it
     assert {LIBRARY_OF.get(name, name) for name in used} <= declared
+
+
+def test_a_plain_install_brings_what_makes_it_fast(setup_cfg):
+    required = setup_cfg["options"]["install_requires"]
+    assert {"numba", "threadpoolctl"} <= names_in(required)
+    # Where numba has no wheel, pip would try to build LLVM: a marker keeps it away.
+    numba = [line for line in required.splitlines() if line.startswith("numba")]
+    assert all("python_version<" in line for line in numba)
+    assert "fast" not in setup_cfg["options.extras_require"]
+
+
+def test_one_extra_brings_all_of_the_desktop_program(setup_cfg):
+    app = setup_cfg["options.extras_require"]["app"]
+    assert {"PySide6-Essentials", "pyvistaqt", "qtpy"} <= names_in(app)
+    assert '!=6.12.0; python_version<"3.12"' in app
 
 
 def test_every_folder_with_code_is_a_declared_package(setup_cfg):

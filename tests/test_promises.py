@@ -147,6 +147,16 @@ def test_the_botsch_sorkine_poses_keep_volume_where_arap_loses_it(name, most):
         f"distortion {ours_distortion:.4f}"
     )
 
+    free = sd.deform(
+        mesh, fixed, handle, targets, n_regions=3, n_cage_vertices=200, preserve_volume=False
+    )
+    free_distortion = distortion(mesh, free.vertices)
+    gain = 1.0 - free_distortion / ours_distortion
+    print(
+        f"{name}: with preserve_volume=False volume {free.volume_change:+.3f}, "
+        f"distortion {free_distortion:.4f}, lower by {100.0 * gain:.1f} %"
+    )
+
     begin = time.perf_counter()
     arap = igl.ARAPData()
     arap.max_iter = 200
@@ -164,6 +174,8 @@ def test_the_botsch_sorkine_poses_keep_volume_where_arap_loses_it(name, most):
     assert lost < 0.95
     assert max(ours.handle_error, ours.fixed_error) <= 1e-3
     assert ours_distortion <= most
+    assert free.volume_change < -0.02
+    assert 0.0 < gain < 0.1  # not the volume is what ARAP's distortion is paid with
 
 
 @pytest.mark.parametrize(
@@ -182,7 +194,11 @@ def test_turning_scaling_and_moving_the_scene_does_just_that_to_the_answer(name)
         error = np.abs(((moved.vertices - shift) @ turned / scale) - plain.vertices).max()
         print(f"{name}, scale {scale:g}, shift {np.linalg.norm(shift):g}: {error:.1e}")
         assert error <= 1e-6 * mesh.diagonal
-        assert abs(moved.volume_change) <= 1e-12
+        # Far away the vertices themselves are rounded; the wire's volume is small for its area.
+        area = scene.with_vertices(moved.vertices).face_areas.sum()
+        rounding = 2.0**-52 * np.abs(moved.vertices).max() * area
+        volume = signed_volume(scene.vertices, scene.faces)
+        assert abs(moved.volume_change) <= 1e-13 + rounding / volume
 
 
 @pytest.mark.campaign

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
-from solids import icosphere, rotation
+from solids import exact_volume_change, icosphere, rotation
 
 from vtk_segdeform.cages import Cage
 from vtk_segdeform.deformer import Deformer
@@ -23,6 +23,7 @@ from vtk_segdeform.session import Session
 from vtk_segdeform.solution import Status
 from vtk_segdeform.subspace import bind
 from vtk_segdeform.volume import signed_volume
+from vtk_segdeform.widgets.colouring.region_volumes import RegionVolumes
 
 SCENE = sausage(2)
 VERTICES = SCENE.mesh.vertices
@@ -746,6 +747,32 @@ def test_far_from_the_origin_a_pose_keeps_its_volume():
         session.drag(scene.turned(degrees, about=shift), max_steps=3)
         assert abs(session.volume_change) < 1e-10
         session.commit()
+
+
+@pytest.mark.parametrize("diagonals", [0.0, 1e5])
+def test_the_volume_change_is_that_of_the_vertices_after_a_drag_and_after_loading(diagonals):
+    shift = diagonals * SCENE.mesh.diagonal * np.array([0.6, -0.64, 0.48])
+    scene = SCENE.transformed(shift=shift)
+    session = Session(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.set_fixed(scene.fixed)
+    session.add_handle(scene.handle)
+    solution = session.drag(scene.turned(40, about=shift))
+    session.commit()
+    loaded = Session(scene.mesh, state=session.state)
+    assert loaded.solution is None
+    for told, x in (
+        (solution.volume_change, solution.vertices),
+        (session.volume_change, session.vertices),
+        (loaded.volume_change, loaded.vertices),
+    ):
+        true = exact_volume_change(scene.mesh.vertices, x, scene.mesh.faces)
+        print(f"{diagonals:g} diagonals away: {told:.2e}, truly {true:.2e}")
+        assert abs(told - true) < 1e-14
+    shares = RegionVolumes(session).changes()
+    assert shares == list(enumerate(solution.region_volume_change))
+    assert_allclose(dict(RegionVolumes(loaded).changes())[0], shares[0][1], rtol=1e-12)
 
 
 ODD = [

@@ -93,7 +93,7 @@ class Binder:
         if groups is not None and energy.exact:
             faces = [cage.faces for cage in self.cages]
             energy = with_cage_stiffness(energy, self.rest_cages, faces, groups)
-            energy = self._joined(energy, groups)
+            energy = self._joined(energy, groups, part(progress, 0.85, 0.86))
         share, whole = part(progress, 0.86, 0.9), energy.turns_vertices
         stand_in = StandIn.of(self.regions.mesh, subspace, whole=whole, progress=share)
         patches = None
@@ -118,7 +118,7 @@ class Binder:
         component = self.regions.mesh.components
         return np.asarray(self.regions.labels * (int(component.max()) + 1) + component)
 
-    def _joined(self, energy: Energy, groups: IntArray) -> Energy:
+    def _joined(self, energy: Energy, groups: IntArray, progress: Progress | None) -> Energy:
         """Return *energy* with as many rotations as asked for."""
         assert self.n_groups is not None
         counts = np.bincount(groups)
@@ -127,7 +127,8 @@ class Binder:
         means = np.stack([np.bincount(groups, x) / counts for x in self.rest.vertices.T], axis=1)
         parts = np.zeros(len(counts), dtype=np.int64)
         parts[groups] = self._parts
-        return join_rotations(energy, self.rest_cages, (means, parts, counts), self.n_groups)[0]
+        bits = means, parts, counts
+        return join_rotations(energy, self.rest_cages, bits, self.n_groups, progress=progress)[0]
 
     def _name(self) -> str:
         """Return a name that is the same exactly when the binding is."""

@@ -23,7 +23,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from .arrays import FloatArray, IntArray, as_ids, is_number, is_whole
-from .cages import Cage, cage_faults
+from .cages import MOST_CAGE_VERTICES, Cage, cage_faults
 from .caging.cage_simplify import roundness, simplify
 from .caging.contour import contour_surface
 from .caging.region_solid import Patch, Skin, SolidField, solid_field
@@ -33,7 +33,7 @@ from .progress import Progress, part, tell
 from .regions import Regions
 from .surface.columns import inside_points
 from .surface.inside import distance_to_surface
-from .threads import n_threads
+from .threads import n_threads, one_blas_thread
 
 _OFFSET = 0.4  # of sqrt(area of the region / vertices of its cage)
 _STEP = 0.27  # of the same: about thirty contour vertices for one of the cage
@@ -41,7 +41,7 @@ _LARGER = 1.25  # attempt k = 0, 1, ... is made at 1.25^(k (k + 1) / 2) times th
 _ATTEMPTS = 8  # 1, 1.25, 2, 4, 9, 28, 108, 517
 _ROUND, _NEAR = 0.2, 0.2  # or more: a good cage's worst face; the skin from it, in offsets
 _NODES, _NODES_PER_VERTEX = 3e5, 1e3  # of the grid: the larger is the most it may have
-_FEWEST, _MOST = 8, 2000  # vertices of a cage
+_FEWEST = 8  # vertices of a cage
 _SHELL = 6  # vertices, at least, of each part of a cage that is in parts
 _FLOOR = 12  # vertices that every region gets before the rest is shared out
 _CLEARANCE = 0.5  # of the offset: the least distance from the skin that faces are pushed to
@@ -53,6 +53,7 @@ _SAMPLES = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)])
 _log = logging.getLogger(__name__)
 
 
+@one_blas_thread()
 def fit_cages(
     mesh: Mesh,
     regions: Regions,
@@ -70,8 +71,8 @@ def fit_cages(
     regions : Regions
         Of that mesh, r of them.
     n_vertices : int
-        Of all cages together, met exactly; at least 8 for each region.  Shared out by area and
-        shape: large and long regions get more.
+        Of all cages together, met exactly; at least 8 for each region, and at most 1600.  Shared
+        out by area and shape: large and long regions get more.
     offset : float, optional
         How far the cages stay from the skin, about, in the mesh's unit.  By default, for each
         region, 0.4 sqrt(area / vertices of its cage).  It is raised where no valid cage is
@@ -87,10 +88,11 @@ def fit_cages(
     Raises
     ------
     CageError
-        If *n_vertices* is too small or *offset* is not positive.
+        If *n_vertices* is too small or too large, or *offset* is not positive.
     """
     require_mesh(mesh)
     patches, n_regions = [], regions.n_regions
+    _require_enough(n_vertices, n_regions)
     tell(progress, 0.0, "measuring regions")
     skin = Skin.of(mesh)
     for r, members in enumerate(regions.membership):
@@ -123,8 +125,23 @@ def fit_cage(
     if not mask.any():
         raise RegionError("members is empty: a cage needs at least one vertex to hold")
     patch = Patch.of(Skin.of(mesh), mask)
-    _share_out([patch], n_vertices)
+    _require_enough(n_vertices, 1)
     return _fit(patch, n_vertices, offset, progress)
+
+
+def _require_enough(n_vertices: int, n_regions: int) -> None:
+    """Raise a CageError unless cages of so many vertices can be made, and solved with."""
+    fewest, most = _FEWEST * n_regions, MOST_CAGE_VERTICES
+    if fewest > most:
+        raise CageError(
+            f"{n_regions} regions need {fewest} cage vertices, {_FEWEST} each, and at most {most} "
+            f"can be solved with; use {most // _FEWEST} regions or fewer (n_regions of segment)"
+        )
+    if not is_whole(n_vertices, fewest, most):
+        raise CageError(
+            f"n_vertices must be {fewest} to {most}, at least {_FEWEST} for each of {n_regions} "
+            f"regions; got {n_vertices!r}"
+        )
 
 
 def _share_out(patches: list[Patch], n_vertices: int) -> IntArray:
@@ -134,10 +151,6 @@ def _share_out(patches: list[Patch], n_vertices: int) -> IntArray:
     around a limb for as many on a small one as on a large one: the root of the area is between.
     The root of length over width gives long regions, which bend, their share.
     """
-    fewest, most = _FEWEST * len(patches), _MOST * len(patches)
-    if not is_whole(n_vertices, fewest, most):
-        each = f"at least {_FEWEST} and at most {_MOST} for each of {len(patches)} regions"
-        raise CageError(f"n_vertices must be {each}, {fewest} to {most}; got {n_vertices!r}")
     area = np.array([patch.area for patch in patches])
     spread = np.array([patch.spread for patch in patches])
     need = np.sqrt(area * spread.sum(axis=1) / spread[:, 1:].sum(axis=1))
@@ -164,8 +177,12 @@ def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) 
         if _SHELL * field.n_shells > n:
             fault = f"it falls into {field.n_shells} parts"
             continue
-        vertices, faces = simplify(*contour_surface(field.smooth, field.offset), n)
+        share = part(progress, (attempt + 0.5) / _ATTEMPTS, (attempt + 0.8) / _ATTEMPTS)
+        contour = contour_surface(field.smooth, field.offset)
+        vertices, faces = simplify(*contour, n, progress=share, message=doing)
+        tell(progress, (attempt + 0.8) / _ATTEMPTS, doing)
         vertices = _cleared(vertices, faces, field)
+        tell(progress, (attempt + 0.9) / _ATTEMPTS, doing)
         fault = _fault(vertices, faces, field, n)
         if fault:
             continue

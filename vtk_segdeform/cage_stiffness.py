@@ -22,6 +22,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy import sparse
 
 from .arrays import FloatArray, IntArray
 from .energy import Energy
@@ -56,11 +57,11 @@ def with_cage_stiffness(
     share = energy.subspace.squares(groups)  # (G, m)
     share /= np.maximum(share.sum(axis=0), np.finfo(float).tiny)
     pull = np.empty((len(share), 3, m))
+    ends = np.concatenate([tail, tail]), np.concatenate([tail, head])
     for axis in range(3):
-        by_tail = np.zeros((m, m))  # row a: half of sum_b (q_a - q_b) (p_a - p_b), along the axis
-        np.add.at(by_tail, (tail, tail), 0.5 * offset[:, axis])
-        np.add.at(by_tail, (tail, head), -0.5 * offset[:, axis])
-        pull[:, axis] = share @ by_tail
+        half = 0.5 * offset[:, axis]  # row a: half of sum_b (q_a - q_b) (p_a - p_b), along the axis
+        by_tail = sparse.coo_array((np.concatenate([half, -half]), ends), (m, m)).tocsr()
+        pull[:, axis] = (by_tail.T @ share.T).T
     fit = energy.fit + strength * pull.reshape(-1, m)
     return replace(
         energy,

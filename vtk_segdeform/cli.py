@@ -26,6 +26,7 @@ from .command_line.bench import bench
 from .command_line.progress_bar import ProgressBar
 from .command_line.replaying import replay_command
 from .errors import ConstraintError, SegDeformError
+from .fast import advice
 
 _TAKE_VECTORS = ("--rotate", "--pivot", "--translate")
 DONE, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
@@ -153,7 +154,8 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EXAMPLES,
         formatter_class=form,
     )
-    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
+    version = "\n".join(filter(None, (f"segdeform {__version__}", advice())))
+    parser.add_argument("--version", action="version", version=version)
     parser.add_argument("--debug", action="store_true", help="show where an error came from")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
 

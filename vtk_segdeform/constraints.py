@@ -70,8 +70,10 @@ class VolumeConstraint:
         return step_to_volume(volume_along_path(self._extended(path), self.faces), self.target)
 
     def _extended(self, x: FloatArray) -> FloatArray:
+        """Return all points; with added ones about a vertex, so that these keep their digits."""
         if self.extension is None:
             return x
+        x = x - x[0]
         return np.concatenate([x, self.extension[len(x) :] @ x])  # its upper part is the identity
 
 
@@ -123,8 +125,8 @@ def region_volumes(mesh: Mesh, labels: IntArray) -> tuple[VolumeConstraint, ...]
     for label in np.unique(face_labels):
         u, v = halves[border & (owner == label)].T
         faces = np.concatenate([mesh.faces[face_labels == label], np.stack([v, u, centre[u]], 1)])
-        target = signed_volume(extension @ mesh.vertices, faces)
-        constraints.append(VolumeConstraint(faces, target, extension))
+        free = VolumeConstraint(faces, 0.0, extension)
+        constraints.append(replace(free, target=free.violation(mesh.vertices)))
     return tuple(constraints)
 
 

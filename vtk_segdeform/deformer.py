@@ -14,6 +14,7 @@ Long because every option of the method meets here, and each is told in the docs
 from __future__ import annotations
 
 import copy
+import itertools
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -27,7 +28,8 @@ from .arrays import FloatArray, as_points, is_number, is_whole
 from .binding import Binder
 from .cages import Cage
 from .constraints import VolumeConstraint, Volumes, region_volumes, total_volume
-from .errors import ArgumentError, CageError, ConstraintError, RegionError
+from .errors import ArgumentError, CageError, Cancelled, ConstraintError, RegionError
+from .fast import compiled
 from .iteration import Iteration, SolverOptions
 from .landing import LargeSurface, along
 from .mesh import Mesh, require_mesh
@@ -55,6 +57,8 @@ _FAR = 1e3  # mesh sizes
 _NONE = np.zeros(0, dtype=np.int64)
 _WIDE = 20_000  # vertices beyond which mapping directions too is what takes long
 _LANDINGS, _NEAR, _SAME = 4, 3e-5, 1e-7  # times it is gone on to that scale; and one of rounding
+_LEFT = 0.97  # of a solve after a step, as progress tells it
+_TRIAL = 1e-4  # mesh sizes
 _MET = 1e-3  # diagonals within which a vertex counts as in its place
 
 
@@ -113,6 +117,7 @@ class Deformer:
     _p: FloatArray  # (m, 3), the cages of the last pose, in the frame of the mesh's own
     _targets: FloatArray  # (k, 3), what it was for
 
+    @one_blas_thread()
     def __init__(
         self,
         mesh: Mesh,
@@ -173,8 +178,12 @@ class Deformer:
         )
         self._keep(preserve_volume, preserve_region_volumes)
         self._take_hold(fixed, handle)
+        if compiled(mesh.n_vertices):
+            tell(progress, 0.99, "trying a step")
+            self._try_a_step()
         tell(progress, 1.0, "ready")
 
+    @one_blas_thread()
     def hold(
         self,
         *,
@@ -212,11 +221,13 @@ class Deformer:
         """What the solver's steps hold: the volumes, and the surface they are taken over."""
         return self._volumes
 
+    @one_blas_thread()
     def passengers(self, points: ArrayLike, *, progress: Progress | None = None) -> Passengers:
         """Bind other points (k, 3) to the cages, to be moved with them; see `passengers`."""
         blend = self.regions.weights if self._own_blend is None else self._own_blend
         return board(self.mesh, blend, self.cages, points, progress=progress)
 
+    @one_blas_thread()
     def carry(self, points: ArrayLike) -> FloatArray:
         """Return where other points (k, 3), given at rest, are in the last pose.
 
@@ -225,6 +236,7 @@ class Deformer:
         p = self._outward(self._p)
         return self.passengers(points).moved([p[columns] for columns in self.subspace.columns])
 
+    @one_blas_thread()
     def surface(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
         """Return the mesh (n, 3) with its cages at *cage_vertices*, (m_r, 3) each: x = W~ p."""
         return self._placed(self._surface(self._stacked(cage_vertices) - self._centre))
@@ -238,7 +250,14 @@ class Deformer:
         p = self._inward(self._stacked(cage_vertices))
         self._begin(p, self._inward(checked_targets(targets, len(self.handle))))
 
-    def solve(self, targets: ArrayLike, *, max_steps: int | None = None) -> Solution:
+    @one_blas_thread()
+    def solve(
+        self,
+        targets: ArrayLike,
+        *,
+        max_steps: int | None = None,
+        progress: Progress | None = None,
+    ) -> Solution:
         """Return the pose whose handle vertices are at *targets*.
 
         Parameters
@@ -249,6 +268,8 @@ class Deformer:
         max_steps : int, optional
             Instead of the deformer's own limit, for the last leg: a drag may stop early and go
             on with the next event.
+        progress : Progress, optional
+            Called before every step; may cancel, and the pose is then the one before the call.
 
         Raises
         ------
@@ -263,12 +284,18 @@ class Deformer:
                 "are both in the same unit?"
             )
         require_together(self._rest, goal, self._ends_of_fixed)
-        with one_blas_thread():
-            return self._solve(goal, max_steps)
+        before = self._p, self._targets
+        try:
+            return self._solve(goal, max_steps, _counting(progress))
+        except Cancelled:
+            self._begin(*before)
+            raise
 
-    def _solve(self, goal: FloatArray, max_steps: int | None) -> Solution:
+    def _solve(
+        self, goal: FloatArray, max_steps: int | None, progress: Progress | None
+    ) -> Solution:
         limit = self._options.max_steps if max_steps is None else max_steps
-        options = replace(self._options, max_steps=limit)
+        options = replace(self._options, max_steps=limit, progress=progress)
         *way, _ = waypoints(self._targets, goal, self._handles)
         on_the_way = replace(options, tolerance=_LEG_TOLERANCE, max_steps=_LEG_STEPS)
         steps = sum(self._ladder.hurry(self._places(leg), on_the_way).steps for leg in way)
@@ -286,6 +313,12 @@ class Deformer:
             steps += result.steps
             x, missed = self._landed(result)
         return self._solution(result, x, steps)
+
+    def _try_a_step(self) -> None:
+        """Load the kernels, or at their first use ever compile them, before the first frame."""
+        handle = [0]
+        targets = self.mesh.vertices[handle] + _TRIAL * self._size
+        self.hold(handle=handle).solve(targets, max_steps=1)
 
     def _stacked(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
         poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
@@ -307,7 +340,6 @@ class Deformer:
         return region_volumes(self._here, self.regions.labels)
 
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:
-        x = x - self._origin if self._origin.any() else x
         return np.array([each.relative(x) for each in self._region_volumes])
 
     def _take_hold(self, fixed: ArrayLike, handle: ArrayLike) -> None:
@@ -328,8 +360,7 @@ class Deformer:
         self._to_places = gathered[:, : len(self.handle)].tocsr()
         self._fixed_places = gathered[:, len(self.handle) :] @ self._rest.vertices[self.fixed]
         self._volumes = self._stand_in.volumes(self._constraints, self._rest.vertices)
-        with one_blas_thread():
-            self._at_rest = GaussNewton(self._energy, positions, self._volumes)
+        self._at_rest = GaussNewton(self._energy, positions, self._volumes)
         one = len(self._constraints) == 1 and self._keeps == (True, False)
         self._is_wide = one and self._stand_in.cells is not None and mesh.n_vertices > _WIDE
         held = self._rest.vertices[self.fixed] if len(self.fixed) else np.zeros((1, 3))
@@ -384,7 +415,7 @@ class Deformer:
 
     def _solution(self, result: Iteration, x: FloatArray, steps: int) -> Solution:
         p = self._p * self._size
-        near, x = x, self._placed(x)
+        x = self._placed(x)
         errors = partial(self._errors, self._targets)
         status = result.status
         if status is Status.CONVERGED and max(errors(x)) > _MET:
@@ -396,7 +427,7 @@ class Deformer:
             status=status,
             merits=result.merits,
             errors=errors,
-            volume=partial(self._total_volume.relative, near),  # before a far place rounds it
+            volume=partial(self._total_volume.relative, x),
             region_volumes=self._region_volume_changes,
         )
 
@@ -413,3 +444,15 @@ class Deformer:
         outside: FloatArray = points * self._size
         outside += self._centre
         return outside
+
+
+def _counting(progress: Progress | None) -> Progress | None:
+    """Return a progress for steps of which nobody knows how many there will be."""
+    if progress is None:
+        return None
+    steps = itertools.count()
+
+    def report(_: float, message: str) -> None:
+        progress(1.0 - _LEFT ** next(steps), message)
+
+    return report

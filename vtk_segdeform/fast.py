@@ -2,27 +2,42 @@
 
     kernels = compiled()        the module `compiled`, or None
 
-numba is optional (``pip install 'vtk-segdeform[fast]'``).  It is imported, which takes half a
-second, when the first array comes along that is large enough to win that back.
-``SEGDEFORM_NUMBA=0`` does without.
+numba comes with the package wherever it has wheels.  It is imported, which takes half a second,
+when the first array comes along that is large enough to win that back.  Without it everything
+works, more slowly, and `advice` says so; ``SEGDEFORM_NUMBA=0`` does without.
 """
 
 from __future__ import annotations
 
 import functools
 import importlib
+import importlib.util
 import os
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+_LIBRARIES = "numba", "threadpoolctl"  # that speed needs and nothing else does
 WORTHWHILE = 2000  # faces, points: fewer are as quick in numpy
 
 
 def compiled(size: int = WORTHWHILE) -> Any:
     """Return the compiled kernels if *size* is worth them and numba is there; else None."""
     return _kernels() if size >= WORTHWHILE else None
+
+
+def advice() -> str:
+    """Return what to install for frames to be fast, in a sentence; "" if all is there."""
+    missing = [name for name in _LIBRARIES if importlib.util.find_spec(name) is None]
+    if not missing:
+        return ""
+    times = "3 to 6 times as long" if "numba" in missing else "longer"
+    verb = "are" if len(missing) > 1 else "is"
+    return (
+        f"{' and '.join(missing)} {verb} not installed: frames take {times}. "
+        f"pip install {' '.join(missing)}"
+    )
 
 
 def inputs(*arrays: NDArray[Any]) -> tuple[NDArray[Any], ...]:

@@ -102,7 +102,8 @@ class SegmentedCageDeformFilter(SettingsOfAFilter):
             handle=handle,
             preserve_volume=settings.preserve_volume,
         )
-        solution = held.solve(self._targets(vertices[held.handle]))
+        solving = part(self._progress(), 0.95, 1.0)
+        solution = held.solve(self._targets(vertices[held.handle]), progress=solving)
         output.ShallowCopy(source)
         vtk_surfaces.move(output, solution.vertices, faces)
         if settings.local_volume:

@@ -44,6 +44,7 @@ import numpy as np
 from .arrays import FloatArray, IntArray
 from .curvature import curved_factor
 from .energy import Energy
+from .progress import Progress, tell
 from .rotations import farthest_points, rotation_groups
 
 _PULLS = 12  # places
@@ -51,6 +52,7 @@ _HELD = 1e-9  # of the stiffness, to hold a free body
 _NEARNESS = 0.3  # what distance counts, beside how bits turn
 _ROUNDS = 3  # of k-means
 _TAKEN, _MOST = 0.9, 0.95  # of the share that turned: poses are not those few pulls; of all
+_DOING = "grouping rotations"
 _SOFTEST = 1e-3  # least eigenvalue of N and M, as a share of the largest
 _TIE_BREAK = 1e-6  # as in `rotations`
 
@@ -66,7 +68,12 @@ class Response(NamedTuple):
 
 
 def join_rotations(
-    energy: Energy, rest: FloatArray, bits: tuple[FloatArray, IntArray, IntArray], n_groups: int
+    energy: Energy,
+    rest: FloatArray,
+    bits: tuple[FloatArray, IntArray, IntArray],
+    n_groups: int,
+    *,
+    progress: Progress | None = None,
 ) -> tuple[Energy, IntArray]:
     """Return *energy* with fewer rotations, and the group that each of the present ones is in.
 
@@ -81,13 +88,18 @@ def join_rotations(
         how many vertices.  No group spans two parts.
     n_groups : int
         About how many; at least one for each part.
+    progress : Progress, optional
+        Called between the steps; may cancel.
     """
     positions, parts, counts = bits
     rows = np.asarray(energy.fit).reshape(len(parts), 3, -1)
     groups = rotation_groups(positions, parts, n_groups)
-    pulls = _pulls(energy, rest)
+    tell(progress, 0.0, _DOING)
+    pulls = _pulls(energy, rest, progress)
+    tell(progress, 0.4, _DOING)
     one = _response(rows, rest, pulls)
-    for _ in range(_ROUNDS if pulls.size else 0):
+    for done in range(_ROUNDS if pulls.size else 0):
+        tell(progress, 0.5 + 0.1 * done, _DOING)
         groups = _regrouped(groups, one, positions, parts)
 
     rows = _added(rows, groups)
@@ -98,6 +110,7 @@ def join_rotations(
     # Of what varies over n vertices, k equal pieces show only (1 - 1 / k) / (1 - 1 / n).
     n, k = np.bincount(groups, counts), np.bincount(groups).clip(min=2)
     share = np.minimum(share * (1.0 - 1.0 / n) / (1.0 - 1.0 / k), _MOST)
+    tell(progress, 0.9, _DOING)
     excess = _squares(one.roots, share[groups]) - _squares(whole.roots, share)
     quadratic = energy.quadratic - _blind_to(rest, excess)
     return _with_rotations(replace(energy, quadratic=quadratic), rows), groups
@@ -109,7 +122,7 @@ def _with_rotations(energy: Energy, rows: FloatArray) -> Energy:
     return replace(energy, fit=k, pull=k)
 
 
-def _pulls(energy: Energy, rest: FloatArray) -> FloatArray:
+def _pulls(energy: Energy, rest: FloatArray, progress: Progress | None) -> FloatArray:
     """Return (m, c, 3): how cages move as the body is pulled, c / 3 places along three axes.
 
     A free body is pulled against its own inertia, so that it neither flies nor spins.  None, c =
@@ -119,6 +132,7 @@ def _pulls(energy: Energy, rest: FloatArray) -> FloatArray:
     factor = curved_factor(energy.quadratic + hold / np.trace(mass) * mass, energy, rest)
     if factor is None:
         return np.zeros((m, 0, 3))
+    tell(progress, 0.2, _DOING)
     axes = np.eye(3)
     shifts = np.broadcast_to(axes[:, None], (3, m, 3))
     fields = np.concatenate([shifts, np.cross(axes[:, None], rest)])

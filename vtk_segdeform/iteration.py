@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from .arrays import FloatArray, is_number, is_whole
 from .curvature import Factor
 from .errors import ArgumentError
 from .positions import Pull
+from .progress import Progress
 from .solution import Status
 
 _OLD, _LONG = 20, 1e-2  # steps after which the curvature is looked at again; or after one as long
@@ -26,6 +27,7 @@ class SolverOptions:
     max_steps: int = 500
     window: int = 5  # Anderson's memory; 0 is the plain iteration of the paper
     exact_volume: bool = True  # False leaves the linearised multiplier of (21), for comparison
+    progress: Progress | None = field(default=None, compare=False)  # called before every step
 
     def __post_init__(self) -> None:
         if not (is_number(self.tolerance) and self.tolerance > 0.0):
@@ -97,7 +99,7 @@ class Course:
 
     def ended(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> Course:
         """Remember where the call ended; return itself."""
-        self._end = p, targets, options
+        self._end = p, targets, replace(options, progress=None)
         return self
 
     def goes_on(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> bool:

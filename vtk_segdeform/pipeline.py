@@ -43,7 +43,7 @@ def deform(
     preserve_volume : bool
         Hold the enclosed volume exactly.
     progress : Progress, optional
-        Called while the cages are made and bound; may cancel.
+        Called while the cages are made and bound, and before every step; may cancel.
 
     Returns
     -------
@@ -63,6 +63,6 @@ def deform(
         fixed=fixed,
         handle=handle,
         preserve_volume=preserve_volume,
-        progress=part(progress, 0.7, 1.0),
+        progress=part(progress, 0.7, 0.9),
     )
-    return deformer.solve(targets)
+    return deformer.solve(targets, progress=part(progress, 0.9, 1.0))

@@ -27,6 +27,7 @@ from .threads import n_threads
 
 _TIMES = 40  # as long as a face of a volume takes each
 _MANY, _EACH = 8000, 10  # positions: so many tell where clusters are, or so many for each
+_WORTH = 2000  # positions: fewer are looked up by one thread
 _EQUAL = 4  # nearest centres among which the favoured one is found
 _TIE_BREAK = 1e-6  # relative: of equal distances one is preferred, the same in every frame
 
@@ -103,9 +104,9 @@ def rotation_groups(
         raise ArgumentError(f"rotation groups must be a whole number, 1 or more; got {n_groups!r}")
     parts, groups = _numbered(parts), np.empty(len(positions), dtype=np.int64)
     used = 0
-    for k in range(int(parts.max()) + 1):
-        here = parts == k
-        share = max(1, round(n_groups * np.count_nonzero(here) / len(positions)))
+    by_part = np.argsort(parts, kind="stable")
+    for here in np.split(by_part, np.cumsum(np.bincount(parts))[:-1]):
+        share = max(1, round(n_groups * len(here) / len(positions)))
         local = group_by_position(positions[here], share, rounds=rounds, seeded=seeded)
         groups[here] = used + local
         used += int(local.max()) + 1
@@ -148,7 +149,8 @@ def _numbered(labels: IntArray) -> IntArray:
 
 def _nearest(positions: FloatArray, centres: FloatArray, favour: FloatArray) -> IntArray:
     few = min(_EQUAL, len(centres))
-    distance, which = cKDTree(centres).query(positions, k=[*range(1, few + 1)], workers=n_threads())
+    workers = n_threads() if len(positions) > _WORTH else 1  # which are started for every call
+    distance, which = cKDTree(centres).query(positions, k=[*range(1, few + 1)], workers=workers)
     best = (distance**2 * favour[which]).argmin(axis=1)
     return np.asarray(np.take_along_axis(which, best[:, None], axis=1)[:, 0], dtype=np.int64)
 

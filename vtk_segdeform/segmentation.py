@@ -22,6 +22,7 @@ from .segmenting.borders import connected_parts, smooth_borders
 from .segmenting.coarse import Surface, coarsen
 from .segmenting.necks import Neck, best_neck
 from .segmenting.slices import fair_slice, quotas
+from .threads import one_blas_thread
 
 _POINTS = 3000  # of the coarse copy, about
 _POINTS_PER_REGION = 16  # at least
@@ -30,6 +31,7 @@ _OVERLAP = 0.1  # of a region's width, counted in edges
 _TIE_BREAK = 1e-3  # of an edge
 
 
+@one_blas_thread()
 def segment(
     mesh: Mesh,
     n_regions: int | None = None,
@@ -126,7 +128,10 @@ def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -
     for label, ids in enumerate(components):
         labels[ids] = label
     necks: list[Neck | None]
-    necks = [best_neck(*alone(label)[1:], share) for label in range(len(components))]
+    necks = []
+    for label in range(len(components)):
+        necks.append(best_neck(*alone(label)[1:], share))
+        tell(progress, 0.1 + 0.2 * len(necks) / len(components), "looking for limbs")
     while len(necks) < wanted:
         ranks = [np.inf if neck is None else neck.rank for neck in necks]
         label = int(np.argmin(ranks))
@@ -136,7 +141,7 @@ def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -
         labels[np.flatnonzero(labels == label)[neck.inside]] = len(necks)
         necks[label] = best_neck(*alone(label)[1:], share)
         necks.append(best_neck(*alone(len(necks))[1:], share))
-        tell(progress, 0.1 + 0.4 * min(1.0, len(necks) / min(wanted, 20)), "cutting off limbs")
+        tell(progress, 0.3 + 0.2 * min(1.0, len(necks) / min(wanted, 20)), "cutting off limbs")
 
     count = len(necks)
     areas = np.bincount(labels, surface.areas).astype(float)

@@ -62,7 +62,13 @@ class Solution:
 
     @cached_property
     def volume_change(self) -> float:
-        """(V - V0) / V0, signed; measured on demand."""
+        """(V - V0) / V0 of `vertices`, signed; measured on demand.
+
+        The solver leaves about 1e-15.  Far from the origin the vertices cannot hold that: rounding
+        them changes V by at most eps |x| A, eps = 2.2e-16, |x| the largest coordinate, A the
+        surface's area, and by a hundredth of that as a rule: 1e-12 of a compact shape's at 1e4 to
+        1e5 diagonals, 1e-11 of a wire's.
+        """
         return self.volume()
 
     @cached_property

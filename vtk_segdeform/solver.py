@@ -47,6 +47,7 @@ from .energy import Energy
 from .errors import CageError
 from .iteration import Course, Iteration, Point, SolverOptions
 from .positions import PositionTerm, Pull
+from .progress import tell
 from .solution import Status
 
 _RISE = 1e-13  # relative rise of the merit that counts as rounding
@@ -115,6 +116,7 @@ class GaussNewton:
         status = Status.STEP_LIMIT
         curved = bool(options.window) and self.energy.exact
         while len(merits) <= options.max_steps:
+            tell(options.progress, (len(merits) - 1) / options.max_steps, "solving")
             if curved and (course.factor_is_old):
                 course.renew(self._curved(here, course) or self._factor)
             course.age += 1

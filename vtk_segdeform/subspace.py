@@ -22,7 +22,7 @@ from scipy import sparse
 
 from .arrays import FloatArray, IntArray
 from .blocks import Groups, add_product, adjoint_product, double, is_heavy, pieces
-from .cages import Cage
+from .cages import MOST_CAGE_VERTICES, Cage
 from .errors import CageError, RegionError
 from .fast import compiled
 from .mean_value import mean_value_coordinates
@@ -32,6 +32,7 @@ from .regions import Regions
 _LARGEST = 1e3  # mesh diagonals a cage may measure
 _BOUND = 1 << 15  # vertices at a time
 _AT_ONCE = 1 << 20  # numbers in all blocks that one thread multiplies in one call
+_BITS = 32  # regions at a time that vertices are told apart by
 _SINGLE = 8_000_000  # numbers in a block times regions beyond which W~ is kept in single precision
 
 
@@ -65,6 +66,14 @@ class Subspace:
     @cached_property
     def _groups(self) -> Groups:
         return Groups.of([(ids, *self.reaching(ids)) for ids in self.reached_alike()])
+
+    @cached_property
+    def _places(self) -> sparse.csr_array:
+        """(n, r) int: 1 + the place of each vertex among the rows of a region."""
+        each = [np.arange(1, len(rows) + 1) for rows in self.rows]
+        region = np.repeat(np.arange(len(self.rows)), [len(rows) for rows in self.rows])
+        entries = np.concatenate(each), (np.concatenate(self.rows), region)
+        return sparse.coo_array(entries, (self.n_vertices, len(self.rows))).tocsr()
 
     def start(self, points: FloatArray) -> FloatArray:
         """Return *points* (n, 3) of the mesh as `map` begins with them: as they are."""
@@ -112,14 +121,12 @@ class Subspace:
 
     def reaching(self, vertices: IntArray) -> tuple[IntArray, FloatArray]:
         """Return the columns of W~ that reach *vertices* (k,), in order, and W~ there (k, c)."""
+        met = self._places[vertices].tocsc()
         reached = []
-        for rows, block, own in zip(self.rows, self.blocks, self.columns, strict=True):
-            if not len(rows):
-                continue
-            found = np.searchsorted(rows, vertices).clip(max=len(rows) - 1)
-            mine = np.flatnonzero(rows[found] == vertices)
-            if len(mine):
-                reached.append((mine, found[mine], block, own))
+        for r in np.flatnonzero(np.diff(met.indptr)):
+            entries = slice(met.indptr[r], met.indptr[r + 1])
+            found = met.data[entries] - 1
+            reached.append((met.indices[entries], found, self.blocks[r], self.columns[r]))
         w = np.zeros((len(vertices), sum(own.stop - own.start for *_, own in reached)))
         end = 0
         for mine, found, block, own in reached:
@@ -131,10 +138,12 @@ class Subspace:
     def reached_alike(self) -> list[IntArray]:
         """Return all vertices, those together that the same cages reach."""
         label = np.zeros(self.n_vertices, dtype=np.int64)
-        for rows in self.rows:
-            reached = np.zeros(self.n_vertices, dtype=np.int64)
-            reached[rows] = 1
-            label = np.unique(2 * label + reached, return_inverse=True)[1]
+        for start in range(0, len(self.rows), _BITS):
+            some = self.rows[start : start + _BITS]
+            label <<= len(some)
+            for bit, rows in enumerate(reversed(some)):
+                label[rows] += 1 << bit
+            label = np.unique(label, return_inverse=True)[1]
         order = np.argsort(label, kind="stable")
         return np.split(order, np.cumsum(np.bincount(label))[:-1])
 
@@ -239,6 +248,12 @@ def _check_cages(regions: Regions, cages: Sequence[Cage]) -> None:
         raise CageError("cages must hold Cage objects; make one by Cage(vertices, faces)")
     if len(cages) != regions.n_regions:
         raise CageError(f"{regions.n_regions} regions need as many cages; got {len(cages)}")
+    total = sum(cage.n_vertices for cage in cages)
+    if total > MOST_CAGE_VERTICES:
+        raise CageError(
+            f"the cages have {total} vertices; at most {MOST_CAGE_VERTICES} can be solved with: "
+            "use coarser cages, or fewer regions"
+        )
     mesh = regions.mesh
     for r, cage in enumerate(cages):
         if np.ptp(cage.vertices, axis=0).max() > _LARGEST * mesh.diagonal:

@@ -13,7 +13,8 @@ from __future__ import annotations
 import contextlib
 import functools
 import os
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from typing import Any
 
@@ -64,27 +65,66 @@ def in_parallel(
                 future.exception()
 
 
-def one_blas_thread() -> contextlib.AbstractContextManager[object]:
-    """Return a context in which BLAS stays in the caller's thread, where threadpoolctl is there.
+@contextlib.contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Keep BLAS in the caller's thread, in a ``with`` block or, as a decorator, in a function.
 
     Threads of its own fight with ours where we have several.  And a solver's step is many products
     too small to share out: waking another thread for each takes longer than the product, and
     while it waits for more it holds the core that we are to use.
+
+    Most builds of BLAS have one number of threads for the whole process, and sum in another order
+    with another number.  So the number is limited by the first thread that comes in and restored by
+    the last that leaves, and what runs in several threads at a time gives what it gives alone, to
+    the last bit.  Without threadpoolctl nothing is limited.
     """
-    controller = _controller()
-    if controller is None:
-        return contextlib.nullcontext()
-    limited: contextlib.AbstractContextManager[object] = controller.limit(limits=1, user_api="blas")
-    return limited
+    limit = _blas_limit()
+    if limit is None:
+        yield
+        return
+    with limit.of_each_thread.limit(limits=1):
+        limit.enter()
+        try:
+            yield
+        finally:
+            limit.leave()
+
+
+class _BlasLimit:
+    """One thread for BLAS in the whole process, while any thread wants it so."""
+
+    def __init__(self, controller: Any) -> None:
+        self._controller = controller
+        # Builds on OpenMP have a limit for each thread.  Mostly there are none; but entering and
+        # leaving tells threadpoolctl as well when this thread is done with setting limits: until
+        # then it lets no other thread set any.
+        self.of_each_thread = controller.select(threading_layer="openmp")
+        self._lock = threading.Lock()
+        self._within = 0
+        self._before: Any = None
+
+    def enter(self) -> None:
+        """Limit BLAS, unless somebody has."""
+        with self._lock:
+            if self._within == 0:
+                self._before = self._controller.limit(limits=1, user_api="blas")
+            self._within += 1
+
+    def leave(self) -> None:
+        """Restore the numbers of threads from before, unless somebody is still within."""
+        with self._lock:
+            self._within -= 1
+            if self._within == 0:
+                self._before.restore_original_limits()
 
 
 @functools.cache
-def _controller() -> Any:
+def _blas_limit() -> _BlasLimit | None:
     try:
         from threadpoolctl import ThreadpoolController
     except ImportError:
         return None
-    return ThreadpoolController()
+    return _BlasLimit(ThreadpoolController())
 
 
 @functools.cache

@@ -24,6 +24,7 @@ Source
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from ..progress import Progress, tell
 
 # Asked of a face that changes: 4 sqrt(3) area / (sum of squared edges), 1 for an equilateral, 0
 # for a needle.  Relaxed only where nothing else can go.
@@ -53,7 +55,14 @@ class _Surface:
     c: FloatArray
 
 
-def simplify(vertices: FloatArray, faces: IntArray, n_vertices: int) -> tuple[FloatArray, IntArray]:
+def simplify(
+    vertices: FloatArray,
+    faces: IntArray,
+    n_vertices: int,
+    *,
+    progress: Progress | None = None,
+    message: str = "simplifying",
+) -> tuple[FloatArray, IntArray]:
     """Return a surface of *n_vertices*, or of more where the topology allows no fewer.
 
     Parameters
@@ -64,6 +73,10 @@ def simplify(vertices: FloatArray, faces: IntArray, n_vertices: int) -> tuple[Fl
         Closed and oriented; may have several components, each of which keeps four vertices.
     n_vertices : int
         How many are wanted.
+    progress : Progress, optional
+        Called between rounds; may cancel.
+    message : str
+        What *progress* is told.
 
     Returns
     -------
@@ -72,10 +85,12 @@ def simplify(vertices: FloatArray, faces: IntArray, n_vertices: int) -> tuple[Fl
     """
     surface = _gather(vertices, faces)
     left = len(vertices)
+    reduction = math.log(max(left / max(n_vertices, 1), 2.0))
     for roundness in _ROUNDNESS:
         refused = np.empty(0, dtype=np.int64)
         gone = 0
         while left > n_vertices:
+            tell(progress, math.log(len(vertices) / left) / reduction, message)
             edges, cost, place = _priced(surface)
             key = edges @ [len(vertices), 1]
             at = np.searchsorted(key, refused).clip(max=len(key) - 1)

@@ -11,7 +11,7 @@ from ..errors import MissingDependencyError
 from ..progress import Progress
 from .outputs import Say
 
-_NEEDED = "pip install 'vtk-segdeform[qt]' PySide6"
+_NEEDED = "pip install 'vtk-segdeform[app]'"
 
 
 def application(options: Namespace, say: Say, progress: Progress) -> bool:

@@ -72,7 +72,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     )  # fmt: skip
     progress(0.9, "solving")
     start = time.perf_counter()
-    solution = deformer.solve(targets)
+    solution = deformer.solve(targets, progress=part(progress, 0.9, 1.0))
     tell_solution(solution, time.perf_counter() - start, say)
     deformed = convert.with_vertices(surface, solution.vertices)
     convert.write_mesh(options.output, deformed)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
-_compile = numba.njit(nogil=True, cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
+from .kernels import kernel
+
+_compile = kernel(fastmath={"reassoc", "contract"})
 
 
 @_compile

@@ -5,10 +5,11 @@ Several rows at a time: what is read of the columns then serves all of them.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
-_compile = numba.njit(nogil=True, cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
+from .kernels import kernel
+
+_compile = kernel(fastmath={"reassoc", "contract"})
 _IN_A_ROW = 1 << 14  # numbers that are read forwards, so that they are fetched ahead
 
 

@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
-_compile = numba.njit(nogil=True, cache=True, error_model="numpy")
+from .kernels import kernel
+
+_compile = kernel()
 
 _SWEEPS, _ROUNDS = 12, 40  # of Jacobi's method, of Newton's
 _CLEAR = 1e-3  # of the largest eigenvalue's cube: how small cofactors may be

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import numba
+from .kernels import kernel
 
-_compile = numba.njit(nogil=True, cache=True, error_model="numpy")
+_compile = kernel()
 # Sums in several registers at a time, which takes half as long; no other freedom is given.
-_compile_sums = numba.njit(nogil=True, cache=True, error_model="numpy", fastmath={"reassoc"})
+_compile_sums = kernel(fastmath={"reassoc"})
 
 
 @_compile_sums

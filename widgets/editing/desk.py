@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from vtk_segdeform.editing.listeners import Change
+from vtk_segdeform.fast import advice
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
@@ -60,6 +61,7 @@ class Desk:
         self.view = view
         self.help = HelpCard(view, keys)
         self.voice = Voice(view)
+        self.voice.note(advice())
         self.takes = Takes(view)
         self._mode = Mode.REGIONS
         self._is_on = False
