@@ -20,7 +20,7 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 # One line per part of the story; a new file takes its place here.
 STORY = [
     # a checked mesh
-    "errors", "arrays", "progress", "threads", "compiled.volumes", "compiled.products",
+    "errors", "checks", "arrays", "progress", "threads", "compiled.volumes", "compiled.products",
     "compiled.patch_products", "compiled.normals", "compiled.rotations", "compiled.triangles",
     "compiled.coordinates", "fast",
     "surface.counting", "surface.topology", "surface.manifold", "surface.inside", "surface.columns",

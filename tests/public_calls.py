@@ -1,0 +1,320 @@
+"""Every public callable of the package, found by looking, and a valid call of each.
+
+Functions and classes of the modules below, public methods of these classes, and the setters of
+their properties.  `ARGUMENTS` has a valid value for each name of a parameter; where one name means
+several things, `SPECIAL` has it under "Class.method.name".
+"""
+
+from __future__ import annotations
+
+import enum
+import functools
+import importlib
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+import vtk_segdeform as sd
+from vtk_segdeform import models
+from vtk_segdeform.deformer import Deformer
+from vtk_segdeform.passengers import Passengers
+from vtk_segdeform.session import Session
+
+CORE = (
+    "vtk_segdeform",
+    "vtk_segdeform.models",
+    "vtk_segdeform.convert",
+    "vtk_segdeform.meshlab",
+    "vtk_segdeform.distortion",
+    "vtk_segdeform.passengers",
+    "vtk_segdeform.local_volume",
+    "vtk_segdeform.plugin",
+)
+WIDGETS = ("vtk_segdeform.widgets",)
+
+# Hooks that `Widget` calls with what it has made itself, and functions that wait for a person.
+NOT_CALLED = {"begins", "hovers", "wheels", "types", "edit.title"}
+
+
+@dataclass(frozen=True)
+class Call:
+    """One public callable; *bound* returns it with fresh objects, *parameters* are its names."""
+
+    name: str
+    bound: Callable[[], Callable[..., Any]]
+    parameters: tuple[str, ...]
+    required: tuple[str, ...]
+
+    def arguments(self) -> dict[str, Any]:
+        """Return valid values of all that is required."""
+        return {name: valid(self.name, name) for name in self.required}
+
+
+def calls(modules: tuple[str, ...]) -> Iterator[Call]:
+    """Yield every public callable of *modules*."""
+    for module in map(importlib.import_module, modules):
+        for name in _names(module):
+            thing = getattr(module, name)
+            if inspect.isclass(thing):
+                yield from _calls_of_class(thing)
+            elif callable(thing):
+                yield _call(name, functools.partial(lambda f: f, thing), thing)
+
+
+def valid(call: str, name: str) -> Any:
+    """Return a valid value of one parameter; a KeyError if nobody has said what that is."""
+    special = f"{call}.{name}"
+    return SPECIAL[special]() if special in SPECIAL else ARGUMENTS[name]()
+
+
+def _names(module: Any) -> list[str]:
+    if hasattr(module, "__all__"):
+        return sorted(module.__all__)
+    own = (n for n, v in vars(module).items() if getattr(v, "__module__", "") == module.__name__)
+    return sorted(name for name in own if not name.startswith("_"))
+
+
+def _calls_of_class(cls: type) -> Iterator[Call]:
+    if issubclass(cls, enum.Enum | BaseException):
+        return
+    if cls in MADE_BY_HAND:
+        yield _call(cls.__name__, lambda: cls, cls)
+    for name, member in inspect.getmembers(cls):
+        if name.startswith("_") or name in NOT_CALLED:
+            continue
+        label = f"{cls.__name__}.{name}"
+        if isinstance(member, property):
+            if member.fset is not None:
+                yield Call(label, functools.partial(_setter, cls, name), ("value",), ("value",))
+        elif callable(member):
+            yield _call(label, functools.partial(_bound, cls, name), getattr(cls, name))
+
+
+def _call(label: str, bound: Callable[[], Any], signed: Any) -> Call:
+    signature = inspect.signature(signed)
+    plain = [
+        p
+        for p in signature.parameters.values()
+        if p.name != "self" and p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)
+    ]
+    names = tuple(p.name for p in plain if f"{label}.{p.name}" not in NOT_CALLED)
+    needed = tuple(p.name for p in plain if p.default is p.empty)
+    if label in EXTRA:  # passed on as keywords
+        names += EXTRA[label]
+    return Call(label, bound, names, needed)
+
+
+def _bound(cls: type, name: str) -> Any:
+    return getattr(instance(cls), name)
+
+
+def _setter(cls: type, name: str) -> Callable[..., None]:
+    thing = instance(cls)
+    return lambda value: setattr(thing, name, value)
+
+
+# What calls are made on.
+
+
+@functools.cache
+def mesh() -> sd.Mesh:
+    return models.sphere(200)
+
+
+def _left() -> np.ndarray:
+    return np.flatnonzero(mesh().vertices[:, 0] < -0.8)
+
+
+def _right() -> np.ndarray:
+    return np.flatnonzero(mesh().vertices[:, 0] > 0.8)
+
+
+def _targets() -> np.ndarray:
+    return mesh().vertices[_right()] + [0.1, 0.0, 0.0]
+
+
+@functools.cache
+def regions() -> sd.Regions:
+    x = mesh().vertices[:, 0]
+    return sd.Regions.from_masks(mesh(), [x < 0.3, x > -0.3])
+
+
+@functools.cache
+def cages() -> tuple[sd.Cage, ...]:
+    return sd.fit_cages(mesh(), regions(), 24)
+
+
+@functools.cache
+def bound() -> Deformer:
+    return Deformer(mesh(), regions(), cages(), fixed=_left(), handle=_right())
+
+
+@functools.cache
+def passengers() -> Passengers:
+    return bound().passengers(mesh().vertices[:5])
+
+
+@functools.cache
+def _worked_on() -> Session:
+    session = Session(mesh())
+    session.set_regions(regions())
+    session.set_cages(cages())
+    session.set_fixed(_left())
+    session.add_handle(_right())
+    session.drag(_targets())
+    session.commit()
+    return session
+
+
+def session() -> Session:
+    return Session(mesh(), state=_worked_on().state)
+
+
+def surface() -> pv.PolyData:
+    return sd.convert.to_polydata(mesh())
+
+
+@functools.cache
+def view() -> Any:
+    from hands import plain_view
+
+    return plain_view((64, 64))
+
+
+@functools.cache
+def meshset() -> Any:
+    return sd.meshlab.to_meshset(mesh())
+
+
+@functools.cache
+def shared_session() -> Session:
+    """Of the widgets, which live as long as the tests do."""
+    return session()
+
+
+@functools.cache
+def _widget(cls: type) -> Any:
+    from vtk_segdeform import widgets
+
+    if cls is widgets.View:
+        return view()
+    if cls is widgets.Recorder:
+        return cls(view())
+    return cls(view(), shared_session())
+
+
+def instance(cls: type) -> Any:
+    """Return an object to call methods of; a state of its own where it has one."""
+    name = cls.__name__
+    made = {
+        "Mesh": mesh,
+        "Regions": regions,
+        "Cage": lambda: cages()[0],
+        "Deformer": lambda: bound().copy(),
+        "Session": session,
+        "Passengers": passengers,
+        "Solution": lambda: bound().copy().solve(_targets()),
+        "Options": sd.Options,
+        "LocalVolume": lambda: sd.local_volume.LocalVolume(mesh()),
+        "PolyDataTools": lambda: surface().segdeform,
+        "PlotterTools": lambda: _plotter().segdeform,
+    }
+    return made[name]() if name in made else _widget(cls)
+
+
+@functools.cache
+def _plotter() -> pv.Plotter:
+    return pv.Plotter(off_screen=True, window_size=(64, 64))
+
+
+# Classes that callers make; others are only handed out.
+MADE_BY_HAND = {sd.Mesh, sd.Regions, sd.Cage, sd.Deformer, sd.Session, sd.Options}
+EXTRA = {
+    "Session.change_options": (
+        "n_cage_vertices", "offset", "preserve_volume", "preserve_region_volumes", "stretch",
+        "rotation_groups",
+    ),
+}  # fmt: skip
+
+
+def _none() -> None:
+    return None
+
+
+ARGUMENTS: dict[str, Callable[[], Any]] = {
+    "arrays": lambda: (),
+    "blend": lambda: regions().weights,
+    "cage_faces": lambda: cages()[0].faces,
+    "cage_vertices": lambda: [cage.vertices for cage in cages()],
+    "cages": cages,
+    "cache": lambda: Path("cache"),
+    "callback": lambda: lambda: None,
+    "divisions": lambda: (2, 2, 4),
+    "event": lambda: "ModifiedEvent",
+    "exact_volume": lambda: True,
+    "faces": lambda: mesh().faces,
+    "fixed": _left,
+    "fps": lambda: 20.0,
+    "frames": lambda: [None],
+    "handle": _right,
+    "history": lambda: 5,
+    "hold_tolerance": lambda: 1e-3,
+    "interactor": lambda: view().interactor,
+    "keys": lambda: "",
+    "label": lambda: "a step",
+    "labels": lambda: (mesh().vertices[:, 0] > 0).astype(int),
+    "largest_hole": lambda: 10,
+    "listener": lambda: lambda _change: None,
+    "major": lambda: 1.0,
+    "masks": lambda: regions().membership,
+    "max_steps": lambda: 3,
+    "membership": lambda: regions().membership,
+    "mesh": mesh,
+    "meshset": meshset,
+    "minor": lambda: 0.3,
+    "motion": lambda: np.eye(4),
+    "n_cage_vertices": lambda: 24,
+    "n_regions": lambda: 2,
+    "n_vertices": lambda: 60,
+    "name": lambda: "handle 1",
+    "new_name": lambda: "grip",
+    "offset": lambda: 0.2,
+    "options": sd.Options,
+    "overlap": lambda: 1,
+    "path": lambda: Path("written.segdeform"),
+    "points": lambda: mesh().vertices[:4],
+    "polydata": surface,
+    "preserve_region_volumes": lambda: False,
+    "preserve_volume": lambda: True,
+    "progress": lambda: lambda _fraction, _message: None,
+    "radius": lambda: 1.0,
+    "region": lambda: 0,
+    "regions": regions,
+    "renderer": lambda: view().renderer,
+    "rings": lambda: 1,
+    "rotation_groups": lambda: 20,
+    "seed": lambda: 3,
+    "session": session,
+    "size": lambda: (0.2, 0.2, 1.0),
+    "smoothness": lambda: 1.0,
+    "state": lambda: _worked_on().state,
+    "stretch": lambda: 10.0,
+    "subtract": lambda: False,
+    "surface": surface,
+    "targets": _targets,
+    "tolerance": lambda: 1e-6,
+    "vertices": lambda: mesh().vertices,
+    "view": view,
+    "weights": lambda: regions().weights,
+    "weld_distance": lambda: 0.0,
+    "what": mesh,
+    "which": lambda: [0, 1],
+    "window": lambda: 3,
+}
+
+SPECIAL: dict[str, Callable[[], Any]] = {}
