@@ -28,6 +28,13 @@ class BrokenArray:
         raise RuntimeError("broken on purpose")
 
 
+class Anything:
+    """Can be made from any arguments."""
+
+    def __init__(self, *_args, **_keywords):
+        pass
+
+
 class Endless:
     """Claims to have a million million entries."""
 
@@ -78,7 +85,7 @@ BAD: dict[str, Callable[[], object]] = {
     "bytearray": lambda: bytearray(b"name"),
     "path": lambda: pathlib.Path("no-such-folder/file"),
     "object": object,
-    "a class": lambda: dict,
+    "a class": lambda: Anything,
     "a function": lambda: lambda *_arguments, **_keywords: None,
     "module": lambda: np,
     "Ellipsis": lambda: Ellipsis,
@@ -136,7 +143,7 @@ BAD: dict[str, Callable[[], object]] = {
     "half": lambda: np.zeros((4, 3), dtype=np.float16),
     "masked points": lambda: np.ma.masked_all((4, 3)),
     "masked ids": lambda: np.ma.array([1, 2], mask=[0, 1]),
-    "matrix": lambda: np.asmatrix(np.eye(3)),
+    "matrix": lambda: np.eye(3).view(np.matrix),
     "sparse": lambda: sparse.eye_array(4).tocsr(),
     "memoryview": lambda: memoryview(b"abc"),
     "stride 0": lambda: np.broadcast_to(np.float64(1.0), (4, 3)),

@@ -20,6 +20,10 @@ import numpy as np
 import pyvista as pv
 
 import vtk_segdeform as sd
+import vtk_segdeform.local_volume
+import vtk_segdeform.meshlab
+import vtk_segdeform.plugin
+import vtk_segdeform.widgets
 from vtk_segdeform import models
 from vtk_segdeform.deformer import Deformer
 from vtk_segdeform.passengers import Passengers
@@ -37,8 +41,9 @@ CORE = (
 )
 WIDGETS = ("vtk_segdeform.widgets",)
 
-# Hooks that `Widget` calls with what it has made itself, and functions that wait for a person.
-NOT_CALLED = {"begins", "hovers", "wheels", "types", "edit.title"}
+# Hooks that `Widget` calls with what it has made itself, and a view's arithmetic at every event.
+NOT_CALLED = {"begins", "hovers", "wheels", "types"}
+NOT_CALLED |= {"contains", "guarded", "pixel_at", "pointer", "ray", "to_display", "to_world"}
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,7 @@ def calls(modules: tuple[str, ...]) -> Iterator[Call]:
             if inspect.isclass(thing):
                 yield from _calls_of_class(thing)
             elif callable(thing):
+                thing = inspect.unwrap(thing)  # of the cache that `conftest` puts around models
                 yield _call(name, functools.partial(lambda f: f, thing), thing)
 
 
@@ -82,7 +88,7 @@ def _names(module: Any) -> list[str]:
 def _calls_of_class(cls: type) -> Iterator[Call]:
     if issubclass(cls, enum.Enum | BaseException):
         return
-    if cls in MADE_BY_HAND:
+    if cls in MADE_BY_HAND or cls.__module__.startswith("vtk_segdeform.widgets"):
         yield _call(cls.__name__, lambda: cls, cls)
     for name, member in inspect.getmembers(cls):
         if name.startswith("_") or name in NOT_CALLED:
@@ -102,7 +108,7 @@ def _call(label: str, bound: Callable[[], Any], signed: Any) -> Call:
         for p in signature.parameters.values()
         if p.name != "self" and p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)
     ]
-    names = tuple(p.name for p in plain if f"{label}.{p.name}" not in NOT_CALLED)
+    names = tuple(p.name for p in plain)
     needed = tuple(p.name for p in plain if p.default is p.empty)
     if label in EXTRA:  # passed on as keywords
         names += EXTRA[label]
@@ -242,8 +248,15 @@ EXTRA = {
 }  # fmt: skip
 
 
-def _none() -> None:
-    return None
+@functools.cache
+def _file(name: str) -> Path:
+    """Return a file in the current folder that can be read."""
+    path = Path(name).absolute()
+    if path.suffix == ".segdeform":
+        sd.save_session(path, session())
+    else:
+        sd.write_mesh(path, mesh())
+    return path
 
 
 ARGUMENTS: dict[str, Callable[[], Any]] = {
@@ -314,7 +327,59 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "weld_distance": lambda: 0.0,
     "what": mesh,
     "which": lambda: [0, 1],
+    "action": lambda: lambda _desk: None,
+    "busy": lambda: lambda: False,
+    "colours": lambda: None,
+    "enabled": lambda: False,
+    "layer": lambda: "layer",
+    "message": lambda: "words",
+    "milliseconds": lambda: 50,
+    "pace": lambda: 0.0,
+    "priority": lambda: 1.0,
+    "scene": session,
+    "skips": lambda: lambda _entry: False,
+    "source": lambda: list(sd.widgets.Recorder(view()).lines),
+    "tag": lambda: 1,
+    "title": lambda: "segdeform",
+    "visible": lambda: True,
+    "while_busy": lambda: False,
     "window": lambda: 3,
 }
 
-SPECIAL: dict[str, Callable[[], Any]] = {}
+SPECIAL: dict[str, Callable[[], Any]] = {
+    "Cage.faces": lambda: cages()[0].faces,
+    "Cage.vertices": lambda: cages()[0].vertices,
+    "CageDisplay.opacity.value": lambda: 0.5,
+    "DeformEditor.load.path": lambda: _file("saved.segdeform"),
+    "DeformEditor.mode.value": lambda: sd.widgets.Mode.DEFORM,
+    "DeformEditor.path.value": lambda: Path("other.segdeform"),
+    "HandleDragger.handle.value": lambda: "handle 1",
+    "HandleDragger.local.value": lambda: True,
+    "HandleDragger.refine_while_resting.value": lambda: False,
+    "Recorder.path": lambda: Path("events.txt"),
+    "RegionSelector.radius.value": lambda: 0.1,
+    "RegionSelector.tool.value": lambda: sd.widgets.Tool.LASSO,
+    "Session.add_handle.vertices": lambda: [int(np.abs(mesh().vertices[:, 0]).argmin())],
+    "Session.move_cage.vertices": lambda: cages()[0].vertices * 1.05,
+    "Session.paint_region.vertices": lambda: [0, 1, 2],
+    "Session.rename_region.name": lambda: "arm",
+    "Session.set_fixed.vertices": _left,
+    "Session.split_region.vertices": lambda: None,
+    "VolumeOverlay.wanted_range.value": lambda: 0.2,
+    "blend_at.points": lambda: mesh().vertices[:4],
+    "cactus.n_vertices": lambda: 600,
+    "dinosaur.n_vertices": lambda: 1200,
+    "film.path": lambda: Path("film.gif"),
+    "film.size": lambda: (64, 64),
+    "fit_cages.n_vertices": lambda: 24,
+    "load_session.path": lambda: _file("saved.segdeform"),
+    "mean_value_coordinates.cage_vertices": lambda: cages()[0].vertices,
+    "read.path": lambda: _file("mesh.ply"),
+    "read_faces.path": lambda: _file("mesh.ply"),
+    "read_mesh.path": lambda: _file("mesh.ply"),
+    "read_polydata.path": lambda: _file("mesh.ply"),
+    "require_writable.arrays": lambda: False,
+    "require_writable.path": lambda: Path("written.vtp"),
+    "write.path": lambda: Path("written.ply"),
+    "write_mesh.path": lambda: Path("written.ply"),
+}

@@ -19,9 +19,14 @@ _LONGEST = 10**8  # entries of a sequence that is no array yet
 _LARGEST = float(np.finfo(np.float64).max)
 
 
-def as_points(points: ArrayLike, name: str) -> FloatArray:
-    """Return *points* as (n, 3) float, or raise an ArgumentError that says what came instead."""
-    array = _as_numbers(points, name)
+def as_points(points: ArrayLike, name: str, count: int | None = None) -> FloatArray:
+    """Return *points* as (n, 3) float, or raise an ArgumentError that says what came instead.
+
+    With *count*, there must be so many.
+    """
+    array = as_numbers(points, name)
+    if count is not None and array.shape != (count, 3):
+        raise ArgumentError(f"{name} must have shape ({count}, 3); got {array.shape}")
     if array.ndim != 2 or array.shape[1] != 3:
         raise ArgumentError(f"{name} must have shape (n, 3); got {array.shape}")
     finite = np.isfinite(array)
@@ -88,7 +93,8 @@ def frozen(array: NDArray[np.generic]) -> NDArray[np.generic]:
     return array
 
 
-def _as_numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
+def as_numbers(values: ArrayLike, name: str) -> FloatArray:
+    """Return *values* as floats of any shape, or raise an ArgumentError."""
     array = plain(values, name)
     if array.dtype.kind == "c":
         raise ArgumentError(f"{name} must hold real numbers; got {array.dtype}")

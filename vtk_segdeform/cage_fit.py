@@ -27,10 +27,11 @@ from .cages import Cage, cage_faults
 from .caging.cage_simplify import roundness, simplify
 from .caging.contour import contour_surface
 from .caging.region_solid import Patch, Skin, SolidField, solid_field
+from .checks import shown
 from .errors import CageError, RegionError
 from .mesh import Mesh, require_mesh
 from .progress import Progress, part, tell
-from .regions import Regions
+from .regions import Regions, require_regions
 from .surface.columns import inside_points
 from .surface.inside import distance_to_surface
 from .threads import n_threads
@@ -90,6 +91,7 @@ def fit_cages(
         If *n_vertices* is too small or *offset* is not positive.
     """
     require_mesh(mesh)
+    require_regions(regions, mesh)
     patches, n_regions = [], regions.n_regions
     tell(progress, 0.0, "measuring regions")
     skin = Skin.of(mesh)
@@ -118,6 +120,7 @@ def fit_cage(
 
     As `fit_cages`, which see, for a single region.
     """
+    require_mesh(mesh)
     mask = np.zeros(mesh.n_vertices, dtype=bool)
     mask[as_ids(members, mesh.n_vertices, "members")] = True
     if not mask.any():
@@ -137,7 +140,7 @@ def _share_out(patches: list[Patch], n_vertices: int) -> IntArray:
     fewest, most = _FEWEST * len(patches), _MOST * len(patches)
     if not is_whole(n_vertices, fewest, most):
         each = f"at least {_FEWEST} and at most {_MOST} for each of {len(patches)} regions"
-        raise CageError(f"n_vertices must be {each}, {fewest} to {most}; got {n_vertices!r}")
+        raise CageError(f"n_vertices must be {each}, {fewest} to {most}; got {shown(n_vertices)}")
     area = np.array([patch.area for patch in patches])
     spread = np.array([patch.spread for patch in patches])
     need = np.sqrt(area * spread.sum(axis=1) / spread[:, 1:].sum(axis=1))
@@ -150,7 +153,7 @@ def _share_out(patches: list[Patch], n_vertices: int) -> IntArray:
 def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) -> Cage:
     """Return the first good cage, or the better of the first two that are merely valid."""
     if offset is not None and not (is_number(offset) and offset > 0.0):
-        raise CageError(f"offset must be a positive length; got {offset!r}")
+        raise CageError(f"offset must be a positive length; got {shown(offset)}")
     length = float(np.sqrt(patch.area / n))
     offset = _OFFSET * length if offset is None else offset
     valid: list[tuple[float, FloatArray, IntArray]] = []

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
+from .checks import require
 from .errors import CageError
 from .surface.columns import inside_points
 from .surface.inside import distance_to_surface, winding_number
@@ -90,7 +91,7 @@ class Cage:
 
     def require_encloses(self, points: ArrayLike, name: str) -> None:
         """Raise a CageError that counts the (n, 3) *points* outside, unless there are none."""
-        x = as_points(points, name)
+        x = as_points(points, require(name, str, "name"))
         outside = x[~self.contains(x)]
         if len(outside):
             farthest = distance_to_surface(outside, self.vertices, self.faces).max()

@@ -67,12 +67,16 @@ def require(value: object, kind: type[_T] | tuple[type[_T], ...], name: str) -> 
     raise ArgumentError(f"{name} must be {expected}; got {shown(value)}")
 
 
-def all_of(values: object, kind: type[_T], name: str) -> tuple[_T, ...]:
+def require_sequence(values: object, name: str) -> None:
+    """Raise unless *values* is a list, a tuple, an array or another sequence, but no text."""
+    known = isinstance(values, Sequence) or (isinstance(values, np.ndarray) and values.ndim > 0)
+    if not known or isinstance(values, str | bytes | bytearray | memoryview):
+        raise ArgumentError(f"{name} must be a sequence; got {shown(values)}")
+
+
+def all_of(values: Sequence[_T], kind: type[_T], name: str) -> tuple[_T, ...]:
     """Return *values*, a sequence of one *kind*, as a tuple."""
-    if not isinstance(values, Sequence) or isinstance(values, str | bytes):
-        raise ArgumentError(
-            f"{name} must be a sequence, each a {kind.__name__}; got {shown(values)}"
-        )
+    require_sequence(values, name)
     return tuple(require(value, kind, f"{name}[{k}]") for k, value in enumerate(values))
 
 
@@ -81,6 +85,18 @@ def as_flag(value: object, name: str) -> bool:
     if isinstance(value, bool | np.bool_):
         return bool(value)
     raise ArgumentError(f"{name} must be True or False; got {shown(value)}")
+
+
+def as_text(value: object, name: str) -> str:
+    """Return *value* if it is text that a file, a window or a label can have."""
+    text = require(value, str, name)
+    if "\0" in text:
+        raise ArgumentError(f"{name} must not contain a null character; got {shown(text)}")
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise ArgumentError(f"{name} cannot be encoded; got {shown(text)}") from None
+    return text
 
 
 def as_callable(value: _Callable, name: str) -> _Callable:

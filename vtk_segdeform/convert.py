@@ -23,13 +23,14 @@ from numpy.typing import ArrayLike
 
 from . import meshlab
 from .arrays import as_points
-from .errors import ArgumentError, MeshError
+from .checks import as_flag, as_path, require
+from .errors import MeshError
 from .formats.off import read_off, write_off
 from .formats.ply import read_ply, write_ply
 from .formats.polygons import polydata_of, triangles_of
 from .formats.vtk_readers import read_with_vtk, write_with_vtk
 from .formats.wavefront import read_obj, write_obj
-from .mesh import Mesh
+from .mesh import Mesh, require_mesh
 
 _log = logging.getLogger(__name__)
 
@@ -46,7 +47,7 @@ _HOLD_ARRAYS = frozenset({".ply", ".vtk", ".vtp", ".vtkhdf"})
 
 def is_mesh_file(path: str | Path) -> bool:
     """Tell whether *path* has a suffix of a format that `read_mesh` knows."""
-    return Path(path).suffix.lower() in {*_READERS, *_VTK_READS, *meshlab.READS}
+    return as_path(path).suffix.lower() in {*_READERS, *_VTK_READS, *meshlab.READS}
 
 
 def read_mesh(path: str | Path) -> Mesh:
@@ -90,10 +91,10 @@ def read_polydata(path: str | Path) -> pv.PolyData:
     MissingDependencyError
         If only PyMeshLab reads such files, and it is not installed.
     """
-    path = Path(path)
-    if not path.is_file():
+    path = as_path(path)
+    if not os.path.isfile(path):
         raise MeshError(
-            f"{path}: {'a folder, not a' if path.is_dir() else 'there is no such'} file"
+            f"{path}: {'a folder, not a' if os.path.isdir(path) else 'there is no such'} file"
         )
     suffix = path.suffix.lower()
     if not is_mesh_file(path):
@@ -132,7 +133,8 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
     MeshError
         If the suffix is not known, the folder is not there, or the disk is full.
     """
-    path = Path(path)
+    path = as_path(path)
+    require(mesh, (Mesh, pv.PolyData), "mesh")
     require_writable(path)
     surface = to_polydata(mesh) if isinstance(mesh, Mesh) else mesh
     suffix = path.suffix.lower()
@@ -172,15 +174,16 @@ def require_writable(path: str | Path, *, arrays: bool = False) -> None:
 
     With *arrays* the file has to hold point arrays and colours, which some formats cannot.
     """
-    path = Path(path)
+    path = as_path(path)
     suffix = path.suffix.lower()
+    as_flag(arrays, "arrays")
     known = {*_HOLD_ARRAYS} if arrays else {*_WRITERS, *_VTK_WRITES, *meshlab.WRITES}
-    if path.is_dir():
+    if os.path.isdir(path):
         raise MeshError(f"{path}: a folder is there; name a file")
     if suffix not in known:
         what = "arrays and colours to " if arrays else ""
         raise MeshError(f"{path}: cannot write {what}{suffix or 'no suffix'}; can {_listed(known)}")
-    if not path.parent.is_dir():
+    if not os.path.isdir(path.parent):
         raise MeshError(f"{path}: there is no folder {path.parent}")
     if not os.access(path.parent, os.W_OK):
         raise MeshError(f"{path}: the folder {path.parent} may not be written to")
@@ -188,6 +191,7 @@ def require_writable(path: str | Path, *, arrays: bool = False) -> None:
 
 def to_polydata(mesh: Mesh) -> pv.PolyData:
     """Return *mesh* as pyvista's PolyData: float64 points, same vertices, same triangles."""
+    require_mesh(mesh)
     return polydata_of(mesh.vertices.copy(), np.full(mesh.n_faces, 3), mesh.faces.ravel())
 
 
@@ -201,6 +205,7 @@ def from_polydata(polydata: pv.PolyData) -> Mesh:
     MeshError
         If the surface is not a closed, outward oriented two-manifold.
     """
+    require(polydata, pv.PolyData, "polydata")
     faces = triangles_of(polydata)
     if len(faces) != polydata.n_cells:
         _log.info("%d cells were cut into %d triangles", polydata.n_cells, len(faces))
@@ -220,9 +225,8 @@ def with_vertices(polydata: pv.PolyData, vertices: ArrayLike) -> pv.PolyData:
     vertices : (n, 3) float
         One position per point, in the order of ``polydata.points``.
     """
-    points = as_points(vertices, "vertices")
-    if len(points) != polydata.n_points:
-        raise ArgumentError(f"vertices must have {polydata.n_points} rows; got {len(points)}")
+    require(polydata, pv.PolyData, "polydata")
+    points = as_points(vertices, "vertices", polydata.n_points)
     moved = polydata.copy(deep=True)
     moved.points = points.copy()
     for attributes, of_points in ((moved.point_data, True), (moved.cell_data, False)):

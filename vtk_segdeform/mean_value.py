@@ -51,6 +51,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import FloatArray, IntArray, as_faces, as_points
+from .checks import as_callable
 from .errors import CageError
 from .fast import compiled, inputs
 from .progress import Progress
@@ -107,6 +108,8 @@ def mean_value_coordinates(
     >>> mean_value_coordinates([[0, 0, 0]], corners, faces).round(6)
     array([[0.25, 0.25, 0.25, 0.25]])
     """
+    if progress is not None:
+        as_callable(progress, "progress")
     x = as_points(points, "points")
     p = as_points(cage_vertices, "cage_vertices")
     faces = as_faces(cage_faces, len(p), "cage_faces")

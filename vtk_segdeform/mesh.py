@@ -15,7 +15,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from .arrays import FloatArray, IntArray, as_points
-from .errors import ArgumentError, MeshError
+from .errors import MeshError
 from .faults import as_soup, find_faults
 from .threads import in_parallel
 
@@ -137,11 +137,7 @@ class Mesh:
 
         The triangles were checked already; a pose that crosses or inverts itself is still a pose.
         """
-        points = as_points(vertices, "vertices")
-        if points.shape != self.vertices.shape:
-            raise ArgumentError(
-                f"vertices must have shape {self.vertices.shape}; got {points.shape}"
-            )
+        points = as_points(vertices, "vertices", self.n_vertices)
         posed = object.__new__(Mesh)
         posed.__setstate__((points.copy(), self.faces))
         # the same at every pose: hand on what is known

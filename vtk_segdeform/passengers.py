@@ -31,11 +31,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from .arrays import FloatArray, as_points
+from .arrays import FloatArray, as_numbers, as_points
 from .cages import Cage
-from .errors import CageError
+from .checks import all_of, require_sequence
+from .errors import ArgumentError, CageError
 from .mean_value import mean_value_coordinates
-from .mesh import Mesh
+from .mesh import Mesh, require_mesh
 from .progress import Progress, part
 from .subspace import Subspace
 
@@ -61,6 +62,7 @@ class Passengers:
         CageError
             If these are not the cages that the points were bound to.
         """
+        require_sequence(cage_vertices, "cage_vertices")
         poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
         expected, got = [b.shape[1] for b in self.subspace.blocks], [len(p) for p in poses]
         if got != expected:
@@ -93,7 +95,13 @@ def board(
     progress : Progress, optional
         Called as the coordinates in each cage are computed; may cancel.
     """
+    require_mesh(mesh)
+    cages = all_of(cages, Cage, "cages")
     points = as_points(points, "points")
+    weights = as_numbers(weights, "weights")
+    if weights.shape != (len(cages), mesh.n_vertices):
+        expected = len(cages), mesh.n_vertices
+        raise ArgumentError(f"weights must have shape {expected}; got {weights.shape}")
     alpha = blend_at(mesh.vertices, weights, points)
     rows, blocks = [], []
     for r, cage in enumerate(cages):
@@ -107,6 +115,13 @@ def board(
 
 def blend_at(vertices: FloatArray, weights: FloatArray, points: FloatArray) -> FloatArray:
     """Return the blend weights (r, k) at *points* (k, 3), of those (r, n) at *vertices* (n, 3)."""
+    vertices, points = as_points(vertices, "vertices"), as_points(points, "points")
+    weights = as_numbers(weights, "weights")
+    if not len(vertices) or weights.ndim != 2 or weights.shape[1] != len(vertices):
+        raise ArgumentError(
+            f"weights must have shape (r, {len(vertices)}), a column for each vertex; "
+            f"got {weights.shape}"
+        )
     count = min(_NEAREST, len(vertices))
     distance, near = map(np.asarray, cKDTree(vertices).query(points, k=np.arange(1, count + 1)))
     farthest = distance[:, -1:]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from .cage_fit import fit_cages
+from .checks import as_flag
 from .deformer import Deformer
 from .mesh import Mesh
 from .progress import Progress, part
@@ -54,6 +55,7 @@ def deform(
     ConstraintError
         If fixed, handle or targets make no sense.
     """
+    as_flag(preserve_volume, "preserve_volume")
     regions = segment(mesh, n_regions, progress=part(progress, 0.0, 0.2))
     cages = fit_cages(mesh, regions, n_cage_vertices, progress=part(progress, 0.2, 0.7))
     deformer = Deformer(

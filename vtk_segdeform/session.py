@@ -29,9 +29,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import FloatArray, IntArray, as_points, frozen
+from .arrays import FloatArray, IntArray, as_points, frozen, is_whole, plain
 from .cage_fit import fit_cages
 from .cages import Cage
+from .checks import require, shown
 from .editing import handles, naming, painting
 from .editing.history import Timeline
 from .editing.listeners import Change
@@ -224,7 +225,8 @@ class Session(Timeline):
 
     def set_regions(self, regions: Regions, *, label: str = "set regions") -> None:
         """Take *regions* of this mesh; *label* is what `undo_label` calls it."""
-        self._set_regions(of_mesh(self.mesh, regions), label)
+        regions = of_mesh(self.mesh, regions)
+        self._set_regions(regions, require(label, str, "label"))
 
     def paint_region(self, region: int, vertices: ArrayLike, *, subtract: bool = False) -> None:
         """Add vertices, ids or a mask, to a region, or take them out; see `painting.painted`.
@@ -256,7 +258,9 @@ class Session(Timeline):
 
     def region_name(self, region: int) -> str:
         """Return what a region is called, or is going to be: number 0 is "region 1" at first."""
-        return naming.called(self._state.region_names, region)
+        if not is_whole(region, 0):
+            raise RegionError(f"region must be a whole number, 0 or more; got {shown(region)}")
+        return naming.called(self._state.region_names, int(region))
 
     def rename_region(self, region: int, name: str) -> None:
         """Call a region something else; "" calls it by its place again.
@@ -271,8 +275,10 @@ class Session(Timeline):
             80 letters.
         """
         count = 0 if self.regions is None else self.regions.n_regions
-        if region not in range(count):
-            raise RegionError(f"there is no region {region} to name; there are {count}, from 0")
+        if not is_whole(region, 0, count - 1):
+            raise RegionError(
+                f"there is no region {shown(region)} to name; there are {count}, from 0"
+            )
         names = naming.renamed(self._state.region_names, int(region), name)
         label = f"rename {self.region_name(region)}"
         self._step(label, replace(self._state, region_names=names))
@@ -281,6 +287,7 @@ class Session(Timeline):
 
     def set_cages(self, cages: Sequence[Cage], *, label: str = "set cages") -> None:
         """Take *cages*, one around each region; CageError if they do not fit."""
+        require(label, str, "label")
         regions, fitted = self._fitted
         if cages is not fitted or self.regions is not regions:  # else they do
             cages = fitting_cages(self.regions, cages, self._state.region_names)
@@ -389,11 +396,12 @@ class Session(Timeline):
             As in `drag`.
         """
         handles.require_handle(self.handles, name)
-        if np.shape(motion) != (4, 4):
-            return self.drag({name: motion}, max_steps=max_steps)
+        matrix = plain(motion, "motion")
+        if matrix.shape != (4, 4):
+            return self.drag({name: matrix}, max_steps=max_steps)
         pose = (self._before or self._state).pose
         start = self._rest_targets() if pose is None else pose.targets
-        return self.drag({name: handles.moved(start[name], motion)}, max_steps=max_steps)
+        return self.drag({name: handles.moved(start[name], matrix)}, max_steps=max_steps)
 
     def move_cage(self, region: int, vertices: ArrayLike) -> None:
         """Put the vertices of one cage elsewhere, (m_r, 3); the mesh follows, x = W~ p.
@@ -402,8 +410,11 @@ class Session(Timeline):
         The volume is kept if the options say so, for which all cages move a little more: by what
         it takes from where they were put, so that a mouse that goes back takes that back as well.
         """
-        if region not in range(len(self.cages)):
-            raise CageError(f"region must be that of one of the {len(self.cages)} cages")
+        if not is_whole(region, 0, len(self.cages) - 1):
+            raise CageError(
+                f"region must be that of one of the {len(self.cages)} cages; got {shown(region)}"
+            )
+        region = int(region)
         going_on = self.is_dragging and self._put[0] is self._state.pose
         places = list(self._put[1] if going_on else self.cage_vertices)
         try:

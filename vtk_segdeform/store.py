@@ -30,6 +30,7 @@ from typing import Any
 import numpy as np
 
 from .cages import Cage
+from .checks import as_path, require
 from .editing.archive import Archive, write_archive
 from .editing.state import Options, Pose, State, pieces
 from .errors import SessionError
@@ -61,10 +62,9 @@ def save_session(path: str | os.PathLike[str], session: Session) -> None:
         If the file cannot be written: no such folder, no permission, no space, or what has that
         name is a folder or a device.
     """
-    try:
-        target = Path(os.path.realpath(path))  # what a link points to, as open() would
-    except ValueError as fault:
-        raise SessionError(f"{path!r}: is no name for a file ({fault})") from fault
+    path = as_path(path)
+    require(session, Session, "session")
+    target = Path(os.path.realpath(path))  # what a link points to, as open() would
     if os.path.lexists(target) and not target.is_file():  # replacing a device would be its end
         raise SessionError(f"{path}: is {_kind(target)}, not a file; choose another name")
     draft = target.with_name(f".segdeform-{secrets.token_hex(8)}.part")
@@ -96,6 +96,7 @@ def load_session(path: str | os.PathLike[str]) -> Session:
         If there is no such file, it is no session, is damaged, or is of a newer version; the text
         names the file and the fault.
     """
+    path = as_path(path)
     if not os.path.isfile(path):
         what = f"is {_kind(path)}, not a file" if os.path.lexists(path) else "there is no such file"
         raise SessionError(f"{path}: {what}")
