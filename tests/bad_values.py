@@ -79,6 +79,7 @@ BAD: dict[str, Callable[[], object]] = {
     "text": lambda: "no such thing",
     "empty text": lambda: "",
     "long text": lambda: "x" * 1_000_000,
+    "long name": lambda: "x" * 300,
     "null character": lambda: "a\0b",
     "surrogate": lambda: "a\ud800b",
     "bytes": lambda: b"name",

@@ -72,6 +72,14 @@ def calls(modules: tuple[str, ...]) -> Iterator[Call]:
                 yield _call(name, functools.partial(lambda f: f, thing), thing)
 
 
+def expensive(call: Call) -> bool:
+    """Tell whether an answer takes a second: a window, cages, or a body made anew."""
+    return call.name in {
+        "PlotterTools.edit", "PolyDataTools.deform", "PolyDataTools.regions", "cactus", "deform",
+        "dinosaur", "edit", "fit_cages", "film",
+    }  # fmt: skip
+
+
 def valid(call: str, name: str) -> Any:
     """Return a valid value of one parameter; a KeyError if nobody has said what that is."""
     special = f"{call}.{name}"
@@ -203,15 +211,29 @@ def shared_session() -> Session:
     return session()
 
 
-@functools.cache
-def _widget(cls: type) -> Any:
-    from vtk_segdeform import widgets
+made_widgets: list[Any] = []
 
+
+def _widget(cls: type) -> Any:
+    widgets = sd.widgets
     if cls is widgets.View:
         return view()
-    if cls is widgets.Recorder:
-        return cls(view())
-    return cls(view(), shared_session())
+    made_widgets.append(cls(view()) if cls is widgets.Recorder else cls(view(), shared_session()))
+    return made_widgets[-1]
+
+
+def tidy() -> None:
+    """Take the widgets that were made out of the view that they share."""
+    while made_widgets:
+        remove(made_widgets.pop())
+
+
+def remove(widget: Any) -> None:
+    """Take a widget out of its view; anything else is left alone."""
+    if isinstance(widget, sd.widgets.Recorder):
+        widget.stop()
+    elif type(widget).__module__.startswith("vtk_segdeform.widgets"):
+        getattr(widget, "remove", lambda: None)()
 
 
 def instance(cls: type) -> Any:
@@ -382,4 +404,36 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "require_writable.path": lambda: Path("written.vtp"),
     "write.path": lambda: Path("written.ply"),
     "write_mesh.path": lambda: Path("written.ply"),
+}
+
+# What messages call an argument, where that is clearer than its name.
+SAID_AS: dict[str, tuple[str, ...]] = {
+    "Cage.require_encloses.points": ("handle 1",),
+    "HandleDragger.handle.value": ("handle",),
+    "Mesh.faces": ("two-manifold",),
+    "Mesh.vertices": ("two-manifold",),
+    "PolyDataTools.deform.n_cage_vertices": ("n_vertices",),
+    "Regions.from_masks.masks": ("membership",),
+    "Session.add_handle.vertices": ("handle",),
+    "Session.drag.targets": ("handle",),
+    "Session.merge_regions.which": ("region",),
+    "Session.move_handle.motion": ("targets",),
+    "Session.move_handle.name": ("handle",),
+    "Session.remove_handle.name": ("handle",),
+    "Session.rename_handle.name": ("handle",),
+    "Session.rename_handle.new_name": ("handle's name",),
+    "Session.set_fixed.vertices": ("fixed",),
+    "blend_at.vertices": ("weights",),
+    "board.cages": ("weights",),
+    "mean_value_coordinates.cage_vertices": ("cage_faces",),
+    "deform.n_cage_vertices": ("n_vertices",),
+    "film.scene": ("view",),
+    "from_meshset.arrays": ("attribute",),
+    "repair.faces": ("nothing to repair",),
+    "repair.vertices": ("nothing to repair",),
+    "replay.source": ("recording",),
+    "to_meshset.what": ("Mesh",),
+    "torus.major": ("two-manifold",),
+    "sphere.radius": ("two-manifold",),
+    "bar.size": ("two-manifold",),
 }

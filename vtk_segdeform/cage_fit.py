@@ -47,6 +47,7 @@ _SHELL = 6  # vertices, at least, of each part of a cage that is in parts
 _FLOOR = 12  # vertices that every region gets before the rest is shared out
 _CLEARANCE = 0.5  # of the offset: the least distance from the skin that faces are pushed to
 _PUSHES, _NEAREST = 30, 200  # rounds; vertices whose distance from the cage is measured
+_CLOSEST, _FARTHEST = 1e-12, 1e6  # diagonals of the mesh that an offset may be
 _MEASURED = 0.25  # of the work: regions are measured
 _SIEVE = 16  # one vertex in so many is measured first
 _SAMPLES = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6.0  # of a face
@@ -92,6 +93,7 @@ def fit_cages(
     """
     require_mesh(mesh)
     require_regions(regions, mesh)
+    _check_offset(offset, mesh)
     patches, n_regions = [], regions.n_regions
     tell(progress, 0.0, "measuring regions")
     skin = Skin.of(mesh)
@@ -121,6 +123,7 @@ def fit_cage(
     As `fit_cages`, which see, for a single region.
     """
     require_mesh(mesh)
+    _check_offset(offset, mesh)
     mask = np.zeros(mesh.n_vertices, dtype=bool)
     mask[as_ids(members, mesh.n_vertices, "members")] = True
     if not mask.any():
@@ -128,6 +131,18 @@ def fit_cage(
     patch = Patch.of(Skin.of(mesh), mask)
     _share_out([patch], n_vertices)
     return _fit(patch, n_vertices, offset, progress)
+
+
+def _check_offset(offset: float | None, mesh: Mesh) -> None:
+    if offset is None:
+        return
+    if not (is_number(offset) and offset > 0.0):
+        raise CageError(f"offset must be a positive length; got {shown(offset)}")
+    if not _CLOSEST <= offset / mesh.diagonal <= _FARTHEST:
+        raise CageError(
+            f"offset must be {_CLOSEST:.0e} to {_FARTHEST:.0e} diagonals of the mesh, of length "
+            f"{mesh.diagonal:.3g}; got {shown(offset)}"
+        )
 
 
 def _share_out(patches: list[Patch], n_vertices: int) -> IntArray:
@@ -152,8 +167,6 @@ def _share_out(patches: list[Patch], n_vertices: int) -> IntArray:
 
 def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) -> Cage:
     """Return the first good cage, or the better of the first two that are merely valid."""
-    if offset is not None and not (is_number(offset) and offset > 0.0):
-        raise CageError(f"offset must be a positive length; got {shown(offset)}")
     length = float(np.sqrt(patch.area / n))
     offset = _OFFSET * length if offset is None else offset
     valid: list[tuple[float, FloatArray, IntArray]] = []

@@ -19,6 +19,7 @@ from .errors import ArgumentError
 _T = TypeVar("_T")
 _Callable = TypeVar("_Callable", bound=Callable[..., Any])
 _LONGEST = 60  # characters of a value in a message
+_LONGEST_PATH = 4096  # characters, as on Linux
 _LARGEST = 10**20  # beyond it, the digits of an integer say less than their number
 
 
@@ -87,6 +88,13 @@ def as_flag(value: object, name: str) -> bool:
     raise ArgumentError(f"{name} must be True or False; got {shown(value)}")
 
 
+def as_switch(value: object, name: str) -> bool:
+    """Return *value* as True or False; as in VTK, 1 and 0 count."""
+    if isinstance(value, bool | np.bool_ | int | np.integer) and value in (0, 1):
+        return bool(value)
+    raise ArgumentError(f"{name} must be True or False; got {shown(value)}")
+
+
 def as_text(value: object, name: str) -> str:
     """Return *value* if it is text that a file, a window or a label can have."""
     text = require(value, str, name)
@@ -115,6 +123,10 @@ def as_path(path: str | os.PathLike[str], name: str = "path") -> Path:
         raise ArgumentError(f"{name} must be a str or a Path; got {shown(text)}")
     if "\0" in text:
         raise ArgumentError(f"{name} must not contain a null character; got {shown(text)}")
+    if len(text) > _LONGEST_PATH:
+        raise ArgumentError(
+            f"{name} has {len(text)} characters; at most {_LONGEST_PATH} are allowed"
+        )
     try:
         os.fsencode(text)
     except UnicodeEncodeError:

@@ -187,7 +187,8 @@ def _require(n_vertices: int, least: int) -> None:
 
 
 def _are_three(values: object) -> bool:
-    return isinstance(values, Sequence | np.ndarray) and len(values) == 3
+    sequence = isinstance(values, Sequence) or (isinstance(values, np.ndarray) and values.ndim == 1)
+    return sequence and len(values) == 3  # type: ignore[arg-type]
 
 
 def _chequered(p: int, q: int) -> IntArray:

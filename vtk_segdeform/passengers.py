@@ -41,6 +41,7 @@ from .progress import Progress, part
 from .subspace import Subspace
 
 _NEAREST = 24  # K
+_FARTHEST = 1e60  # diagonals; beyond it, distances overflow
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +99,8 @@ def board(
     require_mesh(mesh)
     cages = all_of(cages, Cage, "cages")
     points = as_points(points, "points")
+    if np.abs(points - mesh.vertices[0]).max(initial=0.0) > _FARTHEST * mesh.diagonal:
+        raise ArgumentError(f"points are more than {_FARTHEST:.0e} diagonals of the mesh away")
     weights = as_numbers(weights, "weights")
     if weights.shape != (len(cages), mesh.n_vertices):
         expected = len(cages), mesh.n_vertices

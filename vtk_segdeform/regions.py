@@ -127,6 +127,8 @@ class Regions:
                [0, 0, 0, 1]])
         """
         require_mesh(mesh)
+        if not is_whole(overlap, 0):
+            raise RegionError(f"overlap must be a whole number, 0 or more; got {shown(overlap)}")
         array = plain(labels, "labels")
         if array.shape != (mesh.n_vertices,) or array.dtype.kind not in "iu":
             raise RegionError(

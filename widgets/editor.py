@@ -18,6 +18,8 @@ import os
 from pathlib import Path
 from typing import Any
 
+from vtk_segdeform.checks import as_callable, as_flag, as_path, as_switch, require, shown
+from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.session import Session
 
@@ -42,8 +44,7 @@ class DeformEditor:
     """
 
     def __init__(self, view: Any, session: Session | Mesh) -> None:
-        if not isinstance(session, Session | Mesh):
-            raise TypeError(f"session must be a Session or a Mesh; got {type(session).__name__}")
+        require(session, (Session, Mesh), "session")
         self.view = View.of(view)
         has_camera = _is_aimed(self.view.renderer)
         session = session if isinstance(session, Session) else Session(session)
@@ -77,7 +78,9 @@ class DeformEditor:
     @mode.setter
     def mode(self, mode: Mode) -> None:
         if not isinstance(mode, Mode):
-            raise TypeError(f"mode must be one of {', '.join(map(str, Mode))}; got {mode!r}")
+            raise ArgumentError(
+                f"mode must be one of {', '.join(map(str, Mode))}; got {shown(mode)}"
+            )
         self._desk.mode = mode
 
     @property
@@ -87,7 +90,7 @@ class DeformEditor:
 
     @path.setter
     def path(self, path: str | os.PathLike[str]) -> None:
-        self._desk.file.path = Path(path)
+        self._desk.file.path = as_path(path)
 
     @property
     def status(self) -> str:
@@ -113,6 +116,8 @@ class DeformEditor:
         while_busy : bool
             Whether it can be done beside a job; else, if there is one, that is said instead.
         """
+        as_callable(action, "action")
+        as_flag(while_busy, "while_busy")
         with self.view.guarded():
             self._do(action, while_busy)
 
@@ -124,7 +129,7 @@ class DeformEditor:
 
     def load(self, path: str | os.PathLike[str]) -> None:
         """Go on with the session in a file, or its mesh; see `load_session`, `read_mesh`."""
-        self._desk.open(Path(path))
+        self._desk.open(as_path(path))
         self.wait()
 
     # Switching.
@@ -155,7 +160,7 @@ class DeformEditor:
 
     def SetEnabled(self, enabled: bool) -> None:  # noqa: N802
         """Switch on or off."""
-        if enabled:
+        if as_switch(enabled, "enabled"):
             self.On()
         else:
             self.Off()

@@ -35,7 +35,9 @@ from typing import Any, TextIO
 from vtkmodules.vtkCommonCore import vtkVersion
 
 from vtk_segdeform import __version__
-from vtk_segdeform.errors import SessionError
+from vtk_segdeform.arrays import is_number
+from vtk_segdeform.checks import as_callable, as_path, as_text, shown
+from vtk_segdeform.errors import ArgumentError, SessionError
 
 from .dragging.pace import on_steps, order_steps
 from .filming.reading import read_recording
@@ -74,7 +76,8 @@ class Recorder:
         skips: Callable[[Input], bool] | None = None,
     ) -> None:
         self.view = View.of(view)
-        self._skips = skips
+        as_text(keys, "keys")
+        self._skips = None if skips is None else as_callable(skips, "skips")
         self.lines: list[str] = []
         self._start = time.monotonic()
         self._told: dict[type, Entry] = {}
@@ -189,6 +192,10 @@ def replay(
         If there is no such file, or a line makes no sense: the text has its number.
     """
     view = View.of(view)
+    if not is_number(pace, 0.0):
+        raise ArgumentError(f"pace must be a number, 0 or more; got {shown(pace)}")
+    if busy is not None:
+        as_callable(busy, "busy")
     before = 0.0
     for moment, entry, steps in read_recording(source):
         while busy is not None and busy():
@@ -211,6 +218,7 @@ def _is_closed(window: Any) -> bool:
 
 
 def _opened(path: str | os.PathLike[str]) -> TextIO:
+    path = as_path(path)
     try:
         return open(path, "w", encoding="utf-8", buffering=1)  # line by line
     except OSError as fault:

@@ -13,7 +13,10 @@ from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
+from vtk_segdeform.arrays import plain
+from vtk_segdeform.checks import require
 from vtk_segdeform.editing.listeners import Change
+from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.formats.polygons import polydata_of
 from vtk_segdeform.normals import VertexNormals
 from vtk_segdeform.palette import BODY, rgb
@@ -35,7 +38,7 @@ class SurfaceDisplay:
 
     def __init__(self, view: Any, session: Session) -> None:
         self.view = View.of(view)
-        self.session = session
+        self.session = require(session, Session, "session")
         self._layers: dict[str, NDArray[np.uint8]] = {}
         faces = session.mesh.faces
         corners = np.full(len(faces), 3)
@@ -71,10 +74,11 @@ class SurfaceDisplay:
 
         The newest layer is seen; a layer that is there already keeps its place.
         """
+        require(layer, str, "layer")
         if colours is None:
             self._layers.pop(layer, None)
         else:
-            self._layers[layer] = colours
+            self._layers[layer] = self._checked(colours)
         top = next(reversed(self._layers.values()), None)
         self._mapper.SetScalarVisibility(top is not None)
         if top is not None:
@@ -100,6 +104,15 @@ class SurfaceDisplay:
         """Take the mesh out of the view, for good."""
         self._stop()
         self.view.renderer.RemoveActor(self.actor)
+
+    def _checked(self, colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        array = plain(colours, "colours")
+        expected = len(self._points), 3
+        if array.shape != expected or array.dtype != np.uint8:
+            raise ArgumentError(
+                f"colours must be uint8 of shape {expected}; got {array.dtype}, {array.shape}"
+            )
+        return array
 
     def _changed(self, change: Change) -> None:
         if change & Change.POSE:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
-from pathlib import Path
+from collections.abc import Iterable, Iterator
 
+from vtk_segdeform.checks import as_path, require, require_sequence
 from vtk_segdeform.errors import SessionError
 
 from .transcript import TITLE, Entry, Steps, read_entry
@@ -30,20 +30,23 @@ def read_recording(source: str | os.PathLike[str] | Iterable[str]) -> list[Momen
     name = "recording"
     lines: Iterable[str]
     if isinstance(source, str | os.PathLike):
-        name = os.fspath(source)
+        source = as_path(source, "source")
+        name = str(source)
         if not os.path.isfile(source):  # a device would be read for ever
             raise SessionError(f"{name}: cannot be read; it is no file, or not there")
         try:
-            lines = Path(source).read_bytes().decode(errors="replace").splitlines()
+            lines = source.read_bytes().decode(errors="replace").splitlines()
         except OSError as fault:
             raise SessionError(f"{name}: cannot be read ({fault.strerror or fault})") from fault
     else:
+        if not isinstance(source, Iterator):
+            require_sequence(source, "source")
         lines = source
     entries: list[tuple[float, Entry]] = []
     began = False
     for number, line in enumerate(lines, start=1):
         try:
-            text = line.strip()
+            text = require(line, str, "a line").strip()
             if not began:
                 began = _is_title(text)
             elif text and not text.startswith("#"):
