@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from .arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
 from .checks import require
 from .errors import CageError
+from .freezing import Frozen
 from .surface.columns import inside_points
 from .surface.inside import distance_to_surface, winding_number
 from .surface.intersections import flat_faces, self_intersections
@@ -26,7 +27,7 @@ __all__ = ["Cage", "cage_faults", "self_intersections", "winding_number"]
 
 
 @dataclass(frozen=True, init=False, eq=False)
-class Cage:
+class Cage(Frozen):
     """A closed, outward oriented triangle mesh that does not cross itself; frozen.
 
     Parameters

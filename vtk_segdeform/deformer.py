@@ -13,11 +13,11 @@ Long because every option of the method meets here, and each is told in the docs
 
 from __future__ import annotations
 
-import copy
 import os
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +29,7 @@ from .cages import Cage
 from .checks import all_of, as_flag, as_path, require_sequence, shown
 from .constraints import VolumeConstraint, Volumes, region_volumes, total_volume
 from .errors import ArgumentError, CageError, ConstraintError
+from .freezing import read_only
 from .iteration import Iteration, SolverOptions
 from .landing import LargeSurface, along
 from .mesh import Mesh, require_mesh
@@ -191,7 +192,7 @@ class Deformer:
         for volumes in (preserve_volume, preserve_region_volumes):
             if volumes is not None:
                 as_flag(volumes, "preserve_volume and preserve_region_volumes")
-        other = copy.copy(self)
+        other = self._shared()
         before = other._keeps
         other._keep(
             before[0] if preserve_volume is None else preserve_volume,
@@ -202,8 +203,20 @@ class Deformer:
 
     def copy(self) -> Deformer:
         """Return a deformer in the same pose that goes on from there by itself."""
-        other = copy.copy(self)
+        other = self._shared()
         other._at_rest, other._ladder = self._at_rest.copy(), self._ladder.copy()
+        return other
+
+    __copy__ = copy
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self.fixed, self.handle = read_only(self.fixed), read_only(self.handle)
+
+    def _shared(self) -> Deformer:
+        """Return another deformer over the very same parts."""
+        other = object.__new__(type(self))
+        vars(other).update(vars(self))
         return other
 
     @property
@@ -317,7 +330,7 @@ class Deformer:
 
     def _take_hold(self, fixed: ArrayLike, handle: ArrayLike) -> None:
         mesh = self.mesh
-        self.fixed, self.handle = checked_constraints(mesh, fixed, handle)
+        self.fixed, self.handle = map(read_only, checked_constraints(mesh, fixed, handle))
         self._handles = connected_sets(mesh, self.handle)
         patches = connected_sets(mesh, self.fixed)
         # Sets lie side by side here, and their vertices in them as in `handle` and `fixed`.

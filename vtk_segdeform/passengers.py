@@ -35,6 +35,7 @@ from .arrays import FloatArray, as_numbers, as_points
 from .cages import Cage
 from .checks import all_of, require_sequence
 from .errors import ArgumentError, CageError
+from .freezing import Frozen, read_only
 from .mean_value import mean_value_coordinates
 from .mesh import Mesh, require_mesh
 from .progress import Progress, part
@@ -45,7 +46,7 @@ _FARTHEST = 1e60  # diagonals; beyond it, distances overflow
 
 
 @dataclass(frozen=True, eq=False)
-class Passengers:
+class Passengers(Frozen):
     """k points bound to the cages; made by `board` or `Deformer.passengers`."""
 
     points: FloatArray
@@ -98,7 +99,7 @@ def board(
     """
     require_mesh(mesh)
     cages = all_of(cages, Cage, "cages")
-    points = as_points(points, "points")
+    points = read_only(as_points(points, "points").copy())
     if np.abs(points - mesh.vertices[0]).max(initial=0.0) > _FARTHEST * mesh.diagonal:
         raise ArgumentError(f"points are more than {_FARTHEST:.0e} diagonals of the mesh away")
     weights = as_numbers(weights, "weights")

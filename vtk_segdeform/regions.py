@@ -22,6 +22,7 @@ from .arrays import BoolArray, FloatArray, IntArray, is_number, is_whole, plain
 from .blending import border_distance, distance_to_triangles, shares
 from .checks import shown
 from .errors import RegionError
+from .freezing import Frozen
 from .mesh import Mesh, require_mesh
 
 _EQUAL = 1e-9  # weights that differ by rounding only
@@ -40,7 +41,7 @@ class CageSurface(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Regions:
+class Regions(Frozen):
     """Which vertices belong to which regions; every vertex to at least one.
 
     Parameters

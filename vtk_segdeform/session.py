@@ -24,7 +24,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -68,6 +68,11 @@ class Session(Timeline):
     history : int
         Steps that can be undone; older ones are forgotten.
 
+    Notes
+    -----
+    A copy, by `copy` or `pickle`, has the mesh, the state, a drag in hand and the history.  It has
+    no listeners, and its next solve begins as after `start_afresh`.
+
     Raises
     ------
     RegionError, CageError, ConstraintError
@@ -104,6 +109,23 @@ class Session(Timeline):
         self._effort = Effort(0, 0.0)
         self._fitted: tuple[Regions | None, Sequence[Cage] | None] = None, None  # and fit, for sure
         self._put: tuple[Pose | None, list[FloatArray]] = None, []  # where `move_cage` put cages
+
+    # Copies, by `copy` or `pickle`: the mesh, the state, a drag in hand, and the history.  They
+    # bind anew when they have to, solve as after `start_afresh`, and have no listeners.
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {
+            "_mesh": self._mesh,
+            "_state": self._state,
+            "_before": self._before,
+            "_dragged": dict(self._dragged),
+            "_history": self._history.copy(),
+            "_effort": self._effort,
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        Session.__init__(self, state["_mesh"])
+        vars(self).update(state)
 
     # What there is.
 

@@ -18,6 +18,7 @@ from vtk_segdeform.checks import require
 from vtk_segdeform.editing.listeners import Change
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.formats.polygons import polydata_of
+from vtk_segdeform.freezing import read_only
 from vtk_segdeform.normals import VertexNormals
 from vtk_segdeform.palette import BODY, rgb
 from vtk_segdeform.session import Session
@@ -66,8 +67,8 @@ class SurfaceDisplay:
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """(n, 3) float: where the vertices are drawn; the very memory, not to be written to."""
-        return self._points
+        """(n, 3) float: where the vertices are drawn; the very memory, read-only."""
+        return read_only(self._points)
 
     def set_colours(self, layer: str, colours: NDArray[np.uint8] | None) -> None:
         """Show *colours* (n, 3), 0 to 255, one for each vertex; or None to take a layer away.

@@ -30,6 +30,7 @@ from vtk_segdeform.checks import require, shown
 from vtk_segdeform.editing.listeners import Change
 from vtk_segdeform.editing.naming import called
 from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.freezing import read_only
 from vtk_segdeform.local_volume import LocalVolume
 from vtk_segdeform.session import Session
 
@@ -84,7 +85,7 @@ class VolumeOverlay:
     @property
     def change(self) -> FloatArray | None:
         """(n,) float: s of the pose that is shown; None while hidden."""
-        return self._change
+        return read_only(self._change)
 
     @property
     def half_range(self) -> float | None:

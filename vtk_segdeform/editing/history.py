@@ -35,6 +35,13 @@ class History:
         self._past: deque[tuple[str, State]] = deque(maxlen=int(limit))
         self._future: list[tuple[str, State]] = []
 
+    def copy(self) -> History:
+        """Return a history of the same steps that goes its own way."""
+        other = History(self._past.maxlen or 1)
+        other._past.extend(self._past)
+        other._future.extend(self._future)
+        return other
+
     @property
     def undo_label(self) -> str | None:
         """The step that `undo` takes back, or None."""

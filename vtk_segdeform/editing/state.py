@@ -20,9 +20,10 @@ from ..arrays import FloatArray, IntArray, as_points, frozen, is_number
 from ..cages import Cage
 from ..checks import all_of, require, require_sequence, shown
 from ..errors import CageError, ConstraintError, RegionError, SessionError
+from ..freezing import Frozen
 from ..mesh import Mesh
 from ..positions import checked_constraints
-from ..regions import Regions, require_regions
+from ..regions import Regions
 from .listeners import Change
 from .naming import Names, called, checked_names
 
@@ -74,7 +75,7 @@ class Options:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class Pose(Frozen):
     """Where the cages are, from which all else follows, and what for; read-only arrays."""
 
     cage_vertices: tuple[FloatArray, ...]
@@ -84,7 +85,7 @@ class Pose:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class State(Frozen):
     """All that a session holds besides its mesh of n vertices; shared, never changed in place."""
 
     regions: Regions | None = None
@@ -155,8 +156,7 @@ def checked_state(mesh: Mesh, state: State) -> State:
 
 def of_mesh(mesh: Mesh, regions: Regions) -> Regions:
     """Return *regions*, or a RegionError if they are of another mesh."""
-    require_regions(regions, mesh)
-    if regions.mesh is mesh:
+    if require(regions, Regions, "regions").mesh is mesh:
         return regions
     for mine, theirs in ((mesh.vertices, regions.mesh.vertices), (mesh.faces, regions.mesh.faces)):
         if not np.array_equal(mine, theirs):
