@@ -34,6 +34,9 @@ class Anything:
     def __init__(self, *_args, **_keywords):
         pass
 
+    def __bool__(self):
+        return False  # nobody waits for it
+
 
 class Endless:
     """Claims to have a million million entries."""

@@ -410,6 +410,10 @@ SPECIAL: dict[str, Callable[[], Any]] = {
 SAID_AS: dict[str, tuple[str, ...]] = {
     "Cage.require_encloses.points": ("handle 1",),
     "HandleDragger.handle.value": ("handle",),
+    "Cage.vertices": ("faces",),
+    "CageDisplay.show_faults.vertices": ("faces",),
+    "film.frames": ("film", "targets"),
+    "torus.minor": ("two-manifold",),
     "Mesh.faces": ("two-manifold",),
     "Mesh.vertices": ("two-manifold",),
     "PolyDataTools.deform.n_cage_vertices": ("n_vertices",),

@@ -145,6 +145,22 @@ def test_a_bad_argument_ends_in_an_error_that_names_it_or_in_an_answer(modules, 
     _require_ours(cheap, 1, 2, bounded)
 
 
+def test_a_file_descriptor_is_no_path_and_stays_open(bounded):
+    taking = [
+        (call, name)
+        for call in _all(CORE + WIDGETS)
+        for name in call.parameters
+        if name in {"path", "cache", "source"} or call.name == "DeformEditor.path"
+    ]
+    assert len(taking) >= 15
+    for call, name in taking:
+        assert _tried(call, {name: "fd"}, bounded) == ""
+        with pytest.raises(ValueError, match="must be a"):
+            call.bound()(**call.arguments() | {name: bounded})
+        os.fstat(bounded)
+    public_calls.tidy()
+
+
 @pytest.mark.campaign
 @pytest.mark.parametrize("modules", [CORE, WIDGETS], ids=["core", "widgets"])
 @pytest.mark.parametrize("seed", range(3))

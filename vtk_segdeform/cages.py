@@ -93,6 +93,8 @@ class Cage(Frozen):
     def require_encloses(self, points: ArrayLike, name: str) -> None:
         """Raise a CageError that counts the (n, 3) *points* outside, unless there are none."""
         x = as_points(points, require(name, str, "name"))
+        if np.abs(x).max(initial=0.0) > _LARGEST:
+            raise CageError(f"{name} are too large to compute with, above {_LARGEST:.0e}")
         outside = x[~self.contains(x)]
         if len(outside):
             farthest = distance_to_surface(outside, self.vertices, self.faces).max()

@@ -210,8 +210,7 @@ class Deformer:
     __copy__ = copy
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state)
-        self.fixed, self.handle = read_only(self.fixed), read_only(self.handle)
+        vars(self).update(state | {name: read_only(state[name]) for name in ("fixed", "handle")})
 
     def _shared(self) -> Deformer:
         """Return another deformer over the very same parts."""

@@ -42,7 +42,7 @@ from .progress import Progress, part
 from .subspace import Subspace
 
 _NEAREST = 24  # K
-_FARTHEST = 1e60  # diagonals; beyond it, distances overflow
+_FARTHEST = 1e60  # sizes of the mesh; beyond it, distances overflow
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +100,6 @@ def board(
     require_mesh(mesh)
     cages = all_of(cages, Cage, "cages")
     points = read_only(as_points(points, "points").copy())
-    if np.abs(points - mesh.vertices[0]).max(initial=0.0) > _FARTHEST * mesh.diagonal:
-        raise ArgumentError(f"points are more than {_FARTHEST:.0e} diagonals of the mesh away")
     weights = as_numbers(weights, "weights")
     if weights.shape != (len(cages), mesh.n_vertices):
         expected = len(cages), mesh.n_vertices
@@ -126,6 +124,8 @@ def blend_at(vertices: FloatArray, weights: FloatArray, points: FloatArray) -> F
             f"weights must have shape (r, {len(vertices)}), a column for each vertex; "
             f"got {weights.shape}"
         )
+    if np.abs(points - vertices[0]).max(initial=0.0) > _FARTHEST * np.ptp(vertices, axis=0).max():
+        raise ArgumentError(f"points are more than {_FARTHEST:.0e} sizes of the mesh away")
     count = min(_NEAREST, len(vertices))
     distance, near = map(np.asarray, cKDTree(vertices).query(points, k=np.arange(1, count + 1)))
     farthest = distance[:, -1:]

@@ -145,9 +145,9 @@ def film(
     """
     require_film(path, fps)
     require_sequence(size, "size")
-    if len(size) != 2 or not all(is_whole(n, 1, _LARGEST) for n in size):
+    if len(size) != 2 or not all(is_whole(n, 2, _LARGEST) for n in size):
         raise ArgumentError(
-            f"size must be (width, height), 1 to {_LARGEST} pixels each; got {shown(size)}"
+            f"size must be (width, height), 2 to {_LARGEST} pixels each; got {shown(size)}"
         )
     session = scene if isinstance(scene, Session) else None
     room: Sequence[Frame] = []

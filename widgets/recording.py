@@ -45,6 +45,7 @@ from .filming.transcript import EVENTS, TITLE, Camera, Entry, Input, Steps, Tick
 from .view import View
 
 _LONGEST_PAUSE = 2.0  # seconds
+_MOST_KEYS = 1000
 
 
 class Recorder:
@@ -76,7 +77,8 @@ class Recorder:
         skips: Callable[[Input], bool] | None = None,
     ) -> None:
         self.view = View.of(view)
-        as_text(keys, "keys")
+        if len(as_text(keys, "keys")) > _MOST_KEYS:
+            raise ArgumentError(f"keys must be {_MOST_KEYS} at most; got {len(keys)}")
         self._skips = None if skips is None else as_callable(skips, "skips")
         self.lines: list[str] = []
         self._start = time.monotonic()

@@ -49,10 +49,13 @@ def write_film(path: str | os.PathLike[str], pictures: Pictures, fps: float) -> 
         raise SessionError("there is nothing to see in a film without pictures")
     write = {".gif": _write_gif, ".mp4": _write_mp4}.get(path.suffix.lower(), _write_folder)
     # Beside the target, so that os.replace is a rename on one file system.
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".segdeform-") as folder:
-        draft = Path(folder) / path.name
-        write(draft, pictures, fps)
-        os.replace(draft, path)
+    try:
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".segdeform-") as folder:
+            draft = Path(folder) / path.name
+            write(draft, pictures, fps)
+            os.replace(draft, path)
+    except OSError as fault:
+        raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
 
 
 def require_film(path: str | os.PathLike[str], fps: float = 20.0) -> None:
