@@ -20,8 +20,10 @@ import numpy as np
 import pyvista as pv
 
 import vtk_segdeform as sd
+import vtk_segdeform.filters
 import vtk_segdeform.local_volume
 import vtk_segdeform.meshlab
+import vtk_segdeform.meshlab_project
 import vtk_segdeform.plugin
 import vtk_segdeform.widgets
 from vtk_segdeform import models
@@ -37,6 +39,9 @@ CORE = (
     "vtk_segdeform.distortion",
     "vtk_segdeform.passengers",
     "vtk_segdeform.local_volume",
+    "vtk_segdeform.meshlab_project",
+    "vtk_segdeform.pictures",
+    "vtk_segdeform.filters",
     "vtk_segdeform.plugin",
 )
 WIDGETS = ("vtk_segdeform.widgets",)
@@ -44,6 +49,8 @@ WIDGETS = ("vtk_segdeform.widgets",)
 # Hooks that `Widget` calls with what it has made itself, and a view's arithmetic at every event.
 NOT_CALLED = {"begins", "hovers", "wheels", "types"}
 NOT_CALLED |= {"contains", "guarded", "pixel_at", "pointer", "ray", "to_display", "to_world"}
+NOT_CALLED |= {"FillInputPortInformation", "RequestData"}  # by VTK's pipeline
+NOT_CALLED |= {"add_surface", "draw_mesh"}  # in a plotter that `pictures` has made
 
 
 @dataclass(frozen=True)
@@ -65,6 +72,8 @@ def calls(modules: tuple[str, ...]) -> Iterator[Call]:
     for module in map(importlib.import_module, modules):
         for name in _names(module):
             thing = getattr(module, name)
+            if name in NOT_CALLED:
+                continue
             if inspect.isclass(thing):
                 yield from _calls_of_class(thing)
             elif callable(thing):
@@ -76,7 +85,8 @@ def expensive(call: Call) -> bool:
     """Tell whether an answer takes a second: a window, cages, or a body made anew."""
     return call.name in {
         "PlotterTools.edit", "PolyDataTools.deform", "PolyDataTools.regions", "cactus", "deform",
-        "dinosaur", "edit", "fit_cages", "film",
+        "dinosaur", "edit", "fit_cages", "film", "picture_before_after", "picture_distortion",
+        "picture_regions_and_cages", "picture_volume_change",
     }  # fmt: skip
 
 
@@ -105,7 +115,7 @@ def _calls_of_class(cls: type) -> Iterator[Call]:
         if isinstance(member, property):
             if member.fset is not None:
                 yield Call(label, functools.partial(_setter, cls, name), ("value",), ("value",))
-        elif callable(member):
+        elif str(getattr(member, "__module__", "")).startswith("vtk_segdeform"):  # not VTK's own
             yield _call(label, functools.partial(_bound, cls, name), getattr(cls, name))
 
 
@@ -249,6 +259,7 @@ def instance(cls: type) -> Any:
         "Solution": lambda: bound().copy().solve(_targets()),
         "Options": sd.Options,
         "LocalVolume": lambda: sd.local_volume.LocalVolume(mesh()),
+        "SegmentedCageDeformFilter": sd.filters.SegmentedCageDeformFilter,
         "PolyDataTools": lambda: surface().segdeform,
         "PlotterTools": lambda: _plotter().segdeform,
     }
@@ -276,6 +287,8 @@ def _file(name: str) -> Path:
     path = Path(name).absolute()
     if path.suffix == ".segdeform":
         sd.save_session(path, session())
+    elif path.suffix == ".mlp":
+        sd.meshlab_project.write_project(path, mesh())
     else:
         sd.write_mesh(path, mesh())
     return path
@@ -349,6 +362,16 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "weld_distance": lambda: 0.0,
     "what": mesh,
     "which": lambda: [0, 1],
+    "change": lambda: np.zeros(mesh().n_vertices),
+    "count": lambda: 3,
+    "degrees": lambda: 30.0,
+    "distortion": lambda: np.zeros(mesh().n_vertices),
+    "hold": lambda: True,
+    "on": lambda: True,
+    "strength": lambda: 10.0,
+    "x": lambda: 1.0,
+    "y": lambda: 1.0,
+    "z": lambda: 1.0,
     "action": lambda: lambda _desk: None,
     "busy": lambda: lambda: False,
     "colours": lambda: None,
@@ -397,6 +420,14 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "load_session.path": lambda: _file("saved.segdeform"),
     "mean_value_coordinates.cage_vertices": lambda: cages()[0].vertices,
     "read.path": lambda: _file("mesh.ply"),
+    "picture_before_after.path": lambda: Path("a.png"),
+    "picture_distortion.path": lambda: Path("a.png"),
+    "picture_regions_and_cages.path": lambda: Path("a.png"),
+    "picture_volume_change.path": lambda: Path("a.png"),
+    "read_project.path": lambda: _file("project.mlp"),
+    "write_project.path": lambda: Path("written.mlp"),
+    "SegmentedCageDeformFilter.SetFixed.points": _left,
+    "SegmentedCageDeformFilter.SetHandle.points": _right,
     "read_faces.path": lambda: _file("mesh.ply"),
     "read_mesh.path": lambda: _file("mesh.ply"),
     "read_polydata.path": lambda: _file("mesh.ply"),
@@ -437,6 +468,7 @@ SAID_AS: dict[str, tuple[str, ...]] = {
     "repair.vertices": ("nothing to repair",),
     "replay.source": ("recording",),
     "to_meshset.what": ("Mesh",),
+    "write_project.what": ("Mesh",),
     "torus.major": ("two-manifold",),
     "sphere.radius": ("two-manifold",),
     "bar.size": ("two-manifold",),

@@ -14,6 +14,7 @@ import resource
 import signal
 import sys
 from collections.abc import Iterator
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ import pytest
 from bad_values import BAD
 from public_calls import CORE, SAID_AS, WIDGETS, Call, calls, valid
 
+from vtk_segdeform.editing.state import Pose, State
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.session import Session
 
@@ -143,6 +145,30 @@ def test_every_parameter_has_a_valid_value_and_the_call_is_answered(modules):
 def test_a_bad_argument_ends_in_an_error_that_names_it_or_in_an_answer(modules, bounded):
     cheap = [call for call in _all(modules) if not public_calls.expensive(call)]
     _require_ours(cheap, 1, 2, bounded)
+
+
+@pytest.mark.parametrize("cls", [State, Pose], ids=lambda cls: cls.__name__)
+def test_a_state_with_bad_parts_begins_no_session(cls, bounded):
+    """Each field of a state, or of its pose, in turn holds each bad value."""
+    state = public_calls.session().state
+    thing = state if cls is State else state.pose
+    answered = 0
+    for each in fields(cls):
+        for kind in BAD:
+            bad = replace(thing, **{each.name: BAD[kind]()})
+            bad = bad if cls is State else replace(state, pose=bad)
+            try:
+                with _in_time():
+                    Session(public_calls.mesh(), state=bad)
+            except SegDeformError as error:
+                said = str(error)
+            except Exception as error:  # noqa: BLE001 - that is what is asked
+                pytest.fail(f"{cls.__name__}({each.name}={kind}): {type(error)} {error!s:.200}")
+            else:
+                said = ""
+                answered += 1
+            assert len(said) < LONGEST, (each.name, kind)
+    assert answered < 20
 
 
 def test_a_file_descriptor_is_no_path_and_stays_open(bounded):

@@ -82,7 +82,7 @@ def is_number(value: object, least: float = -np.inf) -> bool:
     return real and least <= value <= _LARGEST and not isinstance(value, bool)  # type: ignore[operator]
 
 
-def is_whole(value: object, least: int, most: float = np.inf) -> bool:
+def is_whole(value: object, least: float, most: float = np.inf) -> bool:
     """Tell whether *value* is one whole number in *least*..*most*, be it written 4 or 4.0."""
     return is_number(value, least) and value <= most and value % 1 == 0  # type: ignore[operator]
 

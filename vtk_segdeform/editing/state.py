@@ -25,7 +25,7 @@ from ..mesh import Mesh
 from ..positions import checked_constraints
 from ..regions import Regions
 from .listeners import Change
-from .naming import Names, called, checked_names
+from .naming import Names, called, checked_names, fault_of
 
 _TINY = float(np.finfo(np.float64).tiny)
 _WRECKED = 1e6  # diagonals from the mesh that no drag gets to
@@ -141,14 +141,21 @@ def checked_state(mesh: Mesh, state: State) -> State:
     require(state.options, Options, "state.options")
     regions = None if state.regions is None else of_mesh(mesh, state.regions)
     names = checked_names(state.region_names, regions.n_regions if regions else 0)
-    cages = fitting_cages(regions, state.cages, names) if state.cages else ()
-    fixed, handle = checked_constraints(mesh, state.fixed, state.handle)
-    lengths = [len(ids) for ids in state.handles.values()]
+    cages = all_of(state.cages, Cage, "state.cages")
+    cages = fitting_cages(regions, cages, names) if cages else ()
+    handles = {}
+    for name, ids in state.handles.items():
+        if fault := fault_of(name):
+            raise ConstraintError(f"a handle{fault}")
+        _, handles[name] = checked_constraints(mesh, (), ids)
+    every = np.concatenate([np.empty(0, dtype=np.int64), *handles.values()])
+    fixed, _ = checked_constraints(mesh, state.fixed, every)
+    lengths = [len(ids) for ids in handles.values()]
     if not all(lengths):
         raise ConstraintError("each handle must have a vertex or more; leave out empty ones")
-    handles = dict(zip(state.handles, pieces(handle, lengths), strict=True))
-    pose = state.pose and _checked_pose(cages, lengths, list(handles), state.pose)
-    if pose:
+    pose = None
+    if state.pose is not None:
+        pose = _checked_pose(cages, lengths, list(handles), require(state.pose, Pose, "state.pose"))
         _require_no_wreck(mesh, pose)
     owned = MappingProxyType({name: _own(ids) for name, ids in handles.items()})
     return State(regions, cages, _own(fixed), owned, pose, state.options, names)
@@ -198,7 +205,6 @@ def _require_number(name: str, value: float, least: float, *, whole: bool = Fals
 def _checked_pose(
     cages: Sequence[Cage], lengths: Sequence[int], names: Sequence[str], pose: Pose
 ) -> Pose:
-    require(pose, Pose, "state.pose")
     require(pose.targets, Mapping, "state.pose.targets")
     require_sequence(pose.cage_vertices, "state.pose.cage_vertices")
     places = [as_points(points, "cage_vertices") for points in pose.cage_vertices]
