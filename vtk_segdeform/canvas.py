@@ -127,7 +127,7 @@ def write_panels(
         If the file is no .png or its folder is not there.
     """
     path = Path(path)
-    if path.suffix.lower() != ".png" or not path.parent.is_dir():
+    if path.suffix.lower() != ".png" or not os.path.isdir(path.parent):
         raise MeshError(f"{path}: must be a .png file in a folder that exists")
     require_offscreen()
     seen = points @ view.T

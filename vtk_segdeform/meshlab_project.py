@@ -93,9 +93,10 @@ def write_project(path: str | Path, what: Surface | Session | Mapping[str, Surfa
     if path.suffix.lower() != ".mlp":
         raise MeshError(f"{path}: the name of a MeshLab project ends in .mlp")
     folder = path.with_suffix(".layers")
-    if not (path.parent.is_dir() and os.access(path.parent, os.W_OK)):
+    if not (os.path.isdir(path.parent) and os.access(path.parent, os.W_OK)):
         raise MeshError(f"{path}: there is no folder {path.parent} that may be written to")
-    if path.is_dir() or folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+    is_else = os.path.islink(folder) or (os.path.exists(folder) and not os.path.isdir(folder))
+    if os.path.isdir(path) or is_else:
         raise MeshError(f"{path}: {folder.name} or {path.name} is something else already")
     layers = as_layers(what)
     project = ElementTree.Element("MeshLabProject")
@@ -145,7 +146,7 @@ def _printable(text: str) -> str:
 
 
 def _parsed(path: Path) -> ElementTree.Element:
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise MeshError(f"{path}: there is no such file")
     if path.stat().st_size > _LARGEST:
         raise MeshError(f"{path}: too large for a MeshLab project")
