@@ -45,6 +45,7 @@ class SurfaceDisplay:
         corners = np.full(len(faces), 3)
         self.polydata = polydata_of(session.vertices.copy(), corners, faces.ravel())
         self._points: NDArray[np.float64] = vtk_to_numpy(self.polydata.GetPoints().GetData())
+        self._seen_points = read_only(self._points)
         self._vertex_normals = VertexNormals(session.mesh)
         self._normals = self._vertex_normals.of(self._points)
         self._normal_array = numpy_to_vtk(self._normals)
@@ -68,7 +69,7 @@ class SurfaceDisplay:
     @property
     def points(self) -> NDArray[np.float64]:
         """(n, 3) float: where the vertices are drawn; the very memory, read-only."""
-        return read_only(self._points)
+        return self._seen_points
 
     def set_colours(self, layer: str, colours: NDArray[np.uint8] | None) -> None:
         """Show *colours* (n, 3), 0 to 255, one for each vertex; or None to take a layer away.

@@ -85,7 +85,7 @@ class VolumeOverlay:
     @property
     def change(self) -> FloatArray | None:
         """(n,) float: s of the pose that is shown; None while hidden."""
-        return read_only(self._change)
+        return self._change
 
     @property
     def half_range(self) -> float | None:
@@ -162,7 +162,7 @@ class VolumeOverlay:
             self.view.touch()
 
     def _update(self) -> None:
-        self._change = self._prepared().change(self.session.vertices)
+        self._change = read_only(self._prepared().change(self.session.vertices))
         self._show(self._change)
 
     def _show(self, change: FloatArray) -> None:
