@@ -6,7 +6,6 @@ import copy
 import pickle
 from dataclasses import fields
 
-import numpy as np
 import public_calls
 import pytest
 from numpy.testing import assert_array_equal
@@ -106,17 +105,20 @@ def test_a_copied_session_goes_its_own_way_and_has_no_listeners(way):
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
 def test_a_copied_deformer_solves_the_same_bits_from_the_same_pose(way):
-    deformer = SCENE.held()
-    deformer.solve(SCENE.turned(15))
-    other = way(deformer)
-    before = other.solve(SCENE.turned(5), max_steps=3)  # does not carry the first one along
-    first, second = deformer.solve(SCENE.turned(30)), way(deformer).solve(SCENE.turned(30))
-    third = deformer.solve(SCENE.turned(30))
-    assert_array_equal(second.vertices, third.vertices)
-    assert not np.array_equal(before.vertices, first.vertices)
-    fresh = way(SCENE.held())
-    assert_array_equal(fresh.solve(SCENE.turned(15)).vertices,
-                       SCENE.held().solve(SCENE.turned(15)).vertices)  # fmt: skip
+    untouched, deformer = SCENE.held(), SCENE.held()
+    for one in (untouched, deformer):
+        one.solve(SCENE.turned(15))
+    expected = untouched.solve(SCENE.turned(30))
+    other, astray = way(deformer), way(deformer)
+    astray.solve(SCENE.turned(-20))
+    for one in (deformer, other):
+        solution = one.solve(SCENE.turned(30))
+        assert_array_equal(solution.vertices, expected.vertices)
+        assert solution.steps == expected.steps
+    points = SCENE.mesh.vertices[:5]
+    assert_array_equal(other.carry(points), deformer.carry(points))
+    poses = [one.hold(handle=SCENE.handle).solve(SCENE.turned(10)) for one in (deformer, other)]
+    assert_array_equal(poses[1].vertices, poses[0].vertices)
 
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sized
 from typing import Any
 
 import numpy as np
@@ -115,6 +116,8 @@ def plain(values: ArrayLike, name: str) -> NDArray[Any]:
     _require_bounded(values, name)
     try:
         array = np.asarray(values)
+    except MemoryError:
+        raise
     except Exception as fault:  # rows of different lengths, or the __array__ of *values* fails
         if isinstance(values, list | tuple):
             message = f"{name} must be an array; its rows differ in length"
@@ -127,13 +130,21 @@ def plain(values: ArrayLike, name: str) -> NDArray[Any]:
 
 
 def _require_bounded(values: object, name: str) -> None:
-    """Raise an ArgumentError for lists too deep, or too long, for numpy to refuse them itself."""
-    if isinstance(values, range) and len(values) > _LONGEST:
-        raise ArgumentError(f"{name} has more than {_LONGEST:.0e} entries; got {values!r}")
+    """Raise an ArgumentError for what numpy would follow without end, or until memory is full.
+
+    Those are lists that contain themselves, and sequences of its own that claim to be very long.
+    """
     inner: Any = values
     for _ in range(_DEEPEST):
         if not isinstance(inner, list | tuple) or not inner:
-            return
+            break
         inner = inner[0]
-    if isinstance(inner, list | tuple):
+    if isinstance(inner, list | tuple) and inner:
         raise ArgumentError(f"{name} must be an array; it has lists more than {_DEEPEST} deep")
+    if isinstance(inner, Sized) and not hasattr(inner, "__array__"):
+        try:
+            count = len(inner)
+        except Exception as fault:
+            raise ArgumentError(f"{name} must be an array; got {shown(inner)}") from fault
+        if count > _LONGEST:
+            raise ArgumentError(f"{name} has more than {_LONGEST:.0e} entries; got {shown(inner)}")

@@ -45,7 +45,7 @@ class SurfaceDisplay:
         corners = np.full(len(faces), 3)
         self.polydata = polydata_of(session.vertices.copy(), corners, faces.ravel())
         self._points: NDArray[np.float64] = vtk_to_numpy(self.polydata.GetPoints().GetData())
-        self._seen_points = read_only(self._points)
+        self._seen_points: NDArray[np.float64] = read_only(self._points)
         self._vertex_normals = VertexNormals(session.mesh)
         self._normals = self._vertex_normals.of(self._points)
         self._normal_array = numpy_to_vtk(self._normals)
