@@ -189,9 +189,10 @@ class Deformer:
 
         None keeps the volumes that this one keeps.
         """
-        for volumes in (preserve_volume, preserve_region_volumes):
-            if volumes is not None:
-                as_flag(volumes, "preserve_volume and preserve_region_volumes")
+        if preserve_volume is not None:
+            as_flag(preserve_volume, "preserve_volume")
+        if preserve_region_volumes is not None:
+            as_flag(preserve_region_volumes, "preserve_region_volumes")
         other = self._shared()
         before = other._keeps
         other._keep(
