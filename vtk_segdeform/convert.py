@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 
 from . import meshlab
 from .arrays import as_points
+from .cages import Cage
 from .checks import as_flag, as_path, require
 from .errors import MeshError
 from .formats.off import read_off, write_off
@@ -30,7 +31,7 @@ from .formats.ply import read_ply, write_ply
 from .formats.polygons import polydata_of, triangles_of
 from .formats.vtk_readers import read_with_vtk, write_with_vtk
 from .formats.wavefront import read_obj, write_obj
-from .mesh import Mesh, require_mesh
+from .mesh import Mesh
 
 _log = logging.getLogger(__name__)
 
@@ -189,9 +190,9 @@ def require_writable(path: str | Path, *, arrays: bool = False) -> None:
         raise MeshError(f"{path}: the folder {path.parent} may not be written to")
 
 
-def to_polydata(mesh: Mesh) -> pv.PolyData:
-    """Return *mesh* as pyvista's PolyData: float64 points, same vertices, same triangles."""
-    require_mesh(mesh)
+def to_polydata(mesh: Mesh | Cage) -> pv.PolyData:
+    """Return *mesh*, or a cage, as pyvista's PolyData: float64 points, same vertices, same triangles."""
+    require(mesh, (Mesh, Cage), "mesh")
     return polydata_of(mesh.vertices.copy(), np.full(mesh.n_faces, 3), mesh.faces.ravel())
 
 
