@@ -191,7 +191,7 @@ def require_writable(path: str | Path, *, arrays: bool = False) -> None:
 
 
 def to_polydata(mesh: Mesh | Cage) -> pv.PolyData:
-    """Return *mesh*, or a cage, as pyvista's PolyData: float64 points, same vertices, same triangles."""
+    """Return *mesh*, or a cage, as PolyData: float64 points, same vertices, same triangles."""
     require(mesh, (Mesh, Cage), "mesh")
     return polydata_of(mesh.vertices.copy(), np.full(mesh.n_faces, 3), mesh.faces.ravel())
 
