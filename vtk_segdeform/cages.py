@@ -21,6 +21,7 @@ from .surface.inside import distance_to_surface, winding_number
 from .surface.intersections import flat_faces, self_intersections
 from .surface.manifold import components, connectivity_faults, counted
 
+_LONGEST_NAME = 100  # characters of it in a message
 _LARGEST = 1e70  # as of a mesh, see `faults`
 
 __all__ = ["Cage", "cage_faults", "self_intersections", "winding_number"]
@@ -92,7 +93,8 @@ class Cage(Frozen):
 
     def require_encloses(self, points: ArrayLike, name: str) -> None:
         """Raise a CageError that counts the (n, 3) *points* outside, unless there are none."""
-        x = as_points(points, require(name, str, "name"))
+        name = require(name, str, "name")[:_LONGEST_NAME]
+        x = as_points(points, name)
         if np.abs(x).max(initial=0.0) > _LARGEST:
             raise CageError(f"{name} are too large to compute with, above {_LARGEST:.0e}")
         outside = x[~self.contains(x)]
