@@ -20,12 +20,12 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 # One line per part of the story; a new file takes its place here.
 STORY = [
     # a checked mesh
-    "errors", "arrays", "progress", "lock", "regular_file", "atomic", "threads",
+    "errors", "checks", "arrays", "progress", "lock", "regular_file", "atomic", "threads",
     "compiled.kernels", "compiled.volumes", "compiled.products", "compiled.patch_products",
     "compiled.normals", "compiled.rotations", "compiled.triangles", "compiled.coordinates", "fast",
     "surface.counting", "surface.topology", "surface.manifold", "surface.inside", "surface.columns",
-    "surface.intersections", "surface.report", "surface.shells", "faults", "mesh", "surface.holes",
-    "surface.splitting", "surface.repair_steps", "repair",
+    "surface.intersections", "surface.report", "surface.shells", "faults", "freezing", "mesh",
+    "surface.holes", "surface.splitting", "surface.repair_steps", "repair",
     # what a deformation keeps
     "volume", "normals", "segmenting.thinning", "local_volume", "distortion", "differential",
     "rotations",

@@ -1,10 +1,14 @@
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
+from bad_values import BAD
 from numpy.testing import assert_array_equal
 
 from vtk_segdeform.arrays import as_faces, as_ids, as_points, frozen
+from vtk_segdeform.errors import ArgumentError
 
 
 def test_points_and_faces_come_out_as_plain_arrays():
@@ -69,6 +73,20 @@ def test_ids_keep_their_order_and_a_mask_becomes_ids():
 def test_bad_ids_are_named_and_told_what_came(ids, message):
     with pytest.raises(ValueError, match=message):
         as_ids(ids, 5, "fixed")
+
+
+@pytest.mark.parametrize(
+    "kind", ["recursive list", "recursive after rows", "endless", "huge range"]
+)
+def test_what_has_no_end_is_refused_at_once_and_without_gigabytes(kind):
+    for values in (BAD[kind](), [BAD[kind]()]):
+        tracemalloc.start()
+        try:
+            with pytest.raises(ArgumentError, match="fixed"):
+                as_ids(values, 5, "fixed")
+            assert tracemalloc.get_traced_memory()[1] < 1e6
+        finally:
+            tracemalloc.stop()
 
 
 def test_a_frozen_array_cannot_be_written():

@@ -260,7 +260,7 @@ def test_with_nothing_held_rounding_carries_nothing_off_even_over_slivers():
         ({"stretch": -1.0}, "stretch must be a number, 0 or more; got -1"),
         ({"stretch": np.nan}, "stretch must be a number"),
         ({"stretch": "much"}, "stretch must be a number, 0 or more; got 'much'"),
-        ({"rotation_groups": 0}, "rotation groups must be a whole number, 1 or more; got 0"),
+        ({"rotation_groups": 0}, "rotation_groups must be a whole number, 1 or more; got 0"),
         ({"tolerance": np.nan}, "tolerance must be a positive number"),
         ({"max_steps": 0}, "max_steps must be a whole number, 1 or more"),
         ({"window": -1}, "window must be a whole number, 0 or more"),

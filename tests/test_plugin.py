@@ -284,7 +284,7 @@ def test_the_command_explains_itself(capsys):
 
 
 def test_what_is_no_mesh_is_refused():
-    with pytest.raises(TypeError, match="mesh must be a Mesh, a PolyData or a Session; got str"):
+    with pytest.raises(ValueError, match="a PolyData or a Session; got 'cactus'"):
         sd.edit("cactus")
     with pytest.raises(MissingDependencyError, match="off-screen"):
         canvas.require_screen()

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bad_values import BAD
+from hands import plain_view
 from numpy.testing import assert_array_equal
 from PIL import Image
 from qt_hands import (
@@ -28,9 +30,10 @@ from qtpy import QtGui
 import pyvistaqt  # isort: skip
 from vtk_segdeform import Session, models
 from vtk_segdeform.convert import read_mesh, read_polydata, to_polydata
+from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.store import load_session
 from vtk_segdeform.widgets import Mode, Paint, Tool
-from vtk_segdeform.widgets.qt import DeformWidget, deform_dock
+from vtk_segdeform.widgets.qt import DeformDock, DeformWidget, deform_dock
 
 MESH = models.cactus(500)
 
@@ -700,3 +703,21 @@ def test_the_example_of_an_application_runs(tmp_path):
     colours = np.array(Image.open(tmp_path / "window.png").convert("RGB")).astype(int)
     body = (np.ptp(colours, axis=2) > 10) & (colours.mean(axis=2) < 220)
     assert 0.04 < body.mean() < 0.5  # the cactus, the mode that is on, the status line
+
+
+def test_a_bad_argument_is_an_error_of_ours_before_anything_is_made():
+    application()
+    mesh, view = models.sphere(100), plain_view((64, 64))
+    before = len(QtWidgets.QApplication.allWidgets())
+    for kind in sorted(set(BAD) - {"None"}):
+        calls = [
+            lambda bad: DeformWidget(bad),
+            lambda bad: DeformWidget(mesh, bad),
+            lambda bad: deform_dock(bad, mesh),
+            lambda bad: deform_dock(view, bad),
+            lambda bad: DeformDock(bad),
+        ]
+        for call in calls:
+            with pytest.raises(SegDeformError):
+                call(BAD[kind]())
+    assert len(QtWidgets.QApplication.allWidgets()) == before

@@ -189,7 +189,7 @@ def test_other_nonsense_is_refused():
     mesh = Mesh(*CUBE)
     with pytest.raises(RegionError, match="one integer for each of the 8"):
         Regions.from_labels(mesh, np.zeros(8))
-    with pytest.raises(RegionError, match="rings"):
+    with pytest.raises(RegionError, match="overlap"):
         Regions.from_labels(mesh, np.zeros(8, int), overlap=-1)
     with pytest.raises(RegionError, match="smoothness"):
         Regions(mesh, np.ones((1, 8), dtype=bool), smoothness=0.0)

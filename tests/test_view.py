@@ -11,6 +11,7 @@ from solids import icosphere
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from vtk_segdeform import Mesh, Session, models
+from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.widgets.gestures import Gesture, Phase, Pointer
 from vtk_segdeform.widgets.surface_display import SurfaceDisplay
 from vtk_segdeform.widgets.view import View
@@ -95,9 +96,11 @@ def test_a_view_is_made_from_a_plotter_or_a_pair_and_from_nothing_else():
         assert view.renderer is plotter.renderer
         assert View.of(view) is view
         assert View.of((view.renderer, view.interactor)).renderer is view.renderer
-        with pytest.raises(TypeError, match="view must be a pyvista plotter"):
+        with pytest.raises(ArgumentError, match="view must be a pyvista plotter"):
             View.of("window")
-        with pytest.raises(TypeError, match=r"must be \(vtkRenderer, vtkRenderWindowInteractor\)"):
+        with pytest.raises(
+            ArgumentError, match=r"must be \(vtkRenderer, vtkRenderWindowInteractor\)"
+        ):
             View.of((view.renderer, None))
         with pytest.raises(ValueError, match="AddRenderer"):
             View.of((vtkRenderer(), view.interactor))

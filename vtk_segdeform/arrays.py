@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sized
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .checks import shown
 from .errors import ArgumentError
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
+_DEEPEST = 4  # lists within lists; numpy follows one that contains itself without end
+_LONGEST = 10**8  # entries of a sequence that is no array yet
+_LARGEST = float(np.finfo(np.float64).max)
 
-def as_points(points: ArrayLike, name: str) -> FloatArray:
-    """Return *points* as (n, 3) float, or raise an ArgumentError that says what came instead."""
-    array = _as_numbers(points, name)
+
+def as_points(points: ArrayLike, name: str, count: int | None = None) -> FloatArray:
+    """Return *points* as (n, 3) float, or raise an ArgumentError that says what came instead.
+
+    With *count*, there must be so many.
+    """
+    array = as_numbers(points, name)
+    if count is not None and array.shape != (count, 3):
+        raise ArgumentError(f"{name} must have shape ({count}, 3); got {array.shape}")
     if array.ndim != 2 or array.shape[1] != 3:
         raise ArgumentError(f"{name} must have shape (n, 3); got {array.shape}")
     finite = np.isfinite(array)
@@ -69,10 +80,10 @@ def as_ids(ids: ArrayLike, n_points: int, name: str) -> IntArray:
 def is_number(value: object, least: float = -np.inf) -> bool:
     """Tell whether *value* is one finite real number, *least* or more."""
     real = isinstance(value, int | float | np.integer | np.floating)
-    return real and least <= value < np.inf and not isinstance(value, bool)  # type: ignore[operator]
+    return real and least <= value <= _LARGEST and not isinstance(value, bool)  # type: ignore[operator]
 
 
-def is_whole(value: object, least: int, most: float = np.inf) -> bool:
+def is_whole(value: object, least: float, most: float = np.inf) -> bool:
     """Tell whether *value* is one whole number in *least*..*most*, be it written 4 or 4.0."""
     return is_number(value, least) and value <= most and value % 1 == 0  # type: ignore[operator]
 
@@ -83,23 +94,57 @@ def frozen(array: NDArray[np.generic]) -> NDArray[np.generic]:
     return array
 
 
-def _as_numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
+def as_numbers(values: ArrayLike, name: str) -> FloatArray:
+    """Return *values* as floats of any shape, or raise an ArgumentError."""
     array = plain(values, name)
     if array.dtype.kind == "c":
         raise ArgumentError(f"{name} must hold real numbers; got {array.dtype}")
-    try:
-        if array.dtype.kind in "biufO":
-            return array.astype(np.float64, copy=False)
-    except (TypeError, ValueError, OverflowError):
-        pass
-    raise ArgumentError(f"{name} must hold numbers; got {array.dtype}")
+    if array.dtype.kind == "O":  # its entries say themselves whether they are numbers
+        try:
+            return array.astype(np.float64)
+        except Exception as fault:
+            raise ArgumentError(f"{name} must hold numbers; got {array.dtype}") from fault
+    if array.dtype.kind not in "biuf":
+        raise ArgumentError(f"{name} must hold numbers; got {array.dtype}")
+    return array.astype(np.float64, copy=False)
 
 
 def plain(values: ArrayLike, name: str) -> NDArray[Any]:
     """Return *values* as an array, nothing left out: a mask over some of them would get lost."""
-    if np.ma.is_masked(values):
+    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
         raise ArgumentError(f"{name} holds masked entries; fill them in or leave them out")
+    _require_bounded(values, name)
     try:
-        return np.asarray(values)
-    except ValueError:  # rows of different lengths
-        raise ArgumentError(f"{name} must be an array; its rows differ in length") from None
+        array = np.asarray(values)
+    except MemoryError:
+        raise
+    except Exception as fault:  # rows of different lengths, or the __array__ of *values* fails
+        if isinstance(values, list | tuple):
+            message = f"{name} must be an array; its rows differ in length"
+        else:
+            message = f"{name} must be an array; {type(values).__name__} does not make one"
+        raise ArgumentError(message) from fault
+    if array.ndim == 0 and array.dtype.kind == "O":
+        raise ArgumentError(f"{name} must be an array; got {shown(values)}")
+    return array
+
+
+def _require_bounded(values: object, name: str) -> None:
+    """Raise an ArgumentError for what numpy would follow without end, or until memory is full.
+
+    Those are lists that contain themselves, and sequences of its own that claim to be very long.
+    """
+    inner: Any = values
+    for _ in range(_DEEPEST):
+        if not isinstance(inner, list | tuple) or not inner:
+            break
+        inner = inner[0]
+    if isinstance(inner, list | tuple) and inner:
+        raise ArgumentError(f"{name} must be an array; it has lists more than {_DEEPEST} deep")
+    if isinstance(inner, Sized) and not hasattr(inner, "__array__"):
+        try:
+            count = len(inner)
+        except Exception as fault:
+            raise ArgumentError(f"{name} must be an array; got {shown(inner)}") from fault
+        if count > _LONGEST:
+            raise ArgumentError(f"{name} has more than {_LONGEST:.0e} entries; got {shown(inner)}")

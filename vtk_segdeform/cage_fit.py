@@ -27,10 +27,11 @@ from .cages import MOST_CAGE_VERTICES, Cage, cage_faults
 from .caging.cage_simplify import roundness, simplify
 from .caging.contour import contour_surface
 from .caging.region_solid import Patch, Skin, SolidField, solid_field
+from .checks import shown
 from .errors import CageError, RegionError
 from .mesh import Mesh, require_mesh
 from .progress import Progress, part, tell
-from .regions import Regions
+from .regions import Regions, require_regions
 from .surface.columns import inside_points
 from .surface.inside import distance_to_surface
 from .threads import n_threads, one_blas_thread
@@ -46,6 +47,7 @@ _SHELL = 6  # vertices, at least, of each part of a cage that is in parts
 _FLOOR = 12  # vertices that every region gets before the rest is shared out
 _CLEARANCE = 0.5  # of the offset: the least distance from the skin that faces are pushed to
 _PUSHES, _NEAREST = 30, 200  # rounds; vertices whose distance from the cage is measured
+_CLOSEST, _FARTHEST = 1e-12, 1e6  # diagonals of the mesh that an offset may be
 _MEASURED = 0.25  # of the work: regions are measured
 _SIEVE = 16  # one vertex in so many is measured first
 _SAMPLES = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6.0  # of a face
@@ -91,6 +93,8 @@ def fit_cages(
         If *n_vertices* is too small or too large, or *offset* is not positive.
     """
     require_mesh(mesh)
+    require_regions(regions, mesh)
+    _check_offset(offset, mesh)
     patches, n_regions = [], regions.n_regions
     _require_enough(n_vertices, n_regions)
     tell(progress, 0.0, "measuring regions")
@@ -120,6 +124,8 @@ def fit_cage(
 
     As `fit_cages`, which see, for a single region.
     """
+    require_mesh(mesh)
+    _check_offset(offset, mesh)
     mask = np.zeros(mesh.n_vertices, dtype=bool)
     mask[as_ids(members, mesh.n_vertices, "members")] = True
     if not mask.any():
@@ -140,7 +146,19 @@ def _require_enough(n_vertices: int, n_regions: int) -> None:
     if not is_whole(n_vertices, fewest, most):
         raise CageError(
             f"n_vertices must be {fewest} to {most}, at least {_FEWEST} for each of {n_regions} "
-            f"regions; got {n_vertices!r}"
+            f"regions; got {shown(n_vertices)}"
+        )
+
+
+def _check_offset(offset: float | None, mesh: Mesh) -> None:
+    if offset is None:
+        return
+    if not (is_number(offset) and offset > 0.0):
+        raise CageError(f"offset must be a positive length; got {shown(offset)}")
+    if not _CLOSEST <= offset / mesh.diagonal <= _FARTHEST:
+        raise CageError(
+            f"offset must be {_CLOSEST:.0e} to {_FARTHEST:.0e} diagonals of the mesh, of length "
+            f"{mesh.diagonal:.3g}; got {shown(offset)}"
         )
 
 
@@ -162,8 +180,6 @@ def _share_out(patches: list[Patch], n_vertices: int) -> IntArray:
 
 def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) -> Cage:
     """Return the first good cage, or the better of the first two that are merely valid."""
-    if offset is not None and not (is_number(offset) and offset > 0.0):
-        raise CageError(f"offset must be a positive length; got {offset!r}")
     length = float(np.sqrt(patch.area / n))
     offset = _OFFSET * length if offset is None else offset
     valid: list[tuple[float, FloatArray, IntArray]] = []

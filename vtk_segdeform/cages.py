@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
+from .checks import require
 from .errors import CageError
+from .freezing import Frozen
 from .surface.columns import inside_points
 from .surface.inside import distance_to_surface, winding_number
 from .surface.intersections import flat_faces, self_intersections
@@ -22,13 +24,14 @@ from .surface.manifold import components, connectivity_faults, counted
 MOST_CAGE_VERTICES = 1600
 """Of all cages together: the solver factors matrices of three times as many rows, in seconds."""
 
+_LONGEST_NAME = 100  # characters of it in a message
 _LARGEST = 1e70  # as of a mesh, see `faults`
 
 __all__ = ["Cage", "cage_faults", "self_intersections", "winding_number"]
 
 
 @dataclass(frozen=True, init=False, eq=False)
-class Cage:
+class Cage(Frozen):
     """A closed, outward oriented triangle mesh that does not cross itself; frozen.
 
     Parameters
@@ -93,7 +96,10 @@ class Cage:
 
     def require_encloses(self, points: ArrayLike, name: str) -> None:
         """Raise a CageError that counts the (n, 3) *points* outside, unless there are none."""
+        name = require(name, str, "name")[:_LONGEST_NAME]
         x = as_points(points, name)
+        if np.abs(x).max(initial=0.0) > _LARGEST:
+            raise CageError(f"{name} are too large to compute with, above {_LARGEST:.0e}")
         outside = x[~self.contains(x)]
         if len(outside):
             farthest = distance_to_surface(outside, self.vertices, self.faces).max()

@@ -24,6 +24,7 @@ from vtkmodules.vtkIOImage import vtkPNGWriter
 
 from .arrays import FloatArray
 from .atomic import replacing, require_place
+from .checks import as_path
 from .errors import MeshError, MissingDependencyError
 from .palette import INK, PAPER
 
@@ -66,7 +67,8 @@ def require_picture(path: str | Path) -> None:
     MeshError
         If the file is no .png or cannot be written.
     """
-    if Path(path).suffix.lower() != ".png":
+    path = as_path(path)
+    if path.suffix.lower() != ".png":
         raise MeshError(f"{path}: a picture must be a .png file")
     try:
         require_place(path)

@@ -23,7 +23,9 @@ from numpy.typing import ArrayLike
 from . import meshlab
 from .arrays import as_points
 from .atomic import replacing, require_place
-from .errors import ArgumentError, MeshError
+from .cages import Cage
+from .checks import as_flag, as_path, require
+from .errors import MeshError
 from .formats.off import read_off, write_off
 from .formats.ply import read_ply, write_ply
 from .formats.polygons import polydata_of, triangles_of
@@ -46,7 +48,7 @@ _HOLD_ARRAYS = frozenset({".ply", ".vtk", ".vtp", ".vtkhdf"})
 
 def is_mesh_file(path: str | Path) -> bool:
     """Tell whether *path* has a suffix of a format that `read_mesh` knows."""
-    return Path(path).suffix.lower() in {*_READERS, *_VTK_READS, *meshlab.READS}
+    return as_path(path).suffix.lower() in {*_READERS, *_VTK_READS, *meshlab.READS}
 
 
 def read_mesh(path: str | Path) -> Mesh:
@@ -90,7 +92,7 @@ def read_polydata(path: str | Path) -> pv.PolyData:
     MissingDependencyError
         If only PyMeshLab reads such files, and it is not installed.
     """
-    path = Path(path)
+    path = as_path(path)
     if not os.path.isfile(path):
         raise MeshError(
             f"{path}: {'a folder, not a' if os.path.isdir(path) else 'there is no such'} file"
@@ -135,7 +137,8 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
         If the suffix is not known, the folder is not there, what has that name is no file, or the
         disk is full.
     """
-    path = Path(path)
+    path = as_path(path)
+    require(mesh, (Mesh, pv.PolyData), "mesh")
     require_writable(path)
     surface = to_polydata(mesh) if isinstance(mesh, Mesh) else mesh
     suffix = path.suffix.lower()
@@ -170,8 +173,9 @@ def require_writable(path: str | Path, *, arrays: bool = False) -> None:
 
     With *arrays* the file has to hold point arrays and colours, which some formats cannot.
     """
-    path = Path(path)
+    path = as_path(path)
     suffix = path.suffix.lower()
+    as_flag(arrays, "arrays")
     known = {*_HOLD_ARRAYS} if arrays else {*_WRITERS, *_VTK_WRITES, *meshlab.WRITES}
     if suffix not in known:
         what = "arrays and colours to " if arrays else ""
@@ -182,8 +186,9 @@ def require_writable(path: str | Path, *, arrays: bool = False) -> None:
         raise MeshError(f"{path}: {fault.strerror or fault}") from fault
 
 
-def to_polydata(mesh: Mesh) -> pv.PolyData:
-    """Return *mesh* as pyvista's PolyData: float64 points, same vertices, same triangles."""
+def to_polydata(mesh: Mesh | Cage) -> pv.PolyData:
+    """Return *mesh*, or a cage, as PolyData: float64 points, same vertices, same triangles."""
+    require(mesh, (Mesh, Cage), "mesh")
     return polydata_of(mesh.vertices.copy(), np.full(mesh.n_faces, 3), mesh.faces.ravel())
 
 
@@ -197,6 +202,7 @@ def from_polydata(polydata: pv.PolyData) -> Mesh:
     MeshError
         If the surface is not a closed, outward oriented two-manifold.
     """
+    require(polydata, pv.PolyData, "polydata")
     faces = triangles_of(polydata)
     if len(faces) != polydata.n_cells:
         _log.info("%d cells were cut into %d triangles", polydata.n_cells, len(faces))
@@ -216,9 +222,8 @@ def with_vertices(polydata: pv.PolyData, vertices: ArrayLike) -> pv.PolyData:
     vertices : (n, 3) float
         One position per point, in the order of ``polydata.points``.
     """
-    points = as_points(vertices, "vertices")
-    if len(points) != polydata.n_points:
-        raise ArgumentError(f"vertices must have {polydata.n_points} rows; got {len(points)}")
+    require(polydata, pv.PolyData, "polydata")
+    points = as_points(vertices, "vertices", polydata.n_points)
     moved = polydata.copy(deep=True)
     moved.points = points.copy()
     for attributes, of_points in ((moved.point_data, True), (moved.cell_data, False)):

@@ -13,23 +13,25 @@ Long because every option of the method meets here, and each is told in the docs
 
 from __future__ import annotations
 
-import copy
 import itertools
 import os
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from .arrays import FloatArray, as_points, is_number, is_whole
+from .arrays import FloatArray, as_numbers, as_points, is_number, is_whole
 from .binding import Binder
 from .cages import Cage
+from .checks import all_of, as_flag, as_path, require_sequence, shown
 from .constraints import VolumeConstraint, Volumes, region_volumes, total_volume
-from .errors import ArgumentError, CageError, Cancelled, ConstraintError, RegionError
+from .errors import ArgumentError, CageError, Cancelled, ConstraintError
 from .fast import compiled
+from .freezing import read_only
 from .iteration import Iteration, SolverOptions
 from .landing import LargeSurface, along
 from .mesh import Mesh, require_mesh
@@ -43,7 +45,7 @@ from .positions import (
     require_together,
 )
 from .progress import Progress, tell
-from .regions import Regions
+from .regions import Regions, require_regions
 from .solution import Solution, Status
 from .solver import GaussNewton
 from .stiffening import Ladder
@@ -54,7 +56,7 @@ from .threads import one_blas_thread
 _LEG_TOLERANCE, _LEG_STEPS = 1e-3, 12  # for the targets on the way to a far one
 _POSITION_WEIGHT = 1e2  # of the shape energy's trace, shared out over each handle's vertices
 _FAR = 1e3  # mesh sizes
-_NONE = np.zeros(0, dtype=np.int64)
+_NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
 _WIDE = 20_000  # vertices beyond which mapping directions too is what takes long
 _LANDINGS, _NEAR, _SAME = 4, 3e-5, 1e-7  # times it is gone on to that scale; and one of rounding
 _LEFT = 0.97  # of a solve after a step, as progress tells it
@@ -140,12 +142,11 @@ class Deformer:
         progress: Progress | None = None,
     ) -> None:
         require_mesh(mesh)
-        if regions.mesh.n_vertices != mesh.n_vertices:
-            raise RegionError(
-                f"these regions belong to a mesh of {regions.mesh.n_vertices} vertices, "
-                f"this one has {mesh.n_vertices}; make them anew"
-            )
-        self.mesh, self.regions, self.cages = mesh, regions, tuple(cages)
+        require_regions(regions, mesh)
+        cages = all_of(cages, Cage, "cages")
+        as_flag(preserve_volume, "preserve_volume")
+        as_flag(preserve_region_volumes, "preserve_region_volumes")
+        self.mesh, self.regions, self.cages = mesh, regions, cages
         self._centre = mesh.vertices.mean(axis=0)
         self._size = 2.0 * float(np.linalg.norm(mesh.vertices - self._centre, axis=1).max())
         self._rest = mesh.with_vertices(self._inward(mesh.vertices))
@@ -154,19 +155,20 @@ class Deformer:
         self._origin = self._centre if is_far else np.zeros(3)
         self._here = mesh.with_vertices(mesh.vertices - self._origin) if is_far else mesh
         if not is_number(hold_tolerance, 0.0):
-            raise ArgumentError(f"hold_tolerance must be 0 or more; got {hold_tolerance!r}")
+            raise ArgumentError(f"hold_tolerance must be 0 or more; got {shown(hold_tolerance)}")
         if not is_number(stretch, 0.0):
-            raise ArgumentError(f"stretch must be a number, 0 or more; got {stretch!r}")
+            raise ArgumentError(f"stretch must be a number, 0 or more; got {shown(stretch)}")
         if rotation_groups is not None and not is_whole(rotation_groups, 1):
             raise ArgumentError(
-                f"rotation groups must be a whole number, 1 or more; got {rotation_groups!r}"
+                f"rotation_groups must be a whole number, 1 or more; got {shown(rotation_groups)}"
             )
         self._hold_tolerance = hold_tolerance
         self._options = SolverOptions(tolerance, max_steps, window, exact_volume)
 
-        self._rest_cages = np.concatenate([self._inward(cage.vertices) for cage in cages])
-        own = None if blend is None else np.asarray(blend, dtype=np.float64)
+        self._rest_cages = np.concatenate([_NO_POINTS, *(self._inward(c.vertices) for c in cages)])
+        own = None if blend is None else as_numbers(blend, "blend")
         what = self._rest, regions, self.cages, self._rest_cages, own
+        cache = None if cache is None else as_path(cache, "cache")
         binding = Binder(*what, stretch, rotation_groups).bound(cache, progress)
         self._own_blend, self._energy, self._stand_in = own, binding.energy, binding.stand_in
         self._mapping = binding.mapping
@@ -196,7 +198,11 @@ class Deformer:
 
         None keeps the volumes that this one keeps.
         """
-        other = copy.copy(self)
+        if preserve_volume is not None:
+            as_flag(preserve_volume, "preserve_volume")
+        if preserve_region_volumes is not None:
+            as_flag(preserve_region_volumes, "preserve_region_volumes")
+        other = self._shared()
         before = other._keeps
         other._keep(
             before[0] if preserve_volume is None else preserve_volume,
@@ -207,8 +213,19 @@ class Deformer:
 
     def copy(self) -> Deformer:
         """Return a deformer in the same pose that goes on from there by itself."""
-        other = copy.copy(self)
+        other = self._shared()
         other._at_rest, other._ladder = self._at_rest.copy(), self._ladder.copy()
+        return other
+
+    __copy__ = copy
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state | {name: read_only(state[name]) for name in ("fixed", "handle")})
+
+    def _shared(self) -> Deformer:
+        """Return another deformer over the very same parts."""
+        other = object.__new__(type(self))
+        vars(other).update(vars(self))
         return other
 
     @property
@@ -321,6 +338,7 @@ class Deformer:
         self.hold(handle=handle).solve(targets, max_steps=1)
 
     def _stacked(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
+        require_sequence(cage_vertices, "cage_vertices")
         poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
         expected, got = [cage.n_vertices for cage in self.cages], [len(pose) for pose in poses]
         if got != expected:
@@ -344,7 +362,7 @@ class Deformer:
 
     def _take_hold(self, fixed: ArrayLike, handle: ArrayLike) -> None:
         mesh = self.mesh
-        self.fixed, self.handle = checked_constraints(mesh, fixed, handle)
+        self.fixed, self.handle = map(read_only, checked_constraints(mesh, fixed, handle))
         self._handles = connected_sets(mesh, self.handle)
         patches = connected_sets(mesh, self.fixed)
         # Sets lie side by side here, and their vertices in them as in `handle` and `fixed`.

@@ -11,16 +11,19 @@ its singular values, both 1 where T only moved.  Over the surface,
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .arrays import FloatArray
-from .mesh import Mesh
+from .arrays import FloatArray, as_points
+from .mesh import Mesh, require_mesh
 
 
-def triangle_distortion(mesh: Mesh, vertices: FloatArray) -> FloatArray:
+def triangle_distortion(mesh: Mesh, vertices: ArrayLike) -> FloatArray:
     """Return (m,): sqrt((s1 - 1)^2 + (s2 - 1)^2) of each face from *mesh* to *vertices* (n, 3).
 
     A face without area at rest gives 0.
     """
+    require_mesh(mesh)
+    vertices = as_points(vertices, "vertices", mesh.n_vertices)
     a, b, c = mesh.vertices[mesh.faces.T]
     along, other = b - a, c - a
     length = np.linalg.norm(along, axis=1)
@@ -43,7 +46,7 @@ def triangle_distortion(mesh: Mesh, vertices: FloatArray) -> FloatArray:
     return np.where(flat, 0.0, np.sqrt(np.maximum(square, 0.0)))
 
 
-def distortion(mesh: Mesh, vertices: FloatArray) -> float:
+def distortion(mesh: Mesh, vertices: ArrayLike) -> float:
     """Return the distortion of the whole surface, weighted by rest area.
 
     Examples

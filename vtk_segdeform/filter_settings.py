@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
 
-from .arrays import plain
+from .arrays import is_number, is_whole, plain
+from .checks import as_switch, as_text, shown
 from .errors import ArgumentError
 
 
@@ -43,27 +44,27 @@ class SettingsOfAFilter(VTKPythonAlgorithmBase):  # type: ignore[misc]
 
     def SetNumberOfRegions(self, count: int) -> None:  # noqa: N802 - VTK's manner
         """Find so many regions; 0 leaves the choice to `segment`."""
-        self._set(n_regions=int(count))
+        self._set(n_regions=_whole(count, "count"))
 
     def SetNumberOfCageVertices(self, count: int) -> None:  # noqa: N802
         """Fit cages of so many vertices, all together."""
-        self._set(n_cage_vertices=int(count))
+        self._set(n_cage_vertices=_whole(count, "count"))
 
     def SetRegionArrayName(self, name: str) -> None:  # noqa: N802
         """Name the point array of labels that makes regions; "" finds regions instead."""
-        self._set(region_array=str(name or ""))
+        self._set(region_array=_name(name))
 
     def SetOverlap(self, rings: int) -> None:  # noqa: N802
         """Let regions of labels grow by rings of edges; see `Regions.from_labels`."""
-        self._set(overlap=int(rings))
+        self._set(overlap=_whole(rings, "rings"))
 
     def SetFixedArrayName(self, name: str) -> None:  # noqa: N802
         """Name the point array that is not 0 where points stay; it may be missing."""
-        self._set(fixed_array=str(name or ""), fixed=None)
+        self._set(fixed_array=_name(name), fixed=None)
 
     def SetHandleArrayName(self, name: str) -> None:  # noqa: N802
         """Name the point array that is not 0 where points are moved."""
-        self._set(handle_array=str(name or ""), handle=None)
+        self._set(handle_array=_name(name), handle=None)
 
     def SetFixed(self, points: ArrayLike) -> None:  # noqa: N802
         """Tell the points that stay by their numbers, instead of by an array."""
@@ -80,33 +81,53 @@ class SettingsOfAFilter(VTKPythonAlgorithmBase):  # type: ignore[misc]
 
     def SetTranslation(self, x: float, y: float, z: float) -> None:  # noqa: N802
         """Shift the handle."""
-        self._set(translation=(float(x), float(y), float(z)))
+        self._set(translation=_vector(x, y, z))
 
     def SetRotationAxis(self, x: float, y: float, z: float) -> None:  # noqa: N802
         """Turn the handle about an axis through its centre."""
-        self._set(axis=(float(x), float(y), float(z)))
+        self._set(axis=_vector(x, y, z))
 
     def SetRotationAngle(self, degrees: float) -> None:  # noqa: N802
         """Turn it by so much, the right hand's thumb along the axis."""
-        self._set(angle=float(degrees))
+        self._set(angle=_real(degrees, "degrees"))
 
     def SetPreserveVolume(self, hold: bool) -> None:  # noqa: N802
         """Hold the enclosed volume exactly."""
-        self._set(preserve_volume=bool(hold))
+        self._set(preserve_volume=as_switch(hold, "hold"))
 
     def SetStretch(self, strength: float) -> None:  # noqa: N802
         """See `Deformer`."""
-        self._set(stretch=float(strength))
+        self._set(stretch=_real(strength, "strength"))
 
     def SetComputeLocalVolumeChange(self, on: bool) -> None:  # noqa: N802
         """Add "LocalVolumeChange"; see `local_volume_change`."""
-        self._set(local_volume=bool(on))
+        self._set(local_volume=as_switch(on, "on"))
 
     def _set(self, **changes: Any) -> None:
         settings = replace(self._settings, **changes)
         if settings != self._settings:
             self._settings = settings
             self.Modified()
+
+
+def _whole(value: int, name: str) -> int:
+    if not is_whole(value, -np.inf):
+        raise ArgumentError(f"{name} must be a whole number; got {shown(value)}")
+    return int(value)
+
+
+def _real(value: float, name: str) -> float:
+    if not is_number(value):
+        raise ArgumentError(f"{name} must be a finite number; got {shown(value)}")
+    return float(value)
+
+
+def _vector(x: float, y: float, z: float) -> tuple[float, float, float]:
+    return _real(x, "x"), _real(y, "y"), _real(z, "z")
+
+
+def _name(name: str | None) -> str:
+    return "" if name is None else as_text(name, "name")
 
 
 def _places(targets: ArrayLike) -> list[list[float]]:

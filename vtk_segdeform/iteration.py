@@ -9,6 +9,7 @@ import numpy as np
 
 from .acceleration import Anderson
 from .arrays import FloatArray, is_number, is_whole
+from .checks import as_flag, shown
 from .curvature import Factor
 from .errors import ArgumentError
 from .positions import Pull
@@ -31,13 +32,14 @@ class SolverOptions:
 
     def __post_init__(self) -> None:
         if not (is_number(self.tolerance) and self.tolerance > 0.0):
-            raise ArgumentError(f"tolerance must be a positive number; got {self.tolerance!r}")
+            raise ArgumentError(f"tolerance must be a positive number; got {shown(self.tolerance)}")
         for name, least in (("max_steps", 1), ("window", 0)):
             value = getattr(self, name)
             if not is_whole(value, least):
                 raise ArgumentError(
-                    f"{name} must be a whole number, {least} or more; got {value!r}"
+                    f"{name} must be a whole number, {least} or more; got {shown(value)}"
                 )
+        as_flag(self.exact_volume, "exact_volume")
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,8 +29,7 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from .arrays import FloatArray, IntArray, as_points
-from .errors import ArgumentError
-from .mesh import Mesh
+from .mesh import Mesh, require_mesh
 from .segmenting.thinning import cells as cells_of
 from .segmenting.thinning import faces_between, unique_edges
 from .threads import in_parallel
@@ -57,6 +56,7 @@ class LocalVolume:
     """
 
     def __init__(self, mesh: Mesh) -> None:
+        require_mesh(mesh)
         self._shape = mesh.vertices.shape
         points, faces = mesh.vertices, mesh.faces
         self._means: sparse.csr_array | None = None
@@ -78,9 +78,7 @@ class LocalVolume:
 
         Vertices over (almost) no flesh at rest, on the rim of a thin plate say, get 0.
         """
-        x = as_points(vertices, "vertices")
-        if x.shape != self._shape:
-            raise ArgumentError(f"vertices must have shape {self._shape}; got {x.shape}")
+        x = as_points(vertices, "vertices", self._shape[0])
         now = self._flesh.smoothed(x if self._means is None else self._means @ x)
         s = np.divide(now - self._rest, self._rest, where=self._trusted, out=np.zeros(len(now)))
         if self._means is None:

@@ -51,7 +51,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import FloatArray, IntArray, as_faces, as_points
-from .errors import CageError
+from .checks import as_callable
+from .errors import ArgumentError, CageError
 from .fast import compiled, inputs
 from .progress import Progress
 from .surface.intersections import flat_faces
@@ -62,6 +63,7 @@ from .threads import in_parallel
 _ON = 1e-14  # as near as this, a point is on the vertex or edge
 _OFF = 1e-30  # added to h: no point is in a plane to the last digit
 _NEAR = 1e-3  # of max |a|, for |h|: where S is summed as psi
+_FARTHEST = 1e60  # diagonals; beyond it, fourth powers of distances overflow
 _BLOCK = 1 << 15  # numbers per temporary: a quarter of a megabyte, so that they stay in the cache
 
 
@@ -107,12 +109,16 @@ def mean_value_coordinates(
     >>> mean_value_coordinates([[0, 0, 0]], corners, faces).round(6)
     array([[0.25, 0.25, 0.25, 0.25]])
     """
+    if progress is not None:
+        as_callable(progress, "progress")
     x = as_points(points, "points")
     p = as_points(cage_vertices, "cage_vertices")
     faces = as_faces(cage_faces, len(p), "cage_faces")
     _require_closed(p, faces)
     low, high = p.min(axis=0), p.max(axis=0)
     centre, size = (low + high) / 2.0, np.linalg.norm(high - low)
+    if max(x.max(initial=0.0), -x.min(initial=0.0)) > _FARTHEST * size:
+        raise ArgumentError(f"points are more than {_FARTHEST:.0e} sizes of the cage away")
     cage = _prepare((p - centre) / size, faces)
     weights = np.empty((len(x), len(p)))
     kernels = compiled(len(x))

@@ -14,16 +14,17 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from .arrays import FloatArray, IntArray, as_points
-from .errors import ArgumentError, MeshError
+from .arrays import FloatArray, IntArray, as_points, frozen
+from .errors import MeshError
 from .faults import as_soup, find_faults
+from .freezing import Frozen, read_only
 from .threads import in_parallel
 
 _PIECE = 20_000  # faces to a thread; what they need stays in the cache
 
 
 @dataclass(frozen=True, init=False, eq=False)
-class Mesh:
+class Mesh(Frozen):
     """A closed, outward oriented triangle mesh; frozen.
 
     Parameters
@@ -64,16 +65,7 @@ class Mesh:
                 f"not a closed, outward oriented two-manifold: {faults}; see find_faults and repair"
             )
         points, triangles = as_soup(vertices, faces)
-        self.__setstate__((points.copy(), triangles.copy()))
-
-    def __getstate__(self) -> tuple[FloatArray, IntArray]:
-        return self.vertices, self.faces
-
-    def __setstate__(self, state: tuple[FloatArray, IntArray]) -> None:
-        for array in state:
-            array.flags.writeable = False
-        object.__setattr__(self, "vertices", state[0])
-        object.__setattr__(self, "faces", state[1])
+        self.__setstate__({"vertices": points.copy(), "faces": triangles.copy()})
 
     @property
     def n_vertices(self) -> int:
@@ -96,7 +88,7 @@ class Mesh:
         tails, heads = self.faces.ravel(), self.faces[:, [1, 2, 0]].ravel()
         once = tails < heads  # every edge is met once from either end
         keys = np.sort(tails[once] * self.n_vertices + heads[once])
-        return np.stack(np.divmod(keys, self.n_vertices), axis=1)
+        return read_only(np.stack(np.divmod(keys, self.n_vertices), axis=1))
 
     @cached_property
     def adjacency(self) -> sparse.csr_array:
@@ -105,7 +97,10 @@ class Mesh:
         length = np.linalg.norm(self.vertices[i] - self.vertices[j], axis=1)
         length = np.maximum(length, np.finfo(float).tiny)  # csgraph reads a zero as "no edge"
         at = self._edge_numbers
-        return sparse.csr_array((length[at.data - 1], at.indices, at.indptr), at.shape)
+        lengths = sparse.csr_array((length[at.data - 1], at.indices, at.indptr), at.shape)
+        for array in (lengths.data, lengths.indices, lengths.indptr):
+            frozen(array)
+        return lengths
 
     @cached_property
     def _edge_numbers(self) -> sparse.csr_array:
@@ -118,7 +113,7 @@ class Mesh:
     def components(self) -> IntArray:
         """(n,) int: the connected component of each vertex, numbered from 0."""
         _, labels = csgraph.connected_components(self.adjacency, directed=False)
-        return labels.astype(np.int64)
+        return read_only(labels.astype(np.int64))
 
     @cached_property
     def face_areas(self) -> FloatArray:
@@ -130,6 +125,7 @@ class Mesh:
             areas[start:stop] = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
 
         in_parallel(work, self.n_faces, _PIECE)
+        frozen(areas)
         return areas
 
     def with_vertices(self, vertices: ArrayLike) -> Mesh:
@@ -137,13 +133,9 @@ class Mesh:
 
         The triangles were checked already; a pose that crosses or inverts itself is still a pose.
         """
-        points = as_points(vertices, "vertices")
-        if points.shape != self.vertices.shape:
-            raise ArgumentError(
-                f"vertices must have shape {self.vertices.shape}; got {points.shape}"
-            )
+        points = as_points(vertices, "vertices", self.n_vertices)
         posed = object.__new__(Mesh)
-        posed.__setstate__((points.copy(), self.faces))
+        posed.__setstate__({"vertices": points.copy(), "faces": self.faces})
         # the same at every pose: hand on what is known
         for name in ("edges", "components", "_edge_numbers"):
             if name in self.__dict__:

@@ -23,13 +23,14 @@ from __future__ import annotations
 import contextlib
 import importlib
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .arrays import FloatArray, IntArray
+from .arrays import FloatArray, IntArray, is_whole
+from .checks import all_of, as_path, require, shown
 from .errors import ArgumentError, MeshError, MissingDependencyError
 from .formats.meshlab_layers import (
     Surface,
@@ -39,7 +40,7 @@ from .formats.meshlab_layers import (
     ingredients,
     surface_of,
 )
-from .mesh import Mesh
+from .mesh import Mesh, require_mesh
 from .session import Session
 
 if TYPE_CHECKING:
@@ -100,14 +101,14 @@ def to_meshset(what: Surface | Session | Mapping[str, Surface]) -> Any:
     return meshset
 
 
-def from_meshset(meshset: Any, arrays: Iterable[str] = ()) -> pv.PolyData:
+def from_meshset(meshset: Any, arrays: Sequence[str] = ()) -> pv.PolyData:
     """Return the current layer of a ``pymeshlab.MeshSet``, with all that MeshLab knows of it.
 
     Parameters
     ----------
     meshset : pymeshlab.MeshSet
         Left as it is.
-    arrays : iterable of str
+    arrays : sequence of str
         Names of custom attributes, of vertices or faces, to bring along as float64 arrays.
 
     Raises
@@ -115,11 +116,13 @@ def from_meshset(meshset: Any, arrays: Iterable[str] = ()) -> pv.PolyData:
     MeshError
         If there is no layer, or no attribute of a name.
     """
+    arrays = all_of(arrays, str, "arrays")
     return surface_of(_current(meshset), arrays, _pymeshlab().PyMeshLabException)
 
 
 def layers_from_meshset(meshset: Any) -> dict[str, pv.PolyData]:
     """Return all layers of a ``pymeshlab.MeshSet`` by name; equal names get a number."""
+    _require_meshset(meshset)
     layers: dict[str, pv.PolyData] = {}
     for layer in meshset:
         layers[free_name(layer.label(), layers)] = surface_of(layer)
@@ -147,11 +150,12 @@ def selected_vertices(meshset: Any) -> IntArray:
 
 def read_faces(path: str | Path) -> tuple[FloatArray, IntArray]:
     """Return (vertices, faces) of a file in any format PyMeshLab reads; nothing is checked."""
+    path = as_path(path)
     pymeshlab = _pymeshlab()
     meshset = pymeshlab.MeshSet(verbose=False)
     try:
         with _standing_still():
-            meshset.load_new_mesh(str(Path(path).absolute()))
+            meshset.load_new_mesh(str(path.absolute()))
     except pymeshlab.PyMeshLabException as error:
         raise MeshError(f"{path}: PyMeshLab cannot read it: {error}") from None
     if meshset.mesh_number() > 1:
@@ -170,10 +174,12 @@ def read(path: str | Path) -> Mesh:
 
 def write(path: str | Path, mesh: Mesh) -> None:
     """Write *mesh* in the format PyMeshLab knows by the suffix of *path*."""
+    path = as_path(path)
+    require_mesh(mesh)
     pymeshlab, meshset = _pymeshlab(), to_meshset(mesh)
     try:
         with _standing_still():
-            meshset.save_current_mesh(str(Path(path).absolute()))
+            meshset.save_current_mesh(str(path.absolute()))
     except pymeshlab.PyMeshLabException as error:
         raise MeshError(f"{path}: PyMeshLab cannot write it: {error}") from None
 
@@ -193,8 +199,10 @@ def simplify(mesh: Mesh, n_vertices: int) -> Mesh:
     MissingDependencyError
         If PyMeshLab is not installed.
     """
-    if n_vertices < 4:
-        raise ArgumentError(f"n_vertices must be 4 or more; got {n_vertices}")
+    require_mesh(mesh)
+    if not is_whole(n_vertices, 4):
+        raise ArgumentError(f"n_vertices must be 4 or more; got {shown(n_vertices)}")
+    n_vertices = min(int(n_vertices), mesh.n_vertices)
     meshset = to_meshset(mesh)
     euler = mesh.n_vertices - len(mesh.edges) + mesh.n_faces  # stays; V - E + F with E = 3/2 F
     meshset.meshing_decimation_quadric_edge_collapse(
@@ -207,7 +215,12 @@ def simplify(mesh: Mesh, n_vertices: int) -> Mesh:
     return Mesh(*_arrays(meshset))
 
 
+def _require_meshset(meshset: object) -> None:
+    require(meshset, _pymeshlab().MeshSet, "meshset")
+
+
 def _current(meshset: Any) -> Any:
+    _require_meshset(meshset)
     if not meshset.mesh_number():
         raise MeshError("this MeshSet has no layer; add a mesh to it first")
     return meshset.current_mesh()

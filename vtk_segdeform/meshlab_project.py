@@ -26,6 +26,7 @@ import pyvista as pv
 
 from .arrays import FloatArray
 from .atomic import replacing, require_place
+from .checks import as_path
 from .convert import read_polydata, with_vertices, write_mesh
 from .errors import MeshError
 from .formats.meshlab_layers import Surface, as_layers, free_name
@@ -57,7 +58,7 @@ def read_project(path: str | Path) -> dict[str, pv.PolyData]:
     MissingDependencyError
         If only PyMeshLab reads a layer's format, and it is not installed.
     """
-    path = Path(path)
+    path = as_path(path)
     layers: dict[str, pv.PolyData] = {}
     elements = _parsed(path).findall("MeshGroup/MLMesh")
     if len(elements) > _MOST_LAYERS:
@@ -100,7 +101,7 @@ def write_project(path: str | Path, what: Surface | Session | Mapping[str, Surfa
     MeshError
         If the suffix is not .mlp, the folder is not there, or *what* is none of these.
     """
-    path = Path(path)
+    path = as_path(path)
     if path.suffix.lower() != ".mlp":
         raise MeshError(f"{path}: the name of a MeshLab project ends in .mlp")
     folder = path.with_suffix(".layers")

@@ -15,11 +15,13 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from .arrays import IntArray, is_number, is_whole
+from .checks import shown
 from .errors import ArgumentError
 from .mesh import Mesh
 from .modelling.implicit import Limb, standing_body
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # the golden angle, radians
+_MOST, _FINEST = 10_000_000, 1000  # a hull or a grid of more takes minutes and gigabytes
 
 
 def cactus(n_vertices: int = 5430) -> Mesh:
@@ -110,9 +112,11 @@ def bar(
         How often each edge is divided: 2 (ab + bc + ca) + 2 vertices.
     """
     if not (_are_three(size) and all(is_number(each) and each > 0 for each in size)):
-        raise ArgumentError(f"size must be three positive numbers; got {size!r}")
-    if not (_are_three(divisions) and all(is_whole(each, 1) for each in divisions)):
-        raise ArgumentError(f"divisions must be three whole numbers, 1 or more; got {divisions!r}")
+        raise ArgumentError(f"size must be three positive numbers; got {shown(size)}")
+    if not (_are_three(divisions) and all(is_whole(each, 1, _FINEST) for each in divisions)):
+        raise ArgumentError(
+            f"divisions must be three whole numbers, 1 to {_FINEST}; got {shown(divisions)}"
+        )
     divisions = int(divisions[0]), int(divisions[1]), int(divisions[2])
     sides, faces, count = [], [], 0
     for axis in range(3):
@@ -142,7 +146,9 @@ def torus(n_vertices: int = 3000, *, major: float = 1.0, minor: float = 0.35) ->
     """
     _require(n_vertices, 30)
     if not (is_number(minor) and is_number(major) and 0 < minor < major):
-        raise ArgumentError(f"a torus needs 0 < minor < major; got {minor!r} and {major!r}")
+        raise ArgumentError(
+            f"a torus needs 0 < minor < major; got {shown(minor)} and {shown(major)}"
+        )
     n_vertices = int(n_vertices)
     around = max(3, round(np.sqrt(n_vertices * minor / major)))  # vertices in one winding
     k = np.arange(n_vertices)
@@ -161,7 +167,7 @@ def sphere(n_vertices: int = 2562, *, radius: float = 1.0) -> Mesh:
     """Return a sphere about the origin: points along a spiral of golden angles, their hull."""
     _require(n_vertices, 4)
     if not (is_number(radius) and radius > 0):
-        raise ArgumentError(f"radius must be a positive number; got {radius!r}")
+        raise ArgumentError(f"radius must be a positive number; got {shown(radius)}")
     k = np.arange(int(n_vertices))
     z = 1.0 - (2.0 * k + 1.0) / n_vertices
     ring = np.sqrt(1.0 - z**2)
@@ -174,14 +180,15 @@ def sphere(n_vertices: int = 2562, *, radius: float = 1.0) -> Mesh:
 
 
 def _require(n_vertices: int, least: int) -> None:
-    if not is_whole(n_vertices, least):
+    if not is_whole(n_vertices, least, _MOST):
         raise ArgumentError(
-            f"n_vertices must be a whole number, {least} or more; got {n_vertices!r}"
+            f"n_vertices must be a whole number, {least} to {_MOST}; got {shown(n_vertices)}"
         )
 
 
 def _are_three(values: object) -> bool:
-    return isinstance(values, Sequence | np.ndarray) and len(values) == 3
+    sequence = isinstance(values, Sequence) or (isinstance(values, np.ndarray) and values.ndim == 1)
+    return sequence and len(values) == 3  # type: ignore[arg-type]
 
 
 def _chequered(p: int, q: int) -> IntArray:

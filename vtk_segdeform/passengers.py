@@ -31,19 +31,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from .arrays import FloatArray, as_points
+from .arrays import FloatArray, as_numbers, as_points
 from .cages import Cage
-from .errors import CageError
+from .checks import all_of, require_sequence
+from .errors import ArgumentError, CageError
+from .freezing import Frozen, read_only
 from .mean_value import mean_value_coordinates
-from .mesh import Mesh
+from .mesh import Mesh, require_mesh
 from .progress import Progress, part
 from .subspace import Subspace
 
 _NEAREST = 24  # K
+_FARTHEST = 1e60  # sizes of the mesh; beyond it, distances overflow
 
 
 @dataclass(frozen=True, eq=False)
-class Passengers:
+class Passengers(Frozen):
     """k points bound to the cages; made by `board` or `Deformer.passengers`."""
 
     points: FloatArray
@@ -61,6 +64,7 @@ class Passengers:
         CageError
             If these are not the cages that the points were bound to.
         """
+        require_sequence(cage_vertices, "cage_vertices")
         poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
         expected, got = [b.shape[1] for b in self.subspace.blocks], [len(p) for p in poses]
         if got != expected:
@@ -93,7 +97,13 @@ def board(
     progress : Progress, optional
         Called as the coordinates in each cage are computed; may cancel.
     """
-    points = as_points(points, "points")
+    require_mesh(mesh)
+    cages = all_of(cages, Cage, "cages")
+    points = read_only(as_points(points, "points").copy())
+    weights = as_numbers(weights, "weights")
+    if weights.shape != (len(cages), mesh.n_vertices):
+        expected = len(cages), mesh.n_vertices
+        raise ArgumentError(f"weights must have shape {expected}; got {weights.shape}")
     alpha = blend_at(mesh.vertices, weights, points)
     rows, blocks = [], []
     for r, cage in enumerate(cages):
@@ -107,6 +117,15 @@ def board(
 
 def blend_at(vertices: FloatArray, weights: FloatArray, points: FloatArray) -> FloatArray:
     """Return the blend weights (r, k) at *points* (k, 3), of those (r, n) at *vertices* (n, 3)."""
+    vertices, points = as_points(vertices, "vertices"), as_points(points, "points")
+    weights = as_numbers(weights, "weights")
+    if not len(vertices) or weights.ndim != 2 or weights.shape[1] != len(vertices):
+        raise ArgumentError(
+            f"weights must have shape (r, {len(vertices)}), a column for each vertex; "
+            f"got {weights.shape}"
+        )
+    if np.abs(points - vertices[0]).max(initial=0.0) > _FARTHEST * np.ptp(vertices, axis=0).max():
+        raise ArgumentError(f"points are more than {_FARTHEST:.0e} sizes of the mesh away")
     count = min(_NEAREST, len(vertices))
     distance, near = map(np.asarray, cKDTree(vertices).query(points, k=np.arange(1, count + 1)))
     farthest = distance[:, -1:]

@@ -18,12 +18,14 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike
 
-from .arrays import FloatArray, IntArray, as_ids, as_points
+from .arrays import FloatArray, IntArray, as_faces, as_ids, as_numbers, as_points
 from .canvas import add_surface, require_offscreen, view_of, write_panels
+from .checks import as_path, require_sequence, shown
+from .errors import ArgumentError
 from .formats.polygons import polydata_of
-from .mesh import Mesh
+from .mesh import Mesh, require_mesh
 from .palette import BODY, FIXED, HANDLE, INK, of_region
-from .regions import CageSurface
+from .regions import CageSurface, Regions
 
 __all__ = [
     "draw_mesh", "picture_before_after", "picture_distortion", "picture_regions_and_cages",
@@ -52,7 +54,16 @@ def picture_regions_and_cages(
     cages : sequence with .vertices (m, 3) and .faces (k, 3)
         One per region, in the same order; without any, only the regions are drawn.
     """
-    belongs = np.asarray(membership, dtype=bool)
+    path = as_path(path)
+    belongs = Regions(mesh, as_numbers(membership, "membership").astype(bool)).membership
+    require_sequence(cages, "cages")
+    if len(cages) not in (0, len(belongs)):
+        raise ArgumentError(f"cages must be {len(belongs)}, one for each region; got {len(cages)}")
+    for cage in cages:
+        if not (hasattr(cage, "vertices") and hasattr(cage, "faces")):
+            raise ArgumentError(f"cages must have vertices and faces; got {shown(cage)}")
+        points = as_points(cage.vertices, "vertices of cages")
+        as_faces(cage.faces, len(points), "faces of cages")
     palette = np.array([of_region(r) for r in range(len(belongs))])
     shares = belongs / belongs.sum(axis=0)
     colours = (shares.T @ palette)[mesh.faces].mean(axis=1)
@@ -95,11 +106,13 @@ def picture_before_after(
     fixed, handle : (k,) int or (n,) bool
         Drawn grey and red.
     """
-    deformed = as_points(vertices, "vertices")
+    path = as_path(path)
+    require_mesh(mesh)
+    deformed = as_points(vertices, "vertices", mesh.n_vertices)
     colours = np.tile(pv.Color(BODY).int_rgb, (mesh.n_faces, 1)).astype(float)
-    for ids, colour in ((fixed, FIXED), (handle, HANDLE)):
+    for ids, name, colour in ((fixed, "fixed", FIXED), (handle, "handle", HANDLE)):
         chosen = np.zeros(mesh.n_vertices, dtype=bool)
-        chosen[as_ids(ids, mesh.n_vertices, "fixed and handle")] = True
+        chosen[as_ids(ids, mesh.n_vertices, name)] = True
         colours[chosen[mesh.faces].all(axis=1)] = pv.Color(colour).int_rgb
 
     def draw_rest(plotter: pv.Plotter) -> None:
@@ -129,7 +142,7 @@ def picture_volume_change(
     change : (n,) or (m,) float
         Per vertex or per face, relative: 0.1 is shown as 10 per cent.
     """
-    percent = 100.0 * np.asarray(change, dtype=float)
+    percent = 100.0 * _values(mesh, change, "change")
     most = _largest(np.abs(percent))
     _picture_values(
         path, mesh, vertices, percent, "local volume change [%]", ("RdBu_r", -most, most)
@@ -143,7 +156,7 @@ def picture_distortion(
 
     The arguments are those of `picture_volume_change`.
     """
-    values = np.asarray(distortion, dtype=float)
+    values = _values(mesh, distortion, "distortion")
     limits = ("cividis", 0.0, _largest(values))
     _picture_values(path, mesh, vertices, values, "distortion", limits)
 
@@ -183,7 +196,8 @@ def _picture_values(
     title: str,
     scale: tuple[str, float, float],
 ) -> None:
-    deformed = as_points(vertices, "vertices")
+    path = as_path(path)
+    deformed = as_points(vertices, "vertices", mesh.n_vertices)
     surface = _surface(mesh.faces, deformed)
     attributes = surface.point_data if len(values) == mesh.n_vertices else surface.cell_data
     attributes["values"] = values
@@ -204,6 +218,18 @@ def _picture_values(
         )
 
     write_panels(path, [(title, draw)], deformed, view_of(mesh.vertices, deformed), foot=_BAR)
+
+
+def _values(mesh: Mesh, values: ArrayLike, name: str) -> FloatArray:
+    """Return *values* (n,) or (m,), one for each vertex or face of *mesh*."""
+    require_mesh(mesh)
+    array = as_numbers(values, name)
+    if array.shape not in ((mesh.n_vertices,), (mesh.n_faces,)) or not np.isfinite(array).all():
+        raise ArgumentError(
+            f"{name} must be finite, one for each of {mesh.n_vertices} vertices or "
+            f"{mesh.n_faces} faces; got shape {array.shape}"
+        )
+    return array
 
 
 def _surface(faces: IntArray, vertices: FloatArray) -> pv.PolyData:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from .cage_fit import fit_cages
+from .checks import as_flag
 from .deformer import Deformer
-from .mesh import Mesh
+from .mesh import Mesh, require_mesh
+from .positions import checked_constraints, checked_targets
 from .progress import Progress, part
 from .segmentation import segment
 from .solution import Solution
@@ -54,6 +56,10 @@ def deform(
     ConstraintError
         If fixed, handle or targets make no sense.
     """
+    require_mesh(mesh)
+    as_flag(preserve_volume, "preserve_volume")
+    _, held = checked_constraints(mesh, fixed, handle)
+    checked_targets(targets, len(held))
     regions = segment(mesh, n_regions, progress=part(progress, 0.0, 0.2))
     cages = fit_cages(mesh, regions, n_cage_vertices, progress=part(progress, 0.2, 0.7))
     deformer = Deformer(

@@ -23,6 +23,8 @@ from numpy.typing import ArrayLike
 
 from . import convert, pipeline
 from .canvas import require_screen
+from .checks import as_path, as_text, require, shown
+from .errors import ArgumentError
 from .faults import find_faults
 from .formats.polygons import triangles_of
 from .mesh import Mesh
@@ -74,6 +76,8 @@ def edit(mesh: Any, *, path: _Path = None, title: str = "segdeform") -> Any:
         If there is no screen.
     """
     session = session_of(mesh)
+    path = None if path is None else as_path(path)
+    as_text(title, "title")
     if not pv.OFF_SCREEN:
         require_screen()
     plotter = pv.Plotter(title=title, notebook=False)
@@ -91,6 +95,8 @@ def edit(mesh: Any, *, path: _Path = None, title: str = "segdeform") -> Any:
 
 def deformed(surface: pv.PolyData, session: Session) -> pv.PolyData:
     """Return a copy of *surface* as *session* has it, or the session's mesh if it is another."""
+    require(surface, pv.PolyData, "surface")
+    require(session, Session, "session")
     if surface.n_points == session.mesh.n_vertices:
         return convert.with_vertices(surface, session.vertices)
     return convert.to_polydata(session.mesh.with_vertices(session.vertices))
@@ -128,6 +134,7 @@ class PlotterTools:
         from .widgets.editor import DeformEditor
 
         session = session_of(mesh)
+        path = None if path is None else as_path(path)
         if isinstance(mesh, pv.PolyData):
             for actor in self._plotter.renderer.actors.values():
                 if getattr(getattr(actor, "mapper", None), "dataset", None) is mesh:
@@ -147,7 +154,7 @@ class PlotterTools:
         from .widgets.volume_overlay import VolumeOverlay
 
         if not isinstance(session, Session):
-            raise TypeError(f"session must be a Session; got {type(session).__name__}")
+            raise ArgumentError(f"session must be a Session; got {shown(session)}")
         overlay = VolumeOverlay(self._plotter, session)
         self.added.append(overlay)
         overlay.show()
@@ -232,4 +239,4 @@ def session_of(mesh: Mesh | pv.PolyData | Session) -> Session:
         return mesh if isinstance(mesh, Session) else Session(mesh)
     if isinstance(mesh, pv.PolyData):
         return Session(convert.from_polydata(mesh))
-    raise TypeError(f"mesh must be a Mesh, a PolyData or a Session; got {type(mesh).__name__}")
+    raise ArgumentError(f"mesh must be a Mesh, a PolyData or a Session; got {shown(mesh)}")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from .checks import as_callable
+
 Progress = Callable[[float, str], None]
 """Called with a fraction in 0..1 and what is being done; raise `errors.Cancelled` in it to stop."""
 
@@ -11,13 +13,14 @@ Progress = Callable[[float, str], None]
 def tell(progress: Progress | None, fraction: float, message: str) -> None:
     """Call *progress*, if there is one."""
     if progress is not None:
-        progress(fraction, message)
+        as_callable(progress, "progress")(fraction, message)
 
 
 def part(progress: Progress | None, start: float, end: float) -> Progress | None:
     """Return a progress for a piece of work that spans *start*..*end* of the whole."""
     if progress is None:
         return None
+    as_callable(progress, "progress")
 
     def report(fraction: float, message: str) -> None:
         progress(start + fraction * (end - start), message)

@@ -20,7 +20,9 @@ from numpy.typing import ArrayLike
 
 from .arrays import BoolArray, FloatArray, IntArray, is_number, is_whole, plain
 from .blending import border_distance, distance_to_triangles, shares
+from .checks import shown
 from .errors import RegionError
+from .freezing import Frozen
 from .mesh import Mesh, require_mesh
 
 _EQUAL = 1e-9  # weights that differ by rounding only
@@ -39,7 +41,7 @@ class CageSurface(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Regions:
+class Regions(Frozen):
     """Which vertices belong to which regions; every vertex to at least one.
 
     Parameters
@@ -82,7 +84,7 @@ class Regions:
                 f"{len(bare)} vertices lie in no region: {_some(bare)}; add them to a region"
             )
         if not (is_number(self.smoothness) and self.smoothness > 0.0):
-            raise RegionError(f"smoothness must be a number above 0; got {self.smoothness!r}")
+            raise RegionError(f"smoothness must be a number above 0; got {shown(self.smoothness)}")
         membership.flags.writeable = False
         object.__setattr__(self, "membership", membership)
 
@@ -125,6 +127,9 @@ class Regions:
         array([[1, 1, 1, 0],
                [0, 0, 0, 1]])
         """
+        require_mesh(mesh)
+        if not is_whole(overlap, 0):
+            raise RegionError(f"overlap must be a whole number, 0 or more; got {shown(overlap)}")
         array = plain(labels, "labels")
         if array.shape != (mesh.n_vertices,) or array.dtype.kind not in "iu":
             raise RegionError(
@@ -163,12 +168,13 @@ class Regions:
 
     def members(self, region: int) -> IntArray:
         """Return the numbers of the vertices in *region*, in order."""
-        return np.flatnonzero(self.membership[region])
+        require_region(region, self.n_regions)
+        return np.flatnonzero(self.membership[int(region)])
 
     def grow(self, rings: int) -> Regions:
         """Return the same regions, each with *rings* more rings of neighbours."""
         if not is_whole(rings, 0):
-            raise RegionError(f"rings must be a whole number, 0 or more; got {rings}")
+            raise RegionError(f"rings must be a whole number, 0 or more; got {shown(rings)}")
         membership = self.membership.copy()
         graph, (i, j) = self.mesh.adjacency, self.mesh.edges.T
         for members in membership:
@@ -181,6 +187,26 @@ class Regions:
                     break
                 members[last] = True
         return Regions(self.mesh, membership, self.smoothness)
+
+
+def require_regions(regions: object, mesh: Mesh) -> None:
+    """Raise a RegionError unless *regions* are `Regions` over as many vertices as *mesh* has."""
+    if not isinstance(regions, Regions):
+        raise RegionError(
+            f"regions must be Regions; got {shown(regions)}. Make them by segment(mesh) or "
+            "Regions.from_masks(mesh, masks)"
+        )
+    if regions.mesh.n_vertices != mesh.n_vertices:
+        raise RegionError(
+            f"these regions belong to a mesh of {regions.mesh.n_vertices} vertices, "
+            f"this one has {mesh.n_vertices}; make them anew"
+        )
+
+
+def require_region(region: int, count: int) -> None:
+    """Raise a RegionError unless *region* is one of 0..count-1."""
+    if not is_whole(region, 0, count - 1):
+        raise RegionError(f"region must be one of 0..{count - 1}; got {shown(region)}")
 
 
 def cage_distance_weights(regions: Regions, cages: Sequence[CageSurface]) -> FloatArray:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import FloatArray, IntArray, is_number, is_whole
+from .checks import shown
 from .errors import ArgumentError, MeshError
 from .faults import HOPELESS, as_soup, find_faults
 from .surface import repair_steps as steps
@@ -85,9 +86,13 @@ def repair(
     (array([ 0,  1,  2, -1]), True)
     """
     if not is_number(weld_distance, 0.0):
-        raise ArgumentError(f"weld_distance must be a length, 0 or more; got {weld_distance!r}")
+        raise ArgumentError(
+            f"weld_distance must be a length, 0 or more; got {shown(weld_distance)}"
+        )
     if not is_whole(largest_hole, 0):
-        raise ArgumentError(f"largest_hole must be a whole number of edges; got {largest_hole!r}")
+        raise ArgumentError(
+            f"largest_hole must be a whole number of edges; got {shown(largest_hole)}"
+        )
     points, triangles = as_soup(vertices, faces)
     report = find_faults(points, triangles)
     hopeless = [

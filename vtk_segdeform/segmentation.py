@@ -14,7 +14,8 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import FloatArray, IntArray, is_whole
-from .errors import RegionError
+from .checks import shown
+from .errors import ArgumentError, RegionError
 from .mesh import Mesh, require_mesh
 from .progress import Progress, part, tell
 from .regions import Regions
@@ -77,7 +78,11 @@ def segment(
     require_mesh(mesh)
     n = mesh.n_vertices
     if n_regions is not None and not is_whole(n_regions, 1, n):
-        raise RegionError(f"n_regions must be a whole number in 1..{n}; got {n_regions!r}")
+        raise RegionError(f"n_regions must be a whole number in 1..{n}; got {shown(n_regions)}")
+    if overlap is not None and not is_whole(overlap, 0):
+        raise RegionError(f"overlap must be a whole number, 0 or more; got {shown(overlap)}")
+    if not is_whole(seed, 0):
+        raise ArgumentError(f"seed must be a whole number, 0 or more; got {shown(seed)}")
     tell(progress, 0.0, "thinning out vertices")
     shape = _without_ties(mesh)
     if n_regions is not None and n_regions <= mesh.components.max() + 1:
@@ -86,7 +91,7 @@ def segment(
         n_regions = None if n_regions is None else int(n_regions)
         points = max(_POINTS, _POINTS_PER_REGION * (n_regions or 1))
         thinning = part(progress, 0.02, 0.1)
-        cell, surface = coarsen(shape, points, np.random.default_rng(seed), thinning)
+        cell, surface = coarsen(shape, points, np.random.default_rng(int(seed)), thinning)
         labels = _parts(surface, n_regions, progress)[cell]
         tell(progress, 0.8, "smoothing borders")
         labels = smooth_borders(shape, labels)

@@ -24,14 +24,15 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import FloatArray, IntArray, as_points, frozen
+from .arrays import FloatArray, IntArray, as_points, frozen, is_whole, plain
 from .cage_fit import fit_cages
 from .cages import Cage
+from .checks import require, shown
 from .editing import handles, naming, painting
 from .editing.history import Timeline
 from .editing.listeners import Change
@@ -66,6 +67,11 @@ class Session(Timeline):
         Where to begin, another session's `state` of the same mesh; by default with nothing.
     history : int
         Steps that can be undone; older ones are forgotten.
+
+    Notes
+    -----
+    A copy, by `copy` or `pickle`, has the mesh, the state, a drag in hand and the history.  It has
+    no listeners, and its next solve begins as after `start_afresh`.
 
     Raises
     ------
@@ -103,6 +109,23 @@ class Session(Timeline):
         self._effort = Effort(0, 0.0)
         self._fitted: tuple[Regions | None, Sequence[Cage] | None] = None, None  # and fit, for sure
         self._put: tuple[Pose | None, list[FloatArray]] = None, []  # where `move_cage` put cages
+
+    # Copies, by `copy` or `pickle`: the mesh, the state, a drag in hand, and the history.  They
+    # bind anew when they have to, solve as after `start_afresh`, and have no listeners.
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {
+            "_mesh": self._mesh,
+            "_state": self._state,
+            "_before": self._before,
+            "_dragged": dict(self._dragged),
+            "_history": self._history.copy(),
+            "_effort": self._effort,
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        Session.__init__(self, state["_mesh"])
+        vars(self).update(state)
 
     # What there is.
 
@@ -224,7 +247,8 @@ class Session(Timeline):
 
     def set_regions(self, regions: Regions, *, label: str = "set regions") -> None:
         """Take *regions* of this mesh; *label* is what `undo_label` calls it."""
-        self._set_regions(of_mesh(self.mesh, regions), label)
+        regions = of_mesh(self.mesh, regions)
+        self._set_regions(regions, require(label, str, "label"))
 
     def paint_region(self, region: int, vertices: ArrayLike, *, subtract: bool = False) -> None:
         """Add vertices, ids or a mask, to a region, or take them out; see `painting.painted`.
@@ -256,7 +280,9 @@ class Session(Timeline):
 
     def region_name(self, region: int) -> str:
         """Return what a region is called, or is going to be: number 0 is "region 1" at first."""
-        return naming.called(self._state.region_names, region)
+        if not is_whole(region, 0):
+            raise RegionError(f"region must be a whole number, 0 or more; got {shown(region)}")
+        return naming.called(self._state.region_names, int(region))
 
     def rename_region(self, region: int, name: str) -> None:
         """Call a region something else; "" calls it by its place again.
@@ -271,8 +297,10 @@ class Session(Timeline):
             80 letters.
         """
         count = 0 if self.regions is None else self.regions.n_regions
-        if region not in range(count):
-            raise RegionError(f"there is no region {region} to name; there are {count}, from 0")
+        if not is_whole(region, 0, count - 1):
+            raise RegionError(
+                f"there is no region {shown(region)} to name; there are {count}, from 0"
+            )
         names = naming.renamed(self._state.region_names, int(region), name)
         label = f"rename {self.region_name(region)}"
         self._step(label, replace(self._state, region_names=names))
@@ -281,6 +309,7 @@ class Session(Timeline):
 
     def set_cages(self, cages: Sequence[Cage], *, label: str = "set cages") -> None:
         """Take *cages*, one around each region; CageError if they do not fit."""
+        require(label, str, "label")
         regions, fitted = self._fitted
         if cages is not fitted or self.regions is not regions:  # else they do
             cages = fitting_cages(self.regions, cages, self._state.region_names)
@@ -389,11 +418,12 @@ class Session(Timeline):
             As in `drag`.
         """
         handles.require_handle(self.handles, name)
-        if np.shape(motion) != (4, 4):
-            return self.drag({name: motion}, max_steps=max_steps)
+        matrix = plain(motion, "motion")
+        if matrix.shape != (4, 4):
+            return self.drag({name: matrix}, max_steps=max_steps)
         pose = (self._before or self._state).pose
         start = self._rest_targets() if pose is None else pose.targets
-        return self.drag({name: handles.moved(start[name], motion)}, max_steps=max_steps)
+        return self.drag({name: handles.moved(start[name], matrix)}, max_steps=max_steps)
 
     def move_cage(self, region: int, vertices: ArrayLike) -> None:
         """Put the vertices of one cage elsewhere, (m_r, 3); the mesh follows, x = W~ p.
@@ -402,8 +432,11 @@ class Session(Timeline):
         The volume is kept if the options say so, for which all cages move a little more: by what
         it takes from where they were put, so that a mouse that goes back takes that back as well.
         """
-        if region not in range(len(self.cages)):
-            raise CageError(f"region must be that of one of the {len(self.cages)} cages")
+        if not is_whole(region, 0, len(self.cages) - 1):
+            raise CageError(
+                f"region must be that of one of the {len(self.cages)} cages; got {shown(region)}"
+            )
+        region = int(region)
         going_on = self.is_dragging and self._put[0] is self._state.pose
         places = list(self._put[1] if going_on else self.cage_vertices)
         try:

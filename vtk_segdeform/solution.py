@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, fields
+from functools import cached_property, partial
+from typing import Any, TypeVar
 
 from .arrays import FloatArray
+from .freezing import read_only
+
+_T = TypeVar("_T")
 
 
 class Status(enum.Enum):
@@ -46,6 +50,24 @@ class Solution:
     region_volumes: Callable[[FloatArray], FloatArray] = field(repr=False)
     """What measures `region_volume_change`."""
 
+    def __post_init__(self) -> None:
+        for name in ("vertices", "cage_vertices"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    # In a copy or a pickle, what is measured on demand is a number: the deformer stays behind.
+
+    def __getstate__(self) -> dict[str, Any]:
+        measured = {
+            "errors": partial(_known, self._errors),
+            "volume": partial(_known, self.volume_change),
+            "region_volumes": partial(_known, self.region_volume_change),
+        }
+        return {each.name: vars(self)[each.name] for each in fields(self)} | measured
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, value in state.items():
+            object.__setattr__(self, name, read_only(value))
+
     @cached_property
     def _errors(self) -> tuple[float, ...]:
         return self.errors(self.vertices)
@@ -74,4 +96,8 @@ class Solution:
     @cached_property
     def region_volume_change(self) -> FloatArray:
         """(V - V0) / V0 of each region that owns a face, closed at its border; on demand."""
-        return self.region_volumes(self.vertices)
+        return read_only(self.region_volumes(self.vertices))
+
+
+def _known(value: _T, *_: object) -> _T:
+    return value

@@ -29,6 +29,7 @@ import numpy as np
 
 from .atomic import replacing
 from .cages import Cage
+from .checks import as_path, require
 from .editing.archive import Archive, write_archive
 from .editing.state import Options, Pose, State, pieces
 from .errors import SessionError
@@ -61,6 +62,8 @@ def save_session(path: str | os.PathLike[str], session: Session) -> None:
         If the file cannot be written: no such folder, no permission, no space, or what has that
         name is a folder or a device.
     """
+    path = as_path(path)
+    require(session, Session, "session")
     try:
         with replacing(path) as draft, open(draft, "wb") as file:
             _write(file, session)
@@ -80,6 +83,7 @@ def load_session(path: str | os.PathLike[str]) -> Session:
         If there is no such file, it is no session, is damaged, or is of a newer version; the text
         names the file and the fault.
     """
+    path = as_path(path)
     try:
         file = open_regular(path)
     except OSError as fault:

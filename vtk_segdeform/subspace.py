@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from .arrays import FloatArray, IntArray
+from .arrays import FloatArray, IntArray, as_numbers
 from .blocks import Groups, add_product, adjoint_product, double, is_heavy, pieces
 from .cages import MOST_CAGE_VERTICES, Cage
 from .errors import CageError, RegionError
@@ -232,10 +232,10 @@ def bind(
 
 
 def _checked_blend(blend: ArrayLike, regions: Regions) -> FloatArray:
-    weights = np.asarray(blend, dtype=np.float64)
+    weights = as_numbers(blend, "blend")
     if weights.shape != regions.membership.shape:
         raise RegionError(f"blend must have shape {regions.membership.shape}; got {weights.shape}")
-    unity = np.abs(weights.sum(axis=0) - 1.0).max() <= 1e-9
+    unity = np.isfinite(weights).all() and np.abs(weights.sum(axis=0) - 1.0).max() <= 1e-9
     if not unity or (weights < 0.0).any() or weights[~regions.membership].any():
         raise RegionError(
             "blend must be non-negative, sum to 1 at every vertex and be 0 outside each region"

@@ -14,8 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vtk_segdeform.arrays import is_number, is_whole
+from vtk_segdeform.checks import as_flag, as_text, shown
 from vtk_segdeform.editing.listeners import Change
-from vtk_segdeform.errors import CageError
+from vtk_segdeform.errors import ArgumentError, CageError
 from vtk_segdeform.palette import HANDLE, of_region, rgb
 from vtk_segdeform.session import Session
 from vtk_segdeform.surface.manifold import face_edges
@@ -86,11 +88,12 @@ class CageDisplay(Widget):
 
     def is_visible(self, region: int) -> bool:
         """Tell whether the cage of *region* is seen while cages are shown."""
-        return region not in self._hidden
+        return _checked_region(region) not in self._hidden
 
     def set_visible(self, region: int, visible: bool) -> None:
         """Show or hide the cage of one region, also one that is still to come."""
-        (self._hidden.discard if visible else self._hidden.add)(region)
+        place = _checked_region(region)
+        (self._hidden.discard if as_flag(visible, "visible") else self._hidden.add)(place)
         self._refresh()
 
     @property
@@ -100,8 +103,8 @@ class CageDisplay(Widget):
 
     @opacity.setter
     def opacity(self, opacity: float) -> None:
-        if not 0.0 < opacity <= 1.0:
-            raise ValueError(f"opacity must be above 0 and at most 1; got {opacity}")
+        if not (is_number(opacity) and 0.0 < opacity <= 1.0):
+            raise ArgumentError(f"opacity must be above 0 and at most 1; got {shown(opacity)}")
         self._opacity = opacity
         self._refresh()
 
@@ -136,9 +139,11 @@ class CageDisplay(Widget):
         mesh, regions = self.session.mesh, self.session.regions
         enclosed = mesh.vertices[:0]
         if region is not None:
-            if regions is None or region not in range(regions.n_regions):
-                raise CageError(f"there is no region {region} for a cage to enclose")
-            enclosed = mesh.vertices[regions.membership[region]]
+            if regions is None or not is_whole(region, 0, regions.n_regions - 1):
+                raise CageError(f"there is no region {shown(region)} for a cage to enclose")
+            enclosed = mesh.vertices[regions.members(region)]
+        if message is not None:
+            as_text(message, "message")
         self.clear_faults()
         self._rejected = RejectedCage(
             self.view, vertices, faces, enclosed=enclosed, message=message
@@ -247,3 +252,9 @@ class CageDisplay(Widget):
         self._mark.draw(rgb(HANDLE), line_width=1.0, ball_size=13.0 * scale)
         if self._rejected is not None:
             self._rejected.draw(scale)
+
+
+def _checked_region(region: int) -> int:
+    if not is_whole(region, 0):
+        raise ArgumentError(f"region must be a whole number, 0 or more; got {shown(region)}")
+    return int(region)

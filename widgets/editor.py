@@ -21,6 +21,8 @@ import os
 from pathlib import Path
 from typing import Any
 
+from vtk_segdeform.checks import as_callable, as_flag, as_path, as_switch, require, shown
+from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.session import Session
 
@@ -45,8 +47,7 @@ class DeformEditor:
     """
 
     def __init__(self, view: Any, session: Session | Mesh) -> None:
-        if not isinstance(session, Session | Mesh):
-            raise TypeError(f"session must be a Session or a Mesh; got {type(session).__name__}")
+        require(session, (Session, Mesh), "session")
         self.view = View.of(view)
         has_camera = _is_aimed(self.view.renderer)
         session = session if isinstance(session, Session) else Session(session)
@@ -80,7 +81,9 @@ class DeformEditor:
     @mode.setter
     def mode(self, mode: Mode) -> None:
         if not isinstance(mode, Mode):
-            raise TypeError(f"mode must be one of {', '.join(map(str, Mode))}; got {mode!r}")
+            raise ArgumentError(
+                f"mode must be one of {', '.join(map(str, Mode))}; got {shown(mode)}"
+            )
         self._desk.mode = mode
 
     @property
@@ -90,7 +93,7 @@ class DeformEditor:
 
     @path.setter
     def path(self, path: str | os.PathLike[str]) -> None:
-        self._desk.file.path = Path(path)
+        self._desk.file.path = as_path(path)
 
     @property
     def status(self) -> str:
@@ -117,6 +120,8 @@ class DeformEditor:
             Whether it can be done beside a job, and beside a drag or a stroke that is going on.
             Otherwise a job is said to be running instead, and a drag is finished first.
         """
+        as_callable(action, "action")
+        as_flag(while_busy, "while_busy")
         with self.view.guarded():
             self._do(action, while_busy)
 
@@ -128,7 +133,7 @@ class DeformEditor:
 
     def load(self, path: str | os.PathLike[str]) -> None:
         """Go on with the session in a file, or its mesh; see `load_session`, `read_mesh`."""
-        self._desk.open(Path(path))
+        self._desk.open(as_path(path))
         self.wait()
 
     # Switching.
@@ -159,7 +164,7 @@ class DeformEditor:
 
     def SetEnabled(self, enabled: bool) -> None:  # noqa: N802
         """Switch on or off."""
-        if enabled:
+        if as_switch(enabled, "enabled"):
             self.On()
         else:
             self.Off()

@@ -20,12 +20,17 @@ from numpy.typing import ArrayLike, NDArray
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 
+from vtk_segdeform.arrays import as_points, is_whole
+from vtk_segdeform.checks import require_sequence, shown
+from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.progress import Progress, tell
 from vtk_segdeform.session import Session
 
 from .filming.film_files import Picture, require_film, write_film
 from .filming.off_screen import OffScreen
 from .view import Stop, View
+
+_LARGEST = 16_384  # pixels, of a width or height
 
 Targets = Mapping[str, ArrayLike] | ArrayLike
 Frame = Callable[[], object] | Targets | None
@@ -132,7 +137,7 @@ class _Told:
 def film(
     path: str | os.PathLike[str],
     scene: Any,
-    frames: Iterable[Frame],
+    frames: Sequence[Frame] | Iterator[Frame],
     *,
     fps: float = 20.0,
     size: tuple[int, int] = (800, 600),
@@ -146,7 +151,7 @@ def film(
     scene : Session, View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
         A view as it is; or a session, whose mesh is then shown with fixed vertices in grey and
         handles in red.
-    frames : iterable of callable, targets or None
+    frames : sequence or iterator of callable, targets or None
         Before each picture a callable is called, a session dragged to targets, (k, 3) or by the
         name of the handle, as in `Session.drag`; None does nothing.  All targets together are one
         step of the session, and none at all if something fails.
@@ -163,11 +168,16 @@ def film(
         If the library for such a film is absent, or nothing can be rendered here.
     """
     require_film(path, fps)
+    require_sequence(size, "size")
+    if len(size) != 2 or not all(is_whole(n, 2, _LARGEST) for n in size):
+        raise ArgumentError(
+            f"size must be (width, height), 2 to {_LARGEST} pixels each; got {shown(size)}"
+        )
     session = scene if isinstance(scene, Session) else None
-    if isinstance(frames, Iterator):
-        room: Sequence[Frame] = []
-    else:
-        frames = room = list(frames)
+    room: Sequence[Frame] = []
+    if not isinstance(frames, Iterator):
+        require_sequence(frames, "frames")
+        room = frames
     if session is None:
         made = Film(scene)
         _shoot(made, None, frames)
@@ -189,17 +199,17 @@ def _shoot(made: Film, session: Session | None, frames: Iterable[Frame]) -> None
             frame()
         elif frame is not None:
             if session is None:
-                raise TypeError("targets are for a session; to film a view, give callables")
+                raise ArgumentError("targets are for a session; to film a view, give callables")
             session.drag(frame)
         made.snap()
 
 
 def _places(frames: Sequence[Frame]) -> list[NDArray[np.float64]]:
     """Return the targets among *frames*, each (k, 3)."""
-    places: list[ArrayLike] = []
+    places: list[NDArray[np.float64]] = []
     for frame in frames:
         if isinstance(frame, Mapping):
-            places += frame.values()
+            places += [as_points(place, "frames") for place in frame.values()]
         elif frame is not None and not callable(frame):
-            places.append(frame)
-    return [np.asarray(place, dtype=float).reshape(-1, 3) for place in places]
+            places.append(as_points(frame, "frames"))
+    return places

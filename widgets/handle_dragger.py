@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from vtk_segdeform.arrays import FloatArray
+from vtk_segdeform.checks import as_flag, require
 from vtk_segdeform.editing.handles import require_handle
 from vtk_segdeform.editing.listeners import Change
 from vtk_segdeform.rotations import rigid_fit
@@ -60,6 +61,8 @@ class HandleDragger(Widget):
 
     def __init__(self, view: Any, session: Session, surface: SurfaceDisplay | None = None) -> None:
         super().__init__(view, session)
+        if surface is not None:
+            require(surface, SurfaceDisplay, "surface")
         self._own_surface = surface is None
         self._surface = SurfaceDisplay(self.view, session) if surface is None else surface
         self._picker = Picker(self._surface)
@@ -95,7 +98,7 @@ class HandleDragger(Widget):
 
     @local.setter
     def local(self, local: bool) -> None:
-        self._local = local
+        self._local = as_flag(local, "local")
         self._place()
 
     @property
@@ -105,7 +108,7 @@ class HandleDragger(Widget):
 
     @refine_while_resting.setter
     def refine_while_resting(self, refines: bool) -> None:
-        self._live.refines = refines
+        self._live.refines = as_flag(refines, "refine_while_resting")
         if self.GetEnabled():
             self._live.go_on()
 

@@ -17,10 +17,12 @@ import pyvistaqt
 from qtpy import QtWidgets
 
 from vtk_segdeform import plugin  # gives plotters `segdeform`, also where entry points do not work
+from vtk_segdeform.checks import require
 from vtk_segdeform.session import Session
 
 from .editor import DeformEditor
 from .panel.panel import DeformPanel
+from .view import View
 
 
 class DeformWidget(QtWidgets.QWidget):
@@ -46,9 +48,9 @@ class DeformWidget(QtWidgets.QWidget):
     """
 
     def __init__(self, mesh: Any, parent: Any = None) -> None:
-        super().__init__(parent)
-        self._is_closed = False
         session = plugin.session_of(mesh)
+        super().__init__(_checked(parent))
+        self._is_closed = False
         self.plotter = pyvistaqt.QtInteractor(self, auto_update=False, off_screen=False)
         self.plotter.setAcceptDrops(False)  # it would add the mesh beside the one that is edited
         self.editor: DeformEditor = self.plotter.segdeform.edit(session)
@@ -117,7 +119,8 @@ class DeformDock(QtWidgets.QDockWidget):
     """
 
     def __init__(self, editor: DeformEditor, parent: Any = None) -> None:
-        super().__init__("Deform", parent)
+        require(editor, DeformEditor, "editor")
+        super().__init__("Deform", _checked(parent))
         self.editor = editor
         self.panel = DeformPanel(editor, self)
         self.setObjectName("segdeform dock")  # for QMainWindow.saveState
@@ -148,6 +151,8 @@ def deform_dock(view: Any, mesh: Any, parent: Any = None) -> DeformDock:
     parent : QWidget, optional
         As ever in Qt.
     """
+    View.of(view)  # which a plotter's tools do not ask for
+    _checked(parent)
     if hasattr(view, "segdeform"):
         editor = view.segdeform.edit(mesh)
     else:
@@ -155,3 +160,7 @@ def deform_dock(view: Any, mesh: Any, parent: Any = None) -> DeformDock:
         editor.desk.file.surface = plugin.surface_of(mesh)
         editor.On()
     return DeformDock(editor, parent)
+
+
+def _checked(parent: Any) -> Any:
+    return None if parent is None else require(parent, QtWidgets.QWidget, "parent")

@@ -36,8 +36,10 @@ from typing import Any, TextIO
 from vtkmodules.vtkCommonCore import vtkVersion
 
 from vtk_segdeform import __version__
+from vtk_segdeform.arrays import is_number
 from vtk_segdeform.atomic import replacing, require_place
-from vtk_segdeform.errors import SessionError
+from vtk_segdeform.checks import as_callable, as_path, as_text, shown
+from vtk_segdeform.errors import ArgumentError, SessionError
 
 from .dragging.pace import on_steps, order_steps
 from .filming.confinement import confined
@@ -47,6 +49,7 @@ from .filming.transcript import EVENTS, TITLE, Camera, Entry, Input, Steps, Tick
 from .view import View
 
 _LONGEST_PAUSE = 2.0  # seconds
+_MOST_KEYS = 1000
 
 
 class Recorder:
@@ -78,7 +81,9 @@ class Recorder:
         skips: Callable[[Input], bool] | None = None,
     ) -> None:
         self.view = View.of(view)
-        self._skips = skips
+        if len(as_text(keys, "keys")) > _MOST_KEYS:
+            raise ArgumentError(f"keys must be {_MOST_KEYS} at most; got {len(keys)}")
+        self._skips = None if skips is None else as_callable(skips, "skips")
         self.lines: list[str] = []
         self._start = time.monotonic()
         self._told: dict[type, Entry] = {}
@@ -207,8 +212,12 @@ def replay(
         gives the number of the line and the limit.
     """
     view, limits = View.of(view), limits or ReplayLimits()
-    if folder is not None and not os.path.isdir(folder):
-        raise SessionError(f"{os.fsdecode(folder)}: there is no such folder to replay into")
+    if not is_number(pace, 0.0):
+        raise ArgumentError(f"pace must be a number, 0 or more; got {shown(pace)}")
+    if busy is not None:
+        as_callable(busy, "busy")
+    if folder is not None and not (folder := as_path(folder, "folder")).is_dir():
+        raise SessionError(f"{folder}: there is no such folder to replay into")
     moments = read_recording(source, limits)
     _require_short(moments, pace, limits.seconds)
     clock, tick = Clock(limits.seconds), Ticks(1)
@@ -252,6 +261,7 @@ def _is_closed(window: Any) -> bool:
 
 def _opened(path: str | os.PathLike[str]) -> TextIO:
     """Open a text file, emptied if it exists, that is flushed after every line."""
+    path = as_path(path)
     try:
         return open(require_place(path), "w", encoding="utf-8", buffering=1)
     except OSError as fault:

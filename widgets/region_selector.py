@@ -19,8 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from vtk_segdeform.arrays import BoolArray
+from vtk_segdeform.arrays import BoolArray, is_number
+from vtk_segdeform.checks import require, shown
 from vtk_segdeform.editing.listeners import Change
+from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.palette import PAPER, rgb
 from vtk_segdeform.session import Session
 
@@ -75,6 +77,10 @@ class RegionSelector(Widget):
         colours: RegionColours | None = None,
     ) -> None:
         super().__init__(view, session)
+        if surface is not None:
+            require(surface, SurfaceDisplay, "surface")
+        if colours is not None:
+            require(colours, RegionColours, "colours")
         self.paints = Paint.REGION
         self.region = 0
         self.handle: str | None = None
@@ -100,7 +106,7 @@ class RegionSelector(Widget):
 
     @tool.setter
     def tool(self, tool: Tool) -> None:
-        self._tool = tool
+        self._tool = require(tool, Tool, "tool")
         self._ring.hide()
         self._tell("ModifiedEvent")
 
@@ -111,8 +117,8 @@ class RegionSelector(Widget):
 
     @radius.setter
     def radius(self, radius: float) -> None:
-        if not 0.0 < radius < np.inf:
-            raise ValueError(f"radius must be above 0; got {radius}")
+        if not (is_number(radius) and radius > 0.0):
+            raise ArgumentError(f"radius must be above 0; got {shown(radius)}")
         self._radius = radius
         self._tell("ModifiedEvent")
 

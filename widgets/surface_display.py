@@ -13,8 +13,12 @@ from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
+from vtk_segdeform.arrays import plain
+from vtk_segdeform.checks import require
 from vtk_segdeform.editing.listeners import Change
+from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.formats.polygons import polydata_of
+from vtk_segdeform.freezing import read_only
 from vtk_segdeform.normals import VertexNormals
 from vtk_segdeform.palette import BODY, rgb
 from vtk_segdeform.session import Session
@@ -35,12 +39,13 @@ class SurfaceDisplay:
 
     def __init__(self, view: Any, session: Session) -> None:
         self.view = View.of(view)
-        self.session = session
+        self.session = require(session, Session, "session")
         self._layers: dict[str, NDArray[np.uint8]] = {}
         faces = session.mesh.faces
         corners = np.full(len(faces), 3)
         self.polydata = polydata_of(session.vertices.copy(), corners, faces.ravel())
         self._points: NDArray[np.float64] = vtk_to_numpy(self.polydata.GetPoints().GetData())
+        self._seen_points: NDArray[np.float64] = read_only(self._points)
         self._vertex_normals = VertexNormals(session.mesh)
         self._normals = self._vertex_normals.of(self._points)
         self._normal_array = numpy_to_vtk(self._normals)
@@ -63,18 +68,19 @@ class SurfaceDisplay:
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """(n, 3) float: where the vertices are drawn; the very memory, not to be written to."""
-        return self._points
+        """(n, 3) float: where the vertices are drawn; the very memory, read-only."""
+        return self._seen_points
 
     def set_colours(self, layer: str, colours: NDArray[np.uint8] | None) -> None:
         """Show *colours* (n, 3), 0 to 255, one for each vertex; or None to take a layer away.
 
         The newest layer is seen; a layer that is there already keeps its place.
         """
+        require(layer, str, "layer")
         if colours is None:
             self._layers.pop(layer, None)
         else:
-            self._layers[layer] = colours
+            self._layers[layer] = self._checked(colours)
         top = next(reversed(self._layers.values()), None)
         self._mapper.SetScalarVisibility(top is not None)
         if top is not None:
@@ -100,6 +106,15 @@ class SurfaceDisplay:
         """Take the mesh out of the view, for good."""
         self._stop()
         self.view.renderer.RemoveActor(self.actor)
+
+    def _checked(self, colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        array = plain(colours, "colours")
+        expected = len(self._points), 3
+        if array.shape != expected or array.dtype != np.uint8:
+            raise ArgumentError(
+                f"colours must be uint8 of shape {expected}; got {array.dtype}, {array.shape}"
+            )
+        return array
 
     def _changed(self, change: Change) -> None:
         if change & Change.POSE:

@@ -24,6 +24,10 @@ import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - both: what renders, for wh
 from vtkmodules.vtkCommonCore import vtkCommand
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindowInteractor
 
+from vtk_segdeform.arrays import is_number, is_whole
+from vtk_segdeform.checks import as_callable, as_text, shown
+from vtk_segdeform.errors import ArgumentError
+
 from .front import Front
 from .gestures import Phase, Pointer
 from .sight import Sight
@@ -31,6 +35,7 @@ from .sight import Sight
 _log = logging.getLogger(__name__)
 
 Stop = Callable[[], None]
+_LONGEST = 86_400_000  # milliseconds between ticks: a day
 ABOVE_CAMERA = 1.0  # priority: VTK's own widgets have 0.5, camera styles 0
 _HEARS_KEYS = vtkCommand.UserEvent + 411  # never happens: a mark on renderers whose views do
 
@@ -65,10 +70,10 @@ class View(Sight):
             return cls(*_checked_pair(*view))
         if hasattr(view, "iren") and hasattr(view, "renderer"):
             if view.iren is None:
-                raise ValueError("view: this plotter has no interactor, or was closed")
+                raise ArgumentError("view: this plotter has no interactor, or was closed")
             return cls(view.renderer, view.iren.interactor)
-        raise TypeError(
-            f"view must be a pyvista plotter or (renderer, interactor); got {type(view).__name__}"
+        raise ArgumentError(
+            f"view must be a pyvista plotter or (renderer, interactor); got {shown(view)}"
         )
 
     @property
@@ -118,6 +123,10 @@ class View(Sight):
 
         Where it returns True, or fails, those of lower priority do not hear of the event.
         """
+        as_text(event, "event")
+        as_callable(callback, "callback")
+        if not is_number(priority):
+            raise ArgumentError(f"priority must be a number; got {shown(priority)}")
         tag = 0
 
         def called(*_: object) -> None:
@@ -143,6 +152,7 @@ class View(Sight):
 
     def before_render(self, callback: Callable[[], None]) -> Stop:
         """Call *callback* each time the renderer is about to draw; what it touches is drawn."""
+        as_callable(callback, "callback")
 
         def called(*_: object) -> None:
             touched, self._depth = self._touched, self._depth + 1
@@ -164,6 +174,11 @@ class View(Sight):
 
         Not while a camera style drags: it keeps the timer's events to itself as well; see `pulse`.
         """
+        if not is_whole(milliseconds, 1, _LONGEST):
+            raise ArgumentError(
+                f"milliseconds must be a whole number, 1 to {_LONGEST}; got {shown(milliseconds)}"
+            )
+        as_callable(callback, "callback")
 
         def ticked(*_: object) -> None:
             with self.guarded(), self._drawn_after():
@@ -183,6 +198,7 @@ class View(Sight):
 
         It may draw, but neither observe the interactor nor stop anything there.
         """
+        as_callable(callback, "callback")
 
         def ticked(*_: object) -> None:
             with self.guarded(), self._drawn_after():
@@ -210,7 +226,7 @@ class View(Sight):
 
     def on_failure(self, listener: Callable[[Exception], None]) -> Stop:
         """Tell *listener* of every exception in a callback, from now on until stopped."""
-        self._failures.append(listener)
+        self._failures.append(as_callable(listener, "listener"))
         return _once(lambda: self._failures.remove(listener))
 
     @contextmanager
@@ -321,7 +337,9 @@ def _checked_pair(renderer: Any, interactor: Any) -> tuple[Any, Any]:
     kinds = (renderer, vtkRenderer), (interactor, vtkRenderWindowInteractor)
     for thing, kind in kinds:
         if not isinstance(thing, kind):
-            raise TypeError(f"view must be (vtkRenderer, {kind.__name__}); got {thing!r}")
+            raise ArgumentError(f"view must be (vtkRenderer, {kind.__name__}); got {shown(thing)}")
     if renderer.GetRenderWindow() is None:
-        raise ValueError("view: the renderer is in no window; window.AddRenderer(renderer) first")
+        raise ArgumentError(
+            "view: the renderer is in no window; window.AddRenderer(renderer) first"
+        )
     return renderer, interactor

@@ -25,11 +25,12 @@ from __future__ import annotations
 import time
 from typing import Any
 
-import numpy as np
-
-from vtk_segdeform.arrays import FloatArray
+from vtk_segdeform.arrays import FloatArray, is_number
+from vtk_segdeform.checks import require, shown
 from vtk_segdeform.editing.listeners import Change
 from vtk_segdeform.editing.naming import called
+from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.freezing import read_only
 from vtk_segdeform.local_volume import LocalVolume
 from vtk_segdeform.session import Session
 
@@ -61,7 +62,9 @@ class VolumeOverlay:
 
     def __init__(self, view: Any, session: Session, surface: SurfaceDisplay | None = None) -> None:
         self.view = View.of(view)
-        self.session = session
+        self.session = require(session, Session, "session")
+        if surface is not None:
+            require(surface, SurfaceDisplay, "surface")
         self._own_surface = surface is None
         self._surface = SurfaceDisplay(self.view, session) if surface is None else surface
         self._legend = Legend(self.view, "local volume")
@@ -93,14 +96,16 @@ class VolumeOverlay:
     def wanted_range(self) -> float | None:
         """The share that is to be at the ends of the scale; None, as at first, chooses.
 
-        May be set, to a number above 0; else a ValueError.
+        May be set, to a number above 0; else an ArgumentError.
         """
         return self._wanted_range
 
     @wanted_range.setter
     def wanted_range(self, share: float | None) -> None:
-        if share is not None and not 0.0 < share < np.inf:
-            raise ValueError(f"wanted_range must be a share above 0, or None; got {share!r}")
+        if share is not None and not (is_number(share) and share > 0.0):
+            raise ArgumentError(
+                f"wanted_range must be a share above 0, or None; got {shown(share)}"
+            )
         if share != self._wanted_range:
             self._wanted_range, self._half_range = share, None
             if self._change is not None:
@@ -157,7 +162,7 @@ class VolumeOverlay:
             self.view.touch()
 
     def _update(self) -> None:
-        self._change = self._prepared().change(self.session.vertices)
+        self._change = read_only(self._prepared().change(self.session.vertices))
         self._show(self._change)
 
     def _show(self, change: FloatArray) -> None:

@@ -17,6 +17,9 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any
 
+from vtk_segdeform.arrays import is_whole
+from vtk_segdeform.checks import as_callable, as_switch, require, shown
+from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.session import Session
 
 from .gestures import Gesture, Grab, Phase, Pointer
@@ -44,7 +47,7 @@ class Widget(abc.ABC):
 
     def __init__(self, view: Any, session: Session) -> None:
         self.view = View.of(view)
-        self.session = session
+        self.session = require(session, Session, "session")
         self.remark = ""
         self._grab = Grab()
         self._stops: list[Stop] = []
@@ -106,7 +109,7 @@ class Widget(abc.ABC):
 
     def SetEnabled(self, enabled: bool) -> None:  # noqa: N802
         """Switch on or off."""
-        if enabled:
+        if as_switch(enabled, "enabled"):
             self.On()
         else:
             self.Off()
@@ -117,14 +120,17 @@ class Widget(abc.ABC):
 
     def AddObserver(self, event: str, callback: Callable[[Widget, str], None]) -> int:  # noqa: N802
         """Call ``callback(widget, event)`` at one of the events above; return its tag."""
-        if event not in _EVENTS:
-            raise ValueError(f"event must be one of {', '.join(_EVENTS)}; got {event!r}")
+        if not isinstance(event, str) or event not in _EVENTS:
+            raise ArgumentError(f"event must be one of {', '.join(_EVENTS)}; got {shown(event)}")
+        as_callable(callback, "callback")
         tag, self._next_tag = self._next_tag, self._next_tag + 1
         self._observers[tag] = event, callback
         return tag
 
     def RemoveObserver(self, tag: int) -> None:  # noqa: N802
         """Forget the observer with this *tag*."""
+        if not is_whole(tag, 0):
+            raise ArgumentError(f"tag must be what AddObserver returned; got {shown(tag)}")
         self._observers.pop(tag, None)
 
     @property

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_points, frozen, plain
+from ..checks import shown
 from ..errors import ConstraintError
 from ..mesh import Mesh
 from ..positions import FARTHEST_APART, checked_constraints
@@ -83,9 +84,9 @@ def new_name(handles: Handles) -> str:
 
 def require_handle(handles: Handles, name: str) -> None:
     """Raise a ConstraintError that lists the names there are, unless *name* is one."""
-    if name not in handles:
+    if not isinstance(name, str) or name not in handles:
         there = ", ".join(map(repr, handles)) or "none yet; add one first"
-        raise ConstraintError(f"there is no handle {name!r}; there are {there}")
+        raise ConstraintError(f"there is no handle {shown(name)}; there are {there}")
 
 
 def targets_at(handles: Handles, vertices: FloatArray) -> Targets:
@@ -162,13 +163,13 @@ def _farthest(points: FloatArray, place: FloatArray) -> float:
 
 def moved(points: FloatArray, matrix: ArrayLike) -> FloatArray:
     """Return (k, 3) *points* under an affine (4, 4) *matrix*; ConstraintError if it is none."""
-    M = plain(matrix, "the matrix")
+    M = plain(matrix, "motion")
     if M.dtype.kind not in "iuf":
-        raise ConstraintError(f"the matrix must hold real numbers; got {M.dtype}")
+        raise ConstraintError(f"motion must hold real numbers; got {M.dtype}")
     if not np.array_equal(M[3], [0.0, 0.0, 0.0, 1.0]):
-        raise ConstraintError(f"the last row of the matrix must be 0 0 0 1; got {M[3]}")
+        raise ConstraintError(f"the last row of motion must be 0 0 0 1; got {M[3]}")
     if not np.isfinite(M).all():
-        raise ConstraintError("the matrix holds NaN or infinite numbers; all must be finite")
+        raise ConstraintError("motion holds NaN or infinite numbers; all must be finite")
     return np.asarray(points @ M[:3, :3].T + M[:3, 3])
 
 

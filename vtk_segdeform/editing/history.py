@@ -7,10 +7,13 @@ become one step: it is begun by the first move, and ended by `Timeline.commit`, 
 
 from __future__ import annotations
 
+import sys
 from collections import deque
 from collections.abc import Callable
 from typing import final
 
+from ..arrays import is_whole
+from ..checks import as_callable, require, shown
 from ..errors import SessionError
 from .listeners import Change, Listener, Listeners
 from .state import State
@@ -27,10 +30,17 @@ class History:
     """
 
     def __init__(self, limit: int) -> None:
-        if limit != int(limit) or limit < 1:
-            raise SessionError(f"history must be a number of steps, 1 or more; got {limit!r}")
+        if not is_whole(limit, 1, sys.maxsize):
+            raise SessionError(f"history must be a number of steps, 1 or more; got {shown(limit)}")
         self._past: deque[tuple[str, State]] = deque(maxlen=int(limit))
         self._future: list[tuple[str, State]] = []
+
+    def copy(self) -> History:
+        """Return a history of the same steps that goes its own way."""
+        other = History(self._past.maxlen or 1)
+        other._past.extend(self._past)
+        other._future.extend(self._future)
+        return other
 
     @property
     def undo_label(self) -> str | None:
@@ -141,7 +151,7 @@ class Timeline:
         label : str or None
             None if there was no drag, and nothing was done.
         """
-        label = self._end_drag(label)
+        label = self._end_drag(None if label is None else require(label, str, "label"))
         if label is not None:
             self._listeners.tell(Change.HISTORY)
         return label
@@ -159,7 +169,7 @@ class Timeline:
         What a listener raises comes out of the method that made the change, which is done all the
         same, and the other listeners hear of it; see `Listeners`.
         """
-        return self._listeners.add(listener)
+        return self._listeners.add(as_callable(listener, "listener"))
 
     def _step(self, label: str, after: State) -> None:
         """Go to *after*, as a step, unless that is where we are."""

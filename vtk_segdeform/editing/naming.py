@@ -14,6 +14,7 @@ import re
 import unicodedata
 from collections.abc import Sequence
 
+from ..checks import require_sequence, shown
 from ..errors import RegionError
 
 LONGEST = 80
@@ -31,13 +32,13 @@ def fault_of(name: object) -> str:
     ('', "'s name may have 80 letters; got 90")
     """
     if not isinstance(name, str) or not name.strip():
-        return f"'s name must be printable text; got {name!r}"
+        return f"'s name must be printable text; got {shown(name)}"
     if len(name) > LONGEST:
         return f"'s name may have {LONGEST} letters; got {len(name)}"
     for letter in name:
         turns = unicodedata.bidirectional(letter) in _TURNING
         if turns or unicodedata.category(letter) in _CONTROL:
-            return f"'s name must be printable text; got {name!r}"
+            return f"'s name must be printable text; got {shown(name)}"
     return ""
 
 
@@ -58,7 +59,9 @@ def renamed(names: Names, region: int, name: str) -> Names:
     RegionError
         If *name* cannot be one, or is another region's.
     """
-    given = name.strip() if isinstance(name, str) else name
+    if not isinstance(name, str):
+        raise RegionError(f"a region{fault_of(name)}")
+    given = name.strip()
     if given == f"region {region + 1}":
         given = ""
     longer = [*names, *[""] * (region + 1 - len(names))]
@@ -103,6 +106,7 @@ def split(names: Names, region: int, count: int) -> Names:
 
 def checked_names(names: Sequence[object], count: int) -> Names:
     """Return the *names* of *count* regions, or a RegionError that says what is wrong with them."""
+    require_sequence(names, "region_names")
     if len(names) > count:
         raise RegionError(f"there are {len(names)} names for {count} regions")
     checked: list[str] = []

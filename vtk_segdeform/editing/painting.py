@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, FloatArray, as_ids, is_whole
+from ..checks import as_flag, require_sequence, shown
 from ..errors import RegionError
 from ..mesh import Mesh
-from ..regions import Regions
+from ..regions import Regions, require_region
 
 _OVERLAP = 0.1  # of a new region's width, counted in edges
 
@@ -45,7 +46,7 @@ def painted(
     """
     mesh, count = regions.mesh, regions.n_regions
     mask = _mask(mesh, vertices)
-    if not subtract and region == count and mask.any():
+    if not as_flag(subtract, "subtract") and is_whole(region, count, count) and mask.any():
         return Regions(mesh, np.vstack([regions.membership, mask]), regions.smoothness)
     region = _checked(regions, region)
     membership = regions.membership.copy()
@@ -70,9 +71,10 @@ def merged(regions: Regions, which: Sequence[int]) -> Regions:
     RegionError
         If there is no such region, or fewer than two are named.
     """
+    require_sequence(which, "which")
     numbers = sorted({_checked(regions, region) for region in which})
     if len(numbers) < 2:
-        raise RegionError(f"name two regions or more to merge; got {list(which)}")
+        raise RegionError(f"name two regions or more to merge; got {shown(which)}")
     membership = regions.membership.copy()
     membership[numbers[0]] = membership[numbers].any(axis=0)
     return Regions(regions.mesh, np.delete(membership, numbers[1:], axis=0), regions.smoothness)
@@ -120,7 +122,7 @@ def split(
     if overlap is None:
         overlap = max(2, round(_OVERLAP * np.sqrt(np.count_nonzero(whole) / 2)))
     elif not is_whole(overlap, 0):
-        raise RegionError(f"overlap must be a whole number, 0 or more; got {overlap!r}")
+        raise RegionError(f"overlap must be a whole number, 0 or more; got {shown(overlap)}")
     membership = regions.membership.copy()
     membership[region] = _grown(mesh, first, overlap) & whole
     second = _grown(mesh, second, overlap) & whole
@@ -168,6 +170,5 @@ def _mask(mesh: Mesh, vertices: ArrayLike) -> BoolArray:
 
 
 def _checked(regions: Regions, region: int) -> int:
-    if region != int(region) or not 0 <= region < regions.n_regions:
-        raise RegionError(f"region must be one of 0..{regions.n_regions - 1}; got {region}")
+    require_region(region, regions.n_regions)
     return int(region)

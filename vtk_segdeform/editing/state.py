@@ -16,14 +16,16 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray, as_points, frozen
+from ..arrays import FloatArray, IntArray, as_points, frozen, is_number
 from ..cages import Cage
+from ..checks import all_of, require, require_sequence, shown
 from ..errors import CageError, ConstraintError, RegionError, SessionError
+from ..freezing import Frozen
 from ..mesh import Mesh
 from ..positions import checked_constraints
 from ..regions import Regions
 from .listeners import Change
-from .naming import Names, called, checked_names
+from .naming import Names, called, checked_names, fault_of
 
 _TINY = float(np.finfo(np.float64).tiny)
 _WRECKED = 1e6  # diagonals from the mesh that no drag gets to
@@ -61,8 +63,9 @@ class Options:
 
     def __post_init__(self) -> None:
         for name in ("preserve_volume", "preserve_region_volumes"):
-            if not isinstance(getattr(self, name), bool):
-                raise SessionError(f"{name} must be True or False; got {getattr(self, name)!r}")
+            value = getattr(self, name)
+            if not isinstance(value, bool):
+                raise SessionError(f"{name} must be True or False; got {shown(value)}")
         _require_number("n_cage_vertices", self.n_cage_vertices, 8, whole=True)
         _require_number("stretch", self.stretch, 0.0)
         if self.offset is not None:
@@ -72,7 +75,7 @@ class Options:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class Pose(Frozen):
     """Where the cages are, from which all else follows, and what for; read-only arrays."""
 
     cage_vertices: tuple[FloatArray, ...]
@@ -82,7 +85,7 @@ class Pose:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class State(Frozen):
     """All that a session holds besides its mesh of n vertices; shared, never changed in place."""
 
     regions: Regions | None = None
@@ -133,16 +136,26 @@ def checked_state(mesh: Mesh, state: State) -> State:
         If fixed vertices or handles are no vertices of *mesh* or share one, or the targets of the
         pose are not theirs.
     """
+    require(state, State, "state")
+    require(state.handles, Mapping, "state.handles")
+    require(state.options, Options, "state.options")
     regions = None if state.regions is None else of_mesh(mesh, state.regions)
     names = checked_names(state.region_names, regions.n_regions if regions else 0)
-    cages = fitting_cages(regions, state.cages, names) if state.cages else ()
-    fixed, handle = checked_constraints(mesh, state.fixed, state.handle)
-    lengths = [len(ids) for ids in state.handles.values()]
+    cages = all_of(state.cages, Cage, "state.cages")
+    cages = fitting_cages(regions, cages, names) if cages else ()
+    handles = {}
+    for name, ids in state.handles.items():
+        if fault := fault_of(name):
+            raise ConstraintError(f"a handle{fault}")
+        _, handles[name] = checked_constraints(mesh, (), ids)
+    every = np.concatenate([np.empty(0, dtype=np.int64), *handles.values()])
+    fixed, _ = checked_constraints(mesh, state.fixed, every)
+    lengths = [len(ids) for ids in handles.values()]
     if not all(lengths):
         raise ConstraintError("each handle must have a vertex or more; leave out empty ones")
-    handles = dict(zip(state.handles, pieces(handle, lengths), strict=True))
-    pose = state.pose and _checked_pose(cages, lengths, list(handles), state.pose)
-    if pose:
+    pose = None
+    if state.pose is not None:
+        pose = _checked_pose(cages, lengths, list(handles), require(state.pose, Pose, "state.pose"))
         _require_no_wreck(mesh, pose)
     owned = MappingProxyType({name: _own(ids) for name, ids in handles.items()})
     return State(regions, cages, _own(fixed), owned, pose, state.options, names)
@@ -150,7 +163,7 @@ def checked_state(mesh: Mesh, state: State) -> State:
 
 def of_mesh(mesh: Mesh, regions: Regions) -> Regions:
     """Return *regions*, or a RegionError if they are of another mesh."""
-    if regions.mesh is mesh:
+    if require(regions, Regions, "regions").mesh is mesh:
         return regions
     for mine, theirs in ((mesh.vertices, regions.mesh.vertices), (mesh.faces, regions.mesh.faces)):
         if not np.array_equal(mine, theirs):
@@ -167,12 +180,13 @@ def fitting_cages(
     """
     if regions is None:
         raise CageError("there are no regions to put cages around; make regions first")
+    cages = all_of(cages, Cage, "cages")
     if len(cages) != regions.n_regions:
         raise CageError(f"{regions.n_regions} regions need as many cages; got {len(cages)}")
     for r, cage in enumerate(cages):
         members = regions.mesh.vertices[regions.membership[r]]
         cage.require_encloses(members, f"vertices of {called(names, r)}")
-    return tuple(cages)
+    return cages
 
 
 def pieces(array: Any, lengths: Sequence[int]) -> list[Any]:
@@ -182,18 +196,17 @@ def pieces(array: Any, lengths: Sequence[int]) -> list[Any]:
 
 
 def _require_number(name: str, value: float, least: float, *, whole: bool = False) -> None:
-    number = isinstance(
-        value, int | np.integer if whole else int | float | np.number
-    ) and not isinstance(value, bool)
-    if not number or not least <= value < np.inf:
+    if not is_number(value, least) or (whole and not isinstance(value, int | np.integer)):
         kind = "a whole number" if whole else "a number"
         bound = "above 0" if least == _TINY else f"from {least:g} up"
-        raise SessionError(f"{name} must be {kind} {bound}; got {value!r}")
+        raise SessionError(f"{name} must be {kind} {bound}; got {shown(value)}")
 
 
 def _checked_pose(
     cages: Sequence[Cage], lengths: Sequence[int], names: Sequence[str], pose: Pose
 ) -> Pose:
+    require(pose.targets, Mapping, "state.pose.targets")
+    require_sequence(pose.cage_vertices, "state.pose.cage_vertices")
     places = [as_points(points, "cage_vertices") for points in pose.cage_vertices]
     expected, got = [cage.n_vertices for cage in cages], [len(points) for points in places]
     if not cages or got != expected:

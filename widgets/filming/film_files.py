@@ -14,8 +14,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from vtk_segdeform.arrays import is_number
 from vtk_segdeform.atomic import replacing, require_place
 from vtk_segdeform.canvas import png_of
+from vtk_segdeform.checks import as_path, shown
 from vtk_segdeform.errors import MissingDependencyError, SessionError
 
 Picture = NDArray[np.uint8]  # (h, w, 3), upper row first, all of one size
@@ -39,7 +41,7 @@ def write_film(path: str | os.PathLike[str], pictures: Pictures, fps: float) -> 
     SessionError, MissingDependencyError
         As `require_film`; or if there are no pictures.
     """
-    path = Path(path)
+    path = as_path(path)
     require_film(path, fps)
     if not len(pictures):
         raise SessionError("there is nothing to see in a film without pictures")
@@ -53,12 +55,12 @@ def write_film(path: str | os.PathLike[str], pictures: Pictures, fps: float) -> 
 
 def require_film(path: str | os.PathLike[str], fps: float = 20.0) -> None:
     """Raise what `Film.save` would, before the work that is to be filmed."""
-    path = Path(path)
+    path = as_path(path)
     suffix = path.suffix.lower()
     if suffix not in (".gif", ".mp4", ""):
         raise SessionError(f"{path}: a film is a .gif, an .mp4 or, without a suffix, a folder")
-    if not 0.1 <= fps <= 100.0:
-        raise SessionError(f"fps must be 0.1 to 100 pictures in a second; got {fps}")
+    if not (is_number(fps, 0.1) and fps <= 100.0):
+        raise SessionError(f"fps must be 0.1 to 100 pictures in a second; got {shown(fps)}")
     if os.path.isdir(path) or (not suffix and os.path.lexists(path)):
         raise SessionError(f"{path}: is there already; name another")
     try:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
+from vtk_segdeform.checks import as_path, require, require_sequence
 from vtk_segdeform.errors import SessionError
 from vtk_segdeform.regular_file import open_regular
 
@@ -33,15 +34,23 @@ def read_recording(
         If there is no such file, or a line is invalid or exceeds the limits; the text gives its
         number.
     """
-    name = os.fsdecode(source) if isinstance(source, str | os.PathLike) else "recording"
-    lines = _lines(source) if isinstance(source, str | os.PathLike) else source
     limits = limits or ReplayLimits()
+    name = "recording"
+    lines: Iterable[str]
+    if isinstance(source, str | os.PathLike):
+        source = as_path(source, "source")
+        name = str(source)
+        lines = _lines(source)
+    else:
+        if not isinstance(source, Iterator):
+            require_sequence(source, "source")
+        lines = source
     entries: list[tuple[float, Entry]] = []
     began = False
     events = 0
     for number, line in enumerate(lines, start=1):
         try:
-            text = line.strip()
+            text = require(line, str, "a line").strip()
             if not began:
                 began = _is_title(text)
                 continue
