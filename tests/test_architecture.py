@@ -24,7 +24,8 @@ STORY = [
     "compiled.patch_products", "compiled.normals", "compiled.rotations", "compiled.triangles",
     "compiled.coordinates", "fast",
     "surface.counting", "surface.topology", "surface.manifold", "surface.inside", "surface.columns",
-    "surface.intersections", "surface.report", "surface.shells", "faults", "mesh", "surface.holes",
+    "surface.intersections", "surface.report", "surface.shells", "faults", "mesh", "surface.quality",
+    "surface.borders", "surface.lids", "surface.ears", "surface.lid_refining", "surface.holes",
     "surface.splitting", "surface.repair_steps", "repair",
     # what a deformation keeps
     "volume", "normals", "segmenting.thinning", "local_volume", "distortion", "differential",

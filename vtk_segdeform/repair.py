@@ -95,7 +95,7 @@ def repair(
     ]
     if hopeless:
         raise MeshError(f"nothing to repair: {'; '.join(hopeless)}")
-    draft = steps.Draft(points, triangles, np.arange(len(points)), np.arange(len(triangles)))
+    draft = steps.Draft.of(points, triangles)
     done: list[str] = []
     if not report.ok:
         for step in (

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy import sparse
 from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
@@ -29,12 +30,23 @@ from .topology import (
 
 @dataclass(frozen=True)
 class Draft:
-    """A mesh under repair; the maps name what each vertex and face was, -1 for a new one."""
+    """A mesh under repair; the maps name what each vertex and face was, -1 for a new one.
+
+    *mix* (n, o) has the shares of the o original vertices in each vertex.
+    """
 
     vertices: FloatArray
     faces: IntArray
     vertex_map: IntArray
     face_map: IntArray
+    mix: sparse.csr_array
+
+    @classmethod
+    def of(cls, vertices: FloatArray, faces: IntArray) -> Draft:
+        """Return the draft of a mesh to which nothing is done yet."""
+        n = len(vertices)
+        mix = sparse.eye_array(n, format="csr")
+        return cls(vertices, faces, np.arange(n), np.arange(len(faces)), mix)
 
     @cached_property
     def sides(self) -> Sides:
@@ -53,6 +65,7 @@ class Draft:
             vertices=self.vertices[keep],
             faces=number[self.faces],
             vertex_map=self.vertex_map[keep],
+            mix=self.mix[np.flatnonzero(keep)],
         )
 
     def turn(self, which: BoolArray) -> Draft:
@@ -151,6 +164,7 @@ def split(draft: Draft) -> tuple[Draft, str]:
             vertices=np.concatenate([draft.vertices, draft.vertices[copied]]),
             faces=faces,
             vertex_map=np.concatenate([draft.vertex_map, draft.vertex_map[copied]]),
+            mix=sparse.vstack([draft.mix, draft.mix[copied]], format="csr"),
         ),
         sentence,
     )
@@ -184,21 +198,31 @@ def fill(draft: Draft, largest: int) -> tuple[Draft, str]:
     """Close holes of up to *largest* edges, at most with one new vertex each."""
     if len(draft.sides.crowded) or draft.sides.turned.any():
         return draft, ""
-    sizes, centres, lids = close_holes(draft.vertices, draft.sides, largest)
+    closing = close_holes(draft.vertices, draft.sides, largest)
+    sizes, new = closing.sizes, len(closing.vertices)
     if not sizes:
         return draft, ""
     few, many = min(sizes), max(sizes)
     sentence = f"fill {_n(sizes, 'hole')} of {few if few == many else f'{few} to {many}'} edges"
-    sentence += f" with {_n(lids, 'triangle')}"
+    sentence += f" with {_n(closing.faces, 'triangle')}"
+    sentence += f" and {_n(closing.vertices, 'new vertex', 'new vertices')}" if new else ""
+    if closing.n_crossing:
+        sentence += f"; {closing.n_crossing} of them cannot be filled without crossing the surface"
+    rows = np.repeat(np.arange(new), closing.sources.shape[1])
+    mix = sparse.coo_array(
+        (closing.weights.ravel(), (rows, closing.sources.ravel())),
+        shape=(new, len(draft.vertices)),
+    )
     return (
         replace(
             draft,
-            vertices=np.concatenate([draft.vertices, centres]),
-            faces=np.concatenate([draft.faces, lids]),
-            vertex_map=np.append(draft.vertex_map, np.full(len(centres), -1)),
-            face_map=np.append(draft.face_map, np.full(len(lids), -1)),
+            vertices=np.concatenate([draft.vertices, closing.vertices]),
+            faces=np.concatenate([draft.faces, closing.faces]),
+            vertex_map=np.append(draft.vertex_map, np.full(new, -1)),
+            face_map=np.append(draft.face_map, np.full(len(closing.faces), -1)),
+            mix=sparse.vstack([draft.mix, mix.tocsr() @ draft.mix], format="csr"),
         ),
-        sentence + (f" and {_n(centres, 'new vertex', 'new vertices')}" if len(centres) else ""),
+        sentence,
     )
 
 
