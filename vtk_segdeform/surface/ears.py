@@ -1,4 +1,4 @@
-"""Triangles over a loop that is a simple polygon as seen along its mean normal.
+"""Triangles over a loop that is a simple polygon as seen from somewhere.
 
 Ears are clipped off the projection, the roundest first.  An ear with another corner in it or on
 its rim stays, so no ear of a polygon is without area.  Triangles that do not overlap in the
@@ -9,23 +9,37 @@ from __future__ import annotations
 
 import numpy as np
 
+from scipy.spatial import cKDTree
+
 from ..arrays import BoolArray, FloatArray, IntArray
 
 _STRAIGHT = 1e-9  # sine of an angle
-_PAIRS = 1_000_000  # pairs of sides compared at once
+_VIEWS = 60  # directions that a loop is looked at from, before it counts as winding
+_AREA = 1e-3  # of its extent squared, for each corner: a loop of less is seen from its edge
 
 
-def clip_ears(points: FloatArray) -> IntArray | None:
-    """Return n - 2 triangles over the loop *points* (n, 3); None if it crosses itself as seen.
+def clip_ears(points: FloatArray) -> tuple[IntArray, FloatArray] | None:
+    """Return n - 2 triangles over the loop *points* (n, 3), and how it was looked at.
+
+    None if the loop crosses itself from everywhere.  ``points @ view.T`` with the *view* (3, 3), a
+    rotation, are coordinates to the right, upwards and towards the eye.  Of the directions from which the loop is simple, the one along its mean normal comes first, and
+    then those nearest to it.
 
     Examples
     --------
-    >>> clip_ears(np.array([[0.0, 0, 0], [2, 0, 1], [2, 2, 0], [1, 0.5, 1]])).tolist()
+    >>> clip_ears(np.array([[0.0, 0, 0], [2, 0, 1], [2, 2, 0], [1, 0.5, 1]]))[0].tolist()
     [[1, 2, 3], [0, 1, 3]]
     """
-    flat = _projected(points)
-    if flat is None or _crosses_itself(flat):
-        return None
+    for up in _directions(points):
+        view = _view(up)
+        flat = (points - points[0]) @ view[:2].T
+        if _is_simple(flat) and (triangles := _clipped(flat)) is not None:
+            return triangles, view
+    return None
+
+
+def _clipped(flat: FloatArray) -> IntArray | None:
+    """Return the ears of a simple polygon (n, 2); None if rounding leaves none to clip."""
     n = len(flat)
     before, after = np.roll(np.arange(n), 1), np.roll(np.arange(n), -1)
     sharp = _roundness(flat[before], flat, flat[after])
@@ -57,17 +71,25 @@ def clip_ears(points: FloatArray) -> IntArray | None:
     return np.array(triangles, dtype=np.int64)
 
 
-def _projected(points: FloatArray) -> FloatArray | None:
-    """Return *points* (n, 2) along the normal of the loop's area, which runs counter-clockwise."""
+def _directions(points: FloatArray) -> FloatArray:
+    """Return unit vectors (v, 3): the mean normal of the loop, and others around it."""
     x = points - points.mean(axis=0)
     area = np.cross(x, np.roll(x, -1, axis=0)).sum(axis=0)
+    k = np.arange(_VIEWS) + 0.5  # spread evenly over the sphere
+    z, turn = 1.0 - 2.0 * k / _VIEWS, np.pi * (1.0 + np.sqrt(5.0)) * k
+    r = np.sqrt(1.0 - z * z)
+    around = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
+    along = around @ area
+    around = around[np.argsort(-along, kind="stable")][: np.count_nonzero(along > 0.0)]
     size = np.linalg.norm(area)
-    if size <= 1e-12 * (x * x).sum():
-        return None
-    up = area / size
+    return np.concatenate([[area / size], around]) if size > 0.0 else around
+
+
+def _view(up: FloatArray) -> FloatArray:
+    """Return a rotation (3, 3) whose last row is *up*."""
     right = np.cross(np.eye(3)[np.abs(up).argmin()], up)
     right /= np.linalg.norm(right)
-    return np.stack([x @ right, x @ np.cross(up, right)], axis=1)
+    return np.stack([right, np.cross(up, right), up])
 
 
 def _roundness(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
@@ -89,29 +111,23 @@ def _any_inside(ear: FloatArray, others: FloatArray) -> bool:
     return bool(inside.any())
 
 
-def _crosses_itself(flat: FloatArray) -> bool:
-    """Tell whether sides of the polygon *flat* (n, 2) cross or touch where they are no neighbours."""
-    n = len(flat)
-    rows = max(1, _PAIRS // n)
-    return any(
-        _sides_meet(flat, np.arange(s, min(s + rows, n))).any() for s in range(0, n, rows)
-    )
-
-
-def _sides_meet(flat: FloatArray, some: IntArray) -> BoolArray:
-    n = len(flat)
-    p, q = flat, np.roll(flat, -1, axis=0)
-
-    def side_of(start: FloatArray, end: FloatArray, point: FloatArray) -> FloatArray:
-        u, v = end - start, point - start
-        return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
-
-    a, b = p[some, None], q[some, None]
+def _is_simple(flat: FloatArray) -> bool:
+    """Tell whether the polygon *flat* (n, 2) runs counter-clockwise and no two sides cross."""
+    n, after = len(flat), np.roll(flat, -1, axis=0)
+    area = (flat[:, 0] * after[:, 1] - flat[:, 1] * after[:, 0]).sum()
+    if area <= _AREA * float(np.ptp(flat, axis=0).max()) ** 2 / n:
+        return False
+    longest = float(np.linalg.norm(after - flat, axis=1).max())
+    near = cKDTree(0.5 * (flat + after)).query_pairs(longest, output_type="ndarray")
+    one, other = near.T
+    apart = ~np.isin(other - one, (1, n - 1))
+    a, b, c, d = flat[one], after[one], flat[other], after[other]
     slack = _STRAIGHT * float(np.ptp(flat, axis=0).max()) ** 2
-    s1, s2 = side_of(a, b, p[None]), side_of(a, b, q[None])
-    s3, s4 = side_of(p[None], q[None], a), side_of(p[None], q[None], b)
-    meet = (np.minimum(s1, s2) < -slack) & (np.maximum(s1, s2) > slack)
-    meet &= (np.minimum(s3, s4) < -slack) & (np.maximum(s3, s4) > slack)
-    gap = np.abs(some[:, None] - np.arange(n))
-    result: BoolArray = meet & (gap > 1) & (gap < n - 1)
-    return result
+
+    def parted(start: FloatArray, end: FloatArray, p: FloatArray, q: FloatArray) -> BoolArray:
+        """Tell the pairs whose points p and q lie on two sides of the line."""
+        u, v, w = end - start, p - start, q - start
+        left, right = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]
+        return (np.minimum(left, right) < -slack) & (np.maximum(left, right) > slack)
+
+    return not (apart & parted(a, b, c, d) & parted(c, d, a, b)).any()

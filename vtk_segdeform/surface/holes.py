@@ -15,7 +15,7 @@ All holes are worked on together, so that a mesh with thousands of them takes se
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -24,7 +24,7 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from .borders import border_loops
 from .ears import clip_ears
 from .intersections import intersections_of
-from .lid_refining import Lids, joined_twice, refine, split_edges
+from .lid_refining import Lids, harmonic, joined_twice, refine, split_edges
 from .lids import triangulate_long_loop, triangulate_loops
 from .quality import least_angle, normals
 from .topology import Sides, edge_keys
@@ -143,16 +143,16 @@ class _Holes:
 
 def _best_lids(holes: _Holes) -> tuple[Lids, _Scores]:
     """Return the best lid found for every loop."""
-    lids = _plain(holes)
-    scores = _scores(holes, lids, lids, np.ones(len(holes.length), dtype=bool))
-    again = (scores.angle < holes.wanted) | (scores.crossings > 0)
-    for triangulate in (_as_it_is, _ears, _least_bending):
+    lids = plain = _plain(holes)
+    narrow = _least(holes, lids) < holes.wanted
+    scores = _scores(holes, lids, lids, ~narrow)  # others count as worse than anything refined
+    again = narrow | (scores.crossings > 0)
+    for attempt in (_refined, _as_seen, _least_bending, _plain_again):
         asked = again & (holes.length > 3)
         if not asked.any():
             break
-        tried = triangulate(holes, lids, np.flatnonzero(asked))
-        asked = _mask(holes, tried.owner[tried.faces[:, 0]])
-        tried = refine(tried, holes.known, len(holes.vertices))
+        tried = attempt(holes, plain, np.flatnonzero(asked))
+        asked &= _mask(holes, tried.owner[tried.faces[:, 0]])
         found = _scores(holes, lids, tried, asked)
         better = asked & scores.worse_than(found)
         lids = _together(
@@ -204,7 +204,7 @@ def _over_corners(holes: _Holes, some: IntArray, known: IntArray) -> tuple[IntAr
         lids = []
         for loop in at:
             clipped = clip_ears(holes.points[loop])
-            lids.append(triangulate_long_loop(holes.points[loop]) if clipped is None else clipped)
+            lids.append(clipped[0] if clipped else triangulate_long_loop(holes.points[loop]))
         return np.stack(lids), np.ones(len(some), dtype=bool)
     ids = holes.corners[at]
     keys = edge_keys(ids[:, :, None], ids[:, None, :], len(holes.vertices))
@@ -225,14 +225,32 @@ def _in_conflict(holes: _Holes, lids: Lids) -> tuple[IntArray, IntArray]:
     return short, np.sort(np.append(holes.known, keys))
 
 
-def _as_it_is(holes: _Holes, lids: Lids, some: IntArray) -> Lids:
+def _refined(holes: _Holes, lids: Lids, some: IntArray) -> Lids:
+    return refine(_plain_again(holes, lids, some), holes.known, len(holes.vertices))
+
+
+def _plain_again(holes: _Holes, lids: Lids, some: IntArray) -> Lids:
     return _only(holes, lids, _mask(holes, some))
 
 
-def _ears(holes: _Holes, lids: Lids, some: IntArray) -> Lids:
+def _as_seen(holes: _Holes, lids: Lids, some: IntArray) -> Lids:
+    """Refine in the projection and lift the result: it is the graph of a function over a plane."""
     del lids
-    clipped = [(loop, clip_ears(holes.points[holes.of(loop)])) for loop in some]
-    return _of_corners(holes, [lid + holes.start[loop] for loop, lid in clipped if lid is not None])
+    faces, views = [], np.tile(np.eye(3), (len(holes.length), 1, 1))
+    for loop in some:
+        if (clipped := clip_ears(holes.points[holes.of(loop)])) is not None:
+            faces.append(clipped[0] + holes.start[loop])
+            views[loop] = clipped[1]
+    seen = _of_corners(holes, faces)
+    turned = np.einsum("kxy,ky->kx", views[seen.owner], seen.points)
+    flat = replace(seen, points=turned * [1.0, 1.0, 0.0])
+    flat = refine(flat, holes.known, len(holes.vertices))
+    points, k = flat.points.copy(), len(turned)
+    points[:k, 2] = turned[:, 2]
+    points[:, 2:] = harmonic(flat, points[:, 2:])
+    points[:k] = seen.points
+    points[k:] = np.einsum("kyx,ky->kx", views[flat.owner[k:]], points[k:])
+    return replace(flat, points=points)
 
 
 def _least_bending(holes: _Holes, lids: Lids, some: IntArray) -> Lids:
@@ -247,7 +265,7 @@ def _least_bending(holes: _Holes, lids: Lids, some: IntArray) -> Lids:
         free = np.zeros((len(loops), n, n), dtype=bool)
         lid, _ = triangulate_loops(holes.points[at], free, holes.outer[at])
         found += list(lid + at[:, :1, None])
-    return _of_corners(holes, found)
+    return refine(_of_corners(holes, found), holes.known, len(holes.vertices))
 
 
 def _of_corners(holes: _Holes, faces: list[IntArray]) -> Lids:
@@ -294,6 +312,13 @@ def _over_surface(holes: _Holes, lids: Lids) -> IntArray:
     return np.append(lids.origin[:k], new)[lids.faces]
 
 
+def _least(holes: _Holes, lids: Lids) -> FloatArray:
+    """Return the least angle of the lid over each loop, (h,)."""
+    least = np.full(len(holes.length), np.pi)
+    np.minimum.at(least, lids.owner[lids.faces[:, 0]], least_angle(lids.points[lids.faces]))
+    return least
+
+
 def _scores(holes: _Holes, rest: Lids, lids: Lids, asked: BoolArray) -> _Scores:
     """Judge the *lids* over the loops *asked* (h,), where the *rest* close the others.
 
@@ -308,13 +333,12 @@ def _scores(holes: _Holes, rest: Lids, lids: Lids, asked: BoolArray) -> _Scores:
     hits, _ = intersections_of(
         points, np.concatenate([holes.faces, faces]), len(holes.faces) + some
     ).T
-    angle = least_angle(points[faces])
-    least = np.full(h, np.pi)
-    np.minimum.at(least, owner, angle)
+    crossings = np.bincount(owner[hits - len(holes.faces)], minlength=h)
+    flat = np.bincount(owner, least_angle(points[faces]) <= _FLAT, minlength=h)
     return _Scores(
-        np.bincount(owner[hits - len(holes.faces)], minlength=h),
-        np.bincount(owner, angle <= _FLAT, minlength=h).astype(np.int64),
-        least,
+        np.where(asked | (holes.length == 3), crossings, np.iinfo(np.int64).max),
+        flat.astype(np.int64),
+        _least(holes, both),
     )
 
 

@@ -12,7 +12,7 @@ of the positions vanishes.  A plane border gives a plane lid.  The size wanted i
 edges, and grows by `_GROWTH` with every unit of distance from them: the number of new vertices is
 then proportional to that of border edges, not to its square.
 
-Of neighbouring edges only one is changed at a time, the one that gains the most.
+Of the edges of one triangle only one is changed at a time.
 
 Source
 ------
@@ -36,9 +36,11 @@ from .topology import Sides, edge_keys
 _GROWTH = 0.3  # of the size wanted, per unit of distance from the border
 _LONG = 1.4  # times the size wanted: longer edges are split
 _ROUND = np.deg2rad(25.0)  # least angles beyond this need not widen
-_GAIN = 1e-3  # radians by which a flip must widen the least angle
-_ROUNDS = 60
-_FLIPS = 4
+_GAIN = 1.01  # times wider the least angle must be after a flip
+_FLAT = 1e-9  # radians
+_LEAST_WEIGHT = 1e-3  # cotangents may be negative, means not
+_ROUNDS = 50
+_FLIPS = 5
 _SETTLE = 4
 
 
@@ -106,11 +108,15 @@ def _interior(lids: Lids) -> tuple[IntArray, IntArray, IntArray, IntArray, IntAr
     return sides.tail[one], sides.head[one], c, d, one // 3, other // 3
 
 
-def _best_apart(gain: FloatArray, one: IntArray, other: IntArray, n_faces: int) -> IntArray:
-    """Return which edges to change, (k,) int: those that gain, and more than all on their faces."""
-    some = np.flatnonzero(gain > 0.0)
+def _some_apart(urgency: FloatArray, one: IntArray, other: IntArray, n_faces: int) -> IntArray:
+    """Return edges to change at once, (k,) int: urgent ones, no two of them on one face.
+
+    Of those on a face the most urgent is taken; among equal ones lots are drawn.
+    """
+    some = np.flatnonzero(urgency > 0)
+    lots = np.random.default_rng(len(some)).permutation(len(some))
     rank = np.empty(len(some), dtype=np.int64)
-    rank[np.argsort(gain[some], kind="stable")] = np.arange(1, len(some) + 1)
+    rank[np.lexsort([lots, urgency[some]])] = np.arange(1, len(some) + 1)
     highest = np.zeros(n_faces, dtype=np.int64)
     np.maximum.at(highest, one[some], rank)
     np.maximum.at(highest, other[some], rank)
@@ -146,13 +152,13 @@ def joined_twice(lids: Lids, known: IntArray, n_vertices: int) -> BoolArray:
     return double
 
 
-def split_edges(lids: Lids, gain: FloatArray) -> Lids:
-    """Return *lids* with a vertex in the middle of the interior edges (e,) that gain, best first.
+def split_edges(lids: Lids, urgency: FloatArray) -> Lids:
+    """Return *lids* with a vertex in the middle of interior edges (e,) of an *urgency* beyond 0.
 
-    Of edges of one triangle only the first is split; *lids* itself comes back if none gains.
+    Of the edges of one triangle only one is split; *lids* itself comes back if there is none.
     """
     a, b, c, d, f, g = _interior(lids)
-    some = _best_apart(gain, f, g, len(lids.faces))
+    some = _some_apart(urgency, f, g, len(lids.faces))
     if not len(some):
         return lids
     a, b, c, d, f, g = (x[some] for x in (a, b, c, d, f, g))
@@ -174,36 +180,39 @@ def _split(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
     """Split long edges, and those that the surface around has already; *lids* if there are none."""
     a, b, *_ = _interior(lids)
     length = np.linalg.norm(lids.points[a] - lids.points[b], axis=1)
-    gain = length / (_LONG * 0.5 * (lids.size[a] + lids.size[b])) - 1.0
+    ratio = length / (_LONG * 0.5 * (lids.size[a] + lids.size[b]))
     double = _joins_neighbours(lids, a, b, taken, n_vertices)
-    gain[double] = np.maximum(gain[double], 1.0)
-    return split_edges(lids, gain)
+    return split_edges(lids, np.where(ratio > 1.0, ratio, double.astype(float)))
 
 
 def _flip(lids: Lids, taken: IntArray, n_vertices: int, times: int) -> Lids:
     """Flip edges where that widens the least angle of both triangles and folds nothing."""
     k = len(lids.points)
     for _ in range(times):
-        a, b, c, d, f, g = _interior(lids)
+        edges = np.stack(_interior(lids))
+        wide = np.pi - corner_angles(lids.points[lids.faces])
+        beyond = [
+            (wide[face] * (lids.faces[face] == corner[:, None])).sum(axis=1)
+            for corner, face in ((edges[2], edges[4]), (edges[3], edges[5]))
+        ]
+        edges = edges[:, beyond[0] + beyond[1] < np.pi - _FLAT]  # not Delaunay
+        a, b, c, d, f, g = edges
         before, after = (
             lids.points[np.stack([np.stack(x, axis=1), np.stack(y, axis=1)], axis=1)]
             for x, y in (((a, b, c), (b, a, d)), ((a, d, c), (d, b, c)))
         )  # (e, 2, 3, 3)
-        gain = least_angle(after).min(axis=1) - least_angle(before).min(axis=1) - _GAIN
+        gain = least_angle(after).min(axis=1) - _GAIN * least_angle(before).min(axis=1) - _FLAT
         up = normals(before).sum(axis=1)
         gain[((normals(after) * up[:, None]).sum(axis=2) <= 0.0).any(axis=1)] = 0.0
-        hopeful = np.flatnonzero(gain > 0.0)
-        new = edge_keys(c[hopeful], d[hopeful], k)
+        keys = edge_keys(c, d, k)
         there = np.sort(edge_keys(lids.faces, lids.faces[:, [1, 2, 0]], k).ravel())
-        bad = (c[hopeful] == d[hopeful]) | _among(new, there)
-        bad |= _joins_neighbours(lids, c[hopeful], d[hopeful], taken, n_vertices)
-        gain[hopeful[bad]] = 0.0
-        some = _best_apart(gain, f, g, len(lids.faces))
-        _, first = np.unique(edge_keys(c[some], d[some], k), return_index=True)
-        some = some[first]
+        bad = (c == d) | _among(keys, there) | _joins_neighbours(lids, c, d, taken, n_vertices)
+        gain[bad] = 0.0
+        some = _some_apart((gain > 0.0).astype(float), f, g, len(lids.faces))
+        some = some[np.unique(keys[some], return_index=True)[1]]
         if not len(some):
             break
-        a, b, c, d, f, g = (x[some] for x in (a, b, c, d, f, g))
+        a, b, c, d, f, g = edges[:, some]
         faces = lids.faces.copy()
         faces[f], faces[g] = np.stack([a, d, c], axis=1), np.stack([d, b, c], axis=1)
         lids = replace(lids, faces=faces)
@@ -225,24 +234,29 @@ def _relax(lids: Lids) -> Lids:
     return _moved(lids, total / np.maximum(count, 1)[:, None], _ROUND)
 
 
-def _settle(lids: Lids) -> Lids:
-    """Move the interior onto the surface of least area, as far as no triangle suffers by it."""
-    free = np.flatnonzero(lids.free)
+def harmonic(lids: Lids, values: FloatArray) -> FloatArray:
+    """Return *values* (k, d) with those of interior vertices as smooth as the border lets them.
+
+    They are means of their neighbours' by cotangent weights, and so between the border's.
+    """
+    free, fixed = np.flatnonzero(lids.free), np.flatnonzero(~lids.free)
     if not len(free):
-        return lids
+        return values
     cot = 1.0 / np.tan(np.clip(corner_angles(lids.points[lids.faces]), 0.05, np.pi - 0.05))
     k = len(lids.points)
     one, other = lids.faces[:, [1, 2, 0]].ravel(), lids.faces[:, [2, 0, 1]].ravel()
     half = sparse.coo_array((cot.ravel(), (one, other)), shape=(k, k))
     weights = (half + half.T).tocsr()
-    weights.data = np.maximum(weights.data, 1e-3)
-    laplacian = (sparse.diags_array(weights.sum(axis=1)) - weights).tocsr()
-    inner = laplacian[free]
-    fixed = np.flatnonzero(~lids.free)
-    right = -(inner[:, fixed] @ lids.points[fixed])
-    there = lids.points.copy()
-    there[free] = splu(inner[:, free].tocsc()).solve(right)
-    return _moved(lids, there, 0.5 * _ROUND)
+    weights.data = np.maximum(weights.data, _LEAST_WEIGHT)
+    inner = (sparse.diags_array(weights.sum(axis=1)) - weights).tocsr()[free]
+    smooth = values.copy()
+    smooth[free] = splu(inner[:, free].tocsc()).solve(-(inner[:, fixed] @ values[fixed]))
+    return smooth
+
+
+def _settle(lids: Lids) -> Lids:
+    """Move the interior onto the surface of least area, as far as no triangle suffers by it."""
+    return _moved(lids, harmonic(lids, lids.points), 0.5 * _ROUND)
 
 
 def _moved(lids: Lids, there: FloatArray, enough: float) -> Lids:

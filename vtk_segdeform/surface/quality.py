@@ -13,22 +13,25 @@ def least_angle(corners: FloatArray) -> FloatArray:
     >>> least_angle(np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])) / np.pi
     array([0.25])
     """
-    return corner_angles(corners).min(axis=-1)
+    angles = corner_angles(corners)
+    return np.minimum(np.minimum(angles[..., 0], angles[..., 1]), angles[..., 2])
 
 
 def corner_angles(corners: FloatArray) -> FloatArray:
     """Return the angle at each corner, (..., 3); 0 or pi in a flat triangle."""
-    out = np.roll(corners, -1, axis=-2) - corners
-    back = np.roll(corners, 1, axis=-2) - corners
-    dot = (out * back).sum(axis=-1)
-    squares = (out * out).sum(axis=-1) * (back * back).sum(axis=-1)
-    cross = np.cross(out, back)
-    sine = np.linalg.norm(cross, axis=-1) if corners.shape[-1] == 3 else np.abs(cross)
-    angles = np.arctan2(sine, dot)
-    return np.where(squares > 0.0, angles, 0.0)
+    sides = corners[..., [1, 2, 0], :] - corners  # from each corner to the next
+    squares = np.einsum("...ix,...ix->...i", sides, sides)
+    dots = -np.einsum("...ix,...ix->...i", sides, sides[..., [2, 0, 1], :])
+    up = normals(corners)
+    twice_area = np.sqrt(np.einsum("...x,...x->...", up, up))[..., None]
+    there = (squares > 0.0) & (squares[..., [2, 0, 1]] > 0.0)
+    return np.where(there, np.arctan2(twice_area, dots), 0.0)
 
 
 def normals(corners: FloatArray) -> FloatArray:
     """Return the normals of triangles (..., 3, 3), as long as twice their areas."""
-    a, b, c = corners[..., 0, :], corners[..., 1, :], corners[..., 2, :]
-    return np.cross(b - a, c - a)
+    x, y, z = np.moveaxis(corners, -1, 0)
+    u = [e[..., 1] - e[..., 0] for e in (x, y, z)]
+    v = [e[..., 2] - e[..., 0] for e in (x, y, z)]
+    cross = [u[i] * v[j] - u[j] * v[i] for i, j in ((1, 2), (2, 0), (0, 1))]
+    return np.stack(cross, axis=-1)
