@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 from numpy.typing import ArrayLike
+from scipy import sparse
 
-from .arrays import FloatArray, IntArray, is_number, is_whole
+from .arrays import BoolArray, FloatArray, IntArray, is_number, is_whole
 from .errors import ArgumentError, MeshError
 from .faults import HOPELESS, as_soup, find_faults
 from .surface import repair_steps as steps
@@ -36,6 +36,14 @@ class Repair:
         The original number of each vertex and face, -1 for one that fills a hole.
     report : MeshReport
         What `find_faults` says of the result.
+    vertex_weights : (n, o) sparse
+        The shares of the o original vertices in each vertex; rows sum to 1.  A vertex that is kept
+        has one, a new one mixes those of the border around it:
+        ``vertex_weights @ array`` is an array of the original vertices on the repaired mesh.
+    face_turned : (m,) bool
+        Which faces name the corners of the original in the opposite order.
+    open_holes : tuple of int
+        The numbers of edges of the holes that are larger than *largest_hole*.
     """
 
     vertices: FloatArray
@@ -44,6 +52,24 @@ class Repair:
     vertex_map: IntArray
     face_map: IntArray
     report: MeshReport
+    vertex_weights: sparse.csr_array
+    face_turned: BoolArray
+    open_holes: tuple[int, ...]
+
+    @property
+    def advice(self) -> str:
+        """What would close the holes that are still open, one sentence; "" if there are none."""
+        if not self.open_holes:
+            return ""
+        few, many = min(self.open_holes), max(self.open_holes)
+        holes = (
+            "1 hole stays" if len(self.open_holes) == 1 else f"{len(self.open_holes)} holes stay"
+        )
+        edges = str(few) if few == many else f"{few} to {many}"
+        return (
+            f"{holes} open, of {edges} edges; to fill up to that size, repair with "
+            f"largest_hole={many} (--largest-hole {many} on the command line)"
+        )
 
 
 def repair(
@@ -65,7 +91,7 @@ def repair(
         How far apart two vertices may lie and still count as one, in the unit of *vertices*.
         Only vertices whose welding closes open edges are welded at all.
     largest_hole : int
-        Holes with more edges than this stay open.
+        Holes with more edges than this stay open; ``open_holes`` has their sizes.
 
     Raises
     ------
@@ -111,13 +137,15 @@ def repair(
             steps.turn_outward,
         ):
             draft, sentence = step(draft)
-            done += [sentence] if sentence else []
+            done += sentence.splitlines()
             if not len(draft.faces):
                 raise MeshError(
                     f"nothing is left of the mesh after: {'; '.join(done)}; "
                     "look at where it comes from"
                 )
         report = find_faults(draft.vertices, draft.faces)
+    left = steps.holes_beyond(draft, largest_hole) if not report.ok else ()
     return Repair(
-        draft.vertices, draft.faces, tuple(done), draft.vertex_map, draft.face_map, report
-    )
+        draft.vertices, draft.faces, tuple(done), draft.vertex_map, draft.face_map, report,
+        draft.mix, draft.turned, left,
+    )  # fmt: skip

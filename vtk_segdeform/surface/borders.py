@@ -54,7 +54,7 @@ def border_loops(vertices: FloatArray, sides: Sides, largest: int) -> list[IntAr
                 if 3 <= len(loop) <= largest:
                     loops.append(border[loop])
             at = onward[at]
-    return [loop for loop in loops if not _is_face(sides, loop)]
+    return [loop for loop in loops if not _is_face(loop)]
 
 
 def _attached(sides: Sides) -> BoolArray:
@@ -70,7 +70,7 @@ def _attached(sides: Sides) -> BoolArray:
 
 
 def _onward(vertices: FloatArray, sides: Sides, border: IntArray) -> list[int]:
-    """Return for each of the *border* sides (b,) the number of the one that the loop goes on with."""
+    """Return for each of the *border* sides (b,) the number of the next one in its loop."""
     head, tail = sides.head[border], sides.tail[border]
     leaving = np.argsort(head, kind="stable")
     arriving = np.argsort(tail, kind="stable")
@@ -113,6 +113,6 @@ def _vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     return np.asarray(normals / np.where(length > 0.0, length, 1.0))
 
 
-def _is_face(sides: Sides, loop: IntArray) -> bool:
+def _is_face(loop: IntArray) -> bool:
     """Tell whether the loop runs around a single face that has no other border."""
     return len(loop) == 3 and bool((loop // 3 == loop[0] // 3).all())

@@ -8,7 +8,6 @@ projection do not cross in space, however the loop winds.
 from __future__ import annotations
 
 import numpy as np
-
 from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
@@ -21,14 +20,14 @@ _AREA = 1e-3  # of its extent squared, for each corner: a loop of less is seen f
 def clip_ears(points: FloatArray) -> tuple[IntArray, FloatArray] | None:
     """Return n - 2 triangles over the loop *points* (n, 3), and how it was looked at.
 
-    None if the loop crosses itself from everywhere.  ``points @ view.T`` with the *view* (3, 3), a
-    rotation, are coordinates to the right, upwards and towards the eye.  Of the directions from which the loop is simple, the one along its mean normal comes first, and
-    then those nearest to it.
+    ``points @ view.T`` with the *view* (3, 3), a rotation, are coordinates to the right, upwards
+    and towards the eye.  Of the directions from which the loop is simple, its mean normal is tried
+    first, and then those nearest to it.  None if the loop crosses itself from everywhere.
 
     Examples
     --------
     >>> clip_ears(np.array([[0.0, 0, 0], [2, 0, 1], [2, 2, 0], [1, 0.5, 1]]))[0].tolist()
-    [[1, 2, 3], [0, 1, 3]]
+    [[1, 2, 3], [3, 0, 1]]
     """
     for up in _directions(points):
         view = _view(up)

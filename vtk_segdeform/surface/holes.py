@@ -155,9 +155,7 @@ def _best_lids(holes: _Holes) -> tuple[Lids, _Scores]:
         asked &= _mask(holes, tried.owner[tried.faces[:, 0]])
         found = _scores(holes, lids, tried, asked)
         better = asked & scores.worse_than(found)
-        lids = _together(
-            holes, _only(holes, lids, ~better), _only(holes, tried, better)
-        )
+        lids = _together(holes, _only(holes, lids, ~better), _only(holes, tried, better))
         scores = _Scores(
             np.where(better, found.crossings, scores.crossings),
             np.where(better, found.flat, scores.flat),

@@ -81,8 +81,10 @@ def refine(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
     lids : Lids
         Triangles over corners of loops only.
     taken : (t,) int
-        Sorted `edge_keys`, over *n_vertices*, of edges of the surface around.  A lid that joins
-        two corners so gets a vertex on that edge.
+        Sorted `edge_keys` of edges of the surface around.  A lid that joins two corners so gets a
+        vertex on that edge.
+    n_vertices : int
+        Of the surface around, as the keys were made with.
     """
     for _ in range(_ROUNDS):
         split = _split(lids, taken, n_vertices)
@@ -120,7 +122,7 @@ def _some_apart(urgency: FloatArray, one: IntArray, other: IntArray, n_faces: in
     highest = np.zeros(n_faces, dtype=np.int64)
     np.maximum.at(highest, one[some], rank)
     np.maximum.at(highest, other[some], rank)
-    return some[(highest[one[some]] == rank) & (highest[other[some]] == rank)]
+    return np.asarray(some[(highest[one[some]] == rank) & (highest[other[some]] == rank)])
 
 
 def _among(keys: IntArray, known: IntArray) -> BoolArray:
@@ -248,7 +250,7 @@ def harmonic(lids: Lids, values: FloatArray) -> FloatArray:
     half = sparse.coo_array((cot.ravel(), (one, other)), shape=(k, k))
     weights = (half + half.T).tocsr()
     weights.data = np.maximum(weights.data, _LEAST_WEIGHT)
-    inner = (sparse.diags_array(weights.sum(axis=1)) - weights).tocsr()[free]
+    inner: sparse.csr_array = (sparse.diags_array(weights.sum(axis=1)) - weights).tocsr()[free]
     smooth = values.copy()
     smooth[free] = splu(inner[:, free].tocsc()).solve(-(inner[:, fixed] @ values[fixed]))
     return smooth

@@ -102,7 +102,10 @@ def triangulate_loops(
         if outer is not None:
             unit = cross / np.maximum(np.linalg.norm(cross, axis=-1, keepdims=True), 1e-300)
             angles = [bend[:, i[:, None], k], bend[:, k, j[:, None]]]
-            angles += [_angle(unit, normal[:, i[:, None], k]), _angle(unit, normal[:, k, j[:, None]])]
+            angles += [
+                _angle(unit, normal[:, i[:, None], k]),
+                _angle(unit, normal[:, k, j[:, None]]),
+            ]
             if span == n - 1:
                 angles.append(_angle(unit, outer[:, -1][:, None, None]))
             worst = np.max(angles, axis=0)
@@ -128,7 +131,7 @@ def triangulate_long_loop(points: FloatArray) -> IntArray:
     n = len(points)
     if n <= _BRANCHES:
         lid, _ = triangulate_loops(points[None], np.zeros((1, n, n), dtype=bool))
-        return lid[0]
+        return np.asarray(lid[0])
     stems = np.unique(np.linspace(0, n, _BRANCHES, endpoint=False).astype(np.int64))
     parts = [stems[triangulate_long_loop(points[stems])]]
     for first, last in zip(stems, [*stems[1:], n], strict=True):
@@ -150,7 +153,7 @@ def _cost(a: FloatArray, b: FloatArray, c: FloatArray) -> tuple[FloatArray, Floa
 
 
 def _angle(one: FloatArray, other: FloatArray) -> FloatArray:
-    return np.arccos(np.clip((one * other).sum(axis=-1), -1.0, 1.0))
+    return np.asarray(np.arccos(np.clip((one * other).sum(axis=-1), -1.0, 1.0)))
 
 
 def _cut(middle: IntArray) -> IntArray:

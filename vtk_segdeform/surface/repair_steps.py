@@ -1,7 +1,8 @@
 """The steps of a repair: each takes a draft of the mesh, and returns a better one and a sentence.
 
-A step that finds nothing to do returns its draft and "".  The steps from `split` on want every edge
-to be sound; where one is left that is not, they leave the mesh alone, and the report says why.
+A step that finds nothing to do returns its draft and ""; several sentences stand on lines of
+their own.  The steps from `split` on want every edge to be sound; where one is left that is not,
+they leave the mesh alone, and the report says why.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from .borders import border_loops
 from .holes import close_holes
 from .shells import wrong_way_round
 from .splitting import split_fans
@@ -32,7 +34,8 @@ from .topology import (
 class Draft:
     """A mesh under repair; the maps name what each vertex and face was, -1 for a new one.
 
-    *mix* (n, o) has the shares of the o original vertices in each vertex.
+    *mix* (n, o) has the shares of the o original vertices in each vertex, *turned* (m,) tells
+    which faces were turned round.
     """
 
     vertices: FloatArray
@@ -40,13 +43,15 @@ class Draft:
     vertex_map: IntArray
     face_map: IntArray
     mix: sparse.csr_array
+    turned: BoolArray
 
     @classmethod
     def of(cls, vertices: FloatArray, faces: IntArray) -> Draft:
         """Return the draft of a mesh to which nothing is done yet."""
         n = len(vertices)
         mix = sparse.eye_array(n, format="csr")
-        return cls(vertices, faces, np.arange(n), np.arange(len(faces)), mix)
+        turned = np.zeros(len(faces), dtype=bool)
+        return cls(vertices, faces, np.arange(n), np.arange(len(faces)), mix, turned)
 
     @cached_property
     def sides(self) -> Sides:
@@ -55,7 +60,12 @@ class Draft:
 
     def keep_faces(self, keep: BoolArray) -> Draft:
         """Return the draft with only these faces (m,), in their order."""
-        return replace(self, faces=self.faces[keep], face_map=self.face_map[keep])
+        return replace(
+            self,
+            faces=self.faces[keep],
+            face_map=self.face_map[keep],
+            turned=self.turned[keep],
+        )
 
     def keep_vertices(self, keep: BoolArray) -> Draft:
         """Return the draft with only these vertices (n,), which no face may need otherwise."""
@@ -70,7 +80,8 @@ class Draft:
 
     def turn(self, which: BoolArray) -> Draft:
         """Return the draft with these faces (m,) turned round; their first vertex stays first."""
-        return replace(self, faces=np.where(which[:, None], self.faces[:, [0, 2, 1]], self.faces))
+        faces = np.where(which[:, None], self.faces[:, [0, 2, 1]], self.faces)
+        return replace(self, faces=faces, turned=self.turned ^ which)
 
 
 def drop_non_finite(draft: Draft) -> tuple[Draft, str]:
@@ -207,7 +218,8 @@ def fill(draft: Draft, largest: int) -> tuple[Draft, str]:
     sentence += f" with {_n(closing.faces, 'triangle')}"
     sentence += f" and {_n(closing.vertices, 'new vertex', 'new vertices')}" if new else ""
     if closing.n_crossing:
-        sentence += f"; {closing.n_crossing} of them cannot be filled without crossing the surface"
+        lids = "1 lid crosses" if closing.n_crossing == 1 else f"{closing.n_crossing} lids cross"
+        sentence += f"\n{lids} the surface or another lid; none was found that does not"
     rows = np.repeat(np.arange(new), closing.sources.shape[1])
     mix = sparse.coo_array(
         (closing.weights.ravel(), (rows, closing.sources.ravel())),
@@ -220,10 +232,19 @@ def fill(draft: Draft, largest: int) -> tuple[Draft, str]:
             faces=np.concatenate([draft.faces, closing.faces]),
             vertex_map=np.append(draft.vertex_map, np.full(new, -1)),
             face_map=np.append(draft.face_map, np.full(len(closing.faces), -1)),
+            turned=np.append(draft.turned, np.zeros(len(closing.faces), dtype=bool)),
             mix=sparse.vstack([draft.mix, mix.tocsr() @ draft.mix], format="csr"),
         ),
         sentence,
     )
+
+
+def holes_beyond(draft: Draft, largest: int) -> tuple[int, ...]:
+    """Return the numbers of edges of the holes that `fill` leaves for their size alone."""
+    if len(draft.sides.crowded) or draft.sides.turned.any():
+        return ()
+    loops = border_loops(draft.vertices, draft.sides, len(draft.sides.open))
+    return tuple(sorted(len(loop) for loop in loops if len(loop) > largest))
 
 
 def turn_outward(draft: Draft) -> tuple[Draft, str]:
