@@ -190,13 +190,14 @@ def _traced(given: _Polygons, done: Repair) -> _Trace:
 def _cells(surface: pv.PolyData) -> IntArray:
     """Return the cell that each polygon of `polygons_of` is, or is a part of."""
     n_polygons = surface.GetPolys().GetNumberOfCells()
-    before = surface.n_verts + surface.n_lines
+    before = int(surface.n_verts + surface.n_lines)
     lengths, strips = [], surface.strips
     while len(strips):
         lengths.append(int(strips[0]) - 2)
         strips = strips[strips[0] + 1 :]
     of_strips = np.repeat(np.arange(len(lengths)), lengths)
-    return np.append(np.arange(n_polygons), n_polygons + of_strips).astype(np.int64) + before
+    cells = np.append(np.arange(n_polygons), n_polygons + of_strips)
+    return np.asarray(before + cells, dtype=np.int64)
 
 
 def _lost(surface: pv.PolyData, trace: _Trace) -> Iterator[str]:

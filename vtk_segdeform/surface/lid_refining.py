@@ -264,18 +264,21 @@ def _settle(lids: Lids) -> Lids:
 def _moved(lids: Lids, there: FloatArray, enough: float) -> Lids:
     """Return the lids with interior vertices moved to *there* (k, 3), but for those that do harm.
 
-    Harm is a triangle that turns over, or whose least angle narrows to less than *enough*.
+    Harm is to turn a triangle over, or to narrow one to less than *enough* and than the least
+    angle that was around the vertex.
     """
     before = lids.points[lids.faces]
     old, up = least_angle(before), normals(before)
+    limit = np.full(len(lids.points), enough)
+    np.minimum.at(limit, lids.faces.ravel(), np.repeat(old - 1e-12, 3))
     moving = lids.free.copy()
     while True:
         points = np.where(moving[:, None], there, lids.points)
         after = points[lids.faces]
         angle = least_angle(after)
-        harm = (angle < old - 1e-12) & (angle < enough)
-        harm |= ((normals(after) * up).sum(axis=1) <= 0.0) & (old > 1e-9)
-        harm &= moving[lids.faces].any(axis=1)
+        over = ((normals(after) * up).sum(axis=1) <= 0.0) & (old > _FLAT)
+        narrow = (angle < old)[:, None] & (angle[:, None] < limit[lids.faces])
+        harm = (over[:, None] | narrow) & moving[lids.faces]
         if not harm.any():
             return replace(lids, points=points)
         moving[lids.faces[harm]] = False
