@@ -37,9 +37,7 @@ def straight(corners, divisions):
 
 
 def polar(radius, angle, height=0.0):
-    return np.stack(
-        [radius * np.cos(angle), radius * np.sin(angle), height + 0.0 * angle], axis=1
-    )
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), height + 0.0 * angle], axis=1)
 
 
 def star(divisions):

@@ -226,7 +226,7 @@ def _carry_points(surface: pv.PolyData, whole: pv.PolyData, done: Repair) -> Ite
         array = np.asarray(values)
         carried = array[done.vertex_map]
         carried[new] = array[nearest]
-        if array.dtype.kind == "f" or array.dtype == np.uint8:
+        if len(new) and (array.dtype.kind == "f" or array.dtype == np.uint8):
             used = np.unique(mix.indices)
             blend = mix[:, used] @ array[used].reshape(len(used), -1).astype(np.float64)
             blend = blend.reshape(len(new), *array.shape[1:])
