@@ -69,6 +69,15 @@ def test_a_soup_of_triangles_is_welded_back(mesh):
     assert_array_equal(result.vertices[result.faces], vertices[faces])
 
 
+def test_a_soup_with_holes_is_the_closed_mesh_again():
+    vertices, faces = icosphere(3)
+    keep = np.random.default_rng(5).random(len(faces)) > 0.1
+    result = mended(*soup(vertices, faces[keep]))
+    assert any(step.endswith("where holes touch") for step in result.steps)
+    assert len(result.vertices) == len(vertices)
+    assert len(result.faces) == len(faces)
+
+
 def test_vertices_that_nearly_coincide_are_welded_when_a_distance_is_given():
     vertices, faces = soup(*SPHERE)
     shaken = vertices + np.random.default_rng(2).uniform(-1e-7, 1e-7, vertices.shape)

@@ -128,6 +128,7 @@ def repair(
             steps.drop_non_finite,
             steps.drop_degenerate,
             lambda draft: steps.weld(draft, weld_distance),
+            lambda draft: steps.weld_corners(draft, weld_distance),
             steps.drop_duplicates,
             steps.drop_unreferenced,
             steps.split,

@@ -132,6 +132,35 @@ def weld(draft: Draft, distance: float) -> tuple[Draft, str]:
     return welded, sentence + (f" and drops {_n(collapsed, 'face')}" if collapsed.any() else "")
 
 
+def weld_corners(draft: Draft, distance: float) -> tuple[Draft, str]:
+    """Make border vertices one that lie within *distance*, where holes touch in a corner only.
+
+    Without that, two holes would count as one whose border runs through the corner twice.  Where
+    edges would become one, too, nothing is welded: that is for `weld` to decide.
+    """
+    sides, n = draft.sides, len(draft.vertices)
+    border = np.union1d(sides.tail[sides.open], sides.head[sides.open])
+    number = _places(draft.vertices, border, distance)
+    edge = sides.order[sides.first]
+    tail, head = sides.tail[edge], sides.head[edge]
+    while (gone := number != np.arange(n)).any():
+        moved = np.isin(np.arange(n), number[gone])[number]
+        near = moved[tail] | moved[head]
+        one, other = number[tail[near]], number[head[near]]
+        _, which, count = np.unique(
+            edge_keys(one, other, n), return_inverse=True, return_counts=True
+        )
+        clash = (count[which] > 1) | (one == other)
+        if not clash.any():
+            break
+        held = np.isin(number, np.append(one[clash], other[clash]))
+        number = np.where(held, np.arange(n), number)
+    if not gone.any():
+        return draft, ""
+    welded = replace(draft, faces=number[draft.faces]).keep_vertices(~gone)
+    return welded, f"weld {_n(gone, 'vertex', 'vertices')} where holes touch"
+
+
 def drop_duplicates(draft: Draft) -> tuple[Draft, str]:
     """Keep one face of those on the same vertices; none of two that wall off body from body."""
     a, b, c = draft.faces.T
