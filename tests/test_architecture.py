@@ -26,7 +26,7 @@ STORY = [
     "surface.counting", "surface.topology", "surface.manifold", "surface.inside", "surface.columns",
     "surface.intersections", "surface.report", "surface.shells", "faults", "mesh",
     "surface.quality", "surface.borders", "surface.lids", "surface.ears", "surface.lid_refining",
-    "surface.holes", "surface.splitting", "surface.repair_steps", "repair",
+    "surface.holes", "surface.cracks", "surface.splitting", "surface.repair_steps", "repair",
     # what a deformation keeps
     "volume", "normals", "segmenting.thinning", "local_volume", "distortion", "differential",
     "rotations",

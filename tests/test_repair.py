@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -245,6 +247,23 @@ def test_no_other_lid_of_a_bent_loop_has_less_area():
         lid = corners[triangulate_loop(corners, np.zeros((n, n), bool))]
         found = sum(area(*triangle) for triangle in lid)
         assert found == pytest.approx(least(corners, 0, n - 1), rel=0.02)
+
+
+@pytest.mark.parametrize("n_on_side", [1, 2, 5])
+def test_a_crack_is_closed_by_cutting_the_face_that_has_vertices_on_its_side(n_on_side):
+    # The face (a, b, c) of a tetrahedron is a fan from c over vertices on the side a-b.
+    a, b, c, d = 0, 1, 2, 3
+    vertices = np.array([[0.0, 0, 0], [6, 0, 0], [0, 1, 0], [0, 0, 1]])
+    share = np.arange(1, n_on_side + 1)[:, None] / (n_on_side + 1)
+    vertices = np.concatenate([vertices, share * vertices[b]])
+    along = [b, *range(3 + n_on_side, 3, -1), a]
+    fan = [[c, one, other] for one, other in pairwise(along)]
+    faces = np.array([*fan, [a, b, d], [b, c, d], [c, a, d]])
+    result = mended(vertices, faces)
+    assert len(result.vertices) == len(vertices)
+    assert result.report.count(Kind.ZERO_AREA) == 0
+    assert result.steps[1] == "cut 1 face at vertices on a side, to close cracks"
+    assert signed_volume(result.vertices, result.faces) == pytest.approx(1.0, rel=1e-12)
 
 
 def test_two_lids_over_the_same_corners_do_not_share_a_diagonal():

@@ -33,7 +33,8 @@ class Repair:
     steps : tuple of str
         What was done, one sentence each; empty if nothing was wrong.
     vertex_map, face_map : (n,) int, (m,) int
-        The original number of each vertex and face, -1 for one that fills a hole.
+        The original number of each vertex and face, -1 for one that fills a hole or a
+        part of one cut to close a crack.
     report : MeshReport
         What `find_faults` says of the result.
     vertex_weights : (n, o) sparse
@@ -134,6 +135,7 @@ def repair(
             steps.split,
             steps.orient,
             lambda draft: steps.fill(draft, largest_hole),
+            steps.close_flat,
             steps.split,
             steps.turn_outward,
         ):

@@ -51,7 +51,7 @@ class Closing:
     sources, weights : (c, 8) int, (c, 8) float
         Border vertices near each new one, and their shares in it; rows sum to 1.
     n_crossing : int
-        How many lids cross themselves or the surface all the same.
+        How many lids cross themselves or the surface all the same; those without area not counted.
     """
 
     sizes: list[int]
@@ -362,5 +362,5 @@ def _closing(holes: _Holes, lids: Lids, scores: _Scores) -> Closing:
         _over_surface(holes, lids)[order],
         sources,
         weights,
-        int(np.count_nonzero(scores.crossings)),
+        int(np.count_nonzero((scores.crossings > 0) & (scores.flat == 0))),
     )

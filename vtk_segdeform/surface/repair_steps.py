@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from .borders import border_loops
+from .cracks import close_cracks
 from .holes import close_holes
 from .shells import wrong_way_round
 from .splitting import split_fans
@@ -266,6 +267,22 @@ def fill(draft: Draft, largest: int) -> tuple[Draft, str]:
         ),
         sentence,
     )
+
+
+def close_flat(draft: Draft) -> tuple[Draft, str]:
+    """Cut the faces beside lids without area, where a vertex lies on their side, instead."""
+    lids = draft.face_map < 0
+    faces, changed = close_cracks(draft.vertices, draft.faces, lids)
+    if not changed.any():
+        return draft, ""
+    order = np.argsort(lids | changed, kind="stable")
+    cut = replace(
+        draft,
+        faces=faces[order],
+        face_map=np.where(changed, -1, draft.face_map)[order],
+        turned=(draft.turned & ~changed)[order],
+    )
+    return cut, f"cut {_n(changed & ~lids, 'face')} at vertices on a side, to close cracks"
 
 
 def holes_beyond(draft: Draft, largest: int) -> tuple[int, ...]:
