@@ -25,7 +25,8 @@ STORY = [
     "compiled.normals", "compiled.rotations", "compiled.triangles", "compiled.coordinates", "fast",
     "surface.counting", "surface.topology", "surface.manifold", "surface.inside", "surface.columns",
     "surface.intersections", "surface.report", "surface.shells", "faults", "freezing", "mesh",
-    "surface.holes", "surface.splitting", "surface.repair_steps", "repair",
+    "surface.quality", "surface.borders", "surface.lids", "surface.ears", "surface.lid_refining",
+    "surface.holes", "surface.cracks", "surface.splitting", "surface.repair_steps", "repair",
     # what a deformation keeps
     "volume", "normals", "segmenting.thinning", "local_volume", "distortion", "differential",
     "rotations",
@@ -44,7 +45,7 @@ STORY = [
     # meshes from code, from files, and as pictures
     "modelling.remeshing", "modelling.implicit", "models", "formats.polygons", "formats.off",
     "formats.ply", "formats.wavefront", "formats.vtk_readers", "formats.meshlab_layers", "meshlab",
-    "convert", "meshlab_project", "palette", "canvas", "pictures",
+    "convert", "repaired", "meshlab_project", "palette", "canvas", "pictures",
     # a VTK pipeline
     "formats.vtk_surfaces", "filter_settings", "filters", "paraview_plugin",
     # a view, and widgets in it
@@ -122,6 +123,7 @@ GRANTED = {
     "meshlab": {"pymeshlab", "pyvista"},
     "meshlab_project": {"pyvista"},
     "convert": VTK | {"pyvista"},
+    "repaired": {"pyvista"},
     "canvas": VTK | {"pyvista"},
     "pictures": VTK | {"pyvista"},
     "formats.vtk_surfaces": VTK,

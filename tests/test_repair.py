@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -9,7 +11,7 @@ from vtk_segdeform.errors import MeshError
 from vtk_segdeform.faults import find_faults
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.repair import repair
-from vtk_segdeform.surface.holes import triangulate_loop
+from vtk_segdeform.surface.lids import triangulate_loop
 from vtk_segdeform.surface.report import Kind
 from vtk_segdeform.volume import signed_volume
 
@@ -67,6 +69,15 @@ def test_a_soup_of_triangles_is_welded_back(mesh):
     assert result.steps == (f"weld {welded} duplicate vertices, which closes {edges} open edges",)
     assert len(result.vertices) == n
     assert_array_equal(result.vertices[result.faces], vertices[faces])
+
+
+def test_a_soup_with_holes_is_the_closed_mesh_again():
+    vertices, faces = icosphere(3)
+    keep = np.random.default_rng(5).random(len(faces)) > 0.1
+    result = mended(*soup(vertices, faces[keep]))
+    assert any(step.endswith("where holes touch") for step in result.steps)
+    assert len(result.vertices) == len(vertices)
+    assert len(result.faces) == len(faces)
 
 
 def test_vertices_that_nearly_coincide_are_welded_when_a_distance_is_given():
@@ -188,8 +199,11 @@ def test_a_large_hole_stays_open_until_it_is_allowed():
     assert left.report.count(Kind.HOLE) == 1
     border = left.report.count(Kind.OPEN_EDGE)
     result = mended(*bowl)
-    assert result.steps == (f"fill 1 hole of {border} edges with {border - 2} triangles",)
-    assert len(result.vertices) == len(used)
+    new = len(result.vertices) - len(used)
+    triangles = border - 2 + 2 * new
+    assert result.steps == (
+        f"fill 1 hole of {border} edges with {triangles} triangles and {new} new vertices",
+    )
     whole = signed_volume(vertices, faces)
     assert signed_volume(result.vertices, result.faces) == pytest.approx(whole / 2, rel=1e-12)
 
@@ -233,6 +247,23 @@ def test_no_other_lid_of_a_bent_loop_has_less_area():
         lid = corners[triangulate_loop(corners, np.zeros((n, n), bool))]
         found = sum(area(*triangle) for triangle in lid)
         assert found == pytest.approx(least(corners, 0, n - 1), rel=0.02)
+
+
+@pytest.mark.parametrize("n_on_side", [1, 2, 5])
+def test_a_crack_is_closed_by_cutting_the_face_that_has_vertices_on_its_side(n_on_side):
+    # The face (a, b, c) of a tetrahedron is a fan from c over vertices on the side a-b.
+    a, b, c, d = 0, 1, 2, 3
+    vertices = np.array([[0.0, 0, 0], [6, 0, 0], [0, 1, 0], [0, 0, 1]])
+    share = np.arange(1, n_on_side + 1)[:, None] / (n_on_side + 1)
+    vertices = np.concatenate([vertices, share * vertices[b]])
+    along = [b, *range(3 + n_on_side, 3, -1), a]
+    fan = [[c, one, other] for one, other in pairwise(along)]
+    faces = np.array([*fan, [a, b, d], [b, c, d], [c, a, d]])
+    result = mended(vertices, faces)
+    assert len(result.vertices) == len(vertices)
+    assert result.report.count(Kind.ZERO_AREA) == 0
+    assert result.steps[1] == "cut 1 face at vertices on a side, to close cracks"
+    assert signed_volume(result.vertices, result.faces) == pytest.approx(1.0, rel=1e-12)
 
 
 def test_two_lids_over_the_same_corners_do_not_share_a_diagonal():

@@ -198,6 +198,8 @@ def _parser() -> argparse.ArgumentParser:
     sub = command("check", commands.check, "report the faults of a mesh, and repair them")
     _input_output(sub, required=False)
     sub.add_argument("--repair", action="store_true", help="write the repaired mesh to -o OUT")
+    text = "fill holes of up to so many edges (100)"
+    sub.add_argument("--largest-hole", type=_count, default=100, metavar="EDGES", help=text)
 
     sub = command("regions", commands.regions, "cut a mesh into regions; write them as an array")
     _input_output(sub, required=False)

@@ -5,6 +5,7 @@
     mesh.segdeform.deform(fixed, handle, targets)    a deformed copy, arrays and all
     mesh.segdeform.regions(3)                        a copy with arrays of its regions
     mesh.segdeform.check()                           what keeps it from being deformed
+    mesh.segdeform.repair()                          a repaired copy, arrays and all
 
 pyvista finds this module by its entry points, when ``segdeform`` is first asked for.  pyvistaqt
 hides those of plotters: there, and where the package is not installed, ``import vtk_segdeform``
@@ -29,6 +30,7 @@ from .faults import find_faults
 from .formats.polygons import triangles_of
 from .mesh import Mesh
 from .progress import Progress
+from .repaired import repair_surface
 from .segmentation import segment
 from .session import Session
 from .surface.report import MeshReport
@@ -226,6 +228,21 @@ class PolyDataTools:
         """Return what keeps the surface from being deformed: ``.ok``, ``.faults``, as text."""
         points = np.asarray(self._surface.points, dtype=np.float64)
         return find_faults(points, triangles_of(self._surface))
+
+    def repair(self, *, weld_distance: float = 0.0, largest_hole: int = 100) -> pv.PolyData:
+        """Return a repaired copy; polygons and arrays are kept where the faces are.
+
+        What was done, what was lost and what is still open is logged, one line each.  The
+        parameters are those of `vtk_segdeform.repair`.
+        """
+        closed, done = repair_surface(
+            self._surface, weld_distance=weld_distance, largest_hole=largest_hole
+        )
+        for step in done.steps:
+            _log.info("repair: %s", step)
+        if done.advice:
+            _log.warning("repair: %s", done.advice)
+        return closed
 
 
 def surface_of(mesh: object) -> pv.PolyData | None:

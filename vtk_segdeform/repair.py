@@ -10,19 +10,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 from numpy.typing import ArrayLike
+from scipy import sparse
 
-from .arrays import FloatArray, IntArray, is_number, is_whole
+from .arrays import BoolArray, FloatArray, IntArray, is_number, is_whole
 from .checks import shown
 from .errors import ArgumentError, MeshError
 from .faults import HOPELESS, as_soup, find_faults
+from .freezing import Frozen
 from .surface import repair_steps as steps
 from .surface.report import MeshReport
 
 
 @dataclass(frozen=True)
-class Repair:
+class Repair(Frozen):
     """A mended mesh and how it came about; *report* says what could not be mended.
 
     What is kept keeps its order; what is created comes after.
@@ -34,9 +35,18 @@ class Repair:
     steps : tuple of str
         What was done, one sentence each; empty if nothing was wrong.
     vertex_map, face_map : (n,) int, (m,) int
-        The original number of each vertex and face, -1 for one that fills a hole.
+        The original number of each vertex and face, -1 for one that fills a hole or a
+        part of one cut to close a crack.
     report : MeshReport
         What `find_faults` says of the result.
+    vertex_weights : (n, o) sparse
+        The shares of the o original vertices in each vertex; rows sum to 1.  A vertex that is kept
+        has one, a new one mixes those of the border around it:
+        ``vertex_weights @ array`` is an array of the original vertices on the repaired mesh.
+    face_turned : (m,) bool
+        Which faces name the corners of the original in the opposite order.
+    open_holes : tuple of int
+        The numbers of edges of the holes that are larger than *largest_hole*.
     """
 
     vertices: FloatArray
@@ -45,6 +55,24 @@ class Repair:
     vertex_map: IntArray
     face_map: IntArray
     report: MeshReport
+    vertex_weights: sparse.csr_array
+    face_turned: BoolArray
+    open_holes: tuple[int, ...]
+
+    @property
+    def advice(self) -> str:
+        """What would close the holes that are still open, one sentence; "" if there are none."""
+        if not self.open_holes:
+            return ""
+        few, many = min(self.open_holes), max(self.open_holes)
+        holes = (
+            "1 hole stays" if len(self.open_holes) == 1 else f"{len(self.open_holes)} holes stay"
+        )
+        edges = str(few) if few == many else f"{few} to {many}"
+        return (
+            f"{holes} open, of {edges} edges; to fill up to that size, repair with "
+            f"largest_hole={many} (--largest-hole {many} on the command line)"
+        )
 
 
 def repair(
@@ -66,7 +94,7 @@ def repair(
         How far apart two vertices may lie and still count as one, in the unit of *vertices*.
         Only vertices whose welding closes open edges are welded at all.
     largest_hole : int
-        Holes with more edges than this stay open.
+        Holes with more edges than this stay open; ``open_holes`` has their sizes.
 
     Raises
     ------
@@ -100,29 +128,35 @@ def repair(
     ]
     if hopeless:
         raise MeshError(f"nothing to repair: {'; '.join(hopeless)}")
-    draft = steps.Draft(points, triangles, np.arange(len(points)), np.arange(len(triangles)))
+    draft = steps.Draft.of(points, triangles)
     done: list[str] = []
     if not report.ok:
         for step in (
             steps.drop_non_finite,
             steps.drop_degenerate,
             lambda draft: steps.weld(draft, weld_distance),
+            lambda draft: steps.weld_corners(draft, weld_distance),
             steps.drop_duplicates,
             steps.drop_unreferenced,
             steps.split,
             steps.orient,
             lambda draft: steps.fill(draft, largest_hole),
+            steps.close_flat,
             steps.split,
             steps.turn_outward,
         ):
             draft, sentence = step(draft)
-            done += [sentence] if sentence else []
+            done += sentence.splitlines()
             if not len(draft.faces):
                 raise MeshError(
                     f"nothing is left of the mesh after: {'; '.join(done)}; "
                     "look at where it comes from"
                 )
         report = find_faults(draft.vertices, draft.faces)
-    return Repair(
-        draft.vertices, draft.faces, tuple(done), draft.vertex_map, draft.face_map, report
-    )
+    left = steps.holes_beyond(draft, largest_hole) if not report.ok else ()
+    found = Repair(
+        draft.vertices, draft.faces, tuple(done), draft.vertex_map, draft.face_map, report,
+        draft.mix, draft.turned, left,
+    )  # fmt: skip
+    found.__setstate__(found.__getstate__())  # its arrays are read-only
+    return found

@@ -27,7 +27,7 @@ from ..mesh import Mesh
 from ..pictures import picture_before_after
 from ..progress import Progress, part
 from ..regions import Regions
-from ..repair import repair
+from ..repaired import repair_surface
 from ..segmentation import segment
 from ..session import Session
 from ..store import load_session
@@ -38,7 +38,6 @@ from .outputs import (
     Say,
     coloured_cages,
     coloured_regions,
-    repaired,
     tell_cages,
     tell_regions,
     tell_solution,
@@ -117,7 +116,7 @@ def check(options: Namespace, say: Say, progress: Progress) -> bool:
     if report.ok and not options.repair:
         return True
     progress(0.4, "repairing")
-    mended = repair(vertices, faces)
+    closed, mended = repair_surface(surface, largest_hole=options.largest_hole)
     progress(1.0, "done")
     did, then = ("repaired", "result") if options.repair else ("--repair would", "it would be")
     for step in mended.steps:
@@ -125,9 +124,11 @@ def check(options: Namespace, say: Say, progress: Progress) -> bool:
     if not mended.steps:
         say("nothing to repair")
     say(f"{then}: {mended.report}")
+    if mended.advice:
+        say(mended.advice)
     if not options.repair:
         return False
-    convert.write_mesh(options.output, repaired(surface, mended))
+    convert.write_mesh(options.output, closed)
     say(f"written {options.output}")
     return mended.report.ok
 

@@ -13,7 +13,6 @@ from ..cages import Cage
 from ..formats.polygons import polydata_of
 from ..palette import COLOURS, rgb
 from ..regions import Regions
-from ..repair import Repair
 from ..solution import Solution
 
 Say = Callable[[str], None]
@@ -75,29 +74,6 @@ def coloured_cages(cages: Sequence[Cage], poses: Sequence[FloatArray] | None = N
     merged.point_data["region"] = region
     merged.point_data["RGB"] = _colours(region)
     return merged
-
-
-def repaired(surface: pv.PolyData, mended: Repair) -> pv.PolyData:
-    """Return the *mended* mesh with the point arrays of *surface*, and its cell arrays if it can.
-
-    What is new, a lid over a hole, gets zeros.
-    """
-    faces = mended.faces
-    whole = polydata_of(mended.vertices, np.full(len(faces), 3), faces.ravel())
-    _carry(surface.point_data, mended.vertex_map, whole.point_data)
-    if surface.is_all_triangles:  # then its cells are the faces that were mended
-        _carry(surface.cell_data, mended.face_map, whole.cell_data)
-    return whole
-
-
-def _carry(source: Any, origin: IntArray, target: Any) -> None:
-    new = origin < 0
-    for name, values in source.items():
-        array = np.asarray(values)
-        if array.dtype.kind in "biuf":
-            carried = array[np.where(new, 0, origin)]
-            carried[new] = 0
-            target[name] = carried
 
 
 def _colours(region: IntArray) -> np.ndarray[Any, np.dtype[np.uint8]]:

@@ -57,12 +57,21 @@ def polygons_of(polydata: pv.PolyData) -> tuple[IntArray, IntArray]:
 
 def triangles_of(polydata: pv.PolyData) -> IntArray:
     """Return (m, 3) faces over the same points; polygons are cut by ear clipping, in order."""
-    counts, corners = polygons_of(polydata)
+    return cut_into_triangles(np.asarray(polydata.points, float), *polygons_of(polydata))[0]
+
+
+def cut_into_triangles(
+    points: FloatArray, counts: IntArray, corners: IntArray
+) -> tuple[IntArray, IntArray]:
+    """Return (m, 3) faces, by ear clipping, and which polygon each was cut from, (m,) int."""
+    number = np.arange(len(counts))
     if (counts == 3).all():
-        return corners.reshape(-1, 3)
-    cut = polydata_of(np.asarray(polydata.points, dtype=float), counts, corners).triangulate()
+        return corners.reshape(-1, 3), number
+    surface = polydata_of(points, counts, corners)
+    surface.cell_data["polygon"] = number
+    cut = surface.triangulate()
     faces: IntArray = cut.regular_faces.astype(np.int64)
-    return faces
+    return faces, np.asarray(cut.cell_data["polygon"], dtype=np.int64)
 
 
 def rows(counts: IntArray, corners: IntArray) -> list[list[int]]:

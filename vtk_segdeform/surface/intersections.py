@@ -21,9 +21,11 @@ Source
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
 
@@ -31,6 +33,7 @@ _TOUCH = 1e-12  # of a pair's extent: closer than this, triangles touch and plan
 _FOLD = 1e-9  # radians between two faces folded over their common edge
 _NEEDLE = 1e-10  # height of a face over its longest edge: below it has no plane
 _BATCH = 200_000  # pairs of boxes looked at together
+_FACES = 10_000  # faces whose neighbourhood is searched together
 
 _EDGES = ((0, 1), (1, 2), (2, 0))
 _OPPOSITE = ((1, 2),)  # the edge opposite to a shared corner that was rolled to the front
@@ -66,6 +69,50 @@ def self_intersections(vertices: ArrayLike, faces: ArrayLike) -> IntArray:
         found.append(pairs[_meet(points, triangles[pairs[:, 0]], triangles[pairs[:, 1]])])
     hits = np.sort(np.concatenate(found), axis=1)
     return hits[np.lexsort((hits[:, 1], hits[:, 0]))]
+
+
+def intersections_of(vertices: FloatArray, faces: IntArray, some: IntArray) -> IntArray:
+    """Return the pairs that `self_intersections` would, but only those of the faces *some* (s,).
+
+    Costs as much as there are faces near those, not as there are in all.
+
+    Returns
+    -------
+    pairs : (k, 2) int
+        One of *some* first; a pair of two of them stands there once either way.
+    """
+    corners = vertices[faces]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    found = [np.empty((0, 2), dtype=np.int64)]
+    for pairs in _boxes_near(low, high, some):
+        found.append(pairs[_meet(vertices, faces[pairs[:, 0]], faces[pairs[:, 1]])])
+    return np.concatenate(found)
+
+
+def _boxes_near(low: FloatArray, high: FloatArray, some: IntArray) -> Iterator[IntArray]:
+    """Yield the pairs of *some* boxes and any others that overlap or touch, sizes sorted apart.
+
+    Boxes of about one size are found by their centres, so that a large one costs the small ones
+    nothing.
+    """
+    centre, radius = 0.5 * (low + high), 0.5 * np.linalg.norm(high - low, axis=1)
+    size = np.frexp(radius)[1]
+    trees = {}
+    for grade in np.unique(size):
+        ids = np.flatnonzero(size == grade)
+        trees[grade] = ids, cKDTree(centre[ids])
+    for grade in np.unique(size[some]):
+        mine = some[size[some] == grade]
+        for ids, tree in trees.values():
+            reach = float(radius[mine].max() + radius[ids].max()) * (1.0 + 1e-12)
+            for start in range(0, len(mine), _FACES):
+                part = mine[start : start + _FACES]
+                lists = tree.query_ball_point(centre[part], reach)
+                count = np.array([len(near) for near in lists])
+                i = np.repeat(part, count)
+                j = ids[np.fromiter(chain.from_iterable(lists), np.int64, int(count.sum()))]
+                keep = ((low[i] <= high[j]) & (low[j] <= high[i])).all(axis=1) & (i != j)
+                yield np.stack([i[keep], j[keep]], axis=1)
 
 
 def flat_faces(vertices: FloatArray, faces: IntArray) -> IntArray:

@@ -1,7 +1,8 @@
 """The steps of a repair: each takes a draft of the mesh, and returns a better one and a sentence.
 
-A step that finds nothing to do returns its draft and "".  The steps from `split` on want every edge
-to be sound; where one is left that is not, they leave the mesh alone, and the report says why.
+A step that finds nothing to do returns its draft and ""; several sentences stand on lines of
+their own.  The steps from `split` on want every edge to be sound; where one is left that is not,
+they leave the mesh alone, and the report says why.
 """
 
 from __future__ import annotations
@@ -11,9 +12,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy import sparse
 from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from .borders import border_loops
+from .cracks import close_cracks
 from .holes import close_holes
 from .shells import wrong_way_round
 from .splitting import split_fans
@@ -29,12 +33,26 @@ from .topology import (
 
 @dataclass(frozen=True)
 class Draft:
-    """A mesh under repair; the maps name what each vertex and face was, -1 for a new one."""
+    """A mesh under repair; the maps name what each vertex and face was, -1 for a new one.
+
+    *mix* (n, o) has the shares of the o original vertices in each vertex, *turned* (m,) tells
+    which faces were turned round.
+    """
 
     vertices: FloatArray
     faces: IntArray
     vertex_map: IntArray
     face_map: IntArray
+    mix: sparse.csr_array
+    turned: BoolArray
+
+    @classmethod
+    def of(cls, vertices: FloatArray, faces: IntArray) -> Draft:
+        """Return the draft of a mesh to which nothing is done yet."""
+        n = len(vertices)
+        mix = sparse.eye_array(n, format="csr")
+        turned = np.zeros(len(faces), dtype=bool)
+        return cls(vertices, faces, np.arange(n), np.arange(len(faces)), mix, turned)
 
     @cached_property
     def sides(self) -> Sides:
@@ -43,7 +61,12 @@ class Draft:
 
     def keep_faces(self, keep: BoolArray) -> Draft:
         """Return the draft with only these faces (m,), in their order."""
-        return replace(self, faces=self.faces[keep], face_map=self.face_map[keep])
+        return replace(
+            self,
+            faces=self.faces[keep],
+            face_map=self.face_map[keep],
+            turned=self.turned[keep],
+        )
 
     def keep_vertices(self, keep: BoolArray) -> Draft:
         """Return the draft with only these vertices (n,), which no face may need otherwise."""
@@ -53,11 +76,13 @@ class Draft:
             vertices=self.vertices[keep],
             faces=number[self.faces],
             vertex_map=self.vertex_map[keep],
+            mix=self.mix[np.flatnonzero(keep)],
         )
 
     def turn(self, which: BoolArray) -> Draft:
         """Return the draft with these faces (m,) turned round; their first vertex stays first."""
-        return replace(self, faces=np.where(which[:, None], self.faces[:, [0, 2, 1]], self.faces))
+        faces = np.where(which[:, None], self.faces[:, [0, 2, 1]], self.faces)
+        return replace(self, faces=faces, turned=self.turned ^ which)
 
 
 def drop_non_finite(draft: Draft) -> tuple[Draft, str]:
@@ -108,6 +133,35 @@ def weld(draft: Draft, distance: float) -> tuple[Draft, str]:
     return welded, sentence + (f" and drops {_n(collapsed, 'face')}" if collapsed.any() else "")
 
 
+def weld_corners(draft: Draft, distance: float) -> tuple[Draft, str]:
+    """Make border vertices one that lie within *distance*, where holes touch in a corner only.
+
+    Without that, two holes would count as one whose border runs through the corner twice.  Where
+    edges would become one, too, nothing is welded: that is for `weld` to decide.
+    """
+    sides, n = draft.sides, len(draft.vertices)
+    border = np.union1d(sides.tail[sides.open], sides.head[sides.open])
+    number = _places(draft.vertices, border, distance)
+    edge = sides.order[sides.first]
+    tail, head = sides.tail[edge], sides.head[edge]
+    while (gone := number != np.arange(n)).any():
+        moved = np.isin(np.arange(n), number[gone])[number]
+        near = moved[tail] | moved[head]
+        one, other = number[tail[near]], number[head[near]]
+        _, which, count = np.unique(
+            edge_keys(one, other, n), return_inverse=True, return_counts=True
+        )
+        clash = (count[which] > 1) | (one == other)
+        if not clash.any():
+            break
+        held = np.isin(number, np.append(one[clash], other[clash]))
+        number = np.where(held, np.arange(n), number)
+    if not gone.any():
+        return draft, ""
+    welded = replace(draft, faces=number[draft.faces]).keep_vertices(~gone)
+    return welded, f"weld {_n(gone, 'vertex', 'vertices')} where holes touch"
+
+
 def drop_duplicates(draft: Draft) -> tuple[Draft, str]:
     """Keep one face of those on the same vertices; none of two that wall off body from body."""
     a, b, c = draft.faces.T
@@ -151,6 +205,7 @@ def split(draft: Draft) -> tuple[Draft, str]:
             vertices=np.concatenate([draft.vertices, draft.vertices[copied]]),
             faces=faces,
             vertex_map=np.concatenate([draft.vertex_map, draft.vertex_map[copied]]),
+            mix=sparse.vstack([draft.mix, draft.mix[copied]], format="csr"),
         ),
         sentence,
     )
@@ -184,22 +239,58 @@ def fill(draft: Draft, largest: int) -> tuple[Draft, str]:
     """Close holes of up to *largest* edges, at most with one new vertex each."""
     if len(draft.sides.crowded) or draft.sides.turned.any():
         return draft, ""
-    sizes, centres, lids = close_holes(draft.vertices, draft.sides, largest)
+    closing = close_holes(draft.vertices, draft.sides, largest)
+    sizes, new = closing.sizes, len(closing.vertices)
     if not sizes:
         return draft, ""
     few, many = min(sizes), max(sizes)
     sentence = f"fill {_n(sizes, 'hole')} of {few if few == many else f'{few} to {many}'} edges"
-    sentence += f" with {_n(lids, 'triangle')}"
+    sentence += f" with {_n(closing.faces, 'triangle')}"
+    sentence += f" and {_n(closing.vertices, 'new vertex', 'new vertices')}" if new else ""
+    if closing.n_crossing:
+        lids = "1 lid crosses" if closing.n_crossing == 1 else f"{closing.n_crossing} lids cross"
+        sentence += f"\n{lids} the surface or another lid; none was found that does not"
+    rows = np.repeat(np.arange(new), closing.sources.shape[1])
+    mix = sparse.coo_array(
+        (closing.weights.ravel(), (rows, closing.sources.ravel())),
+        shape=(new, len(draft.vertices)),
+    )
     return (
         replace(
             draft,
-            vertices=np.concatenate([draft.vertices, centres]),
-            faces=np.concatenate([draft.faces, lids]),
-            vertex_map=np.append(draft.vertex_map, np.full(len(centres), -1)),
-            face_map=np.append(draft.face_map, np.full(len(lids), -1)),
+            vertices=np.concatenate([draft.vertices, closing.vertices]),
+            faces=np.concatenate([draft.faces, closing.faces]),
+            vertex_map=np.append(draft.vertex_map, np.full(new, -1)),
+            face_map=np.append(draft.face_map, np.full(len(closing.faces), -1)),
+            turned=np.append(draft.turned, np.zeros(len(closing.faces), dtype=bool)),
+            mix=sparse.vstack([draft.mix, mix.tocsr() @ draft.mix], format="csr"),
         ),
-        sentence + (f" and {_n(centres, 'new vertex', 'new vertices')}" if len(centres) else ""),
+        sentence,
     )
+
+
+def close_flat(draft: Draft) -> tuple[Draft, str]:
+    """Cut the faces beside lids without area, where a vertex lies on their side, instead."""
+    lids = draft.face_map < 0
+    faces, changed = close_cracks(draft.vertices, draft.faces, lids)
+    if not changed.any():
+        return draft, ""
+    order = np.argsort(lids | changed, kind="stable")
+    cut = replace(
+        draft,
+        faces=faces[order],
+        face_map=np.where(changed, -1, draft.face_map)[order],
+        turned=(draft.turned & ~changed)[order],
+    )
+    return cut, f"cut {_n(changed & ~lids, 'face')} at vertices on a side, to close cracks"
+
+
+def holes_beyond(draft: Draft, largest: int) -> tuple[int, ...]:
+    """Return the numbers of edges of the holes that `fill` leaves for their size alone."""
+    if len(draft.sides.crowded) or draft.sides.turned.any():
+        return ()
+    loops = border_loops(draft.vertices, draft.sides, len(draft.sides.open))
+    return tuple(sorted(len(loop) for loop in loops if len(loop) > largest))
 
 
 def turn_outward(draft: Draft) -> tuple[Draft, str]:

@@ -56,9 +56,9 @@ class Kind(enum.Enum):
         "open edge",
         "open edges",
         "",
-        "`repair` would weld vertices that coincide along them, then fill small holes",
+        "`repair` would weld vertices that coincide along them, then fill holes",
     )
-    HOLE = "hole", "holes", "at vertex ", "`repair` would fill the small ones"
+    HOLE = "hole", "holes", "at vertex ", "`repair` would fill those of up to `largest_hole` edges"
     NON_MANIFOLD_EDGE = (
         "non-manifold edge",
         "non-manifold edges",

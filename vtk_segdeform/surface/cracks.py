@@ -1,0 +1,65 @@
+"""Give up flat lids: cut the face beyond at the corner that lies on its side.
+
+A crack whose border runs straight there and back, where a vertex lies on the side of a face instead
+of at its corner, has no lid with area.  The flat triangle over it and the face beyond its longest
+side become the two halves of that face.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import BoolArray, FloatArray, IntArray
+from .quality import least_angle, normals
+from .topology import Sides, edge_keys
+
+_FLAT = 1e-9  # radians
+
+
+def close_cracks(
+    vertices: FloatArray, faces: IntArray, lids: BoolArray
+) -> tuple[IntArray, BoolArray]:
+    """Return *faces* (m, 3) with flat ones among the *lids* (m,) used up, and which ones changed.
+
+    A lid stays flat where the halves would be flat too, fold, or need an edge that is there.
+    """
+    changed = np.zeros(len(faces), dtype=bool)
+    while True:
+        flat = np.flatnonzero(lids & (least_angle(vertices[faces]) <= _FLAT))
+        cut, beyond, halves = _halves(vertices, faces, flat)
+        if not len(cut):
+            return faces, changed
+        faces = faces.copy()
+        faces[cut], faces[beyond] = halves[:, 0], halves[:, 1]
+        changed[cut] = changed[beyond] = True
+
+
+def _halves(
+    vertices: FloatArray, faces: IntArray, flat: IntArray
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Return flat faces (k,), the faces beyond their longest sides (k,), and halves (k, 2, 3)."""
+    sides = Sides(faces, len(vertices))
+    partner = np.full(3 * len(faces), -1)
+    one, other = sides.pairs[~sides.turned].T
+    partner[one], partner[other] = other, one
+    corners = vertices[faces[flat]]
+    length = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    side = 3 * flat + length.argmax(axis=1)
+    known = partner[side] >= 0
+    flat, side = flat[known], side[known]
+    across = partner[side]
+    beyond = across // 3
+    a, b = sides.tail[side], sides.head[side]
+    c = faces[flat, (side % 3 + 2) % 3]
+    d = faces[beyond, (across % 3 + 2) % 3]
+    halves = np.stack([np.stack([a, d, c], axis=1), np.stack([d, b, c], axis=1)], axis=1)
+    good = (least_angle(vertices[halves]) > _FLAT).all(axis=1) & (c != d)
+    up = normals(vertices[faces[beyond]])
+    good &= ((normals(vertices[halves]) * up[:, None]).sum(axis=2) > 0.0).all(axis=1)
+    keys = edge_keys(c, d, len(vertices))
+    good &= ~np.isin(keys, sides.keys)
+    # One cut to a face and to an edge at a time.
+    some = np.flatnonzero(good)
+    some = some[np.unique(beyond[some], return_index=True)[1]]
+    some = some[np.unique(keys[some], return_index=True)[1]]
+    return flat[some], beyond[some], halves[some]
