@@ -42,8 +42,9 @@ STORY = [
     "editing.listeners", "editing.naming", "editing.state", "editing.history", "editing.painting",
     "editing.handles", "editing.posing", "session", "editing.archive", "store",
     # meshes from code, from files, and as pictures
-    "modelling.remeshing", "modelling.implicit", "models", "formats.polygons", "formats.off",
-    "formats.ply", "formats.wavefront", "formats.vtk_readers", "formats.meshlab_layers", "meshlab",
+    "modelling.remeshing", "modelling.implicit", "models", "formats.array_names",
+    "formats.polygons", "formats.off", "formats.ply_tables", "formats.ply", "formats.wavefront",
+    "formats.vtk_readers", "formats.meshlab_layers", "meshlab",
     "convert", "meshlab_project", "palette", "canvas", "pictures",
     # a VTK pipeline
     "formats.vtk_surfaces", "filter_settings", "filters", "paraview_plugin",
@@ -115,6 +116,7 @@ GRANTED = {
     **{f"compiled.{name}": {"numba"} for name in KERNELS},
     "caging.contour": VTK,
     "modelling.implicit": VTK,
+    "formats.array_names": VTK | {"pyvista"},
     "formats.polygons": VTK | {"pyvista"},
     "formats.off": {"pyvista"},
     "formats.ply": {"pyvista"},
