@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Container, Iterable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import pyvista as pv
@@ -59,7 +58,10 @@ def plain_names(
 
 def _plain(name: str, *, blanks: bool) -> str:
     letters = [c if c.isprintable() and (blanks or c != " ") else "_" for c in name[:_LONGEST]]
-    return "".join(letters).strip() or "unnamed"
+    name = "".join(letters).strip()
+    if name.endswith("\\"):  # in OBJ the next line would belong to it
+        name = name[:-1] + "_"
+    return name or "unnamed"
 
 
 def warn_renamed(what: str, names: dict[str, str]) -> None:
