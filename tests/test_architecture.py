@@ -43,7 +43,8 @@ STORY = [
     "editing.handles", "editing.posing", "session", "editing.archive", "store",
     # meshes from code, from files, and as pictures
     "modelling.remeshing", "modelling.implicit", "models", "formats.array_names",
-    "formats.polygons", "formats.off", "formats.ply_tables", "formats.ply", "formats.wavefront",
+    "formats.neighbours", "formats.polygons", "formats.off", "formats.ply_tables", "formats.ply",
+    "formats.wavefront", "formats.stl", "formats.gltf_buffers", "formats.gltf",
     "formats.vtk_readers", "formats.meshlab_layers", "meshlab",
     "convert", "meshlab_project", "palette", "canvas", "pictures",
     # a VTK pipeline
@@ -121,6 +122,8 @@ GRANTED = {
     "formats.off": {"pyvista"},
     "formats.ply": {"pyvista"},
     "formats.wavefront": {"pyvista"},
+    "formats.stl": {"pyvista"},
+    "formats.gltf": {"pyvista"},
     "formats.vtk_readers": {"pyvista", *VTK},
     "formats.meshlab_layers": {"pyvista"},
     "meshlab": {"pymeshlab", "pyvista"},

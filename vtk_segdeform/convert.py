@@ -24,9 +24,11 @@ from numpy.typing import ArrayLike
 from . import meshlab
 from .arrays import as_points
 from .errors import ArgumentError, MeshError
+from .formats.gltf import read_gltf
 from .formats.off import read_off, write_off
 from .formats.ply import read_ply, write_ply
 from .formats.polygons import polydata_of, triangles_of
+from .formats.stl import read_stl
 from .formats.vtk_readers import read_with_vtk, write_with_vtk
 from .formats.wavefront import read_obj, write_obj
 from .mesh import Mesh
@@ -34,12 +36,13 @@ from .mesh import Mesh
 _log = logging.getLogger(__name__)
 
 _READERS: dict[str, Callable[[Path], pv.PolyData]] = {
-    ".obj": read_obj, ".off": read_off, ".ply": read_ply,
+    ".glb": read_gltf, ".gltf": read_gltf, ".obj": read_obj, ".off": read_off, ".ply": read_ply,
+    ".stl": read_stl,
 }  # fmt: skip
 _WRITERS: dict[str, Callable[[Path, pv.PolyData], None]] = {
     ".obj": write_obj, ".off": write_off, ".ply": write_ply,
 }  # fmt: skip
-_VTK_READS = frozenset({".stl", ".vtk", ".vtp", ".vtu", ".vtkhdf", ".glb", ".gltf"})
+_VTK_READS = frozenset({".vtk", ".vtp", ".vtu", ".vtkhdf"})
 _VTK_WRITES = frozenset({".stl", ".vtk", ".vtp", ".vtkhdf"})
 _HOLD_ARRAYS = frozenset({".ply", ".vtk", ".vtp", ".vtkhdf"})
 

@@ -25,7 +25,7 @@ from ..arrays import IntArray
 from ..errors import MeshError
 from .array_names import plain_names, warn_left_out, warn_renamed
 from .ply_tables import Lists, Table, tables_of
-from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of
+from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of, unstripped
 
 _log = logging.getLogger(__name__)
 _WORDS = {
@@ -56,7 +56,7 @@ def read_ply(path: Path) -> pv.PolyData:
         raise MeshError("the PLY file has no faces and no triangle strips")
     counts, corners = polygons or (_NO_NUMBERS, _NO_NUMBERS)
     if strips is not None:
-        triangles = _unstripped(*strips)
+        triangles = unstripped(*strips)
         face = {} if len(triangles) else face  # its numbers are not those of the triangles
         counts = np.concatenate([counts, np.full(len(triangles), 3)])
         corners = np.concatenate([corners, triangles.ravel()])
@@ -90,22 +90,6 @@ def _corners(table: Table) -> Lists | None:
     if not (np.abs(values.astype(float)) < 2**53).all() or (values != np.rint(values)).any():
         raise MeshError("a face of the PLY file has a corner that is no whole number")
     return Lists(lengths, values.astype(np.int64))
-
-
-def _unstripped(lengths: IntArray, values: IntArray) -> IntArray:
-    """Return the (m, 3) triangles of strips, all oriented as the first of each.
-
-    Triangles that name a vertex twice only join one part of a strip to the next.
-    """
-    values = np.insert(values, np.cumsum(lengths), -1)  # after each strip
-    number = np.arange(len(values))
-    begun = np.maximum.accumulate(np.where(values == -1, number + 1, 0))  # of the strip it is in
-    triangles = np.stack([values[:-2], values[1:-1], values[2:]], axis=-1)
-    odd = (number - begun)[:-2] % 2 == 1
-    triangles[odd] = triangles[odd][:, [1, 0, 2]]
-    a, b, c = triangles.T
-    whole: IntArray = triangles[(triangles != -1).all(axis=1) & (a != b) & (b != c) & (c != a)]
-    return whole
 
 
 def _keep_arrays(table: Table, attributes: Any) -> None:

@@ -67,6 +67,22 @@ def polygons_of(polydata: pv.PolyData) -> tuple[IntArray, IntArray]:
     return result
 
 
+def unstripped(lengths: IntArray, values: IntArray) -> IntArray:
+    """Return the (m, 3) triangles of strips, all oriented as the first of each.
+
+    Triangles that name a vertex twice only join one part of a strip to the next.
+    """
+    values = np.insert(values, np.cumsum(lengths), -1)  # after each strip
+    number = np.arange(len(values))
+    begun = np.maximum.accumulate(np.where(values == -1, number + 1, 0))  # of the strip it is in
+    triangles = np.stack([values[:-2], values[1:-1], values[2:]], axis=-1)
+    odd = (number - begun)[:-2] % 2 == 1
+    triangles[odd] = triangles[odd][:, [1, 0, 2]]
+    a, b, c = triangles.T
+    whole: IntArray = triangles[(triangles != -1).all(axis=1) & (a != b) & (b != c) & (c != a)]
+    return whole
+
+
 def cells_of(polydata: pv.PolyData) -> IntArray:
     """Return for each polygon of `polygons_of` the number of its cell, its row in the cell data."""
     lengths = []
