@@ -45,7 +45,7 @@ STORY = [
     "modelling.remeshing", "modelling.implicit", "models", "formats.array_names",
     "formats.neighbours", "formats.polygons", "formats.off", "formats.ply_tables", "formats.ply",
     "formats.wavefront", "formats.stl", "formats.gltf_buffers", "formats.gltf",
-    "formats.vtk_readers", "formats.meshlab_layers", "meshlab",
+    "formats.reading_child", "formats.isolated", "formats.vtk_readers", "formats.meshlab_layers", "meshlab",
     "convert", "meshlab_project", "palette", "canvas", "pictures",
     # a VTK pipeline
     "formats.vtk_surfaces", "filter_settings", "filters", "paraview_plugin",

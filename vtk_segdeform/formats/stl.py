@@ -56,7 +56,7 @@ def _of_text(data: bytes) -> Any:
 
 
 def _merged(corners: Any) -> tuple[Any, Any]:
-    """Return the different rows (n, 3), by first place, and the number of each corner among them."""
+    """Return the different rows (n, 3), by first place, and each corner's number among them."""
     if not len(corners):
         return np.empty((0, 3)), np.empty(0, dtype=np.int64)
     x, y, z = corners.astype("<f4").view("<u4").astype("u8").T

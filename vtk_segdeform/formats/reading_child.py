@@ -1,0 +1,117 @@
+"""What a process of its own does to read a file with VTK or PyMeshLab; `isolated` starts it.
+
+    python reading_child.py vtk|meshlab FILE FOLDER BYTES
+
+It asks for no more than about BYTES of memory, and leaves in FOLDER what it found: 0.vtp, 1.vtu
+..., surfaces and grids; or mesh.npz, vertices and faces.  What it cannot read it says in said.txt.
+Either library may end the process on the way, which is what the process is for.  It imports
+nothing of this package, so that it starts in a fraction of a second.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+# The readers of `convert`'s VTK formats: module and class.
+_READERS = {
+    ".vtk": ("vtkIOLegacy", "vtkDataSetReader"),
+    ".vtp": ("vtkIOXML", "vtkXMLPolyDataReader"),
+    ".vtu": ("vtkIOXML", "vtkXMLUnstructuredGridReader"),
+    ".vtkhdf": ("vtkIOHDF", "vtkHDFReader"),
+}
+_WRITERS = {
+    "vtkPolyData": (".vtp", "vtkXMLPolyDataWriter"),
+    "vtkUnstructuredGrid": (".vtu", "vtkXMLUnstructuredGridWriter"),
+}
+_LEGACY = (
+    "ColorScalars", "Fields", "Normals", "Scalars", "TCoords", "Tensors", "Vectors",
+)  # fmt: skip
+
+
+def main(tool: str, path: str, folder: str, limit: str) -> None:
+    """Read one file."""
+    try:
+        {"vtk": _with_vtk, "meshlab": _with_meshlab}[tool](Path(path), Path(folder), int(limit))
+    except (RuntimeError, ValueError, MemoryError, OSError, ImportError) as error:
+        said = str(error) or type(error).__name__
+        (Path(folder) / "said.txt").write_text(said, encoding="utf-8", errors="replace")
+
+
+def _with_vtk(path: Path, folder: Path, limit: int) -> None:
+    core = importlib.import_module("vtkmodules.vtkCommonCore")
+    module, name = _READERS[path.suffix.lower()]
+    reader = getattr(importlib.import_module(f"vtkmodules.{module}"), name)()
+    writers = importlib.import_module("vtkmodules.vtkIOXML")
+    _limit_memory(limit)
+    window = core.vtkStringOutputWindow()
+    core.vtkOutputWindow.SetInstance(window)
+    reader.SetFileName(str(path))
+    if path.suffix.lower() == ".vtk":
+        for sort in _LEGACY:
+            getattr(reader, f"ReadAll{sort}On")()
+    reader.Update()
+    if "ERROR:" in window.GetOutput():
+        raise ValueError(window.GetOutput())
+    for number, piece in enumerate(_pieces(reader.GetOutputDataObject(0))):
+        sort = piece.GetClassName()
+        if sort not in _WRITERS:
+            raise ValueError(f"it holds a {sort}, not a surface")
+        suffix, name = _WRITERS[sort]
+        writer = getattr(writers, name)()
+        writer.SetFileName(str(folder / f"{number}{suffix}"))
+        writer.SetInputData(piece)
+        writer.SetDataModeToAppended()
+        writer.EncodeAppendedDataOff()
+        writer.SetCompressorTypeToNone()
+        writer.SetHeaderTypeToUInt64()
+        if not writer.Write() or "ERROR:" in window.GetOutput():
+            raise ValueError(window.GetOutput() or "what was read cannot be handed on")
+
+
+def _pieces(data: Any) -> Iterator[Any]:
+    """Yield the data sets that *data* is, or is composed of, if they have cells."""
+    if data is None:
+        return
+    if not data.IsA("vtkCompositeDataSet"):
+        yield data
+        return
+    places = data.NewIterator()
+    places.InitTraversal()
+    while not places.IsDoneWithTraversal():
+        if places.GetCurrentDataObject().GetNumberOfCells():
+            yield places.GetCurrentDataObject()
+        places.GoToNextItem()
+
+
+def _with_meshlab(path: Path, folder: Path, limit: int) -> None:
+    meshset = importlib.import_module("pymeshlab").MeshSet(verbose=False)
+    _limit_memory(limit)
+    meshset.load_new_mesh(str(path))
+    if meshset.mesh_number() > 1:
+        meshset.generate_by_merging_visible_meshes(mergevertices=False)
+    mesh = meshset.current_mesh()
+    np.savez(folder / "mesh.npz", vertices=mesh.vertex_matrix(), faces=mesh.face_matrix())
+
+
+def _limit_memory(most: int) -> None:
+    """Let this process have *most* bytes more than it has; nothing where there is no such limit."""
+    try:
+        resource: Any = importlib.import_module("resource")
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+        most += pages * resource.getpagesize()
+        _, hard = resource.getrlimit(resource.RLIMIT_AS)
+        if hard != resource.RLIM_INFINITY:
+            most = min(most, hard)
+        resource.setrlimit(resource.RLIMIT_AS, (most, hard))
+    except (ImportError, OSError, ValueError):
+        return
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
