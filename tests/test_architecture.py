@@ -45,8 +45,9 @@ STORY = [
     "modelling.remeshing", "modelling.implicit", "models", "formats.array_names",
     "formats.neighbours", "formats.polygons", "formats.off", "formats.ply_tables", "formats.ply",
     "formats.wavefront", "formats.stl", "formats.gltf_buffers", "formats.gltf",
-    "formats.reading_child", "formats.isolated", "formats.vtk_readers", "formats.meshlab_layers", "meshlab",
-    "convert", "meshlab_project", "palette", "canvas", "pictures",
+    "formats.reading_child", "formats.isolated", "formats.vtk_readers", "formats.vtk_writers",
+    "formats.meshlab_layers", "meshlab", "convert", "meshlab_project", "palette", "canvas",
+    "pictures",
     # a VTK pipeline
     "formats.vtk_surfaces", "filter_settings", "filters", "paraview_plugin",
     # a view, and widgets in it
@@ -124,7 +125,8 @@ GRANTED = {
     "formats.wavefront": {"pyvista"},
     "formats.stl": {"pyvista"},
     "formats.gltf": {"pyvista"},
-    "formats.vtk_readers": {"pyvista", *VTK},
+    "formats.vtk_readers": {"pyvista"},
+    "formats.vtk_writers": {"pyvista", *VTK},
     "formats.meshlab_layers": {"pyvista"},
     "meshlab": {"pymeshlab", "pyvista"},
     "meshlab_project": {"pyvista"},

@@ -29,7 +29,8 @@ from .formats.off import read_off, write_off
 from .formats.ply import read_ply, write_ply
 from .formats.polygons import polydata_of, triangles_of
 from .formats.stl import read_stl
-from .formats.vtk_readers import read_with_vtk, write_with_vtk
+from .formats.vtk_readers import read_with_vtk
+from .formats.vtk_writers import write_with_vtk
 from .formats.wavefront import read_obj, write_obj
 from .mesh import Mesh
 

@@ -8,14 +8,14 @@ line prints.  The file itself is valid either way.
 from __future__ import annotations
 
 import logging
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 
 import numpy as np
 import pyvista as pv
 from vtkmodules.vtkCommonCore import vtkStringArray
 
 _log = logging.getLogger(__name__)
-_LONGEST = 200  # letters; readers written in C keep a line in a buffer of fixed size
+_LONGEST = 200  # readers written in C keep a name in a buffer of fixed size
 
 
 def decoded(data: bytes) -> str:
@@ -27,7 +27,11 @@ def decoded(data: bytes) -> str:
 
 
 def plain_names(
-    names: Iterable[str], reserved: Container[str] = (), *, blanks: bool = False
+    names: Iterable[str],
+    reserved: Container[str] = (),
+    *,
+    refused: str = "",
+    measure: Callable[[str], int] = len,
 ) -> dict[str, str]:
     """Return the name to write for each of *names*; no two are equal, valid ones stay.
 
@@ -37,11 +41,13 @@ def plain_names(
         Any text.
     reserved : container of str
         Names that mean something else in the file.
-    blanks : bool
-        Whether a space may be inside a name.
+    refused : str
+        Letters that cannot be in a name; those that are not printable never can.
+    measure : callable
+        How long a name is in the file; names of over 200 are cut.
     """
     wanted = dict.fromkeys(names)
-    plain = {name: _plain(name, blanks=blanks) for name in wanted}
+    plain = {name: _plain(name, refused, measure) for name in wanted}
     result = {name: name for name in wanted if plain[name] == name and name not in reserved}
     taken = set(result)
     for name in wanted:
@@ -56,12 +62,14 @@ def plain_names(
     return {name: result[name] for name in wanted}
 
 
-def _plain(name: str, *, blanks: bool) -> str:
-    letters = [c if c.isprintable() and (blanks or c != " ") else "_" for c in name[:_LONGEST]]
-    name = "".join(letters).strip()
-    if name.endswith("\\"):  # in OBJ the next line would belong to it
-        name = name[:-1] + "_"
-    return name or "unnamed"
+def _plain(name: str, refused: str, measure: Callable[[str], int]) -> str:
+    letters = [c if c.isprintable() and c not in refused else "_" for c in name[:_LONGEST]]
+    text = "".join(letters).strip()
+    while measure(text) > _LONGEST:
+        text = text[:-1]
+    if text.endswith("\\"):  # in OBJ the next line would belong to it
+        text = text[:-1] + "_"
+    return text or "unnamed"
 
 
 def warn_renamed(what: str, names: dict[str, str]) -> None:

@@ -1,8 +1,9 @@
 """Reading files with native libraries in a process of its own, with limits of memory and time.
 
-The readers of VTK and PyMeshLab believe what a file says: a wrong count, a deep nesting or an entity
-that is a million others ends the process that reads it.  So another one does, `reading_child`, and
-what it found comes back through files that VTK itself has written.  It starts in 0.3 s.
+The readers of VTK and PyMeshLab believe what a file says: a wrong count, a deep nesting or an
+entity that is a million others ends the process that reads it.  So another one does,
+`reading_child`, and what it found comes back through files that VTK has written.  It starts in
+0.3 s.
 
 A program that is frozen, or runs in another one, has no Python to start: it reads in its own
 process, and logs a warning.

@@ -166,7 +166,7 @@ def _columns(
             kept.append(name)
         elif (numeric := _column(values)) is not None:
             numbers[name] = numeric
-    names = plain_names(numbers, reserved)
+    names = plain_names(numbers, reserved, refused=" ")
     warn_renamed(f"{sort} array", names)
     return columns | {names[name]: values for name, values in numbers.items()}, [*kept, *numbers]
 

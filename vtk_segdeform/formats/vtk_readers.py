@@ -1,4 +1,4 @@
-"""Surfaces through VTK's own readers and writers, whose complaints become errors of ours."""
+"""Surfaces through VTK's own readers, whose complaints become errors of ours."""
 
 from __future__ import annotations
 
@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
 from ..errors import MeshError
-from .array_names import warn_left_out
 from .isolated import read_apart
 from .polygons import polydata_of
 
@@ -113,32 +111,6 @@ def _decoded(word: bytes) -> bytes:
         return base64.b64decode(word)[:24]
     except ValueError:
         return b""
-
-
-def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
-    """Write a surface through one of VTK's writers; OSError unless it is there, and whole.
-
-    On a full disk VTK's XML writer ends the process, and its HDF writer leaves half a file and
-    says nothing.  So the first writes into memory, and what the second wrote is read again.
-    """
-    if path.suffix == ".vtp":
-        writer = vtkXMLPolyDataWriter()
-        writer.SetInputData(surface)
-        writer.SetDataModeToBinary()
-        writer.WriteToOutputStringOn()
-        writer.Write()
-        path.write_text(writer.GetOutputString(), encoding="utf-8")
-        return
-    if path.suffix == ".stl":
-        warn_left_out("STL", surface, {})
-    try:
-        with pv.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
-            surface.save(path)
-        again = pv.read(path) if path.suffix == ".vtkhdf" else surface
-    except (RuntimeError, MeshError) as error:
-        raise OSError(_said(error)) from None
-    if not np.array_equal(again.points, surface.points, equal_nan=True):
-        raise OSError("what was written is not all of it")
 
 
 def _surface(data: pv.DataSet) -> pv.PolyData:

@@ -156,7 +156,7 @@ def write_obj(path: Path, surface: pv.PolyData) -> None:
     kept: dict[str, list[str]] = {"point": [], "cell": [], "field": []}
     texture, texture_of = _texture(surface, counts, corners, kept)
     tags = _tags(surface, cells, kept)
-    libraries = plain_names(get_names(surface, _LIBRARY), blanks=True)
+    libraries = plain_names(get_names(surface, _LIBRARY))
     warn_renamed("material library", libraries)
     kept["field"] += [_LIBRARY] if libraries else []
     table = np.asarray(surface.points, dtype=float)
@@ -209,7 +209,7 @@ def _tags(surface: pv.PolyData, cells: IntArray, kept: dict[str, list[str]]) -> 
         numbers = _whole_numbers(surface.cell_data.get(key), len(names))
         if numbers is None:
             continue
-        written = plain_names(names, blanks=True)
+        written = plain_names(names)
         warn_renamed(key.lower(), written)
         lines.append([f"{word} {written[names[k]]}\n" for k in numbers[cells].tolist()])
         kept["cell"].append(key)
