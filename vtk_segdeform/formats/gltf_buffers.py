@@ -99,7 +99,6 @@ class Document:
             raise MeshError(f"{name} is of type {type_!r}; must be {' or '.join(types)}")
         kind, count = _component(accessor, name), whole(accessor, "count", name, least=1)
         shape = (count, _WIDTHS[type_])
-        self.spend(count)
         if "bufferView" in accessor:
             start = whole(accessor, "byteOffset", name, default=0)
             array = self._viewed(accessor["bufferView"], start, shape, kind)
@@ -107,6 +106,7 @@ class Document:
             raise MeshError(f"{name} says {count} elements, and has no buffer for them")
         else:
             array = np.zeros(shape, dtype=kind)
+        self.spend(count)
         if "sparse" in accessor:
             array = self._replaced(array, object_(accessor, "sparse", name), name)
         if accessor.get("normalized") is True and array.dtype.kind in "iu":

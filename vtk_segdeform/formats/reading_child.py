@@ -90,11 +90,15 @@ def _pieces(data: Any) -> Iterator[Any]:
 
 
 def _with_meshlab(path: Path, folder: Path, limit: int) -> None:
-    meshset = importlib.import_module("pymeshlab").MeshSet(verbose=False)
+    pymeshlab = importlib.import_module("pymeshlab")
+    meshset = pymeshlab.MeshSet(verbose=False)
     _limit_memory(limit)
-    meshset.load_new_mesh(str(path))
-    if meshset.mesh_number() > 1:
-        meshset.generate_by_merging_visible_meshes(mergevertices=False)
+    try:
+        meshset.load_new_mesh(str(path))
+        if meshset.mesh_number() > 1:
+            meshset.generate_by_merging_visible_meshes(mergevertices=False)
+    except pymeshlab.PyMeshLabException as error:
+        raise ValueError(str(error)) from None
     mesh = meshset.current_mesh()
     np.savez(folder / "mesh.npz", vertices=mesh.vertex_matrix(), faces=mesh.face_matrix())
 
@@ -109,6 +113,7 @@ def _limit_memory(most: int) -> None:
         if hard != resource.RLIM_INFINITY:
             most = min(most, hard)
         resource.setrlimit(resource.RLIMIT_AS, (most, hard))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a crash leaves no file behind
     except (ImportError, OSError, ValueError):
         return
 
