@@ -427,7 +427,7 @@ def test_what_a_file_says_is_not_believed_beyond_its_size(seen):
     refused = {
         path.name for (_, path), (answer, _) in zip(files, told, strict=True) if answer != "read"
     }
-    assert len(refused) > 0.8 * len(files)
+    assert len(refused) > 0.7 * len(files)
 
 
 @pytest.mark.campaign

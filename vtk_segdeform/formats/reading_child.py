@@ -3,7 +3,8 @@
     python reading_child.py vtk|meshlab FILE FOLDER BYTES
 
 It asks for no more than about BYTES of memory, and leaves in FOLDER what it found: 0.vtp, 1.vtu
-..., surfaces and grids; or mesh.npz, vertices and faces.  What it cannot read it says in said.txt.
+..., surfaces and grids, or mesh.npz, vertices and faces.  Letters of names that XML cannot hold are
+written %XX there.  What it cannot read it says in said.txt.
 Either library may end the process on the way, which is what the process is for.  It imports
 nothing of this package, so that it starts in a fraction of a second.
 """
@@ -11,10 +12,12 @@ nothing of this package, so that it starts in a fraction of a second.
 from __future__ import annotations
 
 import importlib
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -29,6 +32,7 @@ _WRITERS = {
     "vtkPolyData": (".vtp", "vtkXMLPolyDataWriter"),
     "vtkUnstructuredGrid": (".vtu", "vtkXMLUnstructuredGridWriter"),
 }
+_REFUSED = re.compile(r"[%<>&\"\x00-\x1f\x7f-\x9f]")
 _LEGACY = (
     "ColorScalars", "Fields", "Normals", "Scalars", "TCoords", "Tensors", "Vectors",
 )  # fmt: skip
@@ -62,6 +66,10 @@ def _with_vtk(path: Path, folder: Path, limit: int) -> None:
         sort = piece.GetClassName()
         if sort not in _WRITERS:
             raise ValueError(f"it holds a {sort}, not a surface")
+        for attributes in (piece.GetPointData(), piece.GetCellData(), piece.GetFieldData()):
+            for k in range(attributes.GetNumberOfArrays()):
+                array = attributes.GetAbstractArray(k)
+                array.SetName(_REFUSED.sub(lambda found: quote(found[0]), array.GetName() or ""))
         suffix, name = _WRITERS[sort]
         writer = getattr(writers, name)()
         writer.SetFileName(str(folder / f"{number}{suffix}"))

@@ -6,6 +6,7 @@ import base64
 import re
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 import pyvista as pv
@@ -43,14 +44,14 @@ def read_with_vtk(path: Path) -> pv.PolyData:
         with read_apart("vtk", path) as folder:
             pieces = sorted(folder.iterdir(), key=lambda piece: int(piece.stem))
             parts = [_sound(pv.get_reader(piece).read()) for piece in pieces]
-    except MeshError as error:
+    except (MeshError, RuntimeError) as error:
         raise MeshError(f"is no readable {suffix} file ({_said(error)})") from None
     surfaces = [_surface(part) for part in parts]
     return surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
 
 
 def _sound(data: pv.DataSet) -> pv.DataSet:
-    """Return *data*; a MeshError if its cells or arrays do not fit its points.
+    """Return *data*, names as they were; a MeshError if cells or arrays do not fit its points.
 
     VTK's readers do not check that, and what uses the cells reads any memory.
     """
@@ -70,10 +71,12 @@ def _sound(data: pv.DataSet) -> pv.DataSet:
     for sort, attributes, count in (
         ("point", data.GetPointData(), data.n_points),
         ("cell", data.GetCellData(), data.n_cells),
+        ("field", data.GetFieldData(), 0),
     ):
         for k in range(attributes.GetNumberOfArrays()):
             array = attributes.GetAbstractArray(k)
-            if array.GetNumberOfTuples() != count:
+            array.SetName(unquote(array.GetName()))
+            if array.GetNumberOfTuples() != count and sort != "field":
                 raise MeshError(
                     f"its {sort} array {array.GetName()!r} has {array.GetNumberOfTuples()} rows; "
                     f"must be {count}"
