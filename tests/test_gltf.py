@@ -302,9 +302,9 @@ def test_a_compressed_primitive_is_not_read_as_zeros(tmp_path):
 
 def test_many_instances_of_many_primitives_are_refused_soon(tmp_path):
     document = octahedron(*OCTAHEDRON)
-    document.head["meshes"][0]["primitives"] *= 2000
-    document.head["nodes"] = [{"mesh": 0} for _ in range(20_000)]
-    document.head["scenes"][0]["nodes"] = list(range(20_000))
+    document.head["meshes"][0]["primitives"] *= 1000
+    document.head["nodes"] = [{"mesh": 0} for _ in range(60_000)]
+    document.head["scenes"][0]["nodes"] = list(range(60_000))
     changed(document.head, "accessors 1 count", 3)
     for primitive in document.head["meshes"][0]["primitives"]:
         primitive["mode"] = 1

@@ -232,11 +232,10 @@ def save_harmed(path, document):
     path.write_text(json.dumps(document.head))
 
 
-def mutants(folder, count, seed):
+def mutants(folder, sound, count, seed):
     """Write *count* harmed files; return [(reader, path)]."""
     rng = np.random.default_rng(seed)
     files = []
-    sound = originals(folder)
     for number in range(count):
         reader, path = sound[number % len(sound)]
         place = folder / f"m{number}{path.suffix}"
@@ -367,9 +366,8 @@ def wrong_among(files, told):
     ]
 
 
-def special(folder):
+def special(folder, sound):
     """Write, or name, what is no file, or another file than its name says."""
-    sound = originals(folder)
     by_suffix = {path.suffix: path for _, path in sound}
     files = []
     for reader, path in sound:
@@ -395,9 +393,10 @@ def special(folder):
 def seen(tmp_path_factory):
     """Have a few files of every kind read, by one program: [(files, answers)] of three sorts."""
     folder = tmp_path_factory.mktemp("files")
-    sound, harmed = originals(folder), mutants(folder, 40, seed=1)
+    sound = originals(folder)
+    harmed = mutants(folder, sound, 34, seed=1)
     (folder / "lies").mkdir()
-    sorts = [sound, harmed, special(folder)[::5], lies(folder / "lies")[::2]]
+    sorts = [sound, harmed, special(folder, sound)[::7], lies(folder / "lies")[::2]]
     before = sorted(folder.rglob("*"))
     told = iter(answers([file for files in sorts for file in files]))
     assert sorted(folder.rglob("*")) == before  # reading writes nothing
@@ -445,10 +444,12 @@ def test_no_lie_is_believed(tmp_path):
 @pytest.mark.campaign
 def test_two_thousand_harmed_files_are_read_or_refused(tmp_path):
     counts, wrong = Counter(), []
+    sound = originals(tmp_path)
     for seed in range(10):
         folder = tmp_path / str(seed)
         folder.mkdir()
-        files = mutants(folder, 200, seed=100 + seed) + ([] if seed else special(tmp_path))
+        files = mutants(folder, sound, 200, seed=100 + seed)
+        files += [] if seed else special(tmp_path, sound)
         told = answers(files)
         counts += Counter(answer for answer, _ in told)
         wrong += wrong_among(files, told)

@@ -164,7 +164,7 @@ def equal(path, surface, again, name, values, other, told):
 
 
 EASY = settings(
-    deadline=None, derandomize=True, max_examples=40,
+    deadline=None, derandomize=True, max_examples=25,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )  # fmt: skip
 

@@ -19,8 +19,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import numpy as np
-
 # The readers of `convert`'s VTK formats: module and class.
 _READERS = {
     ".vtk": ("vtkIOLegacy", "vtkDataSetReader"),
@@ -108,7 +106,8 @@ def _with_meshlab(path: Path, folder: Path, limit: int) -> None:
     except pymeshlab.PyMeshLabException as error:
         raise ValueError(str(error)) from None
     mesh = meshset.current_mesh()
-    np.savez(folder / "mesh.npz", vertices=mesh.vertex_matrix(), faces=mesh.face_matrix())
+    numpy: Any = importlib.import_module("numpy")
+    numpy.savez(folder / "mesh.npz", vertices=mesh.vertex_matrix(), faces=mesh.face_matrix())
 
 
 def _limit_memory(most: int) -> None:
