@@ -56,15 +56,15 @@ def read_apart(tool: str, path: Path) -> Iterator[Path]:
     seconds = _SECONDS + _PER_MEGABYTE * size / 1e6
     with tempfile.TemporaryDirectory(prefix="segdeform-") as name:
         folder = Path(name)
-        words = [tool, str(path.absolute()), name, str(_MEMORY + _PER_BYTE * size)]
         python = _python()
         if python is None:
             _log.warning("%s is read without protection: there is no Python to start", path)
-            reading_child.main(*words)
+            reading_child.main(tool, str(path.absolute()), name, "0")
             code = 0
         else:
             start = _START.format(path=sys.path, tool=tool, child=reading_child.__file__)
             try:
+                words = [tool, str(path.absolute()), name, str(_MEMORY + _PER_BYTE * size)]
                 code = _ended([python, "-S", "-c", start, *words], name, seconds)
             except subprocess.TimeoutExpired:
                 raise MeshError(f"reading it took over {seconds:.0f} s; it was given up") from None

@@ -2,9 +2,9 @@
 
     python reading_child.py vtk|meshlab FILE FOLDER BYTES
 
-It asks for no more than about BYTES of memory, and leaves in FOLDER what it found: 0.vtp, 1.vtu
-..., surfaces and grids, or mesh.npz, vertices and faces.  Letters of names that XML cannot hold are
-written %XX there.  What it cannot read it says in said.txt.
+It asks for no more than about BYTES of memory, if that is not 0.  In FOLDER it leaves what it
+found: 0.vtp, 1.vtu ..., surfaces and grids, or mesh.npz, vertices and faces.  Letters of names that XML
+cannot hold are written %XX there.  What it cannot read it says in said.txt.
 Either library may end the process on the way, which is what the process is for.  It imports
 nothing of this package, so that it starts in a fraction of a second.
 """
@@ -51,33 +51,47 @@ def _with_vtk(path: Path, folder: Path, limit: int) -> None:
     reader = getattr(importlib.import_module(f"vtkmodules.{module}"), name)()
     writers = importlib.import_module("vtkmodules.vtkIOXML")
     _limit_memory(limit)
-    window = core.vtkStringOutputWindow()
+    window, before = core.vtkStringOutputWindow(), core.vtkOutputWindow.GetInstance()
     core.vtkOutputWindow.SetInstance(window)
+    try:
+        _update(reader, path)
+        if "ERROR:" in window.GetOutput():
+            raise ValueError(window.GetOutput())
+        for number, piece in enumerate(_pieces(reader.GetOutputDataObject(0))):
+            _hand_on(piece, folder / str(number), writers)
+            if "ERROR:" in window.GetOutput():
+                raise ValueError(window.GetOutput())
+    finally:
+        core.vtkOutputWindow.SetInstance(before)
+
+
+def _update(reader: Any, path: Path) -> None:
     reader.SetFileName(str(path))
     if path.suffix.lower() == ".vtk":
         for sort in _LEGACY:
             getattr(reader, f"ReadAll{sort}On")()
     reader.Update()
-    if "ERROR:" in window.GetOutput():
-        raise ValueError(window.GetOutput())
-    for number, piece in enumerate(_pieces(reader.GetOutputDataObject(0))):
-        sort = piece.GetClassName()
-        if sort not in _WRITERS:
-            raise ValueError(f"it holds a {sort}, not a surface")
-        for attributes in (piece.GetPointData(), piece.GetCellData(), piece.GetFieldData()):
-            for k in range(attributes.GetNumberOfArrays()):
-                array = attributes.GetAbstractArray(k)
-                array.SetName(_REFUSED.sub(lambda found: quote(found[0]), array.GetName() or ""))
-        suffix, name = _WRITERS[sort]
-        writer = getattr(writers, name)()
-        writer.SetFileName(str(folder / f"{number}{suffix}"))
-        writer.SetInputData(piece)
-        writer.SetDataModeToAppended()
-        writer.EncodeAppendedDataOff()
-        writer.SetCompressorTypeToNone()
-        writer.SetHeaderTypeToUInt64()
-        if not writer.Write() or "ERROR:" in window.GetOutput():
-            raise ValueError(window.GetOutput() or "what was read cannot be handed on")
+
+
+def _hand_on(piece: Any, path: Path, writers: Any) -> None:
+    """Write a data set as VTK's own XML, numbers as they are, to *path* and its suffix."""
+    sort = piece.GetClassName()
+    if sort not in _WRITERS:
+        raise ValueError(f"it holds a {sort}, not a surface")
+    for attributes in (piece.GetPointData(), piece.GetCellData(), piece.GetFieldData()):
+        for k in range(attributes.GetNumberOfArrays()):
+            array = attributes.GetAbstractArray(k)
+            array.SetName(_REFUSED.sub(lambda found: quote(found[0]), array.GetName() or ""))
+    suffix, name = _WRITERS[sort]
+    writer = getattr(writers, name)()
+    writer.SetFileName(f"{path}{suffix}")
+    writer.SetInputData(piece)
+    writer.SetDataModeToAppended()
+    writer.EncodeAppendedDataOff()
+    writer.SetCompressorTypeToNone()
+    writer.SetHeaderTypeToUInt64()
+    if not writer.Write():
+        raise ValueError("what was read cannot be handed on")
 
 
 def _pieces(data: Any) -> Iterator[Any]:
@@ -112,6 +126,8 @@ def _with_meshlab(path: Path, folder: Path, limit: int) -> None:
 
 def _limit_memory(most: int) -> None:
     """Let this process have *most* bytes more than it has; nothing where there is no such limit."""
+    if not most:
+        return
     try:
         resource: Any = importlib.import_module("resource")
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
