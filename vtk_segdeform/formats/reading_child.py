@@ -3,8 +3,8 @@
     python reading_child.py vtk|meshlab FILE FOLDER BYTES
 
 It asks for no more than about BYTES of memory, if that is not 0.  In FOLDER it leaves what it
-found: 0.vtp, 1.vtu ..., surfaces and grids, or mesh.npz, vertices and faces.  Letters of names that XML
-cannot hold are written %XX there.  What it cannot read it says in said.txt.
+found: 0.vtp, 1.vtu ..., surfaces and grids, or mesh.npz, vertices and faces.  Letters of names
+that XML cannot hold are written %XX there.  What it cannot read it says in said.txt.
 Either library may end the process on the way, which is what the process is for.  It imports
 nothing of this package, so that it starts in a fraction of a second.
 """
