@@ -31,7 +31,9 @@ def read_stl(path: Path) -> pv.PolyData:
     count = int.from_bytes(data[80:84], "little")
     text = data.lstrip()[:5].lower() == b"solid" and len(data) != _START + _SIZE * count
     corners = _of_text(data) if text else _of_bytes(data, count)
-    points, numbers = _merged(corners + np.float32(0.0))  # so that -0 is 0
+    with np.errstate(invalid="ignore"):  # NaN is named when the mesh is checked
+        corners = corners + np.float32(0.0)  # so that -0 is 0
+    points, numbers = _merged(corners)
     faces = numbers.reshape(-1, 3)
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
