@@ -205,6 +205,27 @@ def test_arrays_of_a_surface_with_points_lines_and_strips_stay_with_their_cells(
     assert group[6:] == np.repeat(np.arange(9, 9 + len(lengths)), lengths).tolist()
 
 
+@pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".stl"])
+@settings(EASY, max_examples=8)
+@given(surface=surfaces())
+def test_pymeshlab_reads_the_same_surface(tmp_path, suffix, surface):
+    pymeshlab = pytest.importorskip("pymeshlab")
+    counts, _ = polygons_of(surface)
+    if suffix == ".ply" and counts.max() > 255:  # its own limit, and it is said
+        return
+    if suffix == ".stl":
+        surface = surface.triangulate()
+    write_mesh(tmp_path / f"a{suffix}", surface)
+    meshset = pymeshlab.MeshSet(verbose=False)
+    meshset.load_new_mesh(str(tmp_path / f"a{suffix}"))
+    theirs = meshset.current_mesh()
+    assert theirs.face_number() == (counts - 2).sum()
+    if suffix == ".stl":
+        np.testing.assert_allclose(theirs.vertex_matrix().max(axis=0), surface.points.max(axis=0))
+        return
+    np.testing.assert_allclose(theirs.vertex_matrix(), surface.points, atol=1e-6)
+
+
 @pytest.mark.campaign
 @pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".vtk", ".vtp", ".vtkhdf"])
 def test_a_thousand_surfaces_come_back_or_it_is_said_what_does_not(tmp_path, suffix):
