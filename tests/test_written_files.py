@@ -29,6 +29,7 @@ SPECIAL = [
     "comment", "element", "property", "list", "RGB", "RGBA", "TextureCoordinates",
     "TextureCorners", "Group", "Object", "Material", "Smoothing", "Normals", "a b", "a\nb", "a_b",
     "x_1", "\n", " ", "Größe", "身体", "<&\">'", "a" * 300, "a" * 299 + "b", "end\\",
+    "{", "}", "{}", "%s%n",
 ]  # fmt: skip
 NAMES = st.sampled_from(SPECIAL) | st.text(
     st.characters(exclude_categories=["Cs"], exclude_characters="\0"), min_size=1, max_size=8

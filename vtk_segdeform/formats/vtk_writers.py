@@ -1,8 +1,9 @@
 """Surfaces through VTK's own writers: names that its files cannot hold are changed first.
 
 VTK's XML writer puts names into the file as they are, so that ``<`` makes it unreadable; its HDF
-writer changes some, perhaps two into one; what its legacy writer has written its reader cannot read
-if names are long, or the active scalars have over four components.
+writer changes some, perhaps two into one; its legacy writer takes them for format strings, so that
+``{`` ends the process, and its reader cannot read what that has written if names are long, or the
+active scalars have over four components.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 from .array_names import plain_names, warn_left_out, warn_renamed
 
 _WRITERS = {".stl": vtkSTLWriter, ".vtk": vtkPolyDataWriter, ".vtkhdf": vtkHDFWriter}
-_REFUSED = {".vtp": '<>&"', ".vtkhdf": "/."}
+_REFUSED = {".vtk": "{}", ".vtp": '<>&"', ".vtkhdf": "/."}
 _SCALARS, _MOST = 0, 4  # VTK's number of the attribute; components in a legacy file
 
 
