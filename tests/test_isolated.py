@@ -54,6 +54,20 @@ def test_all_of_a_file_comes_from_the_other_process_or_without_it(
     assert again.point_data.active_texture_coordinates_name == "uv"
 
 
+@pytest.mark.parametrize("suffix", [".vtp", ".vtk", ".vtkhdf"])
+def test_names_of_components_do_not_make_a_file_unreadable(tmp_path, suffix):
+    surface = to_polydata(Mesh(*CUBE))
+    surface.point_data["way"] = np.arange(16.0).reshape(8, 2)
+    for k, name in enumerate(["<{", "Süd 1%"]):
+        surface.GetPointData().GetArray("way").SetComponentName(k, name)
+    write_mesh(tmp_path / f"a{suffix}", surface)
+    assert surface.GetPointData().GetArray("way").GetComponentName(0) == "<{"
+    again = read_polydata(tmp_path / f"a{suffix}").GetPointData().GetArray("way")
+    if suffix != ".vtkhdf":  # which holds none
+        expected = {".vtp": "_{", ".vtk": "<_"}[suffix]
+        assert [again.GetComponentName(k) for k in (0, 1)] == [expected, "Süd 1%"]
+
+
 def test_pieces_of_a_file_are_one_surface(tmp_path):
     parts = [pv.Cube().triangulate(), pv.Cube(center=(5, 0, 0)).triangulate()]
     pv.MultiBlock(parts).save(tmp_path / "a.vtkhdf")

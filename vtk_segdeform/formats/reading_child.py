@@ -81,7 +81,9 @@ def _hand_on(piece: Any, path: Path, writers: Any) -> None:
     for attributes in (piece.GetPointData(), piece.GetCellData(), piece.GetFieldData()):
         for k in range(attributes.GetNumberOfArrays()):
             array = attributes.GetAbstractArray(k)
-            array.SetName(_REFUSED.sub(lambda found: quote(found[0]), array.GetName() or ""))
+            array.SetName(_written(array.GetName() or ""))
+            for j in range(array.GetNumberOfComponents() * array.HasAComponentName()):
+                array.SetComponentName(j, _written(array.GetComponentName(j) or ""))
     suffix, name = _WRITERS[sort]
     writer = getattr(writers, name)()
     writer.SetFileName(f"{path}{suffix}")
@@ -92,6 +94,10 @@ def _hand_on(piece: Any, path: Path, writers: Any) -> None:
     writer.SetHeaderTypeToUInt64()
     if not writer.Write():
         raise ValueError("what was read cannot be handed on")
+
+
+def _written(name: str) -> str:
+    return _REFUSED.sub(lambda found: quote(found[0]), name)
 
 
 def _pieces(data: Any) -> Iterator[Any]:

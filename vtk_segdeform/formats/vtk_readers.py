@@ -76,6 +76,8 @@ def _sound(data: pv.DataSet) -> pv.DataSet:
         for k in range(attributes.GetNumberOfArrays()):
             array = attributes.GetAbstractArray(k)
             array.SetName(unquote(array.GetName()))
+            for j in range(array.GetNumberOfComponents() * array.HasAComponentName()):
+                array.SetComponentName(j, unquote(array.GetComponentName(j) or ""))
             if array.GetNumberOfTuples() != count and sort != "field":
                 raise MeshError(
                     f"its {sort} array {array.GetName()!r} has {array.GetNumberOfTuples()} rows; "

@@ -67,14 +67,14 @@ def _with_plain_names(surface: pv.PolyData, suffix: str) -> Any:
     for sort in ("Point", "Cell", "Field"):
         attributes = getattr(copy, f"Get{sort}Data")()
         arrays = [attributes.GetAbstractArray(k) for k in range(attributes.GetNumberOfArrays())]
-        names = plain_names(
-            [array.GetName() for array in arrays],
-            refused=_REFUSED.get(suffix, ""),
-            measure=_quoted if suffix == ".vtk" else len,
-        )
+        refused, measure = _REFUSED.get(suffix, ""), _quoted if suffix == ".vtk" else len
+        names = plain_names((a.GetName() for a in arrays), refused=refused, measure=measure)
+        parts = {name for array in arrays for name in _components(array) if name}
+        components = plain_names(parts, refused=refused, measure=measure)
         warn_renamed(f"{sort.lower()} array", names)
-        if any(name != plain for name, plain in names.items()):
-            _rename(attributes, arrays, list(names.values()))
+        warn_renamed("component", components)
+        if any(name != plain for name, plain in (names | components).items()):
+            _rename(attributes, arrays, list(names.values()), components)
         if suffix == ".vtk" and sort != "Field":
             scalars = attributes.GetScalars()
             if scalars is not None and scalars.GetNumberOfComponents() > _MOST:
@@ -82,7 +82,16 @@ def _with_plain_names(surface: pv.PolyData, suffix: str) -> Any:
     return copy
 
 
-def _rename(attributes: Any, arrays: list[Any], names: list[str]) -> None:
+def _components(array: Any) -> list[str]:
+    """Return the names of an array's components; "" where one has none."""
+    if not array.HasAComponentName():
+        return []
+    return [array.GetComponentName(k) or "" for k in range(array.GetNumberOfComponents())]
+
+
+def _rename(
+    attributes: Any, arrays: list[Any], names: list[str], components: dict[str, str]
+) -> None:
     """Put copies with other names in place of *arrays*, each the normals, scalars ... it was."""
     parts = [
         attributes.IsArrayAnAttribute(k) if hasattr(attributes, "IsArrayAnAttribute") else -1
@@ -93,6 +102,8 @@ def _rename(attributes: Any, arrays: list[Any], names: list[str]) -> None:
         renamed = array.NewInstance()
         renamed.DeepCopy(array)
         renamed.SetName(name)
+        for k, component in enumerate(_components(array)):
+            renamed.SetComponentName(k, components[component] if component else "")
         place = attributes.AddArray(renamed)
         if part >= 0:
             attributes.SetActiveAttribute(place, part)
