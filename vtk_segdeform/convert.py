@@ -5,8 +5,12 @@
 
 Vertices and faces keep their order and number all the way, coordinates their digits: OBJ, OFF
 and PLY are read and written by this package, because VTK's readers round to seven digits (PLY),
-split vertices at texture seams (OBJ) or do not exist (OFF).  STL is the exception: a soup of
-triangles in single precision, whose equal corners are merged on reading.
+split vertices at texture seams (OBJ) or do not exist (OFF); glTF is read by it because VTK's reader
+believes all that a file says.  STL is the exception: a soup of triangles in single precision, whose
+equal corners are merged on reading.
+
+What a format has no place for is left out, names that it cannot hold are changed, and a warning
+says so (`formats.array_names`).
 """
 
 from __future__ import annotations
@@ -127,7 +131,8 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
     ----------
     path : str or Path
         .obj, .off, .ply, .stl, .vtk, .vtp, .vtkhdf; with PyMeshLab .3ds, .dae, .x3d, .wrl, .ctm.
-        All but .stl and PyMeshLab's keep every digit; .vtk, .vtp and .vtkhdf every array.
+        All but .stl and PyMeshLab's keep every digit; .vtk, .vtp and .vtkhdf every array.  A
+        warning is logged for each array that is left out or gets another name.
     mesh : Mesh or pyvista.PolyData
         What to write.
 
