@@ -43,9 +43,12 @@ STORY = [
     "editing.listeners", "editing.naming", "editing.state", "editing.history", "editing.painting",
     "editing.handles", "editing.posing", "session", "editing.archive", "store",
     # meshes from code, from files, and as pictures
-    "modelling.remeshing", "modelling.implicit", "models", "formats.polygons", "formats.off",
-    "formats.ply", "formats.wavefront", "formats.vtk_readers", "formats.meshlab_layers", "meshlab",
-    "convert", "repaired", "meshlab_project", "palette", "canvas", "pictures",
+    "modelling.remeshing", "modelling.implicit", "models", "formats.array_names",
+    "formats.neighbours", "formats.polygons", "formats.off", "formats.ply_tables", "formats.ply",
+    "formats.wavefront", "formats.stl", "formats.gltf_buffers", "formats.gltf",
+    "formats.reading_child", "formats.isolated", "formats.vtk_readers", "formats.vtk_writers",
+    "formats.meshlab_layers", "meshlab", "convert", "repaired", "meshlab_project", "palette",
+    "canvas", "pictures",
     # a VTK pipeline
     "formats.vtk_surfaces", "filter_settings", "filters", "paraview_plugin",
     # a view, and widgets in it
@@ -114,11 +117,15 @@ GRANTED = {
     "compiled.kernels": {"numba"},
     "caging.contour": VTK,
     "modelling.implicit": VTK,
+    "formats.array_names": VTK | {"pyvista"},
     "formats.polygons": VTK | {"pyvista"},
     "formats.off": {"pyvista"},
     "formats.ply": {"pyvista"},
     "formats.wavefront": {"pyvista"},
-    "formats.vtk_readers": {"pyvista", *VTK},
+    "formats.stl": {"pyvista"},
+    "formats.gltf": {"pyvista"},
+    "formats.vtk_readers": {"pyvista"},
+    "formats.vtk_writers": {"pyvista", *VTK},
     "formats.meshlab_layers": {"pyvista"},
     "meshlab": {"pymeshlab", "pyvista"},
     "meshlab_project": {"pyvista"},
@@ -257,8 +264,9 @@ def test_public_functions_take_at_most_four_positional_arguments(name):
 
 # Given a draft to write to; the log of a recording, which grows event by event; and /proc.
 WRITE_TO_WHAT_THEY_ARE_GIVEN = {
-    "formats.off", "formats.ply", "formats.wavefront", "formats.vtk_readers",
-    "widgets.filming.film_files", "widgets.recording", "benchmarks.measuring",
+    "formats.off", "formats.ply", "formats.wavefront", "formats.vtk_writers",
+    "formats.reading_child", "widgets.filming.film_files", "widgets.recording",
+    "benchmarks.measuring",
 }  # fmt: skip
 
 

@@ -7,6 +7,7 @@ by an error of ours that names it; it never ends the process, hangs, or takes al
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import re
@@ -18,10 +19,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gltf_files import glb, octahedron
 from scenes import sausage
 from solids import OCTAHEDRON, icosphere
+from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
 import vtk_segdeform as sd
+from vtk_segdeform import meshlab
 from vtk_segdeform.convert import to_polydata, write_mesh
 from vtk_segdeform.meshlab_project import write_project
 
@@ -35,6 +39,21 @@ RECORDING = """vtk_segdeform recording 1
 0.3 LeftButtonPress 10 20 shift
 0.4 KeyPress 10 20 key=g code=103
 0.5 Timer 3
+"""
+STRIPS = """ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+element tristrips 1
+property list int int vertex_indices
+end_header
+1 1 1
+1 -1 -1
+-1 1 -1
+-1 -1 1
+7 0 1 2 3 0 1 -1
 """
 MATRIX = "1 0 0 0.5\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
 MESHES = [".ply", ".obj", ".off", ".stl", ".vtk", ".vtp", ".vtkhdf"]
@@ -61,8 +80,16 @@ def originals(folder):
     files.append(("mesh", folder / "text.stl"))
     surface.cast_to_unstructured_grid().save(folder / "sound.vtu")
     files.append(("mesh", folder / "sound.vtu"))
-    save_glb(folder / "sound.glb", *OCTAHEDRON)
-    files.append(("surface", folder / "sound.glb"))
+    for suffix in (".glb", ".gltf"):
+        files.append(("mesh", octahedron(*OCTAHEDRON).save(folder / f"sound{suffix}")))
+    if meshlab.available():
+        for suffix in (".x3d", ".wrl", ".dae"):
+            write_mesh(folder / f"sound{suffix}", mesh)
+            files.append(("mesh", folder / f"sound{suffix}"))
+    files.append(("mesh", folder / "strips.ply"))
+    files[-1][1].write_text(STRIPS)
+    files.append(("mesh", folder / "raw.vtp"))
+    save_raw(files[-1][1], surface)
     sd.save_session(folder / "sound.segdeform", session())
     files.append(("session", folder / "sound.segdeform"))
     write_project(folder / "sound.mlp", mesh)
@@ -78,6 +105,17 @@ def originals(folder):
     return files
 
 
+def save_raw(path, surface):
+    """Write an XML file whose numbers follow it as they are."""
+    writer = vtkXMLPolyDataWriter()
+    writer.SetInputData(surface)
+    writer.SetFileName(str(path))
+    writer.SetDataModeToAppended()
+    writer.EncodeAppendedDataOff()
+    writer.SetCompressorTypeToNone()
+    writer.Write()
+
+
 def session():
     """Return a small session with something of everything."""
     scene = sausage(1)
@@ -89,35 +127,11 @@ def session():
     return result
 
 
-def save_glb(path, vertices, faces):
-    """Write a binary glTF by hand: one mesh, positions and indices."""
-    places, corners = vertices.astype("<f4").tobytes(), faces.astype("<u2").tobytes()
-    blob = places + corners + b"\0" * (-len(corners) % 4)
-    low, high = vertices.min(axis=0).tolist(), vertices.max(axis=0).tolist()
-    head = {
-        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-        "buffers": [{"byteLength": len(blob)}],
-        "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": len(places)},
-                        {"buffer": 0, "byteOffset": len(places), "byteLength": len(corners)}],
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": len(vertices), "type": "VEC3",
-             "min": low, "max": high},
-            {"bufferView": 1, "componentType": 5123, "count": faces.size, "type": "SCALAR"},
-        ],
-    }  # fmt: skip
-    text = json.dumps(head).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text
-    chunks += struct.pack("<I4s", len(blob), b"BIN\0") + blob
-    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
-
-
 def harmed(data, rng):
     """Return *data* after one of the things that happen to files."""
     data = bytearray(data)
     at = int(rng.integers(len(data)))
-    kind = int(rng.integers(8))
+    kind = int(rng.integers(9))
     if kind == 0:
         del data[at:]
     elif kind == 1:
@@ -135,6 +149,9 @@ def harmed(data, rng):
     elif kind == 5:
         other = int(rng.integers(len(data)))
         data[at:at] = data[min(at, other) : max(at, other)]
+    elif kind == 8:  # two pieces change places
+        a, b, c = np.sort(rng.integers(len(data), size=3)).tolist()
+        data[a:c] = data[b:c] + data[a:b]
     elif kind == 6:
         del data[at : at + int(rng.integers(1, 400))]
     else:
@@ -142,19 +159,187 @@ def harmed(data, rng):
     return bytes(data)
 
 
-def mutants(folder, count, seed):
+def places(value):
+    """Yield (container, key) of everything in a JSON value."""
+    if isinstance(value, dict | list):
+        for key in list(value) if isinstance(value, dict) else range(len(value)):
+            yield value, key
+            yield from places(value[key])
+
+
+WORTHS = [
+    0,
+    1,
+    -1,
+    2,
+    3,
+    5,
+    7,
+    255,
+    2**31,
+    2**32,
+    2**53,
+    2**63,
+    1.5,
+    -0.0,
+    1e308,
+    float("nan"),
+    True,
+    None,
+    "",
+    "x",
+    [],
+    {},
+    [0],
+    [[0]],
+    [0, 0],
+    {"0": 0},
+    "VEC3",
+    "../a",
+    "POSITION",
+]
+
+
+def harmed_json(head, rng):
+    """Return a JSON document after something structural: a value replaced, moved, lost, twice."""
+    head = json.loads(json.dumps(head))
+    found = list(places(head))
+    container, key = found[int(rng.integers(len(found)))]
+    other, there = found[int(rng.integers(len(found)))]
+    kind = int(rng.integers(5))
+    if kind <= 1:
+        container[key] = WORTHS[int(rng.integers(len(WORTHS)))]
+    elif kind == 2:
+        del container[key]
+    elif kind == 3:  # as another value is
+        container[key] = json.loads(json.dumps(other[there]))
+    elif isinstance(container, list):
+        container.append(json.loads(json.dumps(container[key])))
+    else:
+        container[str(there)] = container[key]
+    return head
+
+
+def save_harmed(path, document):
+    """Write whatever JSON there is, with the buffer that belongs to it."""
+    if path.suffix == ".glb":
+        path.write_bytes(glb(json.dumps(document.head).encode(), document.blob))
+        return
+    buffers = document.head.get("buffers")
+    if isinstance(buffers, list) and buffers and isinstance(buffers[0], dict):
+        code = base64.b64encode(document.blob).decode()
+        buffers[0].setdefault("uri", f"data:application/octet-stream;base64,{code}")
+    path.write_text(json.dumps(document.head))
+
+
+def mutants(folder, sound, count, seed):
     """Write *count* harmed files; return [(reader, path)]."""
     rng = np.random.default_rng(seed)
     files = []
-    sound = originals(folder)
     for number in range(count):
         reader, path = sound[number % len(sound)]
         place = folder / f"m{number}{path.suffix}"
-        data = path.read_bytes()
-        for _ in range(int(rng.integers(1, 3))):
-            data = harmed(data or b"\0", rng)
-        place.write_bytes(data)
+        if path.suffix in (".glb", ".gltf") and rng.random() < 0.8:
+            document = octahedron(*OCTAHEDRON)
+            for _ in range(int(rng.integers(1, 4))):
+                document.head = harmed_json(document.head, rng)
+            save_harmed(place, document)
+        else:
+            data = path.read_bytes()
+            for _ in range(int(rng.integers(1, 3))):
+                data = harmed(data or b"\0", rng)
+            place.write_bytes(data)
         files.append((reader, place))
+    return files
+
+
+VTP = """<?xml version="1.0"?>{before}
+<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64"><PolyData>
+<Piece NumberOfPoints="{n}" NumberOfPolys="4">
+<PointData>{arrays}</PointData>
+<Points><DataArray type="Float32" NumberOfComponents="3" format="ascii">
+1 1 1 1 -1 -1 -1 1 -1 -1 -1 1</DataArray></Points>
+<Polys><DataArray type="Int64" Name="connectivity" format="ascii">{corners}</DataArray>
+<DataArray type="Int64" Name="offsets" format="ascii">{ends}</DataArray></Polys>
+</Piece></PolyData>{after}</VTKFile>
+"""
+SOUND = {"n": 4, "corners": "0 1 2 0 3 1 0 2 3 1 3 2", "ends": "3 6 9 12", "before": "",
+         "arrays": "", "after": ""}  # fmt: skip
+LEGACY = """# vtk DataFile Version 3.0
+x
+ASCII
+DATASET POLYDATA
+POINTS {points} float
+1 1 1 1 -1 -1 -1 1 -1 -1 -1 1
+POLYGONS {cells} {size}
+3 0 1 2 3 0 3 1 3 0 2 3 3 1 3 {last}
+"""
+FACES = {"points": 4, "cells": 4, "size": 16, "last": 2}
+BOMB = (
+    '<!DOCTYPE x [<!ENTITY a0 "aaaaaaaaaa">'
+    + "".join(f'<!ENTITY a{k} "{10 * f"&a{k - 1};"}">' for k in range(1, 12))
+    + "]>"
+)
+X3D = '<?xml version="1.0"?>{}<X3D version="3.0"><Scene>{}</Scene></X3D>'
+OUTSIDE = '<DataArray type="Float64" Name="a" format="appended" offset="{}"/>'
+
+
+def lies(folder):
+    """Write files that say, or nest, more than any reader can bear; return [(reader, path)]."""
+    texts = {
+        "sound.vtp": VTP.format(**SOUND),
+        "corner.vtp": VTP.format(**SOUND | {"corners": "0 1 2 0 3 1 0 2 3 1 3 900000000"}),
+        "negative.vtp": VTP.format(**SOUND | {"corners": "0 1 2 0 3 1 0 2 3 1 3 -900000000"}),
+        "end.vtp": VTP.format(**SOUND | {"ends": "3 6 9 1200000000"}),
+        "back.vtp": VTP.format(**SOUND | {"ends": "3 -600000000 9 12"}),
+        "points.vtp": VTP.format(**SOUND | {"n": 999999999999}),
+        "few.vtp": VTP.format(**SOUND | {"n": 3}),
+        "deep.vtp": VTP.format(**SOUND | {"after": 300_000 * "<a>" + 300_000 * "</a>"}),
+        "bomb.vtp": VTP.format(**SOUND | {"before": BOMB, "arrays": "&a11;"}),
+        "offset.vtp": VTP.format(
+            **SOUND | {"arrays": OUTSIDE.format(2**62), "after": '<AppendedData encoding="raw">_x'}
+        ),
+        "minus.vtp": VTP.format(
+            **SOUND | {"arrays": OUTSIDE.format(-9), "after": '<AppendedData encoding="raw">_x'}
+        ),
+        "sound.vtk": LEGACY.format(**FACES),
+        "points.vtk": LEGACY.format(**FACES | {"points": 999999999999}),
+        "minus.vtk": LEGACY.format(**FACES | {"points": -4}),
+        "cells.vtk": LEGACY.format(**FACES | {"cells": 999999999999}),
+        "size.vtk": LEGACY.format(**FACES | {"size": 999999999999}),
+        "corner.vtk": LEGACY.format(**FACES | {"last": 900000000}),
+        "scalars.vtk": LEGACY.format(**FACES)
+        + "POINT_DATA 999999999999\nSCALARS a float 4\nLOOKUP_TABLE default\n1 2 3\n",
+        "name.vtk": LEGACY.format(**FACES) + f"POINT_DATA 4\nSCALARS {'a' * 100_000} float\n",
+        "many.off": "OFF\n1000000000000 1000000000000 0\n0 0 0\n",
+        "minus.off": "OFF\n-1 -1 0\n0 0 0\n",
+        "long.off": "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n1000000000000 0 1 2\n",
+        "many.ply": STRIPS.replace("vertex 4", "vertex 1000000000000"),
+        "strips.ply": STRIPS.replace("tristrips 1", "tristrips 1000000000000"),
+        "list.ply": STRIPS.replace("7 0 1", "1000000000000 0 1"),
+        "nothing.ply": STRIPS.replace("element tri", "element x 1000000000000\nelement tri"),
+        "corner.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999\n",
+    }
+    if meshlab.available():
+        deep = 20_000 * "<Group>" + 20_000 * "</Group>"
+        again = '<Group DEF="a"><Group USE="a"/></Group>'
+        texts |= {
+            "deep.x3d": X3D.format("", deep),
+            "bomb.x3d": X3D.format(BOMB, "<Shape>&a11;</Shape>"),
+            "use.x3d": X3D.format("", again),
+            "deep.wrl": "#VRML V2.0 utf8\n" + 20_000 * "Group { children [ " + 20_000 * "] }",
+            "use.wrl": "#VRML V2.0 utf8\nDEF a Group { children [ USE a ] }\n",
+        }
+    files = []
+    for name, text in texts.items():
+        (folder / name).write_text(text)
+        files.append(("mesh", folder / name))
+    for count in (0, 1, 31, 33, 2**31, 2**32 - 1):
+        path = folder / f"{count}.stl"
+        write_mesh(path, sd.Mesh(*icosphere(1)))  # 32 triangles
+        data = path.read_bytes()
+        path.write_bytes(data[:80] + struct.pack("<I", count) + data[84:])
+        files.append(("mesh", path))
     return files
 
 
@@ -181,9 +366,8 @@ def wrong_among(files, told):
     ]
 
 
-def special(folder):
+def special(folder, sound):
     """Write, or name, what is no file, or another file than its name says."""
-    sound = originals(folder)
     by_suffix = {path.suffix: path for _, path in sound}
     files = []
     for reader, path in sound:
@@ -209,8 +393,10 @@ def special(folder):
 def seen(tmp_path_factory):
     """Have a few files of every kind read, by one program: [(files, answers)] of three sorts."""
     folder = tmp_path_factory.mktemp("files")
-    sound, harmed = originals(folder), mutants(folder, 34, seed=1)
-    sorts = [sound, harmed, special(folder)[::4]]
+    sound = originals(folder)
+    harmed = mutants(folder, sound, 34, seed=1)
+    (folder / "lies").mkdir()
+    sorts = [sound, harmed, special(folder, sound)[::7], lies(folder / "lies")[::2]]
     before = sorted(folder.rglob("*"))
     told = iter(answers([file for files in sorts for file in files]))
     assert sorted(folder.rglob("*")) == before  # reading writes nothing
@@ -234,13 +420,36 @@ def test_what_is_no_file_or_another_kind_is_refused_by_its_name(seen):
     assert Counter(answer for answer, _ in told)["refused"] > 0.9 * len(files)
 
 
+def test_what_a_file_says_is_not_believed_beyond_its_size(seen):
+    files, told = seen[3]
+    assert not wrong_among(files, told)
+    refused = {
+        path.name for (_, path), (answer, _) in zip(files, told, strict=True) if answer != "read"
+    }
+    assert len(refused) > 0.7 * len(files)
+
+
+@pytest.mark.campaign
+def test_no_lie_is_believed(tmp_path):
+    files = lies(tmp_path)
+    told = answers(files)
+    assert not wrong_among(files, told)
+    read = [
+        path.name for (_, path), (answer, _) in zip(files, told, strict=True) if answer == "read"
+    ]
+    # An offset into nothing, a count that VTK makes anew, a name that is only long: all sound.
+    assert read == ["sound.vtp", "minus.vtp", "sound.vtk", "cells.vtk", "name.vtk", "nothing.ply"]
+
+
 @pytest.mark.campaign
 def test_two_thousand_harmed_files_are_read_or_refused(tmp_path):
     counts, wrong = Counter(), []
+    sound = originals(tmp_path)
     for seed in range(10):
         folder = tmp_path / str(seed)
         folder.mkdir()
-        files = mutants(folder, 200, seed=100 + seed) + ([] if seed else special(tmp_path))
+        files = mutants(folder, sound, 200, seed=100 + seed)
+        files += [] if seed else special(tmp_path, sound)
         told = answers(files)
         counts += Counter(answer for answer, _ in told)
         wrong += wrong_among(files, told)

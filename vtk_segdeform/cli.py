@@ -10,6 +10,7 @@ What the commands do is told in `commands`; here is how they are called.
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import re
 import sys
@@ -77,6 +78,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         bar.clear()
         print(_printable(line), flush=True)
 
+    warnings = _Warnings(options.command, bar)
+    logging.getLogger(__package__).addHandler(warnings)
     try:
         return DONE if options.run(options, say, bar) else FAILED
     except KeyboardInterrupt:
@@ -92,6 +95,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         told = _printable(_told(error))
         print(f"segdeform {options.command}: {told}", file=sys.stderr)
         return MISUSED if isinstance(error, ConstraintError) else FAILED
+    finally:
+        logging.getLogger(__package__).removeHandler(warnings)
+
+
+class _Warnings(logging.Handler):
+    """Prints what the package logs as a warning, such as arrays that a file has no place for."""
+
+    def __init__(self, command: str, bar: ProgressBar) -> None:
+        super().__init__(logging.WARNING)
+        self._command, self._bar = command, bar
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print a record as a line of its own."""
+        self._bar.clear()
+        print(f"segdeform {self._command}: {record.getMessage()}", file=sys.stderr)
 
 
 def _draw_without_a_screen() -> None:

@@ -5,8 +5,12 @@
 
 Vertices and faces keep their order and number all the way, coordinates their digits: OBJ, OFF
 and PLY are read and written by this package, because VTK's readers round to seven digits (PLY),
-split vertices at texture seams (OBJ) or do not exist (OFF).  STL is the exception: a soup of
-triangles in single precision, whose equal corners are merged on reading.
+split vertices at texture seams (OBJ) or do not exist (OFF); glTF is read by it because VTK's reader
+believes all that a file says.  STL is the exception: a soup of triangles in single precision, whose
+equal corners are merged on reading.
+
+What a format has no place for is left out, names that it cannot hold are changed, and a warning
+says so (`formats.array_names`).
 """
 
 from __future__ import annotations
@@ -26,22 +30,26 @@ from .atomic import replacing, require_place
 from .cages import Cage
 from .checks import as_flag, as_path, require
 from .errors import MeshError
+from .formats.gltf import read_gltf
 from .formats.off import read_off, write_off
 from .formats.ply import read_ply, write_ply
 from .formats.polygons import polydata_of, triangles_of
-from .formats.vtk_readers import read_with_vtk, write_with_vtk
+from .formats.stl import read_stl
+from .formats.vtk_readers import read_with_vtk
+from .formats.vtk_writers import write_with_vtk
 from .formats.wavefront import read_obj, write_obj
 from .mesh import Mesh
 
 _log = logging.getLogger(__name__)
 
 _READERS: dict[str, Callable[[Path], pv.PolyData]] = {
-    ".obj": read_obj, ".off": read_off, ".ply": read_ply,
+    ".glb": read_gltf, ".gltf": read_gltf, ".obj": read_obj, ".off": read_off, ".ply": read_ply,
+    ".stl": read_stl,
 }  # fmt: skip
 _WRITERS: dict[str, Callable[[Path, pv.PolyData], None]] = {
     ".obj": write_obj, ".off": write_off, ".ply": write_ply,
 }  # fmt: skip
-_VTK_READS = frozenset({".stl", ".vtk", ".vtp", ".vtu", ".vtkhdf", ".glb", ".gltf"})
+_VTK_READS = frozenset({".vtk", ".vtp", ".vtu", ".vtkhdf"})
 _VTK_WRITES = frozenset({".stl", ".vtk", ".vtp", ".vtkhdf"})
 _HOLD_ARRAYS = frozenset({".ply", ".vtk", ".vtp", ".vtkhdf"})
 
@@ -127,7 +135,8 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
     ----------
     path : str or Path
         .obj, .off, .ply, .stl, .vtk, .vtp, .vtkhdf; with PyMeshLab .3ds, .dae, .x3d, .wrl, .ctm.
-        All but .stl and PyMeshLab's keep every digit; .vtk, .vtp and .vtkhdf every array.
+        All but .stl and PyMeshLab's keep every digit; .vtk, .vtp and .vtkhdf every array.  A
+        warning is logged for each array that is left out or gets another name.
     mesh : Mesh or pyvista.PolyData
         What to write.
 

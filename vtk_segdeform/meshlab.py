@@ -32,6 +32,7 @@ import numpy as np
 from .arrays import FloatArray, IntArray, is_whole
 from .checks import all_of, as_path, require, shown
 from .errors import ArgumentError, MeshError, MissingDependencyError
+from .formats.isolated import read_apart
 from .formats.meshlab_layers import (
     Surface,
     add_attributes,
@@ -151,16 +152,12 @@ def selected_vertices(meshset: Any) -> IntArray:
 def read_faces(path: str | Path) -> tuple[FloatArray, IntArray]:
     """Return (vertices, faces) of a file in any format PyMeshLab reads; nothing is checked."""
     path = as_path(path)
-    pymeshlab = _pymeshlab()
-    meshset = pymeshlab.MeshSet(verbose=False)
+    _pymeshlab()
     try:
-        with _standing_still():
-            meshset.load_new_mesh(str(path.absolute()))
-    except pymeshlab.PyMeshLabException as error:
+        with read_apart("meshlab", path) as folder, np.load(folder / "mesh.npz") as arrays:
+            return _plain(arrays["vertices"], arrays["faces"])
+    except (MeshError, OSError) as error:
         raise MeshError(f"{path}: PyMeshLab cannot read it: {error}") from None
-    if meshset.mesh_number() > 1:
-        meshset.generate_by_merging_visible_meshes(mergevertices=False)
-    return _arrays(meshset)
 
 
 def read(path: str | Path) -> Mesh:
@@ -228,9 +225,12 @@ def _current(meshset: Any) -> Any:
 
 def _arrays(meshset: Any) -> tuple[FloatArray, IntArray]:
     current = _current(meshset)
-    vertices = np.ascontiguousarray(current.vertex_matrix(), dtype=np.float64)
-    faces = np.ascontiguousarray(current.face_matrix(), dtype=np.int64)
-    return vertices, faces.reshape(-1, 3)
+    return _plain(current.vertex_matrix(), current.face_matrix())
+
+
+def _plain(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:
+    rows = np.ascontiguousarray(faces, dtype=np.int64).reshape(-1, 3)
+    return np.ascontiguousarray(vertices, dtype=np.float64), rows
 
 
 @contextlib.contextmanager

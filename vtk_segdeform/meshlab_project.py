@@ -30,6 +30,7 @@ from .checks import as_path
 from .convert import read_polydata, with_vertices, write_mesh
 from .errors import MeshError
 from .formats.meshlab_layers import Surface, as_layers, free_name
+from .formats.neighbours import file_inside
 from .regular_file import open_regular
 from .session import Session
 
@@ -209,13 +210,8 @@ def _parsed(path: Path) -> ElementTree.Element:
 
 def _inside(path: Path, name: str) -> Path:
     """Return the file of a layer, which must be in the project's own folder or below."""
-    folder = path.parent.resolve()
-    try:
-        file = (folder / name).resolve()
-        named = bool(name) and file.is_relative_to(folder) and file.is_file()
-    except (OSError, ValueError, RuntimeError):  # too long, or links in a circle
-        named = False
-    if not named:
+    file = file_inside(path.parent, name)
+    if file is None:
         raise MeshError(
             f"{path}: the layer {name[:200]!r} is no file in the project's folder; "
             "copy it there, and save the project again"

@@ -16,6 +16,7 @@ import pyvista as pv
 
 from ..arrays import IntArray
 from ..errors import MeshError
+from .array_names import decoded, warn_left_out
 from .polygons import polydata_of, polygons_of, rows
 
 _KIND = re.compile(r"(ST)?(C)?(N)?OFF\b", re.IGNORECASE)
@@ -24,14 +25,16 @@ _WIDTHS = {"N": 3, "C": 4, "ST": 2}
 
 def read_off(path: Path) -> pv.PolyData:
     """Return the surface in an OFF file; colours of vertices as "RGBA", normals are dropped."""
-    text = re.sub(r"#.*", "", path.read_text())
-    lines = [line for line in text.splitlines() if line.strip()]
+    text = re.sub(r"#[^\r\n]*", "", decoded(path.read_bytes()))
+    lines = [line for line in re.split(r"[\r\n]+", text) if line.strip()]
     kind = _KIND.match(lines[0].strip()) if lines else None
     if kind is None:
         raise MeshError("the first line is not OFF")
     rest = lines[0].strip()[kind.end() :]
     lines[:1] = [rest] if rest.strip() else []
     n, m = (int(word) for word in lines[0].split()[:2])
+    if n < 0 or m < 0:
+        raise MeshError(f"says {n} vertices and {m} faces")
     if len(lines) < 1 + n + m:
         raise MeshError(f"says {n} vertices and {m} faces, but ends after {len(lines) - 1} lines")
     table = np.array([line.split() for line in lines[1 : 1 + n]], dtype=float).reshape(
@@ -45,14 +48,16 @@ def read_off(path: Path) -> pv.PolyData:
     if kind[2] and extra.shape[1] >= 3:
         colour = extra[:, : min(extra.shape[1], 4)]
         scale = 255.0 if colour.max(initial=0.0) <= 1.0 and "." in lines[1] else 1.0
-        surface.point_data["RGBA"] = np.round(scale * colour).astype(np.uint8)
+        colour = np.nan_to_num(scale * colour).clip(0.0, 255.0)
+        surface.point_data["RGBA"] = np.round(colour).astype(np.uint8)
     return surface
 
 
 def write_off(path: Path, surface: pv.PolyData) -> None:
     """Write positions with every digit, polygons as they are; OFF holds no other arrays."""
     polygons = rows(*polygons_of(surface))
-    with path.open("w") as file:
+    warn_left_out("OFF", surface, {})
+    with path.open("w", newline="\n") as file:
         file.write(f"OFF\n{surface.n_points} {len(polygons)} 0\n")
         file.writelines(f"{x!r} {y!r} {z!r}\n" for x, y, z in surface.points.tolist())
         file.writelines(f"{len(row)} {' '.join(map(str, row))}\n" for row in polygons)

@@ -1,219 +1,227 @@
 """PLY, Stanford's polygon format, text or binary: read and write, every digit kept.
 
-VTK's own reader and writer hold 7 digits.  A PLY file is a header that lists elements (vertex,
-face, ...) and their properties, and then each element as a table.  A property may be a list, in
-which case its length comes first in every row:
+VTK's own reader and writer hold 7 digits.  These elements and properties make a surface:
 
-    element face 12
-    property list uchar int vertex_indices
+    vertex     x y z; red green blue (alpha); s t, u v or texture_u texture_v
+    face       vertex_indices or vertex_index, a list; texcoord, a list of (u, v) of each corner
+    tristrips  vertex_indices, a list: each three in a row are a triangle, -1 begins a new strip
 
-A text file is read as if it were a binary one of doubles, so that there is one reader.
+Colours become the arrays "RGB" or "RGBA", texture coordinates "TextureCoordinates" of vertices and
+"TextureCorners" of corners, all other numbers arrays under their names.  Arrays are written as
+properties of their own names, unless these names are listed here or have white space in them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import logging
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyvista as pv
 
+from ..arrays import IntArray
 from ..errors import MeshError
-from .polygons import polydata_of, polygons_of
+from .array_names import plain_names, warn_left_out, warn_renamed
+from .ply_tables import Lists, Table, tables_of
+from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of, unstripped
 
-_TYPES = {
-    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
-    "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
-    "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
+_log = logging.getLogger(__name__)
+_WORDS = {
+    "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort", "i4": "int", "u4": "uint",
+    "f4": "float", "f8": "double",
 }  # fmt: skip
-_WORDS = {"u1": "uchar", "i4": "int", "i8": "int", "f4": "float", "f8": "double"}
 _TEXTURE = [("s", "t"), ("u", "v"), ("texture_u", "texture_v")]
 _COLOUR = ["red", "green", "blue", "alpha"]
-
-
-@dataclass
-class _Element:
-    name: str
-    count: int
-    properties: list[tuple[str, str]] = field(default_factory=list)  # (name, type) in order
-    lists: dict[str, str] = field(default_factory=dict)  # list properties: the type of the length
+_WIDTHS = {"RGB": 3, "RGBA": 4}
+_NORMAL = ("nx", "ny", "nz")
+_CORNERS = ("vertex_indices", "vertex_index")
+_POINT_TEXTURE, _CORNER_TEXTURE = "TextureCoordinates", "TextureCorners"
+_COMMON = 255  # corners of a face; VTK and MeshLab keep the number in a byte
+_NO_NUMBERS = np.empty(0, dtype=np.int64)
+_OF_POINTS = frozenset({*"xyz", *_NORMAL, *_COLOUR, *(name for pair in _TEXTURE for name in pair)})
+_OF_FACES = frozenset({*_CORNERS, "texcoord", *_COLOUR})
 
 
 def read_ply(path: Path) -> pv.PolyData:
     """Return the surface in a PLY file: colours as "RGB"(A), other properties under their names."""
-    data = path.read_bytes()
-    kind, elements, start = _header(data)
-    order = ">" if kind == "binary_big_endian" else "<"
-    if kind == "ascii":
-        data, start = np.array(data[start:].split(), dtype="<f8").tobytes(), 0
-    tables: dict[str, dict[str, Any]] = {}
-    for element in elements:
-        stored = _as_doubles(element) if kind == "ascii" else element
-        tables[element.name], start = _table(data, start, stored, order)
-        for name, type_ in element.properties:
-            values = tables[element.name][name]
-            if isinstance(values, np.ndarray) and type_[0] in "iu":
-                tables[element.name][name] = values.astype(type_)
+    tables = tables_of(path.read_bytes())
     vertex, face = tables.get("vertex", {}), tables.get("face", {})
-    lists = [face.pop(name) for name in ("vertex_indices", "vertex_index") if name in face]
-    if not {"x", "y", "z"} <= set(vertex) or not lists:
-        raise MeshError("the PLY file has no vertices with x, y, z, or no faces")
-    counts, corners = lists[0]
+    if not _has_numbers(vertex, "xyz"):
+        raise MeshError("the PLY file has no vertices with x, y, z")
     points = np.stack([vertex.pop(name).astype(float) for name in "xyz"], axis=-1)
-    surface = polydata_of(points, counts, corners.astype(np.int64))
-    for name in ("nx", "ny", "nz"):
-        vertex.pop(name, None)
+    polygons, strips = _corners(face), _corners(tables.get("tristrips", {}))
+    if polygons is None and strips is None:
+        raise MeshError("the PLY file has no faces and no triangle strips")
+    counts, corners = polygons or (_NO_NUMBERS, _NO_NUMBERS)
+    if strips is not None:
+        triangles = unstripped(*strips)
+        face = {} if len(triangles) else face  # its numbers are not those of the triangles
+        counts = np.concatenate([counts, np.full(len(triangles), 3)])
+        corners = np.concatenate([corners, triangles.ravel()])
+    surface = polydata_of(points, counts, corners)
+    if _has_numbers(vertex, _NORMAL):
+        vertex = {name: values for name, values in vertex.items() if name not in _NORMAL}
     for pair in _TEXTURE:
-        if set(pair) <= set(vertex):
+        if _has_numbers(vertex, pair):
             texture = np.stack([vertex.pop(name) for name in pair], axis=-1)
-            surface.point_data["TextureCoordinates"] = texture
-            surface.point_data.active_texture_coordinates_name = "TextureCoordinates"
-    if "texcoord" in face:
-        lengths, values = face.pop("texcoord")
-        if (lengths == lengths[0]).all() and lengths[0] == 2 * counts.max(initial=0):
-            surface.cell_data["TextureCorners"] = values.reshape(len(counts), -1)
-    for table, attributes in ((vertex, surface.point_data), (face, surface.cell_data)):
-        if set(_COLOUR[:3]) <= set(table):
-            colour = [table.pop(name) for name in _COLOUR if name in table]
-            attributes["RGB" if len(colour) == 3 else "RGBA"] = np.stack(colour, -1).astype("u1")
-        for name, values in table.items():
-            if isinstance(values, np.ndarray):
-                attributes[name] = values
+            surface.point_data[_POINT_TEXTURE] = texture
+            surface.point_data.active_texture_coordinates_name = _POINT_TEXTURE
+    seams = face.pop("texcoord", None)
+    if isinstance(seams, Lists) and np.array_equal(seams.lengths, 2 * counts):
+        pairs = seams.values.reshape(-1, 2)
+        surface.cell_data[_CORNER_TEXTURE] = padded_corners(counts, pairs)
+    _keep_arrays(vertex, surface.point_data)
+    _keep_arrays(face, surface.cell_data)
     return surface
 
 
+def _has_numbers(table: Table, names: Iterable[str]) -> bool:
+    return all(isinstance(table.get(name), np.ndarray) for name in names)
+
+
+def _corners(table: Table) -> Lists | None:
+    """Take the vertex numbers of polygons or strips out of a table; None if there are none."""
+    found = [table.pop(name) for name in _CORNERS if isinstance(table.get(name), Lists)]
+    if not found:
+        return None
+    lengths, values = found[0]
+    if not (np.abs(values.astype(float)) < 2**53).all() or (values != np.rint(values)).any():
+        raise MeshError("a face of the PLY file has a corner that is no whole number")
+    return Lists(lengths, values.astype(np.int64))
+
+
+def _keep_arrays(table: Table, attributes: Any) -> None:
+    colour = [table[name] for name in _COLOUR if name in table]
+    if _has_numbers(table, _COLOUR[:3]) and all(_is_colour(values) for values in colour):
+        table = {name: values for name, values in table.items() if name not in _COLOUR}
+        if colour[0].dtype.kind == "f":
+            colour = [np.rint(255.0 * values) for values in colour]
+        attributes["RGB" if len(colour) == 3 else "RGBA"] = np.stack(colour, -1).astype("u1")
+    for name, values in table.items():
+        if isinstance(values, np.ndarray):
+            attributes[name] = values
+
+
+def _is_colour(values: Any) -> bool:
+    """Tell whether a column is bytes, or floating-point numbers from 0 to 1."""
+    if not isinstance(values, np.ndarray) or values.dtype.kind == "f":
+        return isinstance(values, np.ndarray) and bool(((values >= 0) & (values <= 1)).all())
+    return bool(values.dtype == np.uint8)
+
+
 def write_ply(path: Path, surface: pv.PolyData) -> None:
-    """Write a binary PLY file with doubles; of the arrays, colours, texture and plain numbers."""
+    """Write a binary PLY file with doubles; of the arrays, colours, texture and plain numbers.
+
+    Names that a property cannot have are changed, and what is left out is said, by warnings.
+    """
     counts, corners = polygons_of(surface)
-    vertex = _columns(surface.point_data, surface.n_points)
-    texture = surface.active_texture_coordinates
-    if texture is not None:
-        places = np.asarray(texture, dtype="f8").T  # by the names that MeshLab reads as doubles
-        vertex |= dict(zip(_TEXTURE[-1], places, strict=False))
-    points = np.asarray(surface.points, dtype="f8")
-    vertex = {name: points[:, k] for k, name in enumerate("xyz")} | vertex
-    face = _columns(surface.cell_data, len(counts))
-    header = [b"ply", b"format binary_little_endian 1.0", f"element vertex {len(points)}".encode()]
-    header += [f"property {_WORDS[c.dtype.str[1:]]} {n}".encode() for n, c in vertex.items()]
-    header += [f"element face {len(counts)}".encode(), b"property list uchar int vertex_indices"]
-    even = len(set(counts.tolist())) == 1
-    seams = surface.cell_data.get("TextureCorners") if even else None  # (m, 2 per corner)
-    if seams is not None:  # the one type that MeshLab reads
-        header += [b"property list uchar float texcoord"]
-    header += [f"property {_WORDS[c.dtype.str[1:]]} {n}".encode() for n, c in face.items()]
+    points, columns = surface.points, dict[str, Any]()
+    texture, texture_name = surface.active_texture_coordinates, ""
+    if texture is not None and texture.ndim == 2 and texture.shape[1] >= 2:
+        # by the names that MeshLab reads as doubles
+        columns |= dict(zip(_TEXTURE[-1], np.asarray(texture, dtype="f8").T, strict=False))
+        texture_name = surface.point_data.active_texture_coordinates_name
+    arrays = {name: v for name, v in surface.point_data.items() if name != texture_name}
+    of_points, written = _columns("point", arrays, _OF_POINTS)
+    vertex = dict(zip("xyz", np.asarray(points, dtype="f8").T, strict=True)) | columns | of_points
+    cells = cells_of(surface)
+    arrays = {name: np.asarray(values)[cells] for name, values in surface.cell_data.items()}
+    seams = corner_values(arrays.get(_CORNER_TEXTURE), counts)
+    if seams is not None:
+        del arrays[_CORNER_TEXTURE]
+    face, written_cells = _columns("cell", arrays, _OF_FACES)
+    kept = {"point": [*written, texture_name], "cell": written_cells}
+    kept["cell"] += [_CORNER_TEXTURE] if seams is not None else []
+    warn_left_out("PLY", surface, kept)
+    if counts.max(initial=0) > _COMMON:
+        _log.warning("PLY faces of over %d corners: some programs cannot read them", _COMMON)
+    lists = [("vertex_indices", counts, corners.astype("<i4"))]
+    if seams is not None:  # single precision is the one type that MeshLab reads
+        lists.append(("texcoord", 2 * counts, seams.astype("<f4").ravel()))
+    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]
+    header += [f"property {_WORDS[c.dtype.str[1:]]} {name}" for name, c in vertex.items()]
+    header += [f"element face {len(counts)}"]
+    for name, lengths, values in lists:
+        words = _WORDS[_length_type(lengths)], _WORDS[values.dtype.str[1:]]
+        header += [f"property list {words[0]} {words[1]} {name}"]
+    header += [f"property {_WORDS[c.dtype.str[1:]]} {name}" for name, c in face.items()]
     with path.open("wb") as file:
-        file.write(b"\n".join([*header, b"end_header", b""]))
-        file.write(_packed(vertex))
-        if even:
-            rows = corners.reshape(len(counts), -1).astype("<i4")
-            first = {"#": counts.astype("u1")} | {f"#{k}": c for k, c in enumerate(rows.T)}
-            if seams is not None:
-                seams = np.asarray(seams, dtype="f4").T
-                first["#uv"] = np.full(len(counts), len(seams), dtype="u1")
-                first |= {f"#uv{k}": c for k, c in enumerate(seams)}
-            file.write(_packed(first | face))
-            return
-        size = len(_packed(face)) // max(len(counts), 1)
-        tail, at = _packed(face), 0
-        for k, count in enumerate(counts.tolist()):
-            file.write(bytes([count]) + corners[at : at + count].astype("<i4").tobytes())
-            file.write(tail[k * size : (k + 1) * size])
-            at += count
+        file.write("\n".join([*header, "end_header", ""]).encode())
+        file.write(_packed(len(points), list(vertex.values())).tobytes())
+        file.write(_face_rows([(n, v) for _, n, v in lists], list(face.values())))
 
 
-def _columns(attributes: Any, length: int) -> dict[str, Any]:
-    """Return the arrays PLY can hold, as columns by property name."""
+def _columns(
+    sort: str, arrays: dict[str, Any], reserved: frozenset[str]
+) -> tuple[dict[str, Any], list[str]]:
+    """Return the arrays PLY can hold, as columns by property name, and their own names."""
     columns: dict[str, Any] = {}
-    for name, values in attributes.items():
-        values = np.asarray(values)
-        if len(values) != length or values.dtype.str[1:] not in _WORDS:
-            continue
-        if values.ndim == 2 and values.dtype == np.uint8 and name in ("RGB", "RGBA"):
-            columns |= dict(zip(_COLOUR, values.T, strict=False))
-        elif values.ndim == 1 and " " not in name:
-            columns[name] = values.astype("i4") if values.dtype == np.int64 else values
-    return columns
+    numbers: dict[str, Any] = {}
+    kept = []
+    for name, values in arrays.items():
+        if values.dtype == np.uint8 and values.shape[1:] == (_WIDTHS.get(name),) and not columns:
+            columns |= dict(zip(_COLOUR, np.asarray(values).T, strict=False))
+            kept.append(name)
+        elif (numeric := _column(values)) is not None:
+            numbers[name] = numeric
+    names = plain_names(numbers, reserved, refused=" ")
+    warn_renamed(f"{sort} array", names)
+    return columns | {names[name]: values for name, values in numbers.items()}, [*kept, *numbers]
 
 
-def _packed(columns: dict[str, Any]) -> bytes:
-    if not columns:
-        return b""
-    length = len(next(iter(columns.values())))
-    table = np.empty(length, [(n, c.dtype.newbyteorder("<")) for n, c in columns.items()])
-    for name, values in columns.items():
-        table[name] = values
-    return table.tobytes()
+def _column(values: Any) -> Any:
+    """Return numbers (n,) in a type that PLY has, all exactly as they are; None if it has none."""
+    array = np.asarray(values)
+    if array.ndim != 1 or array.dtype.kind not in "biuf":
+        return None
+    if array.dtype.kind == "b":
+        return array.astype("u1")
+    if array.dtype.str[1:] in _WORDS:
+        return array
+    if array.dtype.kind == "f":
+        return array.astype("f4") if array.dtype.itemsize == 2 else None
+    low, high = int(array.min(initial=0)), int(array.max(initial=0))
+    for kind, least, most in (("i4", -(2**31), 2**31), ("u4", 0, 2**32), ("f8", -(2**53), 2**53)):
+        if least <= low and high < most:
+            return array.astype(kind)
+    return None
 
 
-def _header(data: bytes) -> tuple[str, list[_Element], int]:
-    end = data.find(b"end_header")
-    if not data.startswith(b"ply") or end < 0:
-        raise MeshError("the file does not begin with a PLY header")
-    kind, elements = "", list[_Element]()
-    for line in data[:end].decode("ascii", "replace").splitlines():
-        word, *rest = line.split() or [""]
-        if word == "format":
-            kind = rest[0]
-        elif word == "element":
-            elements.append(_Element(rest[0], int(rest[1])))
-        elif word == "property" and rest[0] == "list":
-            elements[-1].properties.append((rest[3], _TYPES[rest[2]]))
-            elements[-1].lists[rest[3]] = _TYPES[rest[1]]
-        elif word == "property":
-            elements[-1].properties.append((rest[1], _TYPES[rest[0]]))
-    return kind, elements, data.index(b"\n", end) + 1
+def _length_type(lengths: IntArray) -> str:
+    return "u1" if lengths.max(initial=0) <= _COMMON else "i4"
 
 
-def _as_doubles(element: _Element) -> _Element:
-    doubles = [(name, "f8") for name, _ in element.properties]
-    return _Element(element.name, element.count, doubles, dict.fromkeys(element.lists, "f8"))
+def _packed(count: int, columns: list[Any]) -> Any:
+    """Return (count, size) bytes: the numbers of each row, one column after another."""
+    parts = [np.ascontiguousarray(c, dtype=c.dtype.newbyteorder("<")) for c in columns]
+    sized = [part.view("u1").reshape(count, -1 if count else 0) for part in parts]
+    return np.hstack(sized) if sized else np.empty((count, 0), dtype="u1")
 
 
-def _table(data: bytes, start: int, element: _Element, order: str) -> tuple[dict[str, Any], int]:
-    """Return an element's columns, and where it ends; a list's column is (lengths, values)."""
-    if not element.count:
-        nothing = np.empty(0)
-        names = [name for name, _ in element.properties]
-        return {n: (nothing, nothing) if n in element.lists else nothing for n in names}, start
-    first, _ = _row(data, start, element, order)
-    parts: list[Any] = []  # of a row, if all are as long as the first
-    for name, kind in element.properties:
-        if name in element.lists:
-            parts.append((f"#{name}", order + element.lists[name]))
-            parts.append((name, order + kind, (len(first[name]),)))
-        else:
-            parts.append((name, order + kind))
-    even = np.dtype(parts)
-    if start + element.count * even.itemsize <= len(data):
-        table = np.frombuffer(data, even, element.count, start)
-        if all((table[f"#{name}"] == len(first[name])).all() for name in element.lists):
-            columns: dict[str, Any] = {name: table[name] for name, _ in element.properties}
-            for name in element.lists:
-                columns[name] = table[f"#{name}"].astype(np.int64), table[name].ravel()
-            return columns, start + element.count * even.itemsize
-    read = []
-    for _ in range(element.count):
-        row, start = _row(data, start, element, order)
-        read.append(row)
-    columns = {}
-    for name, _ in element.properties:
-        joined = np.concatenate([row[name] for row in read])
-        lengths = np.array([len(row[name]) for row in read])
-        columns[name] = (lengths, joined) if name in element.lists else joined
-    return columns, start
+def _face_rows(lists: list[tuple[IntArray, Any]], columns: list[Any]) -> bytes:
+    """Return the rows of faces: *lists*, of (lengths, values), and then the *columns*.
 
-
-def _row(data: bytes, start: int, element: _Element, order: str) -> tuple[dict[str, Any], int]:
-    """Return one row's values, each as an array, and where the row ends."""
-    row = {}
-    for name, kind in element.properties:
-        n = 1
-        if name in element.lists:
-            length = np.frombuffer(data, order + element.lists[name], 1, start)
-            n, start = int(length[0]), start + length.itemsize
-        if n < 0:
-            raise MeshError(f"a {element.name} has a list of length {n}")
-        row[name] = np.frombuffer(data, order + kind, n, start)
-        start += row[name].nbytes
-    return row, start
+    Faces of equally many corners are packed together and put in their places.
+    """
+    counts = lists[0][0]
+    tail = _packed(len(counts), columns)
+    sizes = np.full(len(counts), tail.shape[1])
+    for lengths, values in lists:
+        sizes += np.dtype(_length_type(lengths)).itemsize + lengths * values.itemsize
+    row_starts = np.cumsum(sizes) - sizes
+    result = np.empty(int(sizes.sum()), dtype="u1")
+    for count in np.unique(counts):
+        rows = np.flatnonzero(counts == count)
+        parts = []
+        for lengths, values in lists:
+            starts = (np.cumsum(lengths) - lengths)[rows]
+            length = int(lengths[rows[0]])
+            here = values[starts[:, None] + np.arange(length)]
+            parts += [lengths[rows].astype(_length_type(lengths)), *here.T]
+        packed = np.hstack([_packed(len(rows), parts), tail[rows]])
+        if len(rows) == len(counts):
+            return bytes(packed.tobytes())
+        result[row_starts[rows, None] + np.arange(packed.shape[1])] = packed
+    return result.tobytes()

@@ -24,15 +24,7 @@ def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.P
         If a polygon has fewer than three corners or names a vertex that is not there.
     """
     points = np.ascontiguousarray(points, dtype=np.float64)
-    if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
-        raise MeshError(
-            f"a face names vertex {corners.min()} to {corners.max()}; "
-            f"there are {len(points)}: count from 0, and give all of them"
-        )
-    if len(counts) and counts.min() < 3:
-        raise MeshError(
-            f"{np.count_nonzero(counts < 3)} faces have fewer than three corners; leave them out"
-        )
+    _require_polygons(len(points), counts, corners)
     surface = pv.PolyData()
     surface.points = points
     starts = np.insert(np.cumsum(counts), 0, 0)
@@ -40,8 +32,26 @@ def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.P
     return surface
 
 
+def _require_polygons(n_points: int, counts: IntArray, corners: IntArray) -> None:
+    if len(corners) and (corners.min() < 0 or corners.max() >= n_points):
+        raise MeshError(
+            f"a face names vertex {corners.min()} to {corners.max()}; "
+            f"there are {n_points}: count from 0, and give all of them"
+        )
+    if len(counts) and counts.min() < 3:
+        raise MeshError(
+            f"{np.count_nonzero(counts < 3)} faces have fewer than three corners; leave them out"
+        )
+
+
 def polygons_of(polydata: pv.PolyData) -> tuple[IntArray, IntArray]:
-    """Return (counts, corners) of the polygons, in order, and then of the strips' triangles."""
+    """Return (counts, corners) of the polygons, in order, and then of the strips' triangles.
+
+    Raises
+    ------
+    MeshError
+        If a polygon has fewer than three corners or names a vertex that is not there.
+    """
     cells = polydata.GetPolys()
     starts = pv.convert_array(cells.GetOffsetsArray()).astype(np.int64)
     counts, corners = [np.diff(starts)], [pv.convert_array(cells.GetConnectivityArray())]
@@ -52,7 +62,57 @@ def polygons_of(polydata: pv.PolyData) -> tuple[IntArray, IntArray]:
         triangles[1::2] = triangles[1::2, [1, 0, 2]]  # every other one is turned round
         counts.append(np.full(len(triangles), 3))
         corners.append(triangles.ravel())
-    return np.concatenate(counts).astype(np.int64), np.concatenate(corners).astype(np.int64)
+    result = np.concatenate(counts).astype(np.int64), np.concatenate(corners).astype(np.int64)
+    _require_polygons(polydata.n_points, *result)
+    return result
+
+
+def unstripped(lengths: IntArray, values: IntArray) -> IntArray:
+    """Return the (m, 3) triangles of strips, all oriented as the first of each.
+
+    Triangles that name a vertex twice only join one part of a strip to the next.
+    """
+    values = np.insert(values, np.cumsum(lengths), -1)  # after each strip
+    number = np.arange(len(values))
+    begun = np.maximum.accumulate(np.where(values == -1, number + 1, 0))  # of the strip it is in
+    triangles = np.stack([values[:-2], values[1:-1], values[2:]], axis=-1)
+    odd = (number - begun)[:-2] % 2 == 1
+    triangles[odd] = triangles[odd][:, [1, 0, 2]]
+    a, b, c = triangles.T
+    whole: IntArray = triangles[(triangles != -1).all(axis=1) & (a != b) & (b != c) & (c != a)]
+    return whole
+
+
+def cells_of(polydata: pv.PolyData) -> IntArray:
+    """Return for each polygon of `polygons_of` the number of its cell, its row in the cell data."""
+    lengths = []
+    strips = polydata.strips
+    while len(strips):
+        lengths.append(int(strips[0]) - 2)
+        strips = strips[strips[0] + 1 :]
+    times = np.concatenate([np.ones(polydata.GetNumberOfPolys()), lengths]).astype(np.int64)
+    first = polydata.GetNumberOfVerts() + polydata.GetNumberOfLines()  # VTK's order of cells
+    cells: IntArray = first + np.repeat(np.arange(len(times)), times)
+    return cells
+
+
+def padded_corners(counts: IntArray, pairs: FloatArray) -> FloatArray:
+    """Return (m, 2 * most corners) values of corners in rows, NaN after the last; pairs (k, 2)."""
+    most = int(counts.max(initial=0))
+    wide = np.full((len(counts), most, 2), np.nan)
+    wide[np.arange(most) < counts[:, None]] = pairs
+    return wide.reshape(len(counts), 2 * most)
+
+
+def corner_values(wide: FloatArray | None, counts: IntArray) -> FloatArray | None:
+    """Return the (k, 2) values of corners out of such rows; None if they do not fit *counts*."""
+    if wide is None or wide.ndim != 2 or wide.dtype.kind != "f" or wide.shape[1] % 2:
+        return None
+    most = wide.shape[1] // 2
+    if len(wide) != len(counts) or most < counts.max(initial=0):
+        return None
+    pairs: FloatArray = wide.reshape(len(counts), most, 2)[np.arange(most) < counts[:, None]]
+    return pairs
 
 
 def triangles_of(polydata: pv.PolyData) -> IntArray:

@@ -1,18 +1,18 @@
-"""Surfaces through VTK's own readers and writers, whose complaints become errors of ours."""
+"""Surfaces through VTK's own readers, whose complaints become errors of ours."""
 
 from __future__ import annotations
 
 import base64
 import re
-import shutil
-import tempfile
 from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 import pyvista as pv
-from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
 from ..errors import MeshError
+from .isolated import read_apart
 from .polygons import polydata_of
 
 _SPEAKER = re.compile(r"^\w+ \(\w+\): ")
@@ -20,23 +20,74 @@ _XML = frozenset({".vtp", ".vtu"})
 _DENSEST = 1100  # bytes out of one that is compressed, at most
 _COUNTS = re.compile(rb'(NumberOf\w+)="(\d+)"')
 _BINARY = re.compile(rb'format="binary"[^>]*>\s*([A-Za-z0-9+/=]{32})')
+_BEGINS = {
+    ".vtk": re.compile(rb"# vtk DataFile"),
+    ".vtp": re.compile(rb"[^<]*<[\s\S]*<?VTKFile\b"),
+    ".vtu": re.compile(rb"[^<]*<[\s\S]*<?VTKFile\b"),
+    ".vtkhdf": re.compile(rb"\x89HDF\r\n\x1a\n"),
+}
 _SURFACE_CELLS = frozenset({5, 7, 9})  # VTK's numbers of triangle, polygon, quadrangle
 
 
 def read_with_vtk(path: Path) -> pv.PolyData:
-    """Return the surface that one of VTK's readers finds; its complaints become a MeshError."""
-    if path.suffix.lower() in _XML:
+    """Return the surface that one of VTK's readers finds; its complaints become a MeshError.
+
+    The reader works in a process of its own, which a damaged file may end.
+    """
+    suffix = path.suffix.lower()
+    with path.open("rb") as file:
+        if not _BEGINS[suffix].match(file.read(1000)):
+            raise MeshError(f"is no readable {suffix} file")
+    if suffix in _XML:
         _require_room_for_counts(path)
     try:
-        with pv.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
-            data = pv.get_reader(path).read()
-    except RuntimeError as error:
-        raise MeshError(f"is no readable {path.suffix} file ({_said(error)})") from None
-    if isinstance(data, pv.MultiBlock):
-        parts = [part for part in data.recursive_iterator(skip_none=True) if part.n_cells]
-        surfaces = [_surface(part) for part in parts]
-        return surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
-    return _surface(data)
+        with read_apart("vtk", path) as folder:
+            pieces = sorted(folder.iterdir(), key=lambda piece: int(piece.stem))
+            parts = [_sound(pv.get_reader(piece).read()) for piece in pieces]
+    except (MeshError, RuntimeError) as error:
+        raise MeshError(f"is no readable {suffix} file ({_said(error)})") from None
+    surfaces = [_surface(part) for part in parts]
+    return surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
+
+
+def _sound(data: pv.DataSet) -> pv.DataSet:
+    """Return *data*, names as they were; a MeshError if cells or arrays do not fit its points.
+
+    VTK's readers do not check that, and what uses the cells reads any memory.
+    """
+    arrays = [data.GetCells()] if isinstance(data, pv.UnstructuredGrid) else _cell_arrays(data)
+    for cells in arrays:
+        starts = pv.convert_array(cells.GetOffsetsArray())
+        corners = pv.convert_array(cells.GetConnectivityArray())
+        ends = (int(starts[0]), int(starts[-1])) if len(starts) else (0, len(corners))
+        if ends != (0, len(corners)) or (np.diff(starts) < 0).any():
+            raise MeshError("its cells overlap, or end outside their list of corners")
+        if len(corners) and not 0 <= corners.min() <= corners.max() < data.n_points:
+            raise MeshError(
+                f"a cell names vertex {corners.min()} to {corners.max()}; there are {data.n_points}"
+            )
+    if isinstance(data, pv.UnstructuredGrid) and len(data.celltypes) != data.n_cells:
+        raise MeshError("it has not one type for each cell")
+    for sort, attributes, count in (
+        ("point", data.GetPointData(), data.n_points),
+        ("cell", data.GetCellData(), data.n_cells),
+        ("field", data.GetFieldData(), 0),
+    ):
+        for k in range(attributes.GetNumberOfArrays()):
+            array = attributes.GetAbstractArray(k)
+            array.SetName(unquote(array.GetName()))
+            for j in range(array.GetNumberOfComponents() * array.HasAComponentName()):
+                array.SetComponentName(j, unquote(array.GetComponentName(j) or ""))
+            if array.GetNumberOfTuples() != count and sort != "field":
+                raise MeshError(
+                    f"its {sort} array {array.GetName()!r} has {array.GetNumberOfTuples()} rows; "
+                    f"must be {count}"
+                )
+    return data
+
+
+def _cell_arrays(data: pv.PolyData) -> list[Any]:
+    return [data.GetVerts(), data.GetLines(), data.GetPolys(), data.GetStrips()]
 
 
 def _require_room_for_counts(path: Path) -> None:
@@ -65,37 +116,6 @@ def _decoded(word: bytes) -> bytes:
         return base64.b64decode(word)[:24]
     except ValueError:
         return b""
-
-
-def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
-    """Write a surface through one of VTK's writers; OSError unless it is there, and whole.
-
-    On a full disk VTK's XML writer ends the process, and its HDF writer leaves half a file and
-    says nothing.  So the first writes into memory, and what the second wrote is read again.
-    """
-    if path.suffix == ".vtp":
-        writer = vtkXMLPolyDataWriter()
-        writer.SetInputData(surface)
-        writer.SetDataModeToBinary()
-        writer.WriteToOutputStringOn()
-        writer.Write()
-        path.write_text(writer.GetOutputString(), encoding="utf-8")
-        return
-    try:
-        with pv.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
-            if path.suffix != ".vtkhdf":
-                surface.save(path)
-                again = surface
-            else:  # HDF5 locks what it writes, and so does whoever named this place
-                with tempfile.TemporaryDirectory() as folder:
-                    whole = Path(folder) / path.name
-                    surface.save(whole)
-                    again = read_with_vtk(whole)
-                    shutil.copyfile(whole, path)
-    except (RuntimeError, MeshError) as error:
-        raise OSError(_said(error)) from None
-    if not np.array_equal(again.points, surface.points, equal_nan=True):
-        raise OSError("what was written is not all of it")
 
 
 def _surface(data: pv.DataSet) -> pv.PolyData:

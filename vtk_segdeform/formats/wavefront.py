@@ -7,24 +7,35 @@ closed mesh and renumbers it.  Here a vertex stays one vertex, in the order of t
     vt u v              one per vertex: point array "TextureCoordinates".  Else, with seams, cell
                         array "TextureCorners": (u, v) of each corner in turn, NaN where it has none
     f  a/t/n ...        polygons; negative numbers count back from the last vertex
-    g o usemtl mtllib   cell arrays "Group" and "Material", numbers into the field data of names
+    o g usemtl          cell arrays "Object", "Group" and "Material": numbers into the field arrays
+                        "ObjectNames", "GroupNames" and "MaterialNames"
+    s                   cell array "Smoothing": the number of a smoothing group, 0 is off
+    mtllib              field array "MaterialLibrary"
 
-Normals (vn), lines, points and smoothing groups are dropped.
+A name is the rest of its line, in UTF-8 or Latin-1; it is written in UTF-8.  Normals (vn), lines
+and points are dropped.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 import pyvista as pv
 
 from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
-from .polygons import polydata_of, polygons_of, rows
+from .array_names import decoded, get_names, plain_names, set_names, warn_left_out, warn_renamed
+from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of, rows
 
 _POINT_TEXTURE, _CORNER_TEXTURE = "TextureCoordinates", "TextureCorners"
-_NAMED = {"g": "Group", "o": "Group", "usemtl": "Material"}
+_NAMED = {"o": "Object", "g": "Group", "usemtl": "Material"}
+_SMOOTHING, _LIBRARY = "Smoothing", "MaterialLibrary"
+_Runs: TypeAlias = dict[
+    str, list[tuple[int, str]]
+]  # by statement: from which face on, what it says
 
 
 def read_obj(path: Path) -> pv.PolyData:
@@ -34,72 +45,50 @@ def read_obj(path: Path) -> pv.PolyData:
     counts: list[int] = []
     corners: list[int] = []
     texture_of: list[int] = []
-    names: dict[str, dict[str, int]] = {"Group": {}, "Material": {}}
-    numbers: dict[str, list[int]] = {"Group": [], "Material": []}
-    now = {"Group": "default", "Material": "default"}
-    library = ""
-    for line in path.read_text(errors="replace").replace("\\\n", " ").splitlines():
-        word, *rest = line.partition("#")[0].split() or [""]
+    runs: _Runs = {word: [] for word in (*_NAMED, "s")}
+    libraries = []
+    text = decoded(path.read_bytes()).replace("\r\n", "\n").replace("\r", "\n")
+    for line in text.replace("\\\n", " ").split("\n"):
+        word, rest = (*line.split(None, 1), "", "")[:2]
         if word == "v":
-            points.append(rest)
+            points.append(_words(rest))
         elif word == "vt":
-            textures.append(rest[:2] + ["0"] * (2 - len(rest)))
+            textures.append((_words(rest) + ["0", "0"])[:2])
         elif word == "f":
-            counts.append(len(rest))
-            for corner in rest:
+            face = _words(rest)
+            counts.append(len(face))
+            for corner in face:
                 vertex, _, more = corner.partition("/")
                 texture = more.partition("/")[0]
                 corners.append(_number(vertex, len(points)))
                 texture_of.append(_number(texture, len(textures)) if texture else -1)
-            for key, name in now.items():
-                numbers[key].append(names[key].setdefault(name, len(names[key])))
-        elif word in _NAMED:
-            now[_NAMED[word]] = " ".join(rest) or "default"
+        elif word in runs:
+            runs[word].append((len(counts), rest.strip()))
         elif word == "mtllib":
-            library = " ".join(rest)
+            libraries.append(rest.strip())
     table = _table(points, (3, 4, 6, 7))
     surface = polydata_of(
         table[:, :3], np.array(counts, dtype=np.int64), np.array(corners, dtype=np.int64)
     )
     if table.shape[1] >= 6:
-        surface.point_data["RGB"] = np.round(255.0 * table[:, 3:6].clip(0.0, 1.0)).astype(np.uint8)
+        colour = np.nan_to_num(table[:, 3:6]).clip(0.0, 1.0)
+        surface.point_data["RGB"] = np.round(255.0 * colour).astype(np.uint8)
     _keep_texture(surface, _table(textures, (2,)), np.array(texture_of, dtype=np.int64))
-    for key, known in names.items():
-        if set(known) - {"default"}:
-            surface.cell_data[key] = np.array(numbers[key], dtype=np.int64)
-            surface.field_data[f"{key}Names"] = list(known)
-    if library:
-        surface.field_data["MaterialLibrary"] = [library]
+    _keep_runs(surface, runs)
+    if libraries:
+        set_names(surface, _LIBRARY, libraries)
     return surface
 
 
-def write_obj(path: Path, surface: pv.PolyData) -> None:
-    """Write an OBJ file that `read_obj` gives back unchanged; other arrays are left out."""
-    counts, corners = polygons_of(surface)
-    polygons = rows(counts, corners + 1)
-    texture, texture_of = _texture(surface, counts, corners)
-    tags = [_tags(surface, "g", "Group"), _tags(surface, "usemtl", "Material")]
-    with path.open("w") as file:
-        if "MaterialLibrary" in surface.field_data:
-            file.write(f"mtllib {surface.field_data['MaterialLibrary'][0]}\n")
-        table = np.asarray(surface.points, dtype=float)
-        if "RGB" in surface.point_data:
-            table = np.hstack([table, surface.point_data["RGB"][:, :3] / 255.0])
-        file.writelines(f"v {' '.join(map(repr, row))}\n" for row in table.tolist())
-        file.writelines(f"vt {u!r} {v!r}\n" for u, v in texture.tolist())
-        at = 0
-        for k, row in enumerate(polygons):
-            for tag in tags:
-                if tag and (k == 0 or tag[k] != tag[k - 1]):
-                    file.write(tag[k])
-            slots = texture_of[at : at + len(row)]
-            words = [f"{v}/{t}" if t else str(v) for v, t in zip(row, slots, strict=False)]
-            file.write(f"f {' '.join(words or map(str, row))}\n")
-            at += len(row)
+def _words(rest: str) -> list[str]:
+    return rest.partition("#")[0].split()
 
 
 def _number(word: str, count: int) -> int:
+    """Return the number from 0 of what a corner names: from 1, or back from the last of *count*."""
     number = int(word)
+    if number == 0 or number < -count:
+        raise MeshError(f"a face names {number}; numbers begin with 1, or with -1 from behind")
     return number - 1 if number > 0 else count + number
 
 
@@ -119,38 +108,132 @@ def _keep_texture(surface: pv.PolyData, texture: FloatArray, texture_of: IntArra
         raise MeshError(f"a face names texture coordinate {texture_of.max() + 1} of {len(texture)}")
     counts, corners = polygons_of(surface)
     place = np.full(surface.n_points, -1)
+    if len(texture) == len(place) and (texture_of == corners).all():
+        place = np.arange(len(place))
     place[corners] = texture_of
     if (place[corners] == texture_of).all() and (place >= 0).all():
         surface.point_data[_POINT_TEXTURE] = texture[place]
         surface.point_data.active_texture_coordinates_name = _POINT_TEXTURE
         return
-    wide = np.full((len(counts), counts.max(), 2), np.nan)
-    here = np.arange(counts.max()) < counts[:, None]
-    wide[here] = np.where(texture_of[:, None] >= 0, texture[texture_of], np.nan)
-    surface.cell_data[_CORNER_TEXTURE] = wide.reshape(len(counts), -1)
+    pairs = np.where(texture_of[:, None] >= 0, texture[texture_of], np.nan)
+    surface.cell_data[_CORNER_TEXTURE] = padded_corners(counts, pairs)
+
+
+def _keep_runs(surface: pv.PolyData, runs: _Runs) -> None:
+    """Store what statements say of the faces after them, as cell arrays and their names."""
+    for word, said in runs.items():
+        if not said:
+            continue
+        starts = [0, *(at for at, _ in said), surface.n_cells]
+        lengths = np.diff(starts)
+        texts = ["", *(text for _, text in said)]
+        if word == "s":
+            groups = [_smoothing_group(text) for text in texts]
+            surface.cell_data[_SMOOTHING] = np.repeat(groups, lengths)
+            continue
+        texts = [text or "default" for text in texts]
+        names = dict.fromkeys(t for t, n in zip(texts, lengths, strict=True) if n)
+        numbers = {name: k for k, name in enumerate(names)}
+        key = _NAMED[word]
+        surface.cell_data[key] = np.repeat([numbers.get(text, 0) for text in texts], lengths)
+        set_names(surface, f"{key}Names", names)
+
+
+def _smoothing_group(text: str) -> int:
+    if text.isdecimal() and len(text) < 10:
+        return int(text)
+    return int(text.lower() not in ("", "off"))
+
+
+def write_obj(path: Path, surface: pv.PolyData) -> None:
+    """Write an OBJ file that `read_obj` gives back unchanged; what is left out is said.
+
+    Names that a line cannot hold are changed, and that is said too, by warnings.
+    """
+    counts, corners = polygons_of(surface)
+    cells = cells_of(surface)
+    polygons = rows(counts, corners + 1)
+    kept: dict[str, list[str]] = {"point": [], "cell": [], "field": []}
+    texture, texture_of = _texture(surface, counts, corners, kept)
+    tags = _tags(surface, cells, kept)
+    libraries = plain_names(get_names(surface, _LIBRARY))
+    warn_renamed("material library", libraries)
+    kept["field"] += [_LIBRARY] if libraries else []
+    table = np.asarray(surface.points, dtype=float)
+    colour = surface.point_data.get("RGB")
+    if colour is not None and colour.dtype == np.uint8 and colour.shape == table.shape:
+        table = np.hstack([table, np.asarray(colour) / 255.0])
+        kept["point"].append("RGB")
+    warn_left_out("OBJ", surface, kept)
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.writelines(f"mtllib {name}\n" for name in libraries.values())
+        file.writelines(f"v {' '.join(map(repr, row))}\n" for row in table.tolist())
+        file.writelines(f"vt {u!r} {v!r}\n" for u, v in texture.tolist())
+        at = 0
+        for k, row in enumerate(polygons):
+            file.write(tags.get(k, ""))
+            slots = texture_of[at : at + len(row)]
+            words = [f"{v}/{t}" if t else str(v) for v, t in zip(row, slots, strict=False)]
+            file.write(f"f {' '.join(words or map(str, row))}\n")
+            at += len(row)
 
 
 def _texture(
-    surface: pv.PolyData, counts: IntArray, corners: IntArray
+    surface: pv.PolyData, counts: IntArray, corners: IntArray, kept: dict[str, list[str]]
 ) -> tuple[FloatArray, list[int]]:
     """Return the vt lines and, for each corner, which it uses, counted from 1; 0 for none."""
     wide = surface.cell_data.get(_CORNER_TEXTURE)
-    if wide is not None and len(wide) == len(counts):
-        here = np.arange(wide.shape[1] // 2) < counts[:, None]
-        each = np.asarray(wide).reshape(len(counts), -1, 2)[here]
+    each = None if wide is None else corner_values(np.asarray(wide)[cells_of(surface)], counts)
+    if each is not None:
+        kept["cell"].append(_CORNER_TEXTURE)
         known = ~np.isnan(each).any(axis=1)
         texture, which = np.unique(each[known], axis=0, return_inverse=True)
         slots = np.zeros(len(corners), dtype=np.int64)
         slots[known] = which.ravel() + 1
-        return texture, slots.tolist()
+        return texture.astype(float), slots.tolist()
     texture = surface.active_texture_coordinates
-    if texture is None:
+    if texture is None or texture.ndim != 2 or texture.shape[1] < 2:
         return np.empty((0, 2)), []
+    kept["point"].append(surface.point_data.active_texture_coordinates_name)
     return np.asarray(texture, dtype=float)[:, :2], (corners + 1).tolist()
 
 
-def _tags(surface: pv.PolyData, word: str, key: str) -> list[str]:
-    numbers, names = surface.cell_data.get(key), surface.field_data.get(f"{key}Names")
-    if numbers is None or names is None or len(numbers) != surface.n_cells:
-        return []
-    return [f"{word} {names[int(k)]}\n" for k in numbers]
+def _tags(surface: pv.PolyData, cells: IntArray, kept: dict[str, list[str]]) -> dict[int, str]:
+    """Return the lines to write before a face, by its number, where something changes there.
+
+    After another object everything is said again: some readers forget it there.
+    """
+    lines: list[list[str]] = []  # by statement, of each face
+    for word, key in _NAMED.items():
+        names = get_names(surface, f"{key}Names")
+        numbers = _whole_numbers(surface.cell_data.get(key), len(names))
+        if numbers is None:
+            continue
+        written = plain_names(names)
+        warn_renamed(key.lower(), written)
+        lines.append([f"{word} {written[names[k]]}\n" for k in numbers[cells].tolist()])
+        kept["cell"].append(key)
+        kept["field"].append(f"{key}Names")
+    groups = _whole_numbers(surface.cell_data.get(_SMOOTHING), 10**9)
+    if groups is not None:
+        lines.append([f"s {k or 'off'}\n" for k in groups[cells].tolist()])
+        kept["cell"].append(_SMOOTHING)
+    said = list(zip(*lines, strict=True))  # of each face
+    tags = {0: "".join(said[0])} if said else {}
+    objects = "Object" in kept["cell"]
+    for k, (before, now) in enumerate(pairwise(said), start=1):
+        if now != before:
+            anew = objects and now[0] != before[0]
+            pairs = zip(now, before, strict=True)
+            tags[k] = "".join(line for line, old in pairs if anew or line != old)
+    return tags
+
+
+def _whole_numbers(values: Any, end: int) -> Any:
+    """Return (m,) whole numbers from 0 to *end* - 1; None if *values* are anything else."""
+    array = np.asarray(values)
+    if array.ndim != 1 or array.dtype.kind not in "biuf" or not len(array):
+        return None
+    if not ((array >= 0) & (array < end) & (array == np.rint(array))).all():
+        return None
+    return array.astype(np.int64)

@@ -1,0 +1,119 @@
+"""Arrays and names that a file format cannot hold: what is written instead, and the warning.
+
+A format without room for an array leaves it out; a name that its syntax cannot hold, or that means
+something else there, is written as another one.  Both are logged as warnings, which the command
+line prints.  The file itself is valid either way.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+
+import numpy as np
+import pyvista as pv
+from vtkmodules.vtkCommonCore import vtkStringArray
+
+_log = logging.getLogger(__name__)
+_LONGEST = 200  # readers written in C keep a name in a buffer of fixed size
+
+
+def decoded(data: bytes) -> str:
+    """Return text in UTF-8 or, if it is not valid as that, in Latin-1, which every byte is."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def plain_names(
+    names: Iterable[str],
+    reserved: Container[str] = (),
+    *,
+    refused: str = "",
+    measure: Callable[[str], int] = len,
+) -> dict[str, str]:
+    """Return the name to write for each of *names*; no two are equal, valid ones stay.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Any text.
+    reserved : container of str
+        Names that mean something else in the file.
+    refused : str
+        Letters that cannot be in a name; those that are not printable never can.
+    measure : callable
+        How long a name is in the file; names of over 200 are cut.
+    """
+    wanted = dict.fromkeys(names)
+    plain = {name: _plain(name, refused, measure) for name in wanted}
+    result = {name: name for name in wanted if plain[name] == name and name not in reserved}
+    taken = set(result)
+    for name in wanted:
+        if name in result:
+            continue
+        free, number = plain[name], 0
+        while free in taken or free in reserved:
+            number += 1
+            free = f"{plain[name]}_{number}"
+        taken.add(free)
+        result[name] = free
+    return {name: result[name] for name in wanted}
+
+
+def _plain(name: str, refused: str, measure: Callable[[str], int]) -> str:
+    letters = [c if c.isprintable() and c not in refused else "_" for c in name[:_LONGEST]]
+    text = "".join(letters).strip()
+    while measure(text) > _LONGEST:
+        text = text[:-1]
+    if text.endswith("\\"):  # in OBJ the next line would belong to it
+        text = text[:-1] + "_"
+    return text or "unnamed"
+
+
+def warn_renamed(what: str, names: dict[str, str]) -> None:
+    """Log a warning for each name that is written as another one; *what* says of what."""
+    for name, written in names.items():
+        if name != written:
+            _log.warning("%s %r is written as %r", what, name, written)
+
+
+def warn_left_out(format_: str, surface: pv.PolyData, kept: Mapping[str, Sequence[str]]) -> None:
+    """Log one warning that names everything of *surface* that a file of this format leaves out.
+
+    Parameters
+    ----------
+    format_ : str
+        How people call the format.
+    surface : pyvista.PolyData
+        What is written.
+    kept : mapping
+        Names of the arrays that are written, for "point", "cell" and "field".
+    """
+    lost = [
+        f"{sort} array {name!r}"
+        for sort in ("point", "cell", "field")
+        for name in list(getattr(surface, f"{sort}_data"))
+        if name not in kept.get(sort, ())
+    ]
+    for count, sort in ((surface.n_verts, "vertex"), (surface.n_lines, "line")):
+        if count:
+            lost.append(f"{count} {sort} cell{'s' if count > 1 else ''}")
+    if lost:
+        _log.warning("%s has no place for %s: left out", format_, ", ".join(lost))
+
+
+def set_names(surface: pv.PolyData, key: str, names: Iterable[str]) -> None:
+    """Store *names* as field array *key*; pyvista itself refuses text that is not ASCII."""
+    array = vtkStringArray()
+    array.SetName(key)
+    for name in names:
+        array.InsertNextValue(name)
+    surface.GetFieldData().AddArray(array)
+
+
+def get_names(surface: pv.PolyData, key: str) -> list[str]:
+    """Return the texts of field array *key*; none if it is not there or not of text."""
+    values = np.asarray(surface.field_data[key]) if key in surface.field_data else np.empty(0)
+    return [str(name) for name in values.ravel()] if values.dtype.kind == "U" else []

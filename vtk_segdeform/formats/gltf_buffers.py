@@ -1,0 +1,249 @@
+"""The JSON of a glTF file, and the numbers in its buffers, all checked before they are used.
+
+    buffer      bytes: the rest of a .glb, a data: URI, or a file in the model's own folder
+    bufferView  a piece of a buffer
+    accessor    numbers in a bufferView: type, how many, how far apart; some perhaps replaced
+
+A number of the JSON that does not fit what is there is a MeshError that names it, so that no byte
+outside a buffer is ever read, and no more memory asked for than the file's size allows.
+
+Source
+------
+The Khronos Group, "glTF 2.0 Specification", ISO/IEC 12113:2022, sections 3.6 and 4.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+import struct
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, unquote_to_bytes
+
+import numpy as np
+
+from ..errors import MeshError
+from .neighbours import file_inside
+
+_TYPES = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+_PER_BYTE, _ALWAYS = 64, 50_000_000  # elements that may be made of a file
+_MAGIC, _JSON, _BINARY = b"glTF", b"JSON", b"BIN\0"
+
+
+class Document:
+    """A glTF file: its JSON, and arrays out of its buffers.
+
+    Parameters
+    ----------
+    path : Path
+        A .gltf or .glb file.
+
+    Raises
+    ------
+    MeshError
+        If it is no glTF 2.0.
+    """
+
+    def __init__(self, path: Path) -> None:
+        data = path.read_bytes()
+        text, self._binary = _chunks(data) if data.startswith(_MAGIC) else (data, None)
+        try:
+            self.json = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise MeshError(f"its JSON cannot be read ({error})") from None
+        asset = self.json.get("asset") if isinstance(self.json, dict) else None
+        if not isinstance(asset, dict) or not str(asset.get("version")).startswith("2."):
+            raise MeshError("is no glTF 2.0: there is no asset of that version")
+        self.size = len(data)  # bytes of all that has been read
+        self._folder = path.parent
+        self._buffers: dict[int, bytes] = {}
+        self._lists: dict[str, list[dict[str, Any]]] = {}
+        self._spent = 0
+
+    def spend(self, elements: int) -> None:
+        """Count what is made of the file; a MeshError if it is far more than its bytes are.
+
+        The same few bytes may be instanced any number of times.
+        """
+        self._spent += elements
+        if self._spent > max(_ALWAYS, _PER_BYTE * self.size):
+            raise MeshError(f"its instances are over {_ALWAYS} vertices and corners; too many")
+
+    def items(self, key: str) -> list[dict[str, Any]]:
+        """Return a list of objects at the top of the JSON; empty if there is none."""
+        if key not in self._lists:
+            self._lists[key] = objects(self.json, key, key)
+        return self._lists[key]
+
+    def item(self, key: str, index: object) -> dict[str, Any]:
+        """Return one object of such a list."""
+        found = self.items(key)
+        return found[whole({"index": index}, "index", key, most=len(found) - 1)]
+
+    def array(self, index: object, *types: str) -> Any:
+        """Return the numbers of an accessor, (n, width), in their own type or, normalised, float64.
+
+        Parameters
+        ----------
+        index : int
+            Of the accessor.
+        *types : str
+            One of these it must be: "SCALAR", "VEC3" ...
+        """
+        accessor, name = self.item("accessors", index), f"accessor {index}"
+        type_ = accessor.get("type")
+        if type_ not in types:
+            raise MeshError(f"{name} is of type {type_!r}; must be {' or '.join(types)}")
+        kind, count = _component(accessor, name), whole(accessor, "count", name, least=1)
+        shape = (count, _WIDTHS[type_])
+        if "bufferView" in accessor:
+            start = whole(accessor, "byteOffset", name, default=0)
+            array = self._viewed(accessor["bufferView"], start, shape, kind)
+        elif count > self.size:
+            raise MeshError(f"{name} says {count} elements, and has no buffer for them")
+        else:
+            array = np.zeros(shape, dtype=kind)
+        self.spend(count)
+        if "sparse" in accessor:
+            array = self._replaced(array, object_(accessor, "sparse", name), name)
+        if accessor.get("normalized") is True and array.dtype.kind in "iu":
+            return np.maximum(array / np.iinfo(array.dtype).max, -1.0)
+        return array
+
+    def _replaced(self, array: Any, sparse: dict[str, Any], name: str) -> Any:
+        """Return a copy of *array* with some rows replaced."""
+        name = f"the sparse part of {name}"
+        count = whole(sparse, "count", name, least=1, most=len(array))
+        where, what = object_(sparse, "indices", name), object_(sparse, "values", name)
+        kind = _component(where, name)
+        if kind[0] != "u":
+            raise MeshError(f"{name} has indices that are no unsigned integers")
+        start = whole(where, "byteOffset", name, default=0)
+        rows = self._viewed(where.get("bufferView"), start, (count, 1), kind).ravel()
+        if rows.max() >= len(array):
+            raise MeshError(f"{name} replaces element {rows.max()} of {len(array)}")
+        start, shape = whole(what, "byteOffset", name, default=0), (count, array.shape[1])
+        array = array.copy()
+        array[rows] = self._viewed(what.get("bufferView"), start, shape, array.dtype.str[1:])
+        return array
+
+    def _viewed(self, index: object, start: int, shape: tuple[int, int], kind: str) -> Any:
+        view, name = self.item("bufferViews", index), f"bufferView {index}"
+        buffer = self._buffer(view.get("buffer"))
+        offset = whole(view, "byteOffset", name, default=0)
+        length = whole(view, "byteLength", name)
+        if offset + length > len(buffer):
+            raise MeshError(f"{name} ends at byte {offset + length} of {len(buffer)} in its buffer")
+        item = np.dtype(kind).itemsize
+        row = shape[1] * item
+        stride = whole(view, "byteStride", name, default=row, least=row, most=max(row, 252))
+        end = start + (shape[0] - 1) * stride + row
+        if end > length:
+            raise MeshError(f"an accessor ends at byte {end} of {length} in {name}")
+        place, steps = offset + start, (stride, item)
+        return np.ndarray(shape, f"<{kind}", buffer=buffer, offset=place, strides=steps)
+
+    def _buffer(self, index: object) -> bytes:
+        buffer, number = self.item("buffers", index), int(str(index))
+        if number not in self._buffers:
+            name = f"buffer {index}"
+            data, length = self._bytes(buffer, number), whole(buffer, "byteLength", name)
+            if length > len(data):
+                raise MeshError(f"{name} says {length} bytes; there are {len(data)}")
+            self._buffers[number] = data[:length]
+            self.size += 0 if data is self._binary else len(data)
+        return self._buffers[number]
+
+    def _bytes(self, buffer: dict[str, Any], number: int) -> bytes:
+        uri = buffer.get("uri")
+        if uri is None and number == 0 and self._binary is not None:
+            return self._binary
+        if not isinstance(uri, str):
+            raise MeshError(f"buffer {number} has neither a uri nor bytes in the file")
+        if uri.startswith("data:"):
+            kind, comma, payload = uri.partition(",")
+            if not comma:
+                raise MeshError(f"buffer {number} has a data: URI without data")
+            coded = kind.endswith(";base64")
+            return base64.b64decode(payload) if coded else unquote_to_bytes(payload)
+        file = file_inside(self._folder, unquote(uri))
+        if file is None:
+            raise MeshError(
+                f"buffer {number} is to be read from {uri[:200]!r}, which is no file in the "
+                "model's folder; copy it there"
+            )
+        return file.read_bytes()
+
+
+def _chunks(data: bytes) -> tuple[bytes, bytes | None]:
+    """Return the JSON and the binary chunk, if any, of a .glb file."""
+    if len(data) < 20:
+        raise MeshError("is cut off")
+    _, version, length = struct.unpack_from("<4sII", data)
+    if version != 2:
+        raise MeshError(f"is glTF {version}; only 2 can be read")
+    if length > len(data):
+        raise MeshError(f"says {length} bytes, but has {len(data)}")
+    chunks, at = dict[bytes, bytes](), 12
+    while at + 8 <= length:
+        size, kind = struct.unpack_from("<I4s", data, at)
+        if at + 8 + size > length:
+            raise MeshError(f"has a chunk of {size} bytes, which end after the file does")
+        chunks.setdefault(kind, data[at + 8 : at + 8 + size])
+        at += 8 + size
+    if _JSON not in chunks:
+        raise MeshError("has no JSON in it")
+    return chunks[_JSON], chunks.get(_BINARY)
+
+
+def whole(
+    where: dict[str, Any], key: str, name: str, *, default: int | None = None,
+    least: int = 0, most: float = math.inf,
+) -> int:  # fmt: skip
+    """Return the whole number *key* of an object that messages call *name*."""
+    value = where.get(key, default)
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
+        raise MeshError(f"{name}: {key} is {value!r:.40}; must be {least} to {most}")
+    return value
+
+
+def numbers(where: dict[str, Any], key: str, name: str, default: list[float]) -> Any:
+    """Return a list of as many finite numbers as *default* has, as an array."""
+    value = where.get(key, default)
+    sound = isinstance(value, list) and len(value) == len(default)
+    if not sound or not all(_is_number(each) for each in value):
+        raise MeshError(f"{name}: {key} must be {len(default)} finite numbers")
+    return np.array(value, dtype=float)
+
+
+def object_(where: dict[str, Any], key: str, name: str) -> dict[str, Any]:
+    """Return the object *key* of an object; empty if there is none."""
+    value = where.get(key, {})
+    if not isinstance(value, dict):
+        raise MeshError(f"{name}: {key} must be an object")
+    return value
+
+
+def objects(where: dict[str, Any], key: str, name: str) -> list[dict[str, Any]]:
+    """Return the list of objects *key* of an object; empty if there is none."""
+    value = where.get(key, [])
+    if not isinstance(value, list) or not all(isinstance(each, dict) for each in value):
+        raise MeshError(f"{name}: {key} must be a list of objects")
+    return value
+
+
+def _is_number(value: object) -> bool:
+    good = isinstance(value, int | float) and not isinstance(value, bool)
+    return good and abs(value) < 1e300  # type: ignore[arg-type]
+
+
+def _component(where: dict[str, Any], name: str) -> str:
+    kind = _TYPES.get(whole(where, "componentType", name))
+    if kind is None:
+        raise MeshError(f"{name} is of component type {where['componentType']}; there is none")
+    return kind

@@ -1,0 +1,98 @@
+"""Reading files with native libraries in a process of its own, with limits of memory and time.
+
+The readers of VTK and PyMeshLab believe what a file says: a wrong count, a deep nesting or an
+entity that is a million others ends the process that reads it.  So another one does,
+`reading_child`, and what it found comes back through files that VTK has written.  It starts in
+0.2 s.
+
+A program that is frozen, or runs in another one, has no Python to start: it reads in its own
+process, and logs a warning.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing import spawn
+from pathlib import Path
+
+from ..errors import MeshError
+from . import reading_child
+
+_log = logging.getLogger(__name__)
+_SECONDS, _PER_MEGABYTE = 30.0, 2.0
+_MEMORY, _PER_BYTE = 2 << 30, 64  # bytes, and for each byte of the file
+_START = """import runpy, sys
+sys.path[:] = {path!r}
+if {tool!r} == "vtk":
+    sys.modules["numpy"] = None  # VTK does without, and starts in half the time
+runpy.run_path({child!r}, run_name="__main__")
+"""
+
+
+@contextmanager
+def read_apart(tool: str, path: Path) -> Iterator[Path]:
+    """Have *path* read in another process; give the folder with what `reading_child` found.
+
+    Parameters
+    ----------
+    tool : str
+        "vtk" or "meshlab".
+    path : Path
+        The file.
+
+    Raises
+    ------
+    MeshError
+        If the file cannot be read, takes too much memory or time, or ends the process.
+    """
+    size = path.stat().st_size
+    seconds = _SECONDS + _PER_MEGABYTE * size / 1e6
+    with tempfile.TemporaryDirectory(prefix="segdeform-") as name:
+        folder = Path(name)
+        python = _python()
+        if python is None:
+            _log.warning("%s is read without protection: there is no Python to start", path)
+            reading_child.main(tool, str(path.absolute()), name, "0")
+            code = 0
+        else:
+            start = _START.format(path=sys.path, tool=tool, child=reading_child.__file__)
+            try:
+                words = [tool, str(path.absolute()), name, str(_MEMORY + _PER_BYTE * size)]
+                code = _ended([python, "-S", "-c", start, *words], name, seconds)
+            except subprocess.TimeoutExpired:
+                raise MeshError(f"reading it took over {seconds:.0f} s; it was given up") from None
+        said = folder / "said.txt"
+        if said.exists():
+            raise MeshError(said.read_text(encoding="utf-8"))
+        if code:
+            how = signal.Signals(-code).name if code < 0 else f"code {code}"
+            raise MeshError(
+                f"the reader ended in a crash ({how}); the file is damaged or too large"
+            )
+        yield folder
+
+
+def _ended(words: list[str], folder: str, seconds: float) -> int:
+    one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+    done = subprocess.run(
+        words, cwd=folder, env={**os.environ, **one}, timeout=seconds, check=False,
+        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+    )  # fmt: skip
+    return done.returncode
+
+
+def _python() -> str | None:
+    """Return the program that is Python, or None if this one is something else."""
+    program = spawn.get_executable()
+    if getattr(sys, "frozen", False) or not program:
+        return None
+    name = os.fsdecode(program)
+    return name if Path(name).stem.lower().startswith(("python", "pypy", "pvpython")) else None

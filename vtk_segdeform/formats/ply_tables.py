@@ -1,0 +1,184 @@
+"""The elements of a PLY file as tables, by name: the header, and text or binary rows after it.
+
+    element face 12
+    property list uchar int vertex_indices
+    property uchar red
+
+A property is a number, or a list whose length comes first in every row.  A text file is read as if
+it were a binary one of doubles, so that there is one reader.  Names are whatever stands between
+white space; nothing in the header is believed that the bytes after it could not hold.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from ..errors import MeshError
+from .array_names import decoded
+
+TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+    "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
+    "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+_ORDERS = {"ascii": "<", "binary_little_endian": "<", "binary_big_endian": ">"}
+_FIRST = re.compile(rb"ply[ \t]*(\r\n|\n|\r)")
+_END = re.compile(rb"(?:^|[\r\n])[ \t]*end_header[ \t]*(?=[\r\n]|\Z)")
+_LINE = re.compile(rb"\r\n|\n|\r")
+
+
+class Lists(NamedTuple):
+    """A column of lists, one after another."""
+
+    lengths: Any  # (n,) int
+    values: Any  # (sum of the lengths,)
+
+
+Table: TypeAlias = dict[str, Any]  # by property: (n,) array of numbers, or Lists
+
+
+@dataclass
+class _Property:
+    name: str
+    kind: str  # numpy's type without a byte order
+    length: str = ""  # type of the length, if this is a list
+
+
+@dataclass
+class _Element:
+    name: str
+    count: int
+    properties: list[_Property] = field(default_factory=list)
+
+    @property
+    def smallest(self) -> int:
+        """Bytes that a row has at least."""
+        return sum(np.dtype(each.length or each.kind).itemsize for each in self.properties)
+
+
+def tables_of(data: bytes) -> dict[str, Table]:
+    """Return the tables in the bytes of a PLY file, by the names of its elements.
+
+    Raises
+    ------
+    MeshError
+        If it is no PLY file, or has not the rows that its header says.
+    """
+    kind, elements, start = _header(data)
+    order = _ORDERS[kind]
+    stored = elements
+    if kind == "ascii":
+        data, start = np.array(data[start:].split(), dtype="<f8").tobytes(), 0
+        stored = [_as_doubles(element) for element in elements]
+    tables: dict[str, Table] = {}
+    for element, rows in zip(elements, stored, strict=True):
+        tables[element.name], start = _table(data, start, rows, order)
+        if kind == "ascii":
+            _restore_integers(tables[element.name], element)
+    return tables
+
+
+def _header(data: bytes) -> tuple[str, list[_Element], int]:
+    first, end = _FIRST.match(data), _END.search(data)
+    if first is None or end is None:
+        raise MeshError("the file does not begin with a PLY header")
+    kind, elements = "", list[_Element]()
+    for line in _LINE.split(data[first.end() : end.start()]):
+        match [decoded(word) for word in line.split()]:
+            case ["format", kind, *_]:
+                pass
+            case ["element", name, count, *_] if count.isdecimal():
+                elements.append(_Element(name, int(count)))
+            case ["property", "list", length, type_, name, *_] if elements:
+                sized = _type(length, line)
+                elements[-1].properties.append(_Property(name, _type(type_, line), sized))
+            case ["property", type_, name, *_] if elements:
+                elements[-1].properties.append(_Property(name, _type(type_, line)))
+            case ["element" | "property", *_]:
+                raise MeshError(f"the PLY header has the line {decoded(line)[:80]!r}")
+    if kind not in _ORDERS:
+        raise MeshError(f"the format of the PLY file is {kind[:40]!r}; can {', '.join(_ORDERS)}")
+    for names in ([e.name for e in elements], *([p.name for p in e.properties] for e in elements)):
+        if len(set(names)) < len(names):
+            raise MeshError("the PLY header has two elements or properties of one name")
+    newline = first[1] if data.startswith(first[1], end.end()) else data[end.end() : end.end() + 1]
+    return kind, elements, end.end() + len(newline)
+
+
+def _type(name: str, line: bytes) -> str:
+    if name not in TYPES:
+        raise MeshError(f"the PLY header has an unknown type: {decoded(line)[:80]!r}")
+    return TYPES[name]
+
+
+def _as_doubles(element: _Element) -> _Element:
+    doubles = [_Property(each.name, "f8", each.length and "f8") for each in element.properties]
+    return _Element(element.name, element.count, doubles)
+
+
+def _restore_integers(table: Table, element: _Element) -> None:
+    """Give columns of integers their type back, unless text says what it cannot hold."""
+    for each in element.properties:
+        values = table[each.name]
+        if not each.length and each.kind[0] in "iu":
+            bounds = np.iinfo(each.kind)
+            whole = (values >= bounds.min) & (values <= bounds.max) & (values == np.rint(values))
+            table[each.name] = values.astype(each.kind) if whole.all() else values
+
+
+def _table(data: bytes, start: int, element: _Element, order: str) -> tuple[Table, int]:
+    """Return an element's columns, and where it ends."""
+    if not element.count or not element.properties:
+        nothing = np.empty(0)
+        lists = Lists(np.empty(0, dtype=np.int64), nothing)
+        return {each.name: lists if each.length else nothing for each in element.properties}, start
+    if element.count * element.smallest > len(data) - start:
+        raise MeshError(
+            f"says {element.count} times {element.name!r}, which the rest of the file cannot hold"
+        )
+    first, _ = _row(data, start, element, order)
+    parts: list[Any] = []  # of a row, if all are as long as the first
+    for k, each in enumerate(element.properties):
+        if each.length:
+            parts.append((f"length {k}", order + each.length))
+        parts.append((f"value {k}", order + each.kind, (len(first[k]),)))
+    even = np.dtype(parts)
+    if start + element.count * even.itemsize <= len(data):
+        table = np.frombuffer(data, even, element.count, start)
+        listed = [k for k, each in enumerate(element.properties) if each.length]
+        if all((table[f"length {k}"] == len(first[k])).all() for k in listed):
+            columns: Table = {}
+            for k, each in enumerate(element.properties):
+                values = table[f"value {k}"].ravel()
+                lengths = np.full(element.count, len(first[k]))
+                columns[each.name] = Lists(lengths, values) if each.length else values
+            return columns, start + element.count * even.itemsize
+    rows = []
+    for _ in range(element.count):
+        row, start = _row(data, start, element, order)
+        rows.append(row)
+    columns = {}
+    for k, each in enumerate(element.properties):
+        values = np.concatenate([row[k] for row in rows])
+        lengths = np.array([len(row[k]) for row in rows])
+        columns[each.name] = Lists(lengths, values) if each.length else values
+    return columns, start
+
+
+def _row(data: bytes, start: int, element: _Element, order: str) -> tuple[list[Any], int]:
+    """Return the values of one row, each as an array, and where the row ends."""
+    row = []
+    for each in element.properties:
+        n = 1
+        if each.length:
+            length = np.frombuffer(data, order + each.length, 1, start)
+            n, start = int(length[0]), start + length.itemsize
+        if not 0 <= n <= len(data) - start:
+            raise MeshError(f"a list of {element.name!r} has the length {n}")
+        row.append(np.frombuffer(data, order + each.kind, n, start))
+        start += row[-1].nbytes
+    return row, start

@@ -1,0 +1,151 @@
+"""What a process of its own does to read a file with VTK or PyMeshLab; `isolated` starts it.
+
+    python reading_child.py vtk|meshlab FILE FOLDER BYTES
+
+It asks for no more than about BYTES of memory, if that is not 0.  In FOLDER it leaves what it
+found: 0.vtp, 1.vtu ..., surfaces and grids, or mesh.npz, vertices and faces.  Letters of names
+that XML cannot hold are written %XX there.  What it cannot read it says in said.txt.
+Either library may end the process on the way, which is what the process is for.  It imports
+nothing of this package, so that it starts in a fraction of a second.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+# The readers of `convert`'s VTK formats: module and class.
+_READERS = {
+    ".vtk": ("vtkIOLegacy", "vtkDataSetReader"),
+    ".vtp": ("vtkIOXML", "vtkXMLPolyDataReader"),
+    ".vtu": ("vtkIOXML", "vtkXMLUnstructuredGridReader"),
+    ".vtkhdf": ("vtkIOHDF", "vtkHDFReader"),
+}
+_WRITERS = {
+    "vtkPolyData": (".vtp", "vtkXMLPolyDataWriter"),
+    "vtkUnstructuredGrid": (".vtu", "vtkXMLUnstructuredGridWriter"),
+}
+_REFUSED = re.compile(r"[%<>&\"\x00-\x1f\x7f-\x9f]")
+_LEGACY = (
+    "ColorScalars", "Fields", "Normals", "Scalars", "TCoords", "Tensors", "Vectors",
+)  # fmt: skip
+
+
+def main(tool: str, path: str, folder: str, limit: str) -> None:
+    """Read one file."""
+    try:
+        {"vtk": _with_vtk, "meshlab": _with_meshlab}[tool](Path(path), Path(folder), int(limit))
+    except (RuntimeError, ValueError, MemoryError, OSError, ImportError) as error:
+        said = str(error) or type(error).__name__
+        (Path(folder) / "said.txt").write_text(said, encoding="utf-8", errors="replace")
+
+
+def _with_vtk(path: Path, folder: Path, limit: int) -> None:
+    core = importlib.import_module("vtkmodules.vtkCommonCore")
+    module, name = _READERS[path.suffix.lower()]
+    reader = getattr(importlib.import_module(f"vtkmodules.{module}"), name)()
+    writers = importlib.import_module("vtkmodules.vtkIOXML")
+    _limit_memory(limit)
+    window, before = core.vtkStringOutputWindow(), core.vtkOutputWindow.GetInstance()
+    core.vtkOutputWindow.SetInstance(window)
+    try:
+        _update(reader, path)
+        if "ERROR:" in window.GetOutput():
+            raise ValueError(window.GetOutput())
+        for number, piece in enumerate(_pieces(reader.GetOutputDataObject(0))):
+            _hand_on(piece, folder / str(number), writers)
+            if "ERROR:" in window.GetOutput():
+                raise ValueError(window.GetOutput())
+    finally:
+        core.vtkOutputWindow.SetInstance(before)
+
+
+def _update(reader: Any, path: Path) -> None:
+    reader.SetFileName(str(path))
+    if path.suffix.lower() == ".vtk":
+        for sort in _LEGACY:
+            getattr(reader, f"ReadAll{sort}On")()
+    reader.Update()
+
+
+def _hand_on(piece: Any, path: Path, writers: Any) -> None:
+    """Write a data set as VTK's own XML, numbers as they are, to *path* and its suffix."""
+    sort = piece.GetClassName()
+    if sort not in _WRITERS:
+        raise ValueError(f"it holds a {sort}, not a surface")
+    for attributes in (piece.GetPointData(), piece.GetCellData(), piece.GetFieldData()):
+        for k in range(attributes.GetNumberOfArrays()):
+            array = attributes.GetAbstractArray(k)
+            array.SetName(_written(array.GetName() or ""))
+            for j in range(array.GetNumberOfComponents() * array.HasAComponentName()):
+                array.SetComponentName(j, _written(array.GetComponentName(j) or ""))
+    suffix, name = _WRITERS[sort]
+    writer = getattr(writers, name)()
+    writer.SetFileName(f"{path}{suffix}")
+    writer.SetInputData(piece)
+    writer.SetDataModeToAppended()
+    writer.EncodeAppendedDataOff()
+    writer.SetCompressorTypeToNone()
+    writer.SetHeaderTypeToUInt64()
+    if not writer.Write():
+        raise ValueError("what was read cannot be handed on")
+
+
+def _written(name: str) -> str:
+    return _REFUSED.sub(lambda found: quote(found[0]), name)
+
+
+def _pieces(data: Any) -> Iterator[Any]:
+    """Yield the data sets that *data* is, or is composed of, if they have cells."""
+    if data is None:
+        return
+    if not data.IsA("vtkCompositeDataSet"):
+        yield data
+        return
+    places = data.NewIterator()
+    places.InitTraversal()
+    while not places.IsDoneWithTraversal():
+        if places.GetCurrentDataObject().GetNumberOfCells():
+            yield places.GetCurrentDataObject()
+        places.GoToNextItem()
+
+
+def _with_meshlab(path: Path, folder: Path, limit: int) -> None:
+    pymeshlab = importlib.import_module("pymeshlab")
+    meshset = pymeshlab.MeshSet(verbose=False)
+    _limit_memory(limit)
+    try:
+        meshset.load_new_mesh(str(path))
+        if meshset.mesh_number() > 1:
+            meshset.generate_by_merging_visible_meshes(mergevertices=False)
+    except pymeshlab.PyMeshLabException as error:
+        raise ValueError(str(error)) from None
+    mesh = meshset.current_mesh()
+    numpy: Any = importlib.import_module("numpy")
+    numpy.savez(folder / "mesh.npz", vertices=mesh.vertex_matrix(), faces=mesh.face_matrix())
+
+
+def _limit_memory(most: int) -> None:
+    """Let this process have *most* bytes more than it has; nothing where there is no such limit."""
+    if not most:
+        return
+    try:
+        resource: Any = importlib.import_module("resource")
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+        most += pages * resource.getpagesize()
+        _, hard = resource.getrlimit(resource.RLIMIT_AS)
+        if hard != resource.RLIM_INFINITY:
+            most = min(most, hard)
+        resource.setrlimit(resource.RLIMIT_AS, (most, hard))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a crash leaves no file behind
+    except (ImportError, OSError, ValueError):
+        return
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
