@@ -28,8 +28,8 @@ STORY = [
     "surface.quality", "surface.borders", "surface.lids", "surface.ears", "surface.lid_refining",
     "surface.holes", "surface.cracks", "surface.splitting", "surface.repair_steps", "repair",
     # what a deformation keeps
-    "volume", "normals", "segmenting.thinning", "local_volume", "distortion", "differential",
-    "rotations",
+    "volume", "normals", "segmenting.thinning", "local_volume", "distortion", "intrinsic",
+    "differential", "rotations",
     # regions and their cages
     "blending", "regions", "segmenting.coarse", "segmenting.borders",
     "segmenting.necks", "segmenting.slices", "segmentation", "mean_value", "blocks", "cages",

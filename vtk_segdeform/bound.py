@@ -59,7 +59,13 @@ class Binding:
             subspace = _subspace(arrays, "w", n_vertices)
             pull = arrays["pull"]
             energy = Energy(
-                arrays["quadratic"], float(arrays["constant"]), arrays["mass"], pull, pull, subspace
+                quadratic=arrays["quadratic"],
+                constant=float(arrays["constant"]),
+                scale=float(arrays["scale"]),
+                mass=arrays["mass"],
+                fit=pull,
+                pull=pull,
+                subspace=subspace,
             )
             stand_in = StandIn(subspace)
             if "cells" in arrays:
@@ -83,6 +89,7 @@ class Binding:
             "key": np.array(_key(path)),
             "quadratic": energy.quadratic,
             "constant": np.array(energy.constant),
+            "scale": np.array(energy.scale),
             "mass": energy.mass,
             "pull": energy.pull,
             **_arrays(energy.subspace, "w"),

@@ -52,7 +52,7 @@ def with_cage_stiffness(
     laplacian = np.zeros((m, m))
     np.add.at(laplacian, (tail, tail), 1.0)
     np.add.at(laplacian, (tail, head), -1.0)
-    strength = _SHARE * np.trace(energy.quadratic) / np.trace(laplacian)
+    strength = _SHARE * energy.scale / np.trace(laplacian)
 
     share = energy.subspace.squares(groups)  # (G, m)
     share /= np.maximum(share.sum(axis=0), np.finfo(float).tiny)

@@ -54,7 +54,7 @@ from .targets import waypoints
 from .threads import one_blas_thread
 
 _LEG_TOLERANCE, _LEG_STEPS = 1e-3, 12  # for the targets on the way to a far one
-_POSITION_WEIGHT = 1e2  # of the shape energy's trace, shared out over each handle's vertices
+_POSITION_WEIGHT = 90.0  # of the shape energy's scale, shared out over each handle's vertices
 _FAR = 1e3  # mesh sizes
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
 _WIDE = 20_000  # vertices beyond which mapping directions too is what takes long
@@ -369,7 +369,7 @@ class Deformer:
         ids = np.concatenate([self.handle, self.fixed])
         order = [*self._handles, *(len(self.handle) + patch for patch in patches)]
         in_order = sparse.eye_array(len(ids)).tocsr()[np.concatenate([_NONE, *order])]
-        weight = _POSITION_WEIGHT * float(np.trace(self._energy.quadratic))
+        weight = _POSITION_WEIGHT * self._energy.scale
         positions = position_term(
             self.subspace, self._rest.vertices, [ids[places] for places in order], weight
         )

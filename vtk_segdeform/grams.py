@@ -26,8 +26,10 @@ def grams(
     *,
     stiffness: sparse.csr_array | None = None,
     near: IntArray | None = None,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return W~^T C diag(strength) C W~, W~^T B W~ and W~^T diag(mass) W~, (m, m) each.
+
+    And (n,), by how much each vertex adds to the trace of the first.
 
     For symmetric sparse C and B (n, n), *laplacian* and *stiffness*; B is C where it is not given.
     Cages that reach no common piece of the mesh have a zero block: this is where several beat one.
@@ -38,6 +40,7 @@ def grams(
     order = np.argsort(_last_region(subspace) if near is None else near, kind="stable")
     size = max(_TOGETHER // m, 1)
     found: dict[int, tuple[IntArray, list[FloatArray]]] = {}
+    traces = np.empty(subspace.n_vertices)
 
     def work(first: int, start: int, stop: int) -> None:
         vertices = order[first + start : first + stop]
@@ -50,6 +53,7 @@ def grams(
         for ring, at in zip(rings, places, strict=True):
             compact = ring.data, at, ring.indptr.astype(np.int32)
             products.append(sparse.csr_array(compact, (len(vertices), len(used))) @ w)
+        traces[vertices] = strength[vertices] * np.einsum("ij,ij->i", products[0], products[0])
         squares = (products[0] * strength[vertices][:, None]).T @ products[0]
         plain, masses = here.T @ products[-1], (here * mass[vertices][:, None]).T @ here
         found[start] = columns, [squares, plain, masses]
@@ -63,7 +67,7 @@ def grams(
             for total, product in zip(totals, products, strict=True):
                 total[np.ix_(columns, columns)] += product
     squares, plain, masses = 0.5 * (totals + np.swapaxes(totals, 1, 2))
-    return squares, plain, masses
+    return squares, plain, masses, traces
 
 
 def _last_region(subspace: Subspace) -> IntArray:

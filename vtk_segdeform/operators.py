@@ -14,12 +14,11 @@ from scipy import sparse
 from .arrays import FloatArray, IntArray
 from .differential import (
     area_gradients,
-    corner_cotangents,
     cotangent_laplacian,
     mixed_voronoi_areas,
+    with_least_areas,
 )
-from .mesh import Mesh
-from .sampling import Sample
+from .intrinsic import IntrinsicTriangulation
 
 _CHUNK = 400_000  # faces
 
@@ -36,19 +35,22 @@ class SurfaceOperators(NamedTuple):
     fans: sparse.csr_array  # K of the stretch, over s
 
 
-def surface_operators(surface: Mesh | Sample, groups: IntArray) -> SurfaceOperators:
-    """Return the operators of *surface* for the rotation group of each vertex, *groups* (n,)."""
-    vertices, faces = surface.vertices, surface.faces
-    cotangents = corner_cotangents(vertices, faces)
-    areas = mixed_voronoi_areas(vertices, faces, cotangents=cotangents)
-    laplacian = stiffness = cotangent_laplacian(vertices, faces, cotangents=cotangents)
-    counts = np.ones(len(vertices))
-    if isinstance(surface, Sample):
-        counts = surface.counts
-        shared = cotangents * counts[faces].mean(axis=1, keepdims=True)
-        stiffness = cotangent_laplacian(vertices, faces, cotangents=shared)
-    delta = (laplacian @ vertices) / (2.0 * areas)[:, None]  # the left side of (5) is C x / (2 A)
-    thirds = area_gradients(vertices, faces, cotangents=cotangents) / 3.0
+def surface_operators(
+    surface: IntrinsicTriangulation, groups: IntArray, counts: FloatArray | None = None
+) -> SurfaceOperators:
+    """Return the operators of *surface* for the rotation group of each vertex, *groups* (n,).
+
+    *counts* (n,) are those of a `Sample`, whose triangles *surface* then has.
+    """
+    n, faces = len(surface.vertices), surface.faces
+    areas = with_least_areas(mixed_voronoi_areas(surface), faces)
+    laplacian = stiffness = cotangent_laplacian(faces, surface.cotangents, n)
+    if counts is None:
+        counts = np.ones(n)
+    else:
+        shared = surface.cotangents * counts[faces].mean(axis=1, keepdims=True)
+        stiffness = cotangent_laplacian(faces, shared, n)
+    delta = (laplacian @ surface.vertices) / (2.0 * areas)[:, None]  # eq. (5)
     return SurfaceOperators(
         counts=counts,
         areas=areas,
@@ -56,7 +58,7 @@ def surface_operators(surface: Mesh | Sample, groups: IntArray) -> SurfaceOperat
         laplacian=laplacian,
         stiffness=stiffness,
         detail=_grouped(0.5 * counts[:, None] * delta, groups) @ laplacian,
-        fans=_fans(thirds, faces, groups, counts),
+        fans=_fans(area_gradients(surface) / 3.0, faces, groups, counts),
     )
 
 

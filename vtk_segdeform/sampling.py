@@ -32,7 +32,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arrays import FloatArray, IntArray
-from .mesh import Mesh
+from .intrinsic import IntrinsicTriangulation
 from .subspace import Subspace
 
 _ASKED, _OF_GROUP = 36_000, 18  # vertices in all, or in the mean group if that is more
@@ -50,39 +50,38 @@ class Sample:
     ----------
     ids : (k,) int
         Those asked and their neighbours, in order.
-    vertices : (k, 3) float
-        Where they are.
-    faces : (f, 3) int
+    surface : IntrinsicTriangulation
         All triangles at those asked, over the k.
     counts : (k,) float
         For how many vertices like itself each one speaks; 0 for mere neighbours.
     """
 
     ids: IntArray
-    vertices: FloatArray
-    faces: IntArray
+    surface: IntrinsicTriangulation
     counts: FloatArray
 
     @classmethod
-    def of(cls, mesh: Mesh, groups: IntArray) -> Sample | None:
-        """Return those asked of *mesh*, or None where it is small enough to ask all.
+    def of(cls, surface: IntrinsicTriangulation, groups: IntArray) -> Sample | None:
+        """Return those asked of *surface*, or None where it is small enough to ask all.
 
         *groups* (n,) are the rotation groups of its vertices, numbered from 0.
         """
-        n, faces = mesh.n_vertices, mesh.faces
+        n, faces = len(surface.vertices), surface.faces
         number = max(_ASKED, _OF_GROUP * (int(groups.max()) + 1))
         if n < _WORTH * number:
             return None
-        thirds = np.repeat(mesh.face_areas / 3.0, 3)
+        thirds = np.repeat(surface.face_areas / 3.0, 3)
         areas = np.asarray(np.bincount(faces.ravel(), thirds, n), dtype=np.float64)
-        counts = _counts(_in_order(mesh.vertices, groups), groups, areas, number)
+        counts = _counts(_in_order(surface.vertices, groups), groups, areas, number)
         is_asked = counts > 0.0
-        seen = faces[is_asked[faces].any(axis=1)]
+        near = is_asked[faces].any(axis=1)
+        seen = faces[near]
         place = np.zeros(n, dtype=np.int64)
         place[seen] = 1
         ids = np.flatnonzero(place)
         place[ids] = np.arange(len(ids))
-        return cls(ids, mesh.vertices[ids], place[seen], counts[ids])
+        part = IntrinsicTriangulation(surface.vertices[ids], place[seen], surface.lengths[near])
+        return cls(ids, part, counts[ids])
 
     def rows(self, subspace: Subspace) -> Subspace:
         """Return the rows of W~, *subspace*, for `ids`."""

@@ -17,6 +17,7 @@ from scipy.sparse.linalg import splu
 
 from ..arrays import FloatArray
 from ..grams import grams
+from ..intrinsic import IntrinsicTriangulation
 from ..operators import surface_operators
 from ..rotations import closest_rotations
 from ..subspace import Subspace
@@ -54,9 +55,10 @@ def full_space(task: Task, subspace: Subspace, most: int) -> Answer:
 
 def _factored(task: Task, subspace: Subspace) -> tuple[Any, Any, float]:
     mesh = task.mesh
-    shape = surface_operators(mesh, np.arange(mesh.n_vertices))
+    surface = IntrinsicTriangulation.of(mesh.vertices, mesh.faces)
+    shape = surface_operators(surface, np.arange(mesh.n_vertices))
     areas, laplacian = shape.areas, shape.laplacian
-    inside, between, _ = grams(subspace, laplacian, 0.25 / areas, areas)
+    inside, between, *_ = grams(subspace, laplacian, 0.25 / areas, areas)
     share = _STRETCH * float(np.trace(inside) / np.trace(between))
     matrix = laplacian.T @ sparse.diags_array(0.25 / areas) @ laplacian + share * laplacian
     weight = _HOLD * float(matrix.diagonal().mean())

@@ -1,0 +1,193 @@
+"""The triangulation that the energy is measured on: the mesh's own, without its bad triangles.
+
+The cotangents of caps and needles have no bound.  Cutting them off corner by corner leaves numbers
+that belong to no triangle, and an indefinite matrix.  The energy takes them from an *intrinsic
+triangulation* instead: triangles over the vertices of the mesh, told by their edge lengths alone.
+Whatever the lengths, as long as they satisfy the triangle inequality the triangles are those of
+some flat ones, so that their Dirichlet energies, and with them the matrix, are never negative.
+It is the mesh itself but for two changes, neither of which a mesh of good triangles undergoes:
+
+    mollify     every edge becomes longer by  eps = max(0, d - min (a + b - c)),  the minimum over
+                all corners, so that no triangle has less slack a + b - c than d        [SC20, 4.5]
+    flip        each edge beside a bad triangle that is not Delaunay, cot + cot < 0 at the two
+                corners opposite, until there is none left                              [FSSB07]
+
+Mollification alone makes the matrix positive semi-definite, but a cap keeps a cotangent of about
+sqrt(mean / 2 d), and the detail of eq. (5) goes with its square.  Measured with the cages held, for
+100 flat caps among the 7828 faces of a dinosaur bent by 60 degrees: distortion is 6.2 % off with
+mollification alone, and 0.3 % with flips as well.  To flip every edge, as [SC20] do, changes good
+meshes, too: on 36 poses of three of them distortion became 4 % larger.
+
+Source
+------
+[SC20]    N. Sharp, K. Crane, "A Laplacian for nonmanifold triangle meshes", Computer Graphics
+          Forum 39(5), 69-80, 2020.
+[FSSB07]  M. Fisher, B. Springborn, P. Schroeder, A. I. Bobenko, "An algorithm for the construction
+          of intrinsic Delaunay triangulations with applications to digital geometry processing",
+          Computing 81, 199-213, 2007.
+[Kah14]   W. Kahan, "Miscalculating area and angles of a needle-like triangle", 2014.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .arrays import FloatArray, IntArray
+from .surface.topology import Sides, following
+from .threads import in_parallel
+
+_SLACK = 1e-6  # d, as a share of the mean edge length
+_BAD = 100.0  # cotangent of the smallest angle of a bad triangle: 0.6 degrees
+_DELAUNAY = -1e-9  # cot + cot from which an edge counts as Delaunay, whatever the rounding
+_ROUNDS = 1000  # of flips; ten are many
+_PIECE = 50_000  # faces to a thread
+
+
+@dataclass(frozen=True, eq=False)
+class IntrinsicTriangulation:
+    """Triangles over the vertices of a mesh, with edge lengths of their own.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float
+        Those of the mesh.
+    faces : (m, 3) int
+        Oriented as the mesh is.
+    lengths : (m, 3) float
+        Of the edge opposite each corner; they satisfy the triangle inequality.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    lengths: FloatArray
+
+    @classmethod
+    def of(cls, vertices: FloatArray, faces: IntArray) -> IntrinsicTriangulation:
+        """Return the triangulation of a mesh; open edges are left as they are."""
+        lengths = _mollified(_edge_lengths(vertices, faces))
+        if (np.abs(cotangents(lengths)).max(axis=1, initial=0.0) > _BAD).any():
+            faces, lengths = _flipped(faces, lengths, len(vertices))
+        return cls(vertices, faces, lengths)
+
+    @cached_property
+    def cotangents(self) -> FloatArray:
+        """(m, 3): the cotangent of the angle at each corner of each face."""
+        return cotangents(self.lengths)
+
+    @cached_property
+    def face_areas(self) -> FloatArray:
+        """(m,): the areas of the triangles."""
+        return areas(self.lengths)
+
+
+def areas(lengths: FloatArray) -> FloatArray:
+    """Return (m,): the areas of triangles by their edge *lengths* (m, 3), exact for needles."""
+    found = np.empty(len(lengths))
+
+    def work(start: int, stop: int) -> None:
+        c, b, a = np.sort(lengths[start:stop], axis=1).T
+        product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))  # [Kah14]
+        found[start:stop] = 0.25 * np.sqrt(np.maximum(product, 0.0))
+
+    in_parallel(work, len(lengths), _PIECE)
+    return found
+
+
+def cotangents(lengths: FloatArray) -> FloatArray:
+    """Return (m, 3): the cotangents of the angles opposite edges of *lengths* (m, 3)."""
+    squares = lengths * lengths
+    fourfold = 4.0 * areas(lengths)[:, None]
+    cosines = squares.sum(axis=1, keepdims=True) - 2.0 * squares
+    return np.divide(cosines, fourfold, where=fourfold > 0.0, out=np.zeros_like(cosines))
+
+
+def _edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    lengths = np.empty(faces.shape)
+
+    def work(start: int, stop: int) -> None:
+        a, b, c = vertices[faces[start:stop].T]
+        for corner, side in enumerate((c - b, a - c, b - a)):
+            lengths[start:stop, corner] = np.sqrt(np.einsum("ij,ij->i", side, side))
+
+    in_parallel(work, len(faces), _PIECE)
+    return lengths
+
+
+def _mollified(lengths: FloatArray) -> FloatArray:
+    slack = (lengths.sum(axis=1) - 2.0 * lengths.max(axis=1)).min(initial=np.inf)
+    return lengths + max(0.0, _SLACK * float(lengths.mean()) - float(slack))
+
+
+def _flipped(faces: IntArray, lengths: FloatArray, n_vertices: int) -> tuple[IntArray, FloatArray]:
+    """Return faces and lengths after flips, in rounds of edges no two of which share a face.
+
+    Each flip lowers the Dirichlet energy of every function [FSSB07], so that they come to an end.
+    """
+    twin = _twins(faces, n_vertices)
+    corners, opposite = faces.copy().ravel(), lengths.copy().ravel()
+    cot = cotangents(lengths)
+    for _ in range(_ROUNDS):
+        bad = np.flatnonzero(np.abs(cot).max(axis=1) > _BAD)
+        h = _independent(_not_delaunay(bad, twin, cot.ravel()), twin, cot.ravel())
+        if not len(h):
+            break
+        _flip(h, twin, corners, opposite)
+        changed = np.concatenate([h, twin[following(h)]]) // 3
+        cot[changed] = cotangents(opposite.reshape(-1, 3)[changed])
+    return corners.reshape(-1, 3), opposite.reshape(-1, 3)
+
+
+def _twins(faces: IntArray, n_vertices: int) -> IntArray:
+    """Return (3m,): the corner opposite the same edge in the other face; its own at an open edge.
+
+    Corner h = 3 f + c stands for the edge opposite it.
+    """
+    sides = Sides(faces, n_vertices)  # side s runs from corner s to the next one: opposite the last
+    one, other = following(following(sides.pairs)).T
+    twin = np.arange(faces.size)
+    twin[one], twin[other] = other, one
+    return twin
+
+
+def _not_delaunay(bad: IntArray, twin: IntArray, cot: FloatArray) -> IntArray:
+    """Return the edges of the faces *bad* that are to be flipped, each by one of its corners."""
+    h = (3 * bad[:, None] + np.arange(3)).ravel()
+    h = np.unique(np.minimum(h, twin[h]))
+    inner = h // 3 != twin[h] // 3
+    return h[inner & (cot[h] + cot[twin[h]] < _DELAUNAY)]
+
+
+def _independent(h: IntArray, twin: IntArray, cot: FloatArray) -> IntArray:
+    """Return those of the edges *h* that are worse than every other at either face."""
+    worst_first = np.argsort(cot[h] + cot[twin[h]], kind="stable")
+    h = h[worst_first]
+    rank, sides = np.arange(len(h)), np.stack([h // 3, twin[h] // 3])
+    first = np.full(len(cot) // 3, len(h))
+    np.minimum.at(first, sides.ravel(), np.tile(rank, 2))
+    return h[(first[sides] == rank).all(axis=0)]
+
+
+def _flip(h: IntArray, twin: IntArray, corners: IntArray, opposite: FloatArray) -> None:
+    """Turn the edges i j of faces (k, i, j) and (l, j, i) into k l: (k, i, l) and (l, j, k)."""
+    t = twin[h]
+    h1, h2, t1, t2 = following(h), following(following(h)), following(t), following(following(t))
+    k, new = corners[h], corners[t]  # l, which reads as a one
+    ij, jk, ki, il, lj = (opposite[each] for each in (h, h1, h2, t1, t2))
+    above = 2.0 * areas(np.stack([ij, jk, ki], axis=1)) / ij  # both unfolded, i j on the axis
+    below = 2.0 * areas(np.stack([ij, il, lj], axis=1)) / ij
+    along = ((ki - jk) * (ki + jk) - (il - lj) * (il + lj)) / (2.0 * ij)
+    kl = np.hypot(along, above + below)
+    # Slots keep their corner but for two: j gives way to l, and i to k.
+    moved = np.arange(len(twin))
+    moved[t1], moved[h1] = h, t  # where the edges i l and j k are now
+    outside = [moved[twin[each]] for each in (t1, h2, h1, t2)]
+    corners[h2], corners[t2] = new, k
+    for slot, length in zip((h, h1, h2, t, t1, t2), (il, kl, ki, jk, kl, lj), strict=True):
+        opposite[slot] = length
+    own = [moved[each] for each in (t1, h2, h1, t2)]
+    for slot, beyond in zip(own, outside, strict=True):
+        twin[slot], twin[beyond] = beyond, slot
+    twin[h1], twin[t1] = t1, h1
