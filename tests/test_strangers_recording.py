@@ -180,7 +180,7 @@ def test_a_huge_file_a_pipe_and_a_device_are_refused_at_once(tmp_path):
 def test_the_command_writes_nothing_but_what_it_is_told_to(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     sd.write_mesh("ball.ply", MESH)
-    (tmp_path / "evil.txt").write_text("\n".join(ALL))
+    (tmp_path / "evil.txt").write_text("\n".join([TITLE, "0 Window 200 150", *ALL[1:]]))
     before = set(tree_of(tmp_path))
     assert main(["replay", "evil.txt", "ball.ply", "--film", "a.gif"]) == 0
     assert "only in a folder that it is given" in capsys.readouterr().out
