@@ -7,6 +7,7 @@ several things, `SPECIAL` has it under "Class.method.name".
 
 from __future__ import annotations
 
+import copy
 import enum
 import functools
 import importlib
@@ -30,6 +31,7 @@ from vtk_segdeform import models
 from vtk_segdeform.deformer import Deformer
 from vtk_segdeform.passengers import Passengers
 from vtk_segdeform.session import Session
+from vtk_segdeform.widgets.film import Film
 
 CORE = (
     "vtk_segdeform",
@@ -43,8 +45,9 @@ CORE = (
     "vtk_segdeform.pictures",
     "vtk_segdeform.filters",
     "vtk_segdeform.plugin",
+    "vtk_segdeform.repaired",
 )
-WIDGETS = ("vtk_segdeform.widgets",)
+WIDGETS = ("vtk_segdeform.widgets", "vtk_segdeform.widgets.film")
 
 # Hooks that `Widget` calls with what it has made itself, and a view's arithmetic at every event.
 NOT_CALLED = {"begins", "hovers", "wheels", "types"}
@@ -68,12 +71,14 @@ class Call:
 
 
 def calls(modules: tuple[str, ...]) -> Iterator[Call]:
-    """Yield every public callable of *modules*."""
+    """Yield every public callable of *modules*, once if several have it."""
+    seen = set(NOT_CALLED)
     for module in map(importlib.import_module, modules):
         for name in _names(module):
             thing = getattr(module, name)
-            if name in NOT_CALLED:
+            if name in seen:
                 continue
+            seen.add(name)
             if inspect.isclass(thing):
                 yield from _calls_of_class(thing)
             elif callable(thing):
@@ -196,7 +201,7 @@ def _worked_on() -> Session:
 
 
 def session() -> Session:
-    return Session(mesh(), state=_worked_on().state)
+    return copy.copy(_worked_on())
 
 
 def surface() -> pv.PolyData:
@@ -239,9 +244,11 @@ def tidy() -> None:
 
 
 def remove(widget: Any) -> None:
-    """Take a widget out of its view; anything else is left alone."""
+    """Take a widget out of its view, and stop what a call began; anything else is left alone."""
     if isinstance(widget, sd.widgets.Recorder):
         widget.stop()
+    elif inspect.isroutine(widget):
+        widget()
     elif type(widget).__module__.startswith("vtk_segdeform.widgets"):
         getattr(widget, "remove", lambda: None)()
 
@@ -262,8 +269,15 @@ def instance(cls: type) -> Any:
         "SegmentedCageDeformFilter": sd.filters.SegmentedCageDeformFilter,
         "PolyDataTools": lambda: surface().segdeform,
         "PlotterTools": lambda: _plotter().segdeform,
+        "Film": _film,
     }
     return made[name]() if name in made else _widget(cls)
+
+
+def _film() -> Film:
+    film = Film(view())
+    film.snap()
+    return film
 
 
 @functools.cache
@@ -304,9 +318,11 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "callback": lambda: lambda: None,
     "divisions": lambda: (2, 2, 4),
     "event": lambda: "ModifiedEvent",
+    "events": lambda: 1000,
     "exact_volume": lambda: True,
     "faces": lambda: mesh().faces,
     "fixed": _left,
+    "folder": Path,
     "fps": lambda: 20.0,
     "frames": lambda: [None],
     "handle": _right,
@@ -317,6 +333,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "label": lambda: "a step",
     "labels": lambda: (mesh().vertices[:, 0] > 0).astype(int),
     "largest_hole": lambda: 10,
+    "limits": sd.widgets.ReplayLimits,
     "listener": lambda: lambda _change: None,
     "major": lambda: 1.0,
     "masks": lambda: regions().membership,
@@ -335,6 +352,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "options": sd.Options,
     "overlap": lambda: 1,
     "path": lambda: Path("written.segdeform"),
+    "pixels": lambda: 1_000_000,
     "points": lambda: mesh().vertices[:4],
     "polydata": surface,
     "preserve_region_volumes": lambda: False,
@@ -346,6 +364,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "renderer": lambda: view().renderer,
     "rings": lambda: 1,
     "rotation_groups": lambda: 20,
+    "seconds": lambda: 5.0,
     "seed": lambda: 3,
     "session": session,
     "size": lambda: (0.2, 0.2, 1.0),
@@ -387,6 +406,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "tag": lambda: 1,
     "title": lambda: "segdeform",
     "visible": lambda: True,
+    "when": lambda: lambda: True,
     "while_busy": lambda: False,
     "window": lambda: 3,
 }
@@ -398,6 +418,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "DeformEditor.load.path": lambda: _file("saved.segdeform"),
     "DeformEditor.mode.value": lambda: sd.widgets.Mode.DEFORM,
     "DeformEditor.path.value": lambda: Path("other.segdeform"),
+    "Film.save.path": lambda: Path("saved.gif"),
     "HandleDragger.handle.value": lambda: "handle 1",
     "HandleDragger.local.value": lambda: True,
     "HandleDragger.refine_while_resting.value": lambda: False,

@@ -13,7 +13,13 @@ from scenes import sausage
 
 from vtk_segdeform import Session, models
 from vtk_segdeform.canvas import require_offscreen
-from vtk_segdeform.errors import CageError, Cancelled, MissingDependencyError, SessionError
+from vtk_segdeform.errors import (
+    ArgumentError,
+    CageError,
+    Cancelled,
+    MissingDependencyError,
+    SessionError,
+)
 from vtk_segdeform.widgets.film import Film, film
 from vtk_segdeform.widgets.filming.film_files import require_film
 from vtk_segdeform.widgets.recording import replay
@@ -164,6 +170,11 @@ def test_a_film_that_is_cancelled_leaves_no_file(tmp_path, ball):
     assert list(tmp_path.iterdir()) == []
     made.save(tmp_path / "ball.gif", progress=lambda *said: told.append(said))
     assert max(fraction for fraction, _ in told) <= 1.0
+
+
+def test_what_says_when_to_take_a_picture_is_asked_for_at_once(ball):
+    with pytest.raises(ArgumentError, match="when must be callable; got 3"):
+        Film(ball).watch(3)
 
 
 def test_what_cannot_be_written_is_refused_before_anything_is_done(tmp_path, ball):

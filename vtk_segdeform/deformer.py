@@ -27,7 +27,7 @@ from scipy import sparse
 from .arrays import FloatArray, as_numbers, as_points, is_number, is_whole
 from .binding import Binder
 from .cages import Cage
-from .checks import all_of, as_flag, as_path, require_sequence, shown
+from .checks import all_of, as_callable, as_flag, as_path, require_sequence, shown
 from .constraints import VolumeConstraint, Volumes, region_volumes, total_volume
 from .errors import ArgumentError, CageError, Cancelled, ConstraintError
 from .fast import compiled
@@ -468,6 +468,7 @@ def _counting(progress: Progress | None) -> Progress | None:
     """Return a progress for steps of which nobody knows how many there will be."""
     if progress is None:
         return None
+    as_callable(progress, "progress")
     steps = itertools.count()
 
     def report(_: float, message: str) -> None:

@@ -16,6 +16,7 @@ made here.
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -110,7 +111,7 @@ def write_project(path: str | Path, what: Surface | Session | Mapping[str, Surfa
         require_place(path)
     except OSError as fault:
         raise MeshError(f"{path}: {fault.strerror or fault}") from fault
-    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+    if os.path.islink(folder) or (os.path.exists(folder) and not os.path.isdir(folder)):
         raise MeshError(f"{path}: {folder.name} is something else already")
     layers = as_layers(what)
     project = ElementTree.Element("MeshLabProject")

@@ -24,6 +24,7 @@ import numpy as np
 import pyvista as pv
 
 from .arrays import BoolArray, FloatArray, IntArray
+from .checks import require
 from .formats.polygons import cut_into_triangles, polydata_of, polygons_of
 from .repair import Repair, repair
 from .surface.quality import normals
@@ -57,7 +58,7 @@ def repair_surface(
     MeshError
         As of `repair`.
     """
-    counts, corners = polygons_of(surface)
+    counts, corners = polygons_of(require(surface, pv.PolyData, "surface"))
     points = np.asarray(surface.points, dtype=np.float64)
     triangles, polygon = cut_into_triangles(points, counts, corners)
     done = repair(points, triangles, weld_distance=weld_distance, largest_hole=largest_hole)

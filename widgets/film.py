@@ -21,7 +21,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 
 from vtk_segdeform.arrays import as_points, is_whole
-from vtk_segdeform.checks import require_sequence, shown
+from vtk_segdeform.checks import as_callable, require_sequence, shown
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.progress import Progress, tell
 from vtk_segdeform.session import Session
@@ -68,6 +68,8 @@ class Film:
 
         With *when*, only of what is drawn while it returns True.
         """
+        if when is not None:
+            as_callable(when, "when")
 
         def called(*_: object) -> None:
             with self.view.guarded():

@@ -30,7 +30,6 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterable
-from pathlib import Path
 from typing import Any, TextIO
 
 from vtkmodules.vtkCommonCore import vtkVersion
@@ -38,7 +37,7 @@ from vtkmodules.vtkCommonCore import vtkVersion
 from vtk_segdeform import __version__
 from vtk_segdeform.arrays import is_number
 from vtk_segdeform.atomic import replacing, require_place
-from vtk_segdeform.checks import as_callable, as_path, as_text, shown
+from vtk_segdeform.checks import as_callable, as_path, as_text, require, shown
 from vtk_segdeform.errors import ArgumentError, SessionError
 
 from .dragging.pace import on_steps, order_steps
@@ -116,6 +115,7 @@ class Recorder:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write what was recorded so far to a text file; SessionError if that cannot be."""
+        path = as_path(path)
         try:
             with replacing(path) as draft:
                 draft.write_text("".join(f"{line}\n" for line in self.lines), encoding="utf-8")
@@ -211,18 +211,20 @@ def replay(
         If there is no such file or folder, a line is invalid, or a limit is exceeded; the text
         gives the number of the line and the limit.
     """
-    view, limits = View.of(view), limits or ReplayLimits()
+    view = View.of(view)
+    limits = ReplayLimits() if limits is None else require(limits, ReplayLimits, "limits")
     if not is_number(pace, 0.0):
         raise ArgumentError(f"pace must be a number, 0 or more; got {shown(pace)}")
     if busy is not None:
         as_callable(busy, "busy")
-    if folder is not None and not (folder := as_path(folder, "folder")).is_dir():
-        raise SessionError(f"{folder}: there is no such folder to replay into")
+    place = None if folder is None else as_path(folder, "folder")
+    if place is not None and not os.path.isdir(place):
+        raise SessionError(f"{place}: there is no such folder to replay into")
     moments = read_recording(source, limits)
     _require_short(moments, pace, limits.seconds)
     clock, tick = Clock(limits.seconds), Ticks(1)
     before = 0.0
-    with confined(view.interactor, None if folder is None else Path(folder)):
+    with confined(view.interactor, place):
         for moment, entry, steps in moments:
             if busy is not None:
                 clock.wait_while(busy, lambda: tick.send(view))

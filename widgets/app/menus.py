@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from typing import Any
 
@@ -100,7 +101,7 @@ class Menus:
             )
             name = f"{path.name}    {folder}".replace("&", "&&")
             action = menu.addAction(f"&{number}  {name}")
-            action.setEnabled(path.is_file())
+            action.setEnabled(os.path.isfile(path))
             action.triggered.connect(_calling(window.open, path))
         menu.addSeparator()
         clear = menu.addAction("&Clear")

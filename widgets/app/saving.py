@@ -5,6 +5,7 @@ Every function takes the `Window` and returns whether the file is there.
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -108,7 +109,7 @@ def _path(window: Any, title: str, kinds: str, suffix: str) -> Path | None:
     if path.suffix:
         return path
     path = path.with_suffix(suffix)
-    return path if not path.exists() or ask_replace(window, path.name) else None
+    return path if not os.path.exists(path) or ask_replace(window, path.name) else None
 
 
 def _draw(window: Any, desk: Desk, path: Path) -> None:

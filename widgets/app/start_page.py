@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -71,7 +72,7 @@ class StartPage(QtWidgets.QWidget):
     def _recent_button(self, path: Path) -> Any:
         button = QtWidgets.QPushButton()
         button.setFlat(True)
-        button.setEnabled(path.is_file())
+        button.setEnabled(os.path.isfile(path))
         button.setToolTip(str(path))
         button.setStyleSheet("text-align: left; padding: 4px 2px;")
         metrics, room = self.fontMetrics(), (_WIDTH - 4) * self.fontMetrics().averageCharWidth()

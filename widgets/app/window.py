@@ -10,6 +10,7 @@ file that cannot be read costs nothing; unsaved work is kept by `Keeper` all the
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -189,7 +190,7 @@ class Window(QtWidgets.QMainWindow):
 
     def _failed(self, request: Request, text: str) -> None:
         self._stop_opening()
-        if request.path is not None and not request.path.exists():
+        if request.path is not None and not os.path.exists(request.path):
             self.recent.drop(request.path)
         self._show_page()
         tell_failure(self, f"{request.name} could not be opened", text)

@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 
+from vtk_segdeform.arrays import is_number
+from vtk_segdeform.checks import shown
 from vtk_segdeform.errors import ArgumentError, SessionError
 
 LARGEST_FILE = 64 << 20  # bytes, about ten times the default number of events
@@ -39,8 +41,8 @@ class ReplayLimits:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
-                raise ArgumentError(f"{field.name} must be a positive number; got {value!r}")
+            if not (is_number(value) and value > 0):
+                raise ArgumentError(f"{field.name} must be a positive number; got {shown(value)}")
 
 
 class Clock:
