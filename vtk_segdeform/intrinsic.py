@@ -101,7 +101,9 @@ def cotangents(lengths: FloatArray) -> FloatArray:
     squares = lengths * lengths
     fourfold = 4.0 * areas(lengths)[:, None]
     cosines = squares.sum(axis=1, keepdims=True) - 2.0 * squares
-    return np.divide(cosines, fourfold, where=fourfold > 0.0, out=np.zeros_like(cosines))
+    found: FloatArray = np.zeros_like(cosines)
+    np.divide(cosines, fourfold, where=fourfold > 0.0, out=found)
+    return found
 
 
 def _edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -157,7 +159,7 @@ def _not_delaunay(bad: IntArray, twin: IntArray, cot: FloatArray) -> IntArray:
     h = (3 * bad[:, None] + np.arange(3)).ravel()
     h = np.unique(np.minimum(h, twin[h]))
     inner = h // 3 != twin[h] // 3
-    return h[inner & (cot[h] + cot[twin[h]] < _DELAUNAY)]
+    return np.asarray(h[inner & (cot[h] + cot[twin[h]] < _DELAUNAY)])
 
 
 def _independent(h: IntArray, twin: IntArray, cot: FloatArray) -> IntArray:
@@ -167,7 +169,7 @@ def _independent(h: IntArray, twin: IntArray, cot: FloatArray) -> IntArray:
     rank, sides = np.arange(len(h)), np.stack([h // 3, twin[h] // 3])
     first = np.full(len(cot) // 3, len(h))
     np.minimum.at(first, sides.ravel(), np.tile(rank, 2))
-    return h[(first[sides] == rank).all(axis=0)]
+    return np.asarray(h[(first[sides] == rank).all(axis=0)])
 
 
 def _flip(h: IntArray, twin: IntArray, corners: IntArray, opposite: FloatArray) -> None:
