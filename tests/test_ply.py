@@ -49,7 +49,7 @@ def test_the_command_line_says_which_array_got_another_name(tmp_path, capsys):
     assert main(["regions", str(tmp_path / "a.vtp"), "-o", str(tmp_path / "b.ply"), *options]) == 0
     said = capsys.readouterr().err
     assert "segdeform regions: point array 'x' is written as 'x_1'" in said
-    assert "segdeform regions: PLY has no place for point array 'way': left out" in said
+    assert "segdeform regions: PLY cannot store point array 'way': left out" in said
 
 
 def test_a_face_of_300_corners_keeps_them(tmp_path):
@@ -158,13 +158,13 @@ def test_words_of_the_header_are_names_too(tmp_path):
         (FACES.format(m=-1), [], "line 'element face -1'"),
         (FACES.format(m=1), ["-3 0 1 2"], "length -3"),
         (FACES.format(m=1), ["3 0 1 9"], "names vertex 0 to 9"),
-        (FACES.format(m=1), ["3 0 1 1.5"], "no whole number"),
-        (FACES.format(m=1), ["3 0 1 nan"], "no whole number"),
+        (FACES.format(m=1), ["3 0 1 1.5"], "not a whole number"),
+        (FACES.format(m=1), ["3 0 1 nan"], "not a whole number"),
         (FACES.format(m=1).replace("int v", "thing v"), ["3 0 1 2"], "unknown type"),
         (FACES.format(m=1).replace("vertex_indices", "x"), ["3 0 1 2"], "no faces"),
         (FACES.format(m=1).replace("list uchar ", ""), ["3"], "no faces"),
-        (FACES.format(m=1) * 2, ["3 0 1 2"] * 2, "of one name"),
-        ("property list int int x\n", [], "of one name"),
+        (FACES.format(m=1) * 2, ["3 0 1 2"] * 2, "of the same name"),
+        ("property list int int x\n", [], "of the same name"),
         ("property list int\n", [], "unknown type: 'property list int'"),
         (FACES.format(m=1) + "property int\n", ["3 0 1 2 4"], "line 'property int'"),
     ],

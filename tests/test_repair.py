@@ -262,7 +262,7 @@ def test_a_crack_is_closed_by_cutting_the_face_that_has_vertices_on_its_side(n_o
     result = mended(vertices, faces)
     assert len(result.vertices) == len(vertices)
     assert result.report.count(Kind.ZERO_AREA) == 0
-    assert result.steps[1] == "cut 1 face at vertices on a side, to close cracks"
+    assert result.steps[1] == "split 1 face at vertices on an edge, to close cracks"
     assert signed_volume(result.vertices, result.faces) == pytest.approx(1.0, rel=1e-12)
 
 

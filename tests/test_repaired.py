@@ -166,7 +166,7 @@ def test_values_that_welding_makes_one_are_told():
     closed, done = repair_surface(apart)
     assert (polygons_of(closed)[0] == 4).all()
     assert closed.n_points == surface.n_points
-    assert done.steps[1:] == ("keep one value of u of several at 1 welded vertex",)
+    assert done.steps[1:] == ("keep one of several values of u at 1 welded vertex",)
 
 
 def test_strips_and_loose_cells_are_told():
@@ -200,7 +200,7 @@ def test_the_command_line_fills_holes_as_large_as_it_is_told(tmp_path, capsys):
     command = ["check", str(path), "--repair", "-o", str(out)]
     assert main([*command, "--largest-hole", "3"]) == 1
     text = capsys.readouterr().out
-    assert "1 hole stays open, of 4 edges" in text
+    assert "1 hole remains open, of 4 edges" in text
     assert "largest_hole=4 (--largest-hole 4" in text
     assert main([*command, "--largest-hole", "4"]) == 0
     assert "repaired: fill 1 hole of 4 edges" in capsys.readouterr().out

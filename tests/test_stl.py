@@ -33,7 +33,7 @@ def test_a_count_of_triangles_that_is_not_theirs_is_refused(tmp_path, count):
     path, data = octahedron(tmp_path)
     path.write_bytes(data[:80] + count.to_bytes(4, "little") + data[84:])
     with pytest.raises(
-        MeshError, match=rf"a\.stl: says {count} triangles, but its 484 bytes hold 8"
+        MeshError, match=rf"a\.stl: declares {count} triangles, but its 484 bytes hold 8"
     ):
         read_polydata(path)
 
@@ -57,7 +57,7 @@ def test_text_that_is_cut_off_is_refused(tmp_path):
     path, data = octahedron(tmp_path, binary=False)
     for text in (data[: len(data) // 2], data.replace(b"vertex", b"corner", 1), data[:-12]):
         path.write_bytes(text)
-        with pytest.raises(MeshError, match=r"a\.stl: is cut off"):
+        with pytest.raises(MeshError, match=r"a\.stl: is truncated"):
             read_polydata(path)
 
 

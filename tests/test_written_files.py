@@ -34,7 +34,7 @@ SPECIAL = [
 NAMES = st.sampled_from(SPECIAL) | st.text(
     st.characters(exclude_categories=["Cs"], exclude_characters="\0"), min_size=1, max_size=8
 )
-LOST = re.compile(r"has no place for (.*): left out$", re.DOTALL)
+LOST = re.compile(r"cannot store (.*): left out$", re.DOTALL)
 RENAMED = re.compile(
     r"(point array|cell array|group|object|material) (.*) is written as (.*)$", re.S
 )
