@@ -69,7 +69,7 @@ def test_without_a_folder_nothing_is_written_or_opened_and_that_is_said(bench, t
     assert tree_of(tmp_path) == {"here/session.segdeform": b"mine"}
     assert len(bench.faults) >= 5
     assert {type(fault) for fault in bench.faults} == {SessionError}
-    assert all("only in a folder that it is given" in str(fault) for fault in bench.faults)
+    assert all("only in the folder passed to it" in str(fault) for fault in bench.faults)
 
 
 def test_with_a_folder_all_is_written_there_whatever_the_path_of_the_editor(bench, tmp_path):
@@ -183,7 +183,7 @@ def test_the_command_writes_nothing_but_what_it_is_told_to(tmp_path, monkeypatch
     (tmp_path / "evil.txt").write_text("\n".join(ALL))
     before = set(tree_of(tmp_path))
     assert main(["replay", "evil.txt", "ball.ply", "--film", "a.gif"]) == 0
-    assert "only in a folder that it is given" in capsys.readouterr().out
+    assert "only in the folder passed to it" in capsys.readouterr().out
     assert set(tree_of(tmp_path)) - before == {"a.gif"}
     assert main(["replay", "evil.txt", "ball.ply", "--film", "b.gif", "--folder", "new"]) == 0
     assert "only in a folder" not in capsys.readouterr().out
