@@ -140,7 +140,8 @@ def _table(data: bytes, start: int, element: _Element, order: str) -> tuple[Tabl
         return {each.name: lists if each.length else nothing for each in element.properties}, start
     if element.count * element.smallest > len(data) - start:
         raise MeshError(
-            f"declares {element.count} rows of {element.name!r}; the rest of the file has fewer"
+            f"declares {element.count} rows of {element.name!r}, which the rest of the file cannot "
+            "hold"
         )
     first, _ = _row(data, start, element, order)
     parts: list[Any] = []  # of a row, if all are as long as the first
