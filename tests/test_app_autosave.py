@@ -232,7 +232,7 @@ posix = pytest.mark.skipif(os.name != "posix", reason="links, pipes and owners o
 
 
 def tree_of(folder):
-    """Return all there is below a folder, links not followed, with what is in it."""
+    """Return all files below a folder with their content, links not followed."""
     return {
         str(path.relative_to(folder)): (
             os.readlink(path) if path.is_symlink() else path.is_file() and path.read_bytes()
@@ -242,7 +242,7 @@ def tree_of(folder):
 
 
 def ask(folder):
-    """Ask for what is left, twice, and let all of it go."""
+    """List the remaining slots twice, and release all of them."""
     for _ in range(2):
         for slot in Autosaves(folder).left():
             slot.release()

@@ -1,4 +1,4 @@
-"""A file is replaced whole or not at all, and nothing is deleted but drafts that nobody writes."""
+"""A file is replaced as a whole or not at all, and only abandoned drafts are deleted."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def write(path, text="new", **options):
 
 
 def break_off(path, fault, **options):
-    """Begin to replace a file, or a folder of pictures, and raise *fault* half way."""
+    """Start to replace a file, or a folder of pictures, and raise *fault* half way."""
     with replacing(path, **options) as draft:
         (draft / "0000.png" if draft.is_dir() else draft).write_text("half")
         raise fault
 
 
 def fill_the_disk(path):
-    """Write a file where there is no room."""
+    """Write a file to a full disk."""
     with replacing(path) as draft:
         draft.unlink()
         draft.symlink_to("/dev/full")
@@ -180,7 +180,7 @@ def test_what_is_no_file_is_refused_at_once_and_stays(tmp_path):
 @posix
 @pytest.mark.skipif(not os.path.exists("/proc/self"), reason="needs a folder that is read-only")
 def test_a_folder_that_may_not_be_written_to_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(os, "access", lambda *_: False)  # root may everything
+    monkeypatch.setattr(os, "access", lambda *_: False)  # root may write anywhere
     with pytest.raises(OSError, match=f"{tmp_path} may not be written to"):
         require_place(tmp_path / "a.txt")
     monkeypatch.undo()
@@ -226,7 +226,7 @@ with replacing(pathlib.Path(sys.argv[1])) as draft:
 
 
 def writing(path):
-    """Return a process that writes to *path*, and tells the name of its draft."""
+    """Return a process that is writing to *path*, and the name of its draft."""
     return subprocess.Popen([sys.executable, "-c", _WRITER, path], stdout=subprocess.PIPE)
 
 

@@ -1,4 +1,4 @@
-"""What can be copied and pickled is the same afterwards, to the last bit, and goes its own way."""
+"""Copies and pickles are bit-identical to the original, and independent of it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SCENE = sausage()
 
 
 def pickled(thing):
-    """Return what comes out of a pickle of *thing*."""
+    """Return *thing* after pickling and unpickling."""
     return pickle.loads(pickle.dumps(thing))
 
 
@@ -28,7 +28,7 @@ WAYS = [copy.copy, copy.deepcopy, pickled]
 
 
 def working_session() -> Session:
-    """Return a session with a drag in hand, a step to undo and one to redo."""
+    """Return a session with an ongoing drag, a step to undo and one to redo."""
     session = Session(SCENE.mesh)
     session.set_regions(SCENE.regions)
     session.set_cages(SCENE.cages)

@@ -1,9 +1,9 @@
 """Bad arguments to every public callable end in one of our errors, or in an answer.
 
-The callables are found by looking (`public_calls`), so that a new one is tried as well.  One
-argument of a valid call, sometimes two, is replaced by a value that nobody expects there
-(`bad_values`).  Nothing else than an error of `vtk_segdeform.errors` may come out, in seconds and
-without gigabytes; and what a session holds after an error is what it held before.
+The callables are discovered (`public_calls`), so that new ones are tested as well.  One argument of
+a valid call, sometimes two, is replaced by an unexpected value (`bad_values`).  Only errors of
+`vtk_segdeform.errors` may be raised, within seconds and without gigabytes of memory, and a session
+must be unchanged after an error.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from vtk_segdeform.editing.state import Pose, State
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.session import Session
 
-SECONDS = 30.0  # of one call, beyond which it hangs
-GIGABYTES = 4  # more than there is already
+SECONDS = 30.0  # limit for one call
+GIGABYTES = 4  # in addition to the memory in use
 SETTERS = {"DeformEditor.path"}  # of paths
 LONGEST = 1000  # characters of a message
 
 
 @pytest.fixture(autouse=True)
 def bounded(tmp_path, monkeypatch):
-    """Run in an empty folder, with bounded memory, and with a file open that has to stay open."""
+    """Run in an empty folder, with bounded memory, and with a file that must stay open."""
     monkeypatch.chdir(tmp_path)
     public_calls._file.cache_clear()
     limits = resource.getrlimit(resource.RLIMIT_AS)
@@ -51,11 +51,11 @@ def bounded(tmp_path, monkeypatch):
 
 
 def _tried(call: Call, bad: dict[str, str], fd: int) -> str:
-    """Return what is wrong with how *call* takes the *bad* values; "" if nothing is."""
+    """Return how *call* mishandles the *bad* values; "" if it does not."""
     function = call.bound()
     arguments = call.arguments()
     values = {name: fd if kind == "fd" else BAD[kind]() for name, kind in bad.items()}
-    if set(values) - set(arguments):  # one that may be left out, beside valid ones
+    if set(values) - set(arguments):  # an optional one, in addition to valid ones
         arguments |= {name: valid(call.name, name) for name in call.parameters if name in values}
     arguments |= values
     owner = getattr(function, "__self__", None)
@@ -76,13 +76,13 @@ def _tried(call: Call, bad: dict[str, str], fd: int) -> str:
         os.fstat(fd)
         public_calls.tidy()
     if call.name.startswith("View.") and callable(answer):
-        answer()  # what it began ends
+        answer()  # ends what the call started
     public_calls.remove(answer)
     return ""
 
 
 def _named(call: Call, told: str, message: str, bad: dict[str, str]) -> str:
-    """Return a complaint unless *message* names the argument, or is of the path that it is."""
+    """Return a complaint unless *message* names the argument, or the path passed for it."""
     if len(bad) > 1:
         return ""
     ((name, kind),) = bad.items()

@@ -1,4 +1,4 @@
-"""The energy is that of good triangles, however bad those of the mesh are."""
+"""The energy is that of well-shaped triangles, however bad those of the mesh are."""
 
 from __future__ import annotations
 
@@ -199,7 +199,7 @@ def test_a_needle_does_not_scale_the_weights():
     mesh, _, cages = clean(1)
     good = sd.Deformer(mesh, sd.Regions.single(mesh), cages, handle=[0])
     vertices = mesh.vertices.copy()
-    for vertex in (100, 500, 900):  # three specks: with a neighbour nearly in the same place
+    for vertex in (100, 500, 900):  # with a neighbour at almost the same position
         neighbour = mesh.adjacency[[vertex]].indices[0]
         vertices[vertex] = vertices[neighbour] + 1e-9 * (vertices[vertex] - vertices[neighbour])
     needled = sd.Mesh(vertices, mesh.faces)

@@ -1,4 +1,4 @@
-"""Files of VTK and PyMeshLab are read by another process: its limits, its end, its absence."""
+"""Files of VTK and PyMeshLab are read by a child process: its limits, crashes and absence."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NAMES = ["<&\">'", "a\nb", "100%", "%3C", "Größe", "身体", "a b"]
 
 
 def named(tmp_path):
-    """Write a legacy file, which holds any name; return the surface, with all kinds of arrays."""
+    """Write a legacy file, which can store any name; return the surface with all its arrays."""
     surface = to_polydata(Mesh(*CUBE))
     for k, name in enumerate(NAMES):
         surface.point_data[name] = np.arange(8.0) + k

@@ -1,4 +1,4 @@
-"""Lids over holes: closed, without flat triangles, crossing nothing, whatever the border does."""
+"""Lids over holes: closed, without flat triangles and intersections, for any border."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ PLANE = {
 
 
 def closed(vertices, faces, least, largest=10_000):
-    """Repair; check the lids, whose angles are *least* degrees at least, and return the result."""
+    """Repair, check that all angles of the lids are at least *least* degrees; return the result."""
     assert not len(self_intersections(vertices, faces))
     result = repair(vertices, faces, largest_hole=largest)
     assert result.report.ok, str(result.report)
@@ -137,7 +137,7 @@ def test_the_lid_of_a_long_border_has_triangles_in_proportion_to_it():
         loop = polar(1.0 + 0.2 * np.cos(9 * (angle := 2.0 * np.pi * np.arange(n) / n)), angle)
         result = closed(*tube(loop, 1.0, 3), least=1.0)
         sizes[n] = np.count_nonzero(result.face_map < 0)
-    assert sizes[320] < 6.0 * sizes[80]  # of an even density it would have sixteen times as many
+    assert sizes[320] < 6.0 * sizes[80]  # with uniform density it would be sixteen times
 
 
 def test_ears_are_clipped_from_wherever_the_loop_is_simple():

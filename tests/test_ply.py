@@ -1,4 +1,4 @@
-"""PLY: reserved names, lists of any width, triangle strips; no count is believed unchecked."""
+"""PLY: reserved names, lists of any width, triangle strips, and checks of all counts."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def test_words_of_the_header_are_names_too(tmp_path):
     [
         ("element face 1000000000000\nproperty list uchar int vertex_indices\n", [], "cannot hold"),
         ("element nothing 1000000000000\n" + FACES.format(m=1), ["3 0 1 2"], None),
-        (FACES.format(m=-1), [], "line 'element face -1'"),
+        (FACES.format(m=-1), [], "line: 'element face -1'"),
         (FACES.format(m=1), ["-3 0 1 2"], "length -3"),
         (FACES.format(m=1), ["3 0 1 9"], "names vertex 0 to 9"),
         (FACES.format(m=1), ["3 0 1 1.5"], "not a whole number"),
@@ -166,7 +166,7 @@ def test_words_of_the_header_are_names_too(tmp_path):
         (FACES.format(m=1) * 2, ["3 0 1 2"] * 2, "of the same name"),
         ("property list int int x\n", [], "of the same name"),
         ("property list int\n", [], "unknown type: 'property list int'"),
-        (FACES.format(m=1) + "property int\n", ["3 0 1 2 4"], "line 'property int'"),
+        (FACES.format(m=1) + "property int\n", ["3 0 1 2 4"], "line: 'property int'"),
     ],
 )
 def test_a_header_that_says_what_cannot_be_is_refused(tmp_path, rest, rows, message):

@@ -1,6 +1,6 @@
-"""What may come between in Qt: clicks in the panel, other timers, a focus that goes, the end.
+"""Interruptions in Qt: clicks in the panel, other timers, loss of focus, closing.
 
-In mid-drag, while a pose converges, or during a job; nothing hangs, and no drag is lost.
+In mid-drag, while a pose converges, or during a job: nothing hangs, and no drag is lost.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def slowly():
 
 @pytest.fixture(scope="module")
 def stand(slowly, tmp_path_factory):
-    """Yield an editor that is used again and again."""
+    """Yield an editor that all tests share."""
     stand = QtStand(tmp_path_factory.mktemp("qt"), is_drawn=False)
     yield stand
     stand.close()
@@ -43,7 +43,7 @@ def another(slowly, tmp_path):
 
 
 def dragged(stand: Stand, *, during: bool):
-    """Drag the handle; let go of it unless a test is about what comes *during* the drag."""
+    """Drag the handle; release it unless the interruption comes *during* the drag."""
     stand.begin(Mode.DEFORM)
     place = stand.drag(Mode.DEFORM)
     if not during:
@@ -53,9 +53,9 @@ def dragged(stand: Stand, *, during: bool):
 
 
 def is_kept(stand: Stand, place) -> Story:
-    """Let go at last, and see that the drag is the first step of all; return the whole story."""
+    """Release, and check that the drag is the first step of the history; return the story."""
     stand.hand.release(place)
-    stand.hand.failures.clear()  # what is refused is told
+    stand.hand.failures.clear()  # refusals are reported
     stand.settle()
     story = Story.of(stand.session)
     assert story.labels[0] == DRAG
@@ -65,7 +65,7 @@ def is_kept(stand: Stand, place) -> Story:
 
 
 def settings(panel) -> list:
-    """Return what there is to click or to set in mode 4, but for files and modes."""
+    """Return all widgets that can be clicked or set in mode 4, except files and modes."""
     kinds = QtWidgets.QAbstractButton, QtWidgets.QAbstractSpinBox
     found = [each for kind in kinds for each in panel.findChildren(kind) if each.isVisible()]
     asking = panel.head.open, panel.head.save  # a dialog
@@ -119,7 +119,7 @@ def test_a_job_that_the_host_begins_finds_the_drag_done(stand, during):
         pose = stand.session.state.pose
         stand.hand.move(place + [-40.0, -30.0])
         stand.hand.release(place)
-        assert stand.session.state.pose is pose  # it is the job's meanwhile
+        assert stand.session.state.pose is pose  # the job owns it meanwhile
     assert delivered == ["counted"]
     assert is_kept(stand, place).done == 1
 

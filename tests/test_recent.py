@@ -1,4 +1,4 @@
-"""The list of recent files, whatever its names are and whatever somebody put into the settings."""
+"""The list of recent files, for any file names and any content of the settings."""
 
 from __future__ import annotations
 

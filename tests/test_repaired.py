@@ -1,4 +1,4 @@
-"""What a repaired surface keeps of the polygons and arrays it had, and what is said of the rest."""
+"""Polygons and arrays that a repaired surface keeps, and the report of the others."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ N = 4
 
 
 def box(drop=(), turn=()):
-    """Return a cube of quads, N by N to a side, without some and with others turned round."""
+    """Return a cube of N by N quads per side, with some dropped and others flipped."""
     grid = pv.ImageData(dimensions=(N + 1,) * 3).extract_surface(algorithm=None)
     grid = grid.clean()
     quads = polygons_of(grid)[1].reshape(-1, 4)
@@ -143,7 +143,7 @@ def test_a_polygon_of_which_a_part_goes_becomes_triangles_and_that_is_said():
     surface = box()
     points, (counts, corners) = np.asarray(surface.points), polygons_of(surface)
     triangles, quad = cut_into_triangles(points, counts, corners)
-    extra = triangles[quad == 7][0]  # comes first, so that it is the quad's own that goes
+    extra = triangles[quad == 7][0]  # comes first, so that the triangle of the quad is dropped
     double = polydata_of(points, np.append(3, counts), np.append(extra, corners))
     double.cell_data["material"] = np.arange(double.n_cells)
     closed, done = repair_surface(double)

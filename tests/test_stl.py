@@ -1,4 +1,4 @@
-"""STL: the same mesh as VTK's reader makes; counts that do not fit, and text that is cut off."""
+"""STL: the same mesh as from VTK's reader; wrong counts, and truncated text."""
 
 from __future__ import annotations
 

@@ -418,7 +418,7 @@ def test_the_size_is_that_of_the_file_which_is_open(tmp_path, monkeypatch):
 
 
 def sparse(path, size, n):
-    """Write a session of *n* vertices whose arrays are a hole of *size* bytes in the file."""
+    """Write a session of *n* vertices whose arrays are a hole of *size* bytes in a sparse file."""
     save_session(path, TINY)
     with zipfile.ZipFile(path) as archive:
         header = json.loads(archive.read("header.json"))

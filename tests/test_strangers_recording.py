@@ -1,4 +1,4 @@
-"""A recording may come from anybody: what a replay may write, and for how long it may run."""
+"""Untrusted recordings: where a replay may write files, and how long it may run."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ALL = [TITLE, *SAVES, *RECORDS, *FILM, *OPENS, "0 Timer 20"]
 
 
 class Bench:
-    """An editor in a folder of its own, and what it complains of."""
+    """An editor in a folder of its own, and the errors that it reports."""
 
     def __init__(self) -> None:
         self.view = plain_view((200, 150))
@@ -39,7 +39,7 @@ class Bench:
         self.editor.On()
 
     def replay(self, lines, **options):
-        """Replay *lines*, and wait for what they began."""
+        """Replay *lines*, and wait for the jobs they start."""
         replay(self.view, lines, busy=lambda: self.editor.is_busy, **options)
         self.editor.wait()
 
@@ -54,7 +54,7 @@ def bench(tmp_path, monkeypatch):
 
 
 def tree_of(folder):
-    """Return all files below a folder, with what is in them."""
+    """Return all files below a folder, with their content."""
     return {
         str(path.relative_to(folder)): path.read_bytes()
         for path in folder.rglob("*")

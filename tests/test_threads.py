@@ -1,4 +1,4 @@
-"""BLAS keeps to one thread while we compute, and has its threads back afterwards."""
+"""BLAS is limited to one thread during computations, and its threads are restored afterwards."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_several_deformers_at_a_time_give_what_they_give_alone_and_leave_blas_it
 
 
 class Library:
-    """Stands for threadpoolctl and a BLAS: who limits it remembers what to restore."""
+    """A stand-in for threadpoolctl and BLAS: each limit remembers the number to restore."""
 
     def __init__(self):
         self.threads = 8
@@ -72,7 +72,7 @@ class Library:
 
 
 class Limiter:
-    """What limits a `Library`, until it is restored."""
+    """A limit on a `Library`, until it is restored."""
 
     def __init__(self, library, limits):
         self.library, self.before = library, library.threads

@@ -1,4 +1,4 @@
-"""The one timer of an interactor: shared, and running exactly as long as somebody needs it.
+"""The single timer of an interactor: shared, and running only while a subscriber needs it.
 
 The host of most tests stops all timers when one is destroyed, as pyvistaqt does.
 """
@@ -92,7 +92,9 @@ def test_one_that_fails_keeps_nobody_from_ticking(view, host, capfd, is_heard):
     host.tick(3)
     assert heard == ["tick"] * 3
     assert [str(failure) for failure in failures] == ["out of order"] * 3 * is_heard
-    assert ("out of order" in capfd.readouterr().err) is not is_heard  # VTK prints what it is left
+    assert (
+        "out of order" in capfd.readouterr().err
+    ) is not is_heard  # VTK prints unhandled exceptions
     for stop in stops:
         stop()
 
@@ -132,7 +134,7 @@ def test_it_runs_on_when_somebody_elses_timer_ends(view, host, kind):
     host.tick(2)
     assert heard == ["tick"] * 4
     stop()
-    view.interactor.DestroyTimer(getattr(view.interactor, kind)(50))  # nobody needs ours now
+    view.interactor.DestroyTimer(getattr(view.interactor, kind)(50))  # ours has no subscribers now
     assert not host.is_running
 
 

@@ -191,7 +191,7 @@ def test_an_exception_is_collected_and_leaves_no_grab(scribble):
 
 
 def test_an_event_within_an_event_waits_for_its_turn(scribble):
-    """As where a listener lets an event loop run: moves come, and the release."""
+    """For example, a listener runs the event loop, which delivers moves and the release."""
     hand = Hand(scribble.view)
     seen, inside = [], {20: ("move", 30), 40: ("release", 40), 50: ("press", 70)}
 

@@ -1,4 +1,4 @@
-"""OBJ: names in any encoding, objects, groups, smoothing kept; arrays that do not fit are said."""
+"""OBJ: names in any encoding; objects, groups and smoothing are kept; other arrays are reported."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def test_an_array_that_is_not_what_its_name_says_is_left_out_and_said(tmp_path, 
 @pytest.mark.parametrize("corner", ["0", "-5", "1/0", "1/-9"])
 def test_numbers_before_the_first_are_refused(tmp_path, corner):
     (tmp_path / "a.obj").write_text(f"vt 0 0\n{BLENDER}f {corner} 2 3\n", encoding="utf-8")
-    with pytest.raises(MeshError, match=r"a\.obj: a face names (0|-5|-9)"):
+    with pytest.raises(MeshError, match=r"a\.obj: a face refers to (0|-5|-9)"):
         read_polydata(tmp_path / "a.obj")
 
 

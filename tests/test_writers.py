@@ -1,4 +1,4 @@
-"""Whatever writes a file keeps its mode, follows links, refuses pipes, and harms nothing."""
+"""All functions that write a file keep its mode, follow links, refuse pipes and lose no data."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PICTURES = np.zeros((2, 8, 8, 3), dtype=np.uint8)
 
 
 def write_recording(path):
-    """Write a recording of nothing."""
+    """Write an empty recording."""
     recorder = Recorder(plain_view((40, 40)))
     recorder.stop()
     recorder.save(path)
@@ -123,7 +123,7 @@ def test_a_project_of_a_layer_many_times_or_a_huge_one_is_refused_at_once(tmp_pa
         ):
             read_project(path)
     path.write_text("<MeshLabProject>" + "<a>" * 1_000_000)
-    with pytest.raises(sd.errors.MeshError, match=r"work\.mlp: .*more than 32 elements within"):
+    with pytest.raises(sd.errors.MeshError, match=r"work\.mlp: .*nested more than 32 deep"):
         read_project(path)
     os.truncate(layer, 45_000_000_000)
     path.write_text(f"<MeshLabProject><MeshGroup>{one}</MeshGroup></MeshLabProject>")

@@ -1,8 +1,8 @@
-"""What is written is what is read again: any surface, any arrays, any names, in every format.
+"""Round trips of any surface, any arrays and any names, in every format.
 
 Surfaces with random arrays are written and read by this package.  Points and polygons are the same;
-each array is the same, under its name or under the one that a warning told, or a warning told that
-it is left out.
+each array is the same, under its name or the new name given in a warning, or a warning says that it
+is left out.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def of_textures(surface):
 
 
 class Told(logging.Handler):
-    """Keeps what the package warns of while it writes."""
+    """Collects the warnings of the package while it writes."""
 
     def __init__(self, path, surface):
         super().__init__(logging.WARNING)
@@ -123,7 +123,7 @@ class Told(logging.Handler):
 
 
 def lost_in(path, surface):
-    """Write, read, and return in words what is neither the same nor told."""
+    """Write, read, and return a description of everything that is neither the same nor reported."""
     told = Told(path, surface)
     again = read_polydata(path)
     assert_array_equal(again.points, surface.points)
@@ -150,7 +150,7 @@ def lost_in(path, surface):
 
 
 def equal(path, surface, again, name, values, other, told):
-    """Tell whether an array came back: groups by their names, corners where there are some."""
+    """Return whether an array was read back: groups by name, corners where there are any."""
     counts = polygons_of(surface)[0]
     if name == "TextureCorners" and path.suffix in (".ply", ".obj"):
         mine, theirs = corner_values(values, counts), corner_values(other, counts)

@@ -181,7 +181,7 @@ class Document:
 def _chunks(data: bytes) -> tuple[bytes, bytes | None]:
     """Return the JSON and the binary chunk, if any, of a .glb file."""
     if len(data) < 20:
-        raise MeshError("is cut off")
+        raise MeshError("is truncated")
     _, version, length = struct.unpack_from("<4sII", data)
     if version != 2:
         raise MeshError(f"is glTF {version}; only 2 can be read")
