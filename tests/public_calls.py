@@ -1,8 +1,8 @@
-"""Every public callable of the package, found by looking, and a valid call of each.
+"""Every public callable of the package, discovered automatically, with a valid call of each.
 
 Functions and classes of the modules below, public methods of these classes, and the setters of
-their properties.  `ARGUMENTS` has a valid value for each name of a parameter; where one name means
-several things, `SPECIAL` has it under "Class.method.name".
+their properties.  `ARGUMENTS` has a valid value for each parameter name; where a name has several
+meanings, `SPECIAL` has the value under "Class.method.name".
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ CORE = (
 )
 WIDGETS = ("vtk_segdeform.widgets",)
 
-# Hooks that `Widget` calls with what it has made itself, and a view's arithmetic at every event.
+# Hooks that `Widget` calls with its own objects, and arithmetic of a view at every event.
 NOT_CALLED = {"begins", "hovers", "wheels", "types"}
 NOT_CALLED |= {"contains", "guarded", "pixel_at", "pointer", "ray", "to_display", "to_world"}
 NOT_CALLED |= {"FillInputPortInformation", "RequestData"}  # by VTK's pipeline
-NOT_CALLED |= {"add_surface", "draw_mesh"}  # in a plotter that `pictures` has made
+NOT_CALLED |= {"add_surface", "draw_mesh"}  # in a plotter created by `pictures`
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Call:
     required: tuple[str, ...]
 
     def arguments(self) -> dict[str, Any]:
-        """Return valid values of all that is required."""
+        """Return valid values of all required parameters."""
         return {name: valid(self.name, name) for name in self.required}
 
 
@@ -82,7 +82,7 @@ def calls(modules: tuple[str, ...]) -> Iterator[Call]:
 
 
 def expensive(call: Call) -> bool:
-    """Tell whether an answer takes a second: a window, cages, or a body made anew."""
+    """Return whether a call takes a second: a window, cages, or a new body."""
     return call.name in {
         "PlotterTools.edit", "PolyDataTools.deform", "PolyDataTools.regions", "cactus", "deform",
         "dinosaur", "edit", "fit_cages", "film", "picture_before_after", "picture_distortion",
@@ -91,7 +91,7 @@ def expensive(call: Call) -> bool:
 
 
 def valid(call: str, name: str) -> Any:
-    """Return a valid value of one parameter; a KeyError if nobody has said what that is."""
+    """Return a valid value of one parameter; KeyError if there is none in the tables."""
     special = f"{call}.{name}"
     return SPECIAL[special]() if special in SPECIAL else ARGUMENTS[name]()
 
@@ -142,7 +142,7 @@ def _setter(cls: type, name: str) -> Callable[..., None]:
     return lambda value: setattr(thing, name, value)
 
 
-# What calls are made on.
+# The objects that methods are called on.
 
 
 @functools.cache
@@ -217,7 +217,7 @@ def meshset() -> Any:
 
 @functools.cache
 def shared_session() -> Session:
-    """Of the widgets, which live as long as the tests do."""
+    """The session of the widgets, which live as long as the tests."""
     return session()
 
 
@@ -233,13 +233,13 @@ def _widget(cls: type) -> Any:
 
 
 def tidy() -> None:
-    """Take the widgets that were made out of the view that they share."""
+    """Remove the created widgets from their shared view."""
     while made_widgets:
         remove(made_widgets.pop())
 
 
 def remove(widget: Any) -> None:
-    """Take a widget out of its view; anything else is left alone."""
+    """Remove a widget from its view; ignore anything else."""
     if isinstance(widget, sd.widgets.Recorder):
         widget.stop()
     elif type(widget).__module__.startswith("vtk_segdeform.widgets"):
@@ -247,7 +247,7 @@ def remove(widget: Any) -> None:
 
 
 def instance(cls: type) -> Any:
-    """Return an object to call methods of; a state of its own where it has one."""
+    """Return an object to call methods of, with its own state if it has any."""
     name = cls.__name__
     made = {
         "Mesh": mesh,
@@ -271,7 +271,7 @@ def _plotter() -> pv.Plotter:
     return pv.Plotter(off_screen=True, window_size=(64, 64))
 
 
-# Classes that callers make; others are only handed out.
+# Classes that callers construct; others are only returned.
 MADE_BY_HAND = {sd.Mesh, sd.Regions, sd.Cage, sd.Deformer, sd.Session, sd.Options}
 EXTRA = {
     "Session.change_options": (
@@ -437,7 +437,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "write_mesh.path": lambda: Path("written.ply"),
 }
 
-# What messages call an argument, where that is clearer than its name.
+# The words for an argument in messages, where they are clearer than its name.
 SAID_AS: dict[str, tuple[str, ...]] = {
     "Cage.require_encloses.points": ("handle 1",),
     "HandleDragger.handle.value": ("handle",),

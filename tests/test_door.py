@@ -143,13 +143,13 @@ def test_every_parameter_has_a_valid_value_and_the_call_is_answered(modules):
 
 
 @pytest.mark.parametrize("modules", [CORE, WIDGETS], ids=["core", "widgets"])
-def test_a_bad_argument_ends_in_an_error_that_names_it_or_in_an_answer(modules, bounded):
+def test_a_bad_argument_is_answered_or_raises_an_error_that_names_it(modules, bounded):
     cheap = [call for call in _all(modules) if not public_calls.expensive(call)]
     _require_ours(cheap, 1, 2, bounded)
 
 
 @pytest.mark.parametrize("cls", [State, Pose], ids=lambda cls: cls.__name__)
-def test_a_state_with_bad_parts_begins_no_session(cls, bounded):
+def test_a_state_with_bad_parts_is_refused_by_session(cls, bounded):
     """Each field of a state, or of its pose, in turn holds each bad value."""
     state = public_calls.session().state
     thing = state if cls is State else state.pose
@@ -181,7 +181,7 @@ def _paths() -> list[tuple[Call, str]]:
     return pairs
 
 
-def test_a_name_longer_than_a_file_may_have_is_an_error_of_ours(bounded):
+def test_a_file_name_that_is_too_long_is_one_of_our_errors(bounded):
     cheap = [pair for pair in _paths() if not public_calls.expensive(pair[0])]
     for call, name in cheap:
         suffix = Path(valid(call.name, name)).suffix if name == "path" else ""
@@ -195,7 +195,7 @@ def test_a_name_longer_than_a_file_may_have_is_an_error_of_ours(bounded):
     public_calls.tidy()
 
 
-def test_a_file_descriptor_is_no_path_and_stays_open(bounded):
+def test_a_file_descriptor_is_not_a_path_and_stays_open(bounded):
     for call, name in _paths():
         assert _tried(call, {name: "fd"}, bounded) == ""
         with pytest.raises(ValueError, match="must be a"):

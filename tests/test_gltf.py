@@ -111,7 +111,7 @@ def test_attributes_become_arrays(tmp_path):
     assert_allclose(np.linalg.norm(surface.point_data["NORMAL"], axis=1), 1)
 
 
-def test_a_mirrored_mesh_is_turned_outward_again(tmp_path):
+def test_a_mirrored_mesh_is_oriented_outward_again(tmp_path):
     document = octahedron(*OCTAHEDRON)
     document.head["nodes"][0]["scale"] = [-1, 1, 1]
     assert read_mesh(document.save(tmp_path / "a.glb")).n_faces == 8
@@ -178,7 +178,7 @@ def test_a_buffer_outside_the_folder_of_the_model_is_not_read(tmp_path, kind):
         read_polydata(path)
 
 
-def test_an_image_outside_is_nothing_to_a_surface(tmp_path):
+def test_an_image_outside_the_folder_does_not_matter(tmp_path):
     document = octahedron(*OCTAHEDRON)
     document.add("images", uri="../../../etc/passwd")
     assert read_mesh(document.save(tmp_path / "a.gltf")).n_faces == 8
@@ -254,7 +254,7 @@ def changed(head, where, value):
 
 
 @pytest.mark.parametrize("what", list(LIES))
-def test_what_does_not_fit_together_is_refused_by_name(tmp_path, what):
+def test_inconsistent_files_are_refused_with_the_object_named(tmp_path, what):
     where, value, message = LIES[what]
     document = octahedron(*OCTAHEDRON)
     changed(document.head, where, value)
@@ -283,7 +283,7 @@ def test_sparse_parts_that_do_not_fit_are_refused(tmp_path):
             read_polydata(document.save(tmp_path / "a.glb"))
 
 
-def test_zeros_without_a_buffer_are_no_way_to_more_memory_than_the_file_is(tmp_path):
+def test_an_accessor_without_a_buffer_cannot_allocate_more_than_the_file_size_allows(tmp_path):
     document = octahedron(*OCTAHEDRON)
     document.head["accessors"][0] |= {"count": HUGE}
     del document.head["accessors"][0]["bufferView"]
@@ -300,7 +300,7 @@ def test_a_compressed_primitive_is_not_read_as_zeros(tmp_path):
         read_polydata(document.save(tmp_path / "a.glb"))
 
 
-def test_many_instances_of_many_primitives_are_refused_soon(tmp_path):
+def test_many_instances_of_many_primitives_are_refused_quickly(tmp_path):
     document = octahedron(*OCTAHEDRON)
     document.head["meshes"][0]["primitives"] *= 1000
     document.head["nodes"] = [{"mesh": 0} for _ in range(60_000)]
@@ -319,7 +319,7 @@ def test_a_deep_tree_of_nodes_is_read_as_any_other(tmp_path, levels):
     assert read_mesh(document.save(tmp_path / "a.glb")).n_faces == 8
 
 
-def test_json_that_is_deep_or_none_is_refused(tmp_path):
+def test_deeply_nested_or_invalid_json_is_refused(tmp_path):
     path = tmp_path / "a.glb"
     for text in (b"[" * 200_000, b"{", b"[]", b"\xff", b"null", b'{"asset":' * 50_000):
         path.write_bytes(glb(text, b""))

@@ -420,7 +420,7 @@ def test_what_is_no_file_or_another_kind_is_refused_by_its_name(seen):
     assert Counter(answer for answer, _ in told)["refused"] > 0.9 * len(files)
 
 
-def test_what_a_file_says_is_not_believed_beyond_its_size(seen):
+def test_counts_in_a_file_are_checked_against_its_size(seen):
     files, told = seen[3]
     assert not wrong_among(files, told)
     refused = {
@@ -430,7 +430,7 @@ def test_what_a_file_says_is_not_believed_beyond_its_size(seen):
 
 
 @pytest.mark.campaign
-def test_no_lie_is_believed(tmp_path):
+def test_no_false_count_is_accepted(tmp_path):
     files = lies(tmp_path)
     told = answers(files)
     assert not wrong_among(files, told)

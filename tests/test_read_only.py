@@ -59,7 +59,7 @@ def _shared(thing: object) -> list[str]:
 
 
 @pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.__name__)
-def test_an_array_handed_out_by_reference_is_read_only(cls):
+def test_an_array_returned_by_reference_is_read_only(cls):
     thing = public_calls.instance(cls)
     if isinstance(thing, sd.Session):
         thing.drag(public_calls.ARGUMENTS["targets"]())

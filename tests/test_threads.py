@@ -45,7 +45,7 @@ for _ in range(2):
 """
 
 
-def test_several_deformers_at_a_time_give_what_they_give_alone_and_leave_blas_its_threads():
+def test_concurrent_deformers_agree_with_sequential_ones_and_blas_threads_are_restored():
     pytest.importorskip("threadpoolctl")
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     environment = {**os.environ, **dict.fromkeys(names, "2"), "SEGDEFORM_THREADS": "2"}
@@ -115,7 +115,7 @@ def test_blas_is_limited_until_the_last_thread_has_left(blas):
     assert blas.threads == 8
 
 
-def test_blas_has_its_threads_back_after_an_error(blas):
+def test_blas_threads_are_restored_after_an_error(blas):
     @threads.one_blas_thread()
     def fail():
         with threads.one_blas_thread():

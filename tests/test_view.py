@@ -131,7 +131,7 @@ def test_escape_and_the_right_button_cancel(scribble):
     assert scribble.strokes == []
 
 
-def test_a_press_without_a_release_before_finishes_what_was_in_hand(scribble):
+def test_a_press_without_a_previous_release_finishes_the_gesture(scribble):
     hand = Hand(scribble.view)
     hand.press((50, 50))
     hand.move((60, 60))
@@ -140,7 +140,7 @@ def test_a_press_without_a_release_before_finishes_what_was_in_hand(scribble):
 
 
 @pytest.mark.parametrize("end", ["finish", "Off"])
-def test_a_gesture_that_somebody_ends_is_finished_and_not_cancelled(scribble, end):
+def test_a_gesture_ended_from_outside_is_finished_and_not_cancelled(scribble, end):
     hand = Hand(scribble.view)
     hand.press((50, 50))
     hand.move((60, 60))

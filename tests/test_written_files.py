@@ -173,14 +173,12 @@ EASY = settings(
 @pytest.mark.parametrize("suffix", [".ply", ".obj", ".off"])
 @EASY
 @given(surface=surfaces())
-def test_a_surface_with_any_arrays_comes_back_or_it_is_said_what_does_not(
-    tmp_path, suffix, surface
-):
+def test_a_surface_with_any_arrays_is_read_back_or_losses_are_reported(tmp_path, suffix, surface):
     assert not lost_in(tmp_path / f"a{suffix}", surface)
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".vtk", ".vtp", ".vtkhdf"])
-def test_every_special_name_comes_back_or_it_is_said_what_does_not(tmp_path, suffix):
+def test_every_special_name_is_read_back_or_losses_are_reported(tmp_path, suffix):
     surface = prism(4)
     for k, name in enumerate(SPECIAL):
         surface.point_data[name] = np.arange(8.0) + k
@@ -229,7 +227,7 @@ def test_pymeshlab_reads_the_same_surface(tmp_path, suffix, surface):
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".vtk", ".vtp", ".vtkhdf"])
-def test_a_thousand_surfaces_come_back_or_it_is_said_what_does_not(tmp_path, suffix):
+def test_a_thousand_surfaces_are_read_back_or_losses_are_reported(tmp_path, suffix):
     @settings(EASY, max_examples=1000 if suffix in (".ply", ".obj", ".off") else 100)
     @given(surface=surfaces())
     def each(surface):
