@@ -217,7 +217,7 @@ def meshset() -> Any:
 
 @functools.cache
 def shared_session() -> Session:
-    """The session of the widgets, which live as long as the tests."""
+    """Return the session of the widgets, which live as long as the tests."""
     return session()
 
 
