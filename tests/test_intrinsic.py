@@ -199,7 +199,7 @@ def test_a_needle_does_not_scale_the_weights():
     mesh, _, cages = clean(1)
     good = sd.Deformer(mesh, sd.Regions.single(mesh), cages, handle=[0])
     vertices = mesh.vertices.copy()
-    for vertex in (100, 500, 900):  # with a neighbour at almost the same position
+    for vertex in (100, 500, 900):  # three specks: with a neighbour nearly in the same place
         neighbour = mesh.adjacency[[vertex]].indices[0]
         vertices[vertex] = vertices[neighbour] + 1e-9 * (vertices[vertex] - vertices[neighbour])
     needled = sd.Mesh(vertices, mesh.faces)
