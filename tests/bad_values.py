@@ -1,4 +1,4 @@
-"""Values that no argument expects, each made afresh: a generator can be used only once."""
+"""Values that no argument accepts, each created on demand: a generator can be used only once."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy import sparse
 
 
 class Broken:
-    """Whatever is asked of it, it fails."""
+    """Fails at any operation."""
 
     def _fails(self, *_args, **_keywords):
         raise RuntimeError("broken on purpose")
@@ -29,13 +29,13 @@ class BrokenArray:
 
 
 class Anything:
-    """Can be made from any arguments."""
+    """Can be constructed from any arguments."""
 
     def __init__(self, *_args, **_keywords):
         pass
 
     def __bool__(self):
-        return False  # nobody waits for it
+        return False  # no caller waits for it
 
 
 class Endless:

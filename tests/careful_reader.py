@@ -28,7 +28,7 @@ from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.meshlab_project import read_project
 from vtk_segdeform.widgets.filming.reading import read_recording
 
-SECONDS, MEMORY = 60, 2 << 30  # for each file, beyond what there is already
+SECONDS, MEMORY = 60, 2 << 30  # for each file, in addition to the memory in use
 MESH = sd.Mesh(*OCTAHEDRON)
 READERS = {
     "mesh": sd.read_mesh,

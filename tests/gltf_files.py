@@ -1,4 +1,4 @@
-"""Writes glTF and GLB files of any content, for tests: JSON and bytes put together by hand."""
+"""Writes glTF and GLB files with any content, for tests: JSON and bytes assembled by hand."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ WIDTHS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 
 
 class Gltf:
-    """A glTF document in the making; ``head`` is its JSON, ``blob`` its one buffer."""
+    """A glTF document under construction; ``head`` is its JSON, ``blob`` its only buffer."""
 
     def __init__(self):
         self.blob = b""

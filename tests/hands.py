@@ -40,14 +40,14 @@ KEYSYMS = {"escape": "Escape", "home": "Home", "f1": "F1", "tab": "Tab", "delete
 
 
 class OneTimerHost:
-    """An event loop of one timer behind all of VTK's, as in pyvistaqt, and fired by hand.
+    """An event loop with a single timer behind all of VTK's, as in pyvistaqt, fired by hand.
 
-    Any timer that is created starts it, and any that is destroyed stops it, whoever needs it still.
+    Creating any timer starts it, and destroying any timer stops it, even if others still need it.
 
     Attributes
     ----------
     is_running : bool
-        Whether it would fire.
+        Whether the timer is running.
     made : list of int
         The period of every timer that was created, in milliseconds.
     """

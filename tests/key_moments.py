@@ -1,13 +1,13 @@
 """Every key of the editor at its worst moments: in mid-drag, while a pose converges, during a job.
 
-The keys are those of the editor's own table.  Whatever is pressed, in the end
+The keys are those of the editor's own table.  After any key,
 
-- the editor is idle: no job, no drag, no refinement, no timer;
-- the drag is one step of the history, the first, unless Escape took it back; a drag that a key
-  has ended is where the pointer was at that moment, and does not follow it any farther;
-- what the key does besides is what it does when it is pressed long after the drag;
-- undo leads back to the state before, redo to the very state at the end, and each state on the
-  way has the volume of rest.
+- the editor becomes idle: no job, no drag, no refinement, no timer;
+- the drag is the first step of the history, unless Escape cancelled it; a drag that a key has
+  finished ends where the pointer was at that moment, and no longer follows it;
+- the other effects of the key are those of the key pressed long after the drag;
+- undo restores the state before, redo the exact state at the end, and each state in between has
+  the volume of rest.
 
 During a job a key changes nothing; Escape cancels the job.
 """
@@ -38,8 +38,8 @@ from vtk_segdeform.widgets.view import View
 
 KEYS = sorted({key for binding in BINDINGS for key in binding.keys})
 SIZE = (260, 200)
-LONGEST = 30.0  # seconds that anything may take, on a machine that has much else to do
-SAME_POSE = 2e-3  # of the diagonal: two ways to converge to one pose
+LONGEST = 30.0  # seconds that any action may take, on a busy machine
+SAME_POSE = 2e-3  # of the diagonal: the same pose reached in two ways
 STEPS = {Mode.REGIONS: "paint region 1", Mode.CAGES: "drag the cage of region 1",
          Mode.HANDLES: "mark tip", Mode.DEFORM: "drag tip"}  # fmt: skip
 
@@ -47,8 +47,8 @@ STEPS = {Mode.REGIONS: "paint region 1", Mode.CAGES: "drag the cage of region 1"
 def table(*modes: Mode, campaign: bool = False) -> list:
     """Return every mode with every key, as parameters of a test.
 
-    Those of keys that mean nothing in a mode, or with *campaign* all of them, are a campaign's.
-    Mode 3 paints as mode 1 does, so there only its own keys are for every day.
+    Keys without a meaning in a mode, or with *campaign* all keys, are marked as campaign.
+    Mode 3 paints as mode 1 does, so only its own keys are tested every day.
     """
     own = {mode: {k for b in BINDINGS if mode in b.modes for k in b.keys} for mode in modes}
     if Mode.REGIONS in own and Mode.HANDLES in own:
@@ -63,22 +63,22 @@ def table(*modes: Mode, campaign: bool = False) -> list:
 
 
 def ends_the_drag(key: str, mode: Mode) -> bool:
-    """Tell whether *key* is to end a drag in *mode*; Escape takes it back besides."""
+    """Return whether *key* must end a drag in *mode*; Escape cancels it as well."""
     if any(b.action is None and key in b.keys and mode in b.modes for b in BINDINGS):
-        return False  # the widget that drags has it for itself
+        return False  # the key belongs to the dragging widget
     binding = binding_of(key, mode)
     return key == "escape" or (binding is not None and not binding.while_busy)
 
 
 def slow_down(monkeypatch) -> None:
-    """Have every move and every tick make one step, so that there is a time of converging."""
+    """Limit every move and every tick to one step, so that converging takes a while."""
     for name in ("_MOST_STEPS", "_FEWEST_AT_REST"):
         monkeypatch.setattr(live_solve, name, 1)
 
 
 @dataclass(frozen=True)
 class Story:
-    """What a session went through: the names of the steps, how many are done, and the states."""
+    """The history of a session: the names of the steps, how many are done, and the states."""
 
     labels: list[str]
     done: int
@@ -103,14 +103,14 @@ class Story:
 
 
 def check_volume(session: Session) -> None:
-    """See that the volume of rest is kept, where that is wanted."""
+    """Check that the volume of rest is preserved, where that is enabled."""
     assert np.isfinite(session.vertices).all()
     if session.options.preserve_volume:
         assert abs(session.volume_change) < 1e-12
 
 
 def outline(state) -> tuple:
-    """Return what a state is but for where things are."""
+    """Return everything of a state except positions."""
     regions = 0 if state.regions is None else state.regions.n_regions
     handles = {name: len(ids) for name, ids in state.handles.items()}
     cages = [cage.n_vertices for cage in state.cages]
@@ -118,7 +118,7 @@ def outline(state) -> tuple:
 
 
 class Stand:
-    """An editor over a small session in some host, and a hand on it; to be used again and again.
+    """An editor over a small session in some host, and a hand that operates it; reusable.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ class Stand:
         raise NotImplementedError
 
     def draw(self) -> None:
-        """See that what is to be grabbed is where it is seen."""
+        """Check that the things to grab are where they are displayed."""
         self.editor.view.render()
 
     def close(self) -> None:
@@ -168,7 +168,7 @@ class Stand:
             self.loop()
 
     def settle(self) -> None:
-        """Wait until nothing is going on, and see that really nothing is."""
+        """Wait until the editor is idle, and check that it stays so."""
         self.until(lambda: not self.editor.is_busy, "the job")
         dragger = self.editor.stage.dragger
         self.until(lambda: not dragger.is_refining, "the pose")
@@ -178,7 +178,7 @@ class Stand:
         assert self.hand.failures == []
 
     def begin(self, mode: Mode) -> None:
-        """Begin anew, in *mode*."""
+        """Reset everything, and start in *mode*."""
         desk, stage = self.editor.desk, self.editor.stage
         while self.session.undo() is not None:
             pass
@@ -213,7 +213,7 @@ class Stand:
         return [np.round(self.hand.at(at) + share * shift) for share in (0.0, 0.4, 0.7, 1.0)]
 
     def drag(self, mode: Mode) -> np.ndarray:
-        """Press and drag, and return the place without letting go."""
+        """Press and drag, and return the place without releasing the button."""
         self.draw()
         first, *others = self.way(mode)
         self.hand.press(first)
@@ -225,27 +225,27 @@ class Stand:
     # The moments.
 
     def long_after(self, mode: Mode, *keys: str) -> Story:
-        """Return what becomes of a drag and keys that are typed when it has converged."""
+        """Return the story of a drag and of keys that are typed after it has converged."""
         if (mode, keys) not in self.references:
             self.begin(mode)
             self.hand.release(self.drag(mode))
             self.settle()
             for key in keys:
                 self.hand.types(key)
-            self.hand.failures.clear()  # what goes wrong is told, and not this test's business
+            self.hand.failures.clear()  # failures are reported, but not tested here
             self.settle()
             self.references[mode, keys] = Story.of(self.session)
         return self.references[mode, keys]
 
     def during(self, mode: Mode, key: str) -> None:
-        """Type *key* in mid-drag, move on and let go."""
+        """Type *key* in mid-drag, move on and release."""
         expected, dragged = self.long_after(mode, key), self.long_after(mode)
         assert dragged.labels == [STEPS[mode]]
         self.begin(mode)
         place = self.drag(mode)
         self.hand.types(key)
         if ends_the_drag(key, mode):
-            self.hand.move(place + [-40.0, -30.0])  # which drags nothing any more
+            self.hand.move(place + [-40.0, -30.0])  # no longer drags anything
             self.hand.move(place)
         else:
             assert any(widget.is_grabbing for widget in self.editor.stage.widgets)
@@ -264,7 +264,7 @@ class Stand:
         self._ends_as(mode, None, expected, dragged)
 
     def _ends_as(self, mode: Mode, key: str | None, expected: Story, dragged: Story) -> None:
-        """See that all is as *expected*; *key* was typed in mid-drag, if it is not None."""
+        """Check that all is as *expected*; *key* was typed in mid-drag, if it is not None."""
         told = [str(failure) for failure in self.hand.failures]
         self.hand.failures.clear()
         self.settle()
@@ -285,7 +285,7 @@ class Stand:
 
     @contextmanager
     def job(self) -> Iterator[list[str]]:
-        """Have another thread at work meanwhile; yield a list of what will be delivered then."""
+        """Run a job in another thread; yield the list of results that it will deliver."""
         go_on, delivered = threading.Event(), []
 
         def work(progress):
@@ -304,10 +304,10 @@ class Stand:
         self.settle()
 
     def first_overlay(self, *, during: bool) -> None:
-        """Type O where volumes were never shown: they are measured in a job, beside a drag."""
+        """Type O where volumes were never shown: a job measures them, during a drag."""
         self.begin(Mode.REGIONS)
         self.editor.load(self.folder / "start.segdeform")
-        self.session.bind()  # else what is measured was measured with that
+        self.session.bind()  # otherwise binding would measure them already
         self.begin(Mode.DEFORM)
         overlay, place = self.editor.stage.overlay, self.drag(Mode.DEFORM)
         assert not overlay.is_prepared
@@ -315,7 +315,7 @@ class Stand:
         assert overlay.is_shown
 
     def film_that_ends(self, *, during: bool) -> None:
-        """End a film, which a job then writes, beside a drag."""
+        """End a film, which a job then writes, during a drag."""
         self.begin(Mode.DEFORM)
         self.hand.types("ctrl+m")
         place = self.drag(Mode.DEFORM)
@@ -325,7 +325,7 @@ class Stand:
         assert len(set(self.folder.glob("work.film*")) - before) == 1
 
     def _meanwhile(self, key: str, place: np.ndarray, *, during: bool) -> None:
-        """Begin a job by *key* before or after the release at *place*; nothing is lost by it."""
+        """Start a job by *key* before or after the release at *place*; nothing must be lost."""
         if not during:
             self.hand.release(place)
             assert self.editor.stage.dragger.is_refining
@@ -338,7 +338,7 @@ class Stand:
         assert Story.of(self.session).labels == [STEPS[Mode.DEFORM]]
 
     def in_a_job(self, mode: Mode, key: str) -> None:
-        """Type *key* while another thread works; then let that end."""
+        """Type *key* while another thread works; then let it end."""
         self.begin(mode)
         session = self.session
         before = session.state, session.undo_label, session.redo_label
@@ -352,7 +352,7 @@ class Stand:
 
 
 def same_places(state, expected, session: Session, *, is_final: bool) -> None:
-    """See that handles are exactly where they should be, and cages as good as, once converged."""
+    """Check that handles are exactly where they should be, and cages nearly, once converged."""
     if expected.pose is None:
         return
     for name, places in expected.pose.targets.items():
@@ -368,7 +368,7 @@ def same_places(state, expected, session: Session, *, is_final: bool) -> None:
 
 
 class SeldomDrawn(View):
-    """A view that is drawn when `draw` says so: nine tenths of the time would be spent on it."""
+    """A view that renders only in `draw`: rendering would take nine tenths of the time."""
 
     def render(self):
         pass
@@ -378,7 +378,7 @@ class SeldomDrawn(View):
 
 
 class HandStand(Stand):
-    """In a host of one timer that is fired by hand: `plain_view`, or an off-screen plotter."""
+    """In a host with a single timer fired by hand: `plain_view`, or an off-screen plotter."""
 
     def __init__(self, view: View, folder: Path, close=lambda: None):
         self._host, self._close = OneTimerHost(view.interactor), close
@@ -404,7 +404,7 @@ class HandStand(Stand):
 
 
 def ready() -> Session:
-    """Return a small session that lacks nothing but a pose, bound."""
+    """Return a small session, complete except for a pose, and bound."""
     session = session_of(slender())
     session.change_options(n_cage_vertices=40)
     session = Session(session.mesh, state=session.state)  # without a history

@@ -51,7 +51,7 @@ def main() -> None:
         sd.load_session(path)
         found["old" if after == before else "new"] += 1
         found["killed while writing"] += any(folder.glob(".segdeform-*"))
-        sd.save_session(path, sessions[number % 2])  # which sweeps away what was left
+        sd.save_session(path, sessions[number % 2])  # deletes abandoned drafts
         assert list(folder.iterdir()) == [path]
     print(*(f"{number} {what}" for what, number in sorted(found.items())), sep=", ")
 

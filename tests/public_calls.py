@@ -1,8 +1,8 @@
-"""Every public callable of the package, found by looking, and a valid call of each.
+"""Every public callable of the package, discovered automatically, with a valid call of each.
 
 Functions and classes of the modules below, public methods of these classes, and the setters of
-their properties.  `ARGUMENTS` has a valid value for each name of a parameter; where one name means
-several things, `SPECIAL` has it under "Class.method.name".
+their properties.  `ARGUMENTS` has a valid value for each parameter name; where a name has several
+meanings, `SPECIAL` has the value under "Class.method.name".
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ CORE = (
 )
 WIDGETS = ("vtk_segdeform.widgets", "vtk_segdeform.widgets.film")
 
-# Hooks that `Widget` calls with what it has made itself, and a view's arithmetic at every event.
+# Hooks that `Widget` calls with its own objects, and arithmetic of a view at every event.
 NOT_CALLED = {"begins", "hovers", "wheels", "types"}
 NOT_CALLED |= {"contains", "guarded", "pixel_at", "pointer", "ray", "to_display", "to_world"}
 NOT_CALLED |= {"FillInputPortInformation", "RequestData"}  # by VTK's pipeline
-NOT_CALLED |= {"add_surface", "draw_mesh"}  # in a plotter that `pictures` has made
+NOT_CALLED |= {"add_surface", "draw_mesh"}  # in a plotter created by `pictures`
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Call:
     required: tuple[str, ...]
 
     def arguments(self) -> dict[str, Any]:
-        """Return valid values of all that is required."""
+        """Return valid values of all required parameters."""
         return {name: valid(self.name, name) for name in self.required}
 
 
@@ -87,7 +87,7 @@ def calls(modules: tuple[str, ...]) -> Iterator[Call]:
 
 
 def expensive(call: Call) -> bool:
-    """Tell whether an answer takes a second: a window, cages, or a body made anew."""
+    """Return whether a call takes a second: a window, cages, or a new body."""
     return call.name in {
         "PlotterTools.edit", "PolyDataTools.deform", "PolyDataTools.regions", "cactus", "deform",
         "dinosaur", "edit", "fit_cages", "film", "picture_before_after", "picture_distortion",
@@ -96,7 +96,7 @@ def expensive(call: Call) -> bool:
 
 
 def valid(call: str, name: str) -> Any:
-    """Return a valid value of one parameter; a KeyError if nobody has said what that is."""
+    """Return a valid value of one parameter; KeyError if there is none in the tables."""
     special = f"{call}.{name}"
     return SPECIAL[special]() if special in SPECIAL else ARGUMENTS[name]()
 
@@ -147,7 +147,7 @@ def _setter(cls: type, name: str) -> Callable[..., None]:
     return lambda value: setattr(thing, name, value)
 
 
-# What calls are made on.
+# The objects that methods are called on.
 
 
 @functools.cache
@@ -222,7 +222,7 @@ def meshset() -> Any:
 
 @functools.cache
 def shared_session() -> Session:
-    """Of the widgets, which live as long as the tests do."""
+    """Return the session of the widgets, which live as long as the tests."""
     return session()
 
 
@@ -238,13 +238,13 @@ def _widget(cls: type) -> Any:
 
 
 def tidy() -> None:
-    """Take the widgets that were made out of the view that they share."""
+    """Remove the created widgets from their shared view."""
     while made_widgets:
         remove(made_widgets.pop())
 
 
 def remove(widget: Any) -> None:
-    """Take a widget out of its view, and stop what a call began; anything else is left alone."""
+    """Remove a widget from its view and stop what a call started; ignore anything else."""
     if isinstance(widget, sd.widgets.Recorder):
         widget.stop()
     elif inspect.isroutine(widget):
@@ -254,7 +254,7 @@ def remove(widget: Any) -> None:
 
 
 def instance(cls: type) -> Any:
-    """Return an object to call methods of; a state of its own where it has one."""
+    """Return an object to call methods of, with its own state if it has any."""
     name = cls.__name__
     made = {
         "Mesh": mesh,
@@ -285,7 +285,7 @@ def _plotter() -> pv.Plotter:
     return pv.Plotter(off_screen=True, window_size=(64, 64))
 
 
-# Classes that callers make; others are only handed out.
+# Classes that callers construct; others are only returned.
 MADE_BY_HAND = {sd.Mesh, sd.Regions, sd.Cage, sd.Deformer, sd.Session, sd.Options}
 EXTRA = {
     "Session.change_options": (
@@ -458,7 +458,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "write_mesh.path": lambda: Path("written.ply"),
 }
 
-# What messages call an argument, where that is clearer than its name.
+# The words for an argument in messages, where they are clearer than its name.
 SAID_AS: dict[str, tuple[str, ...]] = {
     "Cage.require_encloses.points": ("handle 1",),
     "HandleDragger.handle.value": ("handle",),

@@ -1,4 +1,4 @@
-"""An editor in Qt's widget, with all that `key_moments` does with one."""
+"""An editor in the Qt widget, operated by `key_moments`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class QtStand(Stand):
         until(lambda: window() and window().isExposed(), "the window")
         view = self.widget.editor.view
         aim(view)
-        if not is_drawn:  # nine tenths of the time would be spent on it
+        if not is_drawn:  # rendering would take nine tenths of the time
             view.render = lambda: None
         hand = QtHand(self.widget.plotter.interactor, self.widget.editor.view)
         super().__init__(self.widget.editor, hand, folder)
@@ -31,7 +31,7 @@ class QtStand(Stand):
         self._plain = plain_stand(folder / "plain")
 
     def long_after(self, mode, *keys):
-        """Return what becomes of keys after a drag elsewhere, where that is known sooner."""
+        """Return the story of keys after a drag in a plain host, which is faster."""
         return self._plain.long_after(mode, *keys) if keys else super().long_after(mode)
 
     def loop(self):
@@ -46,7 +46,7 @@ class QtStand(Stand):
 
     def begin(self, mode):
         super().begin(mode)
-        self.widget.plotter.setFocus()  # Tab leads away from it
+        self.widget.plotter.setFocus()  # Tab moves the focus
 
     def settle(self):
         super().settle()
@@ -67,7 +67,7 @@ class QtStand(Stand):
 
 
 def delete_now():
-    """Let Qt delete what is to be deleted later, and then what PyQt has for that."""
+    """Let Qt process deferred deletes, and then collect the wrappers."""
     for _ in range(2):
         application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
         application().processEvents()

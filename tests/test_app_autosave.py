@@ -232,7 +232,7 @@ posix = pytest.mark.skipif(os.name != "posix", reason="links, pipes and owners o
 
 
 def tree_of(folder):
-    """Return all there is below a folder, links not followed, with what is in it."""
+    """Return all files below a folder with their content, links not followed."""
     return {
         str(path.relative_to(folder)): (
             os.readlink(path) if path.is_symlink() else path.is_file() and path.read_bytes()
@@ -242,7 +242,7 @@ def tree_of(folder):
 
 
 def ask(folder):
-    """Ask for what is left, twice, and let all of it go."""
+    """List the remaining slots twice, and release all of them."""
     for _ in range(2):
         for slot in Autosaves(folder).left():
             slot.release()
@@ -252,7 +252,7 @@ def ask(folder):
 @pytest.mark.parametrize(
     "inside", [["a.txt"], ["lock"], ["lock", "about.json"], [], ["lock", "x/y"]]
 )
-def test_a_folder_of_somebody_else_is_left_as_it_is(folder, name, inside):
+def test_a_foreign_folder_is_unchanged(folder, name, inside):
     for each in inside:
         path = folder / name / each
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -299,7 +299,7 @@ def test_unsaved_work_is_not_written_through_a_link(folder, tmp_path):
 
 
 @posix
-def test_pipes_and_folders_with_names_of_ours_are_neither_waited_for_nor_deleted(folder):
+def test_pipes_and_folders_with_our_names_neither_block_nor_are_deleted(folder):
     for number, name in enumerate(("lock", "about.json", "session.segdeform")):
         for make, digit in ((os.mkfifo, "a"), (os.mkdir, "b")):
             slot = Autosaves(folder).new(ABOUT)
@@ -314,7 +314,7 @@ def test_pipes_and_folders_with_names_of_ours_are_neither_waited_for_nor_deleted
         assert {f"{digit}{number:015d}/{name}" for digit in "ab"} <= left
 
 
-def test_a_file_dropped_into_a_slot_of_ours_stays_and_so_does_the_folder(folder):
+def test_a_foreign_file_in_a_slot_is_kept_and_so_is_the_folder(folder):
     slot = Autosaves(folder).new(ABOUT)
     slot.write(work())
     mine = slot.path.with_name("precious.ply")
@@ -330,7 +330,7 @@ def test_a_file_dropped_into_a_slot_of_ours_stays_and_so_does_the_folder(folder)
     assert mine.read_text() == deeper.read_text() == "mine"
 
 
-def test_what_earlier_versions_left_is_found_and_swept_too(folder):
+def test_slots_of_earlier_versions_are_found_and_removed_too(folder):
     path = crash(folder)
     begun = Autosaves(folder).new(ABOUT)
     begun.release()
@@ -344,7 +344,7 @@ def test_what_earlier_versions_left_is_found_and_swept_too(folder):
 
 @posix
 @pytest.mark.skipif(os.name == "posix" and os.geteuid() != 0, reason="only root gives files away")
-def test_what_another_user_owns_is_left_as_it_is(folder):
+def test_files_of_another_user_are_unchanged(folder):
     path = crash(folder)
     os.chown(path, 12345, 12345)
     assert Autosaves(folder).left() == []

@@ -320,7 +320,7 @@ TIMERS = {
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_only_the_view_makes_and_ends_timers_of_vtk(name):
+def test_only_the_view_creates_and_destroys_vtk_timers(name):
     """Hosts may have one timer behind all of them, so a second owner would stop the first's."""
     if name == "widgets.view":
         return

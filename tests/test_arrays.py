@@ -78,7 +78,7 @@ def test_bad_ids_are_named_and_told_what_came(ids, message):
 @pytest.mark.parametrize(
     "kind", ["recursive list", "recursive after rows", "endless", "huge range"]
 )
-def test_what_has_no_end_is_refused_at_once_and_without_gigabytes(kind):
+def test_endless_sequences_are_refused_at_once_and_without_gigabytes(kind):
     for values in (BAD[kind](), [BAD[kind]()]):
         tracemalloc.start()
         try:

@@ -1,4 +1,4 @@
-"""A file is replaced whole or not at all, and nothing is deleted but drafts that nobody writes."""
+"""A file is replaced as a whole or not at all, and only abandoned drafts are deleted."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def write(path, text="new", **options):
 
 
 def break_off(path, fault, **options):
-    """Begin to replace a file, or a folder of pictures, and raise *fault* half way."""
+    """Start to replace a file, or a folder of pictures, and raise *fault* half way."""
     with replacing(path, **options) as draft:
         (draft / "0000.png" if draft.is_dir() else draft).write_text("half")
         raise fault
 
 
 def fill_the_disk(path):
-    """Write a file where there is no room."""
+    """Write a file to a full disk."""
     with replacing(path) as draft:
         draft.unlink()
         draft.symlink_to("/dev/full")
@@ -46,7 +46,7 @@ def names(folder):
 
 
 @pytest.mark.parametrize("fault", [OSError(28, "full"), ValueError("no"), KeyboardInterrupt()])
-def test_whatever_goes_wrong_the_old_file_stays_and_nothing_else(tmp_path, fault):
+def test_after_any_error_only_the_old_file_is_left(tmp_path, fault):
     path = tmp_path / "a.txt"
     path.write_text("old")
     with pytest.raises(type(fault)):
@@ -56,7 +56,7 @@ def test_whatever_goes_wrong_the_old_file_stays_and_nothing_else(tmp_path, fault
 
 
 @pytest.mark.parametrize("call", ["replace", "fsync", "open"])
-def test_whichever_call_fails_the_old_file_stays_and_nothing_else(tmp_path, monkeypatch, call):
+def test_whichever_call_fails_only_the_old_file_is_left(tmp_path, monkeypatch, call):
     def refused(*_, **__):
         raise OSError(13, "Permission denied")
 
@@ -78,7 +78,7 @@ def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path):
     assert os.path.exists("/dev/full")
 
 
-def test_it_is_on_the_disk_before_the_old_file_goes(tmp_path, monkeypatch):
+def test_the_new_file_is_flushed_before_it_replaces_the_old_one(tmp_path, monkeypatch):
     calls = []
     for name in ("fsync", "replace"):
         real = getattr(os, name)
@@ -92,7 +92,7 @@ def test_it_is_on_the_disk_before_the_old_file_goes(tmp_path, monkeypatch):
 
 @posix
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o664, 0o755])
-def test_the_mode_is_kept_and_nobody_else_reads_what_is_half_written(tmp_path, mode):
+def test_the_mode_is_kept_and_drafts_are_private(tmp_path, mode):
     path = tmp_path / "a.txt"
     path.write_text("old")
     path.chmod(mode)
@@ -109,7 +109,7 @@ def test_the_mode_is_kept_and_nobody_else_reads_what_is_half_written(tmp_path, m
 
 
 @posix
-def test_where_modes_cannot_be_changed_one_that_is_right_is_left_alone(tmp_path, monkeypatch):
+def test_a_correct_mode_is_not_changed_where_modes_cannot_be_set(tmp_path, monkeypatch):
     def refused(*_, **__):
         raise PermissionError(1, "Operation not permitted")
 
@@ -122,7 +122,7 @@ def test_where_modes_cannot_be_changed_one_that_is_right_is_left_alone(tmp_path,
 
 
 @pytest.mark.parametrize("folder", [False, True])
-def test_a_draft_that_is_swept_before_it_is_held_is_begun_anew(tmp_path, monkeypatch, folder):
+def test_a_draft_deleted_before_it_is_locked_is_created_again(tmp_path, monkeypatch, folder):
     swept = []
 
     def hold(handle, draft):
@@ -141,7 +141,7 @@ def test_a_draft_that_is_swept_before_it_is_held_is_begun_anew(tmp_path, monkeyp
 
 
 @posix
-def test_links_stay_and_what_they_point_to_is_replaced(tmp_path):
+def test_links_are_kept_and_their_targets_replaced(tmp_path):
     (tmp_path / "there").mkdir()
     (tmp_path / "there" / "a.txt").write_text("old")
     (tmp_path / "link").symlink_to("again")
@@ -158,7 +158,7 @@ def test_links_stay_and_what_they_point_to_is_replaced(tmp_path):
 
 
 @posix
-def test_what_is_no_file_is_refused_at_once_and_stays(tmp_path):
+def test_anything_but_a_regular_file_is_refused_and_unchanged(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "folder").mkdir()
     (tmp_path / "circle").symlink_to("circle")
@@ -179,8 +179,8 @@ def test_what_is_no_file_is_refused_at_once_and_stays(tmp_path):
 
 @posix
 @pytest.mark.skipif(not os.path.exists("/proc/self"), reason="needs a folder that is read-only")
-def test_a_folder_that_may_not_be_written_to_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(os, "access", lambda *_: False)  # root may everything
+def test_a_read_only_folder_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda *_: False)  # root may write anywhere
     with pytest.raises(OSError, match=f"{tmp_path} may not be written to"):
         require_place(tmp_path / "a.txt")
     monkeypatch.undo()
@@ -226,12 +226,12 @@ with replacing(pathlib.Path(sys.argv[1])) as draft:
 
 
 def writing(path):
-    """Return a process that writes to *path*, and tells the name of its draft."""
+    """Return a process that is writing to *path*, and the name of its draft."""
     return subprocess.Popen([sys.executable, "-c", _WRITER, path], stdout=subprocess.PIPE)
 
 
 @posix
-def test_what_a_killed_writer_left_is_swept_and_what_a_living_one_writes_is_not(tmp_path):
+def test_drafts_of_killed_writers_are_deleted_but_not_those_of_running_ones(tmp_path):
     killed, living = writing(tmp_path / "a.txt"), writing(tmp_path / "b.txt")
     abandoned, draft = (
         tmp_path / child.stdout.readline().decode().strip() for child in (killed, living)
@@ -250,7 +250,7 @@ def test_what_a_killed_writer_left_is_swept_and_what_a_living_one_writes_is_not(
 
 
 @posix
-def test_nothing_is_swept_but_drafts_of_ours(tmp_path):
+def test_only_our_own_drafts_are_deleted(tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "precious").write_text("mine")
     for name in (
@@ -278,14 +278,14 @@ def test_nothing_is_swept_but_drafts_of_ours(tmp_path):
 
 @posix
 @pytest.mark.skipif(os.name == "posix" and os.geteuid() != 0, reason="only root gives files away")
-def test_a_draft_of_somebody_else_is_not_swept(tmp_path):
+def test_a_draft_of_another_user_is_not_deleted(tmp_path):
     (tmp_path / DRAFT).write_text("half")
     os.chown(tmp_path / DRAFT, 12345, 12345)
     write(tmp_path / "a.txt")
     assert names(tmp_path) == [DRAFT, "a.txt"]
 
 
-def test_where_files_cannot_be_locked_a_draft_is_swept_after_a_day(tmp_path, monkeypatch):
+def test_where_files_cannot_be_locked_a_draft_is_deleted_after_a_day(tmp_path, monkeypatch):
     monkeypatch.setattr(atomic, "_LOCKS", False)
     (tmp_path / DRAFT).write_text("half")
     write(tmp_path / "a.txt")
@@ -295,14 +295,16 @@ def test_where_files_cannot_be_locked_a_draft_is_swept_after_a_day(tmp_path, mon
     assert names(tmp_path) == ["a.txt"]
 
 
-def test_a_file_system_without_locks_is_written_to_and_not_swept(tmp_path, monkeypatch):
+def test_on_a_file_system_without_locks_files_are_written_and_no_draft_deleted(
+    tmp_path, monkeypatch
+):
     monkeypatch.setattr(atomic, "holds", lambda *_: False)
     (tmp_path / DRAFT).write_text("half")
     write(tmp_path / "a.txt")
     assert names(tmp_path) == [DRAFT, "a.txt"]
 
 
-def test_a_folder_of_pictures_appears_whole_or_not_at_all(tmp_path):
+def test_a_folder_of_pictures_is_written_completely_or_not_at_all(tmp_path):
     with replacing(tmp_path / "film", folder=True) as draft:
         (draft / "0000.png").write_text("picture")
         assert names(tmp_path) == [draft.name]
@@ -312,7 +314,7 @@ def test_a_folder_of_pictures_appears_whole_or_not_at_all(tmp_path):
     assert names(tmp_path) == ["film"]
 
 
-def test_many_who_write_at_once_leave_one_whole_file_and_nothing_else(tmp_path):
+def test_concurrent_writers_leave_one_complete_file(tmp_path):
     path = tmp_path / "a.txt"
     write(path, "0" * 5000)
     seen, faults, done = set(), [], threading.Event()
@@ -341,7 +343,7 @@ def test_many_who_write_at_once_leave_one_whole_file_and_nothing_else(tmp_path):
     assert names(tmp_path) == ["a.txt"]
 
 
-def test_relative_paths_are_those_of_the_working_folder(tmp_path, monkeypatch):
+def test_relative_paths_refer_to_the_working_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write("a.txt")
     assert Path("a.txt").read_text() == "new"

@@ -160,7 +160,7 @@ posix = pytest.mark.skipif(os.name != "posix", reason="links, pipes and owners o
 
 
 def bound_in(folder, **options):
-    """Return the one file that a deformer leaves in a folder that has none."""
+    """Return the only file that a deformer writes to an empty folder."""
     before = set(folder.iterdir())
     SCENE.deformer(cache=folder, **options)
     (path,) = set(folder.iterdir()) - before
@@ -168,30 +168,30 @@ def bound_in(folder, **options):
 
 
 def exchanged(path):
-    """Put the binding of another mesh, or of other options, under this name."""
+    """Replace the file by the binding of another mesh, or of other options."""
     bound_in(path.parent, stretch=9.0).replace(path)
 
 
 def linked(path):
-    """Put a link to the very same content there."""
+    """Replace the file by a link to the same content."""
     path.rename(path.with_name("elsewhere"))
     path.symlink_to("elsewhere")
 
 
 def piped(path):
-    """Put a pipe there, which nobody ever writes to."""
+    """Replace the file by a pipe that is never written to."""
     path.unlink()
     os.mkfifo(path)
 
 
 def in_a_folder(path):
-    """Put a folder there."""
+    """Replace the file by a folder."""
     path.unlink()
     path.mkdir()
 
 
 def given_away(path):
-    """Give the file to somebody else."""
+    """Change the owner of the file."""
     if os.geteuid() != 0:
         pytest.skip("only root gives files away")
     os.chown(path, 12345, 12345)
@@ -205,7 +205,7 @@ def given_away(path):
         (piped, "a device or a pipe"), (in_a_folder, "a folder"), (given_away, "another user's"),
     ],
 )  # fmt: skip
-def test_what_is_not_what_its_name_says_is_ignored_and_said_once(
+def test_a_binding_that_does_not_match_its_name_is_ignored_with_one_warning(
     tmp_path, counted, caplog, change, says
 ):
     path = bound_in(tmp_path)
@@ -220,7 +220,7 @@ def test_what_is_not_what_its_name_says_is_ignored_and_said_once(
     said = [record.getMessage() for record in caplog.records]
     assert re.search(says, said[0])
     assert path.name in said[0]
-    if change is exchanged:  # which was ours: by now it is what its name says
+    if change is exchanged:  # the own file, written again under its name by now
         SCENE.deformer(cache=tmp_path)
         assert len(counted) == 1
     else:
@@ -230,7 +230,7 @@ def test_what_is_not_what_its_name_says_is_ignored_and_said_once(
     assert caplog.records == []
 
 
-def test_a_file_that_is_exchanged_while_it_is_read_is_ignored(tmp_path, counted, monkeypatch):
+def test_a_file_that_is_replaced_while_it_is_read_is_ignored(tmp_path, counted, monkeypatch):
     path = bound_in(tmp_path)
     other = bound_in(tmp_path, stretch=9.0)
     whole = bound.in_parallel
@@ -244,7 +244,7 @@ def test_a_file_that_is_exchanged_while_it_is_read_is_ignored(tmp_path, counted,
 
 
 @posix
-def test_making_room_deletes_only_bindings_of_ours(tmp_path, monkeypatch):
+def test_making_room_deletes_only_our_own_bindings(tmp_path, monkeypatch):
     theirs = ["my.bound.npz", "0" * 39 + ".bound.npz", "precious.npz", ".bound.npz"]
     for name in theirs:
         (tmp_path / name).write_text("mine")
@@ -258,7 +258,7 @@ def test_making_room_deletes_only_bindings_of_ours(tmp_path, monkeypatch):
 
 
 @posix
-def test_what_cannot_be_kept_is_said_and_done_without(tmp_path, caplog):
+def test_a_binding_that_cannot_be_written_is_logged_and_not_required(tmp_path, caplog):
     (tmp_path / "file").write_text("in the way")
     for _ in range(2):
         SCENE.deformer(cache=tmp_path / "file" / "folder")

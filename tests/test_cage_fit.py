@@ -282,7 +282,7 @@ def test_cavities_are_filled_and_islands_that_hold_nothing_are_sunk():
     assert _filled(values, 1.5, np.array([[3.0, 3.0, 3.0], [15.0, 4.0, 4.0]]))[1] == 2
 
 
-def test_more_cage_vertices_than_can_be_solved_with_are_refused_before_any_work():
+def test_too_many_cage_vertices_are_refused_before_any_work():
     mesh = Mesh(*icosphere(4))
     reports = []
 

@@ -286,7 +286,9 @@ def test_debug_shows_where_an_error_came_from():
         ),
     ],
 )
-def test_version_says_what_speed_lacks(missing, advice, monkeypatch, capsys):
+def test_version_says_which_libraries_are_missing_for_full_speed(
+    missing, advice, monkeypatch, capsys
+):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name in missing else name)
     assert main(["--version"]) == 0
     lines = capsys.readouterr().out.splitlines()

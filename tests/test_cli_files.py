@@ -82,7 +82,7 @@ def test_a_selection_may_be_longer_than_a_name_of_a_file(folder):
 
 
 @pytest.mark.parametrize("text", [LONG, f"{LONG}=2", "z<0%&" * 200 + "x<0%", "a\0b", "/" * 5000])
-def test_a_long_selection_that_makes_no_sense_is_named_and_cut_short(text):
+def test_a_long_invalid_selection_is_named_and_truncated(text):
     with pytest.raises(ConstraintError, match=r"cannot read the selection|selects none") as error:
         parse_selection(text, BAR)
     assert len(str(error.value)) < 700

@@ -206,7 +206,7 @@ def test_a_small_subspace_multiplied_in_one_call_is_the_sum_over_its_regions(twi
 
 
 @pytest.mark.parametrize("regions", [1, 5, 70])
-def test_what_reaches_a_vertex_is_found_by_regions_however_many_there_are(regions):
+def test_the_cages_that_reach_a_vertex_are_found_for_any_number_of_regions(regions):
     n = 400
     rows = [np.sort(RNG.permutation(n)[: RNG.integers(0, 30)]) for _ in range(regions)]
     rows[0] = np.arange(n)
@@ -227,7 +227,7 @@ def test_what_reaches_a_vertex_is_found_by_regions_however_many_there_are(region
     assert_array_equal(w, dense[np.ix_(some, columns)])
 
 
-def test_without_a_folder_to_keep_kernels_in_they_are_compiled_all_the_same(monkeypatch):
+def test_without_a_cache_folder_kernels_are_compiled_nevertheless(monkeypatch):
     caching = pytest.importorskip("numba.core.caching")
     kernels = importlib.import_module("vtk_segdeform.compiled.kernels")
     monkeypatch.setattr(caching.CompileResultCacheImpl, "_locator_classes", [])
@@ -236,7 +236,7 @@ def test_without_a_folder_to_keep_kernels_in_they_are_compiled_all_the_same(monk
     assert twice.signatures
 
 
-def test_set_up_tries_a_step_so_that_the_first_frame_waits_for_no_kernel(monkeypatch):
+def test_set_up_runs_a_trial_step_so_the_first_frame_waits_for_no_kernel(monkeypatch):
     pytest.importorskip("numba")
     mesh = models.torus(3000)
     regions = Regions.single(mesh)

@@ -1,7 +1,7 @@
 """What needles, creases of numbers and tight cages do to an answer: bounded, and by how much.
 
-Energies are measured on an intrinsic triangulation (`intrinsic`), so that a triangle however thin
-weighs no more than a good one.
+Energies are measured on an intrinsic triangulation (`intrinsic`), so that even the thinnest
+triangle has no more weight than a well-shaped one.
 Each scene is bent by 30 degrees.  Two numbers are measured: how far the answer moves when a scene
 is made bad in a way that should not matter, and how far when targets move by a millionth.
 """

@@ -1,4 +1,4 @@
-"""What can be copied and pickled is the same afterwards, to the last bit, and goes its own way."""
+"""Copies and pickles are bit-identical to the original, and independent of it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SCENE = sausage()
 
 
 def pickled(thing):
-    """Return what comes out of a pickle of *thing*."""
+    """Return *thing* after pickling and unpickling."""
     return pickle.loads(pickle.dumps(thing))
 
 
@@ -28,7 +28,7 @@ WAYS = [copy.copy, copy.deepcopy, pickled]
 
 
 def working_session() -> Session:
-    """Return a session with a drag in hand, a step to undo and one to redo."""
+    """Return a session with an ongoing drag, a step to undo and one to redo."""
     session = Session(SCENE.mesh)
     session.set_regions(SCENE.regions)
     session.set_cages(SCENE.cages)
@@ -50,7 +50,7 @@ def test_the_arrays_of_a_copy_are_read_only_as_well(cls, way):
 
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
-def test_a_mesh_its_regions_and_cages_are_the_same_and_leave_their_caches_behind(way):
+def test_copies_of_a_mesh_regions_and_cages_are_equal_and_have_no_caches(way):
     mesh = sd.models.sphere(500)
     regions = sd.Regions.single(mesh)
     cage = public_calls.cages()[0]
@@ -85,7 +85,7 @@ def test_a_copied_session_has_the_drag_the_names_and_the_history(way):
 
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
-def test_a_copied_session_goes_its_own_way_and_has_no_listeners(way):
+def test_a_copied_session_is_independent_and_has_no_listeners(way):
     session = working_session()
     heard: list[sd.Change] = []
     session.on_change(heard.append)
@@ -122,7 +122,7 @@ def test_a_copied_deformer_solves_the_same_bits_from_the_same_pose(way):
 
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
-def test_a_copied_solution_says_the_same_and_leaves_the_deformer_behind(way):
+def test_a_copied_solution_has_the_same_values_and_no_deformer(way):
     solution = SCENE.held().solve(SCENE.turned(15))
     other = way(solution)
     assert_array_equal(other.vertices, solution.vertices)

@@ -97,7 +97,7 @@ def test_detail_turns_with_the_mesh_and_shrinks_with_its_scale():
     assert_allclose(moved, 0.1 * delta @ turn.T, atol=1e-12)
 
 
-def test_a_speck_weighs_no_more_than_a_twentieth_of_its_neighbours():
+def test_the_area_of_a_vertex_is_at_least_a_twentieth_of_that_of_its_neighbours():
     vertices, faces = icosphere(2)
     areas = mixed_voronoi_areas(surface(vertices, faces))
     assert_allclose(with_least_areas(areas, faces), areas)

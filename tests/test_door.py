@@ -1,9 +1,9 @@
 """Bad arguments to every public callable end in one of our errors, or in an answer.
 
-The callables are found by looking (`public_calls`), so that a new one is tried as well.  One
-argument of a valid call, sometimes two, is replaced by a value that nobody expects there
-(`bad_values`).  Nothing else than an error of `vtk_segdeform.errors` may come out, in seconds and
-without gigabytes; and what a session holds after an error is what it held before.
+The callables are discovered (`public_calls`), so that new ones are tested as well.  One argument of
+a valid call, sometimes two, is replaced by an unexpected value (`bad_values`).  Only errors of
+`vtk_segdeform.errors` may be raised, within seconds and without gigabytes of memory, and a session
+must be unchanged after an error.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from vtk_segdeform.editing.state import Pose, State
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.session import Session
 
-SECONDS = 30.0  # of one call, beyond which it hangs
-GIGABYTES = 4  # more than there is already
+SECONDS = 30.0  # limit for one call
+GIGABYTES = 4  # in addition to the memory in use
 SETTERS = {"DeformEditor.path"}  # of paths
 LONGEST = 1000  # characters of a message
 
 
 @pytest.fixture(autouse=True)
 def bounded(tmp_path, monkeypatch):
-    """Run in an empty folder, with bounded memory, and with a file open that has to stay open."""
+    """Run in an empty folder, with bounded memory, and with a file that must stay open."""
     monkeypatch.chdir(tmp_path)
     public_calls._file.cache_clear()
     limits = resource.getrlimit(resource.RLIMIT_AS)
@@ -51,11 +51,11 @@ def bounded(tmp_path, monkeypatch):
 
 
 def _tried(call: Call, bad: dict[str, str], fd: int) -> str:
-    """Return what is wrong with how *call* takes the *bad* values; "" if nothing is."""
+    """Return how *call* mishandles the *bad* values; "" if it does not."""
     function = call.bound()
     arguments = call.arguments()
     values = {name: fd if kind == "fd" else BAD[kind]() for name, kind in bad.items()}
-    if set(values) - set(arguments):  # one that may be left out, beside valid ones
+    if set(values) - set(arguments):  # an optional one, in addition to valid ones
         arguments |= {name: valid(call.name, name) for name in call.parameters if name in values}
     arguments |= values
     owner = getattr(function, "__self__", None)
@@ -80,7 +80,7 @@ def _tried(call: Call, bad: dict[str, str], fd: int) -> str:
 
 
 def _named(call: Call, told: str, message: str, bad: dict[str, str]) -> str:
-    """Return a complaint unless *message* names the argument, or is of the path that it is."""
+    """Return a complaint unless *message* names the argument, or the path passed for it."""
     if len(bad) > 1:
         return ""
     ((name, kind),) = bad.items()
@@ -141,13 +141,13 @@ def test_every_parameter_has_a_valid_value_and_the_call_is_answered(modules):
 
 
 @pytest.mark.parametrize("modules", [CORE, WIDGETS], ids=["core", "widgets"])
-def test_a_bad_argument_ends_in_an_error_that_names_it_or_in_an_answer(modules, bounded):
+def test_a_bad_argument_is_answered_or_raises_an_error_that_names_it(modules, bounded):
     cheap = [call for call in _all(modules) if not public_calls.expensive(call)]
     _require_ours(cheap, 1, 2, bounded)
 
 
 @pytest.mark.parametrize("cls", [State, Pose], ids=lambda cls: cls.__name__)
-def test_a_state_with_bad_parts_begins_no_session(cls, bounded):
+def test_a_state_with_bad_parts_is_refused_by_session(cls, bounded):
     """Each field of a state, or of its pose, in turn holds each bad value."""
     state = public_calls.session().state
     thing = state if cls is State else state.pose
@@ -179,7 +179,7 @@ def _paths() -> list[tuple[Call, str]]:
     return pairs
 
 
-def test_a_name_as_long_as_a_file_may_have_or_longer_ends_in_no_foreign_error(bounded):
+def test_a_file_name_that_is_too_long_is_one_of_our_errors(bounded):
     cheap = [pair for pair in _paths() if not public_calls.expensive(pair[0])]
     for call, name in cheap:
         suffix = Path(valid(call.name, name)).suffix if name == "path" else ""
@@ -194,7 +194,7 @@ def test_a_name_as_long_as_a_file_may_have_or_longer_ends_in_no_foreign_error(bo
     public_calls.tidy()
 
 
-def test_a_file_descriptor_is_no_path_and_stays_open(bounded):
+def test_a_file_descriptor_is_not_a_path_and_stays_open(bounded):
     for call, name in _paths():
         assert _tried(call, {name: "fd"}, bounded) == ""
         with pytest.raises(ValueError, match="must be a"):

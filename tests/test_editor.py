@@ -437,7 +437,7 @@ def test_the_card_of_keys_comes_and_goes(desk):
         assert_array_equal(picture(desk.view), without)
 
 
-def test_without_numba_the_line_says_so_until_something_is_done(monkeypatch):
+def test_without_numba_the_status_line_says_so_until_the_first_action(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "numba" else name)
     made = Desk(plain_view((500, 400)), sausage().mesh)
     said = "numba is not installed: frames take 3 to 6 times as long. pip install numba"
@@ -512,7 +512,7 @@ def test_escape_cancels_a_job_and_nothing_is_changed(bare):
     assert bare.session.regions is not None
 
 
-def test_escape_once_more_does_not_begin_anew_what_it_has_cancelled(desk):
+def test_a_second_escape_does_not_restart_a_cancelled_job(desk):
     desk.hand.key("4")
     assert desk.editor.is_busy
     for _ in range(3):

@@ -1,6 +1,6 @@
 """Every key of the editor in mid-drag, while a pose converges, and during a job; see `key_moments`.
 
-In plain VTK and in a plotter; `test_qt_every_key` has the same in Qt.
+In plain VTK and in a plotter; `test_qt_every_key` repeats them in Qt.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from vtk_segdeform.widgets import Mode
 
 
 def stand_of(make, folder):
-    """Yield an editor that is used again and again."""
+    """Yield an editor that all tests share."""
     with pytest.MonkeyPatch.context() as patch:
         slow_down(patch)
         stand = make(folder)

@@ -143,7 +143,7 @@ def test_a_failure_leaves_no_file_and_the_session_as_it_was(tmp_path, session):
         film(tmp_path / "a.gif", session, iter([*TURNS[:2], np.zeros((2, 3))]), size=SIZE)
     assert session.state is before
     assert not session.is_dragging
-    with pytest.raises(ValueError, match="targets are for a session"):
+    with pytest.raises(ValueError, match="targets require a session"):
         film(tmp_path / "a.gif", plain_view(SIZE), TURNS)
     empty = Session(SCENE.mesh)
     empty.add_handle(SCENE.handle)

@@ -620,7 +620,7 @@ def test_what_is_undone_is_not_refined(bench):
     assert not bench.has_timer
 
 
-def test_off_in_mid_drag_keeps_it_as_one_step_and_on_refines_it_further(bench):
+def test_off_in_mid_drag_keeps_one_step_and_on_continues_refining(bench):
     place = bench.aim(FREE)
     bench.hand.press(place)
     bench.hand.move(place + [-40.0, 60.0])
@@ -639,7 +639,7 @@ def test_off_in_mid_drag_keeps_it_as_one_step_and_on_refines_it_further(bench):
     assert bench.session.state.pose is None
 
 
-def test_what_would_have_to_be_bound_first_is_not_refined_until_it_is(bench):
+def test_a_pose_that_must_be_bound_first_is_not_refined(bench):
     place = bench.aim(FREE)
     bench.hand.drag([place, place + [-40.0, 60.0]])
     assert bench.has_timer

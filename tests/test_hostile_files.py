@@ -201,7 +201,7 @@ WORTHS = [
 
 
 def harmed_json(head, rng):
-    """Return a JSON document after something structural: a value replaced, moved, lost, twice."""
+    """Return a JSON document with a value replaced, moved, removed or duplicated."""
     head = json.loads(json.dumps(head))
     found = list(places(head))
     container, key = found[int(rng.integers(len(found)))]
@@ -221,7 +221,7 @@ def harmed_json(head, rng):
 
 
 def save_harmed(path, document):
-    """Write whatever JSON there is, with the buffer that belongs to it."""
+    """Write any JSON, with the buffer that belongs to it."""
     if path.suffix == ".glb":
         path.write_bytes(glb(json.dumps(document.head).encode(), document.blob))
         return
@@ -285,7 +285,7 @@ OUTSIDE = '<DataArray type="Float64" Name="a" format="appended" offset="{}"/>'
 
 
 def lies(folder):
-    """Write files that say, or nest, more than any reader can bear; return [(reader, path)]."""
+    """Write files with counts or nesting beyond any reader's limits; return [(reader, path)]."""
     texts = {
         "sound.vtp": VTP.format(**SOUND),
         "corner.vtp": VTP.format(**SOUND | {"corners": "0 1 2 0 3 1 0 2 3 1 3 900000000"}),
@@ -420,7 +420,7 @@ def test_what_is_no_file_or_another_kind_is_refused_by_its_name(seen):
     assert Counter(answer for answer, _ in told)["refused"] > 0.9 * len(files)
 
 
-def test_what_a_file_says_is_not_believed_beyond_its_size(seen):
+def test_counts_in_a_file_are_checked_against_its_size(seen):
     files, told = seen[3]
     assert not wrong_among(files, told)
     refused = {
@@ -430,14 +430,14 @@ def test_what_a_file_says_is_not_believed_beyond_its_size(seen):
 
 
 @pytest.mark.campaign
-def test_no_lie_is_believed(tmp_path):
+def test_no_false_count_is_accepted(tmp_path):
     files = lies(tmp_path)
     told = answers(files)
     assert not wrong_among(files, told)
     read = [
         path.name for (_, path), (answer, _) in zip(files, told, strict=True) if answer == "read"
     ]
-    # An offset into nothing, a count that VTK makes anew, a name that is only long: all sound.
+    # An unused offset, a count that VTK computes itself, a long name: all of these are valid.
     assert read == ["sound.vtp", "minus.vtp", "sound.vtk", "cells.vtk", "name.vtk", "nothing.ply"]
 
 

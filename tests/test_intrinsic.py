@@ -1,4 +1,4 @@
-"""The energy is that of good triangles, however bad those of the mesh are."""
+"""The energy is that of well-shaped triangles, however bad those of the mesh are."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_a_mesh_of_good_triangles_is_its_own_triangulation(solid):
 
 
 @pytest.mark.parametrize("height", HEIGHTS)
-def test_caps_are_flipped_away_and_the_surface_stays_closed_and_as_large(height):
+def test_flips_remove_caps_and_keep_the_surface_closed_and_its_area(height):
     whole = icosphere(3)
     vertices, faces = with_caps(*whole, 60, height)
     surface = IntrinsicTriangulation.of(vertices, faces)
@@ -109,7 +109,7 @@ def areas_of(vertices, faces):
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
 
 
-def test_flips_keep_what_is_linear_on_a_plane(monkeypatch):
+def test_flips_preserve_linear_functions_on_a_plane(monkeypatch):
     monkeypatch.setattr(intrinsic, "_BAD", 5.0)
     # Two fans of needles in a square: whatever the triangles, C x is 0 inside a plane.
     line = np.linspace(0.0, 1.0, 12)

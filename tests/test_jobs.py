@@ -103,7 +103,7 @@ def test_what_the_delivery_raises_does_too_and_only_once():
     assert [type(failure) for failure in hand.failures] == [ZeroDivisionError]
 
 
-def test_a_watcher_that_fails_does_not_lose_the_result():
+def test_the_result_is_delivered_even_if_a_watcher_raises():
     hand = Hand(plain_view())
     delivered = []
 

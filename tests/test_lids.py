@@ -1,4 +1,4 @@
-"""Lids over holes: closed, without flat triangles, crossing nothing, whatever the border does."""
+"""Lids over holes: closed, without flat triangles and intersections, for any border."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ PLANE = {
 
 
 def closed(vertices, faces, least, largest=10_000):
-    """Repair; check the lids, whose angles are *least* degrees at least, and return the result."""
+    """Repair, check that all angles of the lids are at least *least* degrees; return the result."""
     assert not len(self_intersections(vertices, faces))
     result = repair(vertices, faces, largest_hole=largest)
     assert result.report.ok, str(result.report)
@@ -82,7 +82,7 @@ def closed(vertices, faces, least, largest=10_000):
 
 
 @pytest.mark.parametrize("name", PLANE)
-def test_a_plane_hole_gets_a_plane_lid_of_round_triangles(name):
+def test_a_planar_hole_gets_a_planar_lid_of_well_shaped_triangles(name):
     loop = PLANE[name]
     onward = np.roll(loop, -1, axis=0)
     area = 0.5 * (loop[:, 0] * onward[:, 1] - loop[:, 1] * onward[:, 0]).sum()
@@ -123,7 +123,7 @@ def test_a_random_border_is_closed_without_a_crossing(seed):
     closed(*tube(loop, 6.0), least=0.2)
 
 
-def test_a_tilted_loop_that_winds_is_closed_as_it_is_seen_from_its_axis():
+def test_a_tilted_winding_loop_is_closed_in_the_projection_along_its_axis():
     t = np.linspace(0.0, 1.0, 40)
     rise = np.array([0.0, 0.0, 1.0]) * np.concatenate([t, t[::-1]])[:, None]
     inner, outer = (polar(r + t, 4.0 * np.pi * t) for r in (0.3, 0.55))
@@ -131,16 +131,16 @@ def test_a_tilted_loop_that_winds_is_closed_as_it_is_seen_from_its_axis():
     closed(*tube(loop, 3.0), least=1.0)
 
 
-def test_the_lid_of_a_long_border_has_triangles_in_proportion_to_it():
+def test_the_number_of_lid_triangles_is_proportional_to_the_border():
     sizes = {}
     for n in (80, 320):
         loop = polar(1.0 + 0.2 * np.cos(9 * (angle := 2.0 * np.pi * np.arange(n) / n)), angle)
         result = closed(*tube(loop, 1.0, 3), least=1.0)
         sizes[n] = np.count_nonzero(result.face_map < 0)
-    assert sizes[320] < 6.0 * sizes[80]  # of an even density it would have sixteen times as many
+    assert sizes[320] < 6.0 * sizes[80]  # with uniform density it would be sixteen times
 
 
-def test_ears_are_clipped_from_wherever_the_loop_is_simple():
+def test_ears_are_clipped_in_any_projection_in_which_the_loop_is_simple():
     loop = spiral() @ np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     triangles, view = clip_ears(loop)
     assert_allclose(view @ view.T, np.eye(3), atol=1e-14)
@@ -152,7 +152,7 @@ def test_ears_are_clipped_from_wherever_the_loop_is_simple():
     assert clip_ears(knot) is None
 
 
-def test_every_new_vertex_knows_what_it_is_a_mixture_of():
+def test_every_new_vertex_has_weights_of_border_vertices():
     vertices, faces = tube(PLANE["square"])
     result = closed(vertices, faces, least=12.0)
     weights = result.vertex_weights
@@ -178,15 +178,15 @@ def test_thousands_of_touching_holes_are_filled_together():
     assert volume == pytest.approx(signed_volume(vertices, faces), rel=1e-4)
 
 
-def test_a_lid_that_has_to_cross_is_told():
+def test_an_unavoidable_intersection_is_reported():
     knot = np.array([np.sin(TURN) + 2 * np.sin(2 * TURN), np.cos(TURN) - 2 * np.cos(2 * TURN),
                      -np.sin(3 * TURN)]).T  # fmt: skip
     result = repair(*tube(knot, 0.3))
     assert result.report.ok
-    assert "2 lids cross the surface or another lid; none was found that does not" in result.steps
+    assert "2 lids cross the surface or another lid; no alternative was found" in result.steps
 
 
-def test_holes_that_touch_are_told_apart():
+def test_touching_holes_are_separated():
     vertices, faces = icosphere(2)
     at = np.flatnonzero((faces == 2).any(axis=1))
     other = [f for f in at if len(np.intersect1d(faces[f], faces[at[0]])) == 1]
@@ -198,7 +198,7 @@ def test_holes_that_touch_are_told_apart():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_crossings_of_some_faces_are_those_among_all(seed):
+def test_the_intersections_of_some_faces_agree_with_those_of_all(seed):
     rng = np.random.default_rng(seed)
     scale = 10.0 ** rng.uniform(-1.0, 0.5, 80)[:, None, None]
     vertices = (rng.normal(size=(80, 1, 3)) + scale * rng.normal(size=(80, 3, 3))).reshape(-1, 3)

@@ -170,7 +170,11 @@ def test_a_matrix_that_is_no_affine_map_is_named(tmp_path, matrix):
 
 def test_where_it_cannot_be_written_nothing_is(tmp_path):
     (tmp_path / "taken.layers").write_text("mine")
-    for name, says in (("a.ply", "ends in .mlp"), ("no/a.mlp", "no folder"), ("taken.mlp", "else")):
+    for name, says in (
+        ("a.ply", "ends in .mlp"),
+        ("no/a.mlp", "no folder"),
+        ("taken.mlp", "not a folder"),
+    ):
         with pytest.raises(MeshError, match=says):
             write_project(tmp_path / name, BALL)
     with pytest.raises(MeshError, match="expected a Mesh"):

@@ -53,7 +53,7 @@ def test_every_library_imported_is_declared(setup_cfg):
     assert {LIBRARY_OF.get(name, name) for name in used} <= declared
 
 
-def test_a_plain_install_brings_what_makes_it_fast(setup_cfg):
+def test_a_plain_install_includes_the_libraries_for_speed(setup_cfg):
     required = setup_cfg["options"]["install_requires"]
     assert {"numba", "threadpoolctl"} <= names_in(required)
     # Where numba has no wheel, pip would try to build LLVM: a marker keeps it away.
@@ -62,7 +62,7 @@ def test_a_plain_install_brings_what_makes_it_fast(setup_cfg):
     assert "fast" not in setup_cfg["options.extras_require"]
 
 
-def test_one_extra_brings_all_of_the_desktop_program(setup_cfg):
+def test_one_extra_installs_the_whole_desktop_program(setup_cfg):
     app = setup_cfg["options.extras_require"]["app"]
     assert {"PySide6-Essentials", "pyvistaqt", "qtpy"} <= names_in(app)
     assert '!=6.12.0; python_version<"3.12"' in app

@@ -1,4 +1,4 @@
-"""PLY: reserved names, lists of any width, triangle strips; no count is believed unchecked."""
+"""PLY: reserved names, lists of any width, triangle strips, and checks of all counts."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_arrays_called_x_y_and_z_do_not_become_the_coordinates(tmp_path):
     assert "point array 'x' is written as 'x_1'" in told.texts
 
 
-def test_the_command_line_says_which_array_got_another_name(tmp_path, capsys):
+def test_the_command_line_reports_renamed_arrays(tmp_path, capsys):
     surface = to_polydata(Mesh(*icosphere(1)))
     surface.point_data["x"] = np.zeros(surface.n_points)
     surface.point_data["way"] = np.zeros((surface.n_points, 3))
@@ -49,7 +49,7 @@ def test_the_command_line_says_which_array_got_another_name(tmp_path, capsys):
     assert main(["regions", str(tmp_path / "a.vtp"), "-o", str(tmp_path / "b.ply"), *options]) == 0
     said = capsys.readouterr().err
     assert "segdeform regions: point array 'x' is written as 'x_1'" in said
-    assert "segdeform regions: PLY has no place for point array 'way': left out" in said
+    assert "segdeform regions: PLY cannot store point array 'way': left out" in said
 
 
 def test_a_face_of_300_corners_keeps_them(tmp_path):
@@ -59,7 +59,7 @@ def test_a_face_of_300_corners_keeps_them(tmp_path):
     assert told.texts == ["PLY faces of over 255 corners: some programs cannot read them"]
 
 
-def test_whole_numbers_of_64_bits_are_exact_or_left_out(tmp_path):
+def test_64_bit_integers_are_exact_or_left_out(tmp_path):
     surface = to_polydata(Mesh(*TETRAHEDRON))
     surface.point_data["i"] = np.array([0, 1, -5, 2**31 - 1])
     surface.point_data["u"] = np.array([0, 1, 5, 2**32 - 1])
@@ -106,7 +106,7 @@ def stripped(faces):
 
 @pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
 @pytest.mark.parametrize("lists", ["one", "many"])
-def test_triangle_strips_are_read_all_oriented_alike(tmp_path, kind, lists):
+def test_triangle_strips_are_read_with_consistent_orientation(tmp_path, kind, lists):
     vertices, faces = icosphere(2)
     strips = stripped((vertices, faces))
     assert max(map(len, strips)) > 6
@@ -130,7 +130,7 @@ def test_triangle_strips_are_read_all_oriented_alike(tmp_path, kind, lists):
     assert {frozenset(f) for f in mesh.faces.tolist()} == {frozenset(f) for f in faces.tolist()}
 
 
-def test_strips_joined_by_triangles_without_area_lose_these(tmp_path):
+def test_degenerate_triangles_that_join_strips_are_left_out(tmp_path):
     vertices, _ = TETRAHEDRON
     rest = "element tristrips 1\nproperty list int int vertex_indices\n"
     rows = ["8 0 1 2 2 3 3 1 0"]  # 012, (122, 223, 233), 331, 310 by turns
@@ -138,7 +138,7 @@ def test_strips_joined_by_triangles_without_area_lose_these(tmp_path):
     assert read_polydata(tmp_path / "a.ply").regular_faces.tolist() == [[0, 1, 2], [1, 3, 0]]
 
 
-def test_words_of_the_header_are_names_too(tmp_path):
+def test_keywords_of_the_header_are_valid_names(tmp_path):
     vertices, faces = TETRAHEDRON
     rest = "comment end_header \nobj_info x\n" + FACES.format(m=4) + "property int end_header\n"
     rows = [f"3 {a} {b} {c} {k}" for k, (a, b, c) in enumerate(faces)]
@@ -155,21 +155,21 @@ def test_words_of_the_header_are_names_too(tmp_path):
     [
         ("element face 1000000000000\nproperty list uchar int vertex_indices\n", [], "cannot hold"),
         ("element nothing 1000000000000\n" + FACES.format(m=1), ["3 0 1 2"], None),
-        (FACES.format(m=-1), [], "line 'element face -1'"),
+        (FACES.format(m=-1), [], "line: 'element face -1'"),
         (FACES.format(m=1), ["-3 0 1 2"], "length -3"),
         (FACES.format(m=1), ["3 0 1 9"], "names vertex 0 to 9"),
-        (FACES.format(m=1), ["3 0 1 1.5"], "no whole number"),
-        (FACES.format(m=1), ["3 0 1 nan"], "no whole number"),
+        (FACES.format(m=1), ["3 0 1 1.5"], "not a whole number"),
+        (FACES.format(m=1), ["3 0 1 nan"], "not a whole number"),
         (FACES.format(m=1).replace("int v", "thing v"), ["3 0 1 2"], "unknown type"),
         (FACES.format(m=1).replace("vertex_indices", "x"), ["3 0 1 2"], "no faces"),
         (FACES.format(m=1).replace("list uchar ", ""), ["3"], "no faces"),
-        (FACES.format(m=1) * 2, ["3 0 1 2"] * 2, "of one name"),
-        ("property list int int x\n", [], "of one name"),
+        (FACES.format(m=1) * 2, ["3 0 1 2"] * 2, "of the same name"),
+        ("property list int int x\n", [], "of the same name"),
         ("property list int\n", [], "unknown type: 'property list int'"),
-        (FACES.format(m=1) + "property int\n", ["3 0 1 2 4"], "line 'property int'"),
+        (FACES.format(m=1) + "property int\n", ["3 0 1 2 4"], "line: 'property int'"),
     ],
 )
-def test_a_header_that_says_what_cannot_be_is_refused(tmp_path, rest, rows, message):
+def test_an_impossible_header_is_refused(tmp_path, rest, rows, message):
     (tmp_path / "a.ply").write_text(text(TETRAHEDRON[0], rows, rest))
     if message is None:
         assert read_polydata(tmp_path / "a.ply").n_cells == 1

@@ -1,6 +1,6 @@
 """Every key of the editor in mid-drag, while a pose converges, and during a job, in Qt.
 
-What is seen to hold is told in `key_moments`; here the panel is to be there again as well.
+The checks are those of `key_moments`; in addition, the panel must be enabled again.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from vtk_segdeform.widgets import Mode
     scope="module", params=["seldom-drawn", pytest.param("drawn", marks=pytest.mark.campaign)]
 )
 def stand(request, tmp_path_factory):
-    """Yield an editor that is used again and again."""
+    """Yield an editor that all tests share."""
     with pytest.MonkeyPatch.context() as patch:
         slow_down(patch)
         stand = QtStand(tmp_path_factory.mktemp("qt"), is_drawn=request.param == "drawn")

@@ -1,6 +1,6 @@
-"""What may come between in Qt: clicks in the panel, other timers, a focus that goes, the end.
+"""Interruptions in Qt: clicks in the panel, other timers, loss of focus, closing.
 
-In mid-drag, while a pose converges, or during a job; nothing hangs, and no drag is lost.
+In mid-drag, while a pose converges, or during a job: nothing hangs, and no drag is lost.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def slowly():
 
 @pytest.fixture(scope="module")
 def stand(slowly, tmp_path_factory):
-    """Yield an editor that is used again and again."""
+    """Yield an editor that all tests share."""
     stand = QtStand(tmp_path_factory.mktemp("qt"), is_drawn=False)
     yield stand
     stand.close()
@@ -43,7 +43,7 @@ def another(slowly, tmp_path):
 
 
 def dragged(stand: Stand, *, during: bool):
-    """Drag the handle; let go of it unless a test is about what comes *during* the drag."""
+    """Drag the handle; release it unless the interruption comes *during* the drag."""
     stand.begin(Mode.DEFORM)
     place = stand.drag(Mode.DEFORM)
     if not during:
@@ -53,9 +53,9 @@ def dragged(stand: Stand, *, during: bool):
 
 
 def is_kept(stand: Stand, place) -> Story:
-    """Let go at last, and see that the drag is the first step of all; return the whole story."""
+    """Release, and check that the drag is the first step of the history; return the story."""
     stand.hand.release(place)
-    stand.hand.failures.clear()  # what is refused is told
+    stand.hand.failures.clear()  # refusals are reported
     stand.settle()
     story = Story.of(stand.session)
     assert story.labels[0] == DRAG
@@ -65,7 +65,7 @@ def is_kept(stand: Stand, place) -> Story:
 
 
 def settings(panel) -> list:
-    """Return what there is to click or to set in mode 4, but for files and modes."""
+    """Return all widgets that can be clicked or set in mode 4, except files and modes."""
     kinds = QtWidgets.QAbstractButton, QtWidgets.QAbstractSpinBox
     found = [each for kind in kinds for each in panel.findChildren(kind) if each.isVisible()]
     asking = panel.head.open, panel.head.save  # a dialog
@@ -77,7 +77,7 @@ def settings(panel) -> list:
     [pytest.param(True, id="in mid-drag", marks=pytest.mark.campaign),
      pytest.param(False, id="converging")],
 )  # fmt: skip
-def test_whatever_is_clicked_or_set_in_the_panel_the_drag_is_kept(stand, during):
+def test_any_action_in_the_panel_keeps_the_drag(stand, during):
     panel = stand.widget.panel
     panel.log.fold.setChecked(True)
     dragged(stand, during=False)
@@ -99,7 +99,7 @@ def test_whatever_is_clicked_or_set_in_the_panel_the_drag_is_kept(stand, during)
 
 
 @MOMENTS
-def test_undo_in_the_panel_takes_back_the_drag_and_redo_has_it_again(stand, during):
+def test_undo_in_the_panel_reverts_the_drag_and_redo_restores_it(stand, during):
     panel, place = stand.widget.panel, dragged(stand, during=during)
     stand.editor.desk.refresh()
     panel.refresh()
@@ -112,19 +112,19 @@ def test_undo_in_the_panel_takes_back_the_drag_and_redo_has_it_again(stand, duri
 
 
 @MOMENTS
-def test_a_job_that_the_host_begins_finds_the_drag_done(stand, during):
+def test_a_job_started_by_the_host_finishes_the_drag_first(stand, during):
     place = dragged(stand, during=during)
     with stand.job() as delivered:
         assert stand.session.undo_label == DRAG
         pose = stand.session.state.pose
         stand.hand.move(place + [-40.0, -30.0])
         stand.hand.release(place)
-        assert stand.session.state.pose is pose  # it is the job's meanwhile
+        assert stand.session.state.pose is pose  # the job owns it meanwhile
     assert delivered == ["counted"]
     assert is_kept(stand, place).done == 1
 
 
-def test_cancel_twice_and_a_second_job_are_no_harm(stand):
+def test_cancelling_twice_and_a_second_job_are_harmless(stand):
     stand.begin(Mode.DEFORM)
     cancel = stand.widget.panel.foot.cancel
     with stand.job() as delivered:
@@ -144,7 +144,9 @@ def test_cancel_twice_and_a_second_job_are_no_harm(stand):
 
 
 @pytest.mark.parametrize("what", ["timer", "interactor"])
-def test_a_job_ends_though_somebody_elses_timer_ends_or_the_interactor_begins_anew(stand, what):
+def test_a_job_ends_even_if_a_foreign_timer_ends_or_the_interactor_is_initialised_again(
+    stand, what
+):
     dragged(stand, during=False)
     interactor = stand.editor.view.interactor
     with stand.job() as delivered:
@@ -156,7 +158,7 @@ def test_a_job_ends_though_somebody_elses_timer_ends_or_the_interactor_begins_an
     assert delivered == ["counted"]
 
 
-def test_two_editors_in_one_view_wait_for_nobody(stand):
+def test_two_editors_in_one_view_do_not_block_each_other(stand):
     view = View.of(stand.widget.plotter)
     view.render = lambda: None
     other = DeformEditor(view, ready())
@@ -193,7 +195,7 @@ def test_a_drag_that_loses_the_focus_or_its_release_is_kept(stand, what):
     assert (story.labels, story.done) == ([DRAG], 1)
 
 
-def test_a_slot_that_lets_events_in_loses_no_drag(stand):
+def test_a_slot_that_processes_events_loses_no_drag(stand):
     stand.begin(Mode.DEFORM)
     stand.draw()
     first, second, *others, last = stand.way(Mode.DEFORM)
@@ -219,7 +221,7 @@ def test_a_slot_that_lets_events_in_loses_no_drag(stand):
 
 
 @pytest.mark.parametrize("moment", ["in mid-drag", "converging", "in a job"])
-def test_a_widget_is_closed_at_once_and_the_drag_is_kept(another, moment):
+def test_closing_a_widget_is_immediate_and_keeps_the_drag(another, moment):
     dragged(another, during=moment == "in mid-drag")
     if moment == "in a job":
         another.editor.do(lambda desk: desk.start("counting", lambda _: "counted", print))

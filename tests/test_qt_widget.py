@@ -705,7 +705,7 @@ def test_the_example_of_an_application_runs(tmp_path):
     assert 0.04 < body.mean() < 0.5  # the cactus, the mode that is on, the status line
 
 
-def test_a_bad_argument_is_an_error_of_ours_before_anything_is_made():
+def test_a_bad_argument_is_one_of_our_errors_before_anything_is_created():
     application()
     mesh, view = models.sphere(100), plain_view((64, 64))
     before = len(QtWidgets.QApplication.allWidgets())

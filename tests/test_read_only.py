@@ -1,6 +1,6 @@
-"""What is handed out by reference cannot be written to: every array that a property or a field is.
+"""Arrays that properties and fields return by reference are read-only.
 
-The properties are found by looking, on an object of each public class.
+The properties are discovered on an object of each public class.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ NOT_READ = {"state"}  # `Session.state`, whose arrays are those of the session
 
 
 def _public(thing: object) -> Iterator[tuple[str, object]]:
-    """Yield the public properties and fields of *thing*, by name, as they are."""
+    """Yield the names and values of the public properties and fields of *thing*."""
     properties = (name for name, _ in inspect.getmembers(type(thing), _is_read))
     for name in sorted({*properties, *vars(thing)}):
         if not name.startswith("_"):
@@ -48,7 +48,7 @@ def _arrays(value: object) -> Iterator[np.ndarray]:
 
 
 def _shared(thing: object) -> list[str]:
-    """Return the names of what *thing* hands out twice as the same memory, to be written to."""
+    """Return the names of arrays that *thing* returns by reference and writeable."""
     twice = zip(_public(thing), _public(thing), strict=True)
     return [
         name
@@ -59,7 +59,7 @@ def _shared(thing: object) -> list[str]:
 
 
 @pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.__name__)
-def test_an_array_handed_out_by_reference_is_read_only(cls):
+def test_an_array_returned_by_reference_is_read_only(cls):
     thing = public_calls.instance(cls)
     if isinstance(thing, sd.Session):
         thing.drag(public_calls.ARGUMENTS["targets"]())

@@ -1,4 +1,4 @@
-"""The list of recent files, whatever its names are and whatever somebody put into the settings."""
+"""The list of recent files, for any file names and any content of the settings."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def test_names_are_kept_as_they_are(tmp_path):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="names of any bytes")
-def test_a_name_that_is_no_text_is_left_out_and_never_another_one(tmp_path):
+def test_a_name_that_is_not_text_is_left_out_and_not_changed(tmp_path):
     recent = Recent(settings_in(tmp_path))
     recent.add(tmp_path / "a.ply")
     recent.add(tmp_path / os.fsdecode(b"\xff\xfe.ply"))
@@ -27,7 +27,7 @@ def test_a_name_that_is_no_text_is_left_out_and_never_another_one(tmp_path):
 
 
 @pytest.mark.parametrize("value", [3, [1, 2], b"abc", [None, "x"], 4.5, "", {"a": 1}])
-def test_settings_that_make_no_sense_are_no_files(tmp_path, value):
+def test_invalid_settings_yield_no_files(tmp_path, value):
     settings = settings_in(tmp_path)
     settings.setValue("recent files", value)
     settings.sync()

@@ -250,7 +250,7 @@ def test_no_other_lid_of_a_bent_loop_has_less_area():
 
 
 @pytest.mark.parametrize("n_on_side", [1, 2, 5])
-def test_a_crack_is_closed_by_cutting_the_face_that_has_vertices_on_its_side(n_on_side):
+def test_a_crack_is_closed_by_splitting_the_face_with_vertices_on_its_edge(n_on_side):
     # The face (a, b, c) of a tetrahedron is a fan from c over vertices on the side a-b.
     a, b, c, d = 0, 1, 2, 3
     vertices = np.array([[0.0, 0, 0], [6, 0, 0], [0, 1, 0], [0, 0, 1]])
@@ -262,7 +262,7 @@ def test_a_crack_is_closed_by_cutting_the_face_that_has_vertices_on_its_side(n_o
     result = mended(vertices, faces)
     assert len(result.vertices) == len(vertices)
     assert result.report.count(Kind.ZERO_AREA) == 0
-    assert result.steps[1] == "cut 1 face at vertices on a side, to close cracks"
+    assert result.steps[1] == "split 1 face at vertices on an edge, to close cracks"
     assert signed_volume(result.vertices, result.faces) == pytest.approx(1.0, rel=1e-12)
 
 

@@ -1,4 +1,4 @@
-"""What a repaired surface keeps of the polygons and arrays it had, and what is said of the rest."""
+"""Polygons and arrays that a repaired surface keeps, and the report of the others."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ N = 4
 
 
 def box(drop=(), turn=()):
-    """Return a cube of quads, N by N to a side, without some and with others turned round."""
+    """Return a cube of N by N quads per side, with some dropped and others flipped."""
     grid = pv.ImageData(dimensions=(N + 1,) * 3).extract_surface(algorithm=None)
     grid = grid.clean()
     quads = polygons_of(grid)[1].reshape(-1, 4)
@@ -62,7 +62,7 @@ def same_corners(old, new):
     return n_new
 
 
-def test_a_sound_surface_comes_back_with_all_it_had():
+def test_a_surface_without_faults_is_unchanged():
     surface = box()
     same, done = repair_surface(surface)
     assert done.steps == ()
@@ -70,7 +70,7 @@ def test_a_sound_surface_comes_back_with_all_it_had():
     assert same.array_names == surface.array_names
 
 
-def test_polygons_and_arrays_are_kept_where_the_face_is():
+def test_polygons_and_arrays_of_kept_faces_are_kept():
     surface = box(drop=[5, 6, 9, 10, 40])
     closed, done = repair_surface(surface)
     assert done.report.ok
@@ -91,7 +91,7 @@ def test_polygons_and_arrays_are_kept_where_the_face_is():
     assert same_corners(surface, closed) == closed.n_cells - kept > 0
 
 
-def test_new_vertices_mix_the_values_around_and_the_report_says_so():
+def test_new_vertices_interpolate_values_and_the_report_says_so():
     n = 40
     turn = 2.0 * np.pi * np.arange(n) / n
     ring = np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
@@ -121,7 +121,7 @@ def test_new_vertices_mix_the_values_around_and_the_report_says_so():
     )
 
 
-def test_a_turned_polygon_stays_one_and_its_corners_turn_along():
+def test_a_flipped_polygon_stays_a_polygon_with_flipped_corners():
     surface = box(turn=[3, 50])
     surface.cell_data["Normals"] = np.tile([1.0, 0.0, 0.0], (surface.n_cells, 1))
     surface.cell_data.active_normals_name = "Normals"
@@ -139,11 +139,11 @@ def test_a_turned_polygon_stays_one_and_its_corners_turn_along():
     assert fixed.volume == pytest.approx(outward.volume)
 
 
-def test_a_polygon_of_which_a_part_goes_becomes_triangles_and_that_is_said():
+def test_a_polygon_that_loses_a_part_becomes_triangles_and_is_reported():
     surface = box()
     points, (counts, corners) = np.asarray(surface.points), polygons_of(surface)
     triangles, quad = cut_into_triangles(points, counts, corners)
-    extra = triangles[quad == 7][0]  # comes first, so that it is the quad's own that goes
+    extra = triangles[quad == 7][0]  # comes first, so that the triangle of the quad is dropped
     double = polydata_of(points, np.append(3, counts), np.append(extra, corners))
     double.cell_data["material"] = np.arange(double.n_cells)
     closed, done = repair_surface(double)
@@ -156,7 +156,7 @@ def test_a_polygon_of_which_a_part_goes_becomes_triangles_and_that_is_said():
     assert_array_equal(np.sort(closed.cell_data["material"][counts == 3]), [0, 8])
 
 
-def test_values_that_welding_makes_one_are_told():
+def test_values_merged_by_welding_are_reported():
     surface = box()
     corners = polygons_of(surface)[1]
     apart = polydata_of(np.asarray(surface.points)[corners], np.full(surface.n_cells, 4),
@@ -166,10 +166,10 @@ def test_values_that_welding_makes_one_are_told():
     closed, done = repair_surface(apart)
     assert (polygons_of(closed)[0] == 4).all()
     assert closed.n_points == surface.n_points
-    assert done.steps[1:] == ("keep one value of u of several at 1 welded vertex",)
+    assert done.steps[1:] == ("keep one of several values of u at 1 welded vertex",)
 
 
-def test_strips_and_loose_cells_are_told():
+def test_strips_and_loose_cells_are_reported():
     strip = pv.PolyData(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]))
     strip.verts, strip.lines = np.array([1, 3]), np.array([2, 0, 3])
     strip.strips = np.array([4, 0, 1, 2, 3])
@@ -194,13 +194,13 @@ def test_the_accessor_repairs_a_copy_and_logs_each_step(caplog):
     assert "largest_hole=4 (--largest-hole 4 on the command line)" in caplog.text
 
 
-def test_the_command_line_fills_holes_as_large_as_it_is_told(tmp_path, capsys):
+def test_the_command_line_fills_holes_up_to_the_given_size(tmp_path, capsys):
     path, out = tmp_path / "open.obj", tmp_path / "closed.obj"
     convert.write_mesh(path, box(drop=[5]))
     command = ["check", str(path), "--repair", "-o", str(out)]
     assert main([*command, "--largest-hole", "3"]) == 1
     text = capsys.readouterr().out
-    assert "1 hole stays open, of 4 edges" in text
+    assert "1 hole remains open, of 4 edges" in text
     assert "largest_hole=4 (--largest-hole 4" in text
     assert main([*command, "--largest-hole", "4"]) == 0
     assert "repaired: fill 1 hole of 4 edges" in capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""STL: the same mesh as VTK's reader makes; counts that do not fit, and text that is cut off."""
+"""STL: the same mesh as from VTK's reader; wrong counts, and truncated text."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ def octahedron(tmp_path, *, binary=True):
 
 
 @pytest.mark.parametrize("count", [0, 7, 9, 2**31, 2**32 - 1])
-def test_a_count_of_triangles_that_is_not_theirs_is_refused(tmp_path, count):
+def test_a_wrong_count_of_triangles_is_refused(tmp_path, count):
     path, data = octahedron(tmp_path)
     path.write_bytes(data[:80] + count.to_bytes(4, "little") + data[84:])
     with pytest.raises(
-        MeshError, match=rf"a\.stl: says {count} triangles, but its 484 bytes hold 8"
+        MeshError, match=rf"a\.stl: declares {count} triangles, but its 484 bytes hold 8"
     ):
         read_polydata(path)
 
 
-def test_binary_files_may_begin_as_text_does_and_have_a_few_bytes_more(tmp_path):
+def test_binary_files_may_start_like_text_and_have_trailing_bytes(tmp_path):
     path, data = octahedron(tmp_path)
     path.write_bytes(b"solid facet vertex 1 2 3 endsolid".ljust(80) + data[80:])
     assert read_polydata(path).n_cells == 8
@@ -53,15 +53,15 @@ def test_text_in_any_case_with_any_ends_of_lines_is_read(tmp_path):
         assert read_polydata(path).n_cells == 8
 
 
-def test_text_that_is_cut_off_is_refused(tmp_path):
+def test_truncated_text_is_refused(tmp_path):
     path, data = octahedron(tmp_path, binary=False)
     for text in (data[: len(data) // 2], data.replace(b"vertex", b"corner", 1), data[:-12]):
         path.write_bytes(text)
-        with pytest.raises(MeshError, match=r"a\.stl: is cut off"):
+        with pytest.raises(MeshError, match=r"a\.stl: is truncated"):
             read_polydata(path)
 
 
-def test_minus_zero_is_zero_and_what_is_no_number_comes_through(tmp_path):
+def test_minus_zero_is_zero_and_nan_is_kept(tmp_path):
     path, _ = octahedron(tmp_path)
     write_mesh(path, Mesh(OCTAHEDRON[0] + 0.0, OCTAHEDRON[1]))
     rows = np.frombuffer(path.read_bytes()[84:], "u1").reshape(-1, 50).copy()

@@ -376,7 +376,7 @@ def test_a_pickle_in_a_file_is_never_run(tmp_path):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="forks")
-def test_a_file_that_is_saved_meanwhile_is_read_whole_the_old_or_the_new(tmp_path):
+def test_a_file_that_is_being_saved_is_read_as_the_old_or_the_new_one(tmp_path):
     path = tmp_path / "saved.npz"
     save_session(path, TINY)
     writer = subprocess.Popen([sys.executable, "-c", _SAVER, path], stdout=subprocess.PIPE)
@@ -402,7 +402,7 @@ for turn in itertools.count():
 """
 
 
-def test_the_size_is_that_of_the_file_which_is_open(tmp_path, monkeypatch):
+def test_the_size_is_that_of_the_open_file(tmp_path, monkeypatch):
     path, other = tmp_path / "saved.npz", tmp_path / "other.npz"
     save_session(path, POSED)
     save_session(other, TINY)
@@ -418,7 +418,7 @@ def test_the_size_is_that_of_the_file_which_is_open(tmp_path, monkeypatch):
 
 
 def sparse(path, size, n):
-    """Write a session of *n* vertices whose arrays are a hole of *size* bytes in the file."""
+    """Write a session of *n* vertices whose arrays are a hole of *size* bytes in a sparse file."""
     save_session(path, TINY)
     with zipfile.ZipFile(path) as archive:
         header = json.loads(archive.read("header.json"))
@@ -433,9 +433,7 @@ def sparse(path, size, n):
 
 
 @pytest.mark.parametrize("size", [45_000_000_000, 2_200_000_000])
-def test_a_file_that_is_a_hole_of_gigabytes_is_refused_before_it_is_read(
-    tmp_path, monkeypatch, size
-):
+def test_a_sparse_file_of_gigabytes_is_refused_before_it_is_read(tmp_path, monkeypatch, size):
     sparse(tmp_path / "saved.npz", size, size // 48)
     monkeypatch.setattr(zipfile, "ZipFile", None)
     with pytest.raises(SessionError, match=r"saved\.npz: .*it has .*e\+\d\d bytes; the limit is"):
@@ -452,7 +450,7 @@ def test_an_archive_of_very_many_members_is_refused_before_they_are_listed(tmp_p
         load_session(path)
 
 
-def test_what_could_not_be_read_again_is_not_written(tmp_path, monkeypatch):
+def test_a_session_too_large_to_read_is_not_written(tmp_path, monkeypatch):
     monkeypatch.setattr("vtk_segdeform.editing.archive._LARGEST", (1 << 20) + 1000)
     with pytest.raises(SessionError, match=r"saved\.npz: cannot be written \(.* bytes exceed"):
         save_session(tmp_path / "saved.npz", POSED)
@@ -460,7 +458,7 @@ def test_what_could_not_be_read_again_is_not_written(tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="no named pipes in folders here")
-def test_a_pipe_or_a_device_is_refused_and_not_waited_for(tmp_path):
+def test_a_pipe_or_a_device_is_refused_without_blocking(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     for path in (tmp_path / "pipe", "/dev/zero"):
         with pytest.raises(SessionError, match="a device or a pipe"):

@@ -1,4 +1,4 @@
-"""A recording may come from anybody: what a replay may write, and for how long it may run."""
+"""Untrusted recordings: where a replay may write files, and how long it may run."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ALL = [TITLE, *SAVES, *RECORDS, *FILM, *OPENS, "0 Timer 20"]
 
 
 class Bench:
-    """An editor in a folder of its own, and what it complains of."""
+    """An editor in a folder of its own, and the errors that it reports."""
 
     def __init__(self) -> None:
         self.view = plain_view((200, 150))
@@ -39,7 +39,7 @@ class Bench:
         self.editor.On()
 
     def replay(self, lines, **options):
-        """Replay *lines*, and wait for what they began."""
+        """Replay *lines*, and wait for the jobs they start."""
         replay(self.view, lines, busy=lambda: self.editor.is_busy, **options)
         self.editor.wait()
 
@@ -54,7 +54,7 @@ def bench(tmp_path, monkeypatch):
 
 
 def tree_of(folder):
-    """Return all files below a folder, with what is in them."""
+    """Return all files below a folder, with their content."""
     return {
         str(path.relative_to(folder)): path.read_bytes()
         for path in folder.rglob("*")
@@ -62,17 +62,17 @@ def tree_of(folder):
     }
 
 
-def test_without_a_folder_nothing_is_written_or_opened_and_that_is_said(bench, tmp_path):
+def test_without_a_folder_no_file_is_accessed_and_that_is_reported(bench, tmp_path):
     (tmp_path / "here" / "session.segdeform").write_text("mine")
     bench.editor.path = tmp_path / "here" / "session.segdeform"
     bench.replay([TITLE, *SAVES, *SAVES, *RECORDS, *FILM, *OPENS, *OPENS])
     assert tree_of(tmp_path) == {"here/session.segdeform": b"mine"}
     assert len(bench.faults) >= 5
     assert {type(fault) for fault in bench.faults} == {SessionError}
-    assert all("only in a folder that it is given" in str(fault) for fault in bench.faults)
+    assert all("only in the folder passed to it" in str(fault) for fault in bench.faults)
 
 
-def test_with_a_folder_all_is_written_there_whatever_the_path_of_the_editor(bench, tmp_path):
+def test_with_a_folder_all_files_are_written_there_whatever_the_path_of_the_editor(bench, tmp_path):
     (tmp_path / "there").mkdir()
     mine = tmp_path / "here" / "work.segdeform"
     mine.write_text("mine")
@@ -108,7 +108,7 @@ def test_a_link_does_not_lead_out_of_the_folder(bench, tmp_path):
     assert len(bench.faults) == 3
 
 
-def test_a_folder_that_is_not_there_is_an_error_before_anything_is_done(bench, tmp_path):
+def test_a_missing_folder_is_an_error_before_any_event(bench, tmp_path):
     with pytest.raises(SessionError, match="no such folder"):
         bench.replay(ALL, folder=tmp_path / "nowhere")
     assert tree_of(tmp_path) == {}
@@ -123,7 +123,7 @@ def test_a_folder_that_is_not_there_is_an_error_before_anything_is_done(bench, t
         (["0 Window 16384 16384"], "16384 x 16384 exceeds the limit of 16,000,000 pixels"),
     ],
 )
-def test_what_is_too_much_is_refused_with_its_line_before_anything_is_done(lines, says):
+def test_a_recording_beyond_the_limits_is_refused_with_its_line_before_any_event(lines, says):
     view = plain_view((50, 50))
     moved = []
     view.observe("MouseMoveEvent", lambda: moved.append("moved"))
@@ -142,7 +142,7 @@ def test_a_limit_may_be_raised_or_lowered_and_counts_ticks():
             ReplayLimits(**wrong)
 
 
-def test_the_time_is_up_within_an_entry_of_many_ticks_and_while_work_never_ends():
+def test_the_time_limit_applies_within_an_entry_of_many_ticks_and_during_endless_work():
     view = plain_view((50, 50))
     view.observe("TimerEvent", lambda: time.sleep(0.02))
     start = time.monotonic()
@@ -177,13 +177,13 @@ def test_a_huge_file_a_pipe_and_a_device_are_refused_at_once(tmp_path):
                 replay(view, path)
 
 
-def test_the_command_writes_nothing_but_what_it_is_told_to(tmp_path, monkeypatch, capsys):
+def test_the_command_writes_only_to_the_given_folder(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     sd.write_mesh("ball.ply", MESH)
     (tmp_path / "evil.txt").write_text("\n".join([TITLE, "0 Window 200 150", *ALL[1:]]))
     before = set(tree_of(tmp_path))
     assert main(["replay", "evil.txt", "ball.ply", "--film", "a.gif"]) == 0
-    assert "only in a folder that it is given" in capsys.readouterr().out
+    assert "only in the folder passed to it" in capsys.readouterr().out
     assert set(tree_of(tmp_path)) - before == {"a.gif"}
     assert main(["replay", "evil.txt", "ball.ply", "--film", "b.gif", "--folder", "new"]) == 0
     assert "only in a folder" not in capsys.readouterr().out
@@ -192,7 +192,7 @@ def test_the_command_writes_nothing_but_what_it_is_told_to(tmp_path, monkeypatch
     assert all(name.startswith("new/") for name in written)
 
 
-def test_the_limits_are_told_by_the_command(tmp_path, monkeypatch, capsys):
+def test_the_limits_are_in_the_help_and_the_messages_of_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     sd.write_mesh("ball.ply", MESH)
     # 100 million ticks last longer than a second on any machine.

@@ -1,4 +1,4 @@
-"""BLAS keeps to one thread while we compute, and has its threads back afterwards."""
+"""BLAS is limited to one thread during computations, and its threads are restored afterwards."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ for _ in range(2):
 """
 
 
-def test_several_deformers_at_a_time_give_what_they_give_alone_and_leave_blas_its_threads():
+def test_concurrent_deformers_agree_with_sequential_ones_and_blas_threads_are_restored():
     pytest.importorskip("threadpoolctl")
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     environment = {**os.environ, **dict.fromkeys(names, "2"), "SEGDEFORM_THREADS": "2"}
@@ -59,7 +59,7 @@ def test_several_deformers_at_a_time_give_what_they_give_alone_and_leave_blas_it
 
 
 class Library:
-    """Stands for threadpoolctl and a BLAS: who limits it remembers what to restore."""
+    """A stand-in for threadpoolctl and BLAS: each limit remembers the number to restore."""
 
     def __init__(self):
         self.threads = 8
@@ -72,7 +72,7 @@ class Library:
 
 
 class Limiter:
-    """What limits a `Library`, until it is restored."""
+    """A limit on a `Library`, until it is restored."""
 
     def __init__(self, library, limits):
         self.library, self.before = library, library.threads
@@ -115,7 +115,7 @@ def test_blas_is_limited_until_the_last_thread_has_left(blas):
     assert blas.threads == 8
 
 
-def test_blas_has_its_threads_back_after_an_error(blas):
+def test_blas_threads_are_restored_after_an_error(blas):
     @threads.one_blas_thread()
     def fail():
         with threads.one_blas_thread():

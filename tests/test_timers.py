@@ -1,4 +1,4 @@
-"""The one timer of an interactor: shared, and running exactly as long as somebody needs it.
+"""The single timer of an interactor: shared, and running only while a subscriber needs it.
 
 The host of most tests stops all timers when one is destroyed, as pyvistaqt does.
 """
@@ -29,7 +29,7 @@ def host(view):
     assert not host.is_running
 
 
-def test_whoever_stops_leaves_the_others_their_ticks(view, host):
+def test_stopping_one_callback_leaves_the_others_running(view, host):
     heard = []
     stops = [view.every(40, lambda k=k: heard.append(k)) for k in range(3)]
     host.tick()
@@ -45,7 +45,7 @@ def test_whoever_stops_leaves_the_others_their_ticks(view, host):
     assert not host.is_running
 
 
-def test_the_timer_has_the_shortest_period_that_is_wanted(view, host):
+def test_the_timer_has_the_shortest_required_period(view, host):
     stops = [view.every(period, list) for period in (40, 20, 30, 20)]
     assert host.made == [40, 20]
     stops[1]()
@@ -59,7 +59,7 @@ def test_the_timer_has_the_shortest_period_that_is_wanted(view, host):
     assert host.made == [40, 20, 30, 40, 40]
 
 
-def test_a_tick_may_stop_itself_and_others_and_begin_others(view, host):
+def test_a_callback_may_stop_itself_and_others_and_start_others(view, host):
     heard, stops = [], {}
 
     def first():
@@ -80,7 +80,7 @@ def test_a_tick_may_stop_itself_and_others_and_begin_others(view, host):
 
 
 @pytest.mark.parametrize("is_heard", [True, False])
-def test_one_that_fails_keeps_nobody_from_ticking(view, host, capfd, is_heard):
+def test_a_callback_that_raises_does_not_stop_the_others(view, host, capfd, is_heard):
     heard, failures = [], []
     if is_heard:
         view.on_failure(failures.append)
@@ -92,7 +92,9 @@ def test_one_that_fails_keeps_nobody_from_ticking(view, host, capfd, is_heard):
     host.tick(3)
     assert heard == ["tick"] * 3
     assert [str(failure) for failure in failures] == ["out of order"] * 3 * is_heard
-    assert ("out of order" in capfd.readouterr().err) is not is_heard  # VTK prints what it is left
+    assert (
+        "out of order" in capfd.readouterr().err
+    ) is not is_heard  # VTK prints unhandled exceptions
     for stop in stops:
         stop()
 
@@ -122,7 +124,7 @@ def test_views_of_two_interactors_do_not(view, host):
 
 
 @pytest.mark.parametrize("kind", ["CreateRepeatingTimer", "CreateOneShotTimer"])
-def test_it_runs_on_when_somebody_elses_timer_ends(view, host, kind):
+def test_it_keeps_running_when_a_foreign_timer_ends(view, host, kind):
     heard = []
     stop = view.every(20, lambda: heard.append("tick"))
     host.tick()
@@ -132,11 +134,11 @@ def test_it_runs_on_when_somebody_elses_timer_ends(view, host, kind):
     host.tick(2)
     assert heard == ["tick"] * 4
     stop()
-    view.interactor.DestroyTimer(getattr(view.interactor, kind)(50))  # nobody needs ours now
+    view.interactor.DestroyTimer(getattr(view.interactor, kind)(50))  # ours has no subscribers now
     assert not host.is_running
 
 
-def test_it_runs_on_when_the_interactor_is_initialised_again(view, host):
+def test_it_keeps_running_when_the_interactor_is_initialised_again(view, host):
     heard = []
     stop = view.every(20, lambda: heard.append("tick"))
     view.interactor.Disable()
@@ -148,7 +150,7 @@ def test_it_runs_on_when_the_interactor_is_initialised_again(view, host):
     stop()
 
 
-def test_a_closed_window_is_no_harm_to_who_stops_later():
+def test_stopping_after_the_window_is_closed_is_harmless():
     plotter = pv.Plotter(off_screen=True)
     view = View.of(plotter)
     stop = view.every(20, list)
@@ -160,7 +162,7 @@ def test_a_closed_window_is_no_harm_to_who_stops_later():
     assert gone() is None
 
 
-def test_nothing_lives_on_for_a_timer_that_nobody_has_stopped():
+def test_a_timer_that_was_not_stopped_keeps_nothing_alive():
     view = plain_view((60, 60))
     OneTimerHost(view.interactor)
     view.every(20, view.touch)

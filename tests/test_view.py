@@ -131,7 +131,7 @@ def test_escape_and_the_right_button_cancel(scribble):
     assert scribble.strokes == []
 
 
-def test_a_press_without_a_release_before_finishes_what_was_in_hand(scribble):
+def test_a_press_without_a_previous_release_finishes_the_gesture(scribble):
     hand = Hand(scribble.view)
     hand.press((50, 50))
     hand.move((60, 60))
@@ -140,7 +140,7 @@ def test_a_press_without_a_release_before_finishes_what_was_in_hand(scribble):
 
 
 @pytest.mark.parametrize("end", ["finish", "Off"])
-def test_a_gesture_that_somebody_ends_is_finished_and_not_cancelled(scribble, end):
+def test_a_gesture_ended_from_outside_is_finished_and_not_cancelled(scribble, end):
     hand = Hand(scribble.view)
     hand.press((50, 50))
     hand.move((60, 60))
@@ -191,7 +191,7 @@ def test_an_exception_is_collected_and_leaves_no_grab(scribble):
 
 
 def test_an_event_within_an_event_waits_for_its_turn(scribble):
-    """As where a listener lets an event loop run: moves come, and the release."""
+    """For example, a listener runs the event loop, which delivers moves and the release."""
     hand = Hand(scribble.view)
     seen, inside = [], {20: ("move", 30), 40: ("release", 40), 50: ("press", 70)}
 

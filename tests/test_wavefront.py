@@ -1,4 +1,4 @@
-"""OBJ: names in any encoding, objects, groups, smoothing kept; arrays that do not fit are said."""
+"""OBJ: names in any encoding; objects, groups and smoothing are kept; other arrays are reported."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_names_that_are_not_ascii_are_read_and_written(tmp_path, encoding, newli
         assert not told.texts
 
 
-def test_a_byte_that_ends_a_line_elsewhere_does_not_end_one_here(tmp_path):
+def test_only_line_feeds_and_carriage_returns_end_a_line(tmp_path):
     text = BLENDER.replace("身体", "a\x85v 9 9 9")  # NEL in Latin-1, an ellipsis on Windows
     (tmp_path / "a.obj").write_bytes(text.encode("latin-1"))
     surface = read_polydata(tmp_path / "a.obj")
@@ -72,7 +72,7 @@ def test_a_byte_that_ends_a_line_elsewhere_does_not_end_one_here(tmp_path):
     assert names_of(surface, "Object")[0] == "a\x85v 9 9 9"
 
 
-def test_smoothing_and_materials_are_said_again_after_each_object(tmp_path):
+def test_smoothing_and_materials_are_repeated_after_each_object(tmp_path):
     (tmp_path / "a.obj").write_text(BLENDER, encoding="utf-8")
     write_mesh(tmp_path / "b.obj", read_polydata(tmp_path / "a.obj"))
     lines = (tmp_path / "b.obj").read_text(encoding="utf-8").splitlines()
@@ -90,7 +90,7 @@ def test_smoothing_groups_are_numbers(tmp_path, word, group):
     assert read_polydata(tmp_path / "a.obj").cell_data["Smoothing"][0] == group
 
 
-def test_a_newline_in_a_name_is_no_line_of_the_file(tmp_path):
+def test_a_newline_in_a_name_does_not_start_a_line(tmp_path):
     surface = to_polydata(Mesh(*TETRAHEDRON))
     surface.cell_data["Group"] = [0, 1, 2, 3]
     names = ["a\nv 9 9 9\nf 1 2 3", "b\\", "b_", "  "]
@@ -122,7 +122,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("what", list(BAD))
-def test_an_array_that_is_not_what_its_name_says_is_left_out_and_said(tmp_path, what):
+def test_an_array_of_the_wrong_type_is_left_out_with_a_warning(tmp_path, what):
     sort, name, values = BAD[what]
     surface = to_polydata(Mesh(*TETRAHEDRON))
     getattr(surface, f"{sort}_data")[name] = values
@@ -138,11 +138,11 @@ def test_an_array_that_is_not_what_its_name_says_is_left_out_and_said(tmp_path, 
 @pytest.mark.parametrize("corner", ["0", "-5", "1/0", "1/-9"])
 def test_numbers_before_the_first_are_refused(tmp_path, corner):
     (tmp_path / "a.obj").write_text(f"vt 0 0\n{BLENDER}f {corner} 2 3\n", encoding="utf-8")
-    with pytest.raises(MeshError, match=r"a\.obj: a face names (0|-5|-9)"):
+    with pytest.raises(MeshError, match=r"a\.obj: a face refers to (0|-5|-9)"):
         read_polydata(tmp_path / "a.obj")
 
 
-def test_vertices_that_no_face_uses_keep_the_texture_with_the_points(tmp_path):
+def test_unused_vertices_keep_texture_coordinates_per_point(tmp_path):
     surface = to_polydata(Mesh(*TETRAHEDRON))
     surface = pv.PolyData(np.vstack([surface.points, [9.0, 9.0, 9.0]]), surface.faces)
     surface.point_data["uv"] = np.arange(10.0).reshape(5, 2)

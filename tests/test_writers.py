@@ -1,4 +1,4 @@
-"""Whatever writes a file keeps its mode, follows links, refuses pipes, and harms nothing."""
+"""All functions that write a file keep its mode, follow links, refuse pipes and lose no data."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PICTURES = np.zeros((2, 8, 8, 3), dtype=np.uint8)
 
 
 def write_recording(path):
-    """Write a recording of nothing."""
+    """Write an empty recording."""
     recorder = Recorder(plain_view((40, 40)))
     recorder.stop()
     recorder.save(path)
@@ -64,7 +64,7 @@ def test_the_mode_is_kept_and_a_link_stays_a_link(tmp_path, name):
     assert os.listdir(there) == [name]
 
 
-def test_what_is_no_file_is_an_error_of_ours_that_names_it(tmp_path, name):
+def test_anything_but_a_regular_file_is_one_of_our_errors_and_named(tmp_path, name):
     path = tmp_path / name
     for make in (os.mkfifo, os.mkdir, lambda path: os.symlink(name, path)):
         make(path)
@@ -78,7 +78,9 @@ def test_what_is_no_file_is_an_error_of_ours_that_names_it(tmp_path, name):
 
 
 @pytest.mark.parametrize("fault", [errno.ENOSPC, errno.EACCES])
-def test_a_failure_is_an_error_of_ours_and_the_old_file_stays(tmp_path, monkeypatch, name, fault):
+def test_a_failure_is_one_of_our_errors_and_the_old_file_is_kept(
+    tmp_path, monkeypatch, name, fault
+):
     def refused(*_):
         raise OSError(fault, os.strerror(fault))
 
@@ -105,7 +107,7 @@ def test_a_picture_has_the_pixels_it_was_given(tmp_path):
         assert np.array_equal(np.asarray(image), pixels)
 
 
-def test_a_project_of_a_layer_many_times_or_a_huge_one_is_refused_at_once(tmp_path, monkeypatch):
+def test_projects_with_too_many_or_too_large_layers_are_refused_at_once(tmp_path, monkeypatch):
     path = tmp_path / "work.mlp"
     write_project(path, MESH)
     (layer,) = (tmp_path / "work.layers").iterdir()
@@ -123,7 +125,7 @@ def test_a_project_of_a_layer_many_times_or_a_huge_one_is_refused_at_once(tmp_pa
         ):
             read_project(path)
     path.write_text("<MeshLabProject>" + "<a>" * 1_000_000)
-    with pytest.raises(sd.errors.MeshError, match=r"work\.mlp: .*more than 32 elements within"):
+    with pytest.raises(sd.errors.MeshError, match=r"work\.mlp: .*nested more than 32 deep"):
         read_project(path)
     os.truncate(layer, 45_000_000_000)
     path.write_text(f"<MeshLabProject><MeshGroup>{one}</MeshGroup></MeshLabProject>")

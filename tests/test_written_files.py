@@ -1,8 +1,8 @@
-"""What is written is what is read again: any surface, any arrays, any names, in every format.
+"""Round trips of any surface, any arrays and any names, in every format.
 
 Surfaces with random arrays are written and read by this package.  Points and polygons are the same;
-each array is the same, under its name or under the one that a warning told, or a warning told that
-it is left out.
+each array is the same, under its name or the new name given in a warning, or a warning says that it
+is left out.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ SPECIAL = [
 NAMES = st.sampled_from(SPECIAL) | st.text(
     st.characters(exclude_categories=["Cs"], exclude_characters="\0"), min_size=1, max_size=8
 )
-LOST = re.compile(r"has no place for (.*): left out$", re.DOTALL)
+LOST = re.compile(r"cannot store (.*): left out$", re.DOTALL)
 RENAMED = re.compile(
     r"(point array|cell array|group|object|material) (.*) is written as (.*)$", re.S
 )
@@ -96,7 +96,7 @@ def of_textures(surface):
 
 
 class Told(logging.Handler):
-    """Keeps what the package warns of while it writes."""
+    """Collects the warnings of the package while it writes."""
 
     def __init__(self, path, surface):
         super().__init__(logging.WARNING)
@@ -123,7 +123,7 @@ class Told(logging.Handler):
 
 
 def lost_in(path, surface):
-    """Write, read, and return in words what is neither the same nor told."""
+    """Write, read, and return a description of everything that is neither the same nor reported."""
     told = Told(path, surface)
     again = read_polydata(path)
     assert_array_equal(again.points, surface.points)
@@ -150,7 +150,7 @@ def lost_in(path, surface):
 
 
 def equal(path, surface, again, name, values, other, told):
-    """Tell whether an array came back: groups by their names, corners where there are some."""
+    """Return whether an array was read back: groups by name, corners where there are any."""
     counts = polygons_of(surface)[0]
     if name == "TextureCorners" and path.suffix in (".ply", ".obj"):
         mine, theirs = corner_values(values, counts), corner_values(other, counts)
@@ -173,14 +173,12 @@ EASY = settings(
 @pytest.mark.parametrize("suffix", [".ply", ".obj", ".off"])
 @EASY
 @given(surface=surfaces())
-def test_a_surface_with_any_arrays_comes_back_or_it_is_said_what_does_not(
-    tmp_path, suffix, surface
-):
+def test_a_surface_with_any_arrays_is_read_back_or_losses_are_reported(tmp_path, suffix, surface):
     assert not lost_in(tmp_path / f"a{suffix}", surface)
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".vtk", ".vtp", ".vtkhdf"])
-def test_every_special_name_comes_back_or_it_is_said_what_does_not(tmp_path, suffix):
+def test_every_special_name_is_read_back_or_losses_are_reported(tmp_path, suffix):
     surface = prism(4)
     for k, name in enumerate(SPECIAL):
         surface.point_data[name] = np.arange(8.0) + k
@@ -229,7 +227,7 @@ def test_pymeshlab_reads_the_same_surface(tmp_path, suffix, surface):
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".vtk", ".vtp", ".vtkhdf"])
-def test_a_thousand_surfaces_come_back_or_it_is_said_what_does_not(tmp_path, suffix):
+def test_a_thousand_surfaces_are_read_back_or_losses_are_reported(tmp_path, suffix):
     @settings(EASY, max_examples=1000 if suffix in (".ply", ".obj", ".off") else 100)
     @given(surface=surfaces())
     def each(surface):

@@ -33,6 +33,9 @@ is right: finite, of exact volume, with the handles in place or a status that sa
 not. Or an error of :mod:`vtk_segdeform.errors` names the fault and says what to do. Nothing else
 comes out: no other exception, no warning, nothing that takes minutes.
 
+Triangles without area are allowed: a closed mesh that contains some is accepted, bound and posed
+like any other.
+
 Each input below met each operation that could take it, {cases} cases: {answered} were answered and
 {refused} refused with a named fault.
 """

@@ -15,15 +15,15 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-_DEEPEST = 4  # lists within lists; numpy follows one that contains itself without end
-_LONGEST = 10**8  # entries of a sequence that is no array yet
+_DEEPEST = 4  # nesting levels; numpy recurses without end into a list that contains itself
+_LONGEST = 10**8  # entries of a sequence that is converted to an array
 _LARGEST = float(np.finfo(np.float64).max)
 
 
 def as_points(points: ArrayLike, name: str, count: int | None = None) -> FloatArray:
-    """Return *points* as (n, 3) float, or raise an ArgumentError that says what came instead.
+    """Return *points* as (n, 3) float, or raise an ArgumentError.
 
-    With *count*, there must be so many.
+    If *count* is given, it is the required number of points.
     """
     array = as_numbers(points, name)
     if count is not None and array.shape != (count, 3):
@@ -99,7 +99,7 @@ def as_numbers(values: ArrayLike, name: str) -> FloatArray:
     array = plain(values, name)
     if array.dtype.kind == "c":
         raise ArgumentError(f"{name} must hold real numbers; got {array.dtype}")
-    if array.dtype.kind == "O":  # its entries say themselves whether they are numbers
+    if array.dtype.kind == "O":  # each entry is checked by the conversion
         try:
             return array.astype(np.float64)
         except Exception as fault:
@@ -122,7 +122,7 @@ def plain(values: ArrayLike, name: str) -> NDArray[Any]:
         if isinstance(values, list | tuple):
             message = f"{name} must be an array; its rows differ in length"
         else:
-            message = f"{name} must be an array; {type(values).__name__} does not make one"
+            message = f"{name} must be an array; cannot convert {type(values).__name__}"
         raise ArgumentError(message) from fault
     if array.ndim == 0 and array.dtype.kind == "O":
         raise ArgumentError(f"{name} must be an array; got {shown(values)}")
@@ -130,9 +130,9 @@ def plain(values: ArrayLike, name: str) -> NDArray[Any]:
 
 
 def _require_bounded(values: object, name: str) -> None:
-    """Raise an ArgumentError for what numpy would follow without end, or until memory is full.
+    """Raise an ArgumentError where numpy would recurse without end or run out of memory.
 
-    Those are lists that contain themselves, and sequences of its own that claim to be very long.
+    That is, for lists that contain themselves and for sequences that claim to be very long.
     """
     inner: Any = values
     for _ in range(_DEEPEST):
@@ -140,7 +140,9 @@ def _require_bounded(values: object, name: str) -> None:
             break
         inner = inner[0]
     if isinstance(inner, list | tuple) and inner:
-        raise ArgumentError(f"{name} must be an array; it has lists more than {_DEEPEST} deep")
+        raise ArgumentError(
+            f"{name} must be an array; its lists are nested more than {_DEEPEST} deep"
+        )
     if isinstance(inner, Sized) and not hasattr(inner, "__array__"):
         try:
             count = len(inner)

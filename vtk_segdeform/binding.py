@@ -33,7 +33,7 @@ from .rotations import rotation_groups
 from .stand_in import StandIn
 from .subspace import bind
 
-_FORMAT = 8  # raise it whenever what is bound changes
+_FORMAT = 8  # increment whenever the content of a binding changes
 _BITS, _EACH = 2000, 6  # rotations at first: so many, or more, for each one asked for
 _LARGE = 100_000  # vertices beyond which what every frame maps by is kept in patches
 

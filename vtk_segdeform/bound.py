@@ -5,8 +5,8 @@ computed from (`binding`).  The file contains this digest as well, so that a ren
 detected.  Files of other users, symbolic links and pipes are neither read nor replaced.  A file
 that is ignored is logged, once for each reason.
 
-A million vertices are some 400 megabytes: what takes its time is memory that nobody has had yet,
-so all cores read.
+A binding of a million vertices is some 400 megabytes.  First touch of fresh memory dominates, so
+the arrays are read in parallel.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class Binding:
             os.utime(path)  # used: among the last to be thrown away
         except FileNotFoundError:
             return None
-        except Exception as fault:  # noqa: BLE001 - damage is an error of a dozen kinds
+        except Exception as fault:  # noqa: BLE001 - damaged files raise a dozen kinds
             _warn_once(path, f"ignored, {getattr(fault, 'strerror', None) or fault}")
             return None
         return cls(energy, stand_in, patches)
@@ -110,7 +110,7 @@ class Binding:
             with replacing(path, follow=False, durable=False) as draft, open(draft, "wb") as file:
                 np.savez(file, allow_pickle=False, **arrays)
             _make_room(path.parent)
-        except OSError as fault:  # a full disk or a folder that cannot be written: then without
+        except OSError as fault:  # full disk or read-only folder: go without the file
             _warn_once(path, f"not written, {fault.strerror or fault}")
 
 

@@ -47,7 +47,7 @@ _SHELL = 6  # vertices, at least, of each part of a cage that is in parts
 _FLOOR = 12  # vertices that every region gets before the rest is shared out
 _CLEARANCE = 0.5  # of the offset: the least distance from the skin that faces are pushed to
 _PUSHES, _NEAREST = 30, 200  # rounds; vertices whose distance from the cage is measured
-_CLOSEST, _FARTHEST = 1e-12, 1e6  # diagonals of the mesh that an offset may be
+_CLOSEST, _FARTHEST = 1e-12, 1e6  # limits of the offset, in diagonals of the mesh
 _MEASURED = 0.25  # of the work: regions are measured
 _SIEVE = 16  # one vertex in so many is measured first
 _SAMPLES = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6.0  # of a face
@@ -73,8 +73,8 @@ def fit_cages(
     regions : Regions
         Of that mesh, r of them.
     n_vertices : int
-        Of all cages together, met exactly; at least 8 for each region, and at most 1600.  Shared
-        out by area and shape: large and long regions get more.
+        Total number of cage vertices, met exactly; at least 8 for each region, at most 1600.
+        Distributed by area and shape: large and long regions get more.
     offset : float, optional
         How far the cages stay from the skin, about, in the mesh's unit.  By default, for each
         region, 0.4 sqrt(area / vertices of its cage).  It is raised where no valid cage is
@@ -136,12 +136,12 @@ def fit_cage(
 
 
 def _require_enough(n_vertices: int, n_regions: int) -> None:
-    """Raise a CageError unless cages of so many vertices can be made, and solved with."""
+    """Raise a CageError if the total number of cage vertices is too small or too large."""
     fewest, most = _FEWEST * n_regions, MOST_CAGE_VERTICES
     if fewest > most:
         raise CageError(
-            f"{n_regions} regions need {fewest} cage vertices, {_FEWEST} each, and at most {most} "
-            f"can be solved with; use {most // _FEWEST} regions or fewer (n_regions of segment)"
+            f"{n_regions} regions need {fewest} cage vertices, {_FEWEST} each; the limit of the "
+            f"solver is {most}: use {most // _FEWEST} regions or fewer (n_regions of segment)"
         )
     if not is_whole(n_vertices, fewest, most):
         raise CageError(

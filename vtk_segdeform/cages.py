@@ -22,9 +22,9 @@ from .surface.intersections import flat_faces, self_intersections
 from .surface.manifold import components, connectivity_faults, counted
 
 MOST_CAGE_VERTICES = 1600
-"""Of all cages together: the solver factors matrices of three times as many rows, in seconds."""
+"""Limit of all cages together: the solver factors matrices with three rows per cage vertex."""
 
-_LONGEST_NAME = 100  # characters of it in a message
+_LONGEST_NAME = 100  # characters of a cage's name in a message
 _LARGEST = 1e70  # as of a mesh, see `faults`
 
 __all__ = ["Cage", "cage_faults", "self_intersections", "winding_number"]

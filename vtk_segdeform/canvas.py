@@ -58,14 +58,14 @@ def require_offscreen() -> None:
 
 
 def require_picture(path: str | Path) -> None:
-    """Raise what drawing a picture to a file would, before the work that it is to show.
+    """Check that a picture can be rendered and written, before the computation that it shows.
 
     Raises
     ------
     MissingDependencyError
         If nothing can be rendered here.
     MeshError
-        If the file is no .png or cannot be written.
+        If the file is not a .png or cannot be written.
     """
     path = as_path(path)
     if path.suffix.lower() != ".png":
@@ -225,7 +225,7 @@ def png_of(pixels: NDArray[np.uint8]) -> bytes:
     image.SetDimensions(width, height, 1)
     rows = np.ascontiguousarray(pixels[::-1]).reshape(-1, 3)
     image.GetPointData().SetScalars(numpy_to_vtk(rows))
-    writer = vtkPNGWriter()  # into memory: on a full disk it says nothing
+    writer = vtkPNGWriter()  # into memory: it does not report a full disk
     writer.WriteToMemoryOn()
     writer.SetInputData(image)
     writer.Write()

@@ -1,7 +1,7 @@
-"""Checks at the public door of arguments that are not arrays; `arrays` has those for arrays.
+"""Checks of the arguments of public functions; those for arrays are in `arrays`.
 
-Each returns what the caller may rely on, or raises an `ArgumentError` that names the argument,
-says what it must be, and shows briefly what came.
+Each check returns the valid value or raises an `ArgumentError` that names the argument, says what
+it must be, and shows a short form of the value passed.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _T = TypeVar("_T")
 _Callable = TypeVar("_Callable", bound=Callable[..., Any])
 _LONGEST = 60  # characters of a value in a message
 _LONGEST_PATH = 4096  # characters, as on Linux
-_LARGEST = 10**20  # beyond it, the digits of an integer say less than their number
+_LARGEST = 10**20  # larger integers are described by their number of bits
 
 
 class _Brief(reprlib.Repr):
@@ -69,7 +69,7 @@ def require(value: object, kind: type[_T] | tuple[type[_T], ...], name: str) -> 
 
 
 def require_sequence(values: object, name: str) -> None:
-    """Raise unless *values* is a list, a tuple, an array or another sequence, but no text."""
+    """Raise unless *values* is a list, a tuple, an array or another sequence other than text."""
     known = isinstance(values, Sequence) or (isinstance(values, np.ndarray) and values.ndim > 0)
     if not known or isinstance(values, str | bytes | bytearray | memoryview):
         raise ArgumentError(f"{name} must be a sequence; got {shown(values)}")
@@ -96,7 +96,7 @@ def as_switch(value: object, name: str) -> bool:
 
 
 def as_text(value: object, name: str) -> str:
-    """Return *value* if it is text that a file, a window or a label can have."""
+    """Return *value* if it is text that can be encoded and contains no null character."""
     text = require(value, str, name)
     if "\0" in text:
         raise ArgumentError(f"{name} must not contain a null character; got {shown(text)}")
@@ -115,7 +115,7 @@ def as_callable(value: _Callable, name: str) -> _Callable:
 
 
 def as_path(path: str | os.PathLike[str], name: str = "path") -> Path:
-    """Return *path* as a Path; a file descriptor, bytes or text that no file can have is none."""
+    """Return *path* as a Path; file descriptors, bytes and invalid file names are refused."""
     if not isinstance(path, str | os.PathLike):
         raise ArgumentError(f"{name} must be a str or a Path; got {shown(path)}")
     text = os.fspath(path)

@@ -42,8 +42,9 @@ selections (SEL):
 """
 
 _REPLAYS = """\
-A recording may come from a stranger. Its keys read and write files only in --folder. It is refused
-or stopped with exit code 1 if it exceeds --events, --seconds or a window of 16 million pixels.
+A recording may come from an untrusted source. Its keys read and write files only in --folder. The
+replay is refused or stopped with exit code 1 if it exceeds --events, --seconds or a window of
+16 million pixels.
 """
 
 _EXAMPLES = """\
@@ -100,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 class _Warnings(logging.Handler):
-    """Prints what the package logs as a warning, such as arrays that a file has no place for."""
+    """Prints the package's warnings, for example of arrays that a file format cannot store."""
 
     def __init__(self, command: str, bar: ProgressBar) -> None:
         super().__init__(logging.WARNING)
@@ -201,14 +202,14 @@ def _parser() -> argparse.ArgumentParser:
     sub = command("app", application, "open the desktop program, with a mesh, a session or nothing")
     sub.add_argument("input", type=Path, nargs="?", metavar="FILE", help="a mesh or a session")
 
-    text = "do again what was recorded in a window by Ctrl+R"
+    text = "replay a recording made with Ctrl+R"
     sub = command("replay", replay_command, text, _REPLAYS)
     sub.add_argument("recording", type=Path, metavar="RECORDING", help="NAME.recording.txt")
     _input_output(sub, required=False)
     sub.add_argument("--film", type=Path, metavar="OUT", help="off-screen, to a .gif or an .mp4")
-    text = "folder for the files its keys save; without it, none are"
+    text = "folder for files that the recorded keys save; without it, saving fails"
     sub.add_argument("--folder", type=Path, metavar="FOLDER", help=text)
-    text = "limit of events plus timer ticks (200000)"
+    text = "limit on events plus timer ticks (200000)"
     sub.add_argument("--events", type=_count, default=200_000, metavar="N", help=text)
     text = "time limit in seconds (300)"
     sub.add_argument("--seconds", type=_count, default=300, metavar="S", help=text)
@@ -216,7 +217,7 @@ def _parser() -> argparse.ArgumentParser:
     sub = command("check", commands.check, "report the faults of a mesh, and repair them")
     _input_output(sub, required=False)
     sub.add_argument("--repair", action="store_true", help="write the repaired mesh to -o OUT")
-    text = "fill holes of up to so many edges (100)"
+    text = "fill holes of up to this many edges (100)"
     sub.add_argument("--largest-hole", type=_count, default=100, metavar="EDGES", help=text)
 
     sub = command("regions", commands.regions, "cut a mesh into regions; write them as an array")

@@ -70,7 +70,7 @@ class VolumeConstraint:
         return step_to_volume(volume_along_path(self._extended(path), self.faces), self.target)
 
     def _extended(self, x: FloatArray) -> FloatArray:
-        """Return all points; with added ones about a vertex, so that these keep their digits."""
+        """Return all points, relative to a vertex if points were added, to limit cancellation."""
         if self.extension is None:
             return x
         x = x - x[0]

@@ -5,12 +5,12 @@
 
 Vertices and faces keep their order and number all the way, coordinates their digits: OBJ, OFF
 and PLY are read and written by this package, because VTK's readers round to seven digits (PLY),
-split vertices at texture seams (OBJ) or do not exist (OFF); glTF is read by it because VTK's reader
-believes all that a file says.  STL is the exception: a soup of triangles in single precision, whose
-equal corners are merged on reading.
+split vertices at texture seams (OBJ) or do not exist (OFF); glTF because VTK's reader does not
+validate the file.  STL is the exception: a triangle soup in single precision, whose equal corners
+are merged on reading.
 
-What a format has no place for is left out, names that it cannot hold are changed, and a warning
-says so (`formats.array_names`).
+Arrays that a format cannot store are left out, names that it cannot store are changed, and a
+warning is logged (`formats.array_names`).
 """
 
 from __future__ import annotations
@@ -127,23 +127,23 @@ def read_polydata(path: str | Path) -> pv.PolyData:
 
 
 def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
-    """Write a mesh; the file appears whole or, if anything fails, what was there stays.
+    """Write a mesh atomically: if anything fails, an existing file stays unchanged.
 
-    A file that is replaced keeps its mode; of a link, the file it points to is replaced.
+    The new file keeps the mode of the old one; a symbolic link is followed.
 
     Parameters
     ----------
     path : str or Path
         .obj, .off, .ply, .stl, .vtk, .vtp, .vtkhdf; with PyMeshLab .3ds, .dae, .x3d, .wrl, .ctm.
-        All but .stl and PyMeshLab's keep every digit; .vtk, .vtp and .vtkhdf every array.  A
-        warning is logged for each array that is left out or gets another name.
+        All formats except .stl and PyMeshLab's keep every digit; .vtk, .vtp and .vtkhdf keep every
+        array.  A warning is logged for each array that is left out or renamed.
     mesh : Mesh or pyvista.PolyData
         What to write.
 
     Raises
     ------
     MeshError
-        If the suffix is not known, the folder is not there, what has that name is no file, or the
+        If the suffix is not known, the folder does not exist, *path* is not a regular file, or the
         disk is full.
     """
     path = as_path(path)

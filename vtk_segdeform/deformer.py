@@ -54,12 +54,12 @@ from .targets import waypoints
 from .threads import one_blas_thread
 
 _LEG_TOLERANCE, _LEG_STEPS = 1e-3, 12  # for the targets on the way to a far one
-_POSITION_WEIGHT = 90.0  # of the shape energy's scale, shared out over each handle's vertices
+_POSITION_WEIGHT = 90.0  # times the shape energy's scale, divided among each handle's vertices
 _FAR = 1e3  # mesh sizes
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
 _WIDE = 20_000  # vertices beyond which mapping directions too is what takes long
 _LANDINGS, _NEAR, _SAME = 4, 3e-5, 1e-7  # times it is gone on to that scale; and one of rounding
-_LEFT = 0.97  # of a solve after a step, as progress tells it
+_LEFT = 0.97  # share of the progress bar that each step leaves
 _TRIAL = 1e-4  # mesh sizes
 _MET = 1e-3  # diagonals within which a vertex counts as in its place
 
@@ -223,7 +223,7 @@ class Deformer:
         vars(self).update(state | {name: read_only(state[name]) for name in ("fixed", "handle")})
 
     def _shared(self) -> Deformer:
-        """Return another deformer over the very same parts."""
+        """Return another deformer that shares all parts with this one."""
         other = object.__new__(type(self))
         vars(other).update(vars(self))
         return other
@@ -286,7 +286,7 @@ class Deformer:
             Instead of the deformer's own limit, for the last leg: a drag may stop early and go
             on with the next event.
         progress : Progress, optional
-            Called before every step; may cancel, and the pose is then the one before the call.
+            Called before every step; may cancel, which restores the pose before the call.
 
         Raises
         ------
@@ -332,7 +332,7 @@ class Deformer:
         return self._solution(result, x, steps)
 
     def _try_a_step(self) -> None:
-        """Load the kernels, or at their first use ever compile them, before the first frame."""
+        """Load the kernels, or compile them at their very first use, before the first frame."""
         handle = [0]
         targets = self.mesh.vertices[handle] + _TRIAL * self._size
         self.hold(handle=handle).solve(targets, max_steps=1)
@@ -465,7 +465,7 @@ class Deformer:
 
 
 def _counting(progress: Progress | None) -> Progress | None:
-    """Return a progress for steps of which nobody knows how many there will be."""
+    """Return a progress callback for steps whose number is not known in advance."""
     if progress is None:
         return None
     as_callable(progress, "progress")

@@ -8,7 +8,7 @@ cotangent Laplacian C, (C x)_i = 1/2 sum_j (cot alpha_ij + cot beta_ij) (x_i - x
 side reads (C x)_i / (2 A_i).
 
 Cotangents and areas are those of an intrinsic triangulation (`intrinsic`), which is the mesh
-itself wherever its triangles are good; so C is positive semi-definite, however bad they are.
+itself wherever its triangles are well shaped; so C is positive semi-definite for any triangles.
 
 Source
 ------
@@ -61,9 +61,9 @@ def mixed_voronoi_areas(surface: IntrinsicTriangulation) -> FloatArray:
 def with_least_areas(areas: FloatArray, faces: IntArray) -> FloatArray:
     """Return vertex *areas* (n,), each at least a twentieth of the mean of its neighbours'.
 
-    Eq. (5) divides by the area, so a speck of a few tiny triangles would outweigh all others:
-    100 of them in the hand's 2390 faces raised the trace of the bending term 27 times, and 1.7
-    times with this floor, which seven good meshes together meet at eight vertices.
+    Eq. (5) divides by the area, so a patch of tiny triangles would outweigh all others: 100 of
+    them among the hand's 2390 faces multiplied the trace of the bending term by 27, and by 1.7
+    with this lower bound, which is active at only eight vertices of seven good meshes.
     """
     n = len(areas)
     around = np.bincount(faces.ravel(), areas[faces[:, [1, 2, 0]]].ravel(), n)

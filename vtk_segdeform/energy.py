@@ -45,8 +45,8 @@ from .rotations import closest_rotations
 from .sampling import Sample
 from .subspace import Subspace
 
-# A density above 30 times what nine tenths of the area have is an outlier; on good meshes the
-# highest is 2 to 80 times that, and less than a thousandth of the area has more than 30.
+# A density above 30 times its 90th percentile by area is an outlier.  On good meshes the maximum is
+# 2 to 80 times that percentile, and less than a thousandth of the area exceeds 30 times.
 _USUAL, _OUTLIER = 0.9, 30.0
 
 
@@ -62,7 +62,7 @@ class Energy:
 
     quadratic: FloatArray  # Q, (m, m)
     constant: float
-    scale: float  # trace of `quadratic`, whatever few bad vertices add to it
+    scale: float  # trace of `quadratic`, without outliers
     mass: FloatArray  # W~^T diag(A) W~, (m, m), A summing to 1: mean square over the surface
     fit: sparse.csr_array | FloatArray  # (3n, n) acting on x, or (3G, m) acting on p
     pull: sparse.csr_array | FloatArray
@@ -221,10 +221,10 @@ def shape_energy(
 
 
 def _without_outliers(traces: FloatArray, areas: FloatArray) -> float:
-    """Return the sum of *traces* (n,), cut where their density over *areas* (n,) is an outlier.
+    """Return the sum of *traces* (n,), clipped where their density over *areas* (n,) is an outlier.
 
-    It scales the weights of the method.  The plain sum would not do: a needle's density can be
-    a million times the highest of a good mesh, and the 26 worst of the koala's 99,994 triangles
+    The sum scales the weights of the method.  Unclipped, it is not robust: a needle's density can
+    be a million times the maximum of a good mesh, and the 26 worst of the koala's 99,994 triangles
     made the sum fifty times as large.
     """
     asked = areas > 0.0

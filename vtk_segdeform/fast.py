@@ -2,9 +2,9 @@
 
     kernels = compiled()        the module `compiled`, or None
 
-numba comes with the package wherever it has wheels.  It is imported, which takes half a second,
-when the first array comes along that is large enough to win that back.  Without it everything
-works, more slowly, and `advice` says so; ``SEGDEFORM_NUMBA=0`` does without.
+numba is installed with the package wherever it has wheels.  Importing it takes half a second, so it
+is imported with the first array that is large enough to make up for that.  Without it everything
+works, more slowly, and `advice` says so; ``SEGDEFORM_NUMBA=0`` disables it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_LIBRARIES = "numba", "threadpoolctl"  # that speed needs and nothing else does
+_LIBRARIES = "numba", "threadpoolctl"  # required for speed only
 WORTHWHILE = 2000  # faces, points: fewer are as quick in numpy
 
 
@@ -28,7 +28,7 @@ def compiled(size: int = WORTHWHILE) -> Any:
 
 
 def advice() -> str:
-    """Return what to install for frames to be fast, in a sentence; "" if all is there."""
+    """Return a sentence on what to install for fast frames; "" if nothing is missing."""
     missing = [name for name in _LIBRARIES if importlib.util.find_spec(name) is None]
     if not missing:
         return ""

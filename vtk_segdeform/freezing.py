@@ -1,7 +1,7 @@
-"""Objects that are never changed: how they are copied and pickled, and their arrays read-only.
+"""Immutable objects: copies, pickles and read-only arrays.
 
-What such an object keeps besides its fields, its caches, is in no pickle and in no copy: it is
-found again when it is asked for.
+Only the fields of such an object are copied and pickled.  Cached values are computed again on
+demand.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _T = TypeVar("_T")
 class Frozen:
     """A frozen dataclass that is copied and pickled by its fields alone.
 
-    Arrays among its fields, also in tuples and mappings, are read-only afterwards.
+    Arrays among its fields, also in tuples and mappings, become read-only.
     """
 
     def __getstate__(self) -> dict[str, Any]:
@@ -33,7 +33,7 @@ class Frozen:
 def read_only(value: _T) -> _T:
     """Return *value* with every array of it read-only, in tuples and mappings as well.
 
-    The arrays are views: who has another reference to one of them may still write to it.
+    The arrays are views: the original arrays remain writeable through other references.
     """
     same: _T = _read_only(value)
     return same
@@ -54,5 +54,5 @@ def _read_only(value: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Return *value* with a dict for each read-only mapping, which nobody can copy or pickle."""
+    """Return *value* with a dict for each read-only mapping, which cannot be pickled."""
     return dict(value) if isinstance(value, Mapping) else value

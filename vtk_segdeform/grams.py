@@ -29,7 +29,7 @@ def grams(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return W~^T C diag(strength) C W~, W~^T B W~ and W~^T diag(mass) W~, (m, m) each.
 
-    And (n,), by how much each vertex adds to the trace of the first.
+    And (n,), the contribution of each vertex to the trace of the first.
 
     For symmetric sparse C and B (n, n), *laplacian* and *stiffness*; B is C where it is not given.
     Cages that reach no common piece of the mesh have a zero block: this is where several beat one.

@@ -1,22 +1,22 @@
-"""The triangulation that the energy is measured on: the mesh's own, without its bad triangles.
+"""Intrinsic triangulation on which the energy is measured: the mesh without its bad triangles.
 
-The cotangents of caps and needles have no bound.  Cutting them off corner by corner leaves numbers
-that belong to no triangle, and an indefinite matrix.  The energy takes them from an *intrinsic
-triangulation* instead: triangles over the vertices of the mesh, told by their edge lengths alone.
-Whatever the lengths, as long as they satisfy the triangle inequality the triangles are those of
-some flat ones, so that their Dirichlet energies, and with them the matrix, are never negative.
-It is the mesh itself but for two changes, neither of which a mesh of good triangles undergoes:
+The cotangents of caps and needles are unbounded.  Clamping them corner by corner gives values that
+belong to no triangle, and an indefinite matrix.  The energy takes them from an *intrinsic
+triangulation* instead: triangles over the vertices of the mesh, defined by edge lengths alone.
+Lengths that satisfy the triangle inequality are those of a planar triangle, whose Dirichlet energy
+is never negative, so the matrix is positive semi-definite.  The triangulation is the mesh itself
+except for two operations, neither of which changes a mesh of well-shaped triangles:
 
     mollify     every edge becomes longer by  eps = max(0, d - min (a + b - c)),  the minimum over
                 all corners, so that no triangle has less slack a + b - c than d        [SC20, 4.5]
-    flip        each edge beside a bad triangle that is not Delaunay, cot + cot < 0 at the two
-                corners opposite, until there is none left                              [FSSB07]
+    flip        each edge of a bad triangle that is not Delaunay, cot + cot < 0 at the two
+                opposite corners, until there is none left                              [FSSB07]
 
 Mollification alone makes the matrix positive semi-definite, but a cap keeps a cotangent of about
-sqrt(mean / 2 d), and the detail of eq. (5) goes with its square.  Measured with the cages held, for
-100 flat caps among the 7828 faces of a dinosaur bent by 60 degrees: distortion is 6.2 % off with
-mollification alone, and 0.3 % with flips as well.  To flip every edge, as [SC20] do, changes good
-meshes, too: on 36 poses of three of them distortion became 4 % larger.
+sqrt(mean / 2 d), whose square enters the detail of eq. (5).  For the same cages and 100 flat caps
+among the 7828 faces of a dinosaur bent by 60 degrees, the distortion is off by 6.2 % with
+mollification alone, and by 0.3 % with flips as well.  Flipping all edges, as [SC20] do, changes
+good meshes, too: on 36 poses of three of them the distortion increased by 4 %.
 
 Source
 ------
@@ -41,8 +41,8 @@ from .threads import in_parallel
 
 _SLACK = 1e-6  # d, as a share of the mean edge length
 _BAD = 100.0  # cotangent of the smallest angle of a bad triangle: 0.6 degrees
-_DELAUNAY = -1e-9  # cot + cot from which an edge counts as Delaunay, whatever the rounding
-_ROUNDS = 1000  # of flips; ten are many
+_DELAUNAY = -1e-9  # cot + cot above which an edge counts as Delaunay, for rounding
+_ROUNDS = 1000  # of flips; more than ten are rare
 _PIECE = 50_000  # faces to a thread
 
 
@@ -66,7 +66,7 @@ class IntrinsicTriangulation:
 
     @classmethod
     def of(cls, vertices: FloatArray, faces: IntArray) -> IntrinsicTriangulation:
-        """Return the triangulation of a mesh; open edges are left as they are."""
+        """Return the triangulation of a mesh; open edges are not flipped."""
         lengths = _mollified(_edge_lengths(vertices, faces))
         if (np.abs(cotangents(lengths)).max(axis=1, initial=0.0) > _BAD).any():
             faces, lengths = _flipped(faces, lengths, len(vertices))
@@ -126,7 +126,7 @@ def _mollified(lengths: FloatArray) -> FloatArray:
 def _flipped(faces: IntArray, lengths: FloatArray, n_vertices: int) -> tuple[IntArray, FloatArray]:
     """Return faces and lengths after flips, in rounds of edges no two of which share a face.
 
-    Each flip lowers the Dirichlet energy of every function [FSSB07], so that they come to an end.
+    A flip never raises the Dirichlet energy of any function [FSSB07], so the rounds terminate.
     """
     twin = _twins(faces, n_vertices)
     corners, opposite = faces.copy().ravel(), lengths.copy().ravel()
@@ -155,7 +155,7 @@ def _twins(faces: IntArray, n_vertices: int) -> IntArray:
 
 
 def _not_delaunay(bad: IntArray, twin: IntArray, cot: FloatArray) -> IntArray:
-    """Return the edges of the faces *bad* that are to be flipped, each by one of its corners."""
+    """Return the edges of the faces *bad* to be flipped, each by one of its corners."""
     h = (3 * bad[:, None] + np.arange(3)).ravel()
     h = np.unique(np.minimum(h, twin[h]))
     inner = h // 3 != twin[h] // 3
@@ -163,7 +163,7 @@ def _not_delaunay(bad: IntArray, twin: IntArray, cot: FloatArray) -> IntArray:
 
 
 def _independent(h: IntArray, twin: IntArray, cot: FloatArray) -> IntArray:
-    """Return those of the edges *h* that are worse than every other at either face."""
+    """Return the edges among *h* that are the worst of both their faces."""
     worst_first = np.argsort(cot[h] + cot[twin[h]], kind="stable")
     h = h[worst_first]
     rank, sides = np.arange(len(h)), np.stack([h // 3, twin[h] // 3])
@@ -173,16 +173,16 @@ def _independent(h: IntArray, twin: IntArray, cot: FloatArray) -> IntArray:
 
 
 def _flip(h: IntArray, twin: IntArray, corners: IntArray, opposite: FloatArray) -> None:
-    """Turn the edges i j of faces (k, i, j) and (l, j, i) into k l: (k, i, l) and (l, j, k)."""
+    """Flip the edges i j of faces (k, i, j) and (l, j, i) to k l: (k, i, l) and (l, j, k)."""
     t = twin[h]
     h1, h2, t1, t2 = following(h), following(following(h)), following(t), following(following(t))
     k, new = corners[h], corners[t]  # l, which reads as a one
     ij, jk, ki, il, lj = (opposite[each] for each in (h, h1, h2, t1, t2))
-    above = 2.0 * areas(np.stack([ij, jk, ki], axis=1)) / ij  # both unfolded, i j on the axis
+    above = 2.0 * areas(np.stack([ij, jk, ki], axis=1)) / ij  # both faces unfolded, i j on the axis
     below = 2.0 * areas(np.stack([ij, il, lj], axis=1)) / ij
     along = ((ki - jk) * (ki + jk) - (il - lj) * (il + lj)) / (2.0 * ij)
     kl = np.hypot(along, above + below)
-    # Slots keep their corner but for two: j gives way to l, and i to k.
+    # All slots keep their corner except two: l replaces j, and k replaces i.
     moved = np.arange(len(twin))
     moved[t1], moved[h1] = h, t  # where the edges i l and j k are now
     outside = [moved[twin[each]] for each in (t1, h2, h1, t2)]

@@ -1,7 +1,7 @@
-"""A file that one process holds, and that everybody sees held, until it ends, however it ends.
+"""Lock files: held by one process, visible to all others, released when that process ends.
 
-The operating system keeps the lock, so that none outlives a crash or a ``kill -9``, and a new
-process with an old number is not taken for the old one.
+The operating system manages the lock, so that it does not outlive a crash or a ``kill -9``, and a
+new process with a reused id is not mistaken for the old one.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ else:
 
 
 def hold(path: Path) -> int | None:
-    """Hold a file, which is made if need be.
+    """Lock a file, which is created if it does not exist.
 
     Returns
     -------
     handle : int or None
-        Open, and held until it is closed; None if somebody holds it already, also in this
-        process, if it was taken away meanwhile, or where files cannot be locked.
+        An open file, locked until it is closed; None if it is locked already, even by this
+        process, if it was deleted meanwhile, or where files cannot be locked.
 
     Raises
     ------

@@ -6,11 +6,11 @@
 PyMeshLab is not needed.  MeshLab keeps a selection in a PLY file as bit 32 of the property
 ``flags``; here it is the array "selection", as `formats.meshlab_layers` has it.
 
-A project may come from anywhere, so only files in its own folder and below are read, a thousand
-layers and four gigabytes at most, and entities are not expanded.  Writing puts new files next to
-the old ones and .mlp last: whatever happens, it names layers that belong together.  Nothing but
-*path* and the folder of its layers is touched, and in that folder only files with names that are
-made here.
+A project may come from an untrusted source, so only files in its own folder and below are read, at
+most a thousand layers of four gigabytes together, and entities are not expanded.  New layers are
+written next to the old ones and the .mlp last, so that it always refers to layers that belong
+together.  Only *path* and the folder of its layers are touched, and in that folder only files with
+generated names.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ def read_project(path: str | Path) -> dict[str, pv.PolyData]:
     Raises
     ------
     MeshError
-        If it is no such file; or names a layer outside its folder, or one that cannot be read, or
-        more than 1000 layers or 4 GB of them.
+        If it is not a MeshLab project, refers to a layer outside its folder or one that cannot be
+        read, or to more than 1000 layers or 4 GiB of them.
     MissingDependencyError
         If only PyMeshLab reads a layer's format, and it is not installed.
     """
@@ -112,7 +112,7 @@ def write_project(path: str | Path, what: Surface | Session | Mapping[str, Surfa
     except OSError as fault:
         raise MeshError(f"{path}: {fault.strerror or fault}") from fault
     if os.path.islink(folder) or (os.path.exists(folder) and not os.path.isdir(folder)):
-        raise MeshError(f"{path}: {folder.name} is something else already")
+        raise MeshError(f"{path}: {folder.name} exists and is not a folder")
     layers = as_layers(what)
     project = ElementTree.Element("MeshLabProject")
     group = ElementTree.SubElement(project, "MeshGroup")
@@ -143,7 +143,7 @@ def write_project(path: str | Path, what: Surface | Session | Mapping[str, Surfa
 
 
 def _digest(surface: pv.PolyData) -> str:
-    """Return twelve digits that are the same for the same surface only."""
+    """Return a digest of a surface, of twelve digits."""
     texture = surface.GetPointData().GetTCoords()
     seen = hashlib.sha256(repr(texture and texture.GetName()).encode())
     arrays = {"points": surface.points, "corners": surface.faces, "strips": surface.strips}
@@ -176,10 +176,10 @@ class _Builder(ElementTree.TreeBuilder):
     _depth = 0
 
     def start(self, tag: str, attributes: dict[str, str]) -> ElementTree.Element:
-        """Begin an element; ValueError if it is within too many others."""
+        """Start an element; ValueError if it is nested too deeply."""
         self._depth += 1
         if self._depth > _DEEPEST:
-            raise ValueError(f"more than {_DEEPEST} elements within each other")
+            raise ValueError(f"elements are nested more than {_DEEPEST} deep")
         return super().start(tag, attributes)
 
     def end(self, tag: str) -> ElementTree.Element:

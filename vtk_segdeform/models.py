@@ -21,7 +21,7 @@ from .mesh import Mesh
 from .modelling.implicit import Limb, standing_body
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # the golden angle, radians
-_MOST, _FINEST = 10_000_000, 1000  # a hull or a grid of more takes minutes and gigabytes
+_MOST, _FINEST = 10_000_000, 1000  # a larger hull or grid takes minutes and gigabytes
 
 
 def cactus(n_vertices: int = 5430) -> Mesh:

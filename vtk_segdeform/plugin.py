@@ -5,7 +5,7 @@
     mesh.segdeform.deform(fixed, handle, targets)    a deformed copy, arrays and all
     mesh.segdeform.regions(3)                        a copy with arrays of its regions
     mesh.segdeform.check()                           what keeps it from being deformed
-    mesh.segdeform.repair()                          a repaired copy, arrays and all
+    mesh.segdeform.repair()                          a repaired copy, with its arrays
 
 pyvista finds this module by its entry points, when ``segdeform`` is first asked for.  pyvistaqt
 hides those of plotters: there, and where the package is not installed, ``import vtk_segdeform``
@@ -230,10 +230,10 @@ class PolyDataTools:
         return find_faults(points, triangles_of(self._surface))
 
     def repair(self, *, weld_distance: float = 0.0, largest_hole: int = 100) -> pv.PolyData:
-        """Return a repaired copy; polygons and arrays are kept where the faces are.
+        """Return a repaired copy; polygons and arrays are kept wherever faces are kept.
 
-        What was done, what was lost and what is still open is logged, one line each.  The
-        parameters are those of `vtk_segdeform.repair`.
+        Each repair, loss and remaining hole is logged on a line of its own.  The parameters are
+        those of `vtk_segdeform.repair`.
         """
         closed, done = repair_surface(
             self._surface, weld_distance=weld_distance, largest_hole=largest_hole

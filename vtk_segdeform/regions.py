@@ -193,13 +193,13 @@ def require_regions(regions: object, mesh: Mesh) -> None:
     """Raise a RegionError unless *regions* are `Regions` over as many vertices as *mesh* has."""
     if not isinstance(regions, Regions):
         raise RegionError(
-            f"regions must be Regions; got {shown(regions)}. Make them by segment(mesh) or "
+            f"regions must be Regions; got {shown(regions)}. Create them with segment(mesh) or "
             "Regions.from_masks(mesh, masks)"
         )
     if regions.mesh.n_vertices != mesh.n_vertices:
         raise RegionError(
             f"these regions belong to a mesh of {regions.mesh.n_vertices} vertices, "
-            f"this one has {mesh.n_vertices}; make them anew"
+            f"this one has {mesh.n_vertices}; create new ones"
         )
 
 

@@ -35,18 +35,18 @@ class Repair(Frozen):
     steps : tuple of str
         What was done, one sentence each; empty if nothing was wrong.
     vertex_map, face_map : (n,) int, (m,) int
-        The original number of each vertex and face, -1 for one that fills a hole or a
-        part of one cut to close a crack.
+        The original index of each vertex and face; -1 if it fills a hole or is part of a face
+        that was split to close a crack.
     report : MeshReport
         What `find_faults` says of the result.
     vertex_weights : (n, o) sparse
-        The shares of the o original vertices in each vertex; rows sum to 1.  A vertex that is kept
-        has one, a new one mixes those of the border around it:
-        ``vertex_weights @ array`` is an array of the original vertices on the repaired mesh.
+        Weights of the o original vertices at each vertex; rows sum to 1.  A kept vertex has one
+        weight, a new one interpolates the border around it: ``vertex_weights @ array`` transfers an
+        array of the original vertices to the repaired mesh.
     face_turned : (m,) bool
-        Which faces name the corners of the original in the opposite order.
+        Which faces were flipped, so that their corners are in the opposite order.
     open_holes : tuple of int
-        The numbers of edges of the holes that are larger than *largest_hole*.
+        Number of edges of each hole that is larger than *largest_hole*.
     """
 
     vertices: FloatArray
@@ -61,12 +61,14 @@ class Repair(Frozen):
 
     @property
     def advice(self) -> str:
-        """What would close the holes that are still open, one sentence; "" if there are none."""
+        """A sentence on how to close the remaining holes; "" if there are none."""
         if not self.open_holes:
             return ""
         few, many = min(self.open_holes), max(self.open_holes)
         holes = (
-            "1 hole stays" if len(self.open_holes) == 1 else f"{len(self.open_holes)} holes stay"
+            "1 hole remains"
+            if len(self.open_holes) == 1
+            else f"{len(self.open_holes)} holes remain"
         )
         edges = str(few) if few == many else f"{few} to {many}"
         return (
@@ -94,7 +96,7 @@ def repair(
         How far apart two vertices may lie and still count as one, in the unit of *vertices*.
         Only vertices whose welding closes open edges are welded at all.
     largest_hole : int
-        Holes with more edges than this stay open; ``open_holes`` has their sizes.
+        Holes with more edges than this are not filled; ``open_holes`` has their sizes.
 
     Raises
     ------
@@ -158,5 +160,5 @@ def repair(
         draft.vertices, draft.faces, tuple(done), draft.vertex_map, draft.face_map, report,
         draft.mix, draft.turned, left,
     )  # fmt: skip
-    found.__setstate__(found.__getstate__())  # its arrays are read-only
+    found.__setstate__(found.__getstate__())  # makes its arrays read-only
     return found

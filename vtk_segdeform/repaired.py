@@ -1,16 +1,16 @@
-"""Repair of a surface with polygons and arrays, all that is not at fault kept.
+"""Repair of a surface with polygons and arrays, which are kept wherever there is no fault.
 
 `repair` works on triangles; its maps lead back from each new triangle to an old one, from there to
 the polygon it was cut from, and from each corner to a corner of that:
 
-    polygon     whole again if all its triangles are left and agree; else its triangles remain
-    point data  as it was; mixed from the border at new vertices, floats and colours by distance,
-                others from the nearest
-    cell data   as it was; 0 or "" on new faces
+    polygon     restored if all its triangles are kept and agree; otherwise left as triangles
+    point data  kept; at new vertices interpolated from the border: floats and colours by distance,
+                others from the nearest vertex
+    cell data   kept; 0 or "" on new faces
     corners     "TextureCorners", two columns to a corner, follow the corners; NaN on new faces
-    normals     turned where faces are turned; those of new faces computed
+    normals     flipped where faces are flipped; computed for new faces
 
-What cannot be kept is said, one sentence each, after the steps of the repair.
+Each loss is reported in a sentence after the steps of the repair.
 """
 
 from __future__ import annotations
@@ -41,17 +41,17 @@ def repair_surface(
     Parameters
     ----------
     surface : pyvista.PolyData
-        In any state; left as it is.
+        With any faults; not modified.
     weld_distance, largest_hole
         As of `repair`.
 
     Returns
     -------
     repaired : pyvista.PolyData
-        Its own points and polygons in their order, then what is new.  Whole only if
-        ``done.report.ok``.
+        The original points and polygons in their order, then the new ones.  Closed and free of
+        faults only if ``done.report.ok``.
     done : Repair
-        Of the triangles that the polygons were cut into; the steps end with what was lost.
+        The repair of the triangulated surface; its last steps list the losses.
 
     Raises
     ------
@@ -121,16 +121,16 @@ class _Trace:
     counts : (c,) int
         Corners of each new polygon.
     corners, places : (s,) int
-        The new vertex at each corner, polygon by polygon; and which corner of its old polygon that
-        was, -1 for new ones.
+        The new vertex at each corner, polygon by polygon, and the index of the corner in its old
+        polygon, -1 for new ones.
     polygon : (c,) int
         The old polygon of each, -1 for new ones.
     turned : (c,) bool
-        Whether it faces the other way now.
+        Whether its orientation was flipped.
     n_cut : int
-        How many old polygons of four and more corners are triangles now.
+        Number of old polygons of four or more corners that are triangles now.
     old, new : (q,) int
-        Which old vertex became which new one, as often as faces say so.
+        Old and new vertex of each kept corner, with repetitions.
     """
 
     counts: IntArray
@@ -144,7 +144,7 @@ class _Trace:
 
 
 def _traced(given: _Polygons, done: Repair) -> _Trace:
-    """Follow faces and corners back to the polygons that they were of."""
+    """Trace faces and corners back to their original polygons."""
     lids = done.faces[done.face_map < 0]
     kept = np.flatnonzero(done.face_map >= 0)
     was, turned, new = done.face_map[kept], done.face_turned[kept], done.faces[kept]
@@ -202,7 +202,7 @@ def _cells(surface: pv.PolyData) -> IntArray:
 
 
 def _lost(surface: pv.PolyData, trace: _Trace) -> Iterator[str]:
-    """Say which cells are something else now, or nothing."""
+    """Yield sentences on cells that were converted or dropped."""
     if trace.n_cut:
         polygons = _counted(trace.n_cut, "polygon", "polygons")
         yield f"cut {polygons} into triangles where the repair changed a part"
@@ -215,7 +215,7 @@ def _lost(surface: pv.PolyData, trace: _Trace) -> Iterator[str]:
 
 
 def _carry_points(surface: pv.PolyData, whole: pv.PolyData, done: Repair) -> Iterator[str]:
-    """Give *whole* the point arrays; mixed ones at new vertices."""
+    """Add the point arrays to *whole*, interpolated at new vertices."""
     new = np.flatnonzero(done.vertex_map < 0)
     mix = done.vertex_weights[new]
     nearest = np.zeros(len(new), dtype=np.int64)
@@ -244,7 +244,7 @@ def _carry_points(surface: pv.PolyData, whole: pv.PolyData, done: Repair) -> Ite
 
 
 def _turned_vertices(done: Repair) -> BoolArray:
-    """Tell which vertices (n,) have only faces that were turned, apart from new ones."""
+    """Return which vertices (n,) have only flipped faces, apart from new ones."""
     kept = done.face_map >= 0
     count = np.bincount(done.faces[kept].ravel(), minlength=len(done.vertices))
     turned = np.bincount(done.faces[kept & done.face_turned].ravel(), minlength=len(done.vertices))
@@ -254,7 +254,7 @@ def _turned_vertices(done: Repair) -> BoolArray:
 def _carry_cells(
     surface: pv.PolyData, whole: pv.PolyData, trace: _Trace, cells: IntArray
 ) -> Iterator[str]:
-    """Give *whole* the cell arrays; zeros on new faces."""
+    """Add the cell arrays to *whole*, zero on new faces."""
     new = cells < 0
     for name, values in surface.cell_data.items():
         array = np.asarray(values)
@@ -278,7 +278,7 @@ def _carry_cells(
 
 
 def _corner_array(array: Any, trace: _Trace, cells: IntArray) -> Any:
-    """Return per-corner values, two columns to a corner, where the corners are now."""
+    """Return per-corner values, two columns to a corner, in the order of the new corners."""
     wide = array.reshape(len(array), -1, 2)
     carried = np.full((len(cells), *wide.shape[1:]), np.nan, dtype=array.dtype)
     owner = np.repeat(np.arange(len(cells)), trace.counts)
@@ -303,7 +303,7 @@ def _normal_arrays(attributes: Any) -> set[str]:
 
 
 def _mixed_up(surface: pv.PolyData, trace: _Trace, done: Repair) -> Iterator[str]:
-    """Say where vertices that became one had different values, of which one is left."""
+    """Yield sentences on welded vertices with different values, of which one is kept."""
     for name, values in surface.point_data.items():
         array = np.asarray(values)
         array = array.reshape(len(array), -1)
@@ -314,7 +314,7 @@ def _mixed_up(surface: pv.PolyData, trace: _Trace, done: Repair) -> Iterator[str
         places = len(np.unique(trace.new[~same.all(axis=1)]))
         if places:
             vertices = _counted(places, "welded vertex", "welded vertices")
-            yield f"keep one value of {name} of several at {vertices}"
+            yield f"keep one of several values of {name} at {vertices}"
 
 
 def _counted(number: int, one: str, many: str) -> str:

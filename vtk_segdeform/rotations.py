@@ -27,7 +27,7 @@ from .threads import n_threads
 
 _TIMES = 40  # as long as a face of a volume takes each
 _MANY, _EACH = 8000, 10  # positions: so many tell where clusters are, or so many for each
-_WORTH = 2000  # positions: fewer are looked up by one thread
+_WORTH = 2000  # positions; fewer are looked up in one thread
 _EQUAL = 4  # nearest centres among which the favoured one is found
 _TIE_BREAK = 1e-6  # relative: of equal distances one is preferred, the same in every frame
 
@@ -149,7 +149,7 @@ def _numbered(labels: IntArray) -> IntArray:
 
 def _nearest(positions: FloatArray, centres: FloatArray, favour: FloatArray) -> IntArray:
     few = min(_EQUAL, len(centres))
-    workers = n_threads() if len(positions) > _WORTH else 1  # which are started for every call
+    workers = n_threads() if len(positions) > _WORTH else 1  # threads are started at every call
     distance, which = cKDTree(centres).query(positions, k=[*range(1, few + 1)], workers=workers)
     best = (distance**2 * favour[which]).argmin(axis=1)
     return np.asarray(np.take_along_axis(which, best[:, None], axis=1)[:, 0], dtype=np.int64)

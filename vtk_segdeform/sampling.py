@@ -62,7 +62,7 @@ class Sample:
 
     @classmethod
     def of(cls, surface: IntrinsicTriangulation, groups: IntArray) -> Sample | None:
-        """Return those asked of *surface*, or None where it is small enough to ask all.
+        """Return a sample of *surface*, or None if it is small enough to use every vertex.
 
         *groups* (n,) are the rotation groups of its vertices, numbered from 0.
         """

@@ -70,8 +70,8 @@ class Session(Timeline):
 
     Notes
     -----
-    A copy, by `copy` or `pickle`, has the mesh, the state, a drag in hand and the history.  It has
-    no listeners, and its next solve begins as after `start_afresh`.
+    A copy, by `copy` or `pickle`, has the mesh, the state, an ongoing drag and the history.  It has
+    no listeners, and its next solve starts as after `start_afresh`.
 
     Raises
     ------
@@ -110,8 +110,8 @@ class Session(Timeline):
         self._fitted: tuple[Regions | None, Sequence[Cage] | None] = None, None  # and fit, for sure
         self._put: tuple[Pose | None, list[FloatArray]] = None, []  # where `move_cage` put cages
 
-    # Copies, by `copy` or `pickle`: the mesh, the state, a drag in hand, and the history.  They
-    # bind anew when they have to, solve as after `start_afresh`, and have no listeners.
+    # Copies, by `copy` or `pickle`, contain the mesh, the state, an ongoing drag and the history.
+    # They bind again when needed, solve as after `start_afresh`, and have no listeners.
 
     def __getstate__(self) -> dict[str, Any]:
         return {

@@ -54,7 +54,7 @@ class Solution:
         for name in ("vertices", "cage_vertices"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
-    # In a copy or a pickle, what is measured on demand is a number: the deformer stays behind.
+    # Copies and pickles store the values measured on demand instead of the deformer.
 
     def __getstate__(self) -> dict[str, Any]:
         measured = {
@@ -86,10 +86,10 @@ class Solution:
     def volume_change(self) -> float:
         """(V - V0) / V0 of `vertices`, signed; measured on demand.
 
-        The solver leaves about 1e-15.  Far from the origin the vertices cannot hold that: rounding
-        them changes V by at most eps |x| A, eps = 2.2e-16, |x| the largest coordinate, A the
-        surface's area, and by a hundredth of that as a rule: 1e-12 of a compact shape's at 1e4 to
-        1e5 diagonals, 1e-11 of a wire's.
+        The solver reaches about 1e-15.  Far from the origin float64 coordinates are too coarse for
+        that: rounding changes V by at most eps |x| A, where eps = 2.2e-16, |x| is the largest
+        coordinate and A the surface area, and typically by a hundredth of that.  At 1e4 to 1e5
+        diagonals this is 1e-12 of the volume of a compact shape and 1e-11 of that of a wire.
         """
         return self.volume()
 

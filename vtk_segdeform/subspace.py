@@ -32,7 +32,7 @@ from .regions import Regions
 _LARGEST = 1e3  # mesh diagonals a cage may measure
 _BOUND = 1 << 15  # vertices at a time
 _AT_ONCE = 1 << 20  # numbers in all blocks that one thread multiplies in one call
-_BITS = 32  # regions at a time that vertices are told apart by
+_BITS = 32  # regions processed at a time, one bit each
 _SINGLE = 8_000_000  # numbers in a block times regions beyond which W~ is kept in single precision
 
 
@@ -251,7 +251,7 @@ def _check_cages(regions: Regions, cages: Sequence[Cage]) -> None:
     total = sum(cage.n_vertices for cage in cages)
     if total > MOST_CAGE_VERTICES:
         raise CageError(
-            f"the cages have {total} vertices; at most {MOST_CAGE_VERTICES} can be solved with: "
+            f"the cages have {total} vertices; the limit of the solver is {MOST_CAGE_VERTICES}: "
             "use coarser cages, or fewer regions"
         )
     mesh = regions.mesh

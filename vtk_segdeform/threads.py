@@ -67,16 +67,16 @@ def in_parallel(
 
 @contextlib.contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Keep BLAS in the caller's thread, in a ``with`` block or, as a decorator, in a function.
+    """Limit BLAS to one thread, in a ``with`` block or, as a decorator, in a function.
 
     Threads of its own fight with ours where we have several.  And a solver's step is many products
     too small to share out: waking another thread for each takes longer than the product, and
     while it waits for more it holds the core that we are to use.
 
-    Most builds of BLAS have one number of threads for the whole process, and sum in another order
-    with another number.  So the number is limited by the first thread that comes in and restored by
-    the last that leaves, and what runs in several threads at a time gives what it gives alone, to
-    the last bit.  Without threadpoolctl nothing is limited.
+    Most builds of BLAS have one number of threads for the whole process, and the order of summation
+    depends on it.  So the first Python thread to enter sets the limit and the last to leave
+    restores it, and calls in several threads give the same results as one after another, bit for
+    bit.  Without threadpoolctl nothing is limited.
     """
     limit = _blas_limit()
     if limit is None:
@@ -91,27 +91,27 @@ def one_blas_thread() -> Iterator[None]:
 
 
 class _BlasLimit:
-    """One thread for BLAS in the whole process, while any thread wants it so."""
+    """Limits BLAS to one thread in the whole process while any Python thread requires it."""
 
     def __init__(self, controller: Any) -> None:
         self._controller = controller
-        # Builds on OpenMP have a limit for each thread.  Mostly there are none; but entering and
-        # leaving tells threadpoolctl as well when this thread is done with setting limits: until
-        # then it lets no other thread set any.
+        # OpenMP builds have one limit per thread.  Most processes have none of them, but entering
+        # and leaving also tells threadpoolctl that this thread has finished setting limits; until
+        # then no other thread can set any.
         self.of_each_thread = controller.select(threading_layer="openmp")
         self._lock = threading.Lock()
         self._within = 0
         self._before: Any = None
 
     def enter(self) -> None:
-        """Limit BLAS, unless somebody has."""
+        """Limit BLAS, unless it is limited already."""
         with self._lock:
             if self._within == 0:
                 self._before = self._controller.limit(limits=1, user_api="blas")
             self._within += 1
 
     def leave(self) -> None:
-        """Restore the numbers of threads from before, unless somebody is still within."""
+        """Restore the previous numbers of threads, unless another thread is still inside."""
         with self._lock:
             self._within -= 1
             if self._within == 0:

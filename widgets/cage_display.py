@@ -81,7 +81,7 @@ class CageDisplay(Widget):
             self._rebuild()
 
     def hide(self) -> None:
-        """Hide all cages; a drag that is going on is finished."""
+        """Hide all cages; an ongoing drag is finished."""
         self.finish()
         self._is_shown, self._grip = False, None
         self._rebuild()
@@ -140,7 +140,7 @@ class CageDisplay(Widget):
         enclosed = mesh.vertices[:0]
         if region is not None:
             if regions is None or not is_whole(region, 0, regions.n_regions - 1):
-                raise CageError(f"there is no region {shown(region)} for a cage to enclose")
+                raise CageError(f"there is no region {shown(region)} to enclose with a cage")
             enclosed = mesh.vertices[regions.members(region)]
         if message is not None:
             as_text(message, "message")
@@ -172,7 +172,7 @@ class CageDisplay(Widget):
     # Dragging.
 
     def Off(self) -> None:  # noqa: N802 - VTK's word
-        """Stop listening; a drag that is going on is finished, and nothing is marked."""
+        """Stop listening; an ongoing drag is finished, and nothing is highlighted."""
         super().Off()
         self._point_at(None)
 

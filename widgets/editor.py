@@ -8,7 +8,7 @@ The line at the bottom says what to do next; H shows the keys, which `bindings` 
 thread: the camera works meanwhile, nothing else does, and Escape stops it.
 
 An action in the middle of a drag or a stroke finishes that first, as if the button had been
-released: it is one undo step.  Escape alone takes it back; the card of keys leaves it in hand.
+released, as one undo step.  Only Escape cancels it; the key card does not interrupt it.
 
 The camera style and pyvista's own keys are not touched.  The editor hears of keys after its
 widgets, so that x, y, z constrain a drag, but before VTK and pyvista, and keeps from them what
@@ -117,8 +117,8 @@ class DeformEditor:
         action : callable
             ``action(desk)``.
         while_busy : bool
-            Whether it can be done beside a job, and beside a drag or a stroke that is going on.
-            Otherwise a job is said to be running instead, and a drag is finished first.
+            Whether the action may run during a job, a drag or a stroke.  Otherwise it is refused
+            during a job, with a message, and a drag or stroke is finished first.
         """
         as_callable(action, "action")
         as_flag(while_busy, "while_busy")
@@ -156,7 +156,7 @@ class DeformEditor:
             self._desk.is_on = True
 
     def Off(self) -> None:  # noqa: N802
-        """Stop listening; a job is cancelled, a drag finished, and what is shown stays."""
+        """Stop listening; a job is cancelled, a drag finished, and the display is unchanged."""
         for stop in self._stops:
             stop()
         self._stops = []
@@ -197,7 +197,7 @@ class DeformEditor:
         places = ", ".join(f"{mode.value} ({what})" for mode, what in modes_of(key))
         if self.is_busy:
             self._desk.insist()
-        else:  # no action, so what is dragged stays in hand
+        else:  # no action, so a drag continues
             self._desk.voice.forget()
             self._desk.say(f"{key_cap(key)} is a key of {places}")
 
@@ -210,7 +210,7 @@ class DeformEditor:
             desk.stage.finish()
         desk.voice.forget()
         action(desk)
-        if not while_busy:  # else Escape would begin anew what it has just cancelled
+        if not while_busy:  # otherwise Escape would restart the job it has just cancelled
             desk.bind_if_ready()
         desk.refresh()
 

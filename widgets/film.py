@@ -96,7 +96,7 @@ class Film:
         fps : float
             Pictures in a second.
         progress : Progress, optional
-            Called meanwhile; may cancel, and then nothing is written.
+            Called before every picture; may cancel, in which case nothing is written.
 
         Raises
         ------
@@ -122,7 +122,7 @@ class Film:
 
 
 class _Told:
-    """The pictures of a film, each of them reported when it is asked for."""
+    """The pictures of a film; accessing one reports progress."""
 
     def __init__(self, film: Film, progress: Progress | None) -> None:
         self._film, self._progress, self._count = film, progress, 0
@@ -201,7 +201,7 @@ def _shoot(made: Film, session: Session | None, frames: Iterable[Frame]) -> None
             frame()
         elif frame is not None:
             if session is None:
-                raise ArgumentError("targets are for a session; to film a view, give callables")
+                raise ArgumentError("targets require a session; to film a view, pass callables")
             session.drag(frame)
         made.snap()
 

@@ -64,8 +64,8 @@ class Grab:
 
     A gesture that raises has lost the pointer; the exception goes on to whoever sent the event.
 
-    An event may come while the gesture is still at work on another one, where something that it
-    tells of lets the event loop run; it then waits until the gesture is ready for it.
+    An event may arrive while the gesture is still handling another one, if a listener lets the
+    event loop run; it is queued until the gesture is ready for it.
     """
 
     def __init__(self) -> None:
@@ -80,7 +80,7 @@ class Grab:
         return self._gesture is not None
 
     def begin(self, gesture: Gesture, press: Pointer) -> None:
-        """Run *gesture* up to where it waits for the next pointer; finish one still going on."""
+        """Run *gesture* until it waits for the next pointer; finish an ongoing one first."""
         self.finish()
         self._gesture, self._last = gesture, press
         self._advance(None)
@@ -88,7 +88,7 @@ class Grab:
     def send(self, pointer: Pointer) -> None:
         """Tell the gesture of *pointer*; after a release or a cancel it has ended."""
         if self._waiting and self._waiting[-1].phase is pointer.phase is Phase.MOVE:
-            self._waiting.pop()  # a later one says it all
+            self._waiting.pop()  # superseded by the later position
         self._waiting.append(pointer)
         if self._is_working:
             return
@@ -111,7 +111,7 @@ class Grab:
             gesture.close()
 
     def finish(self) -> None:
-        """End the gesture, if there is one, as if the button had been released."""
+        """Finish the gesture, if there is one, as if the button had been released."""
         self._end(Phase.RELEASE)
 
     def cancel(self) -> None:

@@ -118,14 +118,14 @@ class HandleDragger(Widget):
         return self._live.is_refining
 
     def On(self) -> None:  # noqa: N802 - VTK's word
-        """Listen to the view, and be seen; a pose that had not converged is refined further."""
+        """Listen to the view and show the handles; refine a pose that has not converged."""
         super().On()
         self._marks.show(self.session.is_ready)
         self._place()
         self._live.go_on()
 
     def Off(self) -> None:  # noqa: N802
-        """Stop listening and solving; a gesture that is going on is finished."""
+        """Stop listening and solving; an ongoing gesture is finished."""
         try:
             super().Off()
         finally:

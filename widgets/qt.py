@@ -151,7 +151,7 @@ def deform_dock(view: Any, mesh: Any, parent: Any = None) -> DeformDock:
     parent : QWidget, optional
         As ever in Qt.
     """
-    View.of(view)  # which a plotter's tools do not ask for
+    View.of(view)  # checks it, which a plotter's tools do not
     _checked(parent)
     if hasattr(view, "segdeform"):
         editor = view.segdeform.edit(mesh)

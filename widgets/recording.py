@@ -185,8 +185,8 @@ def replay(
     The whole of it is read and checked before the first event is sent.  It ends early if one of
     the events closes the window.
 
-    A recording may come from a stranger.  So its keys read and write files only in *folder*,
-    whatever `DeformEditor.path` is, and *limits* bound how long it runs.
+    A recording may come from an untrusted source.  Its keys therefore read and write files only in
+    *folder*, whatever `DeformEditor.path` is, and *limits* bound the duration.
 
     Parameters
     ----------

@@ -152,7 +152,7 @@ class RegionSelector(Widget):
             self._stops.append(self.view.observe("LeaveEvent", self._ring.hide))
 
     def Off(self) -> None:  # noqa: N802
-        """Stop listening; a stroke that is going on is finished."""
+        """Stop listening; an ongoing stroke is finished."""
         try:
             super().Off()
         finally:

@@ -68,7 +68,7 @@ class SurfaceDisplay:
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """(n, 3) float: where the vertices are drawn; the very memory, read-only."""
+        """(n, 3) float: the displayed vertices; a read-only view, not a copy."""
         return self._seen_points
 
     def set_colours(self, layer: str, colours: NDArray[np.uint8] | None) -> None:

@@ -6,9 +6,9 @@ pyvista, and be lost.  Here it reaches the listeners of `on_failure`: a status l
 While a camera style drags it keeps all mouse events to itself, so whoever has to follow the
 camera asks for `before_render` instead.
 
-All timers are one: `View.every` shares a single repeating timer among all views of an interactor,
-and nobody else in this package creates or destroys any.  Some hosts, pyvistaqt among them, drive
-every VTK timer from one timer of their own and stop that when any of them is destroyed.
+`View.every` shares a single repeating timer among all views of an interactor, and nothing else in
+this package creates or destroys timers.  Some hosts, pyvistaqt among them, drive all VTK timers by
+one timer of their own, and stop it when any VTK timer is destroyed.
 """
 
 from __future__ import annotations
@@ -168,9 +168,9 @@ class View(Sight):
     def every(self, milliseconds: int, callback: Callable[[], None]) -> Stop:
         """Call *callback* again and again from the event loop, until stopped.
 
-        All subscribers of an interactor share one timer, which has the shortest of their periods:
-        each is called at every tick, at least every so many *milliseconds*.  A callback may stop
-        itself and others; one that fails keeps no other from being called.
+        All subscribers of an interactor share one timer with the shortest of their periods, and
+        each is called at every tick, so at least once in *milliseconds*.  A callback may stop
+        itself and others; if one raises, the others are still called.
 
         Not while a camera style drags: it keeps the timer's events to itself as well; see `pulse`.
         """
@@ -194,7 +194,7 @@ class View(Sight):
         return _once(stop)
 
     def pulse(self, callback: Callable[[], None]) -> Stop:
-        """Call *callback* at every tick there is, also while a camera style drags.
+        """Call *callback* at every tick of any timer, also during a drag of a camera style.
 
         It may draw, but neither observe the interactor nor stop anything there.
         """
@@ -255,15 +255,15 @@ class View(Sight):
 
 
 class _SharedTimer:
-    """The one repeating timer of an interactor, running while somebody requires it.
+    """The shared repeating timer of an interactor, running while any subscriber requires it.
 
-    Where the host stops it together with a timer of somebody else's, a hovering widget's or a
-    camera style's, it is started again.
+    If the host stops it together with a timer of another owner, such as a hovering widget or a
+    camera style, it is restarted.
 
     Parameters
     ----------
     interactor : vtkRenderWindowInteractor
-        Whose timer; use `of` to share it.
+        Owner of the timer; use `of` to share it.
     """
 
     _shared: WeakValueDictionary[int, _SharedTimer] = WeakValueDictionary()
@@ -271,18 +271,18 @@ class _SharedTimer:
     def __init__(self, interactor: Any) -> None:
         self._interactor = interactor
         self._periods: list[int] = []
-        self._period: int | None = None  # of the timer that runs
+        self._period: int | None = None  # of the running timer
         self._id = self._tag = 0
         self._is_changing = False
 
     @classmethod
     def of(cls, interactor: Any) -> _SharedTimer:
-        """Return the timer of *interactor*, the same one as long as anybody has it."""
-        # It keeps its interactor, so no other one can have the same number meanwhile.
+        """Return the timer of *interactor*, the same one as long as it is referenced."""
+        # It keeps its interactor alive, so no other one can have the same id meanwhile.
         return cls._shared.setdefault(id(interactor), cls(interactor))
 
     def require(self, milliseconds: int) -> Stop:
-        """Run at least every so many *milliseconds*, until what is returned is called."""
+        """Tick at least once in *milliseconds*, until the returned function is called."""
         self._periods.append(milliseconds)
         self._update()
 
@@ -293,7 +293,7 @@ class _SharedTimer:
         return release
 
     def _update(self) -> None:
-        """Have a timer of the shortest period that is required, or none."""
+        """Run a timer with the shortest required period, or none."""
         period = min(self._periods, default=None)
         if period == self._period:
             return
@@ -304,14 +304,14 @@ class _SharedTimer:
                 self._interactor.RemoveObserver(self._tag)
             if period is not None:
                 self._id = self._interactor.CreateRepeatingTimer(period)
-                # The lowest priority: after the host has stopped what it stops.
+                # The lowest priority: after the host has stopped its timer.
                 self._tag = self._interactor.AddObserver("DestroyTimerEvent", self._revive, -1.0)
             self._period = period
         finally:
             self._is_changing = False
 
     def _revive(self, *_: object) -> None:
-        """Start the timer again if the one that is destroyed now is another."""
+        """Restart the timer if a different one is being destroyed."""
         interactor = self._interactor
         destroyed = interactor.GetVTKTimerId(interactor.GetTimerEventPlatformId())
         if destroyed != self._id and not self._is_changing:
@@ -340,6 +340,6 @@ def _checked_pair(renderer: Any, interactor: Any) -> tuple[Any, Any]:
             raise ArgumentError(f"view must be (vtkRenderer, {kind.__name__}); got {shown(thing)}")
     if renderer.GetRenderWindow() is None:
         raise ArgumentError(
-            "view: the renderer is in no window; window.AddRenderer(renderer) first"
+            "view: the renderer has no window; call window.AddRenderer(renderer) first"
         )
     return renderer, interactor

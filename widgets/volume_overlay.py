@@ -96,7 +96,7 @@ class VolumeOverlay:
     def wanted_range(self) -> float | None:
         """The share that is to be at the ends of the scale; None, as at first, chooses.
 
-        May be set, to a number above 0; else an ArgumentError.
+        Can be set to a number above 0; anything else raises an ArgumentError.
         """
         return self._wanted_range
 

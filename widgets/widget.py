@@ -2,8 +2,8 @@
 
 A widget says what a press begins (`begins`), and the rest is done here: the press is taken from
 the camera only if it begins something, moves and the release go to the gesture, Escape or the
-right button cancels it.  Whatever else ends it, such as another tool or a job, finishes it as a
-release would: nothing is lost.  Outside its own things the camera works as ever.
+right button cancels it.  Anything else that ends it, such as another tool or a job, finishes it as
+a release would: nothing is lost.  Elsewhere in the view the camera works as usual.
 
 VTK's words are kept: `On`, `Off`, `SetEnabled`, `GetEnabled`, and observers of
 ``StartInteractionEvent``, ``InteractionEvent`` and ``EndInteractionEvent``, called after whatever
@@ -99,7 +99,7 @@ class Widget(abc.ABC):
         ]
 
     def Off(self) -> None:  # noqa: N802
-        """Stop listening; a gesture that is going on is finished."""
+        """Stop listening; an ongoing gesture is finished."""
         try:
             self.finish()
         finally:
@@ -130,7 +130,7 @@ class Widget(abc.ABC):
     def RemoveObserver(self, tag: int) -> None:  # noqa: N802
         """Forget the observer with this *tag*."""
         if not is_whole(tag, 0):
-            raise ArgumentError(f"tag must be what AddObserver returned; got {shown(tag)}")
+            raise ArgumentError(f"tag must be a value returned by AddObserver; got {shown(tag)}")
         self._observers.pop(tag, None)
 
     @property
@@ -139,7 +139,7 @@ class Widget(abc.ABC):
         return self._grab.is_active
 
     def finish(self) -> bool:
-        """End the gesture as if the button had been released; False if there was none."""
+        """Finish the gesture as if the button had been released; False if there was none."""
         return self._end(self._grab.finish)
 
     def cancel(self) -> bool:
@@ -159,8 +159,8 @@ class Widget(abc.ABC):
 
     def _press(self) -> bool:
         press = self.view.pointer(Phase.PRESS)
-        self.finish()  # a release that never came
-        if self.is_grabbing:  # it is still at work, on an event that this one came within
+        self.finish()  # the release never arrived
+        if self.is_grabbing:  # it is still handling an event, within which this one arrived
             return True
         gesture = self.begins(press) if self.view.contains(press) else None
         if gesture is None:

@@ -76,7 +76,7 @@ def simplify(
     progress : Progress, optional
         Called between rounds; may cancel.
     message : str
-        What *progress* is told.
+        Text passed to *progress*.
 
     Returns
     -------

@@ -67,7 +67,7 @@ def parse_rotation(text: str) -> tuple[FloatArray, float]:
 
 def read_matrix(path: str | Path) -> FloatArray:
     """Return the (4, 4) matrix in a text file of 16 numbers, row by row; # begins a comment."""
-    if not os.path.isfile(path):  # a device would be read for ever
+    if not os.path.isfile(path):  # reading a device may never end
         raise ConstraintError(f"matrix {path}: there is no such file; give one of 16 numbers")
     try:
         matrix = np.loadtxt(path, ndmin=2)

@@ -1,7 +1,7 @@
-"""The command that does again what somebody recorded: in a window, or off-screen as a film.
+"""The command that replays a recording: in a window, or off-screen as a film.
 
-The recording may come from a stranger: its keys write in ``--folder`` or not at all, and its length
-is limited.
+The recording may come from an untrusted source: its keys write files in ``--folder`` or not at all,
+and its length is limited.
 """
 
 from __future__ import annotations
@@ -73,9 +73,9 @@ def replayed(
         Off-screen, with all that is drawn written to this file.  Else in a window, as fast as it
         was recorded; it stays open for whoever wants to go on.
     folder : Path, optional
-        For the files that the recorded keys save; without one they fail.
+        For files that the recorded keys save; without one, saving fails.
     limits : ReplayLimits, optional
-        Of events, time and window size.
+        Limits on events, time and window size.
 
     Returns
     -------
@@ -109,7 +109,7 @@ def replayed(
     with ExitStack() as stack:
         stack.callback(plotter.close)
         editor = DeformEditor(plotter, session)
-        stack.callback(editor.remove)  # which cancels a job, if the replay was stopped
+        stack.callback(editor.remove)  # also cancels a job, if the replay was stopped
         editor.view.on_failure(faults.append)
         editor.On()
         plotter.show(auto_close=False, interactive=False, interactive_update=not unseen)

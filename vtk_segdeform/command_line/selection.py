@@ -89,7 +89,7 @@ def parse_selection(
     array([1])
     """
     chosen = np.ones(mesh.n_vertices, dtype=bool)
-    whole_is_a_file = os.path.isfile(text.strip())  # which asks of any text, however long
+    whole_is_a_file = os.path.isfile(text.strip())  # accepts text of any length
     for term in [text] if whole_is_a_file else text.split("&"):
         chosen &= _term(term.strip(), mesh, dict(point_arrays or {}), role)
     if not chosen.any():
@@ -170,7 +170,7 @@ def _numbers(path: Path) -> FloatArray:
 
 
 def _short(text: str) -> str:
-    """Return *text* in quotes, the end of a long one left out."""
+    """Return *text* in quotes, truncated if long."""
     return repr(text if len(text) <= 200 else f"{text[:200]}...")
 
 

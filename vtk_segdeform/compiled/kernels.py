@@ -1,8 +1,8 @@
-"""How the kernels are compiled: without the interpreter's lock, and kept on disk where they can be.
+"""Compilation of the kernels by numba: without the GIL, and cached on disk where possible.
 
-numba keeps them beside the source or, where that cannot be written, in a folder of the user's; or
-in the one that ``NUMBA_CACHE_DIR`` names.  Where there is none at all it would refuse; then every
-process compiles for itself.
+numba caches compiled code in ``NUMBA_CACHE_DIR``, beside the source or, if that is read-only, in
+the user's cache folder.  Without any writable folder numba raises an error; the kernels are then
+compiled again in every process.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def kernel(**options: Any) -> Any:
     def compiled(function: Any) -> Any:
         try:
             return numba.njit(cache=True, **options)(function)
-        except RuntimeError:  # no folder to keep it in
+        except RuntimeError:  # no writable cache folder
             return numba.njit(**options)(function)
 
     return compiled

@@ -62,7 +62,9 @@ class Archive:
     """
 
     def __init__(self, file: IO[bytes]) -> None:
-        size = os.fstat(file.fileno()).st_size  # of this file: another may have its name by now
+        size = os.fstat(
+            file.fileno()
+        ).st_size  # of the open file: its name may refer to another one by now
         _require_short_list(file, size)
         self._archive = zipfile.ZipFile(file)
         self._left = size  # bytes: members may not overlap to make more of the file than it is
@@ -86,7 +88,7 @@ class Archive:
             size *= count
         with self._open(f"{name}.npy", size + _LONGEST_NPY_HEADER) as content:
             if npy.read_magic(content) != (1, 0):
-                raise ValueError(f"{name} has another layout than this program writes")
+                raise ValueError(f"{name} has a layout that this program does not write")
             found, fortran, kept = npy.read_array_header_1_0(
                 content, max_header_size=_LONGEST_NPY_HEADER
             )

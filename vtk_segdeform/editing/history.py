@@ -36,7 +36,7 @@ class History:
         self._future: list[tuple[str, State]] = []
 
     def copy(self) -> History:
-        """Return a history of the same steps that goes its own way."""
+        """Return an independent copy of the history."""
         other = History(self._past.maxlen or 1)
         other._past.extend(self._past)
         other._future.extend(self._future)

@@ -1,8 +1,8 @@
 """Arrays and names that a file format cannot hold: what is written instead, and the warning.
 
-A format without room for an array leaves it out; a name that its syntax cannot hold, or that means
-something else there, is written as another one.  Both are logged as warnings, which the command
-line prints.  The file itself is valid either way.
+An array that a format cannot store is left out; a name that is invalid or reserved in its syntax is
+replaced by another one.  Both are logged as warnings, which the command line prints.  The file
+itself is valid either way.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _LONGEST = 200  # readers written in C keep a name in a buffer of fixed size
 
 
 def decoded(data: bytes) -> str:
-    """Return text in UTF-8 or, if it is not valid as that, in Latin-1, which every byte is."""
+    """Return the text decoded as UTF-8 or, if that fails, as Latin-1, which never fails."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -33,18 +33,18 @@ def plain_names(
     refused: str = "",
     measure: Callable[[str], int] = len,
 ) -> dict[str, str]:
-    """Return the name to write for each of *names*; no two are equal, valid ones stay.
+    """Return a unique valid name to write for each of *names*; valid ones are unchanged.
 
     Parameters
     ----------
     names : iterable of str
         Any text.
     reserved : container of str
-        Names that mean something else in the file.
+        Names that have a meaning of their own in the format.
     refused : str
-        Letters that cannot be in a name; those that are not printable never can.
+        Characters that a name must not contain, besides those that are not printable.
     measure : callable
-        How long a name is in the file; names of over 200 are cut.
+        Returns the length of a name in the file; names longer than 200 are truncated.
     """
     wanted = dict.fromkeys(names)
     plain = {name: _plain(name, refused, measure) for name in wanted}
@@ -67,27 +67,27 @@ def _plain(name: str, refused: str, measure: Callable[[str], int]) -> str:
     text = "".join(letters).strip()
     while measure(text) > _LONGEST:
         text = text[:-1]
-    if text.endswith("\\"):  # in OBJ the next line would belong to it
+    if text.endswith("\\"):  # in OBJ it would continue on the next line
         text = text[:-1] + "_"
     return text or "unnamed"
 
 
 def warn_renamed(what: str, names: dict[str, str]) -> None:
-    """Log a warning for each name that is written as another one; *what* says of what."""
+    """Log a warning for each name that is replaced; *what* is the kind of thing it names."""
     for name, written in names.items():
         if name != written:
             _log.warning("%s %r is written as %r", what, name, written)
 
 
 def warn_left_out(format_: str, surface: pv.PolyData, kept: Mapping[str, Sequence[str]]) -> None:
-    """Log one warning that names everything of *surface* that a file of this format leaves out.
+    """Log one warning that lists everything of *surface* that the format cannot store.
 
     Parameters
     ----------
     format_ : str
-        How people call the format.
+        Name of the format.
     surface : pyvista.PolyData
-        What is written.
+        The surface to write.
     kept : mapping
         Names of the arrays that are written, for "point", "cell" and "field".
     """
@@ -101,7 +101,7 @@ def warn_left_out(format_: str, surface: pv.PolyData, kept: Mapping[str, Sequenc
         if count:
             lost.append(f"{count} {sort} cell{'s' if count > 1 else ''}")
     if lost:
-        _log.warning("%s has no place for %s: left out", format_, ", ".join(lost))
+        _log.warning("%s cannot store %s: left out", format_, ", ".join(lost))
 
 
 def set_names(surface: pv.PolyData, key: str, names: Iterable[str]) -> None:
@@ -114,6 +114,6 @@ def set_names(surface: pv.PolyData, key: str, names: Iterable[str]) -> None:
 
 
 def get_names(surface: pv.PolyData, key: str) -> list[str]:
-    """Return the texts of field array *key*; none if it is not there or not of text."""
+    """Return the texts of field array *key*; none if it does not exist or is not text."""
     values = np.asarray(surface.field_data[key]) if key in surface.field_data else np.empty(0)
     return [str(name) for name in values.ravel()] if values.dtype.kind == "U" else []

@@ -1,14 +1,14 @@
-"""glTF and GLB: read, the meshes of a scene put where its nodes place them, as one surface.
+"""Read glTF and GLB: the meshes of a scene in world coordinates, as one surface.
 
     nodes        a forest; world matrix of a node = that of its parent @ its own
     mesh         primitives: triangles, strips or fans; lines and points are left out
     morphs       targets are added with the weights of the node or the mesh
-    skins        a skinned vertex goes where its joints take it, whatever its node says
-    attributes   NORMAL and TEXCOORD_0, active ones, COLOR_0 as "RGB" or "RGBA", and further
-                 TEXCOORD_k and _NAMES: point arrays, if all primitives have them
+    skins        a skinned vertex follows its joints and ignores the transform of its node
+    attributes   NORMAL and TEXCOORD_0 (active), COLOR_0 as "RGB" or "RGBA", further TEXCOORD_k
+                 and _NAMES become point arrays if all primitives have them
 
-Animations, materials and images are not read.  Nothing outside the file is, but buffers that lie in
-its folder.
+Animations, materials and images are not read.  The only other files that are read are buffers in
+the model's folder.
 
 Source
 ------
@@ -29,12 +29,12 @@ from ..errors import MeshError
 from .gltf_buffers import Document, numbers, object_, objects, whole
 from .polygons import polydata_of, unstripped
 
-# Extensions that change nothing of a surface, and the one that is read.
+# Extensions that do not change the surface, and the one that is supported.
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_xmp")
 _READ = "KHR_mesh_quantization"
 _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-_PRIMITIVE = 1000  # elements that take as long as a primitive does
+_PRIMITIVE = 1000  # cost of a primitive, in elements
 
 
 class _Part(NamedTuple):
@@ -43,21 +43,21 @@ class _Part(NamedTuple):
     arrays: dict[str, Any]  # (n, ...)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # what overflows is named when the mesh is checked
+@np.errstate(over="ignore", invalid="ignore")  # the check of the mesh reports overflows
 def read_gltf(path: Path) -> pv.PolyData:
     """Return the triangles of the scene in a .gltf or .glb file.
 
     Raises
     ------
     MeshError
-        If anything in it is out of range, its nodes are no forest, it needs an extension that is
-        not supported, or names a file outside its folder.
+        If a number is out of range, the nodes do not form a forest, a required extension is not
+        supported, or a buffer is outside the model's folder.
     """
     document = Document(path)
     _require_known_extensions(document.json)
     parts = list(_parts(document))
     if not parts:
-        raise MeshError("holds no triangles")
+        raise MeshError("contains no triangles")
     starts = np.cumsum([0, *(len(part.points) for part in parts)])
     faces = np.concatenate([p.faces + start for p, start in zip(parts, starts, strict=False)])
     points = np.concatenate([part.points for part in parts])
@@ -116,12 +116,12 @@ def _worlds(nodes: list[dict[str, Any]], children: list[list[int]]) -> list[Floa
         worlds[k] = above @ _local(nodes[k], f"node {k}")
         waiting += [(child, worlds[k]) for child in children[k]]
     if len(worlds) < len(nodes):
-        raise MeshError("a node of the scene is below itself")
+        raise MeshError("a node of the scene is its own descendant")
     return [worlds[k] for k in range(len(nodes))]
 
 
 def _local(node: dict[str, Any], name: str) -> FloatArray:
-    """Return the (4, 4) matrix of a node: given column by column, or turn, size and place."""
+    """Return the (4, 4) matrix of a node: stored by columns, or as rotation, scale, translation."""
     if "matrix" in node:
         columns: FloatArray = numbers(node, "matrix", name, [0.0] * 16).reshape(4, 4)
         return columns.T
@@ -138,7 +138,7 @@ def _local(node: dict[str, Any], name: str) -> FloatArray:
 
 
 def _in_scene(document: Document, children: list[list[int]]) -> Iterable[int]:
-    """Return the nodes of the scene to show, or of all if there is none, in their order."""
+    """Return the nodes of the default scene, or all nodes if there is none, in their order."""
     scenes = document.items("scenes")
     if not scenes:
         return range(len(children))
@@ -154,7 +154,7 @@ def _in_scene(document: Document, children: list[list[int]]) -> Iterable[int]:
 
 
 def _joints(document: Document, index: object, worlds: list[FloatArray]) -> list[FloatArray]:
-    """Return for each joint of a skin the (4, 4) matrix that takes its vertices to the world."""
+    """Return for each joint of a skin the (4, 4) matrix from the bind pose to the world."""
     skin = document.item("skins", index)
     joints = _indices(skin, "joints", f"skin {index}", len(worlds))
     if "inverseBindMatrices" not in skin:
@@ -205,17 +205,17 @@ def _faces(
     if "indices" in primitive:
         listed = document.array(primitive["indices"], "SCALAR").ravel()
         if listed.dtype.kind != "u":
-            raise MeshError(f"{name} has indices that are no unsigned integers")
+            raise MeshError(f"{name} has indices that are not unsigned integers")
         corners = listed.astype(np.int64)
         if corners.max() >= n_points:
-            raise MeshError(f"{name} names vertex {corners.max()} of {n_points}")
+            raise MeshError(f"{name} refers to vertex {corners.max()} of {n_points}")
     if mode == _STRIP:
         return unstripped(np.array([len(corners)]), corners)
     if mode == _FAN:
         hub = np.full(max(len(corners) - 2, 0), corners[0])
         return np.stack([hub, corners[1:-1], corners[2:]], axis=-1)
     if len(corners) % 3:
-        raise MeshError(f"{name} has {len(corners)} corners of triangles, no multiple of 3")
+        raise MeshError(f"{name} has {len(corners)} triangle corners, not a multiple of 3")
     return corners.reshape(-1, 3)
 
 
@@ -225,7 +225,7 @@ def _fitting(document: Document, attributes: dict[str, Any], key: str, points: F
     if len(array) != len(points):
         raise MeshError(f"{key} has {len(array)} elements for {len(points)} vertices")
     if key == "POSITION" and array.shape[1] != 3:
-        raise MeshError("a target has positions that are no VEC3")
+        raise MeshError("a morph target has positions that are not VEC3")
     return array
 
 
@@ -253,7 +253,7 @@ def _arrays(
 def _skinned(
     document: Document, attributes: dict[str, Any], points: FloatArray, joints: list[FloatArray]
 ) -> FloatArray:
-    """Return where the joints take *points*, each weighted."""
+    """Return *points* moved by the weighted joints."""
     matrices, result, total = np.array(joints), np.zeros_like(points), np.zeros(len(points))
     for k in range(len(attributes)):
         keys = f"JOINTS_{k}", f"WEIGHTS_{k}"
@@ -261,7 +261,7 @@ def _skinned(
             break
         which, weights = (_fitting(document, attributes, key, points) for key in keys)
         if which.dtype.kind != "u" or which.shape != weights.shape or which.max() >= len(joints):
-            raise MeshError("a skinned mesh names joints that are not there")
+            raise MeshError("a skinned mesh refers to joints that do not exist")
         for joint, weight in zip(which.T, weights.astype(float).T, strict=True):
             moved = np.einsum("nij,nj->ni", matrices[joint, :3, :3], points)
             result += weight[:, None] * (moved + matrices[joint, :3, 3])

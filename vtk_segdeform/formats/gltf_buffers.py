@@ -1,11 +1,11 @@
 """The JSON of a glTF file, and the numbers in its buffers, all checked before they are used.
 
-    buffer      bytes: the rest of a .glb, a data: URI, or a file in the model's own folder
-    bufferView  a piece of a buffer
-    accessor    numbers in a bufferView: type, how many, how far apart; some perhaps replaced
+    buffer      bytes: the second chunk of a .glb, a data: URI, or a file in the model's folder
+    bufferView  a range of a buffer
+    accessor    numbers in a bufferView: type, count and stride; some may be replaced (sparse)
 
-A number of the JSON that does not fit what is there is a MeshError that names it, so that no byte
-outside a buffer is ever read, and no more memory asked for than the file's size allows.
+A number in the JSON that does not fit the buffers raises a MeshError that names it, so that no byte
+outside a buffer is ever read, and memory is limited by the size of the file.
 
 Source
 ------
@@ -29,12 +29,12 @@ from .neighbours import file_inside
 
 _TYPES = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-_PER_BYTE, _ALWAYS = 64, 50_000_000  # elements that may be made of a file
+_PER_BYTE, _ALWAYS = 64, 50_000_000  # elements allowed: per byte of the file, and in any case
 _MAGIC, _JSON, _BINARY = b"glTF", b"JSON", b"BIN\0"
 
 
 class Document:
-    """A glTF file: its JSON, and arrays out of its buffers.
+    """A glTF file: its JSON, and the arrays in its buffers.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Document:
     Raises
     ------
     MeshError
-        If it is no glTF 2.0.
+        If it is not glTF 2.0.
     """
 
     def __init__(self, path: Path) -> None:
@@ -56,24 +56,24 @@ class Document:
             raise MeshError(f"its JSON cannot be read ({error})") from None
         asset = self.json.get("asset") if isinstance(self.json, dict) else None
         if not isinstance(asset, dict) or not str(asset.get("version")).startswith("2."):
-            raise MeshError("is no glTF 2.0: there is no asset of that version")
-        self.size = len(data)  # bytes of all that has been read
+            raise MeshError("is not glTF 2.0: its asset version is missing or different")
+        self.size = len(data)  # total number of bytes read
         self._folder = path.parent
         self._buffers: dict[int, bytes] = {}
         self._lists: dict[str, list[dict[str, Any]]] = {}
         self._spent = 0
 
     def spend(self, elements: int) -> None:
-        """Count what is made of the file; a MeshError if it is far more than its bytes are.
+        """Count the elements generated; MeshError if they far exceed the size of the file.
 
         The same few bytes may be instanced any number of times.
         """
         self._spent += elements
         if self._spent > max(_ALWAYS, _PER_BYTE * self.size):
-            raise MeshError(f"its instances are over {_ALWAYS} vertices and corners; too many")
+            raise MeshError(f"its instances have more than {_ALWAYS} vertices and corners")
 
     def items(self, key: str) -> list[dict[str, Any]]:
-        """Return a list of objects at the top of the JSON; empty if there is none."""
+        """Return a top-level list of objects of the JSON; empty if there is none."""
         if key not in self._lists:
             self._lists[key] = objects(self.json, key, key)
         return self._lists[key]
@@ -91,7 +91,7 @@ class Document:
         index : int
             Of the accessor.
         *types : str
-            One of these it must be: "SCALAR", "VEC3" ...
+            Allowed types: "SCALAR", "VEC3" ...
         """
         accessor, name = self.item("accessors", index), f"accessor {index}"
         type_ = accessor.get("type")
@@ -103,7 +103,7 @@ class Document:
             start = whole(accessor, "byteOffset", name, default=0)
             array = self._viewed(accessor["bufferView"], start, shape, kind)
         elif count > self.size:
-            raise MeshError(f"{name} says {count} elements, and has no buffer for them")
+            raise MeshError(f"{name} declares {count} elements, but has no buffer")
         else:
             array = np.zeros(shape, dtype=kind)
         self.spend(count)
@@ -120,7 +120,7 @@ class Document:
         where, what = object_(sparse, "indices", name), object_(sparse, "values", name)
         kind = _component(where, name)
         if kind[0] != "u":
-            raise MeshError(f"{name} has indices that are no unsigned integers")
+            raise MeshError(f"{name} has indices that are not unsigned integers")
         start = whole(where, "byteOffset", name, default=0)
         rows = self._viewed(where.get("bufferView"), start, (count, 1), kind).ravel()
         if rows.max() >= len(array):
@@ -152,7 +152,7 @@ class Document:
             name = f"buffer {index}"
             data, length = self._bytes(buffer, number), whole(buffer, "byteLength", name)
             if length > len(data):
-                raise MeshError(f"{name} says {length} bytes; there are {len(data)}")
+                raise MeshError(f"{name} declares {length} bytes; there are {len(data)}")
             self._buffers[number] = data[:length]
             self.size += 0 if data is self._binary else len(data)
         return self._buffers[number]
@@ -172,7 +172,7 @@ class Document:
         file = file_inside(self._folder, unquote(uri))
         if file is None:
             raise MeshError(
-                f"buffer {number} is to be read from {uri[:200]!r}, which is no file in the "
+                f"buffer {number} refers to {uri[:200]!r}, which is not a file in the "
                 "model's folder; copy it there"
             )
         return file.read_bytes()
@@ -181,21 +181,21 @@ class Document:
 def _chunks(data: bytes) -> tuple[bytes, bytes | None]:
     """Return the JSON and the binary chunk, if any, of a .glb file."""
     if len(data) < 20:
-        raise MeshError("is cut off")
+        raise MeshError("is truncated")
     _, version, length = struct.unpack_from("<4sII", data)
     if version != 2:
         raise MeshError(f"is glTF {version}; only 2 can be read")
     if length > len(data):
-        raise MeshError(f"says {length} bytes, but has {len(data)}")
+        raise MeshError(f"declares {length} bytes, but has {len(data)}")
     chunks, at = dict[bytes, bytes](), 12
     while at + 8 <= length:
         size, kind = struct.unpack_from("<I4s", data, at)
         if at + 8 + size > length:
-            raise MeshError(f"has a chunk of {size} bytes, which end after the file does")
+            raise MeshError(f"has a chunk of {size} bytes, which extends past the end of the file")
         chunks.setdefault(kind, data[at + 8 : at + 8 + size])
         at += 8 + size
     if _JSON not in chunks:
-        raise MeshError("has no JSON in it")
+        raise MeshError("has no JSON chunk")
     return chunks[_JSON], chunks.get(_BINARY)
 
 
@@ -245,5 +245,5 @@ def _is_number(value: object) -> bool:
 def _component(where: dict[str, Any], name: str) -> str:
     kind = _TYPES.get(whole(where, "componentType", name))
     if kind is None:
-        raise MeshError(f"{name} is of component type {where['componentType']}; there is none")
+        raise MeshError(f"{name} has the unknown component type {where['componentType']}")
     return kind

@@ -1,12 +1,11 @@
-"""Reading files with native libraries in a process of its own, with limits of memory and time.
+"""Read files with native libraries in a child process, with limits on memory and time.
 
-The readers of VTK and PyMeshLab believe what a file says: a wrong count, a deep nesting or an
-entity that is a million others ends the process that reads it.  So another one does,
-`reading_child`, and what it found comes back through files that VTK has written.  It starts in
-0.2 s.
+The readers of VTK and PyMeshLab do not validate files: a wrong count, deep nesting or an
+exponential entity can end the process that reads them.  So a child process, `reading_child`, reads
+the file and returns the result in files written by VTK.  It starts in 0.2 s.
 
-A program that is frozen, or runs in another one, has no Python to start: it reads in its own
-process, and logs a warning.
+A frozen or embedded application has no Python interpreter to start: it reads in its own process,
+and logs a warning.
 """
 
 from __future__ import annotations
@@ -31,14 +30,14 @@ _MEMORY, _PER_BYTE = 2 << 30, 64  # bytes, and for each byte of the file
 _START = """import runpy, sys
 sys.path[:] = {path!r}
 if {tool!r} == "vtk":
-    sys.modules["numpy"] = None  # VTK does without, and starts in half the time
+    sys.modules["numpy"] = None  # VTK does not need it, and starts in half the time
 runpy.run_path({child!r}, run_name="__main__")
 """
 
 
 @contextmanager
 def read_apart(tool: str, path: Path) -> Iterator[Path]:
-    """Have *path* read in another process; give the folder with what `reading_child` found.
+    """Read *path* in a child process; yield the folder with the results of `reading_child`.
 
     Parameters
     ----------
@@ -50,7 +49,7 @@ def read_apart(tool: str, path: Path) -> Iterator[Path]:
     Raises
     ------
     MeshError
-        If the file cannot be read, takes too much memory or time, or ends the process.
+        If the file cannot be read, takes too much memory or time, or crashes the process.
     """
     size = path.stat().st_size
     seconds = _SECONDS + _PER_MEGABYTE * size / 1e6
@@ -58,7 +57,9 @@ def read_apart(tool: str, path: Path) -> Iterator[Path]:
         folder = Path(name)
         python = _python()
         if python is None:
-            _log.warning("%s is read without protection: there is no Python to start", path)
+            _log.warning(
+                "%s is read without protection: there is no Python interpreter to start", path
+            )
             reading_child.main(tool, str(path.absolute()), name, "0")
             code = 0
         else:
@@ -67,7 +68,7 @@ def read_apart(tool: str, path: Path) -> Iterator[Path]:
                 words = [tool, str(path.absolute()), name, str(_MEMORY + _PER_BYTE * size)]
                 code = _ended([python, "-S", "-c", start, *words], name, seconds)
             except subprocess.TimeoutExpired:
-                raise MeshError(f"reading it took over {seconds:.0f} s; it was given up") from None
+                raise MeshError(f"reading was stopped after {seconds:.0f} s") from None
         said = folder / "said.txt"
         if said.exists():
             raise MeshError(said.read_text(encoding="utf-8"))
@@ -90,7 +91,7 @@ def _ended(words: list[str], folder: str, seconds: float) -> int:
 
 
 def _python() -> str | None:
-    """Return the program that is Python, or None if this one is something else."""
+    """Return the path of the Python interpreter, or None if there is none to start."""
     program = spawn.get_executable()
     if getattr(sys, "frozen", False) or not program:
         return None

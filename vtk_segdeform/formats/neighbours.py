@@ -8,12 +8,12 @@ from pathlib import Path
 def file_inside(folder: Path, name: str) -> Path | None:
     """Return the file *name* in *folder* or below, links resolved; None if there is none.
 
-    None too for a path that leads outside, be it absolute, by ``..`` or through a link.
+    Also None for a path that leads outside, whether absolute, by ``..`` or through a link.
     """
     folder = folder.resolve()
     try:
         file = (folder / name).resolve()
         inside = bool(name) and file.is_relative_to(folder) and file.is_file()
-    except (OSError, ValueError, RuntimeError):  # too long, or links in a circle
+    except (OSError, ValueError, RuntimeError):  # too long, or circular links
         return None
     return file if inside else None

@@ -34,9 +34,11 @@ def read_off(path: Path) -> pv.PolyData:
     lines[:1] = [rest] if rest.strip() else []
     n, m = (int(word) for word in lines[0].split()[:2])
     if n < 0 or m < 0:
-        raise MeshError(f"says {n} vertices and {m} faces")
+        raise MeshError(f"declares {n} vertices and {m} faces")
     if len(lines) < 1 + n + m:
-        raise MeshError(f"says {n} vertices and {m} faces, but ends after {len(lines) - 1} lines")
+        raise MeshError(
+            f"declares {n} vertices and {m} faces, but ends after {len(lines) - 1} lines"
+        )
     table = np.array([line.split() for line in lines[1 : 1 + n]], dtype=float).reshape(
         n, -1 if n else 3
     )

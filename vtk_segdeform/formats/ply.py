@@ -1,14 +1,14 @@
 """PLY, Stanford's polygon format, text or binary: read and write, every digit kept.
 
-VTK's own reader and writer hold 7 digits.  These elements and properties make a surface:
+VTK's own reader and writer keep 7 digits.  A surface consists of these elements and properties:
 
     vertex     x y z; red green blue (alpha); s t, u v or texture_u texture_v
     face       vertex_indices or vertex_index, a list; texcoord, a list of (u, v) of each corner
-    tristrips  vertex_indices, a list: each three in a row are a triangle, -1 begins a new strip
+    tristrips  vertex_indices, a list: any three in a row form a triangle, -1 starts a strip
 
 Colours become the arrays "RGB" or "RGBA", texture coordinates "TextureCoordinates" of vertices and
-"TextureCorners" of corners, all other numbers arrays under their names.  Arrays are written as
-properties of their own names, unless these names are listed here or have white space in them.
+"TextureCorners" of corners, all other numbers arrays of the same name.  Arrays are written as
+properties of the same name, unless that name is listed here or contains white space.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def read_ply(path: Path) -> pv.PolyData:
     counts, corners = polygons or (_NO_NUMBERS, _NO_NUMBERS)
     if strips is not None:
         triangles = unstripped(*strips)
-        face = {} if len(triangles) else face  # its numbers are not those of the triangles
+        face = {} if len(triangles) else face  # its rows do not correspond to triangles
         counts = np.concatenate([counts, np.full(len(triangles), 3)])
         corners = np.concatenate([corners, triangles.ravel()])
     surface = polydata_of(points, counts, corners)
@@ -82,13 +82,13 @@ def _has_numbers(table: Table, names: Iterable[str]) -> bool:
 
 
 def _corners(table: Table) -> Lists | None:
-    """Take the vertex numbers of polygons or strips out of a table; None if there are none."""
+    """Remove and return the vertex indices of polygons or strips; None if there are none."""
     found = [table.pop(name) for name in _CORNERS if isinstance(table.get(name), Lists)]
     if not found:
         return None
     lengths, values = found[0]
     if not (np.abs(values.astype(float)) < 2**53).all() or (values != np.rint(values)).any():
-        raise MeshError("a face of the PLY file has a corner that is no whole number")
+        raise MeshError("a face of the PLY file has a corner that is not a whole number")
     return Lists(lengths, values.astype(np.int64))
 
 
@@ -105,22 +105,22 @@ def _keep_arrays(table: Table, attributes: Any) -> None:
 
 
 def _is_colour(values: Any) -> bool:
-    """Tell whether a column is bytes, or floating-point numbers from 0 to 1."""
+    """Return whether a column is bytes, or floating-point numbers from 0 to 1."""
     if not isinstance(values, np.ndarray) or values.dtype.kind == "f":
         return isinstance(values, np.ndarray) and bool(((values >= 0) & (values <= 1)).all())
     return bool(values.dtype == np.uint8)
 
 
 def write_ply(path: Path, surface: pv.PolyData) -> None:
-    """Write a binary PLY file with doubles; of the arrays, colours, texture and plain numbers.
+    """Write a binary PLY file in double precision, with colours, texture coordinates and scalars.
 
-    Names that a property cannot have are changed, and what is left out is said, by warnings.
+    Warnings are logged for arrays that are renamed or left out.
     """
     counts, corners = polygons_of(surface)
     points, columns = surface.points, dict[str, Any]()
     texture, texture_name = surface.active_texture_coordinates, ""
     if texture is not None and texture.ndim == 2 and texture.shape[1] >= 2:
-        # by the names that MeshLab reads as doubles
+        # the names that MeshLab reads in double precision
         columns |= dict(zip(_TEXTURE[-1], np.asarray(texture, dtype="f8").T, strict=False))
         texture_name = surface.point_data.active_texture_coordinates_name
     arrays = {name: v for name, v in surface.point_data.items() if name != texture_name}
@@ -138,7 +138,7 @@ def write_ply(path: Path, surface: pv.PolyData) -> None:
     if counts.max(initial=0) > _COMMON:
         _log.warning("PLY faces of over %d corners: some programs cannot read them", _COMMON)
     lists = [("vertex_indices", counts, corners.astype("<i4"))]
-    if seams is not None:  # single precision is the one type that MeshLab reads
+    if seams is not None:  # MeshLab reads single precision only
         lists.append(("texcoord", 2 * counts, seams.astype("<f4").ravel()))
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]
     header += [f"property {_WORDS[c.dtype.str[1:]]} {name}" for name, c in vertex.items()]
@@ -156,7 +156,7 @@ def write_ply(path: Path, surface: pv.PolyData) -> None:
 def _columns(
     sort: str, arrays: dict[str, Any], reserved: frozenset[str]
 ) -> tuple[dict[str, Any], list[str]]:
-    """Return the arrays PLY can hold, as columns by property name, and their own names."""
+    """Return the arrays that PLY can store, as columns by property name, and their names."""
     columns: dict[str, Any] = {}
     numbers: dict[str, Any] = {}
     kept = []
@@ -172,7 +172,7 @@ def _columns(
 
 
 def _column(values: Any) -> Any:
-    """Return numbers (n,) in a type that PLY has, all exactly as they are; None if it has none."""
+    """Return numbers (n,) converted exactly to a type of PLY; None if there is no such type."""
     array = np.asarray(values)
     if array.ndim != 1 or array.dtype.kind not in "biuf":
         return None
@@ -203,7 +203,7 @@ def _packed(count: int, columns: list[Any]) -> Any:
 def _face_rows(lists: list[tuple[IntArray, Any]], columns: list[Any]) -> bytes:
     """Return the rows of faces: *lists*, of (lengths, values), and then the *columns*.
 
-    Faces of equally many corners are packed together and put in their places.
+    Faces with the same number of corners are packed together.
     """
     counts = lists[0][0]
     tail = _packed(len(counts), columns)

@@ -4,9 +4,9 @@
     property list uchar int vertex_indices
     property uchar red
 
-A property is a number, or a list whose length comes first in every row.  A text file is read as if
-it were a binary one of doubles, so that there is one reader.  Names are whatever stands between
-white space; nothing in the header is believed that the bytes after it could not hold.
+A property is a number, or a list preceded by its length in every row.  A text file is converted to
+a binary one of doubles, so that there is one reader.  A name is any text between white space.
+Counts in the header are checked against the number of bytes after it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _LINE = re.compile(rb"\r\n|\n|\r")
 
 
 class Lists(NamedTuple):
-    """A column of lists, one after another."""
+    """A column of lists, concatenated."""
 
     lengths: Any  # (n,) int
     values: Any  # (sum of the lengths,)
@@ -56,7 +56,7 @@ class _Element:
 
     @property
     def smallest(self) -> int:
-        """Bytes that a row has at least."""
+        """Smallest number of bytes of a row."""
         return sum(np.dtype(each.length or each.kind).itemsize for each in self.properties)
 
 
@@ -66,7 +66,7 @@ def tables_of(data: bytes) -> dict[str, Table]:
     Raises
     ------
     MeshError
-        If it is no PLY file, or has not the rows that its header says.
+        If it is not a PLY file, or has fewer rows than its header declares.
     """
     kind, elements, start = _header(data)
     order = _ORDERS[kind]
@@ -99,12 +99,14 @@ def _header(data: bytes) -> tuple[str, list[_Element], int]:
             case ["property", type_, name, *_] if elements:
                 elements[-1].properties.append(_Property(name, _type(type_, line)))
             case ["element" | "property", *_]:
-                raise MeshError(f"the PLY header has the line {decoded(line)[:80]!r}")
+                raise MeshError(f"the PLY header has an invalid line: {decoded(line)[:80]!r}")
     if kind not in _ORDERS:
-        raise MeshError(f"the format of the PLY file is {kind[:40]!r}; can {', '.join(_ORDERS)}")
+        raise MeshError(
+            f"the format of the PLY file is {kind[:40]!r}; must be {', '.join(_ORDERS)}"
+        )
     for names in ([e.name for e in elements], *([p.name for p in e.properties] for e in elements)):
         if len(set(names)) < len(names):
-            raise MeshError("the PLY header has two elements or properties of one name")
+            raise MeshError("the PLY header has two elements or properties of the same name")
     newline = first[1] if data.startswith(first[1], end.end()) else data[end.end() : end.end() + 1]
     return kind, elements, end.end() + len(newline)
 
@@ -121,7 +123,7 @@ def _as_doubles(element: _Element) -> _Element:
 
 
 def _restore_integers(table: Table, element: _Element) -> None:
-    """Give columns of integers their type back, unless text says what it cannot hold."""
+    """Convert columns of integers to their type, unless a number in the text does not fit it."""
     for each in element.properties:
         values = table[each.name]
         if not each.length and each.kind[0] in "iu":
@@ -138,7 +140,8 @@ def _table(data: bytes, start: int, element: _Element, order: str) -> tuple[Tabl
         return {each.name: lists if each.length else nothing for each in element.properties}, start
     if element.count * element.smallest > len(data) - start:
         raise MeshError(
-            f"says {element.count} times {element.name!r}, which the rest of the file cannot hold"
+            f"declares {element.count} rows of {element.name!r}, which the rest of the file cannot "
+            "hold"
         )
     first, _ = _row(data, start, element, order)
     parts: list[Any] = []  # of a row, if all are as long as the first

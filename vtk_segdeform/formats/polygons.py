@@ -70,11 +70,11 @@ def polygons_of(polydata: pv.PolyData) -> tuple[IntArray, IntArray]:
 def unstripped(lengths: IntArray, values: IntArray) -> IntArray:
     """Return the (m, 3) triangles of strips, all oriented as the first of each.
 
-    Triangles that name a vertex twice only join one part of a strip to the next.
+    Triangles with a repeated vertex, which only connect parts of a strip, are left out.
     """
     values = np.insert(values, np.cumsum(lengths), -1)  # after each strip
     number = np.arange(len(values))
-    begun = np.maximum.accumulate(np.where(values == -1, number + 1, 0))  # of the strip it is in
+    begun = np.maximum.accumulate(np.where(values == -1, number + 1, 0))  # start of its strip
     triangles = np.stack([values[:-2], values[1:-1], values[2:]], axis=-1)
     odd = (number - begun)[:-2] % 2 == 1
     triangles[odd] = triangles[odd][:, [1, 0, 2]]
@@ -84,7 +84,7 @@ def unstripped(lengths: IntArray, values: IntArray) -> IntArray:
 
 
 def cells_of(polydata: pv.PolyData) -> IntArray:
-    """Return for each polygon of `polygons_of` the number of its cell, its row in the cell data."""
+    """Return the cell number of each polygon of `polygons_of`: its row in the cell data."""
     lengths = []
     strips = polydata.strips
     while len(strips):
@@ -105,7 +105,7 @@ def padded_corners(counts: IntArray, pairs: FloatArray) -> FloatArray:
 
 
 def corner_values(wide: FloatArray | None, counts: IntArray) -> FloatArray | None:
-    """Return the (k, 2) values of corners out of such rows; None if they do not fit *counts*."""
+    """Return the (k, 2) values of corners from such rows; None if they do not fit *counts*."""
     if wide is None or wide.ndim != 2 or wide.dtype.kind != "f" or wide.shape[1] % 2:
         return None
     most = wide.shape[1] // 2

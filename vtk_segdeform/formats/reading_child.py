@@ -1,12 +1,12 @@
-"""What a process of its own does to read a file with VTK or PyMeshLab; `isolated` starts it.
+"""The child process that reads a file with VTK or PyMeshLab; `isolated` starts it.
 
     python reading_child.py vtk|meshlab FILE FOLDER BYTES
 
-It asks for no more than about BYTES of memory, if that is not 0.  In FOLDER it leaves what it
-found: 0.vtp, 1.vtu ..., surfaces and grids, or mesh.npz, vertices and faces.  Letters of names
-that XML cannot hold are written %XX there.  What it cannot read it says in said.txt.
-Either library may end the process on the way, which is what the process is for.  It imports
-nothing of this package, so that it starts in a fraction of a second.
+It allocates no more than about BYTES of memory, if that is not 0.  It writes its results to FOLDER:
+0.vtp, 1.vtu ... for surfaces and grids, or mesh.npz for vertices and faces.  Characters of names
+that XML cannot store are escaped as %XX.  If the file cannot be read, said.txt has the reason.
+Either library may crash, which is why this is a process of its own.  It imports nothing of this
+package, so that it starts in a fraction of a second.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def _hand_on(piece: Any, path: Path, writers: Any) -> None:
     writer.SetCompressorTypeToNone()
     writer.SetHeaderTypeToUInt64()
     if not writer.Write():
-        raise ValueError("what was read cannot be handed on")
+        raise ValueError("the data that was read cannot be passed on")
 
 
 def _written(name: str) -> str:
@@ -101,7 +101,7 @@ def _written(name: str) -> str:
 
 
 def _pieces(data: Any) -> Iterator[Any]:
-    """Yield the data sets that *data* is, or is composed of, if they have cells."""
+    """Yield *data*, or the data sets that it is composed of, if they have cells."""
     if data is None:
         return
     if not data.IsA("vtkCompositeDataSet"):
@@ -131,7 +131,7 @@ def _with_meshlab(path: Path, folder: Path, limit: int) -> None:
 
 
 def _limit_memory(most: int) -> None:
-    """Let this process have *most* bytes more than it has; nothing where there is no such limit."""
+    """Limit this process to *most* more bytes than it has now, where the system allows it."""
     if not most:
         return
     try:

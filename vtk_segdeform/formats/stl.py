@@ -1,10 +1,10 @@
-"""STL, a soup of triangles in single precision, text or binary: read, with equal corners merged.
+"""Read STL, a triangle soup in single precision, text or binary; equal corners are merged.
 
     binary   80 bytes, the number of triangles, and 50 bytes of each: normal, corners, 2 more
-    text     solid ... facet normal ... outer loop, vertex x y z thrice, endloop ... endsolid
+    text     solid ... facet normal ... outer loop, vertex x y z three times, endloop ... endsolid
 
-A vertex gets the number of its first corner in the file.  Normals are dropped, and so are triangles
-that name a vertex twice.
+Vertices are numbered in the order of their first corner.  Normals are dropped, and so are triangles
+with a repeated vertex.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def read_stl(path: Path) -> pv.PolyData:
     count = int.from_bytes(data[80:84], "little")
     text = data.lstrip()[:5].lower() == b"solid" and len(data) != _START + _SIZE * count
     corners = _of_text(data) if text else _of_bytes(data, count)
-    with np.errstate(invalid="ignore"):  # NaN is named when the mesh is checked
+    with np.errstate(invalid="ignore"):  # the check of the mesh reports NaN
         corners = corners + np.float32(0.0)  # so that -0 is 0
     points, numbers = _merged(corners)
     faces = numbers.reshape(-1, 3)
@@ -43,7 +43,9 @@ def read_stl(path: Path) -> pv.PolyData:
 def _of_bytes(data: bytes, count: int) -> Any:
     held = (len(data) - _START) // _SIZE
     if len(data) < _START or held != count:
-        raise MeshError(f"says {count} triangles, but its {len(data)} bytes hold {max(held, 0)}")
+        raise MeshError(
+            f"declares {count} triangles, but its {len(data)} bytes hold {max(held, 0)}"
+        )
     row = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
     return np.frombuffer(data, row, count, _START)["corners"].reshape(-1, 3)
 
@@ -52,13 +54,13 @@ def _of_text(data: bytes) -> Any:
     data = data.replace(b"\r", b"\n")
     rows = _VERTEX.findall(data)
     if len(rows) != 3 * len(_FACET.findall(data)) or not _END.search(data):
-        raise MeshError("is cut off, or has a facet without three vertices")
+        raise MeshError("is truncated, or has a facet without three vertices")
     with np.errstate(over="ignore"):
         return np.array(rows, dtype=float).reshape(-1, 3).astype(np.float32)
 
 
 def _merged(corners: Any) -> tuple[Any, Any]:
-    """Return the different rows (n, 3), by first place, and each corner's number among them."""
+    """Return the unique rows (n, 3), by first occurrence, and the index of each corner's row."""
     if not len(corners):
         return np.empty((0, 3)), np.empty(0, dtype=np.int64)
     x, y, z = corners.astype("<f4").view("<u4").astype("u8").T

@@ -1,4 +1,4 @@
-"""Surfaces through VTK's own readers, whose complaints become errors of ours."""
+"""Surfaces through VTK's own readers, whose error messages become MeshErrors."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ _SURFACE_CELLS = frozenset({5, 7, 9})  # VTK's numbers of triangle, polygon, qua
 
 
 def read_with_vtk(path: Path) -> pv.PolyData:
-    """Return the surface that one of VTK's readers finds; its complaints become a MeshError.
+    """Return the surface read by one of VTK's readers; its error messages become a MeshError.
 
-    The reader works in a process of its own, which a damaged file may end.
+    The reader runs in a child process, which a damaged file may crash.
     """
     suffix = path.suffix.lower()
     with path.open("rb") as file:
@@ -51,9 +51,9 @@ def read_with_vtk(path: Path) -> pv.PolyData:
 
 
 def _sound(data: pv.DataSet) -> pv.DataSet:
-    """Return *data*, names as they were; a MeshError if cells or arrays do not fit its points.
+    """Return *data* with its original names; MeshError if cells or arrays do not fit its points.
 
-    VTK's readers do not check that, and what uses the cells reads any memory.
+    VTK's readers do not check this, and its filters would read outside of the arrays.
     """
     arrays = [data.GetCells()] if isinstance(data, pv.UnstructuredGrid) else _cell_arrays(data)
     for cells in arrays:
@@ -64,10 +64,10 @@ def _sound(data: pv.DataSet) -> pv.DataSet:
             raise MeshError("its cells overlap, or end outside their list of corners")
         if len(corners) and not 0 <= corners.min() <= corners.max() < data.n_points:
             raise MeshError(
-                f"a cell names vertex {corners.min()} to {corners.max()}; there are {data.n_points}"
+                f"cells use vertices {corners.min()} to {corners.max()}; there are {data.n_points}"
             )
     if isinstance(data, pv.UnstructuredGrid) and len(data.celltypes) != data.n_cells:
-        raise MeshError("it has not one type for each cell")
+        raise MeshError("the numbers of cells and cell types differ")
     for sort, attributes, count in (
         ("point", data.GetPointData(), data.n_points),
         ("cell", data.GetCellData(), data.n_cells),

@@ -1,9 +1,9 @@
 """Surfaces through VTK's own writers: names that its files cannot hold are changed first.
 
-VTK's XML writer puts names into the file as they are, so that ``<`` makes it unreadable; its HDF
-writer changes some, perhaps two into one; its legacy writer takes them for format strings, so that
-``{`` ends the process, and its reader cannot read what that has written if names are long, or the
-active scalars have over four components.
+VTK's XML writer does not escape names, so that ``<`` makes the file unreadable.  Its HDF writer
+changes some names, perhaps two into the same one.  Its legacy writer uses names as format strings,
+so that ``{`` aborts the process, and the legacy reader fails on long names and on active scalars of
+more than four components.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ _SCALARS, _MOST = 0, 4  # VTK's number of the attribute; components in a legacy 
 
 
 def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
-    """Write a surface through one of VTK's writers; OSError unless it is there, and whole.
+    """Write a surface through one of VTK's writers; OSError if the file is incomplete.
 
-    On a full disk VTK's XML writer ends the process, and its HDF writer leaves half a file and
-    says nothing.  So the first writes into memory, and what the second wrote is read again.
+    On a full disk VTK's XML writer aborts the process, and its HDF writer leaves half a file
+    without an error.  So the former writes into memory, and the output of the latter is read back.
     """
     suffix = path.suffix.lower()
     if suffix == ".stl":
@@ -56,7 +56,7 @@ def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
                 writer.SetFileName(str(path))
                 writer.SetFileTypeToBinary()
                 writer.Write()
-            else:  # HDF5 locks what it writes, and so does whoever named this place
+            else:  # HDF5 locks the file it writes, and *path* is locked already
                 with tempfile.TemporaryDirectory() as folder:
                     whole = Path(folder) / path.name
                     writer.SetFileName(str(whole))
@@ -66,11 +66,11 @@ def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
     except (RuntimeError, ValueError) as error:
         raise OSError(" ".join(str(error).split())) from None
     if not np.array_equal(again.points, surface.points, equal_nan=True):
-        raise OSError("what was written is not all of it")
+        raise OSError("the file is incomplete")
 
 
 def _with_plain_names(surface: pv.PolyData, suffix: str) -> Any:
-    """Return a vtkPolyData with arrays of names that the format can hold."""
+    """Return a vtkPolyData whose arrays have names that the format can store."""
     copy = vtkPolyData()
     copy.ShallowCopy(surface)
     for sort in ("Point", "Cell", "Field"):
@@ -101,7 +101,7 @@ def _components(array: Any) -> list[str]:
 def _rename(
     attributes: Any, arrays: list[Any], names: list[str], components: dict[str, str]
 ) -> None:
-    """Put copies with other names in place of *arrays*, each the normals, scalars ... it was."""
+    """Replace *arrays* by renamed copies, which stay the active normals, scalars ..."""
     parts = [
         attributes.IsArrayAnAttribute(k) if hasattr(attributes, "IsArrayAnAttribute") else -1
         for k in range(len(arrays))

@@ -35,7 +35,7 @@ _NAMED = {"o": "Object", "g": "Group", "usemtl": "Material"}
 _SMOOTHING, _LIBRARY = "Smoothing", "MaterialLibrary"
 _Runs: TypeAlias = dict[
     str, list[tuple[int, str]]
-]  # by statement: from which face on, what it says
+]  # by statement: the first face it applies to, and its value
 
 
 def read_obj(path: Path) -> pv.PolyData:
@@ -85,10 +85,10 @@ def _words(rest: str) -> list[str]:
 
 
 def _number(word: str, count: int) -> int:
-    """Return the number from 0 of what a corner names: from 1, or back from the last of *count*."""
+    """Return the index from 0 for one that counts from 1, or backwards from the last of *count*."""
     number = int(word)
     if number == 0 or number < -count:
-        raise MeshError(f"a face names {number}; numbers begin with 1, or with -1 from behind")
+        raise MeshError(f"a face refers to {number}; indices start at 1, or at -1 from the end")
     return number - 1 if number > 0 else count + number
 
 
@@ -120,7 +120,7 @@ def _keep_texture(surface: pv.PolyData, texture: FloatArray, texture_of: IntArra
 
 
 def _keep_runs(surface: pv.PolyData, runs: _Runs) -> None:
-    """Store what statements say of the faces after them, as cell arrays and their names."""
+    """Store the values that statements set for the faces after them, as cell and name arrays."""
     for word, said in runs.items():
         if not said:
             continue
@@ -146,9 +146,9 @@ def _smoothing_group(text: str) -> int:
 
 
 def write_obj(path: Path, surface: pv.PolyData) -> None:
-    """Write an OBJ file that `read_obj` gives back unchanged; what is left out is said.
+    """Write an OBJ file that `read_obj` reads back unchanged.
 
-    Names that a line cannot hold are changed, and that is said too, by warnings.
+    Warnings are logged for arrays that are left out and names that are changed.
     """
     counts, corners = polygons_of(surface)
     cells = cells_of(surface)
@@ -199,9 +199,9 @@ def _texture(
 
 
 def _tags(surface: pv.PolyData, cells: IntArray, kept: dict[str, list[str]]) -> dict[int, str]:
-    """Return the lines to write before a face, by its number, where something changes there.
+    """Return the lines to write before each face at which a statement changes, by face number.
 
-    After another object everything is said again: some readers forget it there.
+    All statements are repeated after a new object, where some readers reset them.
     """
     lines: list[list[str]] = []  # by statement, of each face
     for word, key in _NAMED.items():

@@ -58,7 +58,7 @@ def border_loops(vertices: FloatArray, sides: Sides, largest: int) -> list[IntAr
 
 
 def _attached(sides: Sides) -> BoolArray:
-    """Tell which open sides (b,) do not belong to a face that stands nearly alone."""
+    """Return which open sides (b,) do not belong to a nearly isolated face."""
     face = sides.open // 3
     alone = np.bincount(face, minlength=len(sides.faces)) == 3
     if not alone.any():
@@ -75,7 +75,7 @@ def _onward(vertices: FloatArray, sides: Sides, border: IntArray) -> list[int]:
     leaving = np.argsort(head, kind="stable")
     arriving = np.argsort(tail, kind="stable")
     onward = np.empty(len(border), dtype=np.int64)
-    onward[arriving] = leaving  # right wherever one border passes
+    onward[arriving] = leaving  # correct wherever only one border passes
     count = np.bincount(head, minlength=sides.n_vertices)
     crowded = np.flatnonzero(count > 1)
     if not len(crowded):
@@ -114,5 +114,5 @@ def _vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def _is_face(loop: IntArray) -> bool:
-    """Tell whether the loop runs around a single face that has no other border."""
+    """Return whether the loop runs around a single face that has no other border."""
     return len(loop) == 3 and bool((loop // 3 == loop[0] // 3).all())

@@ -1,8 +1,8 @@
-"""Give up flat lids: cut the face beyond at the corner that lies on its side.
+"""Replace flat lids: split the adjacent face at the vertex that lies on its edge.
 
-A crack whose border runs straight there and back, where a vertex lies on the side of a face instead
-of at its corner, has no lid with area.  The flat triangle over it and the face beyond its longest
-side become the two halves of that face.
+A crack along a straight edge, where a vertex lies on the edge of a face (a T-junction), has no lid
+of positive area.  The flat triangle over it and the face beyond its longest edge are replaced by
+the two halves of that face.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ _FLAT = 1e-9  # radians
 def close_cracks(
     vertices: FloatArray, faces: IntArray, lids: BoolArray
 ) -> tuple[IntArray, BoolArray]:
-    """Return *faces* (m, 3) with flat ones among the *lids* (m,) used up, and which ones changed.
+    """Return *faces* (m, 3) with flat *lids* (m,) replaced, and which faces were changed.
 
-    A lid stays flat where the halves would be flat too, fold, or need an edge that is there.
+    A flat lid is kept where a half would be flat too, fold over, or need an existing edge.
     """
     changed = np.zeros(len(faces), dtype=bool)
     while True:
@@ -58,7 +58,7 @@ def _halves(
     good &= ((normals(vertices[halves]) * up[:, None]).sum(axis=2) > 0.0).all(axis=1)
     keys = edge_keys(c, d, len(vertices))
     good &= ~np.isin(keys, sides.keys)
-    # One cut to a face and to an edge at a time.
+    # At most one split per face and edge at a time.
     some = np.flatnonzero(good)
     some = some[np.unique(beyond[some], return_index=True)[1]]
     some = some[np.unique(keys[some], return_index=True)[1]]

@@ -1,8 +1,8 @@
-"""Triangles over a loop that is a simple polygon as seen from somewhere.
+"""Ear clipping of a loop that is a simple polygon in some projection.
 
-Ears are clipped off the projection, the roundest first.  An ear with another corner in it or on
-its rim stays, so no ear of a polygon is without area.  Triangles that do not overlap in the
-projection do not cross in space, however the loop winds.
+Ears of the projected loop are clipped, the best shaped first.  An ear that contains another corner,
+even on its boundary, is not clipped, so that no triangle is degenerate.  Triangles that do not
+overlap in the projection do not cross in space, however the loop winds.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from scipy.spatial import cKDTree
 from ..arrays import BoolArray, FloatArray, IntArray
 
 _STRAIGHT = 1e-9  # sine of an angle
-_VIEWS = 60  # directions that a loop is looked at from, before it counts as winding
-_AREA = 1e-3  # of its extent squared, for each corner: a loop of less is seen from its edge
+_VIEWS = 60  # projection directions that are tried
+_AREA = 1e-3  # least area per corner, over the squared extent; less is seen edge-on
 
 
 def clip_ears(points: FloatArray) -> tuple[IntArray, FloatArray] | None:
-    """Return n - 2 triangles over the loop *points* (n, 3), and how it was looked at.
+    """Return n - 2 triangles over the loop *points* (n, 3), and the view of the projection.
 
     ``points @ view.T`` with the *view* (3, 3), a rotation, are coordinates to the right, upwards
     and towards the eye.  Of the directions from which the loop is simple, its mean normal is tried
-    first, and then those nearest to it.  None if the loop crosses itself from everywhere.
+    first, and then those nearest to it.  None if the loop crosses itself in all of them.
 
     Examples
     --------
@@ -42,7 +42,7 @@ def _clipped(flat: FloatArray) -> IntArray | None:
     n = len(flat)
     before, after = np.roll(np.arange(n), 1), np.roll(np.arange(n), -1)
     sharp = _roundness(flat[before], flat, flat[after])
-    hopeful = sharp.copy()  # 0 once an ear was tried in vain; corners that go may free it
+    hopeful = sharp.copy()  # 0 once an ear has failed, until a neighbour is clipped
     left = np.ones(n, dtype=bool)
     triangles = []
     for _ in range(n - 2):
@@ -101,7 +101,7 @@ def _roundness(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
 
 
 def _any_inside(ear: FloatArray, others: FloatArray) -> bool:
-    """Tell whether any of *others* (k, 2) lies in the counter-clockwise *ear* or on its rim."""
+    """Return whether any of *others* (k, 2) is in counter-clockwise *ear* or on its boundary."""
     inside = np.ones(len(others), dtype=bool)
     slack = _STRAIGHT * float(np.ptp(ear, axis=0).max()) ** 2
     for start, end in ((0, 1), (1, 2), (2, 0)):
@@ -111,7 +111,7 @@ def _any_inside(ear: FloatArray, others: FloatArray) -> bool:
 
 
 def _is_simple(flat: FloatArray) -> bool:
-    """Tell whether the polygon *flat* (n, 2) runs counter-clockwise and no two sides cross."""
+    """Return whether the polygon *flat* (n, 2) is counter-clockwise and no two sides cross."""
     n, after = len(flat), np.roll(flat, -1, axis=0)
     area = (flat[:, 0] * after[:, 1] - flat[:, 1] * after[:, 0]).sum()
     if area <= _AREA * float(np.ptp(flat, axis=0).max()) ** 2 / n:
@@ -124,7 +124,7 @@ def _is_simple(flat: FloatArray) -> bool:
     slack = _STRAIGHT * float(np.ptp(flat, axis=0).max()) ** 2
 
     def parted(start: FloatArray, end: FloatArray, p: FloatArray, q: FloatArray) -> BoolArray:
-        """Tell the pairs whose points p and q lie on two sides of the line."""
+        """Return the pairs whose points p and q lie on different sides of the line."""
         u, v, w = end - start, p - start, q - start
         left, right = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]
         return (np.minimum(left, right) < -slack) & (np.maximum(left, right) > slack)

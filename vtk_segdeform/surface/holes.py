@@ -1,16 +1,16 @@
-"""Close holes with lids that have no flat triangle and, where there is a way, cross nothing.
+"""Close holes with lids that have no flat triangle and, where possible, no intersections.
 
-A lid over the corners of its loop alone is enough where its triangles are about as round as the
-faces along the border.  Others get interior vertices.  A lid that crosses itself or the surface
-around is tried again from other triangulations of its loop, and the best one is kept:
+A lid over the corners of its loop alone is enough where its triangles are about as well shaped as
+the faces along the border.  Others get interior vertices.  A lid that intersects itself or the
+surrounding surface is built again from other triangulations of its loop, and the best one is kept:
 
     least area       by dynamic programming; cuts off bays and follows a curved border
-    clipped ears     of the loop as seen along its mean normal; for a plane border, however it
-                     winds, and any other that is simple as seen so
+    clipped ears     of the projected loop; for planar borders, however they wind, and others with
+                     a simple projection
     least bending    the smallest largest angle to the neighbours first; leaves the surface
                      smoothly
 
-All holes are worked on together, so that a mesh with thousands of them takes seconds.
+All holes are processed together, so that a mesh with thousands of them takes seconds.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from .quality import least_angle, normals
 from .topology import Sides, edge_keys
 
 _CUBIC = 64  # corners of a loop that dynamic programming takes at once
-_ROUND = np.deg2rad(20.0)  # no lid needs better triangles than this
-_WORTH = 1.1  # by how much interior vertices must widen the least angle
+_ROUND = np.deg2rad(20.0)  # least angle that is good enough for any lid
+_WORTH = 1.1  # factor by which interior vertices must increase the least angle
 _FLAT = 1e-9  # radians
-_NEAREST = 8  # border vertices whose arrays a new one mixes
+_NEAREST = 8  # border vertices that a new one interpolates
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,9 @@ class Closing:
     faces : (k, 3) int
         The lids, hole by hole.
     sources, weights : (c, 8) int, (c, 8) float
-        Border vertices near each new one, and their shares in it; rows sum to 1.
+        Border vertices near each new one, and their weights; rows sum to 1.
     n_crossing : int
-        How many lids cross themselves or the surface all the same; those without area not counted.
+        Number of lids that still intersect themselves or the surface, degenerate ones excluded.
     """
 
     sizes: list[int]
@@ -64,14 +64,14 @@ class Closing:
 
 @dataclass(frozen=True)
 class _Scores:
-    """How good the lids over some loops are, (h,) each; the first difference decides."""
+    """Quality of the lids over some loops, (h,) each; the first difference decides."""
 
     crossings: IntArray
     flat: IntArray
     angle: FloatArray
 
     def worse_than(self, other: _Scores) -> BoolArray:
-        """Tell for which loops the *other* lid is better by enough to be worth it."""
+        """Return for which loops the *other* lid is sufficiently better."""
         clearer = other.crossings < self.crossings
         even = other.crossings == self.crossings
         fuller = even & (other.flat < self.flat)
@@ -100,7 +100,7 @@ def close_holes(vertices: FloatArray, sides: Sides, largest: int) -> Closing:
 
 
 class _Holes:
-    """The loops to close, (h) of them, and the surface around.
+    """The h loops to close, and the surrounding surface.
 
     The corners of all loops, one after another, are the first vertices of all `Lids` here.
     """
@@ -145,7 +145,7 @@ def _best_lids(holes: _Holes) -> tuple[Lids, _Scores]:
     """Return the best lid found for every loop."""
     lids = plain = _plain(holes)
     narrow = _least(holes, lids) < holes.wanted
-    scores = _scores(holes, lids, lids, ~narrow)  # others count as worse than anything refined
+    scores = _scores(holes, lids, lids, ~narrow)  # others count as worse than any refined lid
     again = narrow | (scores.crossings > 0)
     for attempt in (_refined, _as_seen, _least_bending, _plain_again):
         asked = again & (holes.length > 3)
@@ -168,7 +168,7 @@ def _best_lids(holes: _Holes) -> tuple[Lids, _Scores]:
 
 
 def _plain(holes: _Holes) -> Lids:
-    """Return lids over corners alone, least area; where edges are in the way, around a centre.
+    """Return lids of least area over corners alone; fans where existing edges prevent them.
 
     Loops that would share a new edge with an earlier one are closed again without it.
     """
@@ -211,7 +211,7 @@ def _over_corners(holes: _Holes, some: IntArray, known: IntArray) -> tuple[IntAr
 
 
 def _in_conflict(holes: _Holes, lids: Lids) -> tuple[IntArray, IntArray]:
-    """Return the loops whose lids have an edge that an earlier one has, and all edges there are."""
+    """Return the loops whose lids share an edge with an earlier one, and all existing edges."""
     one, other = lids.faces.ravel(), lids.faces[:, [1, 2, 0]].ravel()
     old = (lids.origin[one] >= 0) & (lids.origin[other] >= 0)
     keys = edge_keys(lids.origin[one[old]], lids.origin[other[old]], len(holes.vertices))
@@ -320,7 +320,7 @@ def _least(holes: _Holes, lids: Lids) -> FloatArray:
 def _scores(holes: _Holes, rest: Lids, lids: Lids, asked: BoolArray) -> _Scores:
     """Judge the *lids* over the loops *asked* (h,), where the *rest* close the others.
 
-    A lid of one triangle has no alternative, so whether it crosses anything is not asked.
+    A lid of one triangle has no alternative, so it is not tested for intersections.
     """
     h, k = len(holes.length), len(holes.corners)
     both = _together(holes, _only(holes, rest, ~asked), _only(holes, lids, asked))

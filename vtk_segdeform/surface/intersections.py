@@ -72,9 +72,9 @@ def self_intersections(vertices: ArrayLike, faces: ArrayLike) -> IntArray:
 
 
 def intersections_of(vertices: FloatArray, faces: IntArray, some: IntArray) -> IntArray:
-    """Return the pairs that `self_intersections` would, but only those of the faces *some* (s,).
+    """Return the pairs of `self_intersections` that involve the faces *some* (s,).
 
-    Costs as much as there are faces near those, not as there are in all.
+    The cost depends on the number of faces nearby, not on the size of the mesh.
 
     Returns
     -------
@@ -92,8 +92,8 @@ def intersections_of(vertices: FloatArray, faces: IntArray, some: IntArray) -> I
 def _boxes_near(low: FloatArray, high: FloatArray, some: IntArray) -> Iterator[IntArray]:
     """Yield the pairs of *some* boxes and any others that overlap or touch, sizes sorted apart.
 
-    Boxes of about one size are found by their centres, so that a large one costs the small ones
-    nothing.
+    Boxes of similar size are searched by their centres, so that one large box does not slow down
+    the search of the small ones.
     """
     centre, radius = 0.5 * (low + high), 0.5 * np.linalg.norm(high - low, axis=1)
     size = np.frexp(radius)[1]

@@ -1,18 +1,19 @@
-"""Refine lids: interior vertices as dense as the border, round triangles, the least area.
+"""Refine lids: interior vertices as dense as the border, well-shaped triangles, least area.
 
-Many lids are refined as one surface, disjoint as they are.  Three operations take turns:
+Many disjoint lids are refined as one surface.  Three operations alternate:
 
-    split    interior edges much longer than the size wanted there get a vertex in the middle
-    flip     an interior edge gives way to the other diagonal where that widens the least angle
-    relax    interior vertices move to the mean of their neighbours, or not at all where that
-             would turn a triangle over or narrow the least angle around
+    split    interior edges much longer than the target size get a vertex in the middle
+    flip     an interior edge is replaced by the other diagonal where that increases the least
+             angle
+    relax    interior vertices move to the mean of their neighbours, unless that would invert a
+             triangle or reduce the least angle around
 
-and at the end the interior settles on the surface of least area, on which the cotangent Laplacian
-of the positions vanishes.  A plane border gives a plane lid.  The size wanted is that of the border
+Finally the interior moves onto the surface of least area, on which the cotangent Laplacian of the
+positions vanishes.  A planar border gives a planar lid.  The target size is that of the border
 edges, and grows by `_GROWTH` with every unit of distance from them: the number of new vertices is
 then proportional to that of border edges, not to its square.
 
-Of the edges of one triangle only one is changed at a time.
+Only one edge of a triangle is changed at a time.
 
 Source
 ------
@@ -33,12 +34,12 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from .quality import corner_angles, least_angle, normals
 from .topology import Sides, edge_keys
 
-_GROWTH = 0.3  # of the size wanted, per unit of distance from the border
-_LONG = 1.4  # times the size wanted: longer edges are split
-_ROUND = np.deg2rad(25.0)  # least angles beyond this need not widen
-_GAIN = 1.01  # times wider the least angle must be after a flip
+_GROWTH = 0.3  # of the target size, per unit of distance from the border
+_LONG = 1.4  # times the target size: longer edges are split
+_ROUND = np.deg2rad(25.0)  # least angles beyond this need not increase
+_GAIN = 1.01  # factor by which a flip must increase the least angle
 _FLAT = 1e-9  # radians
-_LEAST_WEIGHT = 1e-3  # cotangents may be negative, means not
+_LEAST_WEIGHT = 1e-3  # cotangents may be negative, weights of a mean may not
 _ROUNDS = 50
 _FLIPS = 5
 _SETTLE = 4
@@ -53,7 +54,7 @@ class Lids:
     points : (k, 3) float
         The first are the corners of the loops, which do not move.
     size : (k,) float
-        The edge length wanted there.
+        The target edge length.
     origin : (k,) int
         The vertex of the surface that each is; -1 for a new one.
     owner : (k,) int
@@ -81,10 +82,10 @@ def refine(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
     lids : Lids
         Triangles over corners of loops only.
     taken : (t,) int
-        Sorted `edge_keys` of edges of the surface around.  A lid that joins two corners so gets a
-        vertex on that edge.
+        Sorted `edge_keys` of the surrounding surface.  A lid edge that is among them gets a
+        vertex in its middle.
     n_vertices : int
-        Of the surface around, as the keys were made with.
+        Of the surrounding surface, as used for the keys.
     """
     for _ in range(_ROUNDS):
         split = _split(lids, taken, n_vertices)
@@ -113,7 +114,7 @@ def _interior(lids: Lids) -> tuple[IntArray, IntArray, IntArray, IntArray, IntAr
 def _some_apart(urgency: FloatArray, one: IntArray, other: IntArray, n_faces: int) -> IntArray:
     """Return edges to change at once, (k,) int: urgent ones, no two of them on one face.
 
-    Of those on a face the most urgent is taken; among equal ones lots are drawn.
+    On each face the most urgent edge is chosen; ties are broken at random.
     """
     some = np.flatnonzero(urgency > 0)
     lots = np.random.default_rng(len(some)).permutation(len(some))
@@ -126,7 +127,7 @@ def _some_apart(urgency: FloatArray, one: IntArray, other: IntArray, n_faces: in
 
 
 def _among(keys: IntArray, known: IntArray) -> BoolArray:
-    """Tell which *keys* are in the sorted *known*."""
+    """Return which *keys* are in the sorted *known*."""
     if not len(known):
         return np.zeros(len(keys), dtype=bool)
     return np.asarray(known[np.searchsorted(known, keys).clip(max=len(known) - 1)] == keys)
@@ -135,13 +136,13 @@ def _among(keys: IntArray, known: IntArray) -> BoolArray:
 def _joins_neighbours(
     lids: Lids, a: IntArray, b: IntArray, taken: IntArray, n_vertices: int
 ) -> BoolArray:
-    """Tell which pairs of lid vertices are joined by an edge of the surface around."""
+    """Return which pairs of lid vertices are joined by an edge of the surrounding surface."""
     one, other = lids.origin[a], lids.origin[b]
     return _among(edge_keys(one, other, n_vertices), taken) & (one >= 0) & (other >= 0)
 
 
 def joined_twice(lids: Lids, known: IntArray, n_vertices: int) -> BoolArray:
-    """Tell which interior edges (e,) the surface around has too, or a lid over an earlier loop."""
+    """Return which interior edges (e,) exist in the surface or in a lid of an earlier loop."""
     a, b, *_ = _interior(lids)
     one, other = lids.origin[a], lids.origin[b]
     old = np.flatnonzero((one >= 0) & (other >= 0))
@@ -155,9 +156,9 @@ def joined_twice(lids: Lids, known: IntArray, n_vertices: int) -> BoolArray:
 
 
 def split_edges(lids: Lids, urgency: FloatArray) -> Lids:
-    """Return *lids* with a vertex in the middle of interior edges (e,) of an *urgency* beyond 0.
+    """Return *lids* with a vertex in the middle of interior edges (e,) of positive *urgency*.
 
-    Of the edges of one triangle only one is split; *lids* itself comes back if there is none.
+    Only one edge of a triangle is split; *lids* itself is returned if there is none.
     """
     a, b, c, d, f, g = _interior(lids)
     some = _some_apart(urgency, f, g, len(lids.faces))
@@ -179,7 +180,7 @@ def split_edges(lids: Lids, urgency: FloatArray) -> Lids:
 
 
 def _split(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
-    """Split long edges, and those that the surface around has already; *lids* if there are none."""
+    """Split long edges, and those that exist in the surface; return *lids* if there are none."""
     a, b, *_ = _interior(lids)
     length = np.linalg.norm(lids.points[a] - lids.points[b], axis=1)
     ratio = length / (_LONG * 0.5 * (lids.size[a] + lids.size[b]))
@@ -188,7 +189,7 @@ def _split(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
 
 
 def _flip(lids: Lids, taken: IntArray, n_vertices: int, times: int) -> Lids:
-    """Flip edges where that widens the least angle of both triangles and folds nothing."""
+    """Flip edges where that increases the least angle of both triangles and folds nothing."""
     k = len(lids.points)
     for _ in range(times):
         edges = np.stack(_interior(lids))
@@ -222,7 +223,7 @@ def _flip(lids: Lids, taken: IntArray, n_vertices: int, times: int) -> Lids:
 
 
 def _relax(lids: Lids) -> Lids:
-    """Move interior vertices to the mean of their neighbours, as far as triangles gain by it."""
+    """Move interior vertices to the mean of their neighbours where that improves triangles."""
     one, other = lids.faces.ravel(), lids.faces[:, [1, 2, 0]].ravel()
     k = len(lids.points)
     count = np.bincount(one, minlength=k) + np.bincount(other, minlength=k)
@@ -237,9 +238,9 @@ def _relax(lids: Lids) -> Lids:
 
 
 def harmonic(lids: Lids, values: FloatArray) -> FloatArray:
-    """Return *values* (k, d) with those of interior vertices as smooth as the border lets them.
+    """Return *values* (k, d) with harmonic values at interior vertices.
 
-    They are means of their neighbours' by cotangent weights, and so between the border's.
+    Each is the cotangent-weighted mean of its neighbours, and so between those of the border.
     """
     free, fixed = np.flatnonzero(lids.free), np.flatnonzero(~lids.free)
     if not len(free):
@@ -257,15 +258,15 @@ def harmonic(lids: Lids, values: FloatArray) -> FloatArray:
 
 
 def _settle(lids: Lids) -> Lids:
-    """Move the interior onto the surface of least area, as far as no triangle suffers by it."""
+    """Move the interior onto the surface of least area where no triangle gets worse."""
     return _moved(lids, harmonic(lids, lids.points), 0.5 * _ROUND)
 
 
 def _moved(lids: Lids, there: FloatArray, enough: float) -> Lids:
-    """Return the lids with interior vertices moved to *there* (k, 3), but for those that do harm.
+    """Return the lids with interior vertices moved to *there* (k, 3), except where that does harm.
 
-    Harm is to turn a triangle over, or to narrow one to less than *enough* and than the least
-    angle that was around the vertex.
+    A move does harm if it inverts a triangle, or reduces an angle to less than *enough* and less
+    than the previous least angle around the vertex.
     """
     before = lids.points[lids.faces]
     old, up = least_angle(before), normals(before)

@@ -6,8 +6,8 @@ triangle between them, so the cost of the best one over v_i ... v_j is
     C(i, i+1) = 0        C(i, j) = min over i < k < j of  C(i, k) + C(k, j) + c(i, k, j)
 
 from short spans to long ones: n^3 / 6 triangles, n^2 memory.  The cost c of a triangle is its area
-plus a thousandth of its squared sides, so that of equal areas the rounder triangles win, plus a
-charge for a triangle without area.  With *outer* normals, the largest angle between neighbouring
+plus a thousandth of its squared sides, so that better-shaped triangles win among equal areas, plus
+a penalty for a degenerate triangle.  With *outer* normals, the largest angle between neighbouring
 triangles, including the faces outside the loop, decides first [Lie03], in steps of five degrees so
 that rounding does not.
 
@@ -27,9 +27,9 @@ import numpy as np
 from ..arrays import BoolArray, FloatArray, IntArray
 
 _ROUNDNESS = 1e-3
-_FLAT, _FLAT_CHARGE = 1e-4, 0.05  # twice the area, and the charge, as shares of the longest side^2
+_FLAT, _FLAT_CHARGE = 1e-4, 0.05  # twice the area, and the penalty, over the longest side^2
 _STEP = np.deg2rad(5.0)
-_BRANCHES = 48  # corners that stand for a longer loop
+_BRANCHES = 48  # corners that represent a longer loop
 _AT_ONCE = 2_000_000  # triangles compared together
 
 
@@ -123,9 +123,9 @@ def triangulate_loops(
 
 
 def triangulate_long_loop(points: FloatArray) -> IntArray:
-    """Return n - 2 triangles over a loop (n, 3) of any length, in time that grows with n.
+    """Return n - 2 triangles over a loop (n, 3) of any length, in time proportional to n.
 
-    A few of its corners are closed first, then what lies between each of their chords and the
+    A few of its corners are closed first, then the part between each of their chords and the
     border, and so on.
     """
     n = len(points)

@@ -1,8 +1,8 @@
 """The steps of a repair: each takes a draft of the mesh, and returns a better one and a sentence.
 
-A step that finds nothing to do returns its draft and ""; several sentences stand on lines of
-their own.  The steps from `split` on want every edge to be sound; where one is left that is not,
-they leave the mesh alone, and the report says why.
+A step that finds nothing to do returns its draft and ""; several sentences are on separate lines.
+The steps from `split` on require edges without faults; where a faulty edge remains, they leave the
+mesh unchanged, and the report says why.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from .topology import (
 
 @dataclass(frozen=True)
 class Draft:
-    """A mesh under repair; the maps name what each vertex and face was, -1 for a new one.
+    """A mesh under repair; the maps give the original of each vertex and face, -1 for a new one.
 
-    *mix* (n, o) has the shares of the o original vertices in each vertex, *turned* (m,) tells
-    which faces were turned round.
+    *mix* (n, o) has the weights of the o original vertices at each vertex, *turned* (m,) says
+    which faces were flipped.
     """
 
     vertices: FloatArray
@@ -48,7 +48,7 @@ class Draft:
 
     @classmethod
     def of(cls, vertices: FloatArray, faces: IntArray) -> Draft:
-        """Return the draft of a mesh to which nothing is done yet."""
+        """Return the draft of a mesh before any repair."""
         n = len(vertices)
         mix = sparse.eye_array(n, format="csr")
         turned = np.zeros(len(faces), dtype=bool)
@@ -134,10 +134,10 @@ def weld(draft: Draft, distance: float) -> tuple[Draft, str]:
 
 
 def weld_corners(draft: Draft, distance: float) -> tuple[Draft, str]:
-    """Make border vertices one that lie within *distance*, where holes touch in a corner only.
+    """Weld border vertices within *distance* of each other where holes touch at a corner only.
 
-    Without that, two holes would count as one whose border runs through the corner twice.  Where
-    edges would become one, too, nothing is welded: that is for `weld` to decide.
+    Otherwise two holes would count as one whose border passes the corner twice.  Where edges would
+    be merged, too, nothing is welded: that is left to `weld`.
     """
     sides, n = draft.sides, len(draft.vertices)
     border = np.union1d(sides.tail[sides.open], sides.head[sides.open])
@@ -249,7 +249,7 @@ def fill(draft: Draft, largest: int) -> tuple[Draft, str]:
     sentence += f" and {_n(closing.vertices, 'new vertex', 'new vertices')}" if new else ""
     if closing.n_crossing:
         lids = "1 lid crosses" if closing.n_crossing == 1 else f"{closing.n_crossing} lids cross"
-        sentence += f"\n{lids} the surface or another lid; none was found that does not"
+        sentence += f"\n{lids} the surface or another lid; no alternative was found"
     rows = np.repeat(np.arange(new), closing.sources.shape[1])
     mix = sparse.coo_array(
         (closing.weights.ravel(), (rows, closing.sources.ravel())),
@@ -270,7 +270,7 @@ def fill(draft: Draft, largest: int) -> tuple[Draft, str]:
 
 
 def close_flat(draft: Draft) -> tuple[Draft, str]:
-    """Cut the faces beside lids without area, where a vertex lies on their side, instead."""
+    """Replace degenerate lids by splitting the adjacent faces at the vertex on their edge."""
     lids = draft.face_map < 0
     faces, changed = close_cracks(draft.vertices, draft.faces, lids)
     if not changed.any():
@@ -282,11 +282,11 @@ def close_flat(draft: Draft) -> tuple[Draft, str]:
         face_map=np.where(changed, -1, draft.face_map)[order],
         turned=(draft.turned & ~changed)[order],
     )
-    return cut, f"cut {_n(changed & ~lids, 'face')} at vertices on a side, to close cracks"
+    return cut, f"split {_n(changed & ~lids, 'face')} at vertices on an edge, to close cracks"
 
 
 def holes_beyond(draft: Draft, largest: int) -> tuple[int, ...]:
-    """Return the numbers of edges of the holes that `fill` leaves for their size alone."""
+    """Return the number of edges of each hole that `fill` leaves open only because of its size."""
     if len(draft.sides.crowded) or draft.sides.turned.any():
         return ()
     loops = border_loops(draft.vertices, draft.sides, len(draft.sides.open))

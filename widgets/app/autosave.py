@@ -100,7 +100,7 @@ class Slot:
             If it cannot be written; what was kept before stays.
         """
         if self.path.is_symlink():
-            raise SessionError(f"{self.path}: is a link, which unsaved work is not written through")
+            raise SessionError(f"{self.path}: is a link; unsaved work is not written through links")
         save_session(self.path, session)
 
     def read(self, progress: Progress) -> Session:
@@ -118,7 +118,7 @@ class Slot:
         if _is_file(self.path):
             self.path.unlink(missing_ok=True)
         self.release()  # where open files cannot be deleted
-        with suppress(OSError):  # somebody else who found it empty deletes it too; or it is not
+        with suppress(OSError):  # another process may have deleted it, or it is not empty
             for path in list(self._folder.iterdir()):
                 if (path.name in (_LOCK, _ABOUT) or is_draft(path.name)) and _is_file(path):
                     path.unlink(missing_ok=True)
@@ -203,7 +203,7 @@ class Autosaves:
 
 
 def _hold(folder: Path) -> int | None:
-    """Lock a folder if its name and its mark are those of a slot; else leave it untouched."""
+    """Lock a folder if its name and mark are those of a slot; otherwise leave it untouched."""
     status = os.lstat(folder)
     named = _NAME.fullmatch(folder.name) and stat.S_ISDIR(status.st_mode) and is_ours(status)
     if not (named and _is_file(folder / _LOCK)):
@@ -213,7 +213,7 @@ def _hold(folder: Path) -> int | None:
         return None
     mark = os.read(handle, len(_MARK) + 1)
     by_earlier = not mark and (_is_file(folder / _SESSION) or _read_about(folder) != About())
-    if mark == _MARK or by_earlier:  # versions that left the lock empty
+    if mark == _MARK or by_earlier:  # earlier versions left the lock empty
         return handle
     os.close(handle)
     return None

@@ -30,7 +30,7 @@ class Recent:
         return [Path(name) for name in names if isinstance(name, str) and name]
 
     def add(self, path: Path) -> None:
-        """Put a file first, unless its name is not valid Unicode, which settings cannot hold."""
+        """Put a file first, unless its name is not valid Unicode, which settings cannot store."""
         path = path.absolute()
         if not _is_text(str(path)):
             return

@@ -124,7 +124,7 @@ def _draw(window: Any, desk: Desk, path: Path) -> None:
     content = QtCore.QBuffer()
     content.open(QtCore.QIODevice.OpenModeFlag.WriteOnly)
     if path.suffix.lower() not in _PICTURE or not picture.save(content, path.suffix[1:].upper()):
-        raise SessionError(f"{path}: cannot be written as a picture; name a .png or a .jpg")
+        raise SessionError(f"{path}: this picture format is not supported; use .png or .jpg")
     try:
         with replacing(path) as draft:
             draft.write_bytes(bytes(content.data()))

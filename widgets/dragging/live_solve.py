@@ -68,9 +68,9 @@ class LiveSolve:
         self.go_on()
 
     def go_on(self) -> None:
-        """Refine, if the present pose is one that was stopped early; or else rest.
+        """Refine the current pose if it was stopped early; otherwise stop refining.
 
-        Nor where other options or cages would have to be bound first, which takes long.
+        Also stop where changed options or cages would have to be bound first, which takes long.
         """
         solution = self._session.solution
         is_final = solution is None or solution.status is not Status.STEP_LIMIT

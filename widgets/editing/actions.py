@@ -70,7 +70,7 @@ def reset(desk: Desk) -> None:
 def save(desk: Desk) -> None:
     """Save to the editor's file; one that is somebody else's only when asked twice."""
     place = desk.place
-    question = f"{place} is there already: again to replace it"
+    question = f"{place} already exists; save again to replace it"
     if desk.file.may_replace(place) or desk.voice.confirms(question):
         desk.save()
 

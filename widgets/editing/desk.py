@@ -174,16 +174,16 @@ class Desk:
     def start(
         self, doing: str, work: Callable[[Progress], Any], done: Callable[[Any], object]
     ) -> None:
-        """Do *work* in another thread, then *done* here with what it returned; see `Work.start`.
+        """Run *work* in another thread, then *done* here with its result; see `Work.start`.
 
-        What is dragged or painted is finished first: the work begins with it done.
+        An ongoing drag or stroke is finished before the work starts.
         """
 
         def deliver(result: Any) -> None:
             done(result)
             self._settle()
 
-        self.stage.finish()  # before there is a job: it may fail
+        self.stage.finish()  # before the job starts, because it may fail
         self._work.start(doing, work, deliver)
         self.stage.rest()
         self.refresh()
@@ -193,7 +193,7 @@ class Desk:
         self._work.wait()
 
     def cancel(self) -> None:
-        """Stop the job; or else take back what is in hand; or else put away the card of keys."""
+        """Cancel the job, or else the ongoing drag or stroke, or else close the key card."""
         if self.is_busy:
             self._work.cancel()
             self.refresh()

@@ -144,7 +144,7 @@ class Job(Generic[T]):
         self._ended = True
         error = self._future.exception()
         self._stopping |= isinstance(error, Cancelled)
-        with ExitStack() as told:  # a watcher that fails does not lose the result
+        with ExitStack() as told:  # the result is delivered even if a watcher raises
             told.callback(self._hand_over, error)
             self._tell()
 

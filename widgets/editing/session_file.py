@@ -46,7 +46,7 @@ class SessionFile:
         return self.may_replace(self.path)
 
     def may_replace(self, place: Path) -> bool:
-        """Return whether writing to *place* loses no file of others."""
+        """Return whether writing to *place* overwrites no file of another origin."""
         return self._ours == place or not os.path.isfile(place)
 
     def is_behind(self, session: Session) -> bool:

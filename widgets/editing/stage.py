@@ -134,17 +134,17 @@ class Stage:
         self.overlay.prepare()
 
     def finish(self) -> None:
-        """End the drag or stroke in hand as if the button had been released."""
+        """Finish the ongoing drag or stroke as if the button had been released."""
         for widget in self.widgets:
             widget.finish()
 
     def cancel(self) -> bool:
-        """End the drag or stroke in hand as if it had never begun; False if there was none."""
+        """Cancel the ongoing drag or stroke; False if there was none."""
         return any(widget.cancel() for widget in self.widgets)
 
     def rest(self) -> None:
-        """Switch all widgets off; what is in hand is finished, what is shown stays."""
-        with ExitStack() as all_of_them:  # also after one that fails
+        """Switch all widgets off; an ongoing drag is finished, and the display is unchanged."""
+        with ExitStack() as all_of_them:  # continues if one of them raises
             for widget in self.widgets:
                 all_of_them.callback(widget.Off)
 

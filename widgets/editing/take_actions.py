@@ -26,7 +26,7 @@ def film(desk: Desk) -> None:
     """Begin to film what the deform mode shows, or end it and write the film as a job."""
     takes = desk.takes
     if not takes.is_filming:
-        film_place(desk.place)  # what cannot be written is better said now
+        film_place(desk.place)  # report an unwritable place before filming
         takes.take(lambda: desk.mode is Mode.DEFORM and not desk.is_busy)
         here = "" if desk.mode is Mode.DEFORM else ", in mode 4"
         desk.say(f"filming what is drawn{here}; Ctrl+M ends it")

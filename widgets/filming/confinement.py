@@ -1,6 +1,6 @@
 """Confine a replay: its keys read and write files only below a given folder, or not at all.
 
-The user who replays a recording has not pressed its Ctrl+S.
+The recording may come from an untrusted source, and its Ctrl+S must not overwrite any other file.
 """
 
 from __future__ import annotations
@@ -43,10 +43,12 @@ def place_of(interactor: Any, path: Path) -> Path:
     folder = _folders[interactor]
     if folder is None:
         raise SessionError(
-            f"{path.name}: not accessed; a replay reads and writes files only in a folder that it "
-            "is given"
+            f"{path.name}: not accessed; a replay reads and writes files only in the folder passed "
+            "to it"
         )
     place = folder / path.name
     if not place.resolve().is_relative_to(folder.resolve()):
-        raise SessionError(f"{place}: is a link that leads out of the folder of the replay")
+        raise SessionError(
+            f"{place}: is a link that leads out of the folder of the replay; remove it"
+        )
     return place

@@ -1,4 +1,4 @@
-"""Limits of a replay: a recording may come from a stranger, and ask for years of work."""
+"""Limits of a replay: an untrusted recording could otherwise run for years."""
 
 from __future__ import annotations
 

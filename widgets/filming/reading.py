@@ -26,7 +26,7 @@ def read_recording(
     source : path or iterable of str
         The file, or its lines.
     limits : ReplayLimits, optional
-        How much it may be.
+        Limits on the events and the window size.
 
     Raises
     ------
