@@ -21,7 +21,11 @@ if sys.platform == "linux" and not os.environ.get("DISPLAY"):
     # Without a screen VTK warns once per window that X cannot be reached; EGL needs none.
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
-from vtk_segdeform import models  # noqa: E402 - reads what is set above
+import pyvista as pv  # noqa: E402 - reads what is set above
+
+from vtk_segdeform import models  # noqa: E402
+
+pv.global_theme.multi_samples = 1  # smooth edges take five times as long to draw in software
 
 models.cactus = functools.cache(models.cactus)  # the one that makes it anew is its __wrapped__
 models.dinosaur = functools.cache(models.dinosaur)

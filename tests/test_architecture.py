@@ -8,10 +8,8 @@ from __future__ import annotations
 import ast
 import functools
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-
-import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "vtk_segdeform"
@@ -170,10 +168,28 @@ def tree_of(name: str) -> ast.Module:
     return ast.parse(FILES[name].read_text())
 
 
-def imports(name: str) -> Iterator[tuple[str, bool]]:
-    """Yield (module, is ours) for every import anywhere in a file, inside functions too."""
+@functools.cache
+def nodes_of(name: str) -> tuple[ast.AST, ...]:
+    """Return all nodes of a file, which takes longer than what is asked of them."""
+    return tuple(ast.walk(tree_of(name)))
+
+
+@functools.cache
+def calls_in(name: str) -> tuple[tuple[str, ast.Call], ...]:
+    """Return all calls in a file, each with the text of what it calls."""
+    calls = (node for node in nodes_of(name) if isinstance(node, ast.Call))
+    return tuple((ast.unparse(call.func), call) for call in calls)
+
+
+@functools.cache
+def imports(name: str) -> frozenset[tuple[str, bool]]:
+    """Return (module, is ours) for every import anywhere in a file, inside functions too."""
+    return frozenset(_imports(name))
+
+
+def _imports(name: str) -> Iterator[tuple[str, bool]]:
     folder = name.split(".")[:-1]
-    for node in ast.walk(tree_of(name)):
+    for node in nodes_of(name):
         if isinstance(node, ast.Import):
             yield from ((alias.name.partition(".")[0], False) for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.level:
@@ -193,73 +209,101 @@ def imports(name: str) -> Iterator[tuple[str, bool]]:
                 yield from ((alias.name, True) for alias in node.names)
 
 
+def none(offences: Iterable[str]) -> None:
+    """Fail with all the *offences* at once, "file: offence" each."""
+    found = sorted(set(offences))
+    assert not found, "\n" + "\n".join(found)
+
+
 def test_every_file_has_its_place_in_the_story():
     assert sorted(STORY) == sorted(NAMES)
     assert len(set(STORY)) == len(STORY)
 
 
-@pytest.mark.parametrize("name", CHAPTERS)
-def test_a_chapter_imports_only_earlier_ones(name):
-    earlier = set(STORY[: STORY.index(name)]) | {"__version__"}
-    later = {module for module, ours in imports(name) if ours} - earlier
-    assert not later, f"{name} imports {sorted(later)}, which the story tells later"
+def test_a_chapter_imports_only_earlier_ones():
+    places = {"__version__": -1} | {name: place for place, name in enumerate(STORY)}
+    none(
+        f"{name}: imports {module}, which the story tells later"
+        for name in CHAPTERS
+        for module, ours in imports(name)
+        if ours and places.get(module, len(STORY)) >= places[name]
+    )
 
 
-@pytest.mark.parametrize("name", CHAPTERS)
-def test_a_chapter_imports_only_the_libraries_it_is_granted(name):
-    granted = GRANTED.get(name, VTK if name.startswith("widgets.") else set())
-    allowed = NUMERIC | granted | set(sys.stdlib_module_names)
-    foreign = {module for module, ours in imports(name) if not ours} - allowed
-    assert not foreign, f"{name} imports {sorted(foreign)}"
+def test_a_chapter_imports_only_the_libraries_it_is_granted():
+    everywhere = NUMERIC | set(sys.stdlib_module_names)
+    none(
+        f"{name}: imports {module}"
+        for name in CHAPTERS
+        for module, ours in imports(name)
+        if not ours
+        and module not in everywhere
+        and module not in GRANTED.get(name, VTK if name.startswith("widgets.") else set())
+    )
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_a_chapter_is_short_enough_to_read_at_once(name):
-    text = FILES[name].read_text()
-    lines = text.count("\n")
-    reason = "Long because" in (ast.get_docstring(tree_of(name)) or "")
-    assert lines <= LONGEST or reason, f"{lines} lines; say 'Long because ...' or split it"
+def test_a_chapter_is_short_enough_to_read_at_once():
+    lengths = {name: path.read_text().count("\n") for name, path in FILES.items()}
+    none(
+        f"{name}: {length} lines; say 'Long because ...' or split it"
+        for name, length in lengths.items()
+        if length > LONGEST and "Long because" not in (ast.get_docstring(tree_of(name)) or "")
+    )
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_a_chapter_begins_by_saying_what_it_is(name):
-    assert ast.get_docstring(tree_of(name))
+def test_a_chapter_begins_by_saying_what_it_is():
+    none(f"{name}: no docstring" for name in FILES if not ast.get_docstring(tree_of(name)))
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_only_the_command_line_prints_or_exits(name):
-    if name in MAY_PRINT_AND_EXIT:
-        return
-    tree = tree_of(name)
-    calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
-    named = {call.id for call in calls if isinstance(call, ast.Name)}
-    raised = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-    dotted = {ast.unparse(call) for call in calls if isinstance(call, ast.Attribute)}
-    assert not named & {"print", "exit", "quit", "input"}
-    assert "SystemExit" not in raised
-    assert not dotted & {"sys.exit", "os._exit", "sys.stdout.write", "sys.stderr.write"}
+def test_only_the_command_line_prints_or_exits():
+    forbidden = {
+        "print", "exit", "quit", "input", "sys.exit", "os._exit", "sys.stdout.write",
+        "sys.stderr.write",
+    }  # fmt: skip
+    silent = [name for name in FILES if name not in MAY_PRINT_AND_EXIT]
+    none(
+        f"{name}: calls {what}"
+        for name in silent
+        for what in forbidden & {called for called, _ in calls_in(name)}
+    )
+    none(
+        f"{name}: names SystemExit"
+        for name in silent
+        for node in nodes_of(name)
+        if isinstance(node, ast.Name) and node.id == "SystemExit"
+    )
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_a_chapter_changes_no_global_state_and_evaluates_no_text(name):
-    tree = tree_of(name)
-    calls = {ast.unparse(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+def test_a_chapter_changes_no_global_state_and_evaluates_no_text():
     forbidden = {
         "eval", "exec", "compile", "np.random.seed", "np.seterr", "warnings.filterwarnings",
         "warnings.simplefilter", "logging.basicConfig", "pickle.load", "pickle.loads",
     }  # fmt: skip
-    assert not calls & forbidden
-    assert not any(isinstance(node, ast.Global) for node in ast.walk(tree))
+    none(
+        f"{name}: calls {what}"
+        for name in FILES
+        for what in forbidden & {called for called, _ in calls_in(name)}
+    )
+    none(
+        f"{name}: {ast.unparse(node)}"
+        for name in FILES
+        for node in nodes_of(name)
+        if isinstance(node, ast.Global)
+    )
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_public_functions_take_at_most_four_positional_arguments(name):
-    for node in ast.walk(tree_of(name)):
-        kernel = name.startswith("compiled.")  # numba wants arguments by position
-        if isinstance(node, ast.FunctionDef) and not (kernel or node.name.startswith("_")):
-            positional = [a.arg for a in node.args.posonlyargs + node.args.args]
-            positional = [arg for arg in positional if arg not in ("self", "cls")]
-            assert len(positional) <= 4, f"{node.name}({', '.join(positional)}): use keywords"
+def test_public_functions_take_at_most_four_positional_arguments():
+    offences = []
+    for name in FILES:
+        if name.startswith("compiled."):
+            continue  # numba wants arguments by position
+        for node in nodes_of(name):
+            if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+                positional = [a.arg for a in node.args.posonlyargs + node.args.args]
+                positional = [arg for arg in positional if arg not in ("self", "cls")]
+                if len(positional) > 4:
+                    offences.append(f"{name}: {node.name}({', '.join(positional)}): use keywords")
+    none(offences)
 
 
 # Given a draft to write to; the log of a recording, which grows event by event; and /proc.
@@ -268,39 +312,51 @@ WRITE_TO_WHAT_THEY_ARE_GIVEN = {
     "formats.reading_child", "widgets.filming.film_files", "widgets.recording",
     "benchmarks.measuring",
 }  # fmt: skip
+REPLACING = {
+    "os.replace", "os.rename", "os.renames", "os.link", "shutil.move", "tempfile.mkstemp",
+    "tempfile.mktemp", "tempfile.NamedTemporaryFile", "NamedTemporaryFile", "mkstemp",
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_files_are_replaced_in_one_place_and_written_only_there(name):
-    if name == "atomic":
-        return
-    tree = tree_of(name)
-    within = {
+def test_files_are_replaced_in_one_place():
+    none(
+        f"{name}: {ast.unparse(call)}: use atomic.replacing"
+        for name in FILES
+        if name != "atomic"
+        for what, call in calls_in(name)
+        if _replaces(what, call)
+    )
+
+
+def test_files_are_written_only_where_they_are_replaced():
+    none(
+        f"{name}: {ast.unparse(call)}: write to a draft of atomic.replacing"
+        for name in FILES
+        if name not in {"atomic", *WRITE_TO_WHAT_THEY_ARE_GIVEN}
+        for what, call in calls_in(name)
+        if _writes(what, call) and id(call) not in _within_replacing(name)
+    )
+
+
+def _within_replacing(name: str) -> set[int]:
+    """Return the ids of the calls of a file that are within `with replacing(...)`."""
+    return {
         id(call)
-        for block in ast.walk(tree)
+        for block in nodes_of(name)
         if isinstance(block, ast.With)
-        and any(_called(item.context_expr) == "replacing" for item in block.items)
+        and any(_is_replacing(item.context_expr) for item in block.items)
         for call in ast.walk(block)
     }
-    for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
-        what = _called(call)
-        assert what not in {
-            "os.replace", "os.rename", "os.renames", "os.link", "shutil.move", "tempfile.mkstemp",
-            "tempfile.mktemp", "tempfile.NamedTemporaryFile", "NamedTemporaryFile", "mkstemp",
-        }, f"{what}: use atomic.replacing"  # fmt: skip
-        renames = what.endswith((".rename", ".replace")) and len(call.args) == 1
-        assert not renames or call.keywords, f"{what}: use atomic.replacing"
-        if id(call) not in within and name not in WRITE_TO_WHAT_THEY_ARE_GIVEN:
-            assert not _writes(what, call), f"{ast.unparse(call)}: write to a draft of replacing"
 
 
-def _called(node: ast.expr) -> str:
-    """Return the dotted name that a call calls."""
-    if isinstance(node, ast.Call):
-        return _called(node.func)
-    if isinstance(node, ast.Attribute):
-        return f"{_called(node.value)}.{node.attr}"
-    return node.id if isinstance(node, ast.Name) else ""
+def _is_replacing(node: ast.expr) -> bool:
+    return isinstance(node, ast.Call) and ast.unparse(node.func) == "replacing"
+
+
+def _replaces(what: str, call: ast.Call) -> bool:
+    """Tell whether a call puts a file in the place of another one."""
+    renames = what.endswith((".rename", ".replace")) and len(call.args) == 1
+    return what in REPLACING or (renames and not call.keywords)
 
 
 def _writes(what: str, call: ast.Call) -> bool:
@@ -319,12 +375,14 @@ TIMERS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_only_the_view_creates_and_destroys_vtk_timers(name):
+def test_only_the_view_creates_and_destroys_vtk_timers():
     """Hosts may have one timer behind all of them, so a second owner would stop the first's."""
-    if name == "widgets.view":
-        return
-    tree = tree_of(name)
-    named = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
-    texts = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)}
-    assert not (named | texts) & TIMERS
+    none(
+        f"{name}: {word}"
+        for name in FILES
+        if name != "widgets.view"
+        for node in nodes_of(name)
+        for word in (getattr(node, "attr", None), getattr(node, "value", None))
+        if isinstance(node, ast.Attribute | ast.Constant)
+        if isinstance(word, str) and word in TIMERS
+    )

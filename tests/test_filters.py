@@ -16,7 +16,7 @@ import vtk_segdeform as sd
 from vtk_segdeform.convert import to_polydata
 from vtk_segdeform.filters import SegmentedCageDeformFilter
 
-MESH = sd.models.cactus(1500)
+MESH = sd.models.cactus(800)
 HEIGHT = MESH.vertices[:, 2]
 FIXED, HANDLE = np.flatnonzero(HEIGHT < 0.1), np.flatnonzero(HEIGHT > 0.9)
 SHIFT = np.array([0.25, 0.0, -0.05])
