@@ -95,6 +95,34 @@ def test_a_file_of_the_selection_of_many_gigabytes_is_refused(folder):
         parse_selection("ids.txt", BAR)
 
 
+def test_a_mesh_that_exceeds_memory_is_an_error_that_names_it(folder, monkeypatch, capsys):
+    def read(path):
+        raise MemoryError
+
+    with open("vast.obj", "wb") as file:
+        file.truncate(45 * 10**9)
+    monkeypatch.setitem(convert._READERS, ".obj", read)
+    assert main(["check", "vast.obj"]) == 1
+    told = capsys.readouterr().err
+    assert told == "segdeform check: vast.obj: too large for the memory of this machine (45 GB)\n"
+
+
+def test_work_that_exceeds_memory_is_an_error_in_one_line(folder, monkeypatch, capsys):
+    def solve(*_, **__):
+        raise MemoryError
+
+    monkeypatch.setattr(commands.Deformer, "solve", solve)
+    assert main(["deform", "bar.ply", "-o", "bent.ply", *POSE]) == 1
+    assert capsys.readouterr().err.endswith("segdeform deform: out of memory\n")
+
+
+@posix
+def test_a_pipe_is_told_from_a_file_that_is_not_there(folder):
+    os.mkfifo("pipe.obj")
+    with pytest.raises(MeshError, match=r"pipe\.obj: a device or a pipe, not a file"):
+        read_mesh("pipe.obj")
+
+
 @pytest.mark.parametrize(
     "words",
     [

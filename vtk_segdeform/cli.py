@@ -89,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader, head or less, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
-    except (SegDeformError, OSError, ValueError, RuntimeError) as error:
+    except (SegDeformError, OSError, ValueError, RuntimeError, MemoryError) as error:
         bar.clear()
         if options.debug:
             raise
@@ -129,6 +129,8 @@ def _told(error: Exception) -> str:
     """Return the error in one line."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
+    if isinstance(error, MemoryError):
+        return "out of memory"
     return " ".join(str(error).split()) or type(error).__name__
 
 

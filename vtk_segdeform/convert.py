@@ -16,7 +16,6 @@ warning is logged (`formats.array_names`).
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -39,6 +38,7 @@ from .formats.vtk_readers import read_with_vtk
 from .formats.vtk_writers import write_with_vtk
 from .formats.wavefront import read_obj, write_obj
 from .mesh import Mesh
+from .regular_file import fault_of
 
 _log = logging.getLogger(__name__)
 
@@ -101,10 +101,12 @@ def read_polydata(path: str | Path) -> pv.PolyData:
         If only PyMeshLab reads such files, and it is not installed.
     """
     path = as_path(path)
-    if not os.path.isfile(path):
-        raise MeshError(
-            f"{path}: {'a folder, not a' if os.path.isdir(path) else 'there is no such'} file"
-        )
+    try:
+        status = path.stat()
+    except (OSError, ValueError):
+        raise MeshError(f"{path}: there is no such file") from None
+    if what := fault_of(status):
+        raise MeshError(f"{path}: {what}")
     suffix = path.suffix.lower()
     if not is_mesh_file(path):
         known = {*_READERS, *_VTK_READS, *meshlab.READS}
@@ -121,6 +123,9 @@ def read_polydata(path: str | Path) -> pv.PolyData:
         raise MeshError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
     except (ValueError, IndexError, KeyError, OverflowError, OSError) as error:
         raise MeshError(f"{path}: is no readable {suffix} file ({error})") from None
+    except MemoryError:
+        size = f"{status.st_size / 1e9:.2g} GB"
+        raise MeshError(f"{path}: too large for the memory of this machine ({size})") from None
     if not surface.n_points or not surface.n_cells:
         raise MeshError(f"{path}: holds no surface; give it polygons")
     return surface

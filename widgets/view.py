@@ -4,7 +4,8 @@ Callbacks are guarded: an exception in one would be printed by VTK, or turned in
 pyvista, and be lost.  Here it reaches the listeners of `on_failure`: a status line, a test.
 
 While a camera style drags it keeps all mouse events to itself, so whoever has to follow the
-camera asks for `before_render` instead.
+camera asks for `before_render` instead.  Keys it would keep as well, and answer by VTK's own
+commands, such as stereo at "3": a key, unless it only modifies, ends the camera's drag first.
 
 `View.every` shares a single repeating timer among all views of an interactor, and nothing else in
 this package creates or destroys timers.  Some hosts, pyvistaqt among them, drive all VTK timers by
@@ -37,6 +38,7 @@ _log = logging.getLogger(__name__)
 Stop = Callable[[], None]
 _LONGEST = 86_400_000  # milliseconds between ticks: a day
 ABOVE_CAMERA = 1.0  # priority: VTK's own widgets have 0.5, camera styles 0
+_MODIFIERS = ("Shift", "Control", "Alt", "Super", "Meta", "Caps_Lock", "ISO_Level")
 _HEARS_KEYS = vtkCommand.UserEvent + 411  # never happens: a mark on renderers whose views do
 
 
@@ -143,8 +145,11 @@ class View(Sight):
         if event != "KeyPressEvent":
             return _once(lambda: self.interactor.RemoveObserver(tag))
         mark = self.renderer.AddObserver(_HEARS_KEYS, lambda *_: None)
+        first = self.interactor.AddObserver(event, self._end_camera_drag)
+        self.interactor.GetCommand(first).SetPassiveObserver(1)  # heard whoever has the focus
 
         def stop() -> None:
+            self.interactor.RemoveObserver(first)
             self.interactor.RemoveObserver(tag)
             self.renderer.RemoveObserver(mark)
 
@@ -221,6 +226,18 @@ class View(Sight):
         x, y = self.interactor.GetEventPosition()
         shift, control = self.interactor.GetShiftKey(), self.interactor.GetControlKey()
         return Pointer(phase, float(x), float(y), shift=bool(shift), control=bool(control))
+
+    def _end_camera_drag(self, *_: object) -> None:
+        """End what a camera style has in hand, as if the button had been released."""
+        if (self.interactor.GetKeySym() or "").startswith(_MODIFIERS):
+            return
+        style = self.interactor.GetInteractorStyle()
+        if hasattr(style, "GetCurrentStyle"):  # VTK's default switches between several
+            style = style.GetCurrentStyle()
+        if style is not None and getattr(style, "GetState", int)():
+            style.OnLeftButtonUp()
+            style.OnMiddleButtonUp()
+            style.OnRightButtonUp()
 
     # What goes wrong.
 
