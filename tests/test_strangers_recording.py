@@ -195,10 +195,10 @@ def test_the_command_writes_nothing_but_what_it_is_told_to(tmp_path, monkeypatch
 def test_the_limits_are_told_by_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     sd.write_mesh("ball.ply", MESH)
-    (tmp_path / "long.txt").write_text("\n".join([TITLE, *["0 Timer 100000"] * 3]))
+    (tmp_path / "long.txt").write_text("\n".join([TITLE, *["0 Timer 100000"] * 90]))
     assert main(["replay", "long.txt", "ball.ply", "--film", "a.gif"]) == 1
     assert "long.txt, line 4: the limit of 200,000 events" in capsys.readouterr().err
-    more = ["--film", "a.gif", "--events", "1000000", "--seconds", "1"]
+    more = ["--film", "a.gif", "--events", "10000000", "--seconds", "1"]
     assert main(["replay", "long.txt", "ball.ply", *more]) == 1
     assert "stopped at its limit of 1 seconds" in capsys.readouterr().err
     assert set(tree_of(tmp_path)) == {"ball.ply", "long.txt"}
