@@ -180,9 +180,7 @@ def test_caps_change_the_pose_by_less_than_two_per_cent(n_regions, count, height
     found, spoiled = pose(n_regions, count, height)
     assert good.status is spoiled.status is sd.Status.CONVERGED
     assert abs(spoiled.volume_change) < 1e-12
-    # A hundredth of its base is too high for a cap to be flipped, and a hundred of them stiffen.
-    least = 0.05 if (count, height) == (100, 1e-2) else 0.02
-    assert found == pytest.approx(expected, rel=least)
+    assert found == pytest.approx(expected, rel=0.02)
 
 
 @pytest.mark.parametrize("height", [1e-3, 0.0])
@@ -205,7 +203,7 @@ def test_bad_triangles_hardly_scale_the_weights():
     mesh = clean(1)[0]
     whole = scale(mesh)
     caps = sd.Mesh(*with_caps(mesh.vertices, mesh.faces, 10, 6e-3))  # too good to be flipped
-    assert scale(caps) == pytest.approx(whole, rel=0.2)
+    assert scale(caps) < 1.9 * whole  # without a limit for each 2.4 times
     vertices = mesh.vertices.copy()
     for vertex in np.random.default_rng(0).choice(mesh.n_vertices, 20, replace=False):
         neighbour = mesh.adjacency[[vertex]].indices[0]

@@ -45,9 +45,9 @@ from .rotations import closest_rotations
 from .sampling import Sample
 from .subspace import Subspace
 
-# A density above 30 times its 90th percentile by area is an outlier.  On good meshes the maximum is
-# 2 to 80 times that percentile, and less than a thousandth of the area exceeds 30 times.
-_USUAL, _OUTLIER = 0.9, 30.0
+# A density above 300 times its 90th percentile by area is an outlier; on good meshes the maximum is
+# 2 to 80 times that percentile.
+_USUAL, _OUTLIER = 0.9, 300.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,8 +224,7 @@ def _without_outliers(traces: FloatArray, areas: FloatArray) -> float:
     """Return the sum of *traces* (n,), clipped where their density over *areas* (n,) is an outlier.
 
     The sum scales the weights of the method.  Unclipped, it is not robust: a needle's density can
-    be a million times the maximum of a good mesh, and the 26 worst of the koala's 99,994 triangles
-    made the sum fifty times as large.
+    be a million times the maximum of a good mesh.
     """
     asked = areas > 0.0
     traces, areas = traces[asked], areas[asked]
