@@ -180,7 +180,7 @@ def split_edges(lids: Lids, urgency: FloatArray) -> Lids:
 
 
 def _split(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
-    """Split long edges, and those that exist in the surface; return *lids* if there are none."""
+    """Split edges that are long or duplicate an edge of the surface; *lids* itself without any."""
     a, b, *_ = _interior(lids)
     length = np.linalg.norm(lids.points[a] - lids.points[b], axis=1)
     ratio = length / (_LONG * 0.5 * (lids.size[a] + lids.size[b]))
