@@ -88,7 +88,7 @@ STORY = [
     "widgets.app.autosave", "widgets.app.documents", "widgets.app.recent",
     "widgets.app.keeper", "widgets.app.opening", "widgets.app.start_page", "widgets.app.drops",
     "widgets.app.pages", "widgets.app.asking", "widgets.app.saving", "widgets.app.menus",
-    "widgets.app.window", "widgets.app.none_count",
+    "widgets.app.window",
     # the paper's experiments and its peers, measured
     "benchmarks.measuring", "benchmarks.scale", "benchmarks.sections", "benchmarks.charts",
     "benchmarks.tasks", "benchmarks.drags", "benchmarks.drawing", "benchmarks.programs",
@@ -107,7 +107,6 @@ VTK = {"vtkmodules"}
 PANEL = {"controls", "modes", "painting", "regions", "handles", "options", "foot", "log", "panel"}
 PROGRAM = {
     "keeper", "opening", "start_page", "drops", "pages", "asking", "saving", "menus", "window",
-    "none_count",
 }  # fmt: skip
 GRANTED = {
     "threads": {"threadpoolctl"},
