@@ -26,8 +26,6 @@ if not (_root / "vtk_segdeform" / "widgets").exists() and (_root / "setup.cfg").
     __path__.append(str(_root))
 del _Path, _root
 
-__version__ = "0.1.0"
-
 from . import errors, models
 from .cage_fit import fit_cages
 from .cages import Cage
@@ -45,6 +43,7 @@ from .segmentation import segment
 from .session import Session
 from .solution import Solution, Status
 from .store import load_session, save_session
+from .version import __version__ as __version__
 
 if _TYPE_CHECKING:
     from .convert import read_mesh, write_mesh

@@ -19,7 +19,6 @@ from ctypes.util import find_library
 from pathlib import Path
 from typing import Any
 
-from . import __version__
 from .benchmarks.report import EXPERIMENTS
 from .command_line import commands
 from .command_line.application import application
@@ -28,6 +27,7 @@ from .command_line.progress_bar import ProgressBar
 from .command_line.replaying import replay_command
 from .errors import ConstraintError, SegDeformError
 from .fast import advice
+from .version import __version__
 
 _TAKE_VECTORS = ("--rotate", "--pivot", "--translate")
 DONE, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130

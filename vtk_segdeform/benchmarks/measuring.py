@@ -22,10 +22,10 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 import scipy
 
-from .. import __version__
 from ..errors import MissingDependencyError
 from ..fast import compiled
 from ..threads import n_threads
+from ..version import __version__
 
 _T = TypeVar("_T")
 _P = ParamSpec("_P")
