@@ -128,6 +128,12 @@ def test_the_wheel_holds_both_packages_and_the_licence(tmp_path):
     assert vtk_segdeform.__version__ in wheel.name
 
 
+def test_the_newest_release_of_the_changelog_is_this_version():
+    headings = re.findall(r"(?m)^## (.+)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"))
+    releases = [heading for heading in headings if heading != "Unreleased"]
+    assert re.fullmatch(rf"{re.escape(vtk_segdeform.__version__)} - \d{{4}}-\d\d-\d\d", releases[0])
+
+
 def test_no_file_speaks_of_the_machine_it_was_written_on():
     private = re.compile(r"/work/|/root/|/home/\w+/")
     for folder in ("vtk_segdeform", "widgets", "examples", "tests"):
