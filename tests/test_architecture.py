@@ -92,6 +92,7 @@ STORY = [
     "widgets.app.window",
     # the paper's experiments and its peers, measured
     "benchmarks.measuring", "benchmarks.scale", "benchmarks.sections", "benchmarks.charts",
+    "benchmarks.history",
     "benchmarks.tasks", "benchmarks.drags", "benchmarks.drawing", "benchmarks.programs",
     "benchmarks.frame_profile", "benchmarks.drag_profile", "benchmarks.table_one",
     "benchmarks.segmentation_study", "benchmarks.experiments", "benchmarks.full_space",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from dataclasses import replace
 
+from ..benchmarks.history import plot_history, read_history, record
 from ..benchmarks.report import NAME, write_report
 from ..benchmarks.scale import FULL, QUICK, USUAL
 from ..progress import Progress
@@ -13,7 +14,16 @@ from .outputs import Say
 
 
 def bench(options: Namespace, say: Say, progress: Progress) -> bool:
-    """Measure, leave a report, and say what does not hold; or print the table of a drag."""
+    """Measure, leave a report, and say what does not hold; or plot earlier runs, or time a drag."""
+    if options.history:
+        plot = options.output / "history.png"
+        runs = read_history(options.history)
+        options.output.mkdir(parents=True, exist_ok=True)
+        plot_history(runs, plot)
+        say(f"written         {plot}")
+        return True
+    if options.record:
+        read_history(options.record)  # refused now rather than after the measurements
     if options.interactive:
         say(interactive_table(n_cage_vertices=options.cage_vertices, progress=progress))
         return True
@@ -32,5 +42,8 @@ def bench(options: Namespace, say: Say, progress: Progress) -> bool:
     for section in sections:
         for line in section.absent:
             say(f"not measured    {line}")
+    if options.record:
+        record(options.record, scale.name, ratios)
+        say(f"recorded        {options.record}")
     say(f"written         {options.output / NAME}")
     return True
