@@ -7,6 +7,7 @@
 #   make test-paraview   the plugin in a real ParaView
 #   make docs       the documentation, docs/build/html/index.html
 #   make types      mypy --strict              make bench      a report of timings
+#   make bench-history   plot the timings of earlier runs of make bench
 #
 # The first call makes a virtual environment in .venv; choose its Python with
 # `make PYTHON=python3.12 test`.
@@ -23,15 +24,20 @@ ifeq ($(shell uname -s)$(DISPLAY)$(WAYLAND_DISPLAY),Linux)
 export VTK_DEFAULT_OPENGL_WINDOW ?= vtkEGLRenderWindow
 endif
 
-.PHONY: help demo test test-paraview campaign soak docs lint format types bench clean
+.PHONY: help demo test test-paraview campaign soak docs lint format types bench bench-history clean
 help:
-	@sed -n '3,9s/^# *//p' Makefile
+	@sed -n '3,10s/^# *//p' Makefile
 
 demo: $(VENV)/installed
 	$(BIN)/segdeform demo -o demo-output
 
 bench: $(VENV)/installed
-	$(BIN)/segdeform bench -o bench-output
+	$(BIN)/segdeform bench -o bench-output --record $(HISTORY)
+
+# Each `make bench` adds a line to this file: the speed over commits, of this machine.
+HISTORY ?= bench-history.jsonl
+bench-history: $(VENV)/installed
+	$(BIN)/segdeform bench -o bench-output --history $(HISTORY)
 
 # Each worker takes the next tests when it has done its own: files stay together, and what is made
 # once for a file is.  Where the environment forbids to keep bytecode, every worker, and every

@@ -12,7 +12,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE)]
 
-from vtk_segdeform import __version__  # noqa: E402 - only now can it be found
+from vtk_segdeform.version import __version__  # noqa: E402 - only now can it be found
 
 project = "vtk_segdeform"
 author = "the vtk_segdeform authors"

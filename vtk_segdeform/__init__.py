@@ -27,8 +27,6 @@ if not (_root / "vtk_segdeform" / "widgets").exists() and (_root / "setup.cfg").
     __path__.append(str(_root))
 del _Path, _root
 
-__version__ = "0.1.0"
-
 from . import errors, models
 from .cages import Cage, fit_cages, mean_value_coordinates
 from .deformer import Deformer, deform
@@ -38,6 +36,7 @@ from .regions import Regions, segment
 from .repair import repair
 from .session import Change, Options, Session, load_session, save_session
 from .solver import Solution, Status
+from .version import __version__ as __version__
 
 if _TYPE_CHECKING:
     from .io import read_mesh, write_mesh

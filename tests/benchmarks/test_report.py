@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import json
 import math
+import subprocess
 import sys
 from dataclasses import replace
 
@@ -12,9 +14,11 @@ import pytest
 
 from vtk_segdeform.benchmarks import (
     cage_making,
+    charts,
     drag_profile,
     experiments,
     frame_profile,
+    history,
     peers,
     programs,
     report,
@@ -27,7 +31,7 @@ from vtk_segdeform.benchmarks.measuring import clocked
 from vtk_segdeform.benchmarks.scale import Scale
 from vtk_segdeform.benchmarks.sections import Figure, Ratio, Section, Table
 from vtk_segdeform.benchmarks.tasks import NEAR, bent_cactus, bound
-from vtk_segdeform.errors import MissingDependencyError
+from vtk_segdeform.errors import ArgumentError, MissingDependencyError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.solver.gauss_newton import GaussNewton
 
@@ -223,3 +227,83 @@ def test_a_plot_is_written_for_every_figure_of_the_study(tmp_path):
     figure = segmentation_study._figure(table, 0)
     figure.draw(tmp_path / figure.name)
     assert (tmp_path / figure.name).stat().st_size > 5000
+
+
+def test_a_run_is_appended_to_the_history_as_one_line(tmp_path, monkeypatch):
+    path = tmp_path / "history.jsonl"
+    for commit in ("aaa", None):
+        monkeypatch.setattr(history, "commit_of", lambda source, commit=commit: commit)
+        history.record(path, "tiny", [Ratio("frame", 0.25, 1.0), Ratio("lost", math.nan, 1.0)])
+    first, second = (json.loads(line) for line in path.read_text().splitlines())
+    assert (first["commit"], second["commit"]) == ("aaa", None)
+    assert first["ratios"] == {"frame": 0.25, "lost": None}
+    assert set(first) == {"date", "commit", "version", "processor", "scale", "ratios"}
+    assert history.read_history(path) == [first, second]
+
+
+@pytest.mark.parametrize("line", ["{", "[1]", '{"date": "2026-11-22"}', "\udcff"])
+def test_a_file_that_is_not_a_history_is_refused_and_kept(tmp_path, line):
+    path = tmp_path / "notes.txt"
+    path.write_bytes(b"\n" + line.encode(errors="surrogateescape"))
+    before = path.read_bytes()
+    with pytest.raises(ArgumentError, match="line 2 of"):
+        history.record(path, "tiny", [])
+    assert path.read_bytes() == before
+
+
+def test_the_commit_is_that_of_the_checkout_and_says_if_it_was_changed(tmp_path):
+    (tmp_path / "setup.cfg").write_text("")
+    assert history.commit_of(tmp_path) is None  # not a repository
+    git = ["git", "-C", str(tmp_path), "-c", "user.name=n", "-c", "user.email=e"]
+    try:
+        subprocess.run([*git, "init", "-q"], check=True)
+    except FileNotFoundError:
+        pytest.skip("needs git")
+    for words in (["add", "."], ["commit", "-qm", "first"], ["tag", "-am", "nine", "v9"]):
+        subprocess.run([*git, *words], check=True)
+    words = [*git, "rev-parse", "--short=12", "HEAD"]
+    commit = subprocess.run(words, check=True, capture_output=True, text=True).stdout.strip()
+    assert history.commit_of(tmp_path) == commit
+    (tmp_path / "setup.cfg").write_text("changed")
+    assert history.commit_of(tmp_path) == f"{commit}-dirty"
+    (tmp_path / "setup.cfg").unlink()
+    assert history.commit_of(tmp_path) is None  # a repository, but not ours
+
+
+def test_the_history_is_plotted_by_ratio_and_machine(tmp_path, monkeypatch):
+    drawn = {}
+    monkeypatch.setattr(
+        history, "small_multiples", lambda path, labels, panels: drawn.update(panels, x=labels)
+    )
+    run = {"date": "2026-11-22T10:00:00+00:00", "commit": "aaa", "processor": "A", "scale": "tiny"}
+    runs = [
+        run | {"ratios": {"frame": 1.0, "map": 2.0}},
+        run | {"ratios": {"frame": 3.0}, "processor": "B", "commit": None},
+        run | {"ratios": {"frame": None, "map": 4.0}},
+    ]
+    history.plot_history(runs, tmp_path / "history.png")
+    assert drawn["x"] == ["aaa", "2026-11-22", "aaa"]
+    nan = math.nan
+    for name, line in (
+        ("frame", {"A, tiny": [1.0, nan, nan], "B, tiny": [nan, 3.0, nan]}),
+        ("map", {"A, tiny": [2.0, nan, 4.0], "B, tiny": [nan, nan, nan]}),
+    ):
+        assert list(drawn[name]) == list(line)
+        np.testing.assert_array_equal(list(drawn[name].values()), list(line.values()))
+    with pytest.raises(ArgumentError, match="no runs yet"):
+        history.plot_history([], tmp_path / "history.png")
+
+
+def test_small_multiples_have_a_panel_for_each_quantity(tmp_path, monkeypatch):
+    figures = []
+    pytest.importorskip("matplotlib")
+    make = charts._figure
+    monkeypatch.setattr(
+        charts, "_figure", lambda *count: figures.append(made := make(*count)) or made
+    )
+    panels = {str(k): {"A": [1.0, math.nan, 2.0]} for k in range(4)}
+    charts.small_multiples(tmp_path / "history.png", ["a", "b", "c"], panels)
+    ((_, axes),) = figures
+    assert [axis.get_title() for axis in axes if axis.get_visible()] == ["0", "1", "2", "3"]
+    assert axes[0].lines[0].get_xdata().tolist() == [0, 2]
+    assert (tmp_path / "history.png").stat().st_size > 5000

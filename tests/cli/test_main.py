@@ -14,6 +14,8 @@ from solids import OCTAHEDRON
 
 import vtk_segdeform
 from vtk_segdeform import models
+from vtk_segdeform.benchmarks import report
+from vtk_segdeform.benchmarks.sections import Ratio, Section
 from vtk_segdeform.cli.main import ProgressBar, main
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io import convert
@@ -220,6 +222,28 @@ def test_bench_leaves_a_report_and_says_what_does_not_hold(tmp_path, capsys):
     told = capsys.readouterr().out.splitlines()
     assert told[-1].endswith("report.md")
     assert sum("gain of the products with W" in line for line in told) == 2
+
+
+def test_bench_records_a_run_and_plots_the_history(tmp_path, capsys, monkeypatch):
+    pytest.importorskip("matplotlib")
+    section = Section("Trial", ratios=[Ratio("trial", 0.5, 1.0)])
+    monkeypatch.setattr(report, "EXPERIMENTS", {"drag": lambda scale, progress: section})
+    monkeypatch.setattr(report, "warm_up", lambda: None)
+    file, out = tmp_path / "history.jsonl", tmp_path / "out"
+    for _ in range(2):
+        assert main(["bench", "--quick", "-o", str(out), "--record", str(file)]) == 0
+    assert file.read_text().count('"scale": "quick", "ratios": {"trial": 0.5}') == 2
+    assert main(["bench", "-o", str(out), "--history", str(file)]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].endswith("history.png")
+    assert (out / "history.png").stat().st_size > 5000
+
+
+def test_bench_refuses_a_history_that_it_cannot_append_to_before_it_measures(tmp_path, capsys):
+    (tmp_path / "notes.txt").write_text("not JSON")
+    words = ["bench", "-o", str(tmp_path / "out"), "--record", str(tmp_path / "notes.txt")]
+    assert main(words) == 1
+    assert "line 1 of" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(

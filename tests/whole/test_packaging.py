@@ -128,6 +128,25 @@ def test_the_wheel_holds_both_packages_and_the_licence(tmp_path):
     assert vtk_segdeform.__version__ in wheel.name
 
 
+def test_the_conda_recipe_builds_this_version_with_the_same_requirements(setup_cfg):
+    recipe = (ROOT / "conda" / "recipe.yaml").read_text(encoding="utf-8")
+    assert re.findall(r'version: "(.+)"', recipe) == [vtk_segdeform.__version__]
+    listed = re.findall(r"(?m)^    - (\S+) (>=\S+)$", recipe.partition("\n  run:\n")[2])
+    required = (
+        setup_cfg["options"]["install_requires"]
+        + "\npython"
+        + setup_cfg["options"]["python_requires"]
+    )
+    lowest = dict(re.findall(r"(?m)^([\w-]+)(>=[\d.]+)", required))
+    assert dict(listed) == lowest
+
+
+def test_the_newest_release_of_the_changelog_is_this_version():
+    headings = re.findall(r"(?m)^## (.+)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"))
+    releases = [heading for heading in headings if heading != "Unreleased"]
+    assert re.fullmatch(rf"{re.escape(vtk_segdeform.__version__)} - \d{{4}}-\d\d-\d\d", releases[0])
+
+
 def test_no_file_speaks_of_the_machine_it_was_written_on():
     private = re.compile(r"/work/|/root/|/home/\w+/")
     for folder in ("vtk_segdeform", "widgets", "examples", "tests"):

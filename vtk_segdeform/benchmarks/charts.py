@@ -5,6 +5,7 @@ Colours are those of `palette`, and every line has a marker of its own: a plot r
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -99,7 +100,30 @@ def stack_plot(
         figure.savefig(draft)
 
 
-def _figure(n_panels: int) -> tuple[Any, Any]:
+def small_multiples(
+    path: Path, labels: Sequence[str], panels: Mapping[str, Mapping[str, Sequence[float]]]
+) -> None:
+    """Write a panel for each quantity, all over the same *labels*; NaN is left out."""
+    figure, axes = _figure(min(len(panels), 3), -(-len(panels) // 3))
+    for axis in axes[len(panels) :]:
+        axis.set_visible(False)
+    for axis, (label, lines) in zip(axes, panels.items(), strict=False):
+        for k, (name, values) in enumerate(lines.items()):
+            there = [x for x, value in enumerate(values) if not math.isnan(value)]
+            colour = COLOURS[_ORDER[k % len(_ORDER)]]
+            axis.plot(
+                there, [values[x] for x in there],
+                marker=_MARKERS[k % len(_MARKERS)], color=colour, label=name,
+            )  # fmt: skip
+        axis.set_title(label, fontsize=8)
+        axis.set_ylim(bottom=0.0)
+        axis.set_xticks(range(len(labels)), labels, rotation=90, fontsize=6)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", frameon=False)
+    with replacing(path) as draft:
+        figure.savefig(draft)
+
+
+def _figure(n_panels: int, n_rows: int = 1) -> tuple[Any, Any]:
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -107,9 +131,9 @@ def _figure(n_panels: int) -> tuple[Any, Any]:
         raise MissingDependencyError(
             "plots need matplotlib: pip install 'vtk-segdeform[bench]'"
         ) from None
-    figure = Figure(figsize=(max(4.2 * n_panels, 7.0), 3.8), dpi=150, layout="constrained")
+    figure = Figure(figsize=(max(4.2 * n_panels, 7.0), 3.8 * n_rows), dpi=150, layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.subplots(1, n_panels, squeeze=False)[0]
+    axes = figure.subplots(n_rows, n_panels, squeeze=False).ravel()
     for axis in axes:
         axis.spines[["top", "right"]].set_visible(False)
         axis.grid(color="#E5E5E5", linewidth=0.8)

@@ -22,9 +22,9 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 import scipy
 
-from .. import __version__
 from ..errors import MissingDependencyError
 from ..kernels import compiled_kernels, n_threads
+from ..version import __version__
 
 _T = TypeVar("_T")
 _P = ParamSpec("_P")
@@ -128,7 +128,7 @@ def conditions() -> list[str]:
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     limits = ", ".join(f"{name}={os.environ[name]}" for name in _THREADS if name in os.environ)
     return [
-        f"{_processor()}; {cores} cores for this process; {platform.system()}{_load()}",
+        f"{processor()}; {cores} cores for this process; {platform.system()}{_load()}",
         f"Python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}, "
         f"vtk_segdeform {__version__}",
         f"{n_threads()} threads of our own, "
@@ -146,7 +146,8 @@ def _load() -> str:
     return f"; {wanting:.1f} processes wanted to run in the last minute{warning}"
 
 
-def _processor() -> str:
+def processor() -> str:
+    """Return the name of the processor."""
     info = Path("/proc/cpuinfo")
     if info.is_file():
         for line in info.read_text().splitlines():

@@ -26,7 +26,7 @@ def application(options: Namespace, say: Say, progress: Progress) -> bool:
     try:
         from qtpy import QtCore, QtWidgets
 
-        from ..widgets.app import Window, look_after_none
+        from ..widgets.app import Window
     except ImportError as missing:
         reason = str(missing).strip().rstrip(".")
         raise MissingDependencyError(
@@ -35,7 +35,6 @@ def application(options: Namespace, say: Say, progress: Progress) -> bool:
     require_screen()
     QtWidgets.QApplication.setApplicationName("segdeform")
     program = QtWidgets.QApplication.instance() or QtWidgets.QApplication(["segdeform"])
-    look_after_none(program)
     window = Window()
     window.show()
     path: Path | None = options.input

@@ -19,10 +19,10 @@ from ctypes.util import find_library
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
 from ..benchmarks import EXPERIMENTS
 from ..errors import ConstraintError, SegDeformError
 from ..kernels import advice
+from ..version import __version__
 from . import commands
 from .application import application
 from .bench import bench
@@ -242,7 +242,12 @@ def _parser() -> argparse.ArgumentParser:
         "--size", type=_count, default=None, metavar="N", help="mesh vertices, one size"
     )
     sub.add_argument("--cage-vertices", type=_count, default=155, metavar="N", help="in all (155)")
-    sub.add_argument("--interactive", action="store_true", help="time a drag in a window instead")
+    what = sub.add_mutually_exclusive_group()
+    what.add_argument("--interactive", action="store_true", help="time a drag in a window instead")
+    text = "append the ratios, with date and commit, to a file of JSON lines"
+    what.add_argument("--record", type=Path, metavar="FILE", help=text)
+    text = "measure nothing; plot the runs recorded in a file"
+    what.add_argument("--history", type=Path, metavar="FILE", help=text)
     return parser
 
 

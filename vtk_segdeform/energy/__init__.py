@@ -8,6 +8,7 @@ The files, in reading order:
     rotation_clusters    one local rotation for several vertices
     hessian              the exact Hessian, local rotations included
     cage_stiffness       regularisation where the mesh does not determine the cages
+    grams                products with the subspace
 """
 
 from .cage_stiffness import with_cage_stiffness

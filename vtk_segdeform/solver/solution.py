@@ -87,7 +87,7 @@ class Solution:
         """(V - V0) / V0 of `vertices`, signed; measured on demand.
 
         The solver reaches about 1e-15.  Far from the origin float64 coordinates are too coarse for
-        that: rounding changes V by at most eps |x| A, where eps = 2.2e-16, |x| is the largest
+        that: rounding changes V by at most eps m A, where eps = 2.2e-16, m is the largest
         coordinate and A the surface area, and typically by a hundredth of that.  At 1e4 to 1e5
         diagonals this is 1e-12 of the volume of a compact shape and 1e-11 of that of a wire.
         """

@@ -6,7 +6,8 @@ The files, in reading order:
     products      products with W~ and its transpose
     low_rank      W~ of a large mesh in two narrow factors
     passengers    points that are carried along by a deformation
-    gpu           the map on a GPU
+    device        the map on a GPU
+    gpu           the GPU library in use
 """
 
 from .device import DeviceError, DeviceSurface

@@ -8,7 +8,7 @@ from typing import Any
 
 from qtpy import QtCore, QtGui, QtWidgets
 
-from vtk_segdeform import __version__
+from vtk_segdeform.version import __version__
 
 from ..editor import actions
 from . import saving

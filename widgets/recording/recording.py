@@ -34,11 +34,11 @@ from typing import Any, TextIO
 
 from vtkmodules.vtkCommonCore import vtkVersion
 
-from vtk_segdeform import __version__
 from vtk_segdeform.arrays import is_number
 from vtk_segdeform.checks import as_callable, as_path, as_text, require, shown
 from vtk_segdeform.errors import ArgumentError, SessionError
 from vtk_segdeform.files import replacing, require_place
+from vtk_segdeform.version import __version__
 
 from ..scene import View, on_steps, order_steps
 from .confinement import confined

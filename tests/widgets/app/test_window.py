@@ -34,7 +34,6 @@ from vtk_segdeform.io import convert
 from vtk_segdeform.session.store import load_session, save_session
 from vtk_segdeform.widgets.app import documents
 from vtk_segdeform.widgets.app.autosave import About, Autosaves, Slot
-from vtk_segdeform.widgets.app.none_count import LEAST, add_references, look_after_none
 
 BALL = models.sphere(300)
 
@@ -613,17 +612,12 @@ def test_a_window_that_is_deleted_without_a_word_is_spoken_to_no_more(tmp_path, 
     application().processEvents()
 
 
-@pytest.mark.skipif(sys.version_info >= (3, 12), reason="None is not counted any more")
-def test_python_does_not_run_out_of_none():
-    here = sys.getrefcount(None) + 1000
-    add_references(here)
-    assert sys.getrefcount(None) >= here - 10
-    for _ in range(5000):
-        application().applicationName()
-        application().setObjectName("")  # PySide6 6.12.0 takes a reference each time
-    timer = look_after_none(application())
-    assert sys.getrefcount(None) >= LEAST - 10
-    timer.stop()
+@pytest.mark.skipif(sys.version_info >= (3, 12), reason="None is immortal")
+def test_the_installed_qt_binding_keeps_the_reference_count_of_none():
+    before = sys.getrefcount(None)
+    for _ in range(1000):
+        application().setObjectName("")  # PySide6 6.12.0, excluded in setup.cfg, loses one each
+    assert sys.getrefcount(None) > before - 100
 
 
 @pytest.mark.parametrize("missing", ["qtpy", "pyvistaqt"])
