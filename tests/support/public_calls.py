@@ -42,8 +42,8 @@ CORE = (
     "vtk_segdeform.subspace.passengers",
     "vtk_segdeform.geometry.local_volume",
     "vtk_segdeform.io.meshlab_project",
-    "vtk_segdeform.pictures",
-    "vtk_segdeform.filters",
+    "vtk_segdeform.pictures.pictures",
+    "vtk_segdeform.filters.deform_filter",
     "vtk_segdeform.widgets.plugin",
     "vtk_segdeform.io.repaired",
 )
