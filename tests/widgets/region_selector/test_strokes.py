@@ -33,4 +33,4 @@ def test_one_fast_move_of_the_brush_reaches_all_that_a_slow_one_does(radius):
     away = np.linalg.norm(session.mesh.vertices[:, None] - points, axis=2).min(axis=1)
     assert np.count_nonzero(away < 0.95 * radius) > 100
     assert brush.mask[away < 0.95 * radius].all()
-    assert not brush.mask[away > 1.05 * radius].any()
+    assert not brush.mask[away > 1.1 * radius].any()
