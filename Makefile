@@ -52,14 +52,14 @@ test-paraview: $(VENV)/installed-test
 	  echo "There is no pvpython here. On Debian and Ubuntu: apt-get install paraview" >&2; exit 1; }
 	$(PIP) install --target build/paraview --upgrade --only-binary=:all: --python-version \
 	  `pvpython -c 'import sys; print("%d.%d" % sys.version_info[:2])'` numpy scipy
-	SEGDEFORM_PARAVIEW=$(CURDIR)/build/paraview $(BIN)/python -m pytest tests/test_paraview.py
+	SEGDEFORM_PARAVIEW=$(CURDIR)/build/paraview $(BIN)/python -m pytest tests/filters/test_paraview_plugin.py
 
 campaign: $(VENV)/installed-test
 	$(BIN)/python -m pytest -m campaign
 
 SECONDS ?= 3600
 soak: $(VENV)/installed-test
-	SEGDEFORM_SOAK=$(SECONDS) $(BIN)/python -m pytest -m campaign -s tests/test_soak.py -k hands
+	SEGDEFORM_SOAK=$(SECONDS) $(BIN)/python -m pytest -m campaign -s tests/whole/test_soak.py -k hands
 
 # Pictures, gallery and the table of keys are made anew where the code is newer.
 docs: $(VENV)/installed-docs

@@ -11,7 +11,7 @@ import pyvista as pv
 from scipy.spatial.transform import Rotation
 
 import vtk_segdeform as sd
-from vtk_segdeform.convert import to_polydata
+from vtk_segdeform.io.convert import to_polydata
 
 mesh = sd.models.cactus(3000)
 skin, height = to_polydata(mesh), mesh.vertices[:, 2]

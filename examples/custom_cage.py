@@ -42,7 +42,7 @@ session.move_handle("top", aside)
 session.commit()
 print(f"dragged aside:       volume changed by {session.volume_change:.0e} of itself")
 if len(sys.argv) > 1:
-    from vtk_segdeform.pictures import picture_before_after, picture_regions_and_cages
+    from vtk_segdeform.pictures.pictures import picture_before_after, picture_regions_and_cages
 
     Path(sys.argv[1]).mkdir(parents=True, exist_ok=True)
     folder, ends = Path(sys.argv[1]), {"fixed": session.fixed, "handle": session.handles["top"]}

@@ -36,7 +36,7 @@ session.commit()
 print(f"{session.regions.n_regions} regions of {session.regions.membership.sum(axis=1)} vertices")
 print(f"volume changed by {session.volume_change:.0e} of itself")
 if len(sys.argv) > 1:
-    from vtk_segdeform.pictures import picture_regions_and_cages
+    from vtk_segdeform.pictures.pictures import picture_regions_and_cages
 
     Path(sys.argv[1]).mkdir(parents=True, exist_ok=True)
     path = Path(sys.argv[1]) / "custom-regions.png"

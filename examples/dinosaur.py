@@ -42,7 +42,7 @@ session.commit("graze")
 print(f"{session.regions.n_regions} regions, {solution.steps} steps: {solution.status}")
 print(f"volume changed by {session.volume_change:.0e} of itself")
 if len(sys.argv) > 1:
-    from vtk_segdeform.pictures import picture_before_after, picture_regions_and_cages
+    from vtk_segdeform.pictures.pictures import picture_before_after, picture_regions_and_cages
 
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)

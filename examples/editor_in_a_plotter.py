@@ -11,8 +11,8 @@ import numpy as np
 import pyvista as pv
 
 import vtk_segdeform as sd
-from vtk_segdeform.convert import to_polydata
-from vtk_segdeform.widgets.recording import replay
+from vtk_segdeform.io.convert import to_polydata
+from vtk_segdeform.widgets.recording.recording import replay
 
 show = sys.argv[1:] == ["show"]
 mesh = to_polydata(sd.models.cactus(1500))

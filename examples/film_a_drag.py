@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import vtk_segdeform as sd
-from vtk_segdeform.widgets.film import film
+from vtk_segdeform.widgets.recording.film import film
 
 mesh = sd.models.cactus(2000)
 height = mesh.vertices[:, 2]

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import vtk_segdeform as sd
-from vtk_segdeform.distortion import distortion
+from vtk_segdeform.geometry.distortion import distortion
 
 mesh = sd.models.cactus(2500)
 x, _, height = mesh.vertices.T
@@ -33,7 +33,7 @@ for n_regions in (1, 5):
         f"the other arm moved by {other_arm:.2f} of the height"
     )
     if len(sys.argv) > 1:
-        from vtk_segdeform.pictures import picture_before_after, picture_regions_and_cages
+        from vtk_segdeform.pictures.pictures import picture_before_after, picture_regions_and_cages
 
         Path(sys.argv[1]).mkdir(parents=True, exist_ok=True)
         stem = f"{Path(sys.argv[1])}/{n_regions}-cages"

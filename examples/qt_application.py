@@ -9,7 +9,7 @@ import sys
 from qtpy import QtCore, QtWidgets
 
 import vtk_segdeform as sd
-from vtk_segdeform.widgets.qt import DeformWidget
+from vtk_segdeform.widgets.qt.widget import DeformWidget
 
 
 class Window(QtWidgets.QMainWindow):

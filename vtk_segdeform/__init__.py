@@ -8,8 +8,9 @@
     deformer = sd.Deformer(mesh, regions, cages, fixed=..., handle=...)
     solution = deformer.solve(targets)
 
-The story of the method, in the order of its files: `mesh`, `differential` (detail), `volume`,
-`regions`, `cages`, `mean_value`, `subspace`, `energy`, `constraints`, `solver`, `deformer`.
+The folders follow the paper: `mesh`, `geometry`, `regions`, `cages`, `subspace`, `energy`,
+`solver`, `deformer`.  The main algorithm is `Deformer.solve` in `deformer/deformer.py` and
+`GaussNewton` in `solver/gauss_newton.py`.
 """
 
 from __future__ import annotations
@@ -27,30 +28,22 @@ if not (_root / "vtk_segdeform" / "widgets").exists() and (_root / "setup.cfg").
 del _Path, _root
 
 from . import errors, models
-from .cage_fit import fit_cages
-from .cages import Cage
-from .deformer import Deformer
-from .editing.listeners import Change
-from .editing.state import Options
-from .faults import find_faults
-from .local_volume import local_volume_change
-from .mean_value import mean_value_coordinates
-from .mesh import Mesh
-from .pipeline import deform
-from .regions import Regions
+from .cages import Cage, fit_cages, mean_value_coordinates
+from .deformer import Deformer, deform
+from .geometry import local_volume_change
+from .mesh import Mesh, find_faults
+from .regions import Regions, segment
 from .repair import repair
-from .segmentation import segment
-from .session import Session
-from .solution import Solution, Status
-from .store import load_session, save_session
+from .session import Change, Options, Session, load_session, save_session
+from .solver import Solution, Status
 from .version import __version__ as __version__
 
 if _TYPE_CHECKING:
-    from .convert import read_mesh, write_mesh
-    from .plugin import edit
+    from .io import read_mesh, write_mesh
+    from .widgets.plugin import edit
 
 # pyvista is imported when something that needs it is first asked for.
-_NEED_PYVISTA = {"edit": "plugin", "read_mesh": "convert", "write_mesh": "convert"}
+_NEED_PYVISTA = {"edit": "widgets.plugin", "read_mesh": "io", "write_mesh": "io"}
 
 __all__ = [
     "Cage",
@@ -87,4 +80,4 @@ def __getattr__(name: str) -> object:
 
 
 if hasattr(_sys.modules.get("pyvista"), "register_plotter_component"):
-    from . import plugin as _plugin  # noqa: F401 - gives plotters and meshes their .segdeform
+    from .widgets import plugin as _plugin  # noqa: F401 - gives plotters and meshes their .segdeform

@@ -14,15 +14,11 @@ Widgets turn events into our words and ask a session; they never compute.
 """
 
 from .cage_display import CageDisplay
-from .editing.stage import Mode
-from .editor import DeformEditor
-from .film import film
-from .filming.limits import ReplayLimits
+from .editor import DeformEditor, Mode
 from .handle_dragger import HandleDragger
-from .recording import Recorder, replay
+from .recording import Recorder, ReplayLimits, film, replay
 from .region_selector import Paint, RegionSelector, Tool
-from .surface_display import SurfaceDisplay
-from .view import View
+from .scene import SurfaceDisplay, View
 from .volume_overlay import VolumeOverlay
 
 __all__ = [

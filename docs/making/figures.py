@@ -30,12 +30,12 @@ from making.scene import (
     turned,
     write,
 )
-from vtk_segdeform.canvas import add_surface
-from vtk_segdeform.convert import to_polydata
-from vtk_segdeform.filters import SegmentedCageDeformFilter
-from vtk_segdeform.formats.polygons import polydata_of
-from vtk_segdeform.palette import BODY, FIXED, HANDLE, of_region, rgb
-from vtk_segdeform.pictures import picture_volume_change
+from vtk_segdeform.filters.deform_filter import SegmentedCageDeformFilter
+from vtk_segdeform.io.convert import to_polydata
+from vtk_segdeform.io.polygons import polydata_of
+from vtk_segdeform.pictures.canvas import add_surface
+from vtk_segdeform.pictures.palette import BODY, FIXED, HANDLE, of_region, rgb
+from vtk_segdeform.pictures.pictures import picture_volume_change
 
 RISING = LinearSegmentedColormap.from_list("rising", ["#DFE7EE", "#E69F00", "#A63A00"])
 

@@ -23,9 +23,9 @@ import pyvista as pv
 
 from making.made import DOCS, EXAMPLES
 from making.made import GALLERY as FOLDER
-from vtk_segdeform.canvas import view_of, write_panels
-from vtk_segdeform.palette import BODY
-from vtk_segdeform.pictures import picture_before_after
+from vtk_segdeform.pictures.canvas import view_of, write_panels
+from vtk_segdeform.pictures.palette import BODY
+from vtk_segdeform.pictures.pictures import picture_before_after
 
 FROM_FIGURES = {"with_and_without_volume": ["exact_volume-1", "exact_volume-2"]}
 _DRAWN = {".png", ".gif"}

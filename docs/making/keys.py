@@ -9,7 +9,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from vtk_segdeform.widgets.editing.bindings import help_sections
+from vtk_segdeform.widgets.editor.bindings import help_sections
 
 Row = tuple[str, str]
 
@@ -19,7 +19,7 @@ class Keys(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """Return the tables under their headings."""
-        self.env.note_dependency("../widgets/editing/bindings.py")
+        self.env.note_dependency("../widgets/editor/bindings.py")
         found = []
         for heading, rows in help_sections():
             section = nodes.section("", nodes.title("", heading), ids=[nodes.make_id(heading)])

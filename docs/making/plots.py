@@ -9,9 +9,9 @@ import numpy as np
 
 from making.made import FIGURES as FOLDER
 from making.scene import bar, bound, cactus, turned
-from vtk_segdeform.formats.polygons import polydata_of
-from vtk_segdeform.palette import COLOURS, INK
-from vtk_segdeform.volume import signed_volume, volume_along
+from vtk_segdeform.geometry.volume import signed_volume, volume_along
+from vtk_segdeform.io.polygons import polydata_of
+from vtk_segdeform.pictures.palette import COLOURS, INK
 
 OURS, THEIRS = COLOURS[5], COLOURS[6]
 BESIDE = {"textcoords": "offset points", "color": INK}

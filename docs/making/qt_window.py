@@ -20,7 +20,7 @@ from qtpy import QtCore, QtWidgets
 from making.made import DOCS, EXAMPLES
 from making.scene import PIVOT
 from vtk_segdeform.widgets import Mode
-from vtk_segdeform.widgets.editing import actions
+from vtk_segdeform.widgets.editor import actions
 
 PICTURE = DOCS / "pictures" / "qt-application.png"
 PAUSE = 1500  # milliseconds for the window to lay itself out and draw

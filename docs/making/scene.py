@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 
 import vtk_segdeform as sd
 from making.made import FIGURES
-from vtk_segdeform.canvas import view_of, write_panels
-from vtk_segdeform.formats.polygons import polydata_of
-from vtk_segdeform.palette import of_region
-from vtk_segdeform.pictures import draw_mesh
+from vtk_segdeform.io.polygons import polydata_of
+from vtk_segdeform.pictures.canvas import view_of, write_panels
+from vtk_segdeform.pictures.palette import of_region
+from vtk_segdeform.pictures.pictures import draw_mesh
 
 Drawing = Callable[[pv.Plotter], None]
 PIVOT = np.array([0.0, 0.0, 0.4])

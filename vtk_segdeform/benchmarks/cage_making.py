@@ -17,16 +17,14 @@ from vtkmodules.vtkCommonDataModel import vtkMeanValueCoordinatesInterpolator
 from vtkmodules.vtkFiltersGeneral import vtkDeformPointSet
 
 from ..arrays import FloatArray, IntArray
-from ..cage_fit import fit_cages
-from ..cages import Cage, cage_faults, winding_number
+from ..cages import Cage, cage_faults, fit_cages, mean_value_coordinates, winding_number
 from ..errors import MissingDependencyError, SegDeformError
-from ..formats.polygons import polydata_of
-from ..mean_value import mean_value_coordinates
+from ..geometry import signed_volume
+from ..io import polydata_of
 from ..mesh import Mesh
 from ..models import cactus
 from ..progress import Progress
 from ..regions import Regions
-from ..volume import signed_volume
 from .measuring import called, timed
 from .scale import Scale
 from .sections import Cell, Section, Table

@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..atomic import replacing
 from ..errors import MissingDependencyError
-from ..palette import COLOURS, INK
+from ..files import replacing
+from ..pictures import COLOURS, INK
 
 _MARKERS = "osD^vP*"
 _ORDER = (5, 0, 2, 3, 1, 6, 4)  # of the colours: those that print darkest first

@@ -18,8 +18,7 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..deformer import Deformer
-from ..solution import Solution, Status
-from ..solver import GaussNewton
+from ..solver import GaussNewton, Solution, Status
 from .measuring import clocked, timed
 from .tasks import NEAR, Task
 

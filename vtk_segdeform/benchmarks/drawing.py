@@ -7,10 +7,10 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer, vtkRenderWindow
 
 from ..arrays import FloatArray
-from ..canvas import require_offscreen
-from ..formats.polygons import polydata_of
+from ..geometry import VertexNormals
+from ..io import polydata_of
 from ..mesh import Mesh
-from ..normals import VertexNormals
+from ..pictures import require_offscreen
 from .measuring import median_seconds
 
 _SIZE = (800, 600)  # pixels

@@ -18,13 +18,12 @@ import numpy as np
 import pyvista as pv
 
 from ..arrays import FloatArray
-from ..canvas import add_surface, view_of, write_panels
-from ..distortion import distortion, triangle_distortion
-from ..formats.polygons import polydata_of
+from ..geometry import distortion, triangle_distortion
+from ..io import polydata_of
 from ..mesh import Mesh
-from ..palette import INK
+from ..pictures import INK, add_surface, view_of, write_panels
 from ..progress import Progress
-from ..solution import Solution
+from ..solver import Solution
 from .scale import Scale
 from .sections import Cell, Figure, Section, Table
 from .tasks import Task, bent_cactus, bound, raised_neck

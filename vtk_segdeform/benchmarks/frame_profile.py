@@ -20,10 +20,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from ..arrays import FloatArray
-from ..constraints import total_volume
 from ..errors import MissingDependencyError
+from ..kernels import in_parallel, one_blas_thread
+from ..solver import total_volume
 from ..subspace import Subspace
-from ..threads import in_parallel, one_blas_thread
 from .drags import frames, seconds_per_step, way_of
 from .drawing import drawing_seconds
 from .measuring import forget_peak, median_seconds, peak_memory, timed

@@ -16,12 +16,16 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from ..arrays import FloatArray
-from ..grams import grams
-from ..intrinsic import IntrinsicTriangulation
-from ..operators import surface_operators
-from ..rotations import closest_rotations
+from ..energy import grams, surface_operators
+from ..geometry import (
+    IntrinsicTriangulation,
+    closest_rotations,
+    signed_volume,
+    step_to_volume,
+    volume_along,
+    volume_gradient,
+)
 from ..subspace import Subspace
-from ..volume import signed_volume, step_to_volume, volume_along, volume_gradient
 from .measuring import timed
 from .programs import Answer, until_rest
 from .tasks import NEAR, Task

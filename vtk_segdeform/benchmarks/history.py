@@ -17,8 +17,8 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from ..atomic import replacing, require_place
 from ..errors import ArgumentError
+from ..files import replacing, require_place
 from ..version import __version__
 from .charts import small_multiples
 from .measuring import processor

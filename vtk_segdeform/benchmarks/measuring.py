@@ -23,8 +23,7 @@ import numpy as np
 import scipy
 
 from ..errors import MissingDependencyError
-from ..fast import compiled
-from ..threads import n_threads
+from ..kernels import compiled_kernels, n_threads
 from ..version import __version__
 
 _T = TypeVar("_T")
@@ -132,7 +131,8 @@ def conditions() -> list[str]:
         f"{processor()}; {cores} cores for this process; {platform.system()}{_load()}",
         f"Python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}, "
         f"vtk_segdeform {__version__}",
-        f"{n_threads()} threads of our own, with{'' if compiled() else 'out'} compiled kernels; "
+        f"{n_threads()} threads of our own, "
+        f"with{'' if compiled_kernels() else 'out'} compiled kernels; "
         f"other libraries: {limits or 'as many as they like'}",
     ]
 

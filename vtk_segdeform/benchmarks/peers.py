@@ -11,10 +11,9 @@ from functools import partial
 
 import numpy as np
 
-from ..distortion import distortion
 from ..errors import SegDeformError
+from ..geometry import distortion, signed_volume
 from ..progress import Progress
-from ..volume import signed_volume
 from .experiments import worst_hundredth
 from .full_space import full_space
 from .measuring import called, timed

@@ -11,17 +11,10 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from ..atomic import replacing
 from ..errors import Cancelled, MissingDependencyError, SegDeformError
+from ..files import replacing
 from ..progress import Progress, part
-from . import (
-    cage_making,
-    drag_profile,
-    experiments,
-    peers,
-    segmentation_study,
-    table_one,
-)
+from . import cage_making, drag_profile, experiments, peers, segmentation_study, table_one
 from .measuring import conditions, timed
 from .scale import Scale
 from .sections import Figure, Section, Table

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from statistics import median
 
-from ..distortion import distortion
 from ..errors import CageError
+from ..geometry import distortion
 from ..progress import Progress
 from . import charts
 from .drags import AS_PRINTED, frames, seconds_per_step, way_of

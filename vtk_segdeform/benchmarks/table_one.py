@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
+from ..geometry import closest_rotations
 from ..progress import Progress
-from ..rotations import closest_rotations
 from .drags import AS_PRINTED, frames, seconds_per_step, way_of
 from .measuring import by_turns, median_seconds
 from .scale import Scale

@@ -16,14 +16,12 @@ from typing import Any
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..cage_fit import fit_cages
-from ..cages import Cage
-from ..convert import read_mesh
+from ..cages import Cage, fit_cages
 from ..deformer import Deformer
+from ..io import read_mesh
 from ..mesh import Mesh
 from ..models import cactus, dinosaur
-from ..regions import Regions, cage_distance_weights
-from ..segmentation import segment
+from ..regions import Regions, cage_distance_weights, segment
 from .measuring import timed
 
 # The paper's own formulation: one rotation a vertex, detail only, volume linearised, plain steps.

@@ -27,15 +27,12 @@ from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 
-from vtk_segdeform.atomic import is_draft, replacing
 from vtk_segdeform.errors import SessionError
-from vtk_segdeform.lock import hold
+from vtk_segdeform.files import fault_of, hold, is_draft, is_ours, open_regular, replacing
 from vtk_segdeform.progress import Progress
-from vtk_segdeform.regular_file import fault_of, is_ours, open_regular
-from vtk_segdeform.session import Session
-from vtk_segdeform.store import save_session
+from vtk_segdeform.session import Session, save_session
 
-from ..editing.session_file import read_bound
+from ..editor import read_bound
 
 _LOCK, _ABOUT, _SESSION = "lock", "about.json", "session.segdeform"
 _NAME = re.compile(r"[0-9a-f]{16}")

@@ -13,14 +13,13 @@ from typing import Any
 import numpy as np
 
 from vtk_segdeform import models
-from vtk_segdeform.convert import from_polydata, read_polydata
 from vtk_segdeform.errors import MeshError, SegDeformError
+from vtk_segdeform.io import from_polydata, read_polydata
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
-from ..editing.session_file import SessionFile, is_mesh, read_bound
-from ..editing.voice import words_of
+from ..editor import SessionFile, is_mesh, read_bound, words_of
 from .autosave import About, Slot
 
 SUFFIX = ".segdeform"

@@ -13,11 +13,10 @@ from typing import Any
 
 from qtpy import QtCore
 
-from vtk_segdeform.editing.listeners import Change
 from vtk_segdeform.errors import SegDeformError
-from vtk_segdeform.session import Session
+from vtk_segdeform.session import Change, Session
 
-from ..view import Stop
+from ..scene import Stop
 from .autosave import About, Autosaves, Slot
 
 INTERVAL = 10.0  # seconds that a crash may cost, of a drag that is still going on

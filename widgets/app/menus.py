@@ -10,7 +10,7 @@ from qtpy import QtCore, QtGui, QtWidgets
 
 from vtk_segdeform.version import __version__
 
-from ..editing import actions
+from ..editor import actions
 from . import saving
 from .asking import tell_about
 from .start_page import home_as_tilde

@@ -12,12 +12,10 @@ from typing import Any
 
 from qtpy import QtCore, QtWidgets
 
-from vtk_segdeform.atomic import replacing
 from vtk_segdeform.errors import SessionError
+from vtk_segdeform.files import replacing
 
-from ..editing.actions import Action
-from ..editing.desk import Desk
-from ..editing.panel_actions import exporting, saving
+from ..editor import Action, Desk, exporting, saving
 from .asking import MESHES, Answer, ask_replace, ask_save, tell_failure
 from .documents import SUFFIX
 

@@ -1,0 +1,312 @@
+"""What is a cage and what is not, told by solids with one known fault each."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from real_meshes import path_of, read_off
+from solids import CUBE, OCTAHEDRON, SOLIDS, TETRAHEDRON, icosphere, rotation, somewhere, torus
+from solids import two_components as two_spheres
+from vtkmodules.vtkCommonDataModel import vtkTriangle
+
+from vtk_segdeform.cages.cage import Cage, cage_faults, self_intersections, winding_number
+from vtk_segdeform.errors import CageError
+from vtk_segdeform.mesh.inside import distance_to_surface
+from vtk_segdeform.mesh.intersections import _overlapping_boxes
+
+TURN = rotation([1, 2, 3], 0.7)
+VALID = {
+    **SOLIDS,
+    "turned cube": (CUBE[0] @ TURN.T + 0.3, CUBE[1]),
+    "sphere": icosphere(2),
+    "torus": torus(24, 12),
+    "two spheres": two_spheres(),
+}
+every_valid = pytest.mark.parametrize("solid", VALID.values(), ids=VALID.keys())
+
+
+def joined(*solids):
+    """Return several solids as one surface."""
+    vertices, faces, n = [], [], 0
+    for points, triangles in solids:
+        vertices.append(points)
+        faces.append(triangles + n)
+        n += len(points)
+    return np.concatenate(vertices), np.concatenate(faces)
+
+
+def moved(solid, offset, scale=1.0):
+    return solid[0] * scale + offset, solid[1]
+
+
+def flipped(solid):
+    return solid[0], solid[1][:, ::-1]
+
+
+@every_valid
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_a_good_surface_has_no_faults(solid, scale):
+    vertices, faces = solid
+    assert cage_faults(scale * vertices, faces) == ()
+    assert cage_faults(scale * (vertices @ TURN.T + 5.0), faces) == ()
+
+
+def test_a_cage_is_a_read_only_copy_of_what_it_was_given():
+    vertices, faces = icosphere(1)
+    cage = Cage(vertices, faces)
+    assert (cage.n_vertices, cage.n_faces) == (18, 32)
+    vertices[0] = 9.0
+    assert cage.vertices[0, 0] == 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        cage.vertices[0] = 0.0
+    with pytest.raises(AttributeError):
+        cage.faces = faces
+
+
+def test_the_volume_is_that_of_the_solid():
+    assert_allclose(Cage(*moved(CUBE, 1e4)).volume, 1.0, rtol=1e-9)
+    assert_allclose(Cage(*TETRAHEDRON).volume, 8 / 3)
+    assert_allclose(Cage(*joined(CUBE, moved(CUBE, 3.0, 2.0))).volume, 9.0)
+
+
+def test_an_open_surface_is_refused_with_the_number_of_its_open_edges():
+    vertices, faces = OCTAHEDRON
+    with pytest.raises(CageError, match="3 edges border one face only: the cage is open"):
+        Cage(vertices, faces[1:])
+
+
+def test_a_face_turned_round_is_found():
+    vertices, faces = OCTAHEDRON
+    (fault,) = cage_faults(vertices, np.vstack([faces[:1, ::-1], faces[1:]]))
+    assert "3 edges" in fault
+    assert "orientation" in fault
+
+
+def test_a_surface_facing_inward_is_refused():
+    (fault,) = cage_faults(*flipped(CUBE))
+    assert fault == "it is inside-out, volume -1: reverse its faces"
+
+
+def test_an_edge_of_four_faces_is_found():
+    vertices, faces = TETRAHEDRON
+    mirrored = np.array([0, 1, 4, 5])  # a second tetrahedron on the edge 0, 1
+    extra = vertices[[0, 1]].sum(axis=0) - vertices[[2, 3]]
+    (fault,) = cage_faults(np.vstack([vertices, extra]), np.vstack([faces, mirrored[faces]]))
+    assert "1 edge" in fault
+    assert "three faces or more" in fault
+
+
+def test_two_fans_in_one_vertex_are_found():
+    vertices, faces = TETRAHEDRON
+    other = np.array([0, 4, 5, 6])
+    mirror = 2 * vertices[0] - vertices[1:]
+    (fault,) = cage_faults(np.vstack([vertices, mirror]), np.vstack([faces, other[faces[:, ::-1]]]))
+    assert "1 vertex joins several fans" in fault
+
+
+def test_a_vertex_in_no_face_is_found():
+    vertices, faces = OCTAHEDRON
+    (fault,) = cage_faults(np.vstack([vertices, [[0, 0, 0]]]), faces)
+    assert fault == "1 vertex is in no face"
+
+
+def test_a_face_without_area_is_found():
+    vertices, faces = OCTAHEDRON
+    a, b, c = faces[0]
+    split = np.vstack([faces[1:], [[a, b, 6], [b, c, 6], [c, a, 6]]])
+    (fault,) = cage_faults(np.vstack([vertices, vertices[[a, b]].mean(axis=0)]), split)
+    assert fault == "1 face has no area"
+
+
+def test_a_vertex_pushed_out_through_the_other_side_is_found():
+    vertices, faces = icosphere(2)
+    assert cage_faults(vertices, faces) == ()
+    through = vertices.copy()
+    through[0] *= -1.2
+    (fault,) = cage_faults(through, faces)
+    assert "intersects itself" in fault
+
+
+def test_a_face_folded_over_its_neighbour_is_found():
+    vertices, faces = OCTAHEDRON
+    a, b, c = faces[0]
+    middle = vertices[[a, b, c]].mean(axis=0)
+    split = np.vstack([faces[1:], [[a, b, 6], [b, c, 6], [c, a, 6]]])
+    assert cage_faults(np.vstack([vertices, middle]), split) == ()
+    beyond = vertices[c] + 0.3 * (vertices[c] - middle)  # in the same plane, past the corner
+    assert len(self_intersections(np.vstack([vertices, beyond]), split)) > 0
+    beyond = vertices[[a, b]].mean(axis=0) * 1.3 - 0.3 * vertices[c]  # past the edge
+    assert len(self_intersections(np.vstack([vertices, beyond]), split)) > 0
+
+
+def test_faces_that_share_a_corner_may_touch_only_there():
+    fan = np.array([[0, 1, 2], [0, 3, 4]])
+    corner, wide = [0, 0, 0], [[2, -1, 0], [2, 1, 0]]
+
+    def meet(p, q):
+        return len(self_intersections(np.array([corner, *wide, p, q], float), fan)) == 1
+
+    assert meet([1, 0, -1], [1, 0, 1])  # pierced across
+    assert meet([4, 0, -1], [4, 0, 1])  # the other one is pierced
+    assert meet([1, 0, 0], [1, 3, 0])  # in one plane, overlapping
+    assert meet([1, 0.1, 0], [1, -0.1, 0])  # in one plane, inside
+    assert not meet([-1, 0, -1], [-1, 0, 1])
+    assert not meet([-2, 1, 0], [-2, -1, 0])
+    assert not meet([1, 0, 1], [1, 1, 1])
+    assert not meet([1, 0, 1e-6], [1, 1, 1e-6])
+    assert not meet([2, 1.5, 0], [2, 3, 0])  # in one plane, side by side
+
+
+def test_faces_that_share_an_edge_may_not_fold_over_one_another():
+    pair = np.array([[0, 1, 2], [1, 0, 3]])
+
+    def meet(apex):
+        return (
+            len(self_intersections(np.array([[-1, 0, 0], [1, 0, 0], [0, 1, 0], apex]), pair)) == 1
+        )
+
+    assert meet([0.3, 0.5, 0.0])
+    assert not meet([0.3, -0.5, 0.0])
+    assert not meet([0.3, 0.5, 1e-6])
+
+
+def test_both_sides_of_one_triangle_are_not_a_surface():
+    pillow = np.array([[0, 1, 2], [2, 1, 0]])
+    assert len(self_intersections(np.eye(3), pillow)) == 1
+
+
+def test_faces_that_share_nothing_may_not_even_touch():
+    pair = np.array([[0, 1, 2], [3, 4, 5]])
+    flat = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+
+    def meet(*other):
+        return len(self_intersections(np.array([*flat, *other], float), pair)) == 1
+
+    assert meet([0.2, 0.2, 0], [0.2, 0.2, 1], [0.3, 0.2, 1])  # a corner on the face
+    assert meet([0.5, 0.5, -1], [0.5, 0.5, 1], [1, 1, 0])  # an edge on the edge
+    assert meet([0, 0, 0], [0, 0, 1], [-1, 0, 1])  # a corner on the corner
+    assert meet([1, 0, 0], [2, 0, 0], [1, 1, 0])  # in one plane, corner on corner
+    assert meet([0.1, 0.1, 0], [0.2, 0.1, 0], [0.1, 0.2, 0])  # in one plane, inside
+    assert not meet([0.2, 0.2, 1e-9], [0.2, 0.2, 1], [0.3, 0.2, 1])
+    assert not meet([0.51, 0.51, 0], [1, 0.5, 0], [0.5, 1, 0])
+    assert not meet([0.6, 0.6, -1], [0.6, 0.6, 1], [1, 1, 0])
+
+
+@pytest.mark.parametrize("spread", [0.15, 0.5])
+def test_vtk_finds_the_same_crossings_in_a_heap_of_triangles(spread):
+    n = 150
+    rng = np.random.default_rng(6)
+    corners = rng.uniform(-1, 1, (n, 1, 3)) + spread * rng.normal(size=(n, 3, 3))
+    found = self_intersections(corners.reshape(-1, 3), np.arange(3 * n).reshape(-1, 3))
+    expected = [
+        (i, j)
+        for i in range(n)
+        for j in range(i + 1, n)
+        if vtkTriangle.TrianglesIntersect(*corners[i], *corners[j])
+    ]
+    assert 10 < len(expected) < n * (n - 1) / 4
+    assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_crossings_do_not_depend_on_where_the_sweep_runs_nor_on_batches(axis, monkeypatch):
+    vertices, faces = joined(icosphere(2), moved(icosphere(2), [0.7, 0.1, 0.2]))
+    expected = self_intersections(vertices, faces)
+    assert len(expected) > 20
+    rolled = np.roll(vertices, axis, axis=1) * [1, 10, 1]
+    monkeypatch.setattr("vtk_segdeform.mesh.intersections._BATCH", 97)
+    assert_array_equal(self_intersections(rolled, faces), expected)
+
+
+def test_components_may_lie_apart_or_form_a_cavity_but_not_nest_or_cross():
+    small = moved(icosphere(1), 0.0, 0.5)
+    outer = icosphere(2)
+    assert cage_faults(*joined(outer, moved(small, 2.0))) == ()
+    assert cage_faults(*joined(outer, flipped(small))) == ()
+    assert cage_faults(*joined(flipped(small), outer)) == ()
+    (fault,) = cage_faults(*joined(outer, small))
+    assert fault == "component 2 of 2 is inside another and faces outward"
+    (fault,) = cage_faults(*joined(outer, flipped(moved(small, 3.0))))
+    assert fault == "component 2 of 2 faces inward"
+    (fault,) = cage_faults(*joined(outer, moved(small, [0.8, 0, 0])))
+    assert "intersects itself" in fault
+
+
+def test_inside_is_what_the_formula_of_the_solid_says():
+    x = somewhere(2000, size=0.9)
+    inside = np.abs(x).sum(axis=1) < 1
+    assert_array_equal(Cage(*OCTAHEDRON).contains(x), inside)
+    x = somewhere(2000, size=1.5)
+    inside = ((x > 0) & (x < 1)).all(axis=1)
+    assert_array_equal(Cage(*CUBE).contains(x), inside)
+
+
+def test_a_cavity_is_outside():
+    cage = Cage(*joined(icosphere(2), flipped(moved(icosphere(1), 0.0, 0.5))))
+    assert_array_equal(cage.contains([[0, 0, 0], [0.75, 0, 0], [2, 0, 0]]), [False, True, False])
+
+
+def test_the_winding_number_is_whole_and_does_not_depend_on_chunks(monkeypatch):
+    vertices, faces = torus(24, 12)
+    x = somewhere(500, size=1.5)
+    number = winding_number(x, vertices, faces)
+    assert_allclose(number, number.round(), atol=1e-12)
+    assert set(number.round()) == {0.0, 1.0}
+    monkeypatch.setattr("vtk_segdeform.mesh.inside._BLOCK", 1)
+    assert_allclose(winding_number(x, vertices, faces), number, atol=1e-12)
+
+
+def test_a_point_left_out_is_reported_with_its_distance():
+    cage = Cage(*CUBE)
+    cage.require_encloses([[0.5, 0.5, 0.5], [1e-9, 0.5, 0.5]], "points")
+    x = [[0.5, 0.5, 0.5], [0.5, 0.5, 1.25], [1.3, 1.4, 0.5]]
+    message = "2 of 3 points are outside the cage, the farthest by 0.5; enlarge the cage"
+    with pytest.raises(CageError, match=message):
+        cage.require_encloses(x, "points")
+
+
+@pytest.mark.parametrize(
+    ("point", "distance"),
+    [([0.3, 0.6, 1.25], "0.25"), ([1.3, 1.4, 0.3], "0.5"), ([2, 2, 2], "1.73")],
+    ids=["over a face", "beside an edge", "off a corner"],
+)
+def test_the_distance_is_that_to_the_nearest_place(point, distance):
+    with pytest.raises(CageError, match=f"the farthest by {distance};"):
+        Cage(*CUBE).require_encloses([point], "points")
+
+
+def test_the_cage_of_the_armadillo_is_a_cage_around_it():
+    pv = pytest.importorskip("pyvista")
+    found = pv.read(path_of("armadilloman_cages_triangulated.obj")).clean()
+    vertices = np.asarray(found.points, float)
+    armadillo = pv.read(path_of("armadilloman.obj")).points
+    cage = Cage(vertices, found.regular_faces)
+    assert cage.contains(armadillo).mean() > 0.99
+
+
+def test_a_real_mesh_is_a_cage_too():
+    assert cage_faults(*read_off("hand.off")) == ()
+
+
+def test_the_number_of_pairs_looked_at_grows_like_the_number_of_faces():
+    def pairs_per_face(solid):
+        corners = solid[0][solid[1]]
+        boxes = corners.min(axis=1), corners.max(axis=1)
+        return sum(len(pairs) for pairs in _overlapping_boxes(*boxes)) / len(corners)
+
+    assert pairs_per_face(icosphere(4)) < 1.5 * pairs_per_face(icosphere(2))
+
+
+@pytest.mark.parametrize("level", [0, 1, 2])
+def test_points_straight_above_corners_and_edges_of_a_cage_are_told_as_any_others(level):
+    vertices, faces = icosphere(level)
+    middles = 0.5 * (vertices[faces] + vertices[np.roll(faces, 1, axis=1)]).reshape(-1, 3)
+    columns = np.concatenate([vertices, middles]) * [1.0, 1.0, 0.0]
+    points = np.concatenate([columns + [0.0, 0.0, z] for z in (-0.3, 0.1, 0.4)])
+    winding = winding_number(points, vertices, faces)
+    clear = np.abs(winding - np.round(winding)) < 1e-9
+    clear &= distance_to_surface(points, vertices, faces) > 1e-9
+    assert np.count_nonzero(clear) > 10
+    inside = Cage(vertices, faces).contains(points[clear])
+    assert_array_equal(inside, winding[clear] > 0.5)

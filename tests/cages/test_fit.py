@@ -1,0 +1,297 @@
+"""Cages made automatically: valid and enclosing whatever the region, and moving with the mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from real_meshes import read_off
+from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
+
+from vtk_segdeform.cages import fit
+from vtk_segdeform.cages.cage import Cage, cage_faults
+from vtk_segdeform.cages.contour import contour_surface
+from vtk_segdeform.cages.fit import fit_cage, fit_cages
+from vtk_segdeform.cages.region_solid import Patch, Skin, _filled, principal_axes
+from vtk_segdeform.cages.simplify import roundness, simplify
+from vtk_segdeform.errors import CageError, Cancelled, RegionError
+from vtk_segdeform.mesh.columns import inside_nodes, inside_points
+from vtk_segdeform.mesh.inside import distance_to_surface, winding_number
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.regions.regions import Regions
+
+TURN = rotation([1.0, 2.0, -0.5], 1.234)
+
+
+def squeezed(*factors):
+    vertices, faces = icosphere(3)
+    return vertices * factors, faces
+
+
+ZOO = {
+    "sphere": icosphere(3),
+    "torus": torus(),
+    "two components": two_components(),
+    "plate": squeezed(1.0, 0.8, 0.01),
+    "rod": squeezed(1.0, 0.02, 0.02),
+    "wire": torus(120, 6, 1.0, 0.02),
+}
+
+
+@pytest.fixture(params=ZOO)
+def mesh(request):
+    return Mesh(*ZOO[request.param])
+
+
+def thirds(mesh):
+    """Cut a mesh in three overlapping slices along x."""
+    x = mesh.vertices[:, 0]
+    place = (x - x.min()) / np.ptp(x)
+    return Regions(mesh, np.array([place < 0.4, (place > 0.3) & (place < 0.7), place > 0.6]))
+
+
+def around(mesh, rings):
+    """Return a vertex and so many rings of its neighbours."""
+    members = np.arange(mesh.n_vertices) == mesh.n_vertices // 3
+    for _ in range(rings):
+        members = members | (mesh.adjacency @ members > 0)
+    return members
+
+
+def assert_holds(cage, mesh, members):
+    # That it is closed, outward and clear of itself, `Cage` has checked.
+    assert (winding_number(mesh.vertices[members], cage.vertices, cage.faces) > 0.99).all()
+    assert distance_to_skin(cage, mesh, members).min() > 1e-4 * np.ptp(cage.vertices, axis=0).max()
+    assert roundness(cage.vertices, cage.faces).min() > 0.05
+
+
+def distance_to_skin(cage, mesh, members):
+    return distance_to_surface(mesh.vertices[members], cage.vertices, cage.faces)
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_one_cage_holds_a_mesh_of_a_few_large_faces(name):
+    mesh = Mesh(*SOLIDS[name])
+    (cage,) = fit_cages(mesh, Regions.single(mesh), 40)
+    assert cage.n_vertices == 40
+    assert_holds(cage, mesh, slice(None))
+
+
+def test_three_cages_hold_three_regions_with_the_vertices_asked_for(mesh):
+    regions = thirds(mesh)
+    cages = fit_cages(mesh, regions, 100)
+    assert sum(cage.n_vertices for cage in cages) == 100
+    for cage, members in zip(cages, regions.membership, strict=True):
+        assert_holds(cage, mesh, members)
+
+
+def test_a_cage_holds_a_region_of_any_shape(mesh):
+    scattered = np.random.default_rng(3).random(mesh.n_vertices) < 0.02
+    stripes = np.sin(20.0 * mesh.vertices[:, 0] / mesh.diagonal) > 0.0
+    one, ring = around(mesh, 0), around(mesh, 1)
+    for members, n_vertices in ((one, 8), (ring, 25), (scattered, 8), (stripes, 25)):
+        cage = fit_cage(mesh, members, n_vertices)
+        assert cage.n_vertices == n_vertices
+        assert_holds(cage, mesh, members)
+
+
+def test_a_cage_stays_at_the_offset_asked_for():
+    mesh = Mesh(*icosphere(3))
+    for offset in (0.1, 0.3):
+        cage = fit_cage(mesh, np.arange(mesh.n_vertices), 100, offset=offset)
+        gap = distance_to_skin(cage, mesh, slice(None))
+        assert gap.min() > 0.4 * offset
+        assert gap.max() < 2.0 * offset
+        assert gap.mean() == pytest.approx(offset, rel=0.35)
+
+
+def test_more_vertices_make_a_tighter_cage():
+    mesh = Mesh(*torus())
+    volumes = [fit_cage(mesh, np.arange(mesh.n_vertices), n).volume for n in (30, 80, 250)]
+    assert volumes[0] > volumes[1] > volumes[2] > 2.0 * np.pi**2 * 0.35**2
+    assert volumes[2] < 1.6 * 2.0 * np.pi**2 * 0.35**2
+
+
+def test_a_cage_of_a_torus_keeps_the_hole():
+    mesh = Mesh(*torus())
+    cage = fit_cage(mesh, np.arange(mesh.n_vertices), 60)
+    assert cage.n_vertices - cage.n_faces // 2 == 0  # Euler's characteristic: one handle
+    assert not cage.contains([[0.0, 0.0, 0.0]])[0]
+
+
+@pytest.mark.parametrize("name", ["sphere", "two components", "plate"])
+@pytest.mark.parametrize(
+    ("turn", "scale", "shift"),
+    [(TURN, 1.0, 0.0), (np.eye(3), 1.0, 1e4), (np.eye(3), 1e-3, 0.0), (TURN, 1e3, 0.0)],
+    ids=["turned", "far away", "small", "turned and large"],
+)
+def test_a_cage_moves_with_its_mesh(name, turn, scale, shift):
+    mesh = Mesh(*ZOO[name])
+    by = shift * mesh.diagonal * np.array([1.0, 0.5, -0.3])
+    moved = Mesh(scale * mesh.vertices @ turn.T + by, mesh.faces)
+    members = np.arange(mesh.n_vertices) % 2 == 0
+    cage, same = fit_cage(mesh, members, 30), fit_cage(moved, members, 30)
+    assert_array_equal(same.faces, cage.faces)
+    expected = scale * cage.vertices @ turn.T + by
+    assert_allclose(same.vertices, expected, rtol=0, atol=1e-9 * scale * mesh.diagonal)
+
+
+def test_axes_turn_with_points_that_have_no_longest_direction():
+    vertices, _ = CUBE
+    axes = principal_axes(vertices, np.ones(8))
+    assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    assert_allclose(principal_axes(vertices @ TURN.T, np.ones(8)), axes @ TURN.T, atol=1e-12)
+
+
+def test_larger_and_longer_regions_get_more_vertices():
+    ball, faces = icosphere(3)
+    long, large = ball * [3.0, 1.0, 1.0] + [0, 5, 0], 2.0 * ball - [0, 5, 0]
+    n = len(ball)
+    mesh = Mesh(
+        np.concatenate([ball, long, large]), np.concatenate([faces, faces + n, faces + 2 * n])
+    )
+    regions = Regions(mesh, mesh.components == np.arange(3)[:, None])
+    small, long_number, large_number = (c.n_vertices for c in fit_cages(mesh, regions, 90))
+    assert small < long_number
+    assert small < large_number
+    assert small + long_number + large_number == 90
+
+
+def test_the_last_resort_is_a_cage_and_says_so_once(mesh, monkeypatch, caplog):
+    monkeypatch.setattr(fit, "_fault", lambda *_: "it is to fail")
+    monkeypatch.setattr(fit, "_ATTEMPTS", 1)
+    for members in (around(mesh, 0), around(mesh, 3)):
+        caplog.clear()
+        cage = fit_cage(mesh, members, 12)
+        assert (winding_number(mesh.vertices[members], cage.vertices, cage.faces) > 0.99).all()
+        assert cage.n_vertices == 12
+        assert [record.levelname for record in caplog.records] == ["WARNING"]
+
+
+@pytest.mark.parametrize("n", [4, 5, 8, 50])
+def test_the_ellipsoid_of_a_patch_is_a_cage_around_it(mesh, n):
+    patch = Patch.of(Skin.of(mesh), around(mesh, 2))
+    cage = Cage(*patch.ellipsoid(n))
+    assert cage.n_vertices == n
+    assert cage.contains(patch.skin.points[patch.weights > 0]).all()
+
+
+def test_what_makes_no_cage_is_refused_with_a_reason():
+    mesh = Mesh(*icosphere(2))
+    with pytest.raises(CageError, match="24 to 1600, at least 8 for each of 3 regions; got 23"):
+        fit_cages(mesh, thirds(mesh), 23)
+    with pytest.raises(CageError, match="offset must be a positive length; got -1"):
+        fit_cage(mesh, [0, 1, 2], 12, offset=-1.0)
+    with pytest.raises(RegionError, match="members is empty"):
+        fit_cage(mesh, np.zeros(mesh.n_vertices, dtype=bool), 12)
+
+
+def test_progress_grows_to_one_and_can_cancel():
+    mesh = Mesh(*icosphere(2))
+    seen = []
+    fit_cages(mesh, thirds(mesh), 60, progress=lambda fraction, _: seen.append(fraction))
+    assert seen == sorted(seen)
+    assert (seen[0], seen[-1]) == (0.0, 1.0)
+
+    def cancel(fraction, _):
+        if fraction > 0.3:
+            raise Cancelled("enough")
+
+    with pytest.raises(Cancelled):
+        fit_cages(mesh, thirds(mesh), 60, progress=cancel)
+
+
+@pytest.mark.parametrize(("solid", "genus"), [(icosphere(4), 0), (torus(), 1)])
+def test_simplifying_keeps_the_topology_and_meets_the_number(solid, genus):
+    for n in (300, 77, 20):
+        vertices, faces = simplify(*solid, n)
+        assert len(vertices) == n
+        assert len(vertices) - len(faces) // 2 == 2 - 2 * genus
+        assert cage_faults(vertices, faces) == ()
+        assert roundness(vertices, faces).min() > 0.1
+
+
+def test_simplifying_stops_where_every_component_is_a_tetrahedron():
+    vertices, faces = simplify(*two_components(), 3)
+    assert len(vertices) == 8
+    assert cage_faults(vertices, faces) == ()
+
+
+def test_a_simplified_ball_keeps_its_size():
+    vertices, faces = simplify(*icosphere(4), 60)
+    radius = np.linalg.norm(vertices[faces].mean(axis=1), axis=1)
+    assert radius.min() > 0.9
+    assert radius.max() < 1.05
+
+
+def test_counting_crossings_agrees_with_the_winding_number(mesh):
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    points = np.random.default_rng(0).uniform(low, high, (1000, 3))
+    points = np.concatenate([points, 0.5 * (mesh.vertices + mesh.vertices.mean(axis=0))])
+    expected = winding_number(points, mesh.vertices, mesh.faces) > 0.5
+    assert_array_equal(inside_points(points, mesh.vertices, mesh.faces), expected)
+
+
+def test_columns_through_vertices_and_edges_are_counted_once():
+    vertices, faces = CUBE
+    inside = inside_nodes(4.0 * vertices + [1.0, 1.0, 1.5], faces, (8, 8, 8))
+    node = np.indices((8, 8, 8)).transpose(1, 2, 3, 0)
+    well_in = ((node > [1, 1, 1.5]) & (node < [5, 5, 5.5])).all(axis=-1)
+    well_out = ((node < [1, 1, 1.5]) | (node > [5, 5, 5.5])).any(axis=-1)
+    assert inside[well_in].all()
+    assert not inside[well_out].any()
+
+
+@pytest.mark.parametrize("name", ["cactus", "cylinder"])
+def test_cages_of_a_real_mesh_are_valid_and_tight(name):
+    vertices, faces = read_off(f"botsch-sorkine/{name}.off")
+    mesh = Mesh(vertices, faces)
+    regions = thirds(mesh)
+    cages = fit_cages(mesh, regions, 200)
+    assert sum(cage.n_vertices for cage in cages) == 200
+    for cage, members in zip(cages, regions.membership, strict=True):
+        assert_holds(cage, mesh, members)
+        assert distance_to_skin(cage, mesh, members).mean() < 0.03 * mesh.diagonal
+
+
+def test_simplifying_a_rough_surface_folds_no_face_over():
+    ball, faces = icosphere(4)
+    rough = ball * np.random.default_rng(0).uniform(0.5, 1.5, (len(ball), 1))
+    vertices, faces = simplify(rough, faces, 300)
+    a, b, c = vertices[faces.T]
+    assert (np.einsum("fi,fi->f", np.cross(b - a, c - a), a + b + c) > 0).all()
+
+
+def test_the_contour_is_exact_beyond_single_precision():
+    x, y, z = np.indices((7, 8, 9)).astype(float)
+    points, _ = contour_surface(x + 0.3 * y - 0.7 * z, 1.2345678901234)
+    assert_allclose(points @ [1.0, 0.3, -0.7], 1.2345678901234, atol=1e-13)
+
+
+def test_cavities_are_filled_and_islands_that_hold_nothing_are_sunk():
+    values = np.full((20, 12, 12), 9.0)
+    values[2:9, 2:9, 2:9] = 0.0
+    values[4:7, 4:7, 4:7] = 9.0  # a cavity
+    values[14:17, 3:6, 3:6] = 0.0  # an island
+    filled, n_shells = _filled(values, 1.5, np.array([[3.2, 3.1, 2.9]]))
+    expected = np.zeros(values.shape, dtype=bool)
+    expected[2:9, 2:9, 2:9] = True
+    assert_array_equal(filled < 1.5, expected)
+    assert n_shells == 1
+    assert _filled(values, 1.5, np.array([[3.0, 3.0, 3.0], [15.0, 4.0, 4.0]]))[1] == 2
+
+
+def test_too_many_cage_vertices_are_refused_before_any_work():
+    mesh = Mesh(*icosphere(4))
+    reports = []
+
+    def progress(fraction, message):
+        reports.append(message)
+
+    with pytest.raises(CageError, match="n_vertices must be 24 to 1600, at least 8 for each of 3"):
+        fit_cages(mesh, thirds(mesh), 5000, progress=progress)
+    many = Regions.from_labels(mesh, np.arange(mesh.n_vertices) % 300, overlap=0)
+    with pytest.raises(CageError, match=r"300 regions need 2400 .* use 200 regions or fewer"):
+        fit_cages(mesh, many, 3000, progress=progress)
+    assert reports == []

@@ -1,0 +1,254 @@
+"""Mean value coordinates against exact ones, against VTK's, and against themselves."""
+
+from __future__ import annotations
+
+import tracemalloc
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from real_meshes import read_off
+from solids import OCTAHEDRON, SOLIDS, TETRAHEDRON, icosphere, rotation, somewhere, torus
+from solids import two_components as two_spheres
+from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkCommonCore import vtkIdList, vtkPoints
+from vtkmodules.vtkCommonDataModel import vtkMeanValueCoordinatesInterpolator
+
+from vtk_segdeform.cages.mean_value import mean_value_coordinates
+from vtk_segdeform.errors import CageError, Cancelled
+
+TURN = rotation([1, 2, 3], 0.7)  # tidy coordinates hide faults
+CAGES = {
+    **SOLIDS,
+    "turned octahedron": (OCTAHEDRON[0] @ TURN.T * 1.3 + [0.1, 0.2, 0.3], OCTAHEDRON[1]),
+    "turned cube": (SOLIDS["cube"][0] @ TURN.T - 0.4, SOLIDS["cube"][1]),
+    "sphere": icosphere(1),
+    "torus": torus(9, 6),
+    "two spheres": two_spheres(),
+}
+DISTANCES = [0.0, *10.0 ** np.arange(-17, -2)]
+
+every_cage = pytest.mark.parametrize("cage", CAGES.values(), ids=CAGES.keys())
+every_distance = pytest.mark.parametrize("distance", DISTANCES)
+
+
+def barycentric(x, corners):
+    """Return the four weights that sum to 1 and reproduce *x*: there is only one such row."""
+    rows = np.vstack([corners.T, np.ones(4)])
+    return np.linalg.solve(rows, np.vstack([x.T, np.ones(len(x))])).T
+
+
+def places(cage, n=40, seed=0):
+    """Return points on faces, in their planes, on edges, on their lines, on vertices."""
+    vertices, faces = cage
+    rng = np.random.default_rng(seed)
+    a, b, c = vertices[faces[rng.integers(len(faces), size=n)]].transpose(1, 0, 2)
+    share = rng.dirichlet([1, 1, 1], n)[..., None]
+    t, s = rng.uniform(-2, 3, (2, n, 1))
+    return {
+        "face": share[:, 0] * a + share[:, 1] * b + share[:, 2] * c,
+        "plane": a + t * (b - a) + s * (c - a),
+        "edge": a + share[:, 0] * (b - a),
+        "line": a + t * (b - a),
+        "vertex": a,
+    }
+
+
+def split(cage, face, share):
+    """Return the cage with a vertex sum(share_i p_i) inside one face, which becomes three."""
+    vertices, faces = cage
+    a, b, c = faces[face]
+    new = len(vertices)
+    more = [[a, b, new], [b, c, new], [c, a, new]]
+    return (
+        np.vstack([vertices, share @ vertices[[a, b, c]]]),
+        np.vstack([np.delete(faces, face, axis=0), more]),
+    )
+
+
+@every_cage
+def test_weights_sum_to_one_and_reproduce_every_point(cage):
+    for x in (somewhere(200), *places(cage).values()):
+        weights = mean_value_coordinates(x, *cage)
+        assert_allclose(weights.sum(axis=1), 1.0, atol=1e-11)
+        assert_allclose(weights @ cage[0], x, atol=1e-11)
+
+
+@every_cage
+def test_a_vertex_is_its_own_coordinate(cage):
+    assert_allclose(mean_value_coordinates(cage[0], *cage), np.eye(len(cage[0])), atol=1e-15)
+
+
+@every_cage
+def test_on_a_face_the_weights_are_barycentric(cage):
+    vertices, faces = cage
+    share = np.random.default_rng(1).dirichlet([1, 1, 1], len(faces))
+    x = np.einsum("ki,kix->kx", share, vertices[faces])
+    expected = np.zeros((len(faces), len(vertices)))
+    np.put_along_axis(expected, faces, share, axis=1)
+    assert_allclose(mean_value_coordinates(x, *cage), expected, atol=1e-13)
+
+
+@every_cage
+def test_on_an_edge_only_its_ends_count(cage):
+    vertices, faces = cage
+    share = np.random.default_rng(2).uniform(0, 1, (len(faces), 1))
+    share = np.hstack([share, 1 - share])
+    x = np.einsum("ki,kix->kx", share, vertices[faces[:, :2]])
+    expected = np.zeros((len(faces), len(vertices)))
+    np.put_along_axis(expected, faces[:, :2], share, axis=1)
+    assert_allclose(mean_value_coordinates(x, *cage), expected, atol=1e-13)
+
+
+def test_for_a_tetrahedron_they_are_the_barycentric_coordinates_everywhere():
+    x = somewhere(500, size=3.0)
+    expected = barycentric(x, TETRAHEDRON[0])
+    assert_allclose(mean_value_coordinates(x, *TETRAHEDRON), expected, atol=1e-12)
+
+
+@every_distance
+@pytest.mark.parametrize("place", ["face", "plane", "edge", "line", "vertex"])
+def test_digits_survive_at_any_distance_from_a_tetrahedron(place, distance):
+    vertices, faces = TETRAHEDRON[0] @ TURN.T * 1.3 + 0.1, TETRAHEDRON[1]
+    off = np.random.default_rng(3).normal(size=(40, 3))
+    off *= distance / np.linalg.norm(off, axis=1, keepdims=True)
+    x = places((vertices, faces))[place] + off
+    assert_allclose(
+        mean_value_coordinates(x, vertices, faces), barycentric(x, vertices), atol=1e-11
+    )
+
+
+@pytest.mark.parametrize("distance", [0.0, 1e-16, 1e-12, 1e-8, 1e-4, 1.0])
+@pytest.mark.parametrize("place", ["plane", "line"])
+@pytest.mark.parametrize("name", ["turned octahedron", "turned cube", "sphere", "torus"])
+def test_splitting_a_face_changes_nothing(name, place, distance):
+    """The weights integrate a function linear on each face; a vertex in a face adds no bend."""
+    cage, share = CAGES[name], np.array([0.2, 0.3, 0.5])
+    finer = split(cage, 0, share)
+    off = np.random.default_rng(4).normal(size=(40, 3))
+    off *= distance / np.linalg.norm(off, axis=1, keepdims=True)
+    x = places(cage)[place] + off
+    weights = mean_value_coordinates(x, *finer)
+    weights[:, cage[1][0]] += weights[:, -1:] * share
+    assert_allclose(weights[:, :-1], mean_value_coordinates(x, *cage), atol=1e-10)
+
+
+@pytest.mark.parametrize("height", [1e-3, 1e-5, 1e-7])
+def test_thin_faces_cost_no_more_digits_than_their_height(height):
+    cage = CAGES["turned octahedron"]
+    share = np.array([0.4, 0.6 - height, height])  # a vertex close to an edge: one thin face
+    weights = mean_value_coordinates(somewhere(200), *split(cage, 0, share))
+    assert_allclose(
+        weights @ np.vstack([cage[0], share @ cage[0][cage[1][0]]]),
+        somewhere(200),
+        atol=1e-13 / height,
+    )
+    weights[:, cage[1][0]] += weights[:, -1:] * share
+    expected = mean_value_coordinates(somewhere(200), *cage)
+    assert_allclose(weights[:, :-1], expected, atol=1e-13 / height)
+
+
+@every_cage
+def test_no_jump_across_a_face_an_edge_or_a_vertex(cage):
+    rng = np.random.default_rng(5)
+    for place in ("face", "edge", "vertex"):
+        x = places(cage)[place]
+        off = rng.normal(size=x.shape) * 1e-9
+        both = mean_value_coordinates(x + off, *cage), mean_value_coordinates(x - off, *cage)
+        assert_allclose(*both, atol=1e-7)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_moving_scaling_turning_and_flipping_the_cage_changes_nothing(scale):
+    vertices, faces = CAGES["torus"]
+    x = somewhere()
+    expected = mean_value_coordinates(x, vertices, faces)
+
+    def moved(points):
+        return scale * (points @ TURN.T + [1.0, -2.0, 0.5])
+
+    for triangles in (faces, faces[:, ::-1]):
+        weights = mean_value_coordinates(moved(x), moved(vertices), triangles)
+        assert_allclose(weights, expected, atol=1e-12)
+
+
+def test_inside_a_convex_cage_all_weights_are_positive():
+    x = somewhere(300, size=0.5)
+    assert (mean_value_coordinates(x, *icosphere(1)) > 0).all()
+
+
+@pytest.mark.parametrize(
+    "name", ["octahedron", "turned octahedron", "turned cube", "sphere", "torus"]
+)
+def test_vtk_finds_the_same_weights(name):
+    vertices, faces = CAGES[name]
+    x = somewhere(100, size=1.5)
+    points, triangles = vtkPoints(), vtkIdList()
+    points.SetDataTypeToDouble()
+    points.SetData(numpy_to_vtk(vertices, deep=True))
+    for corner in faces.ravel():
+        triangles.InsertNextId(int(corner))
+    expected = np.empty((len(x), len(vertices)))
+    for point, row in zip(x, expected, strict=True):
+        vtkMeanValueCoordinatesInterpolator.ComputeInterpolationWeights(
+            point, points, triangles, row
+        )
+    assert_allclose(mean_value_coordinates(x, vertices, faces), expected, atol=1e-9)
+
+
+def test_a_cactus_in_a_simplified_copy_of_itself_is_reproduced():
+    pv = pytest.importorskip("pyvista")
+    vertices, faces = read_off("botsch-sorkine/cactus.off")
+    coarse = pv.PolyData.from_regular_faces(vertices, faces).decimate(1 - 306 / len(faces))
+    middle = vertices.mean(axis=0)
+    cage = middle + 1.15 * (np.asarray(coarse.points, float) - middle), coarse.regular_faces
+    weights = mean_value_coordinates(vertices, *cage)
+    diagonal = np.linalg.norm(np.ptp(vertices, axis=0))
+    assert_allclose(weights.sum(axis=1), 1.0, atol=1e-12)
+    assert np.abs(weights @ cage[0] - vertices).max() < 1e-12 * diagonal
+
+
+def test_memory_stays_bounded_whatever_the_size():
+    x = somewhere(20_000)
+    tracemalloc.start()
+    weights = mean_value_coordinates(x, *icosphere(1))
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak - weights.nbytes < 16e6
+
+
+def test_no_points_give_no_rows():
+    assert mean_value_coordinates(np.empty((0, 3)), *OCTAHEDRON).shape == (0, 6)
+
+
+def test_an_open_cage_is_refused():
+    vertices, faces = OCTAHEDRON
+    with pytest.raises(CageError, match="3 edges border one face only"):
+        mean_value_coordinates([[0, 0, 0]], vertices, faces[1:])
+
+
+def test_a_cage_with_a_face_turned_round_is_refused():
+    vertices, faces = OCTAHEDRON
+    turned = np.vstack([faces[:1, ::-1], faces[1:]])
+    with pytest.raises(CageError, match="3 edges have faces of opposite orientation"):
+        mean_value_coordinates([[0, 0, 0]], vertices, turned)
+
+
+def test_a_face_without_area_is_refused():
+    cage = split(TETRAHEDRON, 0, np.array([0.5, 0.5, 0.0]))
+    with pytest.raises(CageError, match="1 face has no area"):
+        mean_value_coordinates([[0, 0, 0]], *cage)
+
+
+def test_progress_arrives_at_one_and_can_cancel():
+    seen = []
+    mean_value_coordinates(somewhere(5000), *icosphere(1), progress=lambda f, _: seen.append(f))
+    assert len(seen) > 1
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0
+
+    def stop(_, message):
+        raise Cancelled(message)
+
+    with pytest.raises(Cancelled):
+        mean_value_coordinates(somewhere(5000), *icosphere(1), progress=stop)

@@ -1,0 +1,373 @@
+"""The command line as a person meets it: what it prints, writes and returns."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import pyvista as pv
+from numpy.testing import assert_allclose, assert_array_equal
+from solids import OCTAHEDRON
+
+import vtk_segdeform
+from vtk_segdeform import models
+from vtk_segdeform.benchmarks import report
+from vtk_segdeform.benchmarks.sections import Ratio, Section
+from vtk_segdeform.cli.main import ProgressBar, main
+from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.io import convert
+from vtk_segdeform.mesh.mesh import Mesh
+
+QUICK = ["--regions", "2", "--cage-vertices", "60"]
+
+
+@pytest.fixture(scope="module")
+def bar() -> Mesh:
+    return models.bar(divisions=(4, 4, 14))
+
+
+@pytest.fixture(scope="module")
+def bar_file(bar, tmp_path_factory) -> str:
+    path = tmp_path_factory.mktemp("bar") / "bar.vtp"
+    surface = convert.to_polydata(bar)
+    surface.point_data["height"] = bar.vertices[:, 2]
+    surface.point_data["half"] = (bar.vertices[:, 2] > 0.5).astype(int)
+    surface.cell_data["number"] = np.arange(bar.n_faces)
+    convert.write_mesh(path, surface)
+    return str(path)
+
+
+def lines(text: str) -> dict[str, str]:
+    """Return the lines of a report by their first word."""
+    return {line.split()[0]: line for line in text.splitlines() if line.strip()}
+
+
+def test_deform_moves_the_handle_keeps_the_volume_and_all_that_came_along(
+    bar, bar_file, tmp_path, capsys
+):
+    out = tmp_path / "bent.vtp"
+    code = main(
+        ["deform", bar_file, "-o", str(out), "--fixed", "z<10%", "--handle", "z>90%",
+         "--rotate", "y,30", "--pivot", "0,0,0.5", *QUICK]
+    )  # fmt: skip
+    report = lines(capsys.readouterr().out)
+    assert code == 0
+    assert {"volume", "handles", "solved", "status", "written"} <= set(report)
+    assert "ms a step" in report["solved"]
+    bent = convert.read_polydata(out)
+    mesh = convert.from_polydata(bent)
+    assert_array_equal(mesh.faces, bar.faces)
+    assert_array_equal(bent.point_data["height"], bar.vertices[:, 2])
+    assert_array_equal(bent.cell_data["number"], np.arange(bar.n_faces))
+    before, after = (signed_volume(m.vertices, m.faces) for m in (bar, mesh))
+    assert after == pytest.approx(before, rel=1e-12)
+    top = bar.vertices[:, 2] > 0.9
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    pivot = np.array([0, 0, 0.5])
+    expected = (bar.vertices[top] - pivot) @ turn.T + pivot
+    assert_allclose(mesh.vertices[top], expected, atol=1e-3 * bar.diagonal)
+    bottom = bar.vertices[:, 2] < 0.1
+    assert_allclose(mesh.vertices[bottom], bar.vertices[bottom], atol=1e-3 * bar.diagonal)
+
+
+def test_each_handle_has_its_own_motion_and_a_shift_may_begin_with_a_minus(bar, bar_file, tmp_path):
+    out = tmp_path / "two.ply"
+    code = main(
+        ["deform", bar_file, "-o", str(out), "--fixed", "z>45%&z<55%", *QUICK,
+         "--handle", "z<5%", "--translate", "-.05,0,0",
+         "--handle", "z>95%", "--rotate", "-1,0,0,10", "--translate", "0.05,0,0"]
+    )  # fmt: skip
+    assert code == 0
+    moved = convert.read_mesh(out).vertices - bar.vertices
+    close = 1e-3 * bar.diagonal
+    assert_allclose(moved[bar.vertices[:, 2] < 0.05], [[-0.05, 0, 0]] * 25, atol=close)
+    top = bar.vertices[:, 2] > 0.95
+    assert_allclose(moved[top].mean(axis=0), [0.05, 0, 0], atol=close)  # turned about its centre
+    assert np.ptp(moved[top][:, 2]) > 0.02
+
+
+def test_a_matrix_file_says_how_the_handle_moves(bar, bar_file, tmp_path):
+    matrix = np.eye(4)
+    matrix[:3, 3] = 0.02, 0.03, -0.04
+    np.savetxt(tmp_path / "pose.def", matrix)
+    out = tmp_path / "moved.ply"
+    code = main(
+        ["deform", bar_file, "-o", str(out), "--fixed", "z<10%", "--handle", "z>90%",
+         "--matrix", str(tmp_path / "pose.def"), "--regions", "half", "--cage-vertices", "60"]
+    )  # fmt: skip
+    assert code == 0
+    moved = convert.read_mesh(out).vertices - bar.vertices
+    top = moved[bar.vertices[:, 2] > 0.9]
+    assert_allclose(top, np.broadcast_to(matrix[:3, 3], top.shape), atol=1e-3 * bar.diagonal)
+
+
+def test_a_turn_about_the_fixed_centre_is_asked_for_by_name(bar, bar_file, tmp_path):
+    out = tmp_path / "moved.ply"
+    main(
+        ["deform", bar_file, "-o", str(out), "--fixed", "z<10%", "--handle", "z>=100%",
+         "--rotate", "x,20", "--pivot", "fixed", "--regions", "1", "--cage-vertices", "40"]
+    )  # fmt: skip
+    bottom, top = bar.vertices[:, 2] < 0.1, bar.vertices[:, 2] >= 1.0
+    arm = bar.vertices[top].mean(axis=0) - bar.vertices[bottom].mean(axis=0)
+    found = convert.read_mesh(out).vertices[top].mean(axis=0)
+    angle = np.radians(20)
+    expected = [
+        0,
+        -np.sin(angle) * arm[2],
+        bar.vertices[bottom][:, 2].mean() + np.cos(angle) * arm[2],
+    ]
+    assert_allclose(found, expected, atol=2e-3 * bar.diagonal)
+
+
+def test_check_praises_a_good_mesh(bar_file, capsys):
+    assert main(["check", bar_file]) == 0
+    assert "a closed, outward oriented two-manifold" in capsys.readouterr().out
+
+
+def test_check_names_the_faults_says_what_repair_would_do_and_changes_nothing(tmp_path, capsys):
+    path = tmp_path / "open.off"
+    vertices, faces = OCTAHEDRON
+    convert.write_mesh(path, pv.make_tri_mesh(vertices, faces[:-1]))
+    before = path.read_bytes()
+    assert main(["check", str(path)]) == 1
+    text = capsys.readouterr().out
+    assert "3 open edges" in text
+    assert "--repair would: fill 1 hole" in text
+    assert path.read_bytes() == before
+    assert sorted(tmp_path.iterdir()) == [path]
+
+
+def test_check_repairs_into_another_file_and_keeps_the_arrays(tmp_path, capsys):
+    path, out = tmp_path / "open.vtp", tmp_path / "closed.vtp"
+    vertices, faces = OCTAHEDRON
+    surface = pv.make_tri_mesh(vertices, faces[:-1])
+    surface.point_data["number"] = np.arange(6)
+    surface.cell_data["number"] = np.arange(1, 8)
+    convert.write_mesh(path, surface)
+    assert main(["check", str(path), "--repair", "-o", str(out)]) == 0
+    assert "repaired: fill 1 hole" in capsys.readouterr().out
+    closed = convert.read_polydata(out)
+    mesh = convert.from_polydata(closed)
+    assert_array_equal(mesh.vertices, vertices)
+    assert_array_equal(mesh.faces[:-1], faces[:-1])
+    assert_array_equal(closed.point_data["number"], np.arange(6))
+    assert_array_equal(closed.cell_data["number"], [1, 2, 3, 4, 5, 6, 7, 0])
+
+
+def test_regions_are_written_as_an_array_that_deform_and_cages_take_up(
+    bar, bar_file, tmp_path, capsys
+):
+    path = tmp_path / "regions.ply"
+    assert main(["regions", bar_file, "-o", str(path), "--regions", "2"]) == 0
+    assert lines(capsys.readouterr().out)["regions"].split()[1] == "2:"
+    written = convert.read_polydata(path)
+    assert set(np.unique(written.point_data["region"])) == {0, 1}
+    assert written.point_data["regions_here"].max() == 2
+    assert written.n_points == bar.n_vertices
+    assert main(["cages", str(path), "--regions", "region", "--cage-vertices", "60"]) == 0
+    assert lines(capsys.readouterr().out)["regions"].split()[1] == "2:"
+
+
+def test_cages_are_written_as_one_coloured_surface_of_closed_cages(bar_file, tmp_path, capsys):
+    path = tmp_path / "cages.ply"
+    assert main(["cages", bar_file, "-o", str(path), *QUICK]) == 0
+    assert "= 60 vertices" in lines(capsys.readouterr().out)["cages"]
+    written = convert.read_polydata(path)
+    assert written.n_points == 60
+    assert convert.from_polydata(written).components.max() == 1
+    assert len(np.unique(written.point_data["RGB"], axis=0)) == 2
+
+
+def test_the_demo_leaves_meshes_whose_volume_is_the_same(tmp_path, capsys):
+    folder = tmp_path / "deep" / "demo"
+    assert main(["demo", "-o", str(folder), "--size", "1500", "--no-pictures"]) == 0
+    report = lines(capsys.readouterr().out)
+    assert {"cactus", "regions", "cages", "volume", "solved"} <= set(report)
+    assert "= 155 vertices" in report["cages"]
+    rest = models.cactus(1500)
+    bent = convert.read_mesh(folder / "cactus-bent.vtp")
+    before, after = (signed_volume(m.vertices, m.faces) for m in (rest, bent))
+    assert after == pytest.approx(before, rel=1e-12)
+    tip = rest.vertices[:, 2] > 0.92
+    assert (bent.vertices - rest.vertices)[tip, 0].mean() > 0.3 * rest.vertices[:, 2].max()
+
+
+def test_the_interactive_bench_drags_in_a_window_and_splits_the_time_of_an_event():
+    pytest.importorskip("pyvista")
+    from vtk_segdeform.cli.interactive import interactive_table
+    from vtk_segdeform.errors import MissingDependencyError
+
+    try:
+        head, _, names, _, row = interactive_table(sizes=(800,), moves=4).splitlines()
+    except MissingDependencyError as missing:
+        pytest.skip(str(missing))
+    assert "4 moves of a drag" in head
+    cells = dict(zip(names.split("|"), row.split("|"), strict=True))
+    event, *parts = (float(cells[f" {k} "]) for k in ("event ms", "solve", "map", "overlay"))
+    assert min(parts) >= 0.0
+    assert 0.0 < sum(parts) < 1.2 * event
+    assert int(cells[" steps "]) >= 1
+
+
+def test_bench_leaves_a_report_and_says_what_does_not_hold(tmp_path, capsys):
+    size = ["--quick", "--size", "800", "--cage-vertices", "60"]
+    assert main(["bench", *size, "--only", "table1", "-o", str(tmp_path / "out")]) == 0
+    written = (tmp_path / "out" / "report.md").read_text()
+    assert "Table 1" in written
+    assert "800 vertices, 60 cage vertices" in written
+    told = capsys.readouterr().out.splitlines()
+    assert told[-1].endswith("report.md")
+    assert sum("gain of the products with W" in line for line in told) == 2
+
+
+def test_bench_records_a_run_and_plots_the_history(tmp_path, capsys, monkeypatch):
+    pytest.importorskip("matplotlib")
+    section = Section("Trial", ratios=[Ratio("trial", 0.5, 1.0)])
+    monkeypatch.setattr(report, "EXPERIMENTS", {"drag": lambda scale, progress: section})
+    monkeypatch.setattr(report, "warm_up", lambda: None)
+    file, out = tmp_path / "history.jsonl", tmp_path / "out"
+    for _ in range(2):
+        assert main(["bench", "--quick", "-o", str(out), "--record", str(file)]) == 0
+    assert file.read_text().count('"scale": "quick", "ratios": {"trial": 0.5}') == 2
+    assert main(["bench", "-o", str(out), "--history", str(file)]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].endswith("history.png")
+    assert (out / "history.png").stat().st_size > 5000
+
+
+def test_bench_refuses_a_history_that_it_cannot_append_to_before_it_measures(tmp_path, capsys):
+    (tmp_path / "notes.txt").write_text("not JSON")
+    words = ["bench", "-o", str(tmp_path / "out"), "--record", str(tmp_path / "notes.txt")]
+    assert main(words) == 1
+    assert "line 1 of" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        ([], 2, "COMMAND"),
+        (["dance"], 2, "dance"),
+        (["check"], 2, "IN"),
+        (["deform", "BAR", "-o", "x.ply", "--fixed", "z<1%"], 2, "--handle"),
+        (["deform", "BAR", "-o", "x.ply", "--fixed", "z<1%", "--rotate", "z,1"], 2, "after its"),
+        (["deform", "BAR", "-o", "x.ply", "--fixed", "z<9%", "--handle", "z>9%"], 2, "not move"),
+        (["deform", "BAR", "-o", "x.ply", "--fixed", "up", "--handle", "z>9%"], 2, "z>80%"),
+        (["deform", "BAR", "-o", "x.ply", "--fixed", "z<9%", "--handle", "z>9%", "--rotate", "q,1"],
+         2, "rotate must be"),
+        (["deform", "BAR", "-o", "x.ply", "--fixed", "z<50%", "--handle", "z>30%", *QUICK,
+          "--translate", "0,0,1"], 2, "both fixed and handle"),
+        (["regions", "BAR", "--regions", "none"], 2, "height, half"),
+        (["regions", "BAR", "--regions", "0"], 2, "number from 1"),
+        (["bench", "--size", "-3"], 2, "--size"),
+        (["check", "BAR", "--repair"], 2, "-o"),
+        (["check", "no-such-file.ply"], 1, "no-such-file.ply"),
+        (["cages", "BAR", "-o", "no/such/folder/x.ply", *QUICK], 1, "no folder"),
+        (["regions", "BAR", "-o", "x.xyz", "--regions", "1"], 1, ".xyz"),
+        (["regions", "BAR", "-o", "x.stl", "--regions", "1"], 1, "cannot write arrays"),
+        (["cages", "BAR", "-o", "x.obj", "--regions", "1"], 1, "cannot write arrays"),
+    ],
+)  # fmt: skip
+def test_what_goes_wrong_is_one_line_on_stderr_and_an_exit_code(
+    bar_file, tmp_path, monkeypatch, capsys, arguments, code, message
+):
+    monkeypatch.chdir(tmp_path)
+    assert main([bar_file if word == "BAR" else word for word in arguments]) == code
+    error = capsys.readouterr().err
+    assert message in error.splitlines()[-1]
+    assert "Traceback" not in error
+    assert error.startswith(("segdeform", "usage"))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_open_mesh_is_refused_with_its_faults_and_the_way_out(tmp_path, capsys):
+    path = tmp_path / "open.off"
+    vertices, faces = OCTAHEDRON
+    convert.write_mesh(path, pv.make_tri_mesh(vertices, faces[:-1]))
+    assert main(["regions", str(path)]) == 1
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "3 open edges" in error
+    assert "segdeform check" in error
+
+
+def test_debug_shows_where_an_error_came_from():
+    with pytest.raises(ValueError, match="no such file"):
+        main(["--debug", "check", "no-such-file.ply"])
+
+
+@pytest.mark.parametrize(
+    ("missing", "advice"),
+    [
+        (set(), ""),
+        ({"numba"}, "numba is not installed: frames take 3 to 6 times as long. pip install numba"),
+        (
+            {"numba", "threadpoolctl"},
+            "numba and threadpoolctl are not installed: frames take 3 to 6 times as long. "
+            "pip install numba threadpoolctl",
+        ),
+    ],
+)
+def test_version_says_which_libraries_are_missing_for_full_speed(
+    missing, advice, monkeypatch, capsys
+):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name in missing else name)
+    assert main(["--version"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines == [f"segdeform {vtk_segdeform.__version__}", *filter(None, [advice])]
+
+
+def test_version_and_help_end_well(capsys):
+    assert main(["--version"]) == 0
+    assert vtk_segdeform.__version__ in capsys.readouterr().out
+    assert main(["--help"]) == 0
+    text = capsys.readouterr().out
+    assert "examples:" in text
+    assert "exit codes:" in text
+    assert main(["deform", "--help"]) == 0
+    assert "selections (SEL):" in capsys.readouterr().out
+
+
+def test_python_m_is_the_same_program():
+    done = subprocess.run(
+        [sys.executable, "-m", "vtk_segdeform", "check", "no-such-file.ply"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+
+
+class Terminal(io.StringIO):
+    """A stream that a person watches."""
+
+    def isatty(self) -> bool:
+        """Say so."""
+        return True
+
+
+def test_the_bar_waits_a_second_then_shows_and_leaves_no_trace(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr("time.monotonic", lambda: clock[0])
+    stream = Terminal()
+    bar = ProgressBar(stream)
+    bar(0.1, "fitting cages")
+    assert stream.getvalue() == ""
+    clock[0] = 2.0
+    bar(0.5, "fitting cages")
+    assert "[###############...............]  50% fitting cages" in stream.getvalue()
+    bar.clear()
+    assert stream.getvalue().endswith("\r\x1b[K")
+
+
+def test_no_bar_is_written_into_a_file(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr("time.monotonic", lambda: clock[0])
+    stream = io.StringIO()
+    bar = ProgressBar(stream)
+    clock[0] = 9.0
+    bar(0.5, "fitting cages")
+    bar.clear()
+    assert stream.getvalue() == ""

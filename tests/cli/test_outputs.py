@@ -1,0 +1,158 @@
+"""Files and names that a command is given: long ones, odd ones, and those it cannot write."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from vtk_segdeform import models, read_mesh
+from vtk_segdeform.cli import commands
+from vtk_segdeform.cli.main import main
+from vtk_segdeform.cli.selection import parse_selection
+from vtk_segdeform.errors import ConstraintError, MeshError
+from vtk_segdeform.io import convert
+
+BAR = models.bar(divisions=(3, 3, 9))
+LONG = "n" * 256
+POSE = ["--fixed", "z<10%", "--handle", "z>90%", "--translate", "0,0,0.1", "--regions", "1"]
+posix = pytest.mark.skipif(os.name != "posix", reason="names of any bytes, pipes")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    convert.write_mesh("bar.ply", BAR)
+    return tmp_path
+
+
+def no_solver(*_, **__):
+    raise AssertionError("the solver was set up")
+
+
+@pytest.mark.parametrize(
+    ("picture", "says"),
+    [
+        ("a.tiff", "a picture must be a .png file"), ("a", "a picture must be a .png file"),
+        ("no/a.png", "there is no folder"), ("folder.png", "is a folder, not a file"),
+        (f"{LONG}.png", "too long"),
+        pytest.param("pipe.png", "a device or a pipe", marks=posix),
+    ],
+)  # fmt: skip
+def test_a_picture_that_cannot_be_written_is_an_error_before_the_solve(
+    folder, monkeypatch, capsys, picture, says
+):
+    (folder / "folder.png").mkdir()
+    if os.name == "posix":
+        os.mkfifo(folder / "pipe.png")
+    before = set(os.listdir(folder))
+    monkeypatch.setattr(commands, "Deformer", no_solver)
+    monkeypatch.setattr(commands, "_subspace", no_solver)
+    assert main(["deform", "bar.ply", "-o", "out.ply", *POSE, "--picture", picture]) == 1
+    error = capsys.readouterr().err
+    assert says in error
+    assert picture in error
+    assert set(os.listdir(folder)) == before
+
+
+def test_a_picture_that_fails_after_the_solve_is_an_error_too(folder, monkeypatch, capsys):
+    real = os.replace
+
+    def full(draft, target):
+        if str(target).endswith(".png"):
+            raise OSError(28, "No space left on device")
+        real(draft, target)
+
+    monkeypatch.setattr(os, "replace", full)
+    assert main(["deform", "bar.ply", "-o", "out.ply", *POSE, "--picture", "a.png"]) == 1
+    assert "a.png: cannot be written (No space left" in capsys.readouterr().err
+    assert sorted(os.listdir(folder)) == ["bar.ply", "out.ply"]
+
+
+def test_a_selection_may_be_longer_than_a_name_of_a_file(folder):
+    long = "&".join([f"z>{k}%" for k in range(90)])
+    assert len(long) > 255
+    assert_array_equal(parse_selection(long, BAR), parse_selection("z>89%", BAR))
+    many = {LONG: np.arange(BAR.n_vertices) == 5}
+    assert_array_equal(parse_selection(LONG, BAR, point_arrays=many), [5])
+    assert_array_equal(parse_selection(f"{LONG} = 1", BAR, point_arrays=many), [5])
+    handles = [word if word != "z>90%" else long for word in POSE]
+    assert main(["deform", "bar.ply", "-o", "out.ply", *handles]) == 0
+
+
+@pytest.mark.parametrize("text", [LONG, f"{LONG}=2", "z<0%&" * 200 + "x<0%", "a\0b", "/" * 5000])
+def test_a_long_invalid_selection_is_named_and_truncated(text):
+    with pytest.raises(ConstraintError, match=r"cannot read the selection|selects none") as error:
+        parse_selection(text, BAR)
+    assert len(str(error.value)) < 700
+
+
+def test_a_file_of_the_selection_of_many_gigabytes_is_refused(folder):
+    with open("ids.txt", "wb") as file:
+        file.truncate(45_000_000_000)
+    with pytest.raises(ConstraintError, match=r"ids\.txt .*more than 268,435,456 bytes"):
+        parse_selection("ids.txt", BAR)
+
+
+def test_a_mesh_that_exceeds_memory_is_an_error_that_names_it(folder, monkeypatch, capsys):
+    def read(path):
+        raise MemoryError
+
+    with open("vast.obj", "wb") as file:
+        file.truncate(45 * 10**9)
+    monkeypatch.setitem(convert._READERS, ".obj", read)
+    assert main(["check", "vast.obj"]) == 1
+    told = capsys.readouterr().err
+    assert told == "segdeform check: vast.obj: too large for the memory of this machine (45 GB)\n"
+
+
+def test_work_that_exceeds_memory_is_an_error_in_one_line(folder, monkeypatch, capsys):
+    def solve(*_, **__):
+        raise MemoryError
+
+    monkeypatch.setattr(commands.Deformer, "solve", solve)
+    assert main(["deform", "bar.ply", "-o", "bent.ply", *POSE]) == 1
+    assert capsys.readouterr().err.endswith("segdeform deform: out of memory\n")
+
+
+@posix
+def test_a_pipe_is_told_from_a_file_that_is_not_there(folder):
+    os.mkfifo("pipe.obj")
+    with pytest.raises(MeshError, match=r"pipe\.obj: a device or a pipe, not a file"):
+        read_mesh("pipe.obj")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["deform", "bar.ply", "-o", f"{LONG}.ply", *POSE],
+        ["deform", f"{LONG}.ply", "-o", "out.ply", *POSE],
+        ["deform", "bar.ply", "-o", "out.ply", *POSE, "--matrix", LONG],
+        ["regions", "bar.ply", "-o", f"{LONG}.ply"],
+        ["check", f"{LONG}.ply"],
+        ["replay", LONG, "bar.ply", "--film", f"{LONG}.gif"],
+        ["edit", f"{LONG}.segdeform"],
+    ],
+)
+def test_a_name_that_is_too_long_is_an_error_that_names_it(capsys, words):
+    assert main(words) in (1, 2)
+    error = capsys.readouterr().err
+    assert LONG[:100] in error
+    assert "Traceback" not in error
+    with pytest.raises(MeshError, match=LONG[:100]):
+        read_mesh(f"{LONG}.ply")
+
+
+@posix
+@pytest.mark.parametrize("stem", [b"n" * 251, b"\xff\xfe", "Körper 身体".encode()])
+def test_every_name_that_the_system_allows_can_be_read_and_written(folder, capsys, stem):
+    name, out = (os.fsdecode(stem[: 251 - len(end)] + end) for end in (b"", b"2"))
+    os.rename("bar.ply", f"{name}.ply")
+    assert main(["deform", f"{name}.ply", "-o", f"{out}.ply", *POSE]) == 0
+    told = capsys.readouterr()
+    assert "written" in told.out
+    assert told.err == ""
+    assert main(["check", f"{out}.ply"]) == 0
+    assert sorted(os.listdir(folder)) == sorted([f"{name}.ply", f"{out}.ply"])

@@ -1,0 +1,439 @@
+"""What a caller sees: motion, scale, many handles, far jumps, too little or wrong input."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scenes import sausage
+from solids import exact_volume_change, icosphere, rotation
+
+from vtk_segdeform.cages.cage import Cage
+from vtk_segdeform.cages.fit import fit_cages
+from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionError
+from vtk_segdeform.geometry import rotations
+from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.models.shapes import cactus
+from vtk_segdeform.regions.regions import Regions, cage_distance_weights
+from vtk_segdeform.regions.segmentation import segment
+from vtk_segdeform.solver.anderson import Anderson
+from vtk_segdeform.solver.solution import Status
+
+SCENE = sausage(2)
+VERTICES = SCENE.mesh.vertices
+REST = SCENE.mesh.vertices[SCENE.handle]
+
+
+def test_nothing_asked_is_nothing_done():
+    solution = SCENE.deformer().solve(REST)
+    assert_allclose(solution.vertices, VERTICES, atol=1e-9)
+    assert solution.steps == 0
+
+
+def test_moving_every_handle_rigidly_and_fixing_nothing_moves_the_mesh_rigidly():
+    scene = replace(SCENE, fixed=np.array([], dtype=int))
+    turn = rotation([1, 2, 0], 0.4)
+    solution = scene.deformer(tolerance=1e-9, max_steps=2000).solve(REST @ turn.T + [0.5, 0, 0])
+    assert_allclose(solution.vertices, VERTICES @ turn.T + [0.5, 0, 0], atol=1e-4)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_turning_and_scaling_the_scene_turns_and_scales_the_answer(scale):
+    turn = rotation([1, 2, 3], 1.2)
+    targets = SCENE.turned(50)
+    plain = SCENE.held().solve(targets)
+    moved = SCENE.transformed(turn, scale).deformer().solve(scale * targets @ turn.T)
+    error = moved.vertices / scale - plain.vertices @ turn.T
+    assert np.abs(error).max() < 1e-6 * SCENE.mesh.diagonal
+    assert moved.steps == plain.steps
+
+
+def test_far_from_the_origin_only_the_digits_of_the_coordinates_are_lost():
+    shift = 1e4 * SCENE.mesh.diagonal * np.array([0.6, -0.8, 0.0])
+    targets = SCENE.turned(50)
+    plain = SCENE.held().solve(targets)
+    moved = SCENE.transformed(shift=shift).deformer().solve(targets + shift)
+    error = np.abs(moved.vertices - shift - plain.vertices).max() / SCENE.mesh.diagonal
+    assert error < 1e-6
+    assert abs(moved.volume_change) < 1e-12
+
+
+@pytest.mark.parametrize("diagonals", [0.0, 10.0, 1e3, 1e5, 1e7])
+def test_the_volume_change_is_that_of_the_returned_vertices_at_any_distance(diagonals):
+    shift = diagonals * SCENE.mesh.diagonal * np.array([0.6, -0.64, 0.48])
+    scene = SCENE.transformed(shift=shift)
+    solution = scene.deformer().solve(SCENE.turned(50) + shift)
+    x, faces = solution.vertices, scene.mesh.faces
+    true = exact_volume_change(scene.mesh.vertices, x, faces)
+    print(f"{diagonals:g} diagonals away: {solution.volume_change:.2e}, truly {true:.2e}")
+    assert abs(solution.volume_change - true) < 1e-14
+    # Rounding moves a vertex by half an ulp along each axis at most: not more than a shell of that.
+    shell = 2.0**-52 * np.abs(x).max() * scene.mesh.with_vertices(x).face_areas.sum()
+    assert abs(true) <= shell / signed_volume(scene.mesh.vertices, faces) + 1e-14
+
+
+@pytest.mark.parametrize("degrees", [30, 70, 120, 180])
+def test_far_jumps_arrive_with_exact_volume_and_no_fold(degrees):
+    scene = sausage(3)
+    solution = scene.deformer().solve(scene.turned(degrees, about=(0.0, 0.0, 1.2)))
+    assert abs(solution.volume_change) < 1e-12
+    assert solution.handle_error < 1e-3
+    assert solution.fixed_error < 1e-3
+    x, faces = solution.vertices, scene.mesh.faces
+    a, b, c = x[faces.T]
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    # One or two of the 2048 may be pinched hard, wherever the fold would be; none is gone.
+    ratio = area / scene.mesh.face_areas
+    assert ratio.min() > 0.01
+    assert np.quantile(ratio, 0.01) > 0.2
+
+
+def test_a_jump_and_a_drag_end_in_the_same_place():
+    jump = SCENE.deformer(tolerance=1e-8, max_steps=2000).solve(SCENE.turned(45))
+    drag = SCENE.deformer(tolerance=1e-8, max_steps=2000)
+    for degrees in range(5, 50, 5):
+        solution = drag.solve(SCENE.turned(degrees))
+        assert abs(solution.volume_change) < 1e-13
+    assert_allclose(solution.vertices, jump.vertices, atol=1e-4 * SCENE.mesh.diagonal)
+
+
+def test_there_and_back_is_at_rest_again_and_reset_is_at_once():
+    deformer = SCENE.deformer(tolerance=1e-8, max_steps=2000)
+    deformer.solve(SCENE.turned(45))
+    back = deformer.solve(REST)
+    assert np.abs(back.vertices - VERTICES).max() < 1e-4 * SCENE.mesh.diagonal
+    deformer.solve(SCENE.turned(45))
+    deformer.reset()
+    assert_allclose(deformer.solve(REST).vertices, VERTICES, atol=1e-9)
+
+
+def test_two_handles_are_moved_and_turned_on_their_own():
+    x = VERTICES[:, 0]
+    left, right = np.flatnonzero(x < -2.4), np.flatnonzero(x > 2.4)
+    scene = replace(
+        SCENE, fixed=np.flatnonzero(np.abs(x) < 0.3), handle=np.concatenate([left, right])
+    )
+    targets = VERTICES[scene.handle].copy()
+    targets[: len(left)] = targets[: len(left)] @ rotation([1, 0, 0], 0.5).T
+    targets[len(left) :] += [0.0, 0.5, 0.2]
+    solution = scene.deformer().solve(targets)
+    assert solution.handle_error < 1e-3
+    assert solution.fixed_error < 1e-3
+    assert abs(solution.volume_change) < 1e-13
+
+
+def test_one_free_handle_vertex_just_carries_the_mesh_along():
+    scene = replace(SCENE, fixed=np.array([], dtype=int), handle=np.array([7]))
+    solution = scene.deformer().solve(VERTICES[[7]] + [0.4, 0.1, 0.0])
+    assert_allclose(solution.vertices, VERTICES + [0.4, 0.1, 0.0], atol=1e-5)
+
+
+def test_without_any_constraint_the_mesh_stays_at_rest():
+    nothing = np.array([], dtype=int)
+    scene = replace(SCENE, fixed=nothing, handle=nothing)
+    solution = scene.deformer().solve(np.empty((0, 3)))
+    assert_allclose(solution.vertices, VERTICES, atol=1e-9)
+
+
+def test_one_cage_around_everything_works_as_well():
+    scene = sausage(1)
+    solution = scene.deformer().solve(scene.turned(40))
+    assert abs(solution.volume_change) < 1e-13
+    assert solution.handle_error < 1e-3
+
+
+def test_stopping_early_says_so_and_goes_on_next_time():
+    deformer = SCENE.held()
+    first = deformer.solve(SCENE.turned(20), max_steps=2)
+    assert first.status is Status.STEP_LIMIT
+    assert "solve again" in str(first.status)
+    assert deformer.solve(SCENE.turned(20)).status is Status.CONVERGED
+
+
+def test_one_step_at_a_time_is_the_same_way_as_all_at_once():
+    targets = SCENE.turned(4)  # near: nothing in between
+    at_once = SCENE.deformer().solve(targets)
+    deformer = SCENE.held()
+    way = [deformer.solve(targets, max_steps=1)]
+    while way[-1].status is Status.STEP_LIMIT and len(way) < 3 * at_once.steps:
+        way.append(deformer.solve(targets, max_steps=1))
+    assert way[-1].status is at_once.status
+    assert sum(solution.steps for solution in way) == at_once.steps
+    assert_allclose(way[-1].vertices, at_once.vertices, rtol=0, atol=1e-9)
+
+
+def test_after_a_reset_nothing_is_known_of_what_was_before():
+    deformer = SCENE.held()
+    deformer.solve(SCENE.turned(20), max_steps=3)
+    deformer.solve(SCENE.turned(10), max_steps=3)
+    deformer.reset()
+    again, anew = deformer.solve(SCENE.turned(20)), SCENE.deformer().solve(SCENE.turned(20))
+    assert again.steps == anew.steps
+    assert_array_equal(again.vertices, anew.vertices)
+
+
+def test_a_drag_learns_from_frame_to_frame(monkeypatch):
+    def drag():
+        deformer = SCENE.deformer(hold_tolerance=1.0)
+        poses = [deformer.solve(SCENE.turned(degrees)) for degrees in range(25)]
+        return sum(pose.steps for pose in poses), poses[-1].vertices
+
+    (few, there), _ = drag(), monkeypatch.setattr(Anderson, "begin_elsewhere", Anderson.forget)
+    many, also_there = drag()
+    assert few < many
+    assert np.abs(there - also_there).max() < 1e-5 * SCENE.mesh.diagonal
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"fixed": np.array([3]), "handle": np.array([3, 4])}, "1 vertices are both fixed and"),
+        ({"handle": np.array([1026])}, r"handle must index 0..1025"),
+        ({"fixed": np.array([5, 5])}, "fixed names a vertex twice"),
+    ],
+)
+def test_wrong_constraints_are_named(change, says):
+    with pytest.raises(ConstraintError, match=says):
+        replace(SCENE, **change).deformer()
+
+
+@pytest.mark.parametrize(
+    ("targets", "says"),
+    [
+        (REST[:-1], "one point for each of the"),
+        (np.where(REST > 2.5, np.nan, REST), "NaN or infinite"),
+        (REST[:, :2], r"shape \(n, 3\)"),
+    ],
+)
+def test_wrong_targets_are_named_and_leave_the_pose_as_it_was(targets, says):
+    deformer = SCENE.held()
+    with pytest.raises(ConstraintError, match=says):
+        deformer.solve(targets)
+    assert_allclose(deformer.solve(REST).vertices, VERTICES, atol=1e-9)
+
+
+def test_cages_that_do_not_fit_are_refused():
+    with pytest.raises(CageError, match="2 regions need as many cages; got 1"):
+        Deformer(SCENE.mesh, SCENE.regions, SCENE.cages[:1])
+    small = Cage(*icosphere(1))
+    with pytest.raises(CageError, match=r"region 0 .*outside the cage"):
+        Deformer(SCENE.mesh, SCENE.regions, [small, small])
+
+
+def test_regions_of_another_mesh_are_refused():
+    with pytest.raises(RegionError, match="belong to a mesh of 1026 vertices, this one has 258"):
+        Deformer(Mesh(*icosphere(3)), SCENE.regions, SCENE.cages)
+
+
+def test_the_printed_blend_can_be_compared_and_nonsense_is_refused():
+    printed = cage_distance_weights(SCENE.regions, SCENE.cages)
+    solution = SCENE.deformer(blend=printed).solve(SCENE.turned(30))
+    assert abs(solution.volume_change) < 1e-13
+    assert np.abs(solution.vertices - SCENE.held().solve(SCENE.turned(30)).vertices).max() > 1e-4
+    with pytest.raises(RegionError, match="sum to 1"):
+        SCENE.deformer(blend=0.5 * printed)
+
+
+def test_with_nothing_held_rounding_carries_nothing_off_even_over_slivers():
+    vertices, faces = icosphere(3)
+    middle = 0.5 * (vertices[faces[0, 0]] + vertices[faces[0, 1]])
+    a, b, c = faces[0]
+    d = next(v for f in faces[1:] if a in f and b in f for v in f if v not in (a, b))
+    new = len(vertices)
+    kept = [f for f in faces if not {a, b} <= set(f)]
+    fan = [[a, new, c], [new, b, c], [new, a, d], [b, new, d]]
+    almost = middle + 1e-7 * (vertices[c] - middle)
+    mesh = Mesh(np.array([*vertices, almost]), np.array([*kept, *fan]))
+    cage = Cage(1.6 * icosphere(1)[0], icosphere(1)[1])
+    solution = Deformer(mesh, Regions.single(mesh), [cage]).solve(np.empty((0, 3)))
+    assert_allclose(solution.vertices, mesh.vertices, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("option", "says"),
+    [
+        ({"stretch": -1.0}, "stretch must be a number, 0 or more; got -1"),
+        ({"stretch": np.nan}, "stretch must be a number"),
+        ({"stretch": "much"}, "stretch must be a number, 0 or more; got 'much'"),
+        ({"rotation_groups": 0}, "rotation_groups must be a whole number, 1 or more; got 0"),
+        ({"tolerance": np.nan}, "tolerance must be a positive number"),
+        ({"max_steps": 0}, "max_steps must be a whole number, 1 or more"),
+        ({"window": -1}, "window must be a whole number, 0 or more"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused_by_name(option, says):
+    with pytest.raises(ValueError, match=says):
+        SCENE.deformer(**option)
+
+
+def test_a_target_in_another_unit_is_asked_about():
+    with pytest.raises(ConstraintError, match="both in the same unit"):
+        SCENE.held().solve(1e6 * REST)
+    with pytest.raises(ConstraintError, match="both in the same unit"):
+        SCENE.held().solve(REST + 1e200)
+
+
+@pytest.mark.parametrize("way", [(1.0, 0.9, -0.8), (0.0, 1.0, 0.0)])
+def test_the_volume_stays_however_far_apart_targets_may_be(way):
+    both = np.concatenate([SCENE.fixed, SCENE.handle])
+    scene = replace(SCENE, fixed=both[:0], handle=both)
+    deformer = scene.deformer()
+    rest = scene.mesh.vertices[deformer.handle]
+    side = np.where(np.isin(deformer.handle, SCENE.handle), 1.0, -1.0)[:, None]
+    far = scene.mesh.diagonal * side * way
+    for distance in np.linspace(1.0, 9.4, 6):
+        solution = deformer.solve(rest + distance * far, max_steps=8)
+        assert abs(solution.volume_change) <= 1e-12
+    assert np.ptp(solution.vertices, axis=0).max() > 18.0 * scene.mesh.diagonal
+    with pytest.raises(ConstraintError, match="at most 20 are allowed"):
+        deformer.solve(rest + 10.5 * far)
+
+
+def test_a_mesh_may_go_far_as_a_whole():
+    scene = replace(SCENE, fixed=SCENE.fixed[:0])
+    away = np.array([0.0, 100.0, 0.0]) * SCENE.mesh.diagonal
+    solution = scene.deformer().solve(REST + away)
+    assert abs(solution.volume_change) <= 1e-12
+    assert_allclose(solution.vertices, SCENE.mesh.vertices + away, atol=1e-6 * SCENE.mesh.diagonal)
+    with pytest.raises(ConstraintError, match="at most 20 are allowed"):
+        SCENE.held().solve(REST + away)
+
+
+def test_a_cage_so_large_that_it_moves_nothing_is_refused():
+    huge = Cage(1e6 * icosphere(1)[0], icosphere(1)[1])
+    scene = replace(SCENE, regions=Regions.single(SCENE.mesh), cages=(huge,))
+    with pytest.raises(CageError, match=r"region 0 is more than 1000 times as large"):
+        scene.deformer()
+
+
+def test_holding_elsewhere_needs_no_new_cages_and_changes_nothing_in_the_old():
+    deformer = SCENE.deformer()
+    before = deformer.solve(SCENE.turned(30))
+    other = deformer.hold(fixed=SCENE.handle, handle=SCENE.fixed)
+    fresh = replace(SCENE, fixed=SCENE.handle, handle=SCENE.fixed)
+    targets = VERTICES[SCENE.fixed] + [0.0, 0.0, 0.3]
+    assert_allclose(
+        other.solve(targets).vertices, fresh.deformer().solve(targets).vertices, atol=1e-12
+    )
+    assert_allclose(deformer.solve(SCENE.turned(30)).vertices, before.vertices, atol=1e-4)
+
+
+def test_a_pose_can_be_taken_up_again_where_it_was_left():
+    deformer = SCENE.deformer()
+    first = deformer.solve(SCENE.turned(30))
+    deformer.solve(SCENE.turned(-40))
+    deformer.resume(first.cage_vertices, SCENE.turned(30))
+    again = deformer.solve(SCENE.turned(30))
+    assert_allclose(again.vertices, first.vertices, atol=1e-4 * SCENE.mesh.diagonal)
+    assert again.steps < first.steps
+    with pytest.raises(CageError, match=r"must hold \[66, 66\] points, cage by cage; got \[66\]"):
+        deformer.resume(first.cage_vertices[:1], SCENE.turned(30))
+
+
+def test_binding_reports_its_progress_and_can_be_cancelled():
+    seen = []
+    SCENE.deformer(progress=lambda fraction, _: seen.append(fraction))
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0
+
+    def stop(fraction, _):
+        if fraction > 0.2:
+            raise Cancelled("enough")
+
+    with pytest.raises(Cancelled, match="enough"):
+        SCENE.deformer(progress=stop)
+
+
+def test_set_up_says_what_it_does_and_stops_at_whatever_it_says():
+    mesh = cactus(4000)
+    regions = segment(mesh, 2)
+    cages = fit_cages(mesh, regions, 60)
+    for work, least in (
+        (lambda told: segment(mesh, 2, progress=told), 4),
+        (lambda told: fit_cages(mesh, regions, 60, progress=told), 4),
+        (lambda told: Deformer(mesh, regions, cages, handle=[0], progress=told), 6),
+    ):
+        seen = []
+        work(lambda _, message, seen=seen: seen.append(message))
+        assert len(set(seen)) >= least
+        for last in dict.fromkeys(seen):
+
+            def stop(_, message, last=last):
+                if message == last:
+                    raise Cancelled(last)
+
+            with pytest.raises(Cancelled, match=last):
+                work(stop)
+
+
+def test_a_copy_goes_on_as_the_deformer_would_and_leaves_it_where_it_is():
+    deformer = SCENE.held()
+    deformer.solve(SCENE.turned(20), max_steps=3)
+    ahead = deformer.copy().solve(SCENE.turned(30))
+    other = deformer.copy()
+    other.reset()
+    other.solve(SCENE.turned(-10))
+    assert_array_equal(deformer.solve(SCENE.turned(30)).vertices, ahead.vertices)
+
+
+def test_cages_with_too_many_vertices_are_refused():
+    ball, faces = icosphere(4)
+    big = tuple(Cage(ball * [9.0, 3.0, 3.0], faces) for _ in SCENE.cages)
+    with pytest.raises(CageError, match="2052 vertices; the limit of the solver is 1600"):
+        Deformer(SCENE.mesh, SCENE.regions, big)
+
+
+def test_a_cancelled_solve_leaves_the_pose_before_it():
+    plain, work = SCENE.held(), SCENE.held()
+    first, second = SCENE.turned(20), SCENE.turned(60)
+    for deformer in (plain, work):
+        deformer.solve(first)
+    fractions = []
+
+    def stop(fraction, message):
+        assert message == "solving"
+        fractions.append(fraction)
+        if len(fractions) == 4:
+            raise Cancelled("enough")
+
+    with pytest.raises(Cancelled, match="enough"):
+        work.solve(second, progress=stop)
+    assert 0.0 == fractions[0] < fractions[1] < fractions[2] < fractions[3] < 1.0
+    assert_array_equal(work.carry(VERTICES[:50]), plain.carry(VERTICES[:50]))
+    solution = work.solve(second)
+    assert solution.status is Status.CONVERGED
+    assert_allclose(solution.vertices, plain.solve(second).vertices, atol=1e-4)
+
+
+def test_many_bodies_are_one_mesh():
+    # As many rotation groups at least as bodies, and a region for each if it is wanted.
+    ball, faces = icosphere(1)
+    grid = np.stack(np.meshgrid(*3 * [3.0 * np.arange(3)]), axis=-1).reshape(-1, 3)
+    vertices = np.concatenate([ball + place for place in grid])
+    mesh = Mesh(vertices, np.concatenate([faces + k * len(ball) for k in range(len(grid))]))
+    lift = [0.0, 0.0, 0.4]
+    for n_regions, n_cage_vertices in ((3, 60), (None, 8 * len(grid))):
+        regions = segment(mesh, n_regions)
+        assert regions.n_regions == (n_regions or len(grid))
+        cages = fit_cages(mesh, regions, n_cage_vertices)
+        top = np.flatnonzero(vertices[:, 2] > 5.5)
+        deformer = Deformer(mesh, regions, cages, fixed=vertices[:, 2] < 0.5, handle=top)
+        solution = deformer.solve(vertices[top] + lift)
+        assert abs(solution.volume_change) < 1e-12
+        assert solution.handle_error < 1e-3
+        assert len(np.unique(mesh.components[top])) == 9
+
+
+def test_small_groups_of_vertices_are_told_apart_without_starting_threads(monkeypatch):
+    started = []
+    monkeypatch.setattr(threading.Thread, "start", started.append)
+    monkeypatch.setattr(rotations, "n_threads", lambda: 2)
+    parts = np.repeat(np.arange(200), 40)
+    groups = rotations.rotation_groups(np.random.default_rng(0).random((8000, 3)), parts, 300)
+    assert len(np.unique(groups)) >= 200
+    assert not started

@@ -1,0 +1,60 @@
+"""The cages' own stiffness: free under motion, a true gradient, and no cage flies off."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scenes import sausage
+from solids import rotation
+
+from vtk_segdeform.energy.cage_stiffness import with_cage_stiffness
+from vtk_segdeform.energy.energy import shape_energy
+from vtk_segdeform.geometry.rotations import group_by_position
+from vtk_segdeform.subspace.subspace import bind
+
+SCENE = sausage(2)  # in cages 1.75 times as large as their regions
+SUBSPACE = bind(SCENE.regions, SCENE.cages)
+REST = np.concatenate([cage.vertices for cage in SCENE.cages])
+FACES = [cage.faces for cage in SCENE.cages]
+GROUPS = group_by_position(SCENE.mesh.vertices, 40)
+WITHOUT = shape_energy(SCENE.mesh, SUBSPACE, 10.0, GROUPS)
+ENERGY = with_cage_stiffness(WITHOUT, REST, FACES, GROUPS)
+
+
+def value_and_slope(energy, p):
+    return energy.local_step(p, SUBSPACE.map(p))
+
+
+def test_a_rigid_motion_of_all_cages_costs_nothing_and_pulls_nowhere():
+    for p in (REST, REST @ rotation([1, 2, 3], 2.0).T + [3.0, 2.0, 1.0]):
+        value, slope = value_and_slope(ENERGY, p)
+        assert abs(value) < 1e-9 * ENERGY.constant
+        assert np.abs(slope).max() < 1e-9 * np.abs(ENERGY.quadratic).max()
+
+
+def test_what_hardly_moves_the_mesh_costs_much_more_than_without():
+    step = np.random.default_rng(3).normal(size=REST.shape)
+    weak = np.linalg.eigh(WITHOUT.quadratic)[1][:, 3:6]  # the softest but for translations
+    p = REST + 0.3 * weak @ (weak.T @ step)
+    assert value_and_slope(ENERGY, p)[0] > 5.0 * value_and_slope(WITHOUT, p)[0]
+
+
+def test_the_slope_is_half_the_gradient():
+    rng = np.random.default_rng(0)
+    p, direction = REST + 0.05 * rng.normal(size=REST.shape), rng.normal(size=REST.shape)
+    value, slope = value_and_slope(ENERGY, p)
+    errors = []
+    for t in (2e-4, 1e-4):
+        ahead, _ = value_and_slope(ENERGY, p + t * direction)
+        errors.append(abs(ahead - value - 2.0 * t * np.vdot(slope, direction)))
+    assert 3.5 < errors[0] / errors[1] < 4.5
+
+
+@pytest.mark.parametrize("n_regions", [1, 2])
+def test_loose_cages_stay_by_the_mesh(n_regions):
+    scene = sausage(n_regions)
+    solution = scene.deformer().solve(scene.turned(60))
+    middle = solution.vertices.mean(axis=0)
+    for vertices, cage in zip(solution.cage_vertices, scene.cages, strict=True):
+        reach = np.linalg.norm(cage.vertices - scene.mesh.vertices.mean(axis=0), axis=1).max()
+        assert np.linalg.norm(vertices - middle, axis=1).max() < 3.0 * reach

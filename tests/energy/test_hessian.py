@@ -1,0 +1,128 @@
+"""The Hessian of the shape energy: it is what differences of the gradient tend to."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scenes import sausage
+from solids import rotation
+
+from vtk_segdeform.energy.energy import shape_energy
+from vtk_segdeform.energy.hessian import _rotations_part, curved_factor, factored
+from vtk_segdeform.geometry.rotations import group_by_position
+from vtk_segdeform.subspace.subspace import bind
+
+SCENE = sausage()
+REST = np.concatenate([cage.vertices for cage in SCENE.cages])
+RNG = np.random.default_rng(5)
+
+
+def energy_of(n_groups):
+    subspace = bind(SCENE.regions, SCENE.cages)
+    groups = n_groups and group_by_position(SCENE.mesh.vertices, n_groups)
+    return shape_energy(SCENE.mesh, subspace, 10.0, groups)
+
+
+def bent(p):
+    """Return *p* bent smoothly, by half a radian at the ends."""
+    angle = 0.15 * p[:, :1]
+    x, z = p[:, :1] * np.cos(angle), p[:, 2:] + p[:, :1] * np.sin(angle)
+    return np.hstack([x, p[:, 1:2], z])
+
+
+def hessian_times(energy, p, dp):
+    """Return half the Hessian of E at *p* times *dp*, from the two parts that the solver adds."""
+    lower = np.tril(_rotations_part(energy, p))
+    part = lower + np.tril(lower, -1).T
+    return energy.quadratic @ dp - (part @ dp.T.ravel()).reshape(3, -1).T
+
+
+def slope(energy, p):
+    return energy.local_step(p, energy.subspace.map(p))[1]
+
+
+@pytest.mark.parametrize("n_groups", [40, None])
+def test_it_is_the_derivative_of_the_gradient_to_second_order(n_groups):
+    energy, p = energy_of(n_groups), bent(REST)
+    dp = RNG.normal(size=p.shape)
+    exact = hessian_times(energy, p, dp)
+    errors = []
+    for step in (1e-2, 1e-3):
+        difference = slope(energy, p + step * dp) - slope(energy, p - step * dp)
+        errors.append(np.linalg.norm(difference / (2 * step) - exact) / np.linalg.norm(exact))
+    assert errors[1] < 1e-4
+    assert errors[1] < 0.02 * errors[0]  # slope 2: ten times closer, a hundred times better
+
+
+@pytest.mark.parametrize("stretch", [10.0, 0.0])
+def test_energy_and_gradient_are_those_of_the_dense_operators(stretch):
+    subspace, p = bind(SCENE.regions, SCENE.cages), bent(REST)
+    groups = group_by_position(SCENE.mesh.vertices, 250)
+    energy = shape_energy(SCENE.mesh, subspace, stretch, groups)
+    assert energy.fit.size > 60_000  # as many as are multiplied without their zeros
+    u, _, vt = np.linalg.svd((energy.fit @ p).reshape(-1, 3, 3))
+    pulled = energy.pull.T @ (u @ vt).reshape(-1, 3)
+    product = energy.quadratic @ p
+    value, half = energy.local_step(p, subspace.map(p))
+    exact = np.vdot(p, product) - 2.0 * np.vdot(p, pulled) + energy.constant
+    assert abs(value - exact) < 1e-12 * energy.constant
+    assert_allclose(half, product - pulled, atol=1e-12 * np.abs(product).max())
+
+
+def test_turning_the_whole_costs_nothing():
+    energy = energy_of(40)
+    for axis in np.eye(3):
+        turn = np.cross(axis, REST)
+        assert np.vdot(turn, energy.quadratic @ turn) > 1.0  # the paper's Hessian resists
+        cost = np.vdot(turn, hessian_times(energy, REST, turn))
+        assert abs(cost) < 1e-9 * np.vdot(turn, energy.quadratic @ turn)
+
+
+def test_it_turns_with_the_pose():
+    energy, p = energy_of(40), bent(REST)
+    turn = rotation([1.0, 2.0, 0.5], 1.1)
+    dp = RNG.normal(size=p.shape)
+    turned = hessian_times(energy, p @ turn.T, dp @ turn.T)
+    expected = hessian_times(energy, p, dp) @ turn.T
+    assert_allclose(turned, expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_the_factor_solves_in_both_of_its_forms():
+    energy, p = energy_of(40), bent(REST)
+    held = energy.quadratic + np.eye(len(p)) * np.trace(energy.quadratic)
+    y = RNG.normal(size=p.shape)
+    plain = factored(held)
+    assert_allclose(held @ plain.solve(y), y, atol=1e-9)
+    curved = curved_factor(held, energy, p)
+    h = curved.solve(y)
+    back = hessian_times(energy, p, h) + (held - energy.quadratic) @ h
+    assert_allclose(back, y, atol=2e-3 * np.abs(y).max())  # a thousandth of the part is kept back
+
+
+def test_how_volumes_curve_is_added_where_it_belongs():
+    energy, p, m = energy_of(40), bent(REST), len(REST)
+    held = energy.quadratic + np.eye(m) * np.trace(energy.quadratic)
+    g = 1e-3 * np.trace(energy.quadratic) / m * RNG.normal(size=(3, m, m))
+    g -= np.swapaxes(g, 1, 2)
+    with_it, without = (curved_factor(held, energy, p, of) for of in (g, None))
+    added = with_it.triangle @ with_it.triangle.T - without.triangle @ without.triangle.T
+    blocks = added.reshape(3, m, 3, m)
+    for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        assert_allclose(blocks[a, :, b], g[c], atol=1e-9 * np.abs(g).max())
+        assert_allclose(blocks[b, :, a], -g[c], atol=1e-9 * np.abs(g).max())
+        assert np.abs(blocks[a, :, a]).max() < 1e-9 * np.abs(g).max()
+
+
+def test_what_is_not_convex_has_no_factor():
+    assert factored(-np.eye(4)) is None
+    energy = energy_of(40)
+    assert curved_factor(-energy.quadratic, energy, REST) is None
+
+
+def test_a_mirrored_pose_still_has_a_factor():
+    energy = energy_of(40)
+    mirrored = REST * [1.0, 1.0, -1.0]
+    held = energy.quadratic + 1e-3 * np.eye(len(REST)) * np.trace(energy.quadratic)
+    factor = curved_factor(held, energy, mirrored)
+    assert factor is None or np.isfinite(factor.solve(mirrored)).all()

@@ -1,0 +1,349 @@
+"""A file is replaced as a whole or not at all, and only abandoned drafts are deleted."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from vtk_segdeform.files import atomic
+from vtk_segdeform.files.atomic import is_draft, replacing, require_place
+
+posix = pytest.mark.skipif(os.name != "posix", reason="modes, links and pipes of files")
+DRAFT = ".segdeform-0123456789abcdef.part"
+
+
+def write(path, text="new", **options):
+    """Replace a file."""
+    with replacing(path, **options) as draft:
+        draft.write_text(text)
+
+
+def break_off(path, fault, **options):
+    """Start to replace a file, or a folder of pictures, and raise *fault* half way."""
+    with replacing(path, **options) as draft:
+        (draft / "0000.png" if draft.is_dir() else draft).write_text("half")
+        raise fault
+
+
+def fill_the_disk(path):
+    """Write a file to a full disk."""
+    with replacing(path) as draft:
+        draft.unlink()
+        draft.symlink_to("/dev/full")
+        draft.write_text("new")
+
+
+def names(folder):
+    """Return the names of all that is in a folder."""
+    return sorted(os.listdir(folder))
+
+
+@pytest.mark.parametrize("fault", [OSError(28, "full"), ValueError("no"), KeyboardInterrupt()])
+def test_after_any_error_only_the_old_file_is_left(tmp_path, fault):
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    with pytest.raises(type(fault)):
+        break_off(path, fault)
+    assert path.read_text() == "old"
+    assert names(tmp_path) == ["a.txt"]
+
+
+@pytest.mark.parametrize("call", ["replace", "fsync", "open"])
+def test_whichever_call_fails_only_the_old_file_is_left(tmp_path, monkeypatch, call):
+    def refused(*_, **__):
+        raise OSError(13, "Permission denied")
+
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    monkeypatch.setattr(os, call, refused)
+    with pytest.raises(OSError, match="Permission denied"):
+        write(path)
+    monkeypatch.undo()
+    assert path.read_text() == "old"
+    assert names(tmp_path) == ["a.txt"]
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is full")
+def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path):
+    with pytest.raises(OSError, match="No space left"):
+        fill_the_disk(tmp_path / "a.txt")
+    assert names(tmp_path) == []
+    assert os.path.exists("/dev/full")
+
+
+def test_the_new_file_is_flushed_before_it_replaces_the_old_one(tmp_path, monkeypatch):
+    calls = []
+    for name in ("fsync", "replace"):
+        real = getattr(os, name)
+        monkeypatch.setattr(os, name, lambda *a, n=name, r=real: (calls.append(n), r(*a))[1])
+    write(tmp_path / "a.txt")
+    assert calls[:2] == ["fsync", "replace"]
+    calls.clear()
+    write(tmp_path / "a.txt", durable=False)
+    assert calls == ["replace"]
+
+
+@posix
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o664, 0o755])
+def test_the_mode_is_kept_and_drafts_are_private(tmp_path, mode):
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    path.chmod(mode)
+    with replacing(path) as draft:
+        draft.write_text("new")
+        assert draft.stat().st_mode & 0o777 == 0o600
+    assert path.stat().st_mode & 0o777 == mode
+    before = os.umask(0o027)
+    try:
+        write(tmp_path / "fresh.txt")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "fresh.txt").stat().st_mode & 0o777 == 0o640
+
+
+@posix
+def test_a_correct_mode_is_not_changed_where_modes_cannot_be_set(tmp_path, monkeypatch):
+    def refused(*_, **__):
+        raise PermissionError(1, "Operation not permitted")
+
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    path.chmod(0o600)
+    monkeypatch.setattr(os, "chmod", refused)
+    write(path)
+    assert path.read_text() == "new"
+
+
+@pytest.mark.parametrize("folder", [False, True])
+def test_a_draft_deleted_before_it_is_locked_is_created_again(tmp_path, monkeypatch, folder):
+    swept = []
+
+    def hold(handle, draft):
+        if len(swept) < 2:
+            swept.append(draft)
+            atomic._delete(draft)
+            return False
+        return real(handle, draft)
+
+    real = atomic.holds
+    monkeypatch.setattr(atomic, "holds", hold)
+    with replacing(tmp_path / "a", folder=folder) as draft:
+        (draft / "0000.png" if folder else draft).write_text("new")
+    assert len(swept) == 2
+    assert names(tmp_path) == ["a"]
+
+
+@posix
+def test_links_are_kept_and_their_targets_replaced(tmp_path):
+    (tmp_path / "there").mkdir()
+    (tmp_path / "there" / "a.txt").write_text("old")
+    (tmp_path / "link").symlink_to("again")
+    (tmp_path / "again").symlink_to("there/a.txt")
+    write(tmp_path / "link")
+    assert (tmp_path / "there" / "a.txt").read_text() == "new"
+    assert (tmp_path / "link").is_symlink()
+    (tmp_path / "dangling").symlink_to("there/b.txt")
+    write(tmp_path / "dangling")  # as open() would
+    assert names(tmp_path / "there") == ["a.txt", "b.txt"]
+    write(tmp_path / "link", "mine", follow=False)
+    assert not (tmp_path / "link").is_symlink()
+    assert (tmp_path / "there" / "a.txt").read_text() == "new"
+
+
+@posix
+def test_anything_but_a_regular_file_is_refused_and_unchanged(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "circle").symlink_to("circle")
+    (tmp_path / "to pipe").symlink_to("pipe")
+    before = names(tmp_path)
+    for name, says in [
+        ("pipe", "a device or a pipe"), ("folder", "a folder"), ("circle", "a link"),
+        ("to pipe", "a device or a pipe"), ("no/a", "there is no folder"), ("pipe/a", "directory"),
+        ("a\0b", "null character"), ("n" * 256, "too long"), ("/dev/null", "a device"),
+    ]:  # fmt: skip
+        with pytest.raises(OSError, match=says):
+            write(tmp_path / name)
+        with pytest.raises(OSError, match=says):
+            require_place(tmp_path / name)
+    assert names(tmp_path) == before
+    assert (tmp_path / "pipe").is_fifo()
+
+
+@posix
+@pytest.mark.skipif(not os.path.exists("/proc/self"), reason="needs a folder that is read-only")
+def test_a_read_only_folder_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda *_: False)  # root may write anywhere
+    with pytest.raises(OSError, match=f"{tmp_path} may not be written to"):
+        require_place(tmp_path / "a.txt")
+    monkeypatch.undo()
+    with pytest.raises(OSError, match=r"proc|No such|Permission|not permitted"):
+        write("/proc/self/a.txt")
+
+
+@posix
+@pytest.mark.parametrize(
+    "name",
+    [
+        b"n" * 255,
+        b"n" + b"." + b"s" * 253,
+        b"\xff\xfe.ply",
+        "Körper 身体.ply".encode(),
+        b" ",
+        b"-n",
+    ],
+)
+def test_every_name_that_the_system_allows_can_be_written(tmp_path, name):
+    path = tmp_path / os.fsdecode(name)
+    for text in ("first", "second"):
+        write(path, text)
+        assert path.read_text() == text
+    assert names(tmp_path) == [os.fsdecode(name)]
+
+
+def test_a_draft_has_the_suffix_by_which_writers_know_the_format(tmp_path):
+    with replacing(tmp_path / "a.vtp") as draft:
+        assert draft.suffix == ".vtp"
+        assert is_draft(draft.name)
+        assert draft.parent == tmp_path
+
+
+_WRITER = """
+import pathlib, sys, time
+from vtk_segdeform.files.atomic import replacing
+with replacing(pathlib.Path(sys.argv[1])) as draft:
+    draft.write_text("half")
+    print(draft.name, flush=True)
+    time.sleep(60)
+"""
+
+
+def writing(path):
+    """Return a process that is writing to *path*, and the name of its draft."""
+    return subprocess.Popen([sys.executable, "-c", _WRITER, path], stdout=subprocess.PIPE)
+
+
+@posix
+def test_drafts_of_killed_writers_are_deleted_but_not_those_of_running_ones(tmp_path):
+    killed, living = writing(tmp_path / "a.txt"), writing(tmp_path / "b.txt")
+    abandoned, draft = (
+        tmp_path / child.stdout.readline().decode().strip() for child in (killed, living)
+    )
+    write(tmp_path / "c.txt")
+    assert abandoned.exists()
+    assert draft.exists()
+    killed.send_signal(signal.SIGKILL)
+    killed.communicate()
+    write(tmp_path / "c.txt")
+    assert names(tmp_path) == sorted([draft.name, "c.txt"])
+    living.terminate()
+    living.communicate()
+    write(tmp_path / "c.txt")
+    assert names(tmp_path) == ["c.txt"]
+
+
+@posix
+def test_only_our_own_drafts_are_deleted(tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "precious").write_text("mine")
+    for name in (
+        ".segdeform-0123.part", ".segdeform-0123456789ABCDEF.part", "x.part", ".segdeform-",
+        "segdeform-0123456789abcdef.part", f"{DRAFT}.bak.txt", ".0123456789abcdef.part",
+    ):  # fmt: skip
+        (tmp_path / name).write_text("mine")
+    (tmp_path / DRAFT).symlink_to("mine")
+    (tmp_path / DRAFT.replace("0", "1")).symlink_to("mine/precious")
+    os.mkfifo(tmp_path / DRAFT.replace("0", "2"))
+    film = tmp_path / DRAFT.replace("0", "3")
+    film.mkdir()
+    for name in ("0000.png", "0001.png", "holiday.png", "0002.txt"):
+        (film / name).write_text("?")
+    (film / "0003.png").symlink_to("../mine/precious")
+    swept = [tmp_path / DRAFT.replace("0", "4"), tmp_path / f"{DRAFT.replace('0', '5')}.vtp"]
+    for draft in swept:
+        draft.write_text("half")
+    before = set(names(tmp_path))
+    write(tmp_path / "a.txt")
+    assert before - set(names(tmp_path)) == {draft.name for draft in swept}
+    assert names(film) == ["0002.txt", "0003.png", "holiday.png"]
+    assert (tmp_path / "mine" / "precious").read_text() == "mine"
+
+
+@posix
+@pytest.mark.skipif(os.name == "posix" and os.geteuid() != 0, reason="only root gives files away")
+def test_a_draft_of_another_user_is_not_deleted(tmp_path):
+    (tmp_path / DRAFT).write_text("half")
+    os.chown(tmp_path / DRAFT, 12345, 12345)
+    write(tmp_path / "a.txt")
+    assert names(tmp_path) == [DRAFT, "a.txt"]
+
+
+def test_where_files_cannot_be_locked_a_draft_is_deleted_after_a_day(tmp_path, monkeypatch):
+    monkeypatch.setattr(atomic, "_LOCKS", False)
+    (tmp_path / DRAFT).write_text("half")
+    write(tmp_path / "a.txt")
+    assert names(tmp_path) == [DRAFT, "a.txt"]
+    os.utime(tmp_path / DRAFT, (time.time() - 90_000,) * 2)
+    write(tmp_path / "a.txt")
+    assert names(tmp_path) == ["a.txt"]
+
+
+def test_on_a_file_system_without_locks_files_are_written_and_no_draft_deleted(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(atomic, "holds", lambda *_: False)
+    (tmp_path / DRAFT).write_text("half")
+    write(tmp_path / "a.txt")
+    assert names(tmp_path) == [DRAFT, "a.txt"]
+
+
+def test_a_folder_of_pictures_is_written_completely_or_not_at_all(tmp_path):
+    with replacing(tmp_path / "film", folder=True) as draft:
+        (draft / "0000.png").write_text("picture")
+        assert names(tmp_path) == [draft.name]
+    assert names(tmp_path / "film") == ["0000.png"]
+    with pytest.raises(ValueError, match="no"):
+        break_off(tmp_path / "b", ValueError("no"), folder=True)
+    assert names(tmp_path) == ["film"]
+
+
+def test_concurrent_writers_leave_one_complete_file(tmp_path):
+    path = tmp_path / "a.txt"
+    write(path, "0" * 5000)
+    seen, faults, done = set(), [], threading.Event()
+
+    def work(number):
+        try:
+            for _ in range(40):
+                write(path, str(number) * 5000, durable=False)
+        except OSError as fault:
+            faults.append(fault)
+
+    def look():
+        while not done.is_set():
+            seen.add(path.read_text())
+
+    looker = threading.Thread(target=look)
+    workers = [threading.Thread(target=work, args=(k,)) for k in range(6)]
+    for thread in (looker, *workers):
+        thread.start()
+    for thread in workers:
+        thread.join()
+    done.set()
+    looker.join()
+    assert faults == []
+    assert seen <= {str(k) * 5000 for k in range(6)}
+    assert names(tmp_path) == ["a.txt"]
+
+
+def test_relative_paths_refer_to_the_working_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write("a.txt")
+    assert Path("a.txt").read_text() == "new"

@@ -1,0 +1,232 @@
+"""The filter: the numbers of `deform`, only what changed is done again, faults told as VTK does."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+from numpy.testing import assert_allclose, assert_array_equal
+from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
+
+import vtk_segdeform as sd
+from vtk_segdeform.filters.deform_filter import SegmentedCageDeformFilter
+from vtk_segdeform.io.convert import to_polydata
+
+MESH = sd.models.cactus(800)
+HEIGHT = MESH.vertices[:, 2]
+FIXED, HANDLE = np.flatnonzero(HEIGHT < 0.1), np.flatnonzero(HEIGHT > 0.9)
+SHIFT = np.array([0.25, 0.0, -0.05])
+
+
+@pytest.fixture
+def surface():
+    """Return the cactus with arrays that mark what stays and what is moved."""
+    polydata = to_polydata(MESH)
+    polydata.point_data["fixed"] = (HEIGHT < 0.1).astype(np.uint8)
+    polydata.point_data["handle"] = (HEIGHT > 0.9).astype(float)
+    polydata.cell_data["number"] = np.arange(MESH.n_faces)
+    return polydata
+
+
+def filter_of(surface, **settings):
+    made = SegmentedCageDeformFilter()
+    made.SetInputDataObject(0, surface)
+    made.faults = []
+
+    def heard(_caller, _event, text):
+        made.faults.append(text)
+
+    heard.CallDataType = "string0"
+    made.AddObserver("ErrorEvent", heard)
+    for name, value in settings.items():
+        getattr(made, f"Set{name}")(*value if isinstance(value, tuple) else [value])
+    return made
+
+
+def output(made):
+    made.Update()
+    return pv.wrap(made.GetOutputDataObject(0))
+
+
+@pytest.fixture(scope="module")
+def expected():
+    return sd.deform(MESH, FIXED, HANDLE, MESH.vertices[HANDLE] + SHIFT)
+
+
+def test_its_numbers_are_those_of_deform(surface, expected):
+    before = surface.copy()
+    made = filter_of(surface, Translation=tuple(SHIFT))
+    out = output(made)
+    assert_allclose(out.points, expected.vertices, rtol=0, atol=1e-12)
+    assert out.points.dtype == np.float64
+    assert_allclose(out["VolumeChange"], [0.0], atol=1e-12)
+    assert out["Steps"] == [expected.steps]
+    assert "converged" in str(out.field_data["Status"][0])
+    assert_allclose(
+        out["LocalVolumeChange"], sd.local_volume_change(MESH, expected.vertices), atol=1e-9
+    )
+    assert_array_equal(out["number"], surface["number"])  # arrays go through
+    assert_array_equal(out.faces, surface.faces)
+    assert surface == before  # and the input is as it was
+    targets = MESH.vertices[HANDLE] + SHIFT
+    by_numbers = filter_of(surface, Fixed=FIXED, Handle=HANDLE, Targets=targets)
+    assert_allclose(output(by_numbers).points, out.points, rtol=0, atol=1e-12)
+
+
+def test_only_what_changed_is_done_again(surface):
+    made = filter_of(surface, Translation=tuple(SHIFT))
+    first = np.array(output(made).points)
+    made.SetTranslation(0.1, 0.0, 0.0)
+    made.SetRotationAxis(0.0, 1.0, 0.0)
+    made.SetRotationAngle(20.0)
+    other = np.array(output(made).points)
+    made.SetPreserveVolume(False)
+    assert abs(output(made)["VolumeChange"][0]) > 1e-6
+    made.SetHandle(HANDLE[:20])
+    output(made)
+    surface.point_data["temperature"] = HEIGHT  # another array is no other surface
+    surface.Modified()
+    assert "temperature" in output(made).point_data
+    assert made.rebinds == 1
+    made.SetHandleArrayName("handle")
+    made.SetPreserveVolume(True)
+    assert_array_equal(output(made).points, other)  # not of what was there before
+    made.SetTranslation(*SHIFT)
+    made.SetRotationAngle(0.0)
+    assert_array_equal(output(made).points, first)
+    made.SetNumberOfCageVertices(120)
+    output(made)
+    assert made.rebinds == 2
+    surface.points = surface.points * [1.0, 1.0, 1.1]
+    output(made)
+    assert made.rebinds == 3
+
+
+def test_a_setting_that_is_set_already_executes_nothing(surface):
+    made = filter_of(surface, Translation=tuple(SHIFT))
+    made.Update()
+    before = made.GetMTime()
+    made.SetTranslation(*SHIFT)
+    made.SetNumberOfRegions(3)
+    made.SetFixedArrayName("fixed")
+    assert made.GetMTime() == before
+
+
+def test_regions_and_cages_of_ones_own_are_used(surface):
+    regions = sd.segment(MESH, n_regions=2)
+    surface.point_data["label"] = regions.labels
+    made = filter_of(surface, RegionArrayName="label", Overlap=3, Translation=tuple(SHIFT))
+    own = sd.Regions.from_labels(MESH, regions.labels, overlap=3)
+    cages = sd.fit_cages(MESH, own, 155)
+    solution = sd.Deformer(MESH, own, cages, fixed=FIXED, handle=HANDLE).solve(
+        MESH.vertices[HANDLE] + SHIFT
+    )
+    assert_allclose(output(made).points, solution.vertices, rtol=0, atol=1e-12)
+    blocks = pv.MultiBlock([to_polydata(cage) for cage in cages])
+    made.SetInputDataObject(1, blocks)
+    assert_allclose(output(made).points, solution.vertices, rtol=0, atol=1e-12)
+    assert made.rebinds == 2
+    blocks[1].points *= 1.01
+    blocks.Modified()
+    output(made)
+    assert made.rebinds == 3
+    assert made.faults == []
+
+
+def test_polygons_stay_polygons_and_normals_are_made_anew():
+    cube = pv.Box(level=6).clean()
+    cube = cube.compute_normals(cell_normals=False, split_vertices=False)
+    top = cube.points[:, 2] > 0.99
+    cube.point_data["handle"], cube.point_data["fixed"] = top, cube.points[:, 2] < -0.99
+    made = filter_of(cube, NumberOfRegions=1, Translation=(0.5, 0.0, 0.0))
+    out = output(made)
+    assert made.faults == []
+    assert out.n_cells == cube.n_cells
+    assert out.points[top, 0].mean() == pytest.approx(0.5, abs=1e-2)
+    side = np.abs(cube.points - [1.0, 0.0, 0.0]).max(axis=1) < 0.5
+    normals = out.point_data["Normals"][side]
+    assert (normals[:, 2] < -0.1).all()  # they lean as the side does
+    assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda f, s: f.SetHandleArrayName("nothing"), "no point array 'nothing'"),
+        (lambda f, s: f.SetRegionArrayName("nothing"), "no point array 'nothing'"),
+        (lambda f, s: f.SetHandle([10**6]), "points"),
+        (lambda f, s: f.SetHandle(FIXED), "both fixed and handle"),
+        (lambda f, s: f.SetTargets([[0.0, 0.0, np.nan]]), "targets"),
+        (lambda f, s: f.SetRotationAxis(0.0, 0.0, 0.0), "axis"),
+        (lambda f, s: f.SetInputDataObject(0, pv.Plane().triangulate()), "open"),
+        (lambda f, s: f.SetInputDataObject(0, pv.PolyData()), "no surface"),
+        (lambda f, s: f.SetInputDataObject(1, pv.Sphere(radius=0.1).triangulate()), "cage"),
+        (lambda f, s: f.SetInputDataObject(1, pv.MultiBlock([s, s])), "2 cages need regions"),
+    ],
+)
+def test_what_is_wrong_is_told_and_the_output_is_empty(surface, spoil, says, capfd):
+    made = filter_of(surface, Translation=tuple(SHIFT))
+    spoil(made, surface)
+    assert output(made).n_points == 0
+    (text,) = made.faults
+    assert says in text
+    assert capfd.readouterr().err == ""
+    spoiled = made.GetInputDataObject(1, 0)
+    if spoiled is None and made.GetInputDataObject(0, 0) is surface:
+        made.SetHandleArrayName("handle")
+        made.SetRegionArrayName("")
+        made.SetTargets(None)
+        made.SetRotationAxis(0.0, 0.0, 1.0)
+        assert output(made).n_points == MESH.n_vertices  # it goes on
+
+
+def test_with_nobody_listening_the_output_window_has_the_fault(surface):
+    window, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
+    vtkOutputWindow.SetInstance(window)
+    try:
+        made = SegmentedCageDeformFilter()
+        made.SetInputDataObject(0, surface)
+        made.SetHandleArrayName("nothing")
+        made.Update()
+    finally:
+        vtkOutputWindow.SetInstance(before)
+    assert "no point array 'nothing'" in window.GetOutput()
+
+
+def test_it_tells_its_progress_and_can_be_aborted(surface):
+    made = filter_of(surface, Translation=tuple(SHIFT))
+    seen = []
+    made.AddObserver("ProgressEvent", lambda *_: seen.append(made.GetProgress()))
+    output(made)
+    assert len(seen) > 4
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0
+    made.SetNumberOfCageVertices(100)
+    made.AddObserver("ProgressEvent", lambda *_: made.SetAbortExecute(1))
+    assert output(made).n_points == 0
+    assert made.faults == []
+
+
+def test_pyvista_draws_what_it_makes(surface):
+    made = filter_of(surface, Translation=tuple(SHIFT))
+    plotter = pv.Plotter(off_screen=True)
+    actor = plotter.add_mesh(made)
+    before = actor.bounds
+    made.SetTranslation(0.0, 0.0, 0.0)
+    actor.mapper.Update()
+    assert actor.bounds != before
+    plotter.close()
+
+
+def test_it_needs_no_pyvista():
+    code = (
+        "import sys; sys.modules['pyvista'] = None; "
+        "from vtk_segdeform.filters import SegmentedCageDeformFilter as F; F()"
+    )
+    root = Path(__file__).resolve().parents[2]
+    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

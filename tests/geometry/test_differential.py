@@ -1,0 +1,108 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from solids import CUBE, SOLIDS, icosphere, rotation, torus
+
+from vtk_segdeform.geometry.differential import (
+    area_gradients,
+    cotangent_laplacian,
+    mean_curvature_normals,
+    mixed_voronoi_areas,
+    with_least_areas,
+)
+from vtk_segdeform.geometry.intrinsic import IntrinsicTriangulation
+
+
+def face_areas(vertices, faces):
+    a, b, c = vertices[faces.T]
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+
+def surface(vertices, faces):
+    return IntrinsicTriangulation.of(np.asarray(vertices, dtype=float), np.asarray(faces))
+
+
+def laplacian_of(vertices, faces):
+    of = surface(vertices, faces)
+    return cotangent_laplacian(of.faces, of.cotangents, len(vertices))
+
+
+@pytest.mark.parametrize("solid", SOLIDS.values(), ids=SOLIDS)
+def test_vertex_areas_add_up_to_the_surface(solid):
+    assert_allclose(
+        mixed_voronoi_areas(surface(*solid)).sum(), face_areas(*solid).sum(), rtol=1e-13
+    )
+
+
+def test_an_obtuse_triangle_gives_half_its_area_to_the_obtuse_corner():
+    # Two copies back to back close the surface; each corner gets its share twice.
+    corners = np.array([[0.0, 0, 0], [4, 0, 0], [2, 0.5, 0]])
+    areas = mixed_voronoi_areas(surface(corners, [[0, 1, 2], [0, 2, 1]]))
+    assert_allclose(areas, [0.5, 0.5, 1.0])
+
+
+def test_the_laplacian_is_symmetric_semidefinite_and_kills_constants():
+    laplacian = laplacian_of(*torus(24, 12)).toarray()
+    assert_allclose(laplacian, laplacian.T, atol=1e-14)
+    assert_allclose(laplacian.sum(axis=1), 0.0, atol=1e-12)
+    assert np.linalg.eigvalsh(laplacian).min() > -1e-12
+
+
+def test_the_laplacian_of_the_coordinates_vanishes_inside_a_flat_face():
+    vertices, faces = CUBE
+    corners = np.array([*vertices, [0.3, 0.6, 0.0]])  # a vertex inside the bottom
+    bottom = [[0, 2, 8], [2, 3, 8], [3, 1, 8], [1, 0, 8]]
+    laplacian = laplacian_of(corners, np.concatenate([faces[2:], bottom]))
+    assert_allclose((laplacian @ corners)[8], 0.0, atol=1e-14)
+
+
+def test_on_a_sphere_the_mean_curvature_normal_is_the_normal_over_the_radius():
+    errors = []
+    for level in (3, 4, 5):
+        vertices, faces = icosphere(level, radius=2.0)
+        delta = mean_curvature_normals(surface(vertices, faces))
+        areas = mixed_voronoi_areas(surface(vertices, faces))
+        square = ((delta - vertices / 4.0) ** 2).sum(axis=1)
+        errors.append(np.sqrt(areas @ square / areas.sum()))
+    assert errors[2] < 0.35 * errors[0]
+    assert errors[2] < 0.02 * 0.5
+
+
+def test_the_dirichlet_energy_of_the_identity_is_the_area_twice():
+    vertices, faces = torus()
+    twice = np.vdot(vertices, laplacian_of(vertices, faces) @ vertices)
+    assert_allclose(twice, 2.0 * face_areas(vertices, faces).sum(), rtol=1e-12)
+
+
+def test_area_gradients_give_back_a_linear_map_in_the_plane_of_each_face():
+    vertices, faces = icosphere(2)
+    matrix = np.array([[1.0, 0.2, 0.0], [0.1, 0.7, -0.3], [0.0, 0.4, 1.1]])
+    moved = (vertices @ matrix.T)[faces]
+    transposed = np.einsum("fka,fkb->fab", area_gradients(surface(vertices, faces)), moved)
+    a, b, c = vertices[faces.T]
+    normal = np.cross(b - a, c - a)
+    area = 0.5 * np.linalg.norm(normal, axis=1)[:, None, None]
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    in_plane = np.eye(3) - normal[:, :, None] * normal[:, None, :]
+    assert_allclose(transposed / area, in_plane @ matrix.T, atol=1e-12)
+
+
+def test_detail_turns_with_the_mesh_and_shrinks_with_its_scale():
+    vertices, faces = torus(24, 12)
+    turn = rotation([1, 2, 3], 1.0)
+    delta = mean_curvature_normals(surface(vertices, faces))
+    moved = mean_curvature_normals(surface(10.0 * vertices @ turn.T + [5, 6, 7], faces))
+    assert_allclose(moved, 0.1 * delta @ turn.T, atol=1e-12)
+
+
+def test_the_area_of_a_vertex_is_at_least_a_twentieth_of_that_of_its_neighbours():
+    vertices, faces = icosphere(2)
+    areas = mixed_voronoi_areas(surface(vertices, faces))
+    assert_allclose(with_least_areas(areas, faces), areas)
+    speck = areas.copy()
+    speck[50] = 0.0
+    around = np.unique(faces[(faces == 50).any(axis=1)])
+    around = around[around != 50]
+    assert_allclose(with_least_areas(speck, faces)[50], 0.05 * areas[around].mean(), rtol=1e-12)

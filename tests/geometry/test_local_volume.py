@@ -1,0 +1,106 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scenes import sausage
+from solids import CUBE, icosphere, rotation, torus
+
+from vtk_segdeform.geometry import local_volume
+from vtk_segdeform.geometry.local_volume import LocalVolume, local_volume_change
+from vtk_segdeform.mesh.mesh import Mesh
+
+MESHES = {"sphere": icosphere(3), "torus": torus(), "cube": CUBE}
+
+
+@pytest.fixture(params=[False, True], ids=["whole", "by cells"])
+def either(request, monkeypatch):
+    """As small meshes are measured, and as large ones are."""
+    if request.param:
+        monkeypatch.setattr(local_volume, "_LARGE", 100)
+        monkeypatch.setattr(local_volume, "_CELLS", 400)
+        monkeypatch.setattr(local_volume, "_AT_ONCE", 300)
+
+
+@pytest.mark.usefixtures("either")
+@pytest.mark.parametrize("solid", MESHES.values(), ids=MESHES)
+def test_it_is_zero_under_rigid_motion_and_the_determinant_under_affine_maps(solid):
+    mesh = Mesh(*solid)
+    local = LocalVolume(mesh)
+    x = mesh.vertices
+    assert_allclose(local.change(x @ rotation([1, 2, 3], 1.0).T + [5, 6, 7]), 0.0, atol=1e-12)
+    matrix = np.array([[1.2, 0.3, 0.0], [0.0, 0.9, -0.1], [0.2, 0.0, 1.1]])
+    assert_allclose(local.change(x @ matrix.T), np.linalg.det(matrix) - 1.0, atol=1e-12)
+
+
+@pytest.mark.usefixtures("either")
+def test_it_is_negative_where_a_body_is_pinched_and_positive_where_it_swells():
+    mesh = sausage().mesh
+    x = mesh.vertices
+    girth = (
+        1.0
+        - 0.4 * np.exp(-((x[:, :1] + 1.2) ** 2) / 0.3)
+        + 0.3 * np.exp(-((x[:, :1] - 1.2) ** 2) / 0.3)
+    )
+    change = local_volume_change(mesh, x * np.hstack([np.ones_like(girth), girth, girth]))
+    pinched, swollen = np.abs(x[:, 0] + 1.2) < 0.2, np.abs(x[:, 0] - 1.2) < 0.2
+    assert change[pinched].max() < -0.35
+    assert change[swollen].min() > 0.35
+    assert np.abs(change[np.abs(x[:, 0]) > 2.7]).max() < 0.1
+
+
+@pytest.mark.usefixtures("either")
+def test_a_sheared_bar_has_lost_nothing():
+    mesh = sausage().mesh
+    x = mesh.vertices.copy()
+    x[:, 2] += 0.3 * x[:, 0]
+    assert_allclose(local_volume_change(mesh, x), 0.0, atol=1e-12)
+
+
+def test_cells_say_what_the_whole_says_and_without_steps_between_them(monkeypatch):
+    ball, faces = icosphere(6)
+    mesh = Mesh(ball * [3.0, 0.8, 0.8], faces)
+    x = mesh.vertices
+    girth = 1.0 - 0.3 * np.exp(-(x[:, :1] ** 2) / 0.5)
+    pinched = x * np.hstack([np.ones_like(girth), girth, girth])
+    whole = local_volume_change(mesh, pinched)
+    monkeypatch.setattr(local_volume, "_LARGE", 100)
+    monkeypatch.setattr(local_volume, "_CELLS", 500)
+    local = LocalVolume(mesh)
+    cells = local.change(pinched)
+    assert_allclose(cells, whole, atol=0.12)  # of 0.44: they are smoothed a little otherwise
+    assert np.sqrt(np.square(cells - whole).mean()) < 0.03
+    i, j = mesh.edges.T
+    steps, smooth = np.abs(cells[i] - cells[j]), np.abs(whole[i] - whole[j])
+    assert steps.max() < 2.5 * smooth.max()
+    assert steps.mean() < 1.2 * smooth.mean()
+
+
+def test_across_a_thin_plate_cells_of_one_side_say_nothing_of_the_other(monkeypatch):
+    monkeypatch.setattr(local_volume, "_LARGE", 100)
+    monkeypatch.setattr(local_volume, "_CELLS", 1500)
+    ball, faces = icosphere(5)
+    local = LocalVolume(Mesh(ball * [1.0, 1.0, 0.02], faces))
+    (spread,) = local._spread
+    rows = np.repeat(np.arange(len(ball)), np.diff(spread.indptr))
+    height = (local._means @ ball)[spread.indices, 2]
+    high = np.abs(ball[rows, 2]) > 0.7
+    assert np.count_nonzero(high) > 3000
+    assert (np.sign(height[high]) == np.sign(ball[rows[high], 2])).all()
+
+
+@pytest.mark.parametrize("with_a_body", [False, True])
+def test_crumbs_are_answered_and_hide_no_body_beside_them(monkeypatch, with_a_body):
+    corners = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+    places = 4.0 * np.stack(np.meshgrid(*[np.arange(8.0)] * 3), axis=-1).reshape(-1, 3)
+    x = (places[:, None] + 0.1 * corners).reshape(-1, 3)
+    faces = (4 * np.arange(len(places))[:, None, None] + triangles).reshape(-1, 3)
+    if with_a_body:
+        ball, more = icosphere(4)
+        x, faces = np.vstack([x, 9.0 * ball - 50.0]), np.vstack([faces, len(x) + more])
+    monkeypatch.setattr(local_volume, "_LARGE", 100)
+    monkeypatch.setattr(local_volume, "_CELLS", 200)
+    change = local_volume_change(Mesh(x, faces), x * [1.0, 1.0, 1.1])
+    assert np.isfinite(change).all()
+    assert_allclose(change[4 * len(places) :] if with_a_body else change, 0.1, atol=1e-9)

@@ -1,0 +1,91 @@
+"""Vertex normals: VTK's own, the slope of the volume, and the same in any frame and unit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from solids import icosphere, rotation
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkFiltersCore import vtkTriangleMeshPointNormals
+
+from vtk_segdeform import Mesh, models
+from vtk_segdeform.geometry.normals import VertexNormals
+from vtk_segdeform.geometry.volume import volume_gradient
+from vtk_segdeform.io.polygons import polydata_of
+from vtk_segdeform.kernels import dispatch
+
+MESHES = {"sphere": Mesh(*icosphere(4)), "torus": models.torus(6000), "cactus": models.cactus(3000)}
+
+
+def cone(count: int) -> Mesh:
+    """Return two cones base to base, their tips with *count* faces each."""
+    angle = 2.0 * np.pi * np.arange(count) / count
+    rim = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1)
+    here, after = 2 + np.arange(count), 2 + (np.arange(count) + 1) % count
+    up = np.stack([here, after, np.zeros(count, dtype=int)], axis=1)
+    down = np.stack([after, here, np.ones(count, dtype=int)], axis=1)
+    return Mesh(np.vstack([[0, 0, 1], [0, 0, -1], rim]), np.vstack([up, down]))
+
+
+@pytest.fixture(params=["compiled", "plain"])
+def either(request, monkeypatch):
+    """Compiled loops, and none."""
+    if request.param == "compiled":
+        pytest.importorskip("numba")
+    else:
+        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+
+
+def posed(mesh: Mesh) -> np.ndarray:
+    x = mesh.vertices
+    return x + 0.1 * np.sin(3.0 * x[:, [1, 2, 0]])
+
+
+@pytest.mark.usefixtures("either")
+@pytest.mark.parametrize("name", MESHES)
+def test_they_are_those_that_vtk_draws_with(name):
+    mesh = MESHES[name]
+    x = posed(mesh)
+    drawn = vtkTriangleMeshPointNormals()
+    drawn.SetInputData(polydata_of(x, np.full(mesh.n_faces, 3), mesh.faces.ravel()))
+    drawn.Update()
+    theirs = vtk_to_numpy(drawn.GetOutput().GetPointData().GetNormals())
+    assert_allclose(VertexNormals(mesh).of(x), theirs, atol=1e-6)
+
+
+@pytest.mark.usefixtures("either")
+@pytest.mark.parametrize("name", MESHES)
+def test_they_point_where_the_volume_grows_fastest(name):
+    mesh = MESHES[name]
+    x = posed(mesh)
+    slope = volume_gradient(x, mesh.faces)
+    slope /= np.linalg.norm(slope, axis=1, keepdims=True)
+    out = np.empty((mesh.n_vertices, 3), dtype=np.float32)
+    assert VertexNormals(mesh).of(x, out) is out
+    assert_allclose(out, slope, atol=1e-6)
+
+
+@pytest.mark.usefixtures("either")
+@pytest.mark.parametrize("unit", [1e-60, 1e-6, 1e60])
+def test_they_turn_with_the_mesh_and_do_not_ask_for_its_unit(unit):
+    mesh, turn = MESHES["torus"], rotation([1.0, 2.0, -0.5], 1.1)
+    before = VertexNormals(mesh).of(posed(mesh))
+    moved = Mesh(unit * mesh.vertices, mesh.faces)
+    after = VertexNormals(moved).of(unit * posed(mesh) @ turn.T)
+    assert_allclose(after, before @ turn.T, atol=1e-6)
+
+
+@pytest.mark.usefixtures("either")
+def test_a_tip_with_thousands_of_faces_points_along_its_axis():
+    normals = VertexNormals(mesh := cone(3000)).of(mesh.vertices)
+    assert_allclose(normals[:2], [[0, 0, 1], [0, 0, -1]], atol=1e-6)
+    assert_allclose(normals[2:], mesh.vertices[2:], atol=1e-6)
+
+
+@pytest.mark.usefixtures("either")
+@pytest.mark.parametrize("nowhere", [0.0, np.nan])
+def test_what_has_no_area_has_no_normal_and_is_no_nan(nowhere):
+    mesh = MESHES["sphere"]
+    normals = VertexNormals(mesh).of(np.full(mesh.vertices.shape, nowhere))
+    assert_array_equal(normals, np.zeros(mesh.vertices.shape))

@@ -1,0 +1,167 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from solids import CUBE, SOLIDS, TETRAHEDRON, icosphere, rotation, somewhere, torus
+
+from vtk_segdeform.geometry.volume import (
+    signed_volume,
+    step_to_volume,
+    volume_along,
+    volume_gradient,
+)
+
+MESHES = {**SOLIDS, "sphere": icosphere(3), "torus": torus()}
+
+
+@pytest.fixture(params=MESHES, ids=str)
+def mesh(request):
+    return MESHES[request.param]
+
+
+def test_known_solids_have_their_known_volumes():
+    assert signed_volume(*CUBE) == pytest.approx(1.0, rel=1e-15)
+    assert signed_volume(*TETRAHEDRON) == pytest.approx(8.0 / 3.0, rel=1e-15)
+    assert signed_volume(*SOLIDS["octahedron"]) == pytest.approx(4.0 / 3.0, rel=1e-15)
+
+
+def test_the_icosphere_tends_to_the_ball_with_order_two():
+    errors = [4 * np.pi / 3 - signed_volume(*icosphere(level)) for level in (2, 3, 4, 5)]
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert_allclose(orders, 2.0, atol=0.1)
+    assert orders[-1] == pytest.approx(2.0, abs=0.01)
+
+
+def test_the_torus_tends_to_its_volume():
+    exact = 2 * np.pi**2 * 1.0 * 0.35**2
+    assert signed_volume(*torus(400, 200)) == pytest.approx(exact, rel=5e-4)
+
+
+def test_turning_the_mesh_changes_nothing(mesh):
+    vertices, faces = mesh
+    turned = vertices @ rotation([1.0, 2.0, -0.5], 1.1).T
+    assert signed_volume(turned, faces) == pytest.approx(signed_volume(vertices, faces), rel=1e-14)
+
+
+def test_turning_the_faces_round_changes_the_sign(mesh):
+    vertices, faces = mesh
+    assert signed_volume(vertices, faces[:, ::-1]) == pytest.approx(
+        -signed_volume(*mesh), rel=1e-14
+    )
+
+
+def test_far_from_the_origin_only_the_digits_of_the_coordinates_are_lost(mesh):
+    vertices, faces = mesh
+    diagonal = np.linalg.norm(np.ptp(vertices, axis=0))
+    far = vertices + 1e4 * diagonal * np.array([0.6, -0.64, 0.48])
+    # The coordinates keep 1e4 * 2^-53 = 1e-12 of the diagonal: twelve digits, and so does V.
+    assert signed_volume(far, faces) == pytest.approx(signed_volume(vertices, faces), rel=1e-11)
+    assert_allclose(
+        volume_gradient(far, faces), volume_gradient(vertices, faces), atol=1e-11 * diagonal**2
+    )
+    # What the cubic says of the far mesh agrees with the far mesh, to the last digits.
+    move = somewhere(len(vertices), seed=3, size=0.1 * diagonal)
+    at_one = volume_along(far, move, faces).sum()
+    assert at_one == pytest.approx(signed_volume(far + move, faces), rel=1e-11)
+
+
+@pytest.mark.parametrize("scale", [1e-100, 1e-3, 7.0, 1e3, 1e90])
+def test_scaling_by_s_scales_the_volume_by_s_cubed(mesh, scale):
+    vertices, faces = mesh
+    expected = scale**3 * signed_volume(vertices, faces)
+    assert signed_volume(scale * vertices, faces) == pytest.approx(expected, rel=1e-13, abs=0.0)
+
+
+def test_the_gradient_leaves_an_error_of_second_order(mesh):
+    vertices, faces = mesh
+    d = somewhere(len(vertices), seed=5, size=1.0)
+    slope = np.sum(volume_gradient(vertices, faces) * d)
+    steps = np.array([1e-1, 1e-2, 1e-3]) / 10.0
+    errors = [
+        abs(signed_volume(vertices + h * d, faces) - signed_volume(*mesh) - h * slope)
+        for h in steps
+    ]
+    assert_allclose(np.diff(np.log10(errors)) / np.diff(np.log10(steps)), 2.0, atol=0.1)
+
+
+def test_the_gradient_sums_to_zero_and_times_the_positions_is_three_volumes(mesh):
+    vertices, faces = mesh
+    gradient = volume_gradient(vertices, faces)
+    assert_allclose(gradient.sum(axis=0), 0.0, atol=1e-13)  # moving all moves no volume
+    assert np.sum(gradient * vertices) == pytest.approx(3 * signed_volume(*mesh), rel=1e-13)
+
+
+@pytest.mark.parametrize("t", [-2.0, -0.3, 0.0, 1e-3, 0.7, 1.0, 5.0])
+def test_the_cubic_is_the_volume_along_the_path(mesh, t):
+    vertices, faces = mesh
+    d = somewhere(len(vertices), seed=7, size=0.5) + [10.0, 0.0, 0.0]  # a shift changes nothing
+    terms = volume_along(vertices, d, faces) * t ** np.arange(4)
+    volume = signed_volume(vertices + t * d, faces)
+    assert abs(terms.sum() - volume) <= 1e-14 * max(1.0, abs(volume), np.abs(terms).sum()) * 4
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_step_lands_on_the_wanted_volume(mesh, seed):
+    vertices, faces = mesh
+    d = somewhere(len(vertices), seed=seed, size=0.2) + 0.3 * vertices
+    coefficients = volume_along(vertices, d, faces)
+    target = signed_volume(vertices, faces) * (1.0 + np.random.default_rng(seed).uniform(-0.3, 0.3))
+    t = step_to_volume(coefficients, target)
+    assert signed_volume(vertices + t * d, faces) == pytest.approx(target, rel=1e-14 * 4)
+
+
+def test_of_several_steps_the_smallest_is_taken():
+    # (t - 1)(t - 2)(t + 5) = t^3 + 2 t^2 - 13 t + 10
+    assert step_to_volume(np.array([10.0, -13.0, 2.0, 1.0]), 0.0) == pytest.approx(1.0, rel=1e-15)
+    # (t + 0.1)(t - 1)(t - 3) = t^3 - 3.9 t^2 + 2.6 t + 0.3
+    assert step_to_volume(np.array([0.3, 2.6, -3.9, 1.0]), 0.0) == pytest.approx(-0.1, rel=1e-14)
+
+
+def test_a_straight_line_and_a_parabola_are_solved_too():
+    assert step_to_volume(np.array([1.0, 2.0, 0.0, 0.0]), 4.0) == pytest.approx(1.5, rel=1e-15)
+    assert step_to_volume(np.array([0.0, 0.0, 2.0, 0.0]), 8.0) in (-2.0, 2.0)
+    assert step_to_volume(np.array([0.0, 0.0, 0.0, 1.0]), 8.0) == pytest.approx(2.0, rel=1e-15)
+
+
+def test_a_volume_that_is_met_already_needs_no_step():
+    assert step_to_volume(np.array([3.0, 1.0, 1.0, 1.0]), 3.0) == 0.0
+    assert step_to_volume(np.array([3.0, 0.0, 0.0, 1.0]), 3.0) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_where_nothing_changes_the_volume_the_step_is_zero():
+    assert step_to_volume(np.zeros(4), 0.0) == 0.0
+    assert step_to_volume(np.array([5.0, 0.0, 0.0, 0.0]), 6.0) == 0.0
+
+
+def test_out_of_reach_the_closest_step_is_taken():
+    # 4 + 2 t - t^2 is at most 5, at t = 1.
+    assert step_to_volume(np.array([4.0, 2.0, -1.0, 0.0]), 9.0) == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("size", [1e-60, 1e-9, 1e-3, 1e6, 1e60])
+@pytest.mark.parametrize("path", [1e-30, 1.0, 1e30])
+def test_neither_the_size_of_the_mesh_nor_of_the_path_matters(size, path):
+    vertices, faces = icosphere(2)
+    d = somewhere(len(vertices), seed=1, size=0.2) + 0.5 * vertices
+    expected = step_to_volume(
+        volume_along(vertices, d, faces), 1.2 * signed_volume(vertices, faces)
+    )
+    scaled = volume_along(size * vertices, size * path * d, faces)
+    t = step_to_volume(scaled, 1.2 * signed_volume(size * vertices, faces))
+    assert t * path == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("slope", [1e-6, 1e-17, -1e-17, 1e-60])
+def test_a_path_that_barely_begins_to_change_the_volume_still_arrives(slope):
+    assert step_to_volume(np.array([1.0, slope, 0.0, 1.0]), 9.0) == pytest.approx(2.0, rel=1e-6)
+
+
+def test_however_flat_the_path_begins_it_still_arrives():
+    t = step_to_volume(np.array([1.0, 1e-200, 0.0, 1.0]), 9.0)
+    assert t == pytest.approx(2.0, rel=1e-14)
+
+
+def test_a_target_at_the_crest_of_the_cubic_is_found_there():
+    # (t - 1)^2 (t + 2) = t^3 - 3 t + 2: a double root at 1, which rounding makes complex.
+    assert step_to_volume(np.array([2.0, -3.0, 0.0, 1.0]), 0.0) == pytest.approx(1.0, abs=1e-7)

@@ -1,0 +1,334 @@
+"""Files and pyvista: order, digits, arrays and seams survive; errors name the file."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import pyvista as pv
+from numpy.testing import assert_array_equal
+from real_meshes import path_of, read_off
+from solids import CUBE, SOLIDS, TETRAHEDRON, icosphere
+
+from vtk_segdeform.errors import MeshError
+from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.io.convert import (
+    from_polydata,
+    read_mesh,
+    read_polydata,
+    to_polydata,
+    with_vertices,
+    write_mesh,
+)
+from vtk_segdeform.mesh.mesh import Mesh
+
+EXACT = [".obj", ".off", ".ply", ".vtk", ".vtp", ".vtkhdf"]
+
+
+def shuffled(seed: int = 1) -> Mesh:
+    """Return a sphere far from the origin, numbered at random, that needs all its digits."""
+    rng = np.random.default_rng(seed)
+    vertices, faces = icosphere(2, radius=1 / 3)
+    number = rng.permutation(len(vertices))
+    moved = np.empty_like(vertices)
+    moved[number] = vertices + [1e5 / 3, -1e-9, 7.0]
+    return Mesh(moved, rng.permutation(number[faces]))
+
+
+def quad_cube() -> pv.PolyData:
+    """Return the unit cube as six quadrangles, with an array of every kind."""
+    quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    cube = pv.PolyData()
+    cube.points = CUBE[0] / 3
+    cube.faces = np.insert(np.array(quads), 0, 4, axis=1).ravel()
+    cube.point_data["warmth"] = np.arange(8) / 7
+    cube.point_data["RGB"] = np.arange(24, dtype=np.uint8).reshape(8, 3)
+    cube.cell_data["part"] = np.arange(6, dtype=np.int32)
+    cube.point_data["uv"] = np.random.default_rng(2).random((8, 2))
+    cube.point_data.active_texture_coordinates_name = "uv"
+    cube.field_data["maker"] = ["nobody"]
+    return cube
+
+
+@pytest.mark.parametrize("suffix", EXACT)
+def test_what_is_written_comes_back_to_the_last_digit_in_the_same_order(tmp_path, suffix):
+    mesh = shuffled()
+    write_mesh(tmp_path / f"a{suffix}", mesh)
+    again = read_mesh(tmp_path / f"a{suffix}")
+    assert_array_equal(again.vertices, mesh.vertices)
+    assert_array_equal(again.faces, mesh.faces)
+
+
+@pytest.mark.parametrize("suffix", EXACT)
+def test_polygons_stay_polygons_and_are_cut_only_for_the_mesh(tmp_path, suffix):
+    cube = quad_cube()
+    write_mesh(tmp_path / f"a{suffix}", cube)
+    again = read_polydata(tmp_path / f"a{suffix}")
+    assert_array_equal(again.faces, cube.faces)
+    mesh = from_polydata(again)
+    assert (mesh.n_vertices, mesh.n_faces) == (8, 12)
+    assert signed_volume(mesh.vertices, mesh.faces) == pytest.approx(1 / 27, rel=1e-14)
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".vtp", ".vtkhdf"])
+def test_every_array_survives_a_deformation_and_a_file_of_vtk(tmp_path, suffix):
+    cube = quad_cube()
+    write_mesh(tmp_path / f"a{suffix}", with_vertices(cube, cube.points * 2.0))
+    again = read_polydata(tmp_path / f"a{suffix}")
+    assert_array_equal(again.points, cube.points * 2.0)
+    for name in ("warmth", "RGB", "uv"):
+        assert_array_equal(again.point_data[name], cube.point_data[name])
+    assert_array_equal(again.cell_data["part"], cube.cell_data["part"])
+    assert list(again.field_data["maker"]) == ["nobody"]
+    assert again.point_data.active_texture_coordinates_name == "uv"
+
+
+def test_a_ply_file_keeps_colours_texture_and_numbers(tmp_path):
+    cube = quad_cube()
+    write_mesh(tmp_path / "a.ply", cube)
+    again = read_polydata(tmp_path / "a.ply")
+    assert_array_equal(again.active_texture_coordinates, cube.active_texture_coordinates)
+    assert_array_equal(again.point_data["RGB"], cube.point_data["RGB"])
+    assert_array_equal(again.point_data["warmth"], cube.point_data["warmth"])
+    assert_array_equal(again.cell_data["part"], cube.cell_data["part"])
+
+
+def test_polygons_of_different_lengths_go_through_every_own_format(tmp_path):
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 1 / 3]])
+    pyramid = pv.PolyData()
+    pyramid.points = points
+    pyramid.faces = [4, 3, 2, 1, 0, 3, 0, 1, 4, 3, 1, 2, 4, 3, 2, 3, 4, 3, 3, 0, 4]
+    pyramid.cell_data["part"] = np.arange(5, dtype=np.int32)
+    for suffix in (".obj", ".off", ".ply"):
+        write_mesh(tmp_path / f"a{suffix}", pyramid)
+        assert_array_equal(read_polydata(tmp_path / f"a{suffix}").faces, pyramid.faces)
+    assert_array_equal(read_polydata(tmp_path / "a.ply").cell_data["part"], np.arange(5))
+
+
+SEAMED = """mtllib paint.mtl
+v 0.1 0 0 1 0 0.2
+v 1 0 0 1 1 1
+v 0 1 0 0 0 0
+v 0 0 1 0.2 0.4 0.6
+vt 0 0
+vt 1 0
+vt 0 1
+vt 0.5 0.5
+usemtl red
+f 1/1 3/2 2/3
+f 1/4/1 2/2 4/3
+g back
+usemtl blue
+f -4/1 4/2 -2/3
+f 2/4 3/3 4/1
+"""
+
+
+def test_texture_seams_and_materials_of_an_obj_survive_without_opening_the_mesh(tmp_path):
+    (tmp_path / "a.obj").write_text(SEAMED)
+    surface = read_polydata(tmp_path / "a.obj")
+    assert from_polydata(surface).n_vertices == 4  # VTK's reader makes 12
+    write_mesh(tmp_path / "b.obj", with_vertices(surface, surface.points + 0.1))
+    again = read_polydata(tmp_path / "b.obj")
+    assert_array_equal(again.points, surface.points + 0.1)
+    for name in ("TextureCorners", "Material", "Group"):
+        assert_array_equal(again.cell_data[name], surface.cell_data[name])
+    assert again.cell_data["TextureCorners"][1].tolist() == [0.5, 0.5, 1, 0, 0, 1]
+    assert list(again.field_data["MaterialNames"]) == ["red", "blue"]
+    assert list(again.field_data["MaterialLibrary"]) == ["paint.mtl"]
+    assert again.point_data["RGB"].tolist()[3] == [51, 102, 153]
+
+
+def test_one_texture_place_per_vertex_is_what_pyvista_calls_texture_coordinates(tmp_path):
+    cube = quad_cube()
+    write_mesh(tmp_path / "a.obj", cube)
+    again = read_polydata(tmp_path / "a.obj")
+    assert_array_equal(again.active_texture_coordinates, cube.active_texture_coordinates)
+
+
+def test_text_and_both_byte_orders_of_ply_are_the_same_mesh(tmp_path):
+    vertices, faces = TETRAHEDRON
+    header = (
+        "ply\nformat {} 1.0\ncomment x\nelement vertex 4\nproperty float x\nproperty float y\n"
+        "property float z\nproperty uchar red\nelement face 4\n"
+        "property list uchar int vertex_index\nend_header\n"
+    )
+    lines = [f"{x} {y} {z} 7" for x, y, z in vertices]
+    lines += [f"3 {a} {b} {c}" for a, b, c in faces]
+    (tmp_path / "t.ply").write_text(header.format("ascii") + "\n".join(lines))
+    for order, kind in ((">", "binary_big_endian"), ("<", "binary_little_endian")):
+        points = np.zeros(4, [("p", order + "f4", 3), ("red", "u1")])
+        points["p"], points["red"] = vertices, 7
+        corners = np.zeros(4, [("k", "u1"), ("f", order + "i4", 3)])
+        corners["k"], corners["f"] = 3, faces
+        data = header.format(kind).encode() + points.tobytes() + corners.tobytes()
+        (tmp_path / f"{kind}.ply").write_bytes(data)
+    for path in sorted(tmp_path.glob("*.ply")):
+        surface = read_polydata(path)
+        assert_array_equal(surface.points, vertices)
+        assert_array_equal(from_polydata(surface).faces, faces)
+        assert surface.point_data["red"].dtype == np.uint8
+
+
+def test_off_with_colours_comments_and_counts_on_the_first_line(tmp_path):
+    text = "COFF 4 4 0 # four\n\n0 0 0 255 0 0 255\n1 0 0 0 9 0 255\n0 1 0 1 2 3 4\n0 0 1 5 6 7 8\n"
+    (tmp_path / "a.off").write_text(text + "3 0 2 1\n3 0 1 3 255 0 0\n3 0 3 2\n3 1 2 3\n")
+    surface = read_polydata(tmp_path / "a.off")
+    assert from_polydata(surface).n_faces == 4
+    assert surface.point_data["RGBA"].tolist()[1] == [0, 9, 0, 255]
+
+
+def test_an_stl_soup_is_merged_into_a_closed_mesh(tmp_path):
+    mesh = Mesh(*icosphere(2))
+    write_mesh(tmp_path / "a.stl", mesh)
+    again = read_mesh(tmp_path / "a.stl")
+    assert again.n_vertices == mesh.n_vertices
+    assert signed_volume(again.vertices, again.faces) == pytest.approx(
+        signed_volume(mesh.vertices, mesh.faces), rel=1e-6
+    )
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_stale_normals_are_computed_anew_and_the_original_is_left_alone(dtype):
+    ball = to_polydata(Mesh(*icosphere(2)))
+    ball.point_data["Normals"] = np.asarray(ball.points, dtype=dtype)
+    ball.point_data.active_normals_name = "Normals"
+    ball.cell_data["Normals"] = np.tile([0.0, 0.0, 1.0], (ball.n_cells, 1))
+    before = ball.copy(deep=True)
+    turned = with_vertices(ball, ball.points[:, [1, 2, 0]])  # a turn
+    assert_array_equal(ball.points, before.points)
+    assert_array_equal(ball.point_data["Normals"], before.point_data["Normals"])
+    facing = np.einsum("ij,ij->i", turned.point_data["Normals"], turned.points)
+    assert facing.min() > 0.99
+    assert turned.point_data["Normals"].dtype == dtype
+    assert turned.point_data.active_normals_name == "Normals"
+    outward = np.einsum("ij,ij->i", turned.cell_data["Normals"], turned.cell_centers().points)
+    assert outward.min() > 0.9
+
+
+def test_strips_and_a_grid_of_triangles_become_the_same_mesh(tmp_path):
+    mesh = Mesh(*icosphere(2))
+    strips = to_polydata(mesh).strip()
+    assert len(strips.strips)
+    assert signed_volume(mesh.vertices, from_polydata(strips).faces) == pytest.approx(
+        signed_volume(mesh.vertices, mesh.faces), rel=1e-13
+    )
+    grid = to_polydata(mesh).cast_to_unstructured_grid()
+    grid.save(tmp_path / "a.vtu")
+    assert_array_equal(read_mesh(tmp_path / "a.vtu").faces, mesh.faces)
+
+
+@pytest.mark.parametrize("name", list(SOLIDS))
+def test_to_polydata_and_back_changes_nothing(name):
+    mesh = Mesh(*SOLIDS[name])
+    again = from_polydata(to_polydata(mesh))
+    assert_array_equal(again.vertices, mesh.vertices)
+    assert_array_equal(again.faces, mesh.faces)
+
+
+SUFFIXES = [".obj", ".off", ".ply", ".stl", ".vtk", ".vtp", ".vtu", ".vtkhdf", ".glb"]
+RUBBISH = {
+    "empty": b"",
+    "text": b"hello\nthis is no mesh 1 2 3\n",
+    "bytes": bytes(range(256)) * 8,
+    "ply": b"ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\nend_header\n1 2",
+    "off": b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n",
+    "obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n",
+}
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("what", list(RUBBISH))
+def test_rubbish_is_refused_in_words_that_name_the_file(tmp_path, suffix, what, capfd):
+    path = tmp_path / f"rubbish{suffix}"
+    path.write_bytes(RUBBISH[what])
+    with pytest.raises(MeshError, match=f"rubbish{suffix}"):
+        read_polydata(path)
+    assert list(tmp_path.iterdir()) == [path]
+    capfd.readouterr()
+
+
+def test_nan_comes_through_to_be_named_as_the_fault_it_is(tmp_path):
+    path = tmp_path / "nan.off"
+    path.write_text(
+        "OFF\n4 4 0\n0 0 0\n1 0 0\nnan 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
+    )
+    assert np.isnan(read_polydata(path).points).sum() == 1
+    with pytest.raises(MeshError, match=r"nan.off: .*1 vertex with NaN or infinite"):
+        read_mesh(path)
+
+
+def test_a_truncated_file_is_refused_in_every_format(tmp_path):
+    for suffix in (".obj", ".off", ".ply", ".vtp"):
+        path = tmp_path / f"a{suffix}"
+        write_mesh(path, Mesh(*icosphere(2)))
+        path.write_bytes(path.read_bytes()[:-200])
+        with pytest.raises(MeshError, match="a\\" + suffix):
+            read_mesh(path)
+
+
+def test_what_is_no_closed_surface_is_refused_by_name(tmp_path):
+    with pytest.raises(MeshError, match=r"nowhere\.obj: there is no such file"):
+        read_mesh(tmp_path / "nowhere.obj")
+    (tmp_path / "a.xyz").write_text("1 2 3")
+    with pytest.raises(MeshError, match=r"cannot read \.xyz; can .*\.obj"):
+        read_mesh(tmp_path / "a.xyz")
+    pv.ImageData(dimensions=(3, 3, 3)).cast_to_unstructured_grid().save(tmp_path / "a.vtu")
+    with pytest.raises(MeshError, match="other than triangles"):
+        read_mesh(tmp_path / "a.vtu")
+    pv.ImageData(dimensions=(3, 3, 3)).save(tmp_path / "image.vtk")
+    with pytest.raises(MeshError, match="not a surface"):
+        read_mesh(tmp_path / "image.vtk")
+    with pytest.raises(MeshError, match=r"cannot write \.jpg"):
+        write_mesh(tmp_path / "a.jpg", shuffled())
+    with pytest.raises(MeshError, match="no folder"):
+        write_mesh(tmp_path / "no" / "a.obj", shuffled())
+
+
+def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
+    path = tmp_path / "a.off"
+    write_mesh(path, shuffled())
+    before = path.read_bytes()
+
+    def full(draft, _surface):
+        assert tmp_path in draft.parents  # on the same disk, so that the rename is one step
+        draft.write_text("half")
+        raise OSError("no space left on device")
+
+    monkeypatch.setitem(pytest.importorskip("vtk_segdeform.io.convert")._WRITERS, ".off", full)
+    with pytest.raises(MeshError, match=r"a.off: cannot be written \(no space"):
+        write_mesh(path, shuffled(2))
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_real_files_are_read_as_an_independent_reader_does():
+    vertices, faces = read_off("botsch-sorkine/cactus.off")
+    mesh = read_mesh(path_of("botsch-sorkine/cactus.off"))
+    assert_array_equal(mesh.vertices, vertices)
+    assert_array_equal(mesh.faces, faces)
+    koala = read_mesh(path_of("koala.obj"))
+    theirs = pv.read(path_of("koala.obj"))
+    assert koala.n_vertices == 49_999
+    assert_array_equal(koala.faces, theirs.regular_faces)
+    assert_array_equal(koala.vertices.astype(np.float32), theirs.points.astype(np.float32))
+    assert read_polydata(path_of("dino.off")).point_data["RGBA"][0].tolist() == [192, 192, 192, 255]
+
+
+@pytest.mark.parametrize("suffix", [*EXACT, ".stl", ".vtu", ".glb", ".gltf"])
+def test_an_empty_file_is_called_empty(tmp_path, suffix):
+    (tmp_path / f"a{suffix}").write_bytes(b"")
+    with pytest.raises(MeshError, match=r"the file is empty \(0 bytes\); copy or export it again"):
+        read_polydata(tmp_path / f"a{suffix}")
+
+
+def test_a_file_without_polygons_says_what_it_holds(tmp_path):
+    pv.PolyData().save(tmp_path / "a.vtp")
+    with pytest.raises(MeshError, match="holds no surface: 0 points, 0 polygons"):
+        read_polydata(tmp_path / "a.vtp")
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".vtp", ".vtu", ".vtkhdf"])
+def test_a_file_with_the_suffix_of_another_format_says_so(tmp_path, suffix):
+    (tmp_path / f"a{suffix}").write_text("v 0 0 0\n")
+    with pytest.raises(MeshError, match=f"does not begin as a {suffix} file does"):
+        read_polydata(tmp_path / f"a{suffix}")

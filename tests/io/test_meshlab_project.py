@@ -1,0 +1,190 @@
+"""MeshLab projects: whole again, the same in MeshLab, and harmless whoever wrote them."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scenes import sausage
+from solids import icosphere, rotation
+from test_meshlab import painted, same, with_pymeshlab, without_pymeshlab  # noqa: F401
+
+from vtk_segdeform.errors import MeshError
+from vtk_segdeform.io import meshlab, meshlab_project
+from vtk_segdeform.io.convert import to_polydata, write_mesh
+from vtk_segdeform.io.meshlab_project import read_project, write_project
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.session.session import Session
+
+BALL = Mesh(*icosphere(1))
+
+
+def files(folder) -> list[str]:
+    """Return the names of all files in a folder and below."""
+    return sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
+
+
+def project(folder, *layers: str, matrix: str = ""):
+    """Write a project by hand, and a ball beside it."""
+    write_mesh(folder / "ball.ply", BALL)
+    inner = f"<MLMatrix44>{matrix}</MLMatrix44>" if matrix else ""
+    meshes = "".join(f'<MLMesh label="a" filename="{name}">{inner}</MLMesh>' for name in layers)
+    path = folder / "work.mlp"
+    path.write_text(f"<MeshLabProject><MeshGroup>{meshes}</MeshGroup></MeshLabProject>")
+    return path
+
+
+@pytest.mark.usefixtures("without_pymeshlab")
+def test_layers_come_back_to_the_last_bit_without_pymeshlab(tmp_path):
+    layers = {"torus": painted(), '<b> & "c"': to_polydata(BALL)}
+    write_project(tmp_path / "work.mlp", layers)
+    again = read_project(tmp_path / "work.mlp")
+    assert list(again) == list(layers)
+    assert all(same(again[name], layers[name]) for name in layers)
+    assert "selection" in layers["torus"].point_data  # the given ones are left as they are
+
+
+@pytest.mark.usefixtures("with_pymeshlab")
+def test_meshlab_opens_the_mesh_and_its_cages_as_they_are(tmp_path):
+    import pymeshlab
+
+    scene = sausage(2)
+    session = Session(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.add_handle(scene.handle)
+    write_project(tmp_path / "work.mlp", {**meshlab.as_layers(session), "painted": painted()})
+    meshset = pymeshlab.MeshSet(verbose=False)
+    meshset.load_project(str(tmp_path / "work.mlp"))
+    layers = meshlab.layers_from_meshset(meshset)
+    assert list(layers) == ["mesh", "cage 1", "cage 2", "painted"]
+    assert same(layers["painted"], painted())
+    assert_array_equal(layers["mesh"].points, scene.mesh.vertices)
+    assert_array_equal(np.flatnonzero(layers["mesh"]["selection"]), scene.handle)
+    assert_array_equal(layers["cage 2"].points, scene.cages[1].vertices)
+
+
+@pytest.mark.usefixtures("with_pymeshlab")
+def test_a_project_that_meshlab_saved_is_opened(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # PyMeshLab writes a project only where it stands
+    meshset = meshlab.to_meshset({"one": painted(), "two": BALL})
+    for number in (0, 1):
+        meshset.set_current_mesh(number)
+        meshset.save_current_mesh(f"{number}.ply")
+    meshset.save_project("work.mlp")
+    layers = read_project("work.mlp")
+    assert_allclose(layers["one"].points, painted().points, atol=1e-6)
+    assert_allclose(layers["two"].points, BALL.vertices, atol=1e-6)
+    assert_array_equal(layers["one"]["RGBA"], painted()["RGBA"])
+
+
+def test_a_matrix_places_the_layer(tmp_path):
+    turn = rotation([1, 2, 3], 0.5)
+    matrix = np.vstack([np.column_stack([turn, [1, 2, 3]]), [0, 0, 0, 1]])
+    path = project(
+        tmp_path, "ball.ply", "ball.ply", matrix=" ".join(map(repr, matrix.ravel().tolist()))
+    )
+    layers = read_project(path)
+    assert list(layers) == ["a", "a 2"]
+    assert_allclose(layers["a 2"].points, BALL.vertices @ turn.T + [1, 2, 3], atol=1e-14)
+
+
+def test_writing_again_replaces_all_layers_and_touches_nothing_else(tmp_path):
+    write_project(tmp_path / "work.mlp", {"a": BALL, "b": BALL, "c": BALL})
+    for name in ("notes.ply", "7.ply", "../work-0.ply"):
+        (tmp_path / "work.layers" / name).write_text("mine")
+    before = set(files(tmp_path))
+    write_project(tmp_path / "work.mlp", BALL)
+    after = set(files(tmp_path))
+    assert list(read_project(tmp_path / "work.mlp")) == ["mesh"]
+    assert after <= before
+    assert after - {"work.mlp"} > {"work.layers/notes.ply", "work.layers/7.ply", "work-0.ply"}
+    assert len(after) == 5
+
+
+def test_cut_off_anywhere_the_old_project_is_still_whole(tmp_path, monkeypatch):
+    write_project(tmp_path / "work.mlp", {"a": BALL, "b": painted()})
+    real, left = os.replace, iter(range(100))
+    for last in range(4):  # three layers, and the project
+        left = iter(range(last))
+
+        def break_off(a, b, left=left):
+            if next(left, None) is None:
+                raise OSError("the power went")
+            real(a, b)
+
+        monkeypatch.setattr(os, "replace", break_off)
+        with pytest.raises(MeshError, match="power"):
+            write_project(tmp_path / "work.mlp", {"a": painted(), "b": BALL, "c": BALL})
+        layers = read_project(tmp_path / "work.mlp")
+        assert same(layers["a"], to_polydata(BALL))
+        assert same(layers["b"], painted())
+
+
+@pytest.mark.parametrize(
+    "name", ["../secret.ply", "{}/secret.ply", "link.ply", "", "x" * 5000, "."]
+)
+def test_a_layer_outside_the_folder_is_not_read(tmp_path, name):
+    write_mesh(tmp_path / "secret.ply", BALL)
+    here = tmp_path / "here"
+    here.mkdir()
+    (here / "link.ply").symlink_to(tmp_path / "secret.ply")
+    before = files(tmp_path)
+    path = project(here, name.format(tmp_path))
+    with pytest.raises(MeshError, match="is no file in the project's folder"):
+        read_project(path)
+    assert set(files(tmp_path)) - set(before) == {"here/ball.ply", "here/work.mlp"}
+
+
+BOMB = "<!DOCTYPE b [<!ENTITY a 'aaaa'><!ENTITY c '&a;&a;'>]><MeshLabProject>&c;</MeshLabProject>"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "is no MeshLab project"),
+        ("rubbish", "is no MeshLab project"),
+        ("<MeshLabProject>", "is no MeshLab project"),
+        ("<html/>", "its root is 'html'"),
+        (BOMB, "declares entities"),
+        ("<?xml version='1.0' encoding='no-such'?><MeshLabProject/>", "is no MeshLab project"),
+        ("<MeshLabProject><MeshGroup/></MeshLabProject>", "has no layers"),
+    ],
+)
+def test_what_is_no_project_is_named(tmp_path, text, says):
+    (tmp_path / "work.mlp").write_text(text)
+    with pytest.raises(MeshError, match=rf"work\.mlp: .*{says}"):
+        read_project(tmp_path / "work.mlp")
+    assert files(tmp_path) == ["work.mlp"]
+
+
+@pytest.mark.parametrize(
+    "matrix", ["1 2 3", "nan " * 16, "1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1", "x " * 16]
+)
+def test_a_matrix_that_is_no_affine_map_is_named(tmp_path, matrix):
+    with pytest.raises(MeshError, match="matrix of layer 'a' is no affine map"):
+        read_project(project(tmp_path, "ball.ply", matrix=matrix))
+
+
+def test_where_it_cannot_be_written_nothing_is(tmp_path):
+    (tmp_path / "taken.layers").write_text("mine")
+    for name, says in (
+        ("a.ply", "ends in .mlp"),
+        ("no/a.mlp", "no folder"),
+        ("taken.mlp", "not a folder"),
+    ):
+        with pytest.raises(MeshError, match=says):
+            write_project(tmp_path / name, BALL)
+    with pytest.raises(MeshError, match="expected a Mesh"):
+        write_project(tmp_path / "a.mlp", 3)
+    with pytest.raises(MeshError, match="no such file"):
+        read_project(tmp_path / "a.mlp")
+    assert files(tmp_path) == ["taken.layers"]
+
+
+def test_a_large_file_is_not_even_parsed(tmp_path, monkeypatch):
+    monkeypatch.setattr(meshlab_project, "_LARGEST", 10)
+    with pytest.raises(MeshError, match="too large"):
+        read_project(project(tmp_path, "ball.ply"))

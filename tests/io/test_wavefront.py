@@ -1,0 +1,222 @@
+"""OBJ: names in any encoding; objects, groups and smoothing are kept; other arrays are reported."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import pyvista as pv
+from numpy.testing import assert_array_equal
+from solids import TETRAHEDRON, icosphere
+from test_written_files import Told, prism
+
+from vtk_segdeform import Mesh
+from vtk_segdeform.errors import MeshError
+from vtk_segdeform.io.array_names import get_names, set_names
+from vtk_segdeform.io.convert import (
+    read_mesh,
+    read_polydata,
+    to_polydata,
+    with_vertices,
+    write_mesh,
+)
+
+BLENDER = """# Blender 4.2
+mtllib Körper.mtl
+o 身体
+v 1 1 1
+v 1 -1 -1
+v -1 1 -1
+v -1 -1 1
+usemtl Haut #1
+s 0
+f 1 2 3
+g links oben
+s 1
+f 1 3 4
+o Körper
+f 1 4 2
+usemtl a\\b
+f 2 4 3
+"""
+
+
+def names_of(surface, key):
+    """Return the name that each face has."""
+    names = get_names(surface, f"{key}Names")
+    return [names[k] for k in surface.cell_data[key]]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1"])
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_names_that_are_not_ascii_are_read_and_written(tmp_path, encoding, newline):
+    text = BLENDER.replace("身体", "Füße") if encoding == "latin-1" else BLENDER
+    (tmp_path / "a.obj").write_bytes(text.replace("\n", newline).encode(encoding))
+    for path in ("a.obj", "b.obj"):
+        surface = read_polydata(tmp_path / path)
+        body = "Füße" if encoding == "latin-1" else "身体"
+        assert names_of(surface, "Object") == [body, body, "Körper", "Körper"]
+        assert names_of(surface, "Group") == ["default"] + 3 * ["links oben"]
+        assert names_of(surface, "Material") == ["Haut #1"] * 3 + ["a\\b"]
+        assert surface.cell_data["Smoothing"].tolist() == [0, 1, 1, 1]
+        assert get_names(surface, "MaterialLibrary") == ["Körper.mtl"]
+        assert read_mesh(tmp_path / path).n_faces == 4
+        told = Told(tmp_path / "b.obj", with_vertices(surface, surface.points))
+        assert not told.texts
+
+
+def test_only_line_feeds_and_carriage_returns_end_a_line(tmp_path):
+    text = BLENDER.replace("身体", "a\x85v 9 9 9")  # NEL in Latin-1, an ellipsis on Windows
+    (tmp_path / "a.obj").write_bytes(text.encode("latin-1"))
+    surface = read_polydata(tmp_path / "a.obj")
+    assert surface.n_points == 4
+    assert names_of(surface, "Object")[0] == "a\x85v 9 9 9"
+
+
+def test_smoothing_and_materials_are_repeated_after_each_object(tmp_path):
+    (tmp_path / "a.obj").write_text(BLENDER, encoding="utf-8")
+    write_mesh(tmp_path / "b.obj", read_polydata(tmp_path / "a.obj"))
+    lines = (tmp_path / "b.obj").read_text(encoding="utf-8").splitlines()
+    at = lines.index("o Körper")
+    assert lines[at : at + 4] == ["o Körper", "g links oben", "usemtl Haut #1", "s 1"]
+    assert lines.count("s off") == 1
+    assert lines[0] == "mtllib Körper.mtl"
+
+
+@pytest.mark.parametrize(
+    ("word", "group"), [("off", 0), ("0", 0), ("", 0), ("1", 1), ("7", 7), ("on", 1)]
+)
+def test_smoothing_groups_are_numbers(tmp_path, word, group):
+    (tmp_path / "a.obj").write_text(BLENDER.replace("s 0", f"s {word}"), encoding="utf-8")
+    assert read_polydata(tmp_path / "a.obj").cell_data["Smoothing"][0] == group
+
+
+def test_a_newline_in_a_name_does_not_start_a_line(tmp_path):
+    surface = to_polydata(Mesh(*TETRAHEDRON))
+    surface.cell_data["Group"] = [0, 1, 2, 3]
+    names = ["a\nv 9 9 9\nf 1 2 3", "b\\", "b_", "  "]
+    set_names(surface, "GroupNames", names)
+    set_names(surface, "MaterialLibrary", ["x.mtl\nf 3 2 1"])
+    told = Told(tmp_path / "a.obj", surface)
+    again = read_polydata(tmp_path / "a.obj")
+    assert_array_equal(again.points, surface.points)
+    assert_array_equal(again.faces, surface.faces)
+    assert names_of(again, "Group") == ["a_v 9 9 9_f 1 2 3", "b__1", "b_", "unnamed"]
+    assert "group 'b\\\\' is written as 'b__1'" in told.texts
+    assert get_names(again, "MaterialLibrary") == ["x.mtl_f 3 2 1"]
+
+
+BAD = {
+    "1-D RGB": ("point", "RGB", np.zeros(4, dtype=np.uint8)),
+    "RGB of floats": ("point", "RGB", np.zeros((4, 3))),
+    "1-D corners": ("cell", "TextureCorners", np.zeros(4)),
+    "odd corners": ("cell", "TextureCorners", np.zeros((4, 5))),
+    "few corners": ("cell", "TextureCorners", np.zeros((4, 4))),
+    "groups without names": ("cell", "Group", np.array([0, 1, 2, 3])),
+    "negative groups": ("cell", "Object", np.array([0, -1, 0, 0])),
+    "fractions of groups": ("cell", "Material", np.array([0, 0.5, 0, 0])),
+    "NaN groups": ("cell", "Material", np.array([0, np.nan, 0, 0])),
+    "2-D groups": ("cell", "Object", np.zeros((4, 2), dtype=int)),
+    "2-D smoothing": ("cell", "Smoothing", np.zeros((4, 2), dtype=int)),
+    "negative smoothing": ("cell", "Smoothing", np.array([0, -1, 0, 0])),
+}
+
+
+@pytest.mark.parametrize("what", list(BAD))
+def test_an_array_of_the_wrong_type_is_left_out_with_a_warning(tmp_path, what):
+    sort, name, values = BAD[what]
+    surface = to_polydata(Mesh(*TETRAHEDRON))
+    getattr(surface, f"{sort}_data")[name] = values
+    for key in ("Object", "Material"):
+        set_names(surface, f"{key}Names", ["a"])
+    told = Told(tmp_path / "a.obj", surface)
+    assert told.left_out(sort, name)
+    again = read_polydata(tmp_path / "a.obj")
+    assert_array_equal(again.points, surface.points)
+    assert not list(again.point_data) + list(again.cell_data)
+
+
+@pytest.mark.parametrize("corner", ["0", "-5", "1/0", "1/-9"])
+def test_numbers_before_the_first_are_refused(tmp_path, corner):
+    (tmp_path / "a.obj").write_text(f"vt 0 0\n{BLENDER}f {corner} 2 3\n", encoding="utf-8")
+    with pytest.raises(MeshError, match=r"a\.obj: a face refers to (0|-5|-9)"):
+        read_polydata(tmp_path / "a.obj")
+
+
+def test_unused_vertices_keep_texture_coordinates_per_point(tmp_path):
+    surface = to_polydata(Mesh(*TETRAHEDRON))
+    surface = pv.PolyData(np.vstack([surface.points, [9.0, 9.0, 9.0]]), surface.faces)
+    surface.point_data["uv"] = np.arange(10.0).reshape(5, 2)
+    surface.point_data.active_texture_coordinates_name = "uv"
+    write_mesh(tmp_path / "a.obj", surface)
+    again = read_polydata(tmp_path / "a.obj")
+    assert_array_equal(again.active_texture_coordinates, surface.point_data["uv"])
+
+
+@pytest.mark.parametrize("reader", ["vtk", "pymeshlab"])
+def test_other_programs_read_the_same_surface_whatever_its_groups_are_called(tmp_path, reader):
+    surface = prism(5)
+    for key, names in [
+        ("Object", ["身体", "b#"]),
+        ("Group", ["a b", "#"]),
+        ("Material", ["f", "v"]),
+    ]:
+        surface.cell_data[key] = np.arange(surface.n_cells) % 2
+        set_names(surface, f"{key}Names", names)
+    surface.cell_data["Smoothing"] = np.arange(surface.n_cells) % 3
+    write_mesh(tmp_path / "a.obj", surface)
+    if reader == "vtk":
+        theirs = pv.read(tmp_path / "a.obj")
+        points, n_faces = theirs.points, theirs.n_cells
+    else:
+        meshset = pytest.importorskip("pymeshlab").MeshSet(verbose=False)
+        meshset.load_new_mesh(str(tmp_path / "a.obj"))
+        points, n_faces = meshset.current_mesh().vertex_matrix(), surface.n_cells
+        assert meshset.current_mesh().face_number() == 5 * 2 + 2 * 3
+    np.testing.assert_allclose(points, surface.points, atol=1e-6)
+    assert n_faces == surface.n_cells
+
+
+def test_a_sphere_with_smoothing_is_as_exact_as_one_without(tmp_path):
+    surface = to_polydata(Mesh(*icosphere(2, radius=1 / 3)))
+    surface.cell_data["Smoothing"] = np.ones(surface.n_cells, dtype=int)
+    write_mesh(tmp_path / "a.obj", surface)
+    again = read_polydata(tmp_path / "a.obj")
+    assert_array_equal(again.points, surface.points)
+    assert_array_equal(again.faces, surface.faces)
+    assert set(again.cell_data["Smoothing"]) == {1}
+
+
+TETRA = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+HUGE = "99999999999999999999999"
+
+
+@pytest.mark.parametrize(
+    ("good", "bad", "message"),
+    [
+        ("f 3 1 4", f"f 3 1 {HUGE}", f"refers to {HUGE}, which is too large"),
+        ("f 3 1 4", f"f 3/{HUGE} 1 4", f"refers to {HUGE}, which is too large"),
+        ("f 3 1 4", f"f 3 1 -{HUGE}", f"refers to -{HUGE}; indices start at 1"),
+        ("f 3 1 4", "f 3 1 4294967295", "refers to vertex 4294967295 of 4"),
+        ("f 3 1 4", "f 3 a 4", "refers to 'a'; indices are whole numbers"),
+        ("v 0 0 1", "v 0 x 1", "vertex 4 is '0 x 1'; must be 3 numbers"),
+        ("v 0 1 0", "v 0 1", "vertex 3 is '0 1'; must be 3 numbers"),
+        ("f 1 3 2", "vt 0 0\nvt 0 y\nf 1 3 2", "texture coordinate 2 is '0 y'; must be 2 numbers"),
+    ],
+)
+def test_a_number_that_cannot_be_is_named(tmp_path, good, bad, message):
+    (tmp_path / "a.obj").write_text(TETRA)
+    assert read_mesh(tmp_path / "a.obj").n_faces == 4
+    (tmp_path / "a.obj").write_text(TETRA.replace(good, bad))
+    with pytest.raises(MeshError, match=message):
+        read_polydata(tmp_path / "a.obj")
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32"])
+@pytest.mark.parametrize("name", ["a.obj", "a.off"])
+def test_text_in_utf_16_is_named_and_what_to_save_it_as(tmp_path, encoding, name):
+    off = "OFF\n4 1 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n"
+    (tmp_path / name).write_text(TETRA if name == "a.obj" else off, encoding=encoding)
+    with pytest.raises(MeshError, match="UTF-16 text, or not text at all; save it as UTF-8"):
+        read_polydata(tmp_path / name)
+    (tmp_path / name).write_text(TETRA if name == "a.obj" else off, encoding="utf-8-sig")
+    assert read_polydata(tmp_path / name).n_points == 4

@@ -1,0 +1,374 @@
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from real_meshes import path_of, read_off
+from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
+
+from vtk_segdeform.mesh import faults as search
+from vtk_segdeform.mesh import shells, topology
+from vtk_segdeform.mesh.faults import find_faults
+from vtk_segdeform.mesh.report import Kind
+from vtk_segdeform.mesh.topology import Sides, first_equal_row
+
+SPHERE = icosphere(2)
+N = len(SPHERE[0])
+
+
+def kinds(vertices, faces):
+    """Return what is fatal, as {kind: count}."""
+    return {fault.kind: fault.count for fault in find_faults(vertices, faces).faults}
+
+
+def together(*solids):
+    """Return solids as one mesh, vertices at the same place made one."""
+    vertices = np.concatenate([v for v, _ in solids])
+    starts = np.cumsum([0] + [len(v) for v, _ in solids])
+    faces = np.concatenate([f + start for (_, f), start in zip(solids, starts, strict=False)])
+    vertices, number = np.unique(vertices, axis=0, return_inverse=True)
+    return vertices, number.reshape(-1)[faces]
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_a_sound_mesh_has_no_faults(name):
+    report = find_faults(*SOLIDS[name])
+    assert report.ok
+    assert report.faults == report.notes == ()
+    assert report.n_components == 1
+
+
+def test_a_torus_and_two_bodies_are_sound():
+    assert find_faults(*torus()).ok
+    report = find_faults(*two_components())
+    assert report.ok
+    assert report.count(Kind.COMPONENTS) == report.n_components == 2
+
+
+def test_a_missing_face_leaves_three_open_edges_around_one_hole():
+    vertices, faces = SPHERE
+    report = find_faults(vertices, faces[1:])
+    assert kinds(vertices, faces[1:]) == {Kind.OPEN_EDGE: 3, Kind.HOLE: 1}
+    a, b, c = sorted(faces[0].tolist())
+    assert sorted(report.faults[0].examples) == [(a, b), (a, c), (b, c)]
+
+
+def test_holes_are_counted_apart():
+    vertices, faces = SPHERE
+    around = [np.flatnonzero((faces == v).any(axis=1)) for v in (0, 1)]
+    left = np.delete(faces, np.concatenate(around), axis=0)
+    expected = {Kind.UNREFERENCED: 2, Kind.OPEN_EDGE: sum(map(len, around)), Kind.HOLE: 2}
+    assert kinds(vertices, left) == expected
+
+
+def test_a_third_face_at_an_edge_is_found():
+    vertices, faces = SPHERE
+    fin = np.array([[faces[0, 0], faces[0, 1], N]])
+    found = kinds(np.append(vertices, [[3.0, 3.0, 3.0]], axis=0), np.append(faces, fin, axis=0))
+    assert found == {Kind.NON_MANIFOLD_EDGE: 1, Kind.OPEN_EDGE: 2, Kind.HOLE: 1}
+
+
+def test_two_cubes_that_share_a_corner_or_an_edge_are_told_apart():
+    vertices, faces = CUBE
+    corner = together(CUBE, (vertices + 1.0, faces))
+    assert kinds(*corner) == {Kind.NON_MANIFOLD_VERTEX: 1}
+    edge = together(CUBE, (vertices + [1.0, 1.0, 0.0], faces))
+    assert kinds(*edge) == {Kind.NON_MANIFOLD_EDGE: 1}
+
+
+def test_one_face_turned_round_disagrees_along_three_edges():
+    vertices, faces = SPHERE
+    turned = faces.copy()
+    turned[3] = turned[3, ::-1]
+    assert kinds(vertices, turned) == {Kind.TURNED_EDGE: 3}
+
+
+def test_a_mesh_turned_inside_out_is_found_wherever_it_lies():
+    vertices, faces = SPHERE
+    for moved in (vertices, vertices + 1e8, 1e-6 * vertices, vertices @ rotation([1, 2, 3], 2.0).T):
+        assert find_faults(moved, faces).ok
+        assert kinds(moved, faces[:, ::-1]) == {Kind.INWARD: 1}
+    assert kinds(vertices * [1.0, 1.0, -1.0], faces) == {Kind.INWARD: 1}  # a mirror does it too
+
+
+def test_a_flat_closed_mesh_encloses_nothing():
+    vertices, faces = CUBE
+    turned = vertices * [1.0, 1.0, 0.0] @ rotation([1.0, 2.0, 3.0], 0.7).T
+    assert kinds(turned, faces) == {Kind.NO_VOLUME: 1}
+
+
+@pytest.mark.parametrize(("scale", "kind"), [(1e150, Kind.TOO_LARGE), (1e-150, Kind.TOO_SMALL)])
+def test_a_size_that_no_volume_can_be_computed_for_is_named(scale, kind):
+    vertices, faces = CUBE
+    assert set(kinds(vertices * scale, faces)) == {kind}
+    for still in (scale**0.46, 1.0 / scale**0.46):
+        assert find_faults(vertices * still, faces).ok
+
+
+@pytest.mark.parametrize("depth", [1, 2, 3])
+def test_nested_shells_are_bodies_and_cavities_in_turn(depth):
+    vertices, faces = SPHERE
+    shells = [(vertices * 0.5**k, faces[:, :: (-1) ** k]) for k in range(depth + 1)]
+    assert find_faults(*together(*shells)).ok
+    wrong = [*shells[:-1], (shells[-1][0], shells[-1][1][:, ::-1])]
+    assert kinds(*together(*wrong)) == {Kind.INWARD: 1}
+
+
+def test_bodies_that_overlap_are_no_cavities():
+    vertices, faces = icosphere(3)
+    bump = vertices * 0.2 + 0.55  # within the box of the ball, half of it outside the ball
+    assert (bump.max(axis=0) < vertices.max(axis=0)).all()
+    assert find_faults(*together((vertices, faces), (bump, faces))).ok
+
+
+def test_degenerate_and_duplicate_faces_are_named_and_nothing_else_is():
+    vertices, faces = SPHERE
+    more = np.concatenate([faces, [[0, 0, 1], [5, 7, 5]], faces[:3], faces[:1, ::-1]])
+    assert kinds(vertices, more) == {Kind.DEGENERATE: 2, Kind.DUPLICATE_FACE: 4}
+
+
+def test_a_face_without_area_and_a_vertex_on_another_are_notes():
+    vertices, faces = SPHERE
+    flat = vertices.copy()
+    flat[faces[0, 0]] = flat[faces[0, 1]]
+    report = find_faults(flat, faces)
+    assert report.ok
+    assert report.count(Kind.COINCIDENT) == 1
+    assert report.count(Kind.ZERO_AREA) == 2  # the two faces at that edge
+
+
+def test_numbers_that_are_none_are_found():
+    vertices, faces = SPHERE
+    broken = vertices.copy()
+    broken[4, 1], broken[9] = np.nan, np.inf
+    report = find_faults(broken, faces)
+    assert kinds(broken, faces) == {Kind.NON_FINITE: 2}
+    assert report.faults[0].examples == (4, 9)
+
+
+def test_bad_indices_are_found():
+    vertices, faces = CUBE
+    assert kinds(vertices, faces + 1)[Kind.BAD_INDEX] == np.sum((faces == 7).any(axis=1))
+    assert kinds(vertices, np.append(faces, [[0, 1, -1]], axis=0)) == {Kind.BAD_INDEX: 1}
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "expected"),
+    [
+        ([], [], {Kind.EMPTY: 1}),
+        ([[0, 0, 0]], [], {Kind.EMPTY: 1, Kind.UNREFERENCED: 1}),
+        ([], [[0, 1, 2]], {Kind.BAD_INDEX: 1}),
+        (np.eye(3), [[0, 1, 2]], {Kind.OPEN_EDGE: 3, Kind.HOLE: 1}),
+        (
+            np.eye(3),
+            [[0, 1, 2], [0, 2, 1]],
+            {Kind.DUPLICATE_FACE: 1, Kind.OPEN_EDGE: 3, Kind.HOLE: 1},
+        ),
+        (np.eye(3), [[0, 0, 1]], {Kind.UNREFERENCED: 1, Kind.DEGENERATE: 1}),
+        (
+            np.full((3, 3), np.nan),
+            [[0, 1, 2]],
+            {Kind.NON_FINITE: 3, Kind.OPEN_EDGE: 3, Kind.HOLE: 1},
+        ),
+    ],
+)
+def test_the_smallest_meshes_do_not_break_the_search(vertices, faces, expected):
+    assert kinds(vertices, faces) == expected
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "message"),
+    [
+        (np.zeros((4, 2)), [[0, 1, 2]], r"vertices must have shape \(n, 3\); got \(4, 2\)"),
+        (np.zeros((4, 3)), [[0, 1, 2, 3]], r"faces must have shape \(m, 3\), triangles"),
+        (np.zeros((4, 3)), [[0.0, 1.0, 2.0]], "faces must hold integers; got float64"),
+        (np.array([["a", "b", "c"]]), [[0, 0, 0]], "vertices must hold numbers"),
+    ],
+)
+def test_what_is_no_mesh_at_all_is_an_error(vertices, faces, message):
+    with pytest.raises(ValueError, match=message):
+        find_faults(vertices, faces)
+
+
+def test_the_report_reads_well():
+    vertices, faces = SPHERE
+    text = str(find_faults(np.append(vertices, [[9, 9, 9]], axis=0), faces[1:]))
+    assert text.splitlines()[0] == "67 vertices, 127 faces, 1 component: not usable as it is"
+    assert "fault: 1 unreferenced vertex (vertex 66); `repair` would drop" in text
+    assert "fault: 3 open edges (" in text
+    assert str(find_faults(*CUBE)).endswith(": a closed, outward oriented two-manifold")
+
+
+def test_random_triangles_agree_with_counting_by_hand():
+    rng = np.random.default_rng(11)
+    for _ in range(50):
+        faces = rng.integers(0, 8, (rng.integers(1, 14), 3))
+        report = find_faults(rng.normal(size=(8, 3)), faces)
+        sound = {tuple(sorted(f)): tuple(f) for f in faces[::-1].tolist() if len(set(f)) == 3}
+        at = {}
+        for a, b, c in sound.values():
+            for i, j in ((a, b), (b, c), (c, a)):
+                at.setdefault((min(i, j), max(i, j)), []).append((i, j))
+        assert report.count(Kind.OPEN_EDGE) == sum(len(s) == 1 for s in at.values())
+        assert report.count(Kind.NON_MANIFOLD_EDGE) == sum(len(s) > 2 for s in at.values())
+        turned = sum(len(s) == 2 and s[0] == s[1] for s in at.values())
+        assert report.count(Kind.TURNED_EDGE) == turned
+        assert report.count(Kind.UNREFERENCED) == 8 - len(set(faces.ravel().tolist()))
+
+
+def damaged(vertices, faces, rng):
+    """Return a closed mesh with up to three things done to it; many leave it closed."""
+    vertices, faces = vertices.copy(), faces.copy()
+    for _ in range(rng.integers(0, 4)):
+        one, other = rng.choice(len(vertices), 2, replace=False)
+        face = rng.integers(len(faces))
+        match rng.integers(7):
+            case 0:
+                faces[faces == one] = other  # a pinch, if they are far apart
+            case 1:
+                faces = np.delete(faces, face, axis=0)
+            case 2:
+                faces = np.append(faces, faces[[face], ::-1], axis=0)
+            case 3:
+                faces[face] = faces[face, ::-1]
+            case 4:
+                vertices[one] = vertices[other]
+            case 5:
+                more = faces[face] + [[0], [0]]  # a pillow of two faces, at vertices of its own
+                vertices, faces = (
+                    np.append(vertices, vertices[more[0]] + 9.0, axis=0),
+                    np.append(faces, len(vertices) + np.array([[0, 1, 2], [0, 2, 1]]), axis=0),
+                )
+            case 6:
+                faces[face, 0] = other
+    return vertices, faces
+
+
+def groups(things, links):
+    """Return how many groups *things* fall into by *links*; a plain union-find."""
+    parent = {thing: thing for thing in things}
+
+    def root(thing):
+        while parent[thing] != thing:
+            thing = parent[thing]
+        return thing
+
+    for one, other in links:
+        parent[root(one)] = root(other)
+    return sum(parent[thing] == thing for thing in things)
+
+
+def test_closed_surfaces_that_were_damaged_agree_with_counting_by_hand():
+    rng = np.random.default_rng(5)
+    bodies = [*SOLIDS.values(), together(CUBE, (CUBE[0] + 1.0, CUBE[1])), two_components()]
+    bodies = [body for body in bodies if len(body[1]) < 100]
+    pinches = 0
+    for _ in range(300):
+        vertices, faces = damaged(*bodies[rng.integers(len(bodies))], rng)
+        report = find_faults(vertices, faces)
+        whole = [f for f in faces.tolist() if len(set(f)) == 3]
+        once = {}
+        for f in whole:
+            once.setdefault(frozenset(f), f)
+        assert report.count(Kind.DUPLICATE_FACE) == len(whole) - len(once)
+        seen = {tuple(v) for v in vertices.tolist()}
+        assert report.count(Kind.COINCIDENT) == len(vertices) - len(seen)
+        at = {}
+        for f in once:
+            for v in f:
+                at.setdefault(f - {v}, []).append(f)
+        touching = [(fs[0], f) for fs in at.values() for f in fs[1:]]
+        assert report.n_components == groups(once, touching)
+        crowded = set().union(*(edge for edge, fs in at.items() if len(fs) > 2))
+        pairs = [(edge, fs) for edge, fs in at.items() if len(fs) == 2]
+        pinched = sum(
+            groups([f for f in once if v in f], [fs for edge, fs in pairs if v in edge]) > 1
+            for v in range(len(vertices))
+            if v not in crowded
+        )
+        assert report.count(Kind.NON_MANIFOLD_VERTEX) == pinched
+        pinches += pinched > 0 and not report.count(Kind.OPEN_EDGE)
+    assert pinches > 20  # of closed surfaces, too
+
+
+def test_what_is_found_does_not_depend_on_pieces_or_on_how_many_faces_meet(monkeypatch):
+    pinched = together(CUBE, (CUBE[0] + 1.0, CUBE[1]))
+    flat = SPHERE[0].copy()
+    flat[SPHERE[1][0, 0]] = flat[SPHERE[1][0, 1]]
+    cavity = together(SPHERE, (0.5 * SPHERE[0], SPHERE[1][:, ::-1]))
+    far = [(CUBE[0] + at, CUBE[1]) for at in (1e15, -1e15)]
+    apart = together(SPHERE, *far)  # they have volumes only about corners of their own
+    meshes = [SPHERE, pinched, (flat, SPHERE[1]), cavity, apart, (SPHERE[0], SPHERE[1][:, ::-1])]
+    before = [find_faults(*mesh) for mesh in meshes]
+    for module in (search, shells):
+        monkeypatch.setattr(module, "_PIECE", 7)
+    monkeypatch.setattr(topology, "_ROUNDS", 4)  # at most corners more faces meet
+    assert [find_faults(*mesh) for mesh in meshes] == before
+
+
+def test_equal_rows_are_equal_numbers_whatever_their_bits():
+    rows = np.array([[0.0, 1.0], [-0.0, 1.0], [np.nan, 1.0], [np.nan, 1.0], [1.0, 0.0], [0.0, 1.0]])
+    assert first_equal_row(rows).tolist() == [0, 0, 2, 3, 4, 0]
+    assert first_equal_row(rows.astype(np.float32)).tolist() == [0, 0, 2, 3, 4, 0]
+    assert first_equal_row(rows[:0]).tolist() == []
+    rng = np.random.default_rng(3)
+    for dtype in (np.int64, np.float64):
+        many = rng.integers(-4, 4, (400, 3)).astype(dtype)
+        seen = {}
+        assert first_equal_row(many).tolist() == [
+            seen.setdefault(tuple(row), i) for i, row in enumerate(many.tolist())
+        ]
+
+
+def test_on_a_manifold_edges_fans_and_genus_agree():
+    for (vertices, faces), euler in ((SPHERE, 2), (torus(), 0), (two_components(), 4)):
+        sides = Sides(faces, len(vertices))
+        assert len(vertices) - len(sides.first) + len(faces) == euler
+        assert sides.fans(sides.pairs).max() + 1 == len(vertices)
+
+
+def test_the_search_grows_no_faster_than_sorting():
+    def best(mesh):
+        times = []
+        for _ in range(3):
+            start = time.perf_counter()
+            find_faults(*mesh)
+            times.append(time.perf_counter() - start)
+        return min(times)
+
+    # Four times the vertices: a search that compares each with each would take sixteen times.
+    assert best(torus(200, 100)) < 10 * best(torus(100, 50))
+
+
+@pytest.mark.parametrize(
+    "name", ["botsch-sorkine/cactus.off", "botsch-sorkine/cylinder.off", "hand.off"]
+)
+def test_benchmark_meshes_are_sound(name):
+    assert find_faults(*read_off(name)).ok
+
+
+@pytest.mark.parametrize(
+    "name", ["koala.obj", "armadilloman.obj", "armadilloman_cages_triangulated.obj"]
+)
+def test_benchmark_meshes_in_obj_files_are_sound(name):
+    lines = [line.split() for line in path_of(name).read_text().splitlines()]
+    vertices = np.array([w[1:4] for w in lines if w and w[0] == "v"], dtype=float)
+    faces = [[int(i.partition("/")[0]) - 1 for i in w[1:4]] for w in lines if w and w[0] == "f"]
+    assert find_faults(vertices, faces).ok
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_boxes_that_begin_within_another_are_among_few_candidates(axis):
+    rng = np.random.default_rng(3)
+    low = np.concatenate([rng.integers(0, 9, (300, 3)).astype(float), 9 * rng.random((100, 3))])
+    low[:, axis] *= 20.0  # along this axis the boxes overlap least
+    high = low + rng.integers(1, 6, (400, 3))
+    order, starts, stops = shells._beginning_within(low, high)
+    for k in range(400):
+        within = ((low > low[k]) & (high < high[k])).all(axis=1)
+        assert set(np.flatnonzero(within)) <= set(order[starts[k] : stops[k]])
+    row = 0.5 * rng.random((1000, 3))
+    row[:, axis] = 3.0 * np.arange(1000)  # separate boxes
+    _, starts, stops = shells._beginning_within(row - 1.0, row + 1.0)
+    assert (stops <= starts).all()

@@ -1,0 +1,179 @@
+from __future__ import annotations
+
+import copy
+import pickle
+import time
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from solids import CUBE, SOLIDS, icosphere, torus, two_components
+
+import vtk_segdeform as sd
+from vtk_segdeform.errors import MeshError
+from vtk_segdeform.mesh.faults import find_faults
+from vtk_segdeform.mesh.mesh import Mesh
+
+
+@pytest.fixture(params=SOLIDS, ids=str)
+def solid(request):
+    return SOLIDS[request.param]
+
+
+def test_a_mesh_holds_what_it_was_given(solid):
+    mesh = Mesh(*solid)
+    assert_array_equal(mesh.vertices, solid[0])
+    assert_array_equal(mesh.faces, solid[1])
+    assert (mesh.vertices.dtype, mesh.faces.dtype) == (np.float64, np.int64)
+    assert (mesh.n_vertices, mesh.n_faces) == (len(solid[0]), len(solid[1]))
+
+
+def test_lists_and_other_number_types_will_do():
+    vertices, faces = CUBE
+    mesh = Mesh(vertices.astype(np.float32), faces.astype(np.uint8).tolist())
+    assert_array_equal(mesh.vertices, vertices)
+
+
+def test_every_fault_is_named_with_its_number():
+    vertices, faces = icosphere(2)
+    broken = np.concatenate([faces[1:], faces[5:7], [[0, 0, 1]]])
+    with pytest.raises(MeshError) as caught:
+        Mesh(np.append(vertices, [[9.0, 9.0, 9.0]], axis=0), broken)
+    for words in ("1 unreferenced vertex (vertex 66)", "1 degenerate face (face 129)",
+                  "2 duplicate faces (face 127, 128)", "3 open edges", "1 hole"):  # fmt: skip
+        assert words in str(caught.value)
+    assert "repair" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "break_it",
+    [
+        lambda v, f: (v, f[1:]),
+        lambda v, f: (v, f[:, ::-1]),
+        lambda v, f: (v, np.append(f, f[:1], axis=0)),
+        lambda v, f: (np.append(v, v[:1], axis=0), f),
+        lambda v, f: (np.where(v == v[3], np.nan, v), f),
+        lambda v, f: (v, f + 1),
+        lambda v, f: (v, f[:0]),
+        lambda v, f: (v * [1.0, 1.0, 0.0], f),
+    ],
+)
+def test_whatever_the_fault_it_is_a_mesh_error(break_it):
+    with pytest.raises(MeshError):
+        Mesh(*break_it(*CUBE))
+
+
+def test_a_wrong_shape_is_told_from_a_fault():
+    with pytest.raises(ValueError, match="faces must have shape") as caught:
+        Mesh(CUBE[0], CUBE[1][:, :2])
+    assert not isinstance(caught.value, MeshError)
+
+
+def test_a_mesh_cannot_be_changed_not_even_through_the_arrays_it_was_made_from():
+    vertices, faces = CUBE[0].copy(), CUBE[1].copy()
+    mesh = Mesh(vertices, faces)
+    vertices[:], faces[:] = 7.0, 0
+    assert_array_equal(mesh.vertices, CUBE[0])
+    assert_array_equal(mesh.faces, CUBE[1])
+    for array in (mesh.vertices, mesh.faces):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+    with pytest.raises(AttributeError):
+        mesh.vertices = vertices
+
+
+@pytest.mark.parametrize(
+    "again", [lambda m: pickle.loads(pickle.dumps(m)), copy.deepcopy, copy.copy]
+)
+def test_a_copy_is_as_frozen_as_the_mesh(again):
+    mesh = Mesh(*CUBE)
+    twin = again(mesh)
+    assert_array_equal(twin.vertices, mesh.vertices)
+    assert_array_equal(twin.edges, mesh.edges)
+    assert not twin.vertices.flags.writeable
+    assert not twin.faces.flags.writeable
+
+
+def test_edges_are_counted_once_in_order_and_satisfy_euler():
+    for (vertices, faces), euler in ((icosphere(2), 2), (torus(), 0), (two_components(), 4)):
+        edges = Mesh(vertices, faces).edges
+        assert len(vertices) - len(edges) + len(faces) == euler
+        pairs = {
+            (min(i, j), max(i, j))
+            for f in faces.tolist()
+            for i, j in zip(f, f[1:] + f[:1], strict=True)
+        }
+        assert [tuple(e) for e in edges.tolist()] == sorted(pairs)
+
+
+def test_adjacency_is_the_edge_lengths_both_ways():
+    mesh = Mesh(*CUBE)
+    dense = mesh.adjacency.toarray()
+    assert_array_equal(dense, dense.T)
+    expected = np.zeros((8, 8))
+    for i, j in mesh.edges:
+        expected[i, j] = expected[j, i] = np.linalg.norm(CUBE[0][i] - CUBE[0][j])
+    assert_array_equal(dense, expected)
+
+
+def test_components_area_and_size_of_known_solids():
+    mesh = Mesh(*CUBE)
+    assert mesh.face_areas.sum() == pytest.approx(6.0)
+    assert mesh.diagonal == pytest.approx(np.sqrt(3.0))
+    assert set(mesh.components) == {0}
+    vertices, _ = two_components()
+    assert_array_equal(Mesh(*two_components()).components, vertices[:, 0] > 1.5)
+
+
+def test_a_pose_keeps_the_triangles_and_what_is_known_of_them():
+    mesh = Mesh(*torus())
+    edges = mesh.edges
+    posed = mesh.with_vertices(2.0 * mesh.vertices)
+    assert posed.faces is mesh.faces
+    assert posed.edges is edges
+    assert posed.diagonal == pytest.approx(2.0 * mesh.diagonal)
+    assert posed.face_areas.sum() == pytest.approx(4.0 * mesh.face_areas.sum())
+    assert not posed.vertices.flags.writeable
+
+
+def test_a_pose_may_be_inside_out():
+    mesh = Mesh(*CUBE)
+    assert not find_faults(mesh.with_vertices(-mesh.vertices).vertices, mesh.faces).ok
+
+
+def test_a_pose_must_be_finite_and_have_as_many_vertices():
+    mesh = Mesh(*CUBE)
+    with pytest.raises(ValueError, match="vertices holds 1 points with NaN"):
+        mesh.with_vertices(np.where(np.arange(8)[:, None] == 2, np.nan, mesh.vertices))
+    with pytest.raises(ValueError, match=r"vertices must have shape \(8, 3\); got \(7, 3\)"):
+        mesh.with_vertices(mesh.vertices[:7])
+
+
+def test_a_pose_costs_a_fraction_of_the_check():
+    vertices, faces = torus(100, 50)
+
+    def best(call):
+        times = []
+        for _ in range(5):
+            start = time.perf_counter()
+            call()
+            times.append(time.perf_counter() - start)
+        return min(times)
+
+    mesh = Mesh(vertices, faces)
+    assert best(lambda: mesh.with_vertices(vertices)) < 0.2 * best(lambda: Mesh(vertices, faces))
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda it: sd.segment(it, 2),
+        lambda it: sd.Regions.single(it),
+        lambda it: sd.fit_cages(it, None),
+        lambda it: sd.Deformer(it, None, ()),
+        lambda it: sd.Session(it),
+    ],
+)
+def test_what_is_no_mesh_is_told_how_to_become_one(ask):
+    with pytest.raises(sd.errors.MeshError, match=r"mesh must be a Mesh; got .*Make one by"):
+        ask(np.zeros((4, 3)))

@@ -1,0 +1,203 @@
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.sparse import csgraph
+from solids import CUBE, SOLIDS, icosphere, somewhere, torus, two_components
+
+from vtk_segdeform.errors import RegionError
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.regions.blending import borders, distance_to_triangles, shares
+from vtk_segdeform.regions.regions import Regions, cage_distance_weights
+
+SPHERE = Mesh(*icosphere(4))
+
+
+def thirds(mesh):
+    """Return labels 0, 1, 2 by the angle about z."""
+    angle = np.arctan2(mesh.vertices[:, 1], mesh.vertices[:, 0]) + np.pi
+    return np.minimum((angle / (2 * np.pi) * 3).astype(int), 2)
+
+
+def bands(mesh):
+    """Return two masks with fixed borders in space: they overlap for |z| < 0.3."""
+    z = mesh.vertices[:, 2]
+    return np.array([z > -0.3, z < 0.3])
+
+
+def biggest_jump(mesh, weights):
+    i, j = mesh.edges.T
+    return np.abs(weights[:, i] - weights[:, j]).max()
+
+
+@pytest.mark.parametrize("overlap", [0, 1, 2, 4, 9])
+@pytest.mark.parametrize("smoothness", [0.5, 1.0, 2.0, 40.0])
+def test_weights_are_shares_of_one_and_zero_outside(overlap, smoothness):
+    grown = Regions.from_labels(SPHERE, thirds(SPHERE), overlap)
+    regions = Regions(SPHERE, grown.membership, smoothness)
+    assert_allclose(regions.weights.sum(axis=0), 1.0, rtol=1e-14)
+    assert regions.weights.min() >= 0.0
+    assert not regions.weights[~regions.membership].any()
+
+
+@pytest.mark.parametrize("overlap", [1, 4])
+def test_a_region_has_nothing_to_say_on_its_own_border(overlap):
+    regions = Regions.from_labels(SPHERE, thirds(SPHERE), overlap)
+    edge = borders(SPHERE, regions.membership)
+    others = regions.membership.sum(axis=0) > 1
+    elsewhere = (regions.membership & ~edge).any(axis=0)  # another region can take the vertex
+    assert (edge & others & elsewhere).sum() > 20
+    assert not regions.weights[edge & others & elsewhere].any()
+
+
+def test_the_border_is_where_a_member_has_a_neighbour_outside():
+    regions = Regions.from_labels(SPHERE, thirds(SPHERE), 2)
+    outside = (~regions.membership).astype(float) @ (SPHERE.adjacency > 0).astype(float)
+    expected = regions.membership & (outside > 0)
+    np.testing.assert_array_equal(borders(SPHERE, regions.membership), expected)
+
+
+def test_where_every_distance_is_zero_the_regions_share_equally():
+    everywhere = np.ones((3, 1), dtype=bool)
+    assert_allclose(shares(everywhere, np.zeros((3, 1))), 1 / 3)
+    assert_allclose(shares(everywhere, np.array([[0.0], [1.0], [3.0]])).ravel(), [0, 0.25, 0.75])
+
+
+def test_a_region_without_border_outweighs_every_other_and_shares_with_its_like():
+    d = np.array([[np.inf], [np.inf], [5.0]])
+    assert_allclose(shares(np.ones((3, 1), dtype=bool), d).ravel(), [0.5, 0.5, 0.0])
+
+
+def test_a_region_that_covers_a_component_has_no_border_there():
+    mesh = Mesh(*two_components())
+    first = mesh.components == 0
+    part = first & (mesh.vertices[:, 0] > 0)
+    regions = Regions.from_masks(mesh, [first, ~first | part])
+    assert np.isinf(regions.border_distance[0, first]).all()
+    assert np.isinf(regions.border_distance[1, ~first]).all()
+    assert_allclose(regions.weights[0, first], 1.0)
+
+
+def test_distance_grows_by_no_more_than_an_edge_along_it():
+    regions = Regions.from_labels(SPHERE, thirds(SPHERE), 4)
+    i, j = SPHERE.edges.T
+    length = np.linalg.norm(SPHERE.vertices[i] - SPHERE.vertices[j], axis=1)
+    d = regions.border_distance
+    both = regions.membership[:, i] & regions.membership[:, j]
+    assert (np.abs(d[:, i] - d[:, j]) <= length + 1e-12)[both].all()
+
+
+def test_distance_is_the_shortest_path_over_the_whole_mesh_to_the_border():
+    regions = Regions.from_labels(SPHERE, thirds(SPHERE), 3)
+    start = np.flatnonzero(borders(SPHERE, regions.membership)[1])
+    whole = csgraph.dijkstra(SPHERE.adjacency, indices=start).min(axis=0)
+    members = regions.members(1)
+    assert_allclose(regions.border_distance[1, members], whole[members], atol=1e-12)
+
+
+def test_refining_the_mesh_makes_the_weights_continuous_and_the_printed_formula_not():
+    jumps, printed = [], []
+    cages = [Mesh(*icosphere(1, 1.3)), Mesh(*icosphere(1, 1.3))]
+    for level in (3, 4, 5):
+        mesh = Mesh(*icosphere(level))
+        regions = Regions.from_masks(mesh, bands(mesh))
+        jumps.append(biggest_jump(mesh, regions.weights))
+        printed.append(biggest_jump(mesh, cage_distance_weights(regions, cages)))
+    assert jumps[1] < 0.7 * jumps[0]
+    assert jumps[2] < 0.7 * jumps[1]
+    assert jumps[2] < 0.15
+    assert min(printed) >= 0.49
+
+
+def test_a_higher_power_leaves_zero_with_a_horizontal_tangent():
+    kinks = {}
+    for power in (1.0, 2.0):
+        kinks[power] = []
+        for level in (4, 5):
+            mesh = Mesh(*icosphere(level))
+            regions = Regions(mesh, bands(mesh), power)
+            edge = borders(mesh, regions.membership)[0]
+            i, j = mesh.edges.T
+            beside = edge[i] | edge[j]
+            step = np.abs(regions.weights[0, i] - regions.weights[0, j])[beside].max()
+            kinks[power].append(step / np.sqrt(mesh.face_areas.mean()))
+    assert kinks[1.0][1] > 0.8 * kinks[1.0][0]
+    assert kinks[2.0][1] < 0.65 * kinks[2.0][0]
+
+
+def test_growing_adds_the_vertices_within_so_many_edges():
+    labels = (np.arange(SPHERE.n_vertices) == 17).astype(int)
+    regions = Regions.from_labels(SPHERE, labels, 3)
+    steps = csgraph.dijkstra(SPHERE.adjacency, indices=17, unweighted=True)
+    np.testing.assert_array_equal(regions.membership[1], steps <= 3)
+    np.testing.assert_array_equal(
+        regions.grow(2).membership, Regions.from_labels(SPHERE, labels, 5).membership
+    )
+
+
+def test_labels_come_back_in_sorted_order():
+    labels = np.array([40, -3, 7])[thirds(SPHERE)]
+    regions = Regions.from_labels(SPHERE, labels, overlap=0)
+    np.testing.assert_array_equal(regions.labels, np.array([2, 0, 1])[thirds(SPHERE)])
+    grown = Regions.from_labels(SPHERE, labels, overlap=4)
+    assert np.mean(grown.labels == regions.labels) > 0.93
+
+
+@pytest.mark.parametrize("solid", SOLIDS.values(), ids=list(SOLIDS))
+def test_a_single_region_is_everything(solid):
+    regions = Regions.single(Mesh(*solid))
+    assert regions.n_regions == 1
+    assert_allclose(regions.weights, 1.0)
+
+
+def test_turning_does_nothing_and_scaling_scales_the_distance():
+    regions = Regions.from_labels(SPHERE, thirds(SPHERE), 3)
+    scaled = Regions.from_labels(SPHERE.with_vertices(1e3 * SPHERE.vertices), thirds(SPHERE), 3)
+    assert_allclose(scaled.border_distance, 1e3 * regions.border_distance, rtol=1e-9)
+    assert_allclose(scaled.weights, regions.weights, atol=1e-12)
+
+
+def test_distance_to_a_cube_is_known():
+    x = somewhere(400, seed=1, size=2.0)
+    outside = np.linalg.norm(np.maximum(np.maximum(-x, x - 1.0), 0.0), axis=1)
+    depth = np.minimum(x, 1.0 - x).min(axis=1)
+    expected = np.where(depth > 0, depth, outside)
+    assert_allclose(distance_to_triangles(x, *CUBE), expected, atol=1e-12)
+
+
+def test_distance_to_triangles_does_not_depend_on_chunks(monkeypatch):
+    x, (vertices, faces) = somewhere(60, seed=2), torus(12, 6)
+    whole = distance_to_triangles(x, vertices, faces)
+    monkeypatch.setattr("vtk_segdeform.regions.blending._PAIRS_AT_ONCE", 1000)
+    assert_allclose(distance_to_triangles(x, vertices, faces), whole)
+
+
+@pytest.mark.parametrize(
+    ("masks", "message"),
+    [
+        (np.ones((2, 7), dtype=bool), "shape"),
+        (np.ones((2, 8), dtype=float), "bool"),
+        (np.array([[True] * 8, [False] * 8]), "1 regions hold no vertex: 1;"),
+        (np.array([[True] * 6 + [False] * 2]), "2 vertices lie in no region: 6, 7;"),
+    ],
+)
+def test_regions_that_do_not_fit_are_refused_by_number(masks, message):
+    with pytest.raises(RegionError, match=message):
+        Regions.from_masks(Mesh(*CUBE), masks)
+
+
+def test_other_nonsense_is_refused():
+    mesh = Mesh(*CUBE)
+    with pytest.raises(RegionError, match="one integer for each of the 8"):
+        Regions.from_labels(mesh, np.zeros(8))
+    with pytest.raises(RegionError, match="overlap"):
+        Regions.from_labels(mesh, np.zeros(8, int), overlap=-1)
+    with pytest.raises(RegionError, match="smoothness"):
+        Regions(mesh, np.ones((1, 8), dtype=bool), smoothness=0.0)
+    with pytest.raises(RegionError, match="one cage for each of the 1"):
+        cage_distance_weights(Regions.single(mesh), [])
+
+
+def test_what_is_handed_out_cannot_be_changed():
+    regions = Regions.single(Mesh(*CUBE))
+    for array in (regions.membership, regions.weights, regions.border_distance):
+        assert not array.flags.writeable

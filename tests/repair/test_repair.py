@@ -1,0 +1,332 @@
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from solids import CUBE, SOLIDS, icosphere, torus
+
+from vtk_segdeform.errors import MeshError
+from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.mesh.faults import find_faults
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.mesh.report import Kind
+from vtk_segdeform.repair.lids import triangulate_loop
+from vtk_segdeform.repair.repair import repair
+
+SPHERE = icosphere(2)
+N, M = len(SPHERE[0]), len(SPHERE[1])
+
+
+def soup(vertices, faces):
+    """Return the mesh with every triangle on vertices of its own."""
+    return vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
+
+
+def together(*solids):
+    """Return solids as one mesh, vertices at the same place made one."""
+    vertices = np.concatenate([v for v, _ in solids])
+    starts = np.cumsum([0] + [len(v) for v, _ in solids])
+    faces = np.concatenate([f + start for (_, f), start in zip(solids, starts, strict=False)])
+    vertices, number = np.unique(vertices, axis=0, return_inverse=True)
+    return vertices, number.reshape(-1)[faces]
+
+
+def mended(vertices, faces, **options):
+    """Repair; check what holds of every success, and return the result."""
+    result = repair(vertices, faces, **options)
+    assert result.report.ok, str(result.report)
+    assert Mesh(result.vertices, result.faces).n_faces == len(result.face_map)
+    old = result.vertex_map >= 0
+    assert_array_equal(result.vertices[old], np.asarray(vertices)[result.vertex_map[old]])
+    kept = result.face_map[result.face_map >= 0]
+    assert (np.diff(kept) > 0).all()  # kept faces keep their order, new ones come after
+    assert (result.face_map[len(kept) :] == -1).all()
+    originals = np.unique(result.vertex_map[old], return_index=True)[1]
+    assert (np.diff(originals) > 0).all()
+    assert repair(result.vertices, result.faces).steps == ()
+    return result
+
+
+@pytest.mark.parametrize("name", [*SOLIDS, "torus"])
+def test_a_sound_mesh_comes_back_unchanged(name):
+    vertices, faces = torus() if name == "torus" else SOLIDS[name]
+    result = mended(vertices, faces)
+    assert result.steps == ()
+    assert_array_equal(result.vertices, vertices)
+    assert_array_equal(result.faces, faces)
+    assert_array_equal(result.vertex_map, np.arange(len(vertices)))
+    assert_array_equal(result.face_map, np.arange(len(faces)))
+
+
+@pytest.mark.parametrize("mesh", [SPHERE, torus(), CUBE], ids=["sphere", "torus", "cube"])
+def test_a_soup_of_triangles_is_welded_back(mesh):
+    vertices, faces = mesh
+    result = mended(*soup(vertices, faces))
+    n = len(vertices)
+    welded, edges = 3 * len(faces) - n, 3 * len(faces)
+    assert result.steps == (f"weld {welded} duplicate vertices, which closes {edges} open edges",)
+    assert len(result.vertices) == n
+    assert_array_equal(result.vertices[result.faces], vertices[faces])
+
+
+def test_a_soup_with_holes_is_the_closed_mesh_again():
+    vertices, faces = icosphere(3)
+    keep = np.random.default_rng(5).random(len(faces)) > 0.1
+    result = mended(*soup(vertices, faces[keep]))
+    assert any(step.endswith("where holes touch") for step in result.steps)
+    assert len(result.vertices) == len(vertices)
+    assert len(result.faces) == len(faces)
+
+
+def test_vertices_that_nearly_coincide_are_welded_when_a_distance_is_given():
+    vertices, faces = soup(*SPHERE)
+    shaken = vertices + np.random.default_rng(2).uniform(-1e-7, 1e-7, vertices.shape)
+    assert not repair(shaken, faces, largest_hole=0).report.ok
+    result = mended(shaken, faces, weld_distance=1e-6)
+    assert len(result.vertices) == N
+
+
+def test_coincident_vertices_of_a_closed_surface_are_left_alone():
+    vertices, faces = SPHERE
+    double = np.concatenate([faces, faces[:, ::-1] + N])  # a cavity right under the surface
+    result = repair(np.concatenate([vertices, vertices]), double[1:])
+    assert not any("weld" in step for step in result.steps)
+
+
+def test_degenerate_and_duplicate_faces_and_loose_vertices_go():
+    vertices, faces = SPHERE
+    result = mended(
+        np.append(vertices, [[9.0, 9.0, 9.0]], axis=0),
+        np.concatenate([[[0, 0, 1]], faces, faces[:3]]),
+    )
+    assert result.steps == (
+        "drop 1 degenerate face", "drop 3 duplicate faces", "drop 1 unreferenced vertex",
+    )  # fmt: skip
+    assert_array_equal(result.faces, faces)
+    assert_array_equal(result.face_map, np.arange(1, M + 1))
+
+
+def test_a_duplicate_face_goes_even_if_it_faces_the_other_side():
+    vertices, faces = SPHERE
+    result = mended(vertices, np.append(faces, faces[7:8, ::-1], axis=0))
+    assert_array_equal(result.faces, faces)
+
+
+def test_the_wall_between_two_bodies_goes_from_both():
+    vertices, faces = CUBE
+    result = mended(*together(CUBE, (vertices + [1.0, 0.0, 0.0], faces)))
+    assert result.steps == ("drop 4 duplicate faces, 4 of them inner walls",)
+    assert signed_volume(result.vertices, result.faces) == pytest.approx(2.0)
+    assert result.report.n_components == 1
+
+
+def test_a_vertex_without_a_place_goes_and_the_hole_is_closed():
+    vertices, faces = SPHERE
+    broken = vertices.copy()
+    broken[5] = np.nan
+    around = int(np.sum(faces == 5))
+    result = mended(broken, faces)
+    assert result.steps == (
+        f"drop 1 vertex with NaN or infinite coordinates and {around} faces there",
+        f"fill 1 hole of {around} edges with {around - 2} triangles",
+    )
+    assert 5 not in result.vertex_map
+
+
+def test_turned_faces_are_turned_back_and_the_majority_wins():
+    vertices, faces = SPHERE
+    some = np.random.default_rng(1).random(M) < 0.3
+    some[0] = True  # the first face has no say of its own
+    broken = np.where(some[:, None], faces[:, [0, 2, 1]], faces)
+    result = mended(vertices, broken)
+    assert result.steps == (f"turn {some.sum()} faces round to agree with the neighbours",)
+    assert_array_equal(result.faces, faces)
+    most = mended(vertices, np.where(some[:, None], faces, faces[:, [0, 2, 1]]))
+    assert_array_equal(most.faces, faces)
+    assert most.steps[1] == f"turn 1 inside-out component round ({M} faces)"
+
+
+def test_an_outward_shell_within_a_body_becomes_a_cavity():
+    vertices, faces = SPHERE
+    result = mended(*together(SPHERE, (0.5 * vertices, faces)))
+    assert result.steps == (f"turn 1 inside-out component round ({M} faces)",)
+    assert signed_volume(result.vertices, result.faces) == pytest.approx(
+        signed_volume(*SPHERE) * (1.0 - 0.5**3)
+    )
+
+
+@pytest.mark.parametrize(
+    ("shift", "step"),
+    [
+        ([1.0, 1.0, 1.0], "split 1 vertex where surfaces touch, adding 1 copy"),
+        ([1.0, 1.0, 0.0], "split 2 vertices and 1 edge where surfaces touch, adding 2 copies"),
+        ([-1.0, 1.0, 0.0], "split 2 vertices and 1 edge where surfaces touch, adding 2 copies"),
+        ([0.0, -1.0, 1.0], "split 2 vertices and 1 edge where surfaces touch, adding 2 copies"),
+    ],
+)
+def test_bodies_that_touch_are_parted_without_moving(shift, step):
+    vertices, faces = CUBE
+    result = mended(*together(CUBE, (vertices + shift, faces)))
+    assert result.steps == (step,)
+    assert (len(result.vertices), len(result.faces)) == (16, 24)
+    for body in (result.faces[:12], result.faces[12:]):  # whole cubes, not halves of each
+        assert find_faults(
+            result.vertices[np.unique(body)], np.searchsorted(np.unique(body), body)
+        ).ok
+        assert signed_volume(result.vertices, body) == pytest.approx(1.0)
+
+
+def test_holes_that_touch_are_filled_without_a_copy():
+    vertices, faces = SPHERE
+    at = np.flatnonzero((faces == 2).any(axis=1))
+    pair = [f for f in at if len(np.intersect1d(faces[f], faces[at[0]])) == 1]
+    assert len(pair) > 0
+    result = mended(vertices, np.delete(faces, [at[0], pair[0]], axis=0))
+    assert result.steps == ("fill 2 holes of 3 edges with 2 triangles",)
+    assert len(result.vertices) == N
+    assert signed_volume(result.vertices, result.faces) == pytest.approx(signed_volume(*SPHERE))
+
+
+def test_a_large_hole_stays_open_until_it_is_allowed():
+    vertices, faces = icosphere(4)
+    lower = faces[(vertices[faces][:, :, 2] <= 1e-12).all(axis=1)]
+    used = np.unique(lower)
+    bowl = vertices[used], np.searchsorted(used, lower)
+    left = repair(*bowl, largest_hole=20)
+    assert left.steps == ()
+    assert left.report.count(Kind.HOLE) == 1
+    border = left.report.count(Kind.OPEN_EDGE)
+    result = mended(*bowl)
+    new = len(result.vertices) - len(used)
+    triangles = border - 2 + 2 * new
+    assert result.steps == (
+        f"fill 1 hole of {border} edges with {triangles} triangles and {new} new vertices",
+    )
+    whole = signed_volume(vertices, faces)
+    assert signed_volume(result.vertices, result.faces) == pytest.approx(whole / 2, rel=1e-12)
+
+
+def test_a_hole_whose_every_diagonal_is_taken_gets_one_new_vertex():
+    # The torus of seven vertices joins each with each; without one, no lid over the six is left.
+    i = np.arange(7)[:, None]
+    faces = np.concatenate([(i + [0, 1, 3]) % 7, (i + [0, 3, 2]) % 7])
+    vertices = np.random.default_rng(4).normal(size=(7, 3))
+    left = faces[(faces != 6).all(axis=1)]
+    result = mended(vertices[:6], left)
+    assert result.steps[0] == "fill 1 hole of 6 edges with 6 triangles and 1 new vertex"
+    assert (len(result.vertices), len(result.faces)) == (7, 14)
+    assert result.vertex_map[-1] == -1
+
+
+def test_the_lid_of_a_loop_has_the_least_area():
+    corners = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [1, 0.5, 0], [0, 2, 0]])  # an arrowhead
+    lid = triangulate_loop(corners, np.zeros((5, 5), bool))
+    a, b, c = corners[lid].transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    assert np.linalg.norm(normals, axis=1).sum() / 2 == pytest.approx(2.5)  # nothing twice
+    assert (normals[:, 2] > 0).all()  # all in the direction of the loop
+
+
+def test_no_other_lid_of_a_bent_loop_has_less_area():
+    def least(points, i, j):
+        if j - i < 2:
+            return 0.0
+        return min(
+            least(points, i, k) + least(points, k, j) + area(points[i], points[k], points[j])
+            for k in range(i + 1, j)
+        )
+
+    def area(a, b, c):
+        return np.linalg.norm(np.cross(b - a, c - a)) / 2.0
+
+    rng = np.random.default_rng(8)
+    for n in (4, 5, 6, 7) * 5:
+        corners = rng.normal(size=(n, 3))
+        lid = corners[triangulate_loop(corners, np.zeros((n, n), bool))]
+        found = sum(area(*triangle) for triangle in lid)
+        assert found == pytest.approx(least(corners, 0, n - 1), rel=0.02)
+
+
+@pytest.mark.parametrize("n_on_side", [1, 2, 5])
+def test_a_crack_is_closed_by_splitting_the_face_with_vertices_on_its_edge(n_on_side):
+    # The face (a, b, c) of a tetrahedron is a fan from c over vertices on the side a-b.
+    a, b, c, d = 0, 1, 2, 3
+    vertices = np.array([[0.0, 0, 0], [6, 0, 0], [0, 1, 0], [0, 0, 1]])
+    share = np.arange(1, n_on_side + 1)[:, None] / (n_on_side + 1)
+    vertices = np.concatenate([vertices, share * vertices[b]])
+    along = [b, *range(3 + n_on_side, 3, -1), a]
+    fan = [[c, one, other] for one, other in pairwise(along)]
+    faces = np.array([*fan, [a, b, d], [b, c, d], [c, a, d]])
+    result = mended(vertices, faces)
+    assert len(result.vertices) == len(vertices)
+    assert result.report.count(Kind.ZERO_AREA) == 0
+    assert result.steps[1] == "split 1 face at vertices on an edge, to close cracks"
+    assert signed_volume(result.vertices, result.faces) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_two_lids_over_the_same_corners_do_not_share_a_diagonal():
+    vertices, faces = SOLIDS["octahedron"]
+    flat = vertices * [0.2, 1.0, 1.0]  # so that both lids would like the short diagonal
+    result = mended(flat, faces[[2, 3, 4, 5]])
+    assert result.steps == ("fill 2 holes of 4 edges with 4 triangles",)
+
+
+def test_what_would_need_guessing_stays_in_the_report():
+    vertices, faces = SPHERE
+    fin = np.append(faces, [[faces[0, 0], faces[0, 1], N]], axis=0)
+    result = repair(np.append(vertices, [[3.0, 3.0, 3.0]], axis=0), fin)
+    assert result.steps == ()
+    assert result.report.count(Kind.NON_MANIFOLD_EDGE) == 1
+    with pytest.raises(MeshError, match="1 non-manifold edge"):
+        Mesh(result.vertices, result.faces)
+
+
+def test_a_moebius_strip_has_no_outside_to_turn_to():
+    k = np.arange(12)
+    a, t = 2 * np.pi * k / 12, np.pi * k / 12
+    r = np.stack([1 - 0.3 * np.cos(t), 1 + 0.3 * np.cos(t)], axis=1)
+    z = np.stack([-0.3 * np.sin(t), 0.3 * np.sin(t)], axis=1)
+    vertices = np.stack([r * np.cos(a)[:, None], r * np.sin(a)[:, None], z], axis=-1).reshape(-1, 3)
+    here, there = 2 * k, 2 * (k + 1)
+    one, two = np.where(k < 11, there, 1), np.where(k < 11, there + 1, 0)
+    faces = np.concatenate([np.stack([here, here + 1, one], 1), np.stack([here + 1, two, one], 1)])
+    result = repair(vertices, faces)
+    assert result.steps == ()
+    assert result.report.count(Kind.TURNED_EDGE) == 1
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "message"),
+    [
+        ([], [], "1 empty mesh"),
+        (CUBE[0], CUBE[1] + 1, "naming a vertex that does not exist"),
+        (CUBE[0], [[0, 0, 1]], "nothing is left of the mesh after: drop 1 degenerate face"),
+        (np.full((3, 3), np.nan), [[0, 1, 2]], "nothing is left"),
+    ],
+)
+def test_where_there_is_nothing_to_repair_it_says_so(vertices, faces, message):
+    with pytest.raises(MeshError, match=message):
+        repair(vertices, faces)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_no_damage_makes_it_crash_and_none_makes_it_worse(seed):
+    rng = np.random.default_rng(seed)
+    vertices, faces = SPHERE if seed % 2 else torus(12, 8)
+    vertices, faces = vertices.copy(), faces[rng.random(len(faces)) > rng.choice([0.0, 0.02, 0.2])]
+    turned = rng.random(len(faces)) < rng.choice([0.0, 0.1, 0.5])
+    faces = np.where(turned[:, None], faces[:, [0, 2, 1]], faces)
+    faces = np.append(faces, rng.integers(0, len(vertices), (rng.integers(0, 3), 3)), axis=0)
+    faces = np.append(faces, faces[: rng.integers(0, 4)], axis=0)
+    vertices[rng.integers(0, len(vertices), rng.integers(0, 2))] = np.inf
+    if rng.random() < 0.4:
+        vertices, faces = soup(vertices, faces)
+    finite = np.isfinite(vertices[faces]).all(axis=(1, 2))
+    before = find_faults(vertices, faces[finite])
+    result = repair(vertices, faces)
+    for kind in (Kind.DEGENERATE, Kind.DUPLICATE_FACE, Kind.UNREFERENCED, Kind.NON_FINITE):
+        assert result.report.count(kind) == 0
+    for kind in (Kind.OPEN_EDGE, Kind.NON_MANIFOLD_EDGE):
+        assert result.report.count(kind) <= before.count(kind)

@@ -1,0 +1,905 @@
+"""A session: every step can be undone, the volume is exact at every move, nobody is forgotten."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scenes import sausage
+from solids import exact_volume_change, icosphere, rotation
+
+from vtk_segdeform.cages.cage import Cage
+from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionError, SessionError
+from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.regions.regions import Regions
+from vtk_segdeform.session.history import History
+from vtk_segdeform.session.listeners import Change
+from vtk_segdeform.session.session import Session
+from vtk_segdeform.session.state import Options, State
+from vtk_segdeform.solver.solution import Status
+from vtk_segdeform.subspace.subspace import bind
+from vtk_segdeform.widgets.volume_overlay.region_volumes import RegionVolumes
+
+SCENE = sausage(2)
+VERTICES = SCENE.mesh.vertices
+X = VERTICES[:, 0]
+
+
+def ready(**options) -> Session:
+    """Return a session with regions, cages, fixed vertices and a handle called "tip"."""
+    session = Session(SCENE.mesh, state=State(options=Options(**options)))
+    session.set_regions(SCENE.regions)
+    session.set_cages(SCENE.cages)
+    session.set_fixed(SCENE.fixed)
+    session.add_handle(SCENE.handle, "tip")
+    return session
+
+
+def snapshot(session: Session) -> list[bytes]:
+    """Return everything that is to be seen of a session, to the last bit."""
+    regions = session.regions
+    seen = [b"none" if regions is None else regions.membership.tobytes()]
+    seen += [cage.vertices.tobytes() + cage.faces.tobytes() for cage in session.cages]
+    seen += [vertices.tobytes() for vertices in session.cage_vertices]
+    seen += [session.fixed.tobytes(), session.vertices.tobytes(), repr(session.options).encode()]
+    for name, ids in session.handles.items():
+        seen += [name.encode(), ids.tobytes(), session.targets[name].tobytes()]
+    return seen
+
+
+def volume_error(session: Session) -> float:
+    faces = SCENE.mesh.faces
+    return abs(signed_volume(session.vertices, faces) / signed_volume(VERTICES, faces) - 1.0)
+
+
+def up(z: float) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[2, 3] = z
+    return matrix
+
+
+def one_action(session: Session, rng: np.random.Generator) -> None:
+    """Do something at random; some of it is not possible, which must change nothing."""
+    some = rng.choice(len(X), 40, replace=False)
+    region, subtract = int(rng.integers(3)), bool(rng.integers(2))
+    free = np.setdiff1d(some, np.concatenate([session.fixed, session.state.handle]))
+    handle = rng.choice([*session.handles, "nobody"])
+    actions = [
+        lambda: session.paint_region(region, some, subtract=subtract),
+        lambda: session.set_regions(SCENE.regions),
+        lambda: session.merge_regions([0, region]),
+        lambda: session.split_region(region),
+        lambda: session.set_cages(SCENE.cages),
+        lambda: session.set_fixed(free),
+        lambda: session.add_handle(free[:6]),
+        lambda: session.remove_handle(handle),
+        lambda: session.rename_handle(handle, f"called {rng.integers(1000)}"),
+        lambda: session.change_options(stretch=float(rng.integers(1, 3))),
+        session.reset_pose,
+        *[lambda: session.move_handle(handle, up(0.4 * rng.normal()), max_steps=4)] * 5,
+    ]
+    before = snapshot(session)
+    try:
+        actions[rng.integers(len(actions))]()
+    except (RegionError, CageError, ConstraintError):
+        assert snapshot(session) == before
+    session.commit()
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_any_sequence_of_actions_is_undone_and_redone_bit_for_bit(seed):
+    rng = np.random.default_rng(seed)
+    session = ready()
+    for _ in range(50):
+        if rng.random() < 0.3 and len(session.cages) == 0:
+            session.set_regions(SCENE.regions)
+            session.set_cages(SCENE.cages)
+        one_action(session, rng)
+    after = [snapshot(session)]
+    labels = []
+    while session.can_undo:
+        labels.append(session.undo())
+        after.append(snapshot(session))
+    assert len(labels) > 20
+    assert sum(label.startswith("drag") for label in labels) > 2
+    assert session.regions is None
+    for label, expected in zip(labels[::-1], after[-2::-1], strict=True):
+        assert session.redo_label == label == session.redo()
+        assert snapshot(session) == expected
+    assert not session.can_redo
+    assert session.redo() is None
+    where = len(labels)
+    for step in rng.integers(0, 2, 20) * 2 - 1:  # to and fro
+        if 0 <= where + step <= len(labels):
+            where += step
+            _ = session.redo() if step > 0 else session.undo()
+            assert snapshot(session) == after[::-1][where]
+
+
+def test_the_volume_is_exact_at_every_move_and_after_undo_and_redo():
+    session = ready()
+    for degrees in range(4, 61, 4):
+        session.drag(SCENE.turned(degrees), max_steps=3)
+        assert volume_error(session) < 1e-13
+        assert abs(session.volume_change) < 1e-13
+        session.commit()
+    for _ in range(15):
+        session.undo()
+        assert volume_error(session) < 1e-13
+    assert_array_equal(session.vertices, VERTICES)
+    while session.redo():
+        assert volume_error(session) < 1e-13
+
+
+def test_region_volumes_are_held_if_asked_for():
+    session = ready(preserve_region_volumes=True)
+    solution = session.drag(SCENE.turned(40))
+    assert np.abs(solution.region_volume_change).max() < 1e-12
+
+
+def test_a_pose_is_the_product_of_its_cage_vertices_and_nothing_else():
+    session = ready()
+    solution = session.drag(SCENE.turned(50))
+    subspace = bind(SCENE.regions, SCENE.cages)
+    expected = subspace.map(np.concatenate(session.cage_vertices))
+    assert_allclose(session.vertices, expected, atol=1e-13)
+    assert solution.vertices is session.vertices
+    assert solution is session.solution
+    other = Session(SCENE.mesh, state=session.state)
+    assert_array_equal(other.vertices, session.vertices)
+    assert other.solution is None
+
+
+def test_the_same_drag_from_the_same_state_has_the_same_end():
+    session = ready()
+    session.drag(SCENE.turned(60), max_steps=5)
+    first = session.vertices
+    session.commit()
+    session.drag(SCENE.turned(-20), max_steps=5)
+    session.commit()
+    session.undo()
+    session.undo()
+    session.drag(SCENE.turned(60), max_steps=5)
+    assert_array_equal(session.vertices, first)
+
+
+def test_after_undo_the_next_move_starts_from_the_pose_that_is_shown():
+    session = ready()
+    for degrees in (30, -30):
+        session.drag(SCENE.turned(degrees), max_steps=5)
+        session.commit()
+    session.undo()
+    fresh = Session(SCENE.mesh, state=session.state)
+    for each in (session, fresh):
+        each.drag(SCENE.turned(35), max_steps=1)
+    assert_array_equal(session.vertices, fresh.vertices)
+
+
+def test_a_new_step_after_undo_leaves_nothing_to_redo():
+    session = ready()
+    session.undo()
+    assert session.can_redo
+    session.set_fixed([1])
+    assert not session.can_redo
+
+
+def test_history_holds_no_vertices_of_the_mesh():
+    session = ready()
+    for k in range(5):
+        session.move_handle("tip", up(0.1 * k), max_steps=2)
+        session.commit()
+    states = [session.state]
+    while session.undo():
+        states.append(session.state)
+    arrays = [array for state in states if state.pose for array in state.pose.cage_vertices]
+    assert arrays
+    assert all(len(array) < 100 for array in arrays)
+    assert len({id(state.regions) for state in states[:6]}) == 1
+    assert all(state.regions is None or state.regions.mesh is SCENE.mesh for state in states)
+
+
+def test_weights_of_regions_not_shown_are_let_go():
+    session = ready()
+    old = session.regions
+    assert old.weights.shape == (2, len(X))
+    session.paint_region(0, X < 0.6)
+    assert not {"weights", "border_distance"} & vars(old).keys()
+    session.undo()
+    assert_allclose(session.regions.weights.sum(axis=0), 1.0)
+
+
+def test_history_is_bounded_and_the_oldest_steps_go_first():
+    session = Session(SCENE.mesh, history=3)
+    for k in range(6):
+        session.set_fixed([k])
+    labels = [session.undo() for _ in range(4)]
+    assert labels == ["set fixed"] * 3 + [None]
+    assert session.fixed.tolist() == [2]
+    with pytest.raises(SessionError, match="number of steps"):
+        History(0)
+
+
+def test_a_drag_is_one_step_and_its_label_names_what_was_dragged():
+    session = ready()
+    session.add_handle(np.abs(X) < 0.1)
+    for z in (0.1, 0.2, 0.3):
+        session.move_handle("tip", up(z), max_steps=2)
+        session.move_handle("handle 1", up(-z), max_steps=2)
+    assert session.is_dragging
+    assert session.undo_label == "drag tip, handle 1"
+    assert session.commit() == "drag tip, handle 1"
+    assert not session.is_dragging
+    assert session.commit() is None
+    session.move_handle("tip", up(0.2), max_steps=2)
+    assert session.commit("nudge") == "nudge"
+    assert [session.undo(), session.undo()] == ["nudge", "drag tip, handle 1"]
+    assert_array_equal(session.vertices, VERTICES)
+
+
+def test_revert_takes_a_drag_back_and_leaves_no_step():
+    session = ready()
+    session.move_handle("tip", up(0.3))
+    session.commit()
+    before, label = snapshot(session), session.undo_label
+    session.move_handle("tip", up(0.3))
+    session.refine()
+    session.revert()
+    session.revert()
+    assert snapshot(session) == before
+    assert session.undo_label == label
+    assert not session.can_redo
+    session.add_handle(np.abs(X) < 0.1, "middle")
+    session.move_handle("middle", up(0.1), max_steps=1)
+    assert session.commit() == "drag middle"
+
+
+@pytest.mark.parametrize("action", ["undo", "set fixed"])
+def test_another_action_commits_the_drag_in_hand_first(action):
+    session = ready()
+    session.move_handle("tip", up(0.3))
+    dragged = snapshot(session)
+    if action == "undo":
+        assert session.undo() == "drag tip"
+        assert_array_equal(session.vertices, VERTICES)
+        assert session.redo() == "drag tip"
+    else:
+        session.set_fixed(X < -2.5)
+        assert [session.undo_label, session.undo()] == ["set fixed"] * 2
+    assert snapshot(session) == dragged
+
+
+def test_a_matrix_moves_a_handle_from_where_the_drag_began():
+    session = ready()
+    turn = np.eye(4)
+    turn[:3, :3] = rotation([1, 0, 0], 0.4)
+    for matrix in (up(0.5), up(0.2), turn):
+        session.move_handle("tip", matrix, max_steps=3)
+    assert_allclose(session.targets["tip"], VERTICES[SCENE.handle] @ turn[:3, :3].T)
+    session.commit()
+    session.move_handle("tip", up(0.2), max_steps=3)
+    expected = VERTICES[SCENE.handle] @ turn[:3, :3].T + [0, 0, 0.2]
+    assert_allclose(session.targets["tip"], expected)
+    session.move_handle("tip", np.eye(4), max_steps=3)
+    assert_allclose(session.targets["tip"], VERTICES[SCENE.handle] @ turn[:3, :3].T)
+
+
+def test_targets_by_name_leave_the_other_handles_where_they_are():
+    session = ready()
+    session.add_handle(np.abs(X) < 0.1, "middle")
+    session.drag({"middle": session.targets["middle"] + [0, 0, 0.2]})
+    session.drag({"tip": session.targets["tip"] + [0, 0, 0.1]})
+    assert_allclose(session.targets["middle"] - VERTICES[np.abs(X) < 0.1], [[0, 0, 0.2]] * 64)
+    both = np.concatenate([session.targets["tip"], session.targets["middle"]])
+    session.drag(both + [0, 0.1, 0])
+    assert_allclose(session.targets["tip"], both[: len(SCENE.handle)] + [0, 0.1, 0])
+
+
+def test_a_drag_stopped_early_is_refined_to_the_end():
+    session = ready()
+    session.drag(SCENE.turned(25), max_steps=1)
+    assert session.solution.status is Status.STEP_LIMIT
+    assert "refine" in session.what_next
+    while session.refine(max_steps=5).status is Status.STEP_LIMIT:
+        assert volume_error(session) < 1e-13
+    session.commit()
+    whole = ready()
+    whole.drag(SCENE.turned(25))
+    assert_allclose(session.vertices, whole.vertices, atol=1e-3)
+    label = session.undo_label
+    assert session.refine().status is not Status.STEP_LIMIT
+    assert session.undo_label == label
+    refined = snapshot(session)
+    session.undo()
+    session.redo()
+    assert snapshot(session) == refined
+    at_rest = ready()
+    assert at_rest.refine().steps == 0
+    assert at_rest.state.pose is None
+
+
+def test_fixed_vertices_and_handles_change_without_moving_anything():
+    session = ready()
+    session.drag(SCENE.turned(30))
+    session.commit()
+    posed = session.vertices
+    session.set_fixed(X < -2.2)
+    session.add_handle(np.abs(X) < 0.1, "middle")
+    session.rename_handle("tip", "end")
+    assert_array_equal(session.vertices, posed)
+    assert_array_equal(session.targets["middle"], posed[np.abs(X) < 0.1])
+    assert_allclose(session.targets["end"], SCENE.turned(30))
+    solution = session.move_handle("middle", up(1e-3))
+    assert np.abs(session.vertices - posed).max() < 0.1
+    assert solution.handle_error < 2e-3
+    session.add_handle(np.abs(X) < 0.3, "middle")
+    assert_array_equal(session.targets["middle"], session.vertices[np.abs(X) < 0.3])
+    session.remove_handle("end")
+    assert list(session.handles) == list(session.targets) == ["middle"]
+    session.remove_handle("middle")
+    assert not session.is_ready
+    assert volume_error(session) < 1e-13
+
+
+def test_a_volume_that_was_let_go_comes_back_with_the_option():
+    session = ready(preserve_volume=False)
+    session.drag(SCENE.turned(70))
+    session.commit()
+    assert volume_error(session) > 1e-4
+    loose = session.vertices
+    session.change_options(preserve_volume=True)
+    assert_array_equal(session.vertices, loose)
+    session.refine()
+    assert volume_error(session) < 1e-13
+
+
+def test_binding_takes_hold_of_what_is_fixed_and_dragged_so_that_the_first_move_need_not(
+    monkeypatch,
+):
+    holds = []
+    hold = Deformer.hold
+
+    def counted(*args, **kwargs):
+        holds.append(kwargs)
+        return hold(*args, **kwargs)
+
+    monkeypatch.setattr(Deformer, "hold", counted)
+    session, other = ready(), ready()
+    shares: list[float] = []
+    session.bind(lambda share, _: shares.append(share))
+    assert len(holds) == 1
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    session.drag(SCENE.turned(20))
+    assert len(holds) == 1
+    other.drag(SCENE.turned(20))
+    assert len(holds) == 2
+    assert_array_equal(session.vertices, other.vertices)
+
+
+def test_cages_just_fitted_are_taken_as_they_are_but_not_for_other_regions(monkeypatch):
+    session = ready()
+    cages = session.fitted_cages()
+    asked = []
+    enclose = Cage.require_encloses
+    monkeypatch.setattr(
+        Cage, "require_encloses", lambda *args: (asked.append(args), enclose(*args))[1]
+    )
+    session.set_cages(cages)
+    assert not asked
+    assert session.cages == cages
+    session.set_cages(list(cages))
+    assert len(asked) == len(cages)
+    session.set_regions(Regions.single(session.mesh))
+    with pytest.raises(CageError, match="1 regions need"):
+        session.set_cages(cages)
+
+
+def test_options_of_fitting_need_no_new_binding_and_others_do():
+    session = ready()
+    session.bind()
+    session.change_options(n_cage_vertices=60, offset=0.2)
+    assert session.is_bound
+    session.change_options(stretch=3.0)
+    assert not session.is_bound
+    session.undo()
+    assert session.is_bound
+
+
+def test_regions_that_stay_in_their_cages_keep_them_and_others_drop_them():
+    session = ready()
+    heard = []
+    session.on_change(heard.append)
+    session.move_handle("tip", up(0.2))
+    session.commit()
+    session.paint_region(0, X < 0.6)
+    assert session.cages == SCENE.cages
+    assert_array_equal(session.vertices, VERTICES)  # at rest
+    session.paint_region(0, X < 3.0)
+    assert session.cages == ()
+    assert heard[2:] == [
+        Change.REGIONS | Change.POSE | Change.HISTORY,
+        Change.REGIONS | Change.CAGES | Change.HISTORY,
+    ]
+    session.undo()
+    assert session.cages == SCENE.cages
+    session.split_region(0)
+    assert session.cages == ()
+
+
+def test_other_cages_put_the_pose_to_rest():
+    session = ready()
+    session.move_handle("tip", up(0.2), max_steps=2)
+    session.set_cages([Cage(1.01 * cage.vertices, cage.faces) for cage in SCENE.cages])
+    assert session.state.pose is None
+    assert_array_equal(session.targets["tip"], VERTICES[SCENE.handle])
+    assert session.undo() == "set cages"
+    assert session.state.pose is not None
+
+
+def test_cages_are_fitted_around_painted_regions():
+    session = Session(SCENE.mesh)
+    session.paint_region(1, X > -0.5)
+    session.paint_region(0, X > 0.5, subtract=True)
+    assert session.regions.n_regions == 2
+    session.change_options(n_cage_vertices=60)
+    session.fit_cages()
+    assert sum(cage.n_vertices for cage in session.cages) == 60
+    assert session.undo_label == "fit cages"
+    session.add_handle(SCENE.handle)
+    session.drag(SCENE.turned(20))
+    assert volume_error(session) < 1e-13
+
+
+@pytest.mark.parametrize("work", ["segment", "fit_cages", "bind"])
+def test_cancelling_leaves_everything_as_it_was(work):
+    session = ready()
+    session.move_handle("tip", up(0.1))
+    session.commit()
+    session.change_options(stretch=5.0)  # so that there is something to bind
+    before, label, heard = snapshot(session), session.undo_label, []
+    session.on_change(heard.append)
+    session.change_options(stretch=6.0)
+    session.undo()
+    heard.clear()
+
+    def stop(fraction, _):
+        if fraction > 0.1:
+            raise Cancelled("enough")
+
+    if work == "bind":
+        session = Session(SCENE.mesh, state=session.state)
+    with pytest.raises(Cancelled, match="enough"):
+        getattr(session, work)(progress=stop)
+    assert snapshot(session) == before
+    assert heard == []
+    if work != "bind":
+        assert session.undo_label == label
+
+
+def test_a_cage_vertex_that_goes_out_and_back_in_one_drag_leaves_everything_where_it_was():
+    session = ready()
+    session.move_handle("tip", up(0.5))
+    session.commit()
+    before, start = session.cage_vertices, session.cage_vertices[0]
+    for way in [*np.linspace(0.0, 1.0, 20), *np.linspace(1.0, 0.0, 20)]:
+        moved = start.copy()
+        moved[7] += way * np.array([0.3, -0.2, 0.5])
+        session.move_cage(0, moved)
+        assert volume_error(session) < 1e-13
+        assert (np.abs(session.cage_vertices[1] - before[1]).max() > 1e-6) == (way > 0.0)
+    for after, cage in zip(session.cage_vertices, before, strict=True):
+        assert_allclose(after, cage, atol=1e-12)
+
+
+def test_two_cages_moved_in_one_drag_are_both_where_they_were_put():
+    session = ready(preserve_volume=False)
+    moved = [cage + [0.0, 0.0, 0.1 * (k + 1)] for k, cage in enumerate(session.cage_vertices)]
+    session.move_cage(0, moved[0])
+    session.move_cage(1, moved[1])
+    for after, cage in zip(session.cage_vertices, moved, strict=True):
+        assert_array_equal(after, cage)
+
+
+def test_a_cage_vertex_can_be_moved_freely_and_the_volume_stays():
+    session = ready()
+    places = SCENE.cages[0].vertices.copy()
+    places[np.argmin(places[:, 2])] -= [0.0, 0.0, 0.5]
+    session.move_cage(0, places)
+    assert volume_error(session) < 1e-13
+    moved = np.abs(session.vertices - VERTICES).max(axis=1)
+    assert moved.max() > 0.01
+    assert session.commit() == "drag the cage of region 1"
+    assert_array_equal(session.targets["tip"], session.vertices[SCENE.handle])
+    session.undo()
+    assert_array_equal(session.vertices, VERTICES)
+    session.change_options(preserve_volume=False)
+    session.move_cage(0, places)
+    assert volume_error(session) > 1e-4
+    assert_array_equal(session.cage_vertices[0], places)
+    with pytest.raises(CageError, match="vertices must be 66 points; got 1"):
+        session.move_cage(0, places[:1])
+
+
+def test_a_cage_put_anywhere_keeps_the_volume_or_is_refused_and_nothing_flies_off():
+    session, rng, refused = ready(), np.random.default_rng(0), []
+    rest, diagonal = session.cage_vertices, session.mesh.diagonal
+    for _ in range(60):
+        region = int(rng.integers(2))
+        places = rest[region].copy()
+        some = rng.permutation(len(places))[: rng.integers(1, len(places))]
+        places[some] += rng.normal(size=3) * diagonal * 10.0 ** rng.uniform(-1.0, 0.6)
+        try:
+            session.move_cage(region, places)
+        except ConstraintError as error:
+            refused.append(str(error))
+        else:
+            assert volume_error(session) < 1e-12
+            assert np.ptp(session.vertices, axis=0).max() < 20.0 * diagonal
+            session.commit()
+            session.undo()
+        assert not session.is_dragging
+        assert_array_equal(session.vertices, VERTICES)
+    assert 0 < len(refused) < 10
+    assert all("at most 10 are allowed" in error for error in refused)
+
+
+def test_what_to_do_next_is_said_at_every_stage():
+    session = Session(SCENE.mesh)
+    said = [session.what_next]
+    for step in (
+        lambda: session.set_regions(SCENE.regions),
+        lambda: session.set_cages(SCENE.cages),
+        lambda: session.add_handle(SCENE.handle),
+        lambda: session.set_fixed(SCENE.fixed),
+    ):
+        assert session.is_ready == (len(said) > 3)
+        step()
+        said.append(session.what_next)
+    assert [words.split()[0] for words in said] == ["make", "fit", "mark", "drag", "drag"]
+    assert "fixed" in said[3]
+
+
+def test_listeners_hear_after_the_change_in_their_order_until_they_stop():
+    session = ready()
+    heard = []
+    session.on_change(lambda change: heard.append(("first", change, session.fixed.tolist())))
+    stop = session.on_change(lambda _: heard.append("second"))
+    session.set_fixed([1])
+    assert heard == [("first", Change.CONSTRAINTS | Change.HISTORY, [1]), "second"]
+    stop()
+    stop()
+    session.set_fixed([1])  # nothing new, nothing said
+    session.change_options(stretch=2.0)
+    session.move_handle("tip", up(0.1), max_steps=1)
+    session.commit()
+    session.undo()
+    assert [item[1] for item in heard[2:]] == [
+        Change.OPTIONS | Change.HISTORY,
+        Change.POSE,
+        Change.HISTORY,
+        Change.POSE | Change.HISTORY,
+    ]
+
+
+def test_a_listener_that_raises_harms_neither_the_session_nor_the_others():
+    session = ready()
+    heard = []
+
+    def fail(_):
+        raise RuntimeError("my own fault")
+
+    session.on_change(lambda _: heard.append("before"))
+    session.on_change(fail)
+    session.on_change(lambda _: heard.append("after"))
+    with pytest.raises(RuntimeError, match="my own fault"):
+        session.set_fixed([1])
+    assert heard == ["before", "after"]
+    assert session.fixed.tolist() == [1]
+    with pytest.raises(RuntimeError, match="my own fault"):
+        session.undo()
+    assert_array_equal(session.fixed, SCENE.fixed)
+
+
+def test_a_change_made_by_a_listener_is_told_when_all_have_heard_of_the_first():
+    session = ready()
+    heard = []
+
+    def at_once(change):
+        heard.append(("a", change))
+        if Change.CONSTRAINTS in change:
+            session.change_options(stretch=3.0)
+
+    session.on_change(at_once)
+    session.on_change(lambda change: heard.append(("b", change)))
+    session.set_fixed([1])
+    one, two = Change.CONSTRAINTS | Change.HISTORY, Change.OPTIONS | Change.HISTORY
+    assert heard == [("a", one), ("b", one), ("a", two), ("b", two)]
+
+
+def test_nothing_handed_out_can_be_written_to():
+    session = ready()
+    session.drag(SCENE.turned(10), max_steps=2)
+    arrays = [session.vertices, session.fixed, *session.handles.values()]
+    arrays += [*session.targets.values(), *session.cage_vertices, session.regions.membership]
+    for array in arrays:
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+    with pytest.raises(TypeError):
+        session.handles["x"] = np.arange(3)
+
+
+def test_what_is_handed_in_can_be_written_to_afterwards():
+    session = ready()
+    ids, targets = SCENE.handle[:5].copy(), VERTICES[SCENE.handle[:5]] + [0, 0, 0.1]
+    session.add_handle(ids, "tip")
+    session.drag(targets)
+    before = snapshot(session)
+    ids[:], targets[:] = 0, 0.0
+    assert snapshot(session) == before
+    targets = VERTICES[SCENE.handle[:5]].copy()
+    session.drag({"tip": targets})
+    before = snapshot(session)
+    targets[:] = 0.0
+    assert snapshot(session) == before
+
+
+NEAR = VERTICES[SCENE.handle]
+WRONG = [
+    (lambda s: s.drag({"nose": NEAR}), ConstraintError, "no handle 'nose'; there are 'tip'"),
+    (lambda s: s.drag(NEAR[:-1]), ConstraintError, "targets of all handles must be"),
+    (lambda s: s.drag(NEAR * np.nan), ConstraintError, "NaN or infinite"),
+    (lambda s: s.drag(NEAR + 1e9), ConstraintError, "diagonals of the mesh away"),
+    (lambda s: s.move_handle("tip", np.ones((4, 4))), ConstraintError, "last row"),
+    (lambda s: s.move_handle("tip", up(np.inf)), ConstraintError, "NaN or infinite"),
+    (lambda s: s.set_fixed(SCENE.handle), ConstraintError, "both fixed and handle"),
+    (lambda s: s.add_handle(SCENE.handle[:3]), ConstraintError, "in 'tip' already"),
+    (lambda s: s.add_handle([]), ConstraintError, "one vertex or more"),
+    (lambda s: s.add_handle([0.5]), ConstraintError, "vertex numbers or be a mask"),
+    (lambda s: s.add_handle(np.abs(X) < 0.1, " "), ConstraintError, "printable"),
+    (lambda s: s.rename_handle("tip", "x" * 81), ConstraintError, "80 letters"),
+    (lambda s: s.remove_handle("nose"), ConstraintError, "no handle 'nose'"),
+    (lambda s: s.paint_region(0, X < -2.0, subtract=True), RegionError, "add them to another one"),
+    (lambda s: s.paint_region(3, X < -2.0), RegionError, r"one of 0\.\.1"),
+    (lambda s: s.paint_region(0, [-1]), RegionError, "vertices must index"),
+    (lambda s: s.merge_regions([1]), RegionError, "two regions or more"),
+    (lambda s: s.rename_region(2, "arm"), RegionError, "no region 2 to name; there are 2, from 0"),
+    (lambda s: s.rename_region(0, "x" * 81), RegionError, "may have 80 letters; got 81"),
+    (lambda s: s.rename_region(0, "two\nlines"), RegionError, "printable"),
+    (lambda s: s.rename_region(0, "\u202egnp.exe"), RegionError, "printable"),  # turns what follows
+    (lambda s: s.rename_region(0, "half a \ud83d"), RegionError, "printable"),
+    (lambda s: s.rename_region(0, "region 2"), RegionError, "while it has no name"),
+    (lambda s: s.rename_region(0, None), RegionError, "printable text; got None"),
+    (lambda s: s.split_region(0, X < 9.0), RegionError, "cannot be split: all"),
+    (lambda s: s.set_regions(Regions.single(Mesh(*icosphere(2)))), RegionError, "another mesh"),
+    (lambda s: s.set_cages(SCENE.cages[:1]), CageError, "2 regions need as many cages; got 1"),
+    (lambda s: s.set_cages([Cage(*icosphere(1))] * 2), CageError, "outside the cage"),
+    (lambda s: s.change_options(stretch=-1.0), SessionError, "stretch must be a number from 0 up"),
+    (lambda s: s.change_options(offset=0.0), SessionError, "offset must be a number above 0"),
+    (lambda s: s.change_options(rotation_groups=2.5), SessionError, "a whole number from 1 up"),
+    (lambda s: s.change_options(preserve_volume="no"), SessionError, "True or False"),
+    (lambda s: s.change_options(colour=1), SessionError, "no option colour; there are n_cage"),
+    (lambda s: s.change_options(n_cage_vertices=9) or s.fit_cages(), CageError, "at least 8"),
+    (lambda s: s.drag(NEAR, max_steps=0), ValueError, "max_steps"),
+]
+
+
+@pytest.mark.parametrize(("wrong", "error", "says"), WRONG)
+def test_what_cannot_be_done_says_why_and_changes_nothing(wrong, error, says):
+    session = ready()
+    session.move_handle("tip", up(0.1), max_steps=2)
+    session.commit()
+    before, options = snapshot(session), session.options
+    with pytest.raises(error, match=says):
+        wrong(session)
+    if session.options == options:
+        assert snapshot(session) == before
+    session.move_handle("tip", up(0.1), max_steps=2)
+    assert volume_error(session) < 1e-13
+
+
+def test_without_cages_or_handles_or_regions_it_says_what_is_missing():
+    session = Session(SCENE.mesh)
+    with pytest.raises(RegionError, match="segment or paint"):
+        session.fit_cages()
+    with pytest.raises(CageError, match="make regions first"):
+        session.set_cages(SCENE.cages)
+    with pytest.raises(CageError, match="fit or set cages"):
+        session.bind()
+    with pytest.raises(ConstraintError, match="add one first"):
+        session.drag(NEAR)
+    session.add_handle(SCENE.handle)
+    with pytest.raises(CageError, match="fit or set cages"):
+        session.drag(NEAR)
+
+
+def test_a_state_of_another_mesh_or_against_itself_is_refused():
+    session = ready()
+    session.drag(SCENE.turned(10), max_steps=1)
+    with pytest.raises(RegionError, match="another mesh"):
+        Session(Mesh(*icosphere(3)), state=session.state)
+    state = session.state
+    for bad, error in (
+        (replace(state, cages=()), CageError),
+        (replace(state, handles={}), ConstraintError),
+        (replace(state, region_names=("arm", "arm")), RegionError),
+        (replace(state, region_names=("", "", "arm")), RegionError),
+        (replace(state, fixed=SCENE.handle), ConstraintError),
+        (replace(state, pose=replace(state.pose, targets={"tip": NEAR[1:]})), ConstraintError),
+    ):
+        with pytest.raises(error):
+            Session(SCENE.mesh, state=bad)
+
+
+def test_far_from_the_origin_a_pose_keeps_its_volume():
+    shift = 1e4 * SCENE.mesh.diagonal * np.array([0.6, -0.8, 0.0])
+    scene = SCENE.transformed(shift=shift)
+    session = Session(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.set_fixed(scene.fixed)
+    session.add_handle(scene.handle)
+    for degrees in (10, 20, 30):
+        session.drag(scene.turned(degrees, about=shift), max_steps=3)
+        assert abs(session.volume_change) < 1e-10
+        session.commit()
+
+
+@pytest.mark.parametrize("diagonals", [0.0, 1e5])
+def test_the_volume_change_is_that_of_the_vertices_after_a_drag_and_after_loading(diagonals):
+    shift = diagonals * SCENE.mesh.diagonal * np.array([0.6, -0.64, 0.48])
+    scene = SCENE.transformed(shift=shift)
+    session = Session(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.set_fixed(scene.fixed)
+    session.add_handle(scene.handle)
+    solution = session.drag(scene.turned(40, about=shift))
+    session.commit()
+    loaded = Session(scene.mesh, state=session.state)
+    assert loaded.solution is None
+    for told, x in (
+        (solution.volume_change, solution.vertices),
+        (session.volume_change, session.vertices),
+        (loaded.volume_change, loaded.vertices),
+    ):
+        true = exact_volume_change(scene.mesh.vertices, x, scene.mesh.faces)
+        print(f"{diagonals:g} diagonals away: {told:.2e}, truly {true:.2e}")
+        assert abs(told - true) < 1e-14
+    shares = RegionVolumes(session).changes()
+    assert shares == list(enumerate(solution.region_volume_change))
+    assert_allclose(dict(RegionVolumes(loaded).changes())[0], shares[0][1], rtol=1e-12)
+
+
+ODD = [
+    "左腕",
+    "\N{WOMAN}\N{ZERO WIDTH JOINER}\N{MICROSCOPE}",
+    "ذراع",
+    "a\N{COMBINING DIAERESIS}",
+    "$x$ | %s <b>",
+]
+
+
+def test_regions_are_called_by_their_place_until_they_have_a_name():
+    session = Session(SCENE.mesh)
+    assert session.region_names == ()
+    session.set_regions(SCENE.regions)
+    assert session.region_names == ("region 1", "region 2")
+    assert session.region_name(2) == "region 3"  # that of one still to come
+    news = []
+    session.on_change(news.append)
+    for name in ODD:
+        session.rename_region(1, f"  {name} ")
+        assert session.region_names == ("region 1", name)
+        assert news[-1] == Change.NAMES | Change.HISTORY
+    with pytest.raises(RegionError, match="already"):
+        session.rename_region(0, ODD[-1])
+    session.rename_region(1, ODD[-1])  # no other name: no step
+    assert session.undo() == f"rename {ODD[-2]}"
+    assert session.region_names == ("region 1", ODD[-2])
+    session.rename_region(1, "")
+    assert session.region_names == ("region 1", "region 2")
+    session.rename_region(1, "arm")
+    session.rename_region(1, "region 2")  # what it would be called anyway is no name
+    session.merge_regions([0, 1])
+    assert session.region_names == ("region 1",)
+
+
+def test_a_name_goes_with_its_region_and_with_what_becomes_of_it():
+    scene = sausage(4)
+    session = Session(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.rename_region(1, "arm")
+    session.rename_region(3, "leg")
+    assert len(session.cages) == 4  # a name changes nothing else
+    masks = session.regions.membership
+    whole = dict(zip(session.region_names, masks, strict=True))
+
+    def mask(name):
+        return session.regions.membership[session.region_names.index(name)]
+
+    session.split_region(1)
+    assert session.region_names == ("region 1", "arm", "region 3", "leg", "arm 2")
+    assert_array_equal(mask("arm") | mask("arm 2"), whole["arm"])
+    assert_array_equal(mask("leg"), whole["leg"])
+    session.split_region(4)
+    assert session.region_names[5] == "arm 3"
+    session.merge_regions([0, 5, 4, 1])  # the first that has a name gives it
+    assert session.region_names == ("arm", "region 2", "leg")
+    assert_array_equal(mask("arm"), whole["arm"] | whole["region 1"])
+    session.split_region(1)
+    assert session.region_names == ("arm", "region 2", "leg", "region 4")
+    session.paint_region(4, scene.mesh.vertices[:, 0] > 2.0)
+    assert session.region_names[2:] == ("leg", "region 4", "region 5")
+    for _ in range(5):
+        session.undo()
+    assert session.region_names == ("region 1", "arm", "region 3", "leg")
+    session.segment(2)  # other regions
+    assert session.region_names == ("region 1", "region 2")
+
+
+def test_errors_and_steps_call_a_region_by_its_name():
+    session = ready()
+    session.rename_region(0, "tail")
+    with pytest.raises(RegionError, match="in no region but tail; add"):
+        session.paint_region(0, X < -2.0, subtract=True)
+    with pytest.raises(RegionError, match="tail cannot be split"):
+        session.split_region(0, X < 9.0)
+    with pytest.raises(CageError, match=r"tail .*outside the cage"):
+        session.set_cages([Cage(*icosphere(1))] * 2)
+    session.split_region(0)
+    assert session.undo_label == "split tail"
+
+
+def test_effort_counts_every_step_of_the_solver_and_nothing_else():
+    session = ready()
+    steps = [session.move_handle("tip", up(z), max_steps=2).steps for z in (0.1, 0.2)]
+    session.commit()
+    steps.append(session.refine(max_steps=3).steps)
+    session.undo()
+    session.move_cage(0, session.cage_vertices[0] + [0.0, 0.0, 0.01])
+    assert session.effort.steps == sum(steps) > 0
+    assert session.effort.seconds > 0.0
+
+
+def test_halves_of_a_region_are_connected_overlap_and_cover_it():
+    session = Session(SCENE.mesh)
+    session.set_regions(Regions.single(SCENE.mesh))
+    session.split_region(0)
+    session.split_region(1, overlap=1)
+    membership = session.regions.membership
+    assert membership.any(axis=0).all()
+    for a, b in itertools.pairwise(sorted(membership, key=lambda row: X[row].mean())):
+        assert (a & b).any()
+        assert X[a].mean() < X[b].mean()
+    for row in membership:
+        faces = SCENE.mesh.faces
+        inside = faces[row[faces].all(axis=1)]
+        reached = np.zeros(len(X), dtype=bool)
+        reached[inside[0]] = True
+        for _ in range(100):
+            touched = inside[reached[inside].any(axis=1)]
+            reached[touched] = True
+        assert reached[row].mean() > 0.98
+    session.merge_regions([2, 0, 1])
+    assert session.regions.n_regions == 1
+    assert session.regions.membership.all()
+
+
+def test_letting_the_volume_go_binds_nothing_anew_and_it_comes_back_exactly():
+    session = ready()
+    session.move_handle("tip", up(0.5))
+    assert volume_error(session) < 1e-12
+    session.change_options(preserve_volume=False)
+    assert session.is_bound
+    session.move_handle("tip", up(0.6))
+    assert volume_error(session) > 1e-4
+    session.change_options(preserve_volume=True)
+    assert session.is_bound
+    session.move_handle("tip", up(0.1))
+    assert volume_error(session) < 1e-12

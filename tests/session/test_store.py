@@ -1,0 +1,465 @@
+"""A session in a file: the same again bit for bit, and nothing but an error from a damaged one."""
+
+from __future__ import annotations
+
+import errno
+import io
+import json
+import os
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from scenes import sausage
+from solids import OCTAHEDRON, TETRAHEDRON
+
+from vtk_segdeform.cages.cage import Cage
+from vtk_segdeform.errors import ArgumentError, SegDeformError, SessionError
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.regions.regions import Regions
+from vtk_segdeform.session.session import Session
+from vtk_segdeform.session.state import Options, State
+from vtk_segdeform.session.store import load_session, save_session
+
+ROOT = Path(__file__).resolve().parents[2]
+SCENE = sausage(2)
+
+
+def posed() -> Session:
+    """Return a session with something of everything."""
+    options = Options(n_cage_vertices=77, offset=0.25, stretch=2.5, rotation_groups=None)
+    session = Session(SCENE.mesh, state=State(options=options))
+    session.set_regions(Regions(SCENE.mesh, SCENE.regions.membership, smoothness=1.5))
+    session.set_cages(SCENE.cages)
+    session.rename_region(1, "左腕 \N{WOMAN}\N{ZERO WIDTH JOINER}\N{MICROSCOPE}")
+    session.set_fixed(SCENE.fixed[::-1])
+    session.add_handle(SCENE.handle, "the tip · 1")
+    session.add_handle(np.abs(SCENE.mesh.vertices[:, 0]) < 0.1)
+    session.move_handle("the tip · 1", np.diag([1.0, 0.9, 1.1, 1.0]), max_steps=3)
+    session.commit()
+    return session
+
+
+def tiny(pose: bool = True) -> Session:
+    """Return a session of six vertices, so that a file of it can be broken in every place."""
+    session = Session(Mesh(*OCTAHEDRON))
+    session.set_regions(Regions.single(session.mesh))
+    session.set_cages([Cage(4.0 * TETRAHEDRON[0], TETRAHEDRON[1])])
+    session.set_fixed([1])
+    session.add_handle([0], "h")
+    if pose:
+        session.drag(session.targets["h"] + [0.2, 0.1, 0.0], max_steps=2)
+    return session
+
+
+POSED = posed()
+TINY = tiny()
+
+
+def same(a: Session, b: Session) -> bool:
+    """Tell whether two sessions cannot be told apart."""
+    one, other = a.state, b.state
+    arrays = [(a.mesh.vertices, b.mesh.vertices), (a.mesh.faces, b.mesh.faces)]
+    arrays += [(a.vertices, b.vertices), (one.fixed, other.fixed)]
+    arrays += [(one.regions.membership, other.regions.membership)]
+    arrays += [(p.vertices, q.vertices) for p, q in zip(one.cages, other.cages, strict=True)]
+    arrays += [(p.faces, q.faces) for p, q in zip(one.cages, other.cages, strict=True)]
+    arrays += list(zip(a.cage_vertices, b.cage_vertices, strict=True))
+    arrays += [(one.handles[name], other.handles.get(name)) for name in one.handles]
+    arrays += [(a.targets[name], b.targets.get(name)) for name in one.handles]
+    return (
+        all(np.array_equal(p, q) for p, q in arrays)
+        and list(one.handles) == list(other.handles)
+        and (one.pose is None) == (other.pose is None)
+        and one.options == other.options
+        and a.region_names == b.region_names
+        and one.regions.smoothness == other.regions.smoothness
+    )
+
+
+def saved(session: Session, folder: Path) -> bytes:
+    save_session(folder / "saved.npz", session)
+    return (folder / "saved.npz").read_bytes()
+
+
+@pytest.mark.parametrize("session", [POSED, tiny(pose=False), TINY], ids=["all", "rest", "tiny"])
+def test_what_is_loaded_is_what_was_saved(session, tmp_path):
+    content = saved(session, tmp_path)
+    loaded = load_session(tmp_path / "saved.npz")
+    assert same(session, loaded)
+    assert not loaded.can_undo
+    save_session(str(tmp_path / "again"), loaded)
+    assert (tmp_path / "again").read_bytes() == content
+    assert sorted(os.listdir(tmp_path)) == ["again", "saved.npz"]
+
+
+def test_a_session_with_nothing_in_it_is_saved_too(tmp_path):
+    saved(Session(SCENE.mesh), tmp_path)
+    loaded = load_session(tmp_path / "saved.npz")
+    assert loaded.regions is None
+    assert loaded.state.pose is None
+    assert_array_equal(loaded.vertices, SCENE.mesh.vertices)
+
+
+def test_another_process_loads_the_same_pose_bit_for_bit(tmp_path):
+    saved(POSED, tmp_path)
+    program = (
+        "import sys; from vtk_segdeform.session.store import load_session;"
+        "sys.stdout.buffer.write(load_session(sys.argv[1]).vertices.tobytes())"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", program, str(tmp_path / "saved.npz")],
+        cwd=ROOT,
+        capture_output=True,
+        check=True,
+    )
+    assert answer.stdout == POSED.vertices.tobytes()
+
+
+def test_a_loaded_session_goes_on_as_the_saved_one_would(tmp_path):
+    session = posed()
+    saved(session, tmp_path)
+    loaded = load_session(tmp_path / "saved.npz")
+    for each in (session, loaded):
+        each.undo()
+        each.move_handle("handle 1", np.diag([1.0, 1.0, 1.1, 1.0]), max_steps=2)
+        assert abs(each.volume_change) < 1e-13
+    assert loaded.undo() == "drag handle 1"
+    assert same(loaded, POSED)
+
+
+def test_a_file_without_names_as_older_programs_wrote_it_is_read_as_before(tmp_path):
+    content = saved(POSED, tmp_path)
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        header = json.loads(archive.read("header.json"))
+    assert header.pop("region_names") == ["", POSED.region_names[1]]
+    assert header["version"] == 1  # older programs read files with names, too
+    nameless = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(nameless, "w") as new:
+        for name in old.namelist():
+            new.writestr(name, json.dumps(header) if name == "header.json" else old.read(name))
+    (tmp_path / "old.npz").write_bytes(nameless.getvalue())
+    loaded = load_session(tmp_path / "old.npz")
+    assert loaded.region_names == ("region 1", "region 2")
+    loaded.rename_region(1, POSED.region_names[1])
+    assert same(loaded, POSED)
+
+
+def test_numpy_alone_can_read_the_arrays(tmp_path):
+    saved(POSED, tmp_path)
+    with np.load(tmp_path / "saved.npz", allow_pickle=False) as arrays:
+        assert_array_equal(arrays["mesh_vertices"], SCENE.mesh.vertices)
+        assert arrays["membership"].dtype == bool
+        assert json.loads(arrays["header.json"])["version"] == 1
+
+
+@pytest.mark.parametrize("call", ["replace", "fsync"])
+def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(call, tmp_path, monkeypatch):
+    before = saved(TINY, tmp_path)
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, call, full)
+    with pytest.raises(SessionError, match=r"saved\.npz: cannot be written \(No space left"):
+        save_session(tmp_path / "saved.npz", POSED)
+    assert (tmp_path / "saved.npz").read_bytes() == before
+    assert os.listdir(tmp_path) == ["saved.npz"]
+
+
+@pytest.mark.parametrize("fault", [OSError(errno.ENOSPC, "full"), KeyboardInterrupt()])
+def test_a_write_that_stops_half_way_leaves_the_old_file(fault, tmp_path, monkeypatch):
+    before = saved(TINY, tmp_path)
+    written = []
+
+    def stop(_, name, *__):
+        written.append(name)
+        if len(written) > 3:
+            raise fault
+
+    monkeypatch.setattr(zipfile.ZipFile, "writestr", stop)
+    with pytest.raises((SessionError, KeyboardInterrupt)):
+        save_session(tmp_path / "saved.npz", POSED)
+    assert (tmp_path / "saved.npz").read_bytes() == before
+    assert os.listdir(tmp_path) == ["saved.npz"]
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is full")
+def test_a_full_disk_is_told_and_nothing_is_left(tmp_path, monkeypatch):
+    def on_full_disk(path, mode):
+        Path(path).touch()
+        return real("/dev/full", mode.replace("x", "w"))
+
+    real = open
+    monkeypatch.setattr("builtins.open", on_full_disk)
+    with pytest.raises(SessionError, match="No space left on device"):
+        save_session(tmp_path / "saved.npz", POSED)
+    assert os.listdir(tmp_path) == []
+
+
+def test_no_such_folder_is_told(tmp_path):
+    with pytest.raises(SessionError, match="cannot be written"):
+        save_session(tmp_path / "nowhere" / "a.npz", TINY)
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="modes and links of files")
+def test_a_replaced_file_keeps_its_mode_and_a_link_stays_a_link(tmp_path):
+    saved(TINY, tmp_path)
+    (tmp_path / "saved.npz").chmod(0o640)
+    (tmp_path / "link").symlink_to("saved.npz")
+    save_session(tmp_path / "link", POSED)
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "saved.npz").stat().st_mode & 0o777 == 0o640
+    assert same(load_session(tmp_path / "saved.npz"), POSED)
+
+
+def refuse(content: bytes, folder: Path) -> str:
+    """Return what is said of a file with *content*, which must be refused."""
+    (folder / "broken.npz").write_bytes(content)
+    with pytest.raises(SegDeformError, match=r"broken\.npz: is no readable session") as caught:
+        load_session(folder / "broken.npz")
+    return str(caught.value)
+
+
+def test_a_truncated_file_is_refused_at_every_length(tmp_path):
+    for content in (saved(TINY, tmp_path), saved(POSED, tmp_path)):
+        for length in np.linspace(0, len(content) - 1, 60).astype(int):
+            refuse(content[:length], tmp_path)
+
+
+def test_a_flipped_bit_is_an_error_or_makes_no_difference(tmp_path):
+    content = saved(TINY, tmp_path)
+    rng = np.random.default_rng(1)
+    refused = 0
+    for place in rng.choice(len(content), 500, replace=False):
+        broken = bytearray(content)
+        broken[place] ^= 1 << rng.integers(8)
+        (tmp_path / "broken.npz").write_bytes(broken)
+        try:
+            loaded = load_session(tmp_path / "broken.npz")
+        except SessionError:
+            refused += 1
+        else:
+            assert same(loaded, TINY)
+    assert refused > 300
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"PK", b"PK\x05\x06" + bytes(18), b"solid x\n" * 99, bytes(range(256)) * 40]
+)
+def test_a_file_of_another_kind_is_refused(content, tmp_path):
+    refuse(content, tmp_path)
+
+
+def test_other_archives_missing_files_and_folders_are_refused(tmp_path):
+    np.savez(tmp_path / "arrays.npz", a=np.arange(3))
+    with pytest.raises(SessionError, match=r"arrays\.npz: .*header\.json is missing"):
+        load_session(tmp_path / "arrays.npz")
+    with pytest.raises(SessionError, match="there is no such file"):
+        load_session(tmp_path / "none.npz")
+    with pytest.raises(SessionError, match="is a folder, not a file"):
+        load_session(tmp_path)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no named pipes in folders here")
+def test_what_is_no_file_is_never_replaced(tmp_path):
+    pipe, folder = tmp_path / "pipe", tmp_path / "folder"
+    os.mkfifo(pipe)
+    folder.mkdir()
+    for path, kind in ((pipe, "a device or a pipe"), (folder, "a folder")):
+        with pytest.raises(SessionError, match=f"is {kind}, not a file"):
+            save_session(path, TINY)
+    assert pipe.is_fifo()
+    assert sorted(tmp_path.iterdir()) == [folder, pipe]
+
+
+@pytest.mark.parametrize("name", ["x" * 300, "a\0b"])
+def test_an_impossible_name_is_told(name, tmp_path):
+    with pytest.raises((SessionError, ArgumentError)):
+        save_session(tmp_path / name, TINY)
+
+
+def rewritten(content: bytes, *, compress: bool = False, **changes) -> bytes:
+    """Return the archive with some members as they are in *changes*; header ones as a dict."""
+    written = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(written, "w") as new:
+        for name in old.namelist():
+            data = old.read(name)
+            stem = name.partition(".")[0]
+            if stem == "header":
+                data = json.dumps({**json.loads(data), **changes.get("header", {})}).encode()
+            elif stem in changes:
+                buffer = io.BytesIO()
+                np.save(buffer, changes[stem], allow_pickle=True)
+                data = buffer.getvalue()
+            kind = zipfile.ZIP_DEFLATED if compress else zipfile.ZIP_STORED
+            new.writestr(name, data, kind)
+    return written.getvalue()
+
+
+HUGE = 1 << 61
+WRONG = [
+    ({"header": {"version": 2}}, "it has version 2, newer than 1; update vtk_segdeform"),
+    ({"header": {"version": 0}}, "never was a version 0"),
+    ({"header": {"version": "1"}}, "version must be a whole number"),
+    ({"header": {"format": "something else"}}, "does not say that it is"),
+    ({"header": {"n_vertices": HUGE}}, "mesh_vertices must be float64 of shape"),
+    ({"header": {"n_vertices": 10**30}}, "mesh_vertices must be float64 of shape"),
+    ({"header": {"n_vertices": -6}}, "n_vertices must be a whole number"),
+    ({"header": {"n_regions": 10**12}}, "membership must be bool of shape"),
+    ({"header": {"cages": [[HUGE, HUGE]]}}, "cage_vertices must be"),
+    ({"header": {"cages": [[2, 4], [2, 0]]}}, "faces must index 0..1"),
+    ({"header": {"cages": [4, 4]}}, "cannot unpack"),
+    ({"header": {"cages": {}}}, "cages must be a list"),
+    ({"header": {"handles": [["h", 2]]}}, "handle must be int64 of shape"),
+    ({"header": {"handles": [["h", 1], ["h", 0]]}}, "two handles have the same name"),
+    ({"header": {"handles": [["h", 1], ["i", 0]]}}, "each handle must have a vertex"),
+    ({"header": {"smoothness": "much"}}, "smoothness must be a number"),
+    ({"header": {"smoothness": -1}}, "smoothness must be a number above 0"),
+    ({"header": {"options": {"stretch": -1.0}}}, "stretch must be a number from 0 up"),
+    ({"header": {"options": {"colour": 1}}}, "colour"),
+    ({"header": {"options": 3}}, "mapping"),
+    ({"mesh_vertices": np.full((6, 3), np.nan)}, "NaN|non-finite|not finite"),
+    ({"mesh_vertices": OCTAHEDRON[0].astype(np.float32)}, "must be float64 of shape"),
+    ({"mesh_vertices": np.array([[None] * 3] * 6)}, "must be float64 of shape"),
+    ({"mesh_faces": OCTAHEDRON[1] + 1}, "does not exist"),
+    ({"mesh_faces": OCTAHEDRON[1][:, ::-1]}, "outward"),
+    ({"membership": np.zeros((1, 6), bool)}, "hold no vertex"),
+    ({"membership": np.full((1, 6), 7, np.uint8).view(bool)}, "neither true nor false"),
+    ({"cage_vertices": 0.1 * TETRAHEDRON[0]}, "outside the cage"),
+    ({"fixed": np.array([99])}, "fixed must index"),
+    ({"fixed": np.array([0])}, "both fixed and handle"),
+    ({"pose": np.full((4, 3), np.inf)}, "NaN or infinite"),
+    ({"pose": np.full((4, 3), 1e300)}, "the pose reaches .* is damaged"),
+    ({"targets": np.full((1, 3), 1e9)}, "is damaged"),
+    ({"header": {"region_names": "arm"}}, "region_names must be a list"),
+    ({"header": {"region_names": ["arm", "leg"]}}, "2 names for 1 regions"),
+    ({"header": {"region_names": [7]}}, "name must be printable text; got 7"),
+    ({"header": {"region_names": ["a\0b"]}}, "name must be printable text"),
+    ({"header": {"region_names": ["a" * 81]}}, "80 letters"),
+    ({"header": {"region_names": ["region 2"]}}, "while it has no name"),
+    ({"header": {"posed": "yes"}}, "posed must be true or false"),
+    ({"targets": np.zeros((2, 3))}, "targets must be"),
+    ({"compress": True}, "header.json is compressed"),
+]
+
+
+@pytest.mark.parametrize(("change", "says"), WRONG)
+def test_a_file_that_was_tampered_with_is_refused_and_the_fault_named(change, says, tmp_path):
+    content = rewritten(saved(TINY, tmp_path), **change)
+    assert re.search(says, refuse(content, tmp_path))
+
+
+def test_arrays_in_another_order_of_bytes_are_refused_and_of_axes_understood(tmp_path):
+    content = saved(TINY, tmp_path)
+    columns = np.asfortranarray(OCTAHEDRON[0])
+    (tmp_path / "a.npz").write_bytes(rewritten(content, mesh_vertices=columns))
+    assert same(load_session(tmp_path / "a.npz"), TINY)
+    swapped = OCTAHEDRON[0].astype(">f8")
+    assert "must be float64" in refuse(rewritten(content, mesh_vertices=swapped), tmp_path)
+
+
+def test_a_pickle_in_a_file_is_never_run(tmp_path):
+    class Trap:
+        def __reduce__(self):
+            return os.mkdir, (str(tmp_path / "trapped"),)
+
+    trap = np.array([[Trap()] * 3] * 6, dtype=object)
+    refuse(rewritten(saved(TINY, tmp_path), mesh_vertices=trap), tmp_path)
+    assert not (tmp_path / "trapped").exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="forks")
+def test_a_file_that_is_being_saved_is_read_as_the_old_or_the_new_one(tmp_path):
+    path = tmp_path / "saved.npz"
+    save_session(path, TINY)
+    writer = subprocess.Popen([sys.executable, "-c", _SAVER, path], stdout=subprocess.PIPE)
+    try:
+        writer.stdout.readline()  # it has begun
+        sizes = {load_session(path).mesh.n_vertices for _ in range(300)}
+    finally:
+        writer.kill()
+        writer.communicate()
+    assert sizes == {4, 642}  # or nothing was tested
+
+
+_SAVER = """
+import itertools, sys
+import vtk_segdeform as sd
+vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+tiny = sd.Session(sd.Mesh(vertices, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+sessions = tiny, sd.Session(sd.models.sphere(642))
+sd.save_session(sys.argv[1], tiny)
+print("begun", flush=True)
+for turn in itertools.count():
+    sd.save_session(sys.argv[1], sessions[turn % 2])
+"""
+
+
+def test_the_size_is_that_of_the_open_file(tmp_path, monkeypatch):
+    path, other = tmp_path / "saved.npz", tmp_path / "other.npz"
+    save_session(path, POSED)
+    save_session(other, TINY)
+    real = zipfile.ZipFile
+
+    def exchanged(file, *options):
+        if other.exists():
+            os.replace(other, path)  # another process saves at this moment
+        return real(file, *options)
+
+    monkeypatch.setattr(zipfile, "ZipFile", exchanged)
+    assert same(load_session(path), POSED)
+
+
+def sparse(path, size, n):
+    """Write a session of *n* vertices whose arrays are a hole of *size* bytes in a sparse file."""
+    save_session(path, TINY)
+    with zipfile.ZipFile(path) as archive:
+        header = json.loads(archive.read("header.json"))
+    header |= {"n_vertices": n}
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("header.json", json.dumps(header))
+    head = path.read_bytes()
+    with open(path, "wb") as file:
+        file.truncate(size)
+        file.seek(size - len(head))
+        file.write(head)
+
+
+@pytest.mark.parametrize("size", [45_000_000_000, 2_200_000_000])
+def test_a_sparse_file_of_gigabytes_is_refused_before_it_is_read(tmp_path, monkeypatch, size):
+    sparse(tmp_path / "saved.npz", size, size // 48)
+    monkeypatch.setattr(zipfile, "ZipFile", None)
+    with pytest.raises(SessionError, match=r"saved\.npz: .*it has .*e\+\d\d bytes; the limit is"):
+        load_session(tmp_path / "saved.npz")
+
+
+def test_an_archive_of_very_many_members_is_refused_before_they_are_listed(tmp_path, monkeypatch):
+    path = tmp_path / "saved.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        for number in range(1500):
+            archive.writestr(f"{number:050d}", b"")
+    monkeypatch.setattr(zipfile, "ZipFile", None)
+    with pytest.raises(SessionError, match=r"saved\.npz: .*the directory of the archive"):
+        load_session(path)
+
+
+def test_a_session_too_large_to_read_is_not_written(tmp_path, monkeypatch):
+    monkeypatch.setattr("vtk_segdeform.session.archive._LARGEST", (1 << 20) + 1000)
+    with pytest.raises(SessionError, match=r"saved\.npz: cannot be written \(.* bytes exceed"):
+        save_session(tmp_path / "saved.npz", POSED)
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no named pipes in folders here")
+def test_a_pipe_or_a_device_is_refused_without_blocking(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", "/dev/zero"):
+        with pytest.raises(SessionError, match="a device or a pipe"):
+            load_session(path)

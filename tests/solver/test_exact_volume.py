@@ -1,0 +1,137 @@
+"""The last operation of a solve: the mesh itself on its own volume, by a step or by its size."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scenes import sausage
+from solids import icosphere, rotation
+
+from vtk_segdeform.deformer import deformer as chapter
+from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.solver import coarse_volume, exact_volume
+from vtk_segdeform.solver.exact_volume import scaled
+from vtk_segdeform.solver.solution import Status
+from vtk_segdeform.solver.volume_constraints import total_volume
+from vtk_segdeform.subspace.device import DeviceError, DeviceSurface
+
+SCENE = sausage()
+TARGETS = SCENE.turned(40)
+
+
+@pytest.fixture
+def wide(monkeypatch):
+    """Small meshes are landed as large ones are."""
+    monkeypatch.setattr(coarse_volume, "_LARGE", 1000)
+    monkeypatch.setattr(coarse_volume, "_POINTS", 700)
+    monkeypatch.setattr(chapter, "_WIDE", 1000)
+
+
+@pytest.mark.parametrize("missing", [-0.3, -1e-5, 1e-9, 0.4])
+def test_scaling_restores_the_volume_and_leaves_the_centre_where_it_was(missing):
+    points, faces = icosphere(3)
+    points = points * [2.0, 1.0, 0.5] + [5.0, -3.0, 1.0]
+    constraint = total_volume(Mesh(points, faces))
+    x = points + 0.0
+    x[:, 2] *= 1.0 + missing
+    before, centre = x.copy(), x[7].copy()
+    scale = scaled(constraint, x, centre)
+    assert signed_volume(x, faces) / constraint.target == pytest.approx(1.0, abs=1e-14)
+    assert scale**3 == pytest.approx(1.0 / (1.0 + missing), rel=1e-12)
+    assert_allclose(x[7], centre, atol=1e-14)
+    assert_allclose(x, centre + scale * (before - centre), atol=1e-13)
+
+
+def test_a_surface_turned_inside_out_is_left_alone():
+    points, faces = icosphere(2)
+    constraint = total_volume(Mesh(points, faces))
+    mirrored = points * [1.0, 1.0, -1.0]
+    x = mirrored.copy()
+    assert scaled(constraint, x, np.zeros(3)) == 1.0
+    assert_array_equal(x, mirrored)
+
+
+@pytest.mark.usefixtures("wide")
+def test_a_large_mesh_is_landed_by_its_size_and_its_cages_with_it():
+    deformer = SCENE.deformer()
+    solution = deformer.solve(TARGETS)
+    assert solution.status is Status.CONVERGED
+    assert abs(solution.volume_change) < 1e-14
+    assert_allclose(deformer.surface(solution.cage_vertices), solution.vertices, atol=1e-13)
+    assert deformer._ladder.solver.volumes.constraints[0].target != pytest.approx(
+        deformer._volumes.constraints[0].target, rel=1e-9
+    )  # held is what the stand-in has where the mesh has its own
+
+
+@pytest.mark.usefixtures("wide")
+def test_the_pose_does_not_depend_on_the_way_there():
+    direct = SCENE.deformer().solve(TARGETS)
+    deformer = SCENE.deformer()
+    for degrees in (-30.0, 10.0, 60.0, 50.0):
+        assert abs(deformer.solve(SCENE.turned(degrees), max_steps=2).volume_change) < 1e-13
+    there = deformer.solve(TARGETS)
+    deformer.resume(there.cage_vertices, TARGETS)
+    resumed = deformer.solve(TARGETS)
+    for other in (there, resumed):
+        away = np.linalg.norm(other.vertices - direct.vertices, axis=1).max()
+        assert away < 1e-4 * SCENE.mesh.diagonal
+    deformer.reset()
+    assert_array_equal(deformer.solve(TARGETS).vertices, direct.vertices)
+
+
+@pytest.mark.usefixtures("wide")
+def test_its_pose_is_that_of_the_whole(monkeypatch):
+    by_size = SCENE.deformer().solve(TARGETS)
+    monkeypatch.setattr(coarse_volume, "_LARGE", 10**9)
+    whole = SCENE.deformer().solve(TARGETS)
+    away = np.linalg.norm(by_size.vertices - whole.vertices, axis=1).max()
+    assert away < 3e-3 * SCENE.mesh.diagonal
+
+
+@pytest.mark.usefixtures("wide")
+def test_a_turned_and_shifted_scene_is_landed_alike():
+    turn, shift = rotation([1.0, 2.0, 3.0], 1.1), np.array([300.0, -20.0, 7.0])
+    here = SCENE.deformer().solve(TARGETS)
+    there = SCENE.transformed(turn, 0.5, shift).deformer().solve(0.5 * TARGETS @ turn.T + shift)
+    assert abs(there.volume_change) < 1e-13
+    assert_allclose(there.vertices, 0.5 * here.vertices @ turn.T + shift, atol=1e-7)
+
+
+@pytest.mark.usefixtures("wide")
+def test_volumes_of_regions_are_still_landed_one_by_one():
+    solution = SCENE.deformer(preserve_region_volumes=True).solve(TARGETS)
+    assert np.abs(solution.region_volume_change).max() < 1e-12
+
+
+@pytest.mark.usefixtures("wide")
+def test_a_gpu_lands_a_mesh_where_the_processor_does(monkeypatch):
+    here = SCENE.deformer().solve(TARGETS)
+    monkeypatch.setattr(exact_volume, "gpu_arrays", lambda: np)  # the lines that a GPU runs
+    used = []
+    monkeypatch.setattr(
+        DeviceSurface,
+        "map",
+        lambda *given, plain=DeviceSurface.map: used.append(1) or plain(*given),
+    )
+    there = SCENE.deformer().solve(TARGETS)
+    assert used
+    assert_allclose(there.vertices, here.vertices, rtol=0, atol=1e-12)
+    assert abs(there.volume_change) < 1e-14
+
+
+@pytest.mark.usefixtures("wide")
+@pytest.mark.parametrize("when", ["__init__", "map", "scaled", "host"])
+def test_a_gpu_that_fails_is_gone_on_without(monkeypatch, when):
+    here = SCENE.deformer().solve(TARGETS)
+    monkeypatch.setattr(exact_volume, "gpu_arrays", lambda: np)
+
+    def failing(*_):
+        raise DeviceError("out of memory")
+
+    monkeypatch.setattr(DeviceSurface, when, failing)
+    deformer = SCENE.deformer()
+    there = deformer.solve(TARGETS)
+    assert_array_equal(there.vertices, here.vertices)
+    assert deformer._large._device is None

@@ -1,0 +1,283 @@
+"""What a GPU would do, done by its own lines over numpy, torch and whatever GPU there is.
+
+Without a GPU the lines are the same and the library is another: numpy always, torch on the
+processor where it is installed.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tracemalloc
+import types
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scenes import sausage
+from solids import CUBE, TETRAHEDRON, icosphere, rotation, torus
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkFiltersCore import vtkTriangleMeshPointNormals
+
+from vtk_segdeform import models
+from vtk_segdeform.geometry.volume import signed_volume, volume_gradient
+from vtk_segdeform.io.polygons import polydata_of
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.solver import exact_volume
+from vtk_segdeform.solver.volume_constraints import total_volume
+from vtk_segdeform.subspace import device, gpu, products
+from vtk_segdeform.subspace.device import DeviceError, DeviceSurface
+from vtk_segdeform.subspace.gpu import TorchArrays, gpu_arrays
+from vtk_segdeform.subspace.subspace import Subspace, bind
+
+ROOT = Path(__file__).resolve().parents[2]
+SCENE = sausage()
+SUBSPACE = bind(SCENE.regions, SCENE.cages)
+SINGLE = replace(SUBSPACE, blocks=tuple(b.astype(np.float32) for b in SUBSPACE.blocks))
+MOVES = 0.3 * np.random.default_rng(4).normal(size=(SUBSPACE.n_columns, 3))
+BEAD = icosphere(3)
+RING = torus(36, 24)
+CACTUS = models.cactus(900)
+
+
+@pytest.fixture(params=["numpy", "torch", "gpu"])
+def arrays(request, monkeypatch):
+    """Return each library in turn; meshes come in many pieces, as large ones do."""
+    monkeypatch.setattr(device, "_FACES", 1000)
+    monkeypatch.setattr(products, "_DENSE", 5000)
+    if request.param == "numpy":
+        return np
+    if request.param == "torch":
+        return TorchArrays(pytest.importorskip("torch"), "cpu")
+    return gpu_arrays() or pytest.skip("no GPU here")
+
+
+def still(points, faces, arrays) -> DeviceSurface:
+    """Return a surface without cages."""
+    return DeviceSurface(Subspace(len(points), (), ()), points, faces, arrays)
+
+
+def normals_of(points, faces, arrays):
+    surface = still(points, faces, arrays)
+    return surface.host(surface.normals(arrays.asarray(points)))
+
+
+@pytest.mark.parametrize("subspace", [SUBSPACE, SINGLE], ids=["double", "single"])
+def test_the_map_is_that_of_the_subspace(arrays, subspace):
+    rest = SCENE.mesh.vertices
+    surface = DeviceSurface(subspace, rest, SCENE.mesh.faces, arrays)
+    for moves in (MOVES, 0.0 * MOVES, -MOVES):  # nothing is left of the last
+        assert_allclose(
+            surface.host(surface.map(moves)), subspace.map(moves, rest.copy()), rtol=0, atol=1e-14
+        )
+
+
+def test_nothing_moved_is_the_rest_to_the_last_digit(arrays):
+    surface = DeviceSurface(SINGLE, SCENE.mesh.vertices, SCENE.mesh.faces, arrays)
+    assert_array_equal(surface.host(surface.map(0.0 * MOVES)), SCENE.mesh.vertices)
+
+
+def test_known_solids_have_their_known_volumes(arrays):
+    for (points, faces), volume in ((CUBE, 1.0), (TETRAHEDRON, 8.0 / 3.0)):
+        points, faces = np.array(points, dtype=float), np.array(faces)
+        x = arrays.asarray(points)
+        assert still(points, faces, arrays).volume(x) == pytest.approx(volume, rel=1e-15)
+
+
+@pytest.mark.parametrize("far", [0.0, 1e4])
+def test_the_volume_is_as_exact_as_ever_and_the_same_every_time(arrays, far):
+    points, faces = RING[0] + far, RING[1]
+    surface, x = still(points, faces, arrays), arrays.asarray(points)
+    volume = surface.volume(x)
+    assert volume == pytest.approx(signed_volume(points, faces), rel=1e-14)
+    assert all(surface.volume(x) == volume for _ in range(5))
+    # On a wire 400 times as long as thick, products of its corners would cost three digits.
+    wire = points * [400.0, 1.0, 1.0]
+    assert surface.volume(arrays.asarray(wire)) == pytest.approx(
+        signed_volume(wire, faces), rel=1e-14
+    )
+
+
+def test_a_frame_ends_on_the_volume_of_the_rest(arrays):
+    rest, faces = SCENE.mesh.vertices, SCENE.mesh.faces
+    constraint = total_volume(SCENE.mesh)
+    surface = DeviceSurface(SINGLE, rest, faces, arrays)
+    x = surface.map(MOVES)
+    centre = np.array([0.3, -2.0, 1.0])
+    there = surface.host(x).copy()
+    assert abs(constraint.relative(there)) > 1e-2
+    scale = surface.scaled(x, constraint.target, centre)
+    assert scale == pytest.approx(exact_volume.scaled(constraint, there, centre), rel=1e-14)
+    assert_allclose(surface.host(x), there, rtol=0, atol=1e-14)
+    assert abs(constraint.relative(surface.host(x))) < 1e-14
+
+
+def test_a_surface_turned_inside_out_is_left_alone(arrays):
+    points, faces = BEAD
+    mirrored = points * [1.0, 1.0, -1.0]
+    x = arrays.asarray(mirrored)
+    surface = still(points, faces, arrays)
+    assert surface.scaled(x, signed_volume(points, faces), np.ones(3)) == 1.0
+    assert_array_equal(surface.host(x), mirrored)
+
+
+@pytest.mark.parametrize("mesh", [Mesh(*BEAD), CACTUS], ids=["bead", "cactus"])
+def test_normals_are_those_that_vtk_draws_with(arrays, mesh):
+    drawn = vtkTriangleMeshPointNormals()
+    drawn.SetInputData(polydata_of(mesh.vertices, np.full(mesh.n_faces, 3), mesh.faces.ravel()))
+    drawn.Update()
+    theirs = vtk_to_numpy(drawn.GetOutput().GetPointData().GetNormals())  # in single precision
+    assert_allclose(normals_of(mesh.vertices, mesh.faces, arrays), theirs, rtol=0, atol=1e-6)
+
+
+def test_normals_point_where_the_volume_grows_fastest(arrays):
+    points, faces = CACTUS.vertices, CACTUS.faces
+    slope = volume_gradient(points, faces)
+    slope /= np.linalg.norm(slope, axis=1, keepdims=True)
+    assert_allclose(normals_of(points, faces, arrays), slope, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("unit", [1e-150, 1e-6, 1e100])
+def test_normals_turn_with_the_mesh_and_do_not_ask_for_its_unit(arrays, unit):
+    points, faces = RING
+    turn = rotation([1.0, 2.0, -0.5], 1.1)
+    before = normals_of(points, faces, arrays)
+    after = normals_of(unit * points @ turn.T, faces, arrays)
+    assert_allclose(after, before @ turn.T, rtol=0, atol=1e-12)
+
+
+def test_a_vertex_with_a_thousand_faces_has_a_normal_like_any_other(arrays):
+    angle = np.linspace(0.0, 2.0 * np.pi, 1001)[:-1]
+    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(1000)], axis=1)
+    points = np.vstack([ring, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
+    i, j = np.arange(1000), np.roll(np.arange(1000), -1)
+    top, bottom = np.full(1000, 1000), np.full(1000, 1001)
+    faces = np.concatenate([np.stack([i, j, top], axis=1), np.stack([j, i, bottom], axis=1)])
+    expected = np.vstack([ring, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
+    assert_allclose(normals_of(points, faces, arrays), expected, atol=1e-12)
+
+
+def test_what_has_shrunk_to_nothing_has_no_normal_and_none_is_no_number(arrays):
+    points, faces = BEAD
+    assert_array_equal(normals_of(0.0 * points + 7.0, faces, arrays), 0.0 * points)
+    flat = points.copy()
+    gone = np.unique(faces[(faces == 5).any(axis=1)])
+    flat[gone] = flat[5]  # all around vertex 5 lies on it
+    normals = normals_of(flat, faces, arrays)
+    assert_array_equal(normals[5], np.zeros(3))
+    others = np.setdiff1d(np.arange(len(points)), gone)
+    assert_allclose(np.linalg.norm(normals[others], axis=1), 1.0, atol=1e-14)
+
+
+def test_a_vertex_without_faces_has_no_normal(arrays):
+    points, faces = BEAD
+    alone = np.vstack([[[5.0, 5.0, 5.0]], points, [[6.0, 6.0, 6.0]]])
+    expected = np.vstack([np.zeros((1, 3)), normals_of(points, faces, arrays), np.zeros((1, 3))])
+    assert_array_equal(normals_of(alone, faces + 1, arrays), expected)
+
+
+def test_no_call_takes_more_memory_than_its_chapter_says(monkeypatch):
+    monkeypatch.setattr(device, "_FACES", 1 << 10)
+    points, faces = torus(240, 120)
+    n, m = len(points), len(faces)
+    whole = np.arange(n)
+    subspace = Subspace(n, (whole,), (np.ones((n, 2), dtype=np.float32),))
+    piece = 300 * device._FACES
+
+    def taken(call):
+        tracemalloc.start()
+        before = tracemalloc.get_traced_memory()[0]
+        kept = call()
+        after, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return kept, after - before, peak - before
+
+    surface, stays, _ = taken(lambda: DeviceSurface(subspace, points, faces, np))
+    assert stays < 1.01 * (8 * 2 * n + 24 * n + 24 * m)
+    _, stays, _ = taken(lambda: surface._fans)
+    assert stays < 60 * m
+    x, _, most = taken(lambda: surface.map(np.zeros((2, 3))))
+    assert most < 1.01 * 80 * n
+    assert taken(lambda: surface.volume(x))[2] < 1.01 * (8 * m + piece)
+    assert taken(lambda: surface.normals(x))[2] < 1.01 * (100 * m + piece)
+
+
+@pytest.mark.parametrize("fault", [MemoryError("2 bytes wanted"), RuntimeError("CUDA error")])
+def test_a_device_that_gives_up_says_so_by_name(fault):
+    def fails(*_, **__):
+        raise fault
+
+    full = types.SimpleNamespace(**{**vars(np), "empty": fails})
+    with pytest.raises(DeviceError, match=f"the GPU gave up: {fault}"):
+        DeviceSurface(SUBSPACE, SCENE.mesh.vertices, SCENE.mesh.faces, full)
+    lost = still(*BEAD, types.SimpleNamespace(**{**vars(np), "take": fails}))
+    for call in (lost.volume, lost.normals, lambda x: lost.scaled(x, 1.0, np.zeros(3))):
+        with pytest.raises(DeviceError, match=f"^the GPU gave up: {fault}$"):
+            call(BEAD[0])
+
+
+def test_a_library_is_taken_only_if_it_counts_right(monkeypatch, capsys):
+    def absent():
+        raise ImportError("no such library")
+
+    wrong = types.SimpleNamespace(**{**vars(np), "cross": lambda a, b: -np.cross(a, b)})
+    monkeypatch.setattr(gpu, "_driver_has_a_gpu", lambda: True)
+    find = gpu._found.__wrapped__
+    for cupy, torch, expected in (
+        (lambda: np, absent, np),
+        (absent, lambda: np, np),
+        (lambda: wrong, lambda: np, np),
+        (lambda: wrong, absent, None),
+        (absent, absent, None),
+    ):
+        monkeypatch.setattr(gpu, "_cupy", cupy)
+        monkeypatch.setattr(gpu, "_torch", torch)
+        assert find() is expected
+    monkeypatch.setattr(gpu, "_driver_has_a_gpu", lambda: False)
+    assert find() is None
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("status", "number", "expected"), [(0, 2, True), (0, 0, False), (100, 1, False)]
+)
+def test_it_is_the_driver_that_knows(monkeypatch, status, number, expected):
+    def tell(place):
+        place._obj.value = number
+        return 0
+
+    driver = types.SimpleNamespace(cuInit=lambda flags: status, cuDeviceGetCount=tell)
+    monkeypatch.setattr(gpu.ctypes, "CDLL", lambda name: driver)
+    assert gpu._driver_has_a_gpu() is expected
+
+
+def test_whoever_wants_no_gpu_gets_none(monkeypatch):
+    monkeypatch.setattr(gpu, "_found", lambda: np)
+    assert gpu_arrays() is np
+    monkeypatch.setenv("SEGDEFORM_GPU", "0")
+    assert gpu_arrays() is None
+
+
+def test_where_there_is_no_gpu_neither_library_is_imported_and_nothing_is_said(tmp_path):
+    for name in ("cupy", "torch"):
+        (tmp_path / f"{name}.py").write_text(f"print('{name} was imported')\n")
+    program = (
+        "import vtk_segdeform, vtk_segdeform.subspace.gpu\n"
+        "assert vtk_segdeform.subspace.gpu.gpu_arrays() is None\n"
+        "import torch\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env={
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)]),
+            "CUDA_VISIBLE_DEVICES": "",  # none is seen where there is one
+        },
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert (done.stdout, done.stderr) == ("torch was imported\n", "")

@@ -1,0 +1,433 @@
+"""Every key of the editor at its worst moments: in mid-drag, while a pose converges, during a job.
+
+The keys are those of the editor's own table.  After any key,
+
+- the editor becomes idle: no job, no drag, no refinement, no timer;
+- the drag is the first step of the history, unless Escape cancelled it; a drag that a key has
+  finished ends where the pointer was at that moment, and no longer follows it;
+- the other effects of the key are those of the key pressed long after the drag;
+- undo restores the state before, redo the exact state at the end, and each state in between has
+  the volume of rest.
+
+During a job a key changes nothing; Escape cancels the job.
+"""
+
+from __future__ import annotations
+
+import shutil
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+from hands import Hand, OneTimerHost, plain_view
+from numpy.testing import assert_allclose, assert_array_equal
+from soaking import session_of, slender
+
+from vtk_segdeform import Session, save_session
+from vtk_segdeform.solver.solution import Status
+from vtk_segdeform.widgets import DeformEditor, Mode, Paint, Tool
+from vtk_segdeform.widgets.editor.bindings import BINDINGS, binding_of
+from vtk_segdeform.widgets.handle_dragger import live_solve
+from vtk_segdeform.widgets.scene.view import View
+
+KEYS = sorted({key for binding in BINDINGS for key in binding.keys})
+SIZE = (260, 200)
+LONGEST = 30.0  # seconds that any action may take, on a busy machine
+SAME_POSE = 2e-3  # of the diagonal: the same pose reached in two ways
+STEPS = {Mode.REGIONS: "paint region 1", Mode.CAGES: "drag the cage of region 1",
+         Mode.HANDLES: "mark tip", Mode.DEFORM: "drag tip"}  # fmt: skip
+
+
+def table(*modes: Mode, campaign: bool = False) -> list:
+    """Return every mode with every key, as parameters of a test.
+
+    Keys without a meaning in a mode, or with *campaign* all keys, are marked as campaign.
+    Mode 3 paints as mode 1 does, so only its own keys are tested every day.
+    """
+    own = {mode: {k for b in BINDINGS if mode in b.modes for k in b.keys} for mode in modes}
+    if Mode.REGIONS in own and Mode.HANDLES in own:
+        own[Mode.HANDLES] -= own[Mode.REGIONS]
+    return [
+        pytest.param(
+            mode, key, id=f"{mode.name}-{key}",
+            marks=[pytest.mark.campaign] * (campaign or key not in own[mode]),
+        )
+        for mode in modes for key in KEYS
+    ]  # fmt: skip
+
+
+def ends_the_drag(key: str, mode: Mode) -> bool:
+    """Return whether *key* must end a drag in *mode*; Escape cancels it as well."""
+    if any(b.action is None and key in b.keys and mode in b.modes for b in BINDINGS):
+        return False  # the key belongs to the dragging widget
+    binding = binding_of(key, mode)
+    return key == "escape" or (binding is not None and not binding.while_busy)
+
+
+def slow_down(monkeypatch) -> None:
+    """Limit every move and every tick to one step, so that converging takes a while."""
+    for name in ("_MOST_STEPS", "_FEWEST_AT_REST"):
+        monkeypatch.setattr(live_solve, name, 1)
+
+
+@dataclass(frozen=True)
+class Story:
+    """The history of a session: the names of the steps, how many are done, and the states."""
+
+    labels: list[str]
+    done: int
+    states: list
+
+    @classmethod
+    def of(cls, session: Session) -> Story:
+        """Walk through the whole history of *session*, and leave it where it was."""
+        now, done = session.state, 0
+        while session.undo() is not None:
+            done += 1
+        labels, states = [], [session.state]
+        check_volume(session)
+        while (label := session.redo()) is not None:
+            labels.append(label)
+            states.append(session.state)
+            check_volume(session)
+        for _ in range(len(labels) - done):
+            session.undo()
+        assert session.state is now
+        return cls(labels, done, states)
+
+
+def check_volume(session: Session) -> None:
+    """Check that the volume of rest is preserved, where that is enabled."""
+    assert np.isfinite(session.vertices).all()
+    if session.options.preserve_volume:
+        assert abs(session.volume_change) < 1e-12
+
+
+def outline(state) -> tuple:
+    """Return everything of a state except positions."""
+    regions = 0 if state.regions is None else state.regions.n_regions
+    handles = {name: len(ids) for name, ids in state.handles.items()}
+    cages = [cage.n_vertices for cage in state.cages]
+    return regions, cages, len(state.fixed), handles, state.options, state.pose is not None
+
+
+class Stand:
+    """An editor over a small session in some host, and a hand that operates it; reusable.
+
+    Parameters
+    ----------
+    editor : DeformEditor
+        Over a session of `ready`.
+    hand : Hand or QtHand
+        In its view.
+    folder : Path
+        For the files that keys write.
+    """
+
+    def __init__(self, editor: DeformEditor, hand, folder: Path):
+        self.editor, self.hand, self.folder = editor, hand, folder
+        save_session(folder / "start.segdeform", editor.session)
+        self.session_before, self.start = editor.session, editor.session.state
+        self.references: dict[tuple, Story] = {}
+
+    # What differs from host to host.
+
+    def loop(self) -> None:
+        """Let the host's event loop run for a moment."""
+        raise NotImplementedError
+
+    def has_timers(self) -> bool:
+        """Whether any timer is running."""
+        raise NotImplementedError
+
+    def draw(self) -> None:
+        """Check that the things to grab are where they are displayed."""
+        self.editor.view.render()
+
+    def close(self) -> None:
+        """End it."""
+        raise NotImplementedError
+
+    # What hands do.
+
+    @property
+    def session(self) -> Session:
+        return self.editor.session
+
+    def until(self, seen, what: str) -> None:
+        """Let the event loop run until *seen* returns something true."""
+        end = time.monotonic() + LONGEST
+        while not seen():
+            assert time.monotonic() < end, f"waited in vain for {what}: {self.editor.status}"
+            self.loop()
+
+    def settle(self) -> None:
+        """Wait until the editor is idle, and check that it stays so."""
+        self.until(lambda: not self.editor.is_busy, "the job")
+        dragger = self.editor.stage.dragger
+        self.until(lambda: not dragger.is_refining, "the pose")
+        self.until(lambda: not self.has_timers(), "the timers")
+        assert not any(widget.is_grabbing for widget in self.editor.stage.widgets)
+        assert not self.session.is_dragging
+        assert self.hand.failures == []
+
+    def begin(self, mode: Mode) -> None:
+        """Reset everything, and start in *mode*."""
+        desk, stage = self.editor.desk, self.editor.stage
+        while self.session.undo() is not None:
+            pass
+        self.session_before, self.start = self.session, self.session.state
+        desk.takes.remove()
+        desk.help.hide()
+        desk.voice.forget()
+        stage.cages_wanted = stage.overlay_wanted = False
+        stage.selector.tool, stage.selector.through = Tool.BRUSH, False
+        shutil.copy(self.folder / "start.segdeform", self.folder / "work.segdeform")
+        self.editor.path = self.folder / "work.segdeform"
+        self.editor.mode = mode
+        self.settle()
+        selector = stage.selector
+        selector.region, selector.handle = 0, "tip"
+        selector.paints = Paint.REGION if mode is Mode.REGIONS else Paint.HANDLE
+        stage.dragger.handle = "tip"
+        self.hand.failures.clear()
+
+    def way(self, mode: Mode) -> list[np.ndarray]:
+        """Return places along which to drag in *mode*: a handle, a vertex of a cage, a brush."""
+        session = self.session
+        if mode is Mode.CAGES:
+            corners = session.cages[0].vertices
+            at = corners[corners[:, 2].argmax()]
+        else:
+            x = session.mesh.vertices[:, 0]
+            at = {Mode.REGIONS: [0.9, -0.7, 0.0], Mode.HANDLES: [-1.6, -0.6, 0.0]}.get(
+                mode, session.mesh.vertices[x > 2.2].mean(axis=0)
+            )
+        shift = np.array([6.0, 24.0] if mode in (Mode.CAGES, Mode.DEFORM) else [4.0, 2.0])
+        return [np.round(self.hand.at(at) + share * shift) for share in (0.0, 0.4, 0.7, 1.0)]
+
+    def drag(self, mode: Mode) -> np.ndarray:
+        """Press and drag, and return the place without releasing the button."""
+        self.draw()
+        first, *others = self.way(mode)
+        self.hand.press(first)
+        for place in others:
+            self.hand.move(place)
+        assert any(widget.is_grabbing for widget in self.editor.stage.widgets)
+        return others[-1]
+
+    # The moments.
+
+    def long_after(self, mode: Mode, *keys: str) -> Story:
+        """Return the story of a drag and of keys that are typed after it has converged."""
+        if (mode, keys) not in self.references:
+            self.begin(mode)
+            self.hand.release(self.drag(mode))
+            self.settle()
+            for key in keys:
+                self.hand.types(key)
+            self.hand.failures.clear()  # failures are reported, but not tested here
+            self.settle()
+            self.references[mode, keys] = Story.of(self.session)
+        return self.references[mode, keys]
+
+    def during(self, mode: Mode, key: str) -> None:
+        """Type *key* in mid-drag, move on and release."""
+        expected, dragged = self.long_after(mode, key), self.long_after(mode)
+        assert dragged.labels == [STEPS[mode]]
+        self.begin(mode)
+        place = self.drag(mode)
+        self.hand.types(key)
+        if ends_the_drag(key, mode):
+            self.hand.move(place + [-40.0, -30.0])  # no longer drags anything
+            self.hand.move(place)
+        else:
+            assert any(widget.is_grabbing for widget in self.editor.stage.widgets)
+            expected = dragged
+        self.hand.release(place)
+        self._ends_as(mode, key, expected, dragged)
+
+    def just_after(self, mode: Mode, *keys: str) -> None:
+        """Type *keys* after a drag, while the pose still converges."""
+        expected, dragged = self.long_after(mode, *keys), self.long_after(mode)
+        self.begin(mode)
+        self.hand.release(self.drag(mode))
+        assert self.editor.stage.dragger.is_refining
+        for key in keys:
+            self.hand.types(key)
+        self._ends_as(mode, None, expected, dragged)
+
+    def _ends_as(self, mode: Mode, key: str | None, expected: Story, dragged: Story) -> None:
+        """Check that all is as *expected*; *key* was typed in mid-drag, if it is not None."""
+        told = [str(failure) for failure in self.hand.failures]
+        self.hand.failures.clear()
+        self.settle()
+        self.editor.mode = mode  # where a pose that has not converged does so
+        self.settle()
+        story = Story.of(self.session)
+        if self.session is self.session_before:  # it opens another one
+            assert not story.states[0].changes(self.start)
+        if key == "escape":
+            assert (story.done, told) == (0, [])
+            return
+        assert (story.labels, story.done) == (expected.labels, expected.done), told
+        mine, its = (list(map(outline, each.states)) for each in (story, expected))
+        assert mine == its, (mine, its)
+        if story.labels == dragged.labels and key not in ("x", "y", "z"):  # which constrain it
+            is_final = story.done == dragged.done
+            same_places(story.states[1], dragged.states[1], self.session, is_final=is_final)
+
+    @contextmanager
+    def job(self) -> Iterator[list[str]]:
+        """Run a job in another thread; yield the list of results that it will deliver."""
+        go_on, delivered = threading.Event(), []
+
+        def work(progress):
+            assert go_on.wait(LONGEST)
+            progress(1.0, "counted")
+            return "counted"
+
+        self.editor.do(lambda desk: desk.start("counting", work, delivered.append))
+        assert self.editor.is_busy
+        try:
+            yield delivered
+            assert self.editor.is_busy
+            assert delivered == []
+        finally:
+            go_on.set()
+        self.settle()
+
+    def first_overlay(self, *, during: bool) -> None:
+        """Type O where volumes were never shown: a job measures them, during a drag."""
+        self.begin(Mode.REGIONS)
+        self.editor.load(self.folder / "start.segdeform")
+        self.session.bind()  # otherwise binding would measure them already
+        self.begin(Mode.DEFORM)
+        overlay, place = self.editor.stage.overlay, self.drag(Mode.DEFORM)
+        assert not overlay.is_prepared
+        self._meanwhile("o", place, during=during)
+        assert overlay.is_shown
+
+    def film_that_ends(self, *, during: bool) -> None:
+        """End a film, which a job then writes, during a drag."""
+        self.begin(Mode.DEFORM)
+        self.hand.types("ctrl+m")
+        place = self.drag(Mode.DEFORM)
+        self.draw()
+        before = set(self.folder.glob("work.film*"))
+        self._meanwhile("ctrl+m", place, during=during)
+        assert len(set(self.folder.glob("work.film*")) - before) == 1
+
+    def _meanwhile(self, key: str, place: np.ndarray, *, during: bool) -> None:
+        """Start a job by *key* before or after the release at *place*; nothing must be lost."""
+        if not during:
+            self.hand.release(place)
+            assert self.editor.stage.dragger.is_refining
+        self.hand.types(key)
+        assert self.editor.is_busy
+        if during:
+            self.hand.release(place)
+        self.settle()
+        assert self.session.solution.status is Status.CONVERGED
+        assert Story.of(self.session).labels == [STEPS[Mode.DEFORM]]
+
+    def in_a_job(self, mode: Mode, key: str) -> None:
+        """Type *key* while another thread works; then let it end."""
+        self.begin(mode)
+        session = self.session
+        before = session.state, session.undo_label, session.redo_label
+        with self.job() as delivered:
+            self.hand.types(key)
+            self.loop()
+        assert delivered == ["counted"] * (key != "escape")
+        assert "cancelled" in self.editor.status or key != "escape"
+        assert self.session is session
+        assert (session.state, session.undo_label, session.redo_label) == before
+
+
+def same_places(state, expected, session: Session, *, is_final: bool) -> None:
+    """Check that handles are exactly where they should be, and cages nearly, once converged."""
+    if expected.pose is None:
+        return
+    for name, places in expected.pose.targets.items():
+        assert_allclose(state.pose.targets[name], places, atol=1e-9)
+    for places, others in zip(state.pose.cage_vertices, expected.pose.cage_vertices, strict=True):
+        away = np.abs(places - others).max() / session.mesh.diagonal
+        assert away < SAME_POSE or not is_final, away
+    for mine, others in ((state.fixed, expected.fixed), *zip(
+        state.handles.values(), expected.handles.values(), strict=True
+    )):  # fmt: skip
+        assert_array_equal(mine, others)
+    assert_array_equal(state.regions.membership, expected.regions.membership)
+
+
+class SeldomDrawn(View):
+    """A view that renders only in `draw`: rendering would take nine tenths of the time."""
+
+    def render(self):
+        pass
+
+    def draw(self):
+        super().render()
+
+
+class HandStand(Stand):
+    """In a host with a single timer fired by hand: `plain_view`, or an off-screen plotter."""
+
+    def __init__(self, view: View, folder: Path, close=lambda: None):
+        self._host, self._close = OneTimerHost(view.interactor), close
+        session, view = ready(), SeldomDrawn(view.renderer, view.interactor)
+        editor = DeformEditor(view, session)
+        aim(view)
+        editor.On()
+        super().__init__(editor, Hand(view), folder)
+
+    def loop(self):
+        self._host.tick()
+
+    def has_timers(self):
+        return self._host.is_running
+
+    def draw(self):
+        self.editor.view.draw()
+
+    def close(self):
+        self.editor.remove()
+        assert not self._host.is_running
+        self._close()
+
+
+def ready() -> Session:
+    """Return a small session, complete except for a pose, and bound."""
+    session = session_of(slender())
+    session.change_options(n_cage_vertices=40)
+    session = Session(session.mesh, state=session.state)  # without a history
+    session.bind()
+    return session
+
+
+def aim(view: View) -> None:
+    """Look from the front, z up, at all of it."""
+    view.camera.SetPosition(0.0, -9.0, 0.0)
+    view.camera.SetFocalPoint(0.0, 0.0, 0.0)
+    view.camera.SetViewUp(0.0, 0.0, 1.0)
+    view.renderer.ResetCamera()
+    view.window.Render()
+
+
+def plain_stand(folder: Path) -> HandStand:
+    """Return an editor in a window of VTK alone."""
+    return HandStand(plain_view(SIZE), folder)
+
+
+def pyvista_stand(folder: Path) -> HandStand:
+    """Return an editor in a plotter."""
+    plotter = pv.Plotter(off_screen=True, window_size=SIZE)
+    plotter.show(auto_close=False, interactive=False)
+    return HandStand(View.of(plotter), folder, plotter.close)

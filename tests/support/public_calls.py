@@ -1,0 +1,497 @@
+"""Every public callable of the package, discovered automatically, with a valid call of each.
+
+Functions and classes of the modules below, public methods of these classes, and the setters of
+their properties.  `ARGUMENTS` has a valid value for each parameter name; where a name has several
+meanings, `SPECIAL` has the value under "Class.method.name".
+"""
+
+from __future__ import annotations
+
+import copy
+import enum
+import functools
+import importlib
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+import vtk_segdeform as sd
+import vtk_segdeform.filters
+import vtk_segdeform.geometry.local_volume
+import vtk_segdeform.io.meshlab
+import vtk_segdeform.io.meshlab_project
+import vtk_segdeform.widgets
+import vtk_segdeform.widgets.plugin
+from vtk_segdeform import models
+from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.session.session import Session
+from vtk_segdeform.subspace.passengers import Passengers
+from vtk_segdeform.widgets.recording.film import Film
+
+CORE = (
+    "vtk_segdeform",
+    "vtk_segdeform.models",
+    "vtk_segdeform.io.convert",
+    "vtk_segdeform.io.meshlab",
+    "vtk_segdeform.geometry.distortion",
+    "vtk_segdeform.subspace.passengers",
+    "vtk_segdeform.geometry.local_volume",
+    "vtk_segdeform.io.meshlab_project",
+    "vtk_segdeform.pictures.pictures",
+    "vtk_segdeform.filters.deform_filter",
+    "vtk_segdeform.widgets.plugin",
+    "vtk_segdeform.io.repaired",
+)
+WIDGETS = ("vtk_segdeform.widgets", "vtk_segdeform.widgets.recording.film")
+
+# Hooks that `Widget` calls with its own objects, and arithmetic of a view at every event.
+NOT_CALLED = {"begins", "hovers", "wheels", "types"}
+NOT_CALLED |= {"contains", "guarded", "pixel_at", "pointer", "ray", "to_display", "to_world"}
+NOT_CALLED |= {"FillInputPortInformation", "RequestData"}  # by VTK's pipeline
+NOT_CALLED |= {"add_surface", "draw_mesh"}  # in a plotter created by `pictures`
+
+
+@dataclass(frozen=True)
+class Call:
+    """One public callable; *bound* returns it with fresh objects, *parameters* are its names."""
+
+    name: str
+    bound: Callable[[], Callable[..., Any]]
+    parameters: tuple[str, ...]
+    required: tuple[str, ...]
+
+    def arguments(self) -> dict[str, Any]:
+        """Return valid values of all required parameters."""
+        return {name: valid(self.name, name) for name in self.required}
+
+
+def calls(modules: tuple[str, ...]) -> Iterator[Call]:
+    """Yield every public callable of *modules*, once if several have it."""
+    seen = set(NOT_CALLED)
+    for module in map(importlib.import_module, modules):
+        for name in _names(module):
+            thing = getattr(module, name)
+            if name in seen:
+                continue
+            seen.add(name)
+            if inspect.isclass(thing):
+                yield from _calls_of_class(thing)
+            elif callable(thing):
+                yield _call(name, functools.partial(lambda f: f, thing), thing)
+
+
+def expensive(call: Call) -> bool:
+    """Return whether a call takes a second: a window, cages, or a new body."""
+    return call.name in {
+        "PlotterTools.edit", "PolyDataTools.deform", "PolyDataTools.regions", "cactus", "deform",
+        "dinosaur", "edit", "fit_cages", "film", "picture_before_after", "picture_distortion",
+        "picture_regions_and_cages", "picture_volume_change",
+    }  # fmt: skip
+
+
+def valid(call: str, name: str) -> Any:
+    """Return a valid value of one parameter; KeyError if there is none in the tables."""
+    special = f"{call}.{name}"
+    return SPECIAL[special]() if special in SPECIAL else ARGUMENTS[name]()
+
+
+def _names(module: Any) -> list[str]:
+    if hasattr(module, "__all__"):
+        return sorted(module.__all__)
+    own = (n for n, v in vars(module).items() if getattr(v, "__module__", "") == module.__name__)
+    return sorted(name for name in own if not name.startswith("_"))
+
+
+def _calls_of_class(cls: type) -> Iterator[Call]:
+    if issubclass(cls, enum.Enum | BaseException):
+        return
+    made_by_pyvista = cls.__module__ == "vtk_segdeform.widgets.plugin"
+    ours = cls.__module__.startswith("vtk_segdeform.widgets") and not made_by_pyvista
+    if cls in MADE_BY_HAND or ours:
+        yield _call(cls.__name__, lambda: cls, cls)
+    for name, member in inspect.getmembers(cls):
+        if name.startswith("_") or name in NOT_CALLED:
+            continue
+        label = f"{cls.__name__}.{name}"
+        if isinstance(member, property):
+            if member.fset is not None:
+                yield Call(label, functools.partial(_setter, cls, name), ("value",), ("value",))
+        elif str(getattr(member, "__module__", "")).startswith("vtk_segdeform"):  # not VTK's own
+            yield _call(label, functools.partial(_bound, cls, name), getattr(cls, name))
+
+
+def _call(label: str, bound: Callable[[], Any], signed: Any) -> Call:
+    signature = inspect.signature(signed)
+    plain = [
+        p
+        for p in signature.parameters.values()
+        if p.name != "self" and p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)
+    ]
+    names = tuple(p.name for p in plain)
+    needed = tuple(p.name for p in plain if p.default is p.empty)
+    if label in EXTRA:  # passed on as keywords
+        names += EXTRA[label]
+    return Call(label, bound, names, needed)
+
+
+def _bound(cls: type, name: str) -> Any:
+    return getattr(instance(cls), name)
+
+
+def _setter(cls: type, name: str) -> Callable[..., None]:
+    thing = instance(cls)
+    return lambda value: setattr(thing, name, value)
+
+
+# The objects that methods are called on.
+
+
+@functools.cache
+def mesh() -> sd.Mesh:
+    return models.sphere(200)
+
+
+def _left() -> np.ndarray:
+    return np.flatnonzero(mesh().vertices[:, 0] < -0.8)
+
+
+def _right() -> np.ndarray:
+    return np.flatnonzero(mesh().vertices[:, 0] > 0.8)
+
+
+def _targets() -> np.ndarray:
+    return mesh().vertices[_right()] + [0.1, 0.0, 0.0]
+
+
+@functools.cache
+def regions() -> sd.Regions:
+    x = mesh().vertices[:, 0]
+    return sd.Regions.from_masks(mesh(), [x < 0.3, x > -0.3])
+
+
+@functools.cache
+def cages() -> tuple[sd.Cage, ...]:
+    return sd.fit_cages(mesh(), regions(), 24)
+
+
+@functools.cache
+def bound() -> Deformer:
+    return Deformer(mesh(), regions(), cages(), fixed=_left(), handle=_right())
+
+
+@functools.cache
+def passengers() -> Passengers:
+    return bound().passengers(mesh().vertices[:5])
+
+
+@functools.cache
+def _worked_on() -> Session:
+    session = Session(mesh())
+    session.set_regions(regions())
+    session.set_cages(cages())
+    session.set_fixed(_left())
+    session.add_handle(_right())
+    session.drag(_targets())
+    session.commit()
+    return session
+
+
+def session() -> Session:
+    return copy.copy(_worked_on())
+
+
+def surface() -> pv.PolyData:
+    return sd.io.to_polydata(mesh())
+
+
+@functools.cache
+def view() -> Any:
+    from hands import plain_view
+
+    return plain_view((64, 64))
+
+
+@functools.cache
+def meshset() -> Any:
+    return sd.io.to_meshset(mesh())
+
+
+@functools.cache
+def shared_session() -> Session:
+    """Return the session of the widgets, which live as long as the tests."""
+    return session()
+
+
+made_widgets: list[Any] = []
+
+
+def _widget(cls: type) -> Any:
+    widgets = sd.widgets
+    if cls is widgets.View:
+        return view()
+    made_widgets.append(cls(view()) if cls is widgets.Recorder else cls(view(), shared_session()))
+    return made_widgets[-1]
+
+
+def tidy() -> None:
+    """Remove the created widgets from their shared view."""
+    while made_widgets:
+        remove(made_widgets.pop())
+
+
+def remove(widget: Any) -> None:
+    """Remove a widget from its view and stop what a call started; ignore anything else."""
+    if isinstance(widget, sd.widgets.Recorder):
+        widget.stop()
+    elif inspect.isroutine(widget):
+        widget()
+    elif type(widget).__module__.startswith("vtk_segdeform.widgets"):
+        getattr(widget, "remove", lambda: None)()
+
+
+def instance(cls: type) -> Any:
+    """Return an object to call methods of, with its own state if it has any."""
+    name = cls.__name__
+    made = {
+        "Mesh": mesh,
+        "Regions": regions,
+        "Cage": lambda: cages()[0],
+        "Deformer": lambda: bound().copy(),
+        "Session": session,
+        "Passengers": passengers,
+        "Solution": lambda: bound().copy().solve(_targets()),
+        "Options": sd.Options,
+        "LocalVolume": lambda: sd.geometry.LocalVolume(mesh()),
+        "SegmentedCageDeformFilter": sd.filters.SegmentedCageDeformFilter,
+        "PolyDataTools": lambda: surface().segdeform,
+        "PlotterTools": lambda: _plotter().segdeform,
+        "Film": _film,
+    }
+    return made[name]() if name in made else _widget(cls)
+
+
+def _film() -> Film:
+    film = Film(view())
+    film.snap()
+    return film
+
+
+@functools.cache
+def _plotter() -> pv.Plotter:
+    return pv.Plotter(off_screen=True, window_size=(64, 64))
+
+
+# Classes that callers construct; others are only returned.
+MADE_BY_HAND = {sd.Mesh, sd.Regions, sd.Cage, sd.Deformer, sd.Session, sd.Options}
+EXTRA = {
+    "Session.change_options": (
+        "n_cage_vertices", "offset", "preserve_volume", "preserve_region_volumes", "stretch",
+        "rotation_groups",
+    ),
+}  # fmt: skip
+
+
+@functools.cache
+def _file(name: str) -> Path:
+    """Return a file in the current folder that can be read."""
+    path = Path(name).absolute()
+    if path.suffix == ".segdeform":
+        sd.save_session(path, session())
+    elif path.suffix == ".mlp":
+        sd.io.write_project(path, mesh())
+    else:
+        sd.write_mesh(path, mesh())
+    return path
+
+
+ARGUMENTS: dict[str, Callable[[], Any]] = {
+    "arrays": lambda: (),
+    "blend": lambda: regions().weights,
+    "cage_faces": lambda: cages()[0].faces,
+    "cage_vertices": lambda: [cage.vertices for cage in cages()],
+    "cages": cages,
+    "cache": lambda: Path("cache"),
+    "callback": lambda: lambda: None,
+    "divisions": lambda: (2, 2, 4),
+    "event": lambda: "ModifiedEvent",
+    "events": lambda: 1000,
+    "exact_volume": lambda: True,
+    "faces": lambda: mesh().faces,
+    "fixed": _left,
+    "folder": Path,
+    "fps": lambda: 20.0,
+    "frames": lambda: [None],
+    "handle": _right,
+    "history": lambda: 5,
+    "hold_tolerance": lambda: 1e-3,
+    "interactor": lambda: view().interactor,
+    "keys": lambda: "",
+    "label": lambda: "a step",
+    "labels": lambda: (mesh().vertices[:, 0] > 0).astype(int),
+    "largest_hole": lambda: 10,
+    "limits": sd.widgets.ReplayLimits,
+    "listener": lambda: lambda _change: None,
+    "major": lambda: 1.0,
+    "masks": lambda: regions().membership,
+    "max_steps": lambda: 3,
+    "membership": lambda: regions().membership,
+    "mesh": mesh,
+    "meshset": meshset,
+    "minor": lambda: 0.3,
+    "motion": lambda: np.eye(4),
+    "n_cage_vertices": lambda: 24,
+    "n_regions": lambda: 2,
+    "n_vertices": lambda: 60,
+    "name": lambda: "handle 1",
+    "new_name": lambda: "grip",
+    "offset": lambda: 0.2,
+    "options": sd.Options,
+    "overlap": lambda: 1,
+    "path": lambda: Path("written.segdeform"),
+    "pixels": lambda: 1_000_000,
+    "points": lambda: mesh().vertices[:4],
+    "polydata": surface,
+    "preserve_region_volumes": lambda: False,
+    "preserve_volume": lambda: True,
+    "progress": lambda: lambda _fraction, _message: None,
+    "radius": lambda: 1.0,
+    "region": lambda: 0,
+    "regions": regions,
+    "renderer": lambda: view().renderer,
+    "rings": lambda: 1,
+    "rotation_groups": lambda: 20,
+    "seconds": lambda: 5.0,
+    "seed": lambda: 3,
+    "session": session,
+    "size": lambda: (0.2, 0.2, 1.0),
+    "smoothness": lambda: 1.0,
+    "state": lambda: _worked_on().state,
+    "stretch": lambda: 10.0,
+    "subtract": lambda: False,
+    "surface": surface,
+    "targets": _targets,
+    "tolerance": lambda: 1e-6,
+    "vertices": lambda: mesh().vertices,
+    "view": view,
+    "weights": lambda: regions().weights,
+    "weld_distance": lambda: 0.0,
+    "what": mesh,
+    "which": lambda: [0, 1],
+    "change": lambda: np.zeros(mesh().n_vertices),
+    "count": lambda: 3,
+    "degrees": lambda: 30.0,
+    "distortion": lambda: np.zeros(mesh().n_vertices),
+    "hold": lambda: True,
+    "on": lambda: True,
+    "strength": lambda: 10.0,
+    "x": lambda: 1.0,
+    "y": lambda: 1.0,
+    "z": lambda: 1.0,
+    "action": lambda: lambda _desk: None,
+    "busy": lambda: lambda: False,
+    "colours": lambda: None,
+    "enabled": lambda: False,
+    "layer": lambda: "layer",
+    "message": lambda: "words",
+    "milliseconds": lambda: 50,
+    "pace": lambda: 0.0,
+    "priority": lambda: 1.0,
+    "scene": session,
+    "skips": lambda: lambda _entry: False,
+    "source": lambda: list(sd.widgets.Recorder(view()).lines),
+    "tag": lambda: 1,
+    "title": lambda: "segdeform",
+    "visible": lambda: True,
+    "when": lambda: lambda: True,
+    "while_busy": lambda: False,
+    "window": lambda: 3,
+}
+
+SPECIAL: dict[str, Callable[[], Any]] = {
+    "Cage.faces": lambda: cages()[0].faces,
+    "Cage.vertices": lambda: cages()[0].vertices,
+    "CageDisplay.opacity.value": lambda: 0.5,
+    "DeformEditor.load.path": lambda: _file("saved.segdeform"),
+    "DeformEditor.mode.value": lambda: sd.widgets.Mode.DEFORM,
+    "DeformEditor.path.value": lambda: Path("other.segdeform"),
+    "Film.save.path": lambda: Path("saved.gif"),
+    "HandleDragger.handle.value": lambda: "handle 1",
+    "HandleDragger.local.value": lambda: True,
+    "HandleDragger.refine_while_resting.value": lambda: False,
+    "Recorder.path": lambda: Path("events.txt"),
+    "RegionSelector.radius.value": lambda: 0.1,
+    "RegionSelector.tool.value": lambda: sd.widgets.Tool.LASSO,
+    "Session.add_handle.vertices": lambda: [int(np.abs(mesh().vertices[:, 0]).argmin())],
+    "Session.move_cage.vertices": lambda: cages()[0].vertices * 1.05,
+    "Session.paint_region.vertices": lambda: [0, 1, 2],
+    "Session.rename_region.name": lambda: "arm",
+    "Session.set_fixed.vertices": _left,
+    "Session.split_region.vertices": lambda: None,
+    "VolumeOverlay.wanted_range.value": lambda: 0.2,
+    "blend_at.points": lambda: mesh().vertices[:4],
+    "cactus.n_vertices": lambda: 600,
+    "dinosaur.n_vertices": lambda: 1200,
+    "film.path": lambda: Path("film.gif"),
+    "film.size": lambda: (64, 64),
+    "fit_cages.n_vertices": lambda: 24,
+    "load_session.path": lambda: _file("saved.segdeform"),
+    "mean_value_coordinates.cage_vertices": lambda: cages()[0].vertices,
+    "read.path": lambda: _file("mesh.ply"),
+    "picture_before_after.path": lambda: Path("a.png"),
+    "picture_distortion.path": lambda: Path("a.png"),
+    "picture_regions_and_cages.path": lambda: Path("a.png"),
+    "picture_volume_change.path": lambda: Path("a.png"),
+    "read_project.path": lambda: _file("project.mlp"),
+    "write_project.path": lambda: Path("written.mlp"),
+    "SegmentedCageDeformFilter.SetFixed.points": _left,
+    "SegmentedCageDeformFilter.SetHandle.points": _right,
+    "read_faces.path": lambda: _file("mesh.ply"),
+    "read_mesh.path": lambda: _file("mesh.ply"),
+    "read_polydata.path": lambda: _file("mesh.ply"),
+    "require_writable.arrays": lambda: False,
+    "require_writable.path": lambda: Path("written.vtp"),
+    "write.path": lambda: Path("written.ply"),
+    "write_mesh.path": lambda: Path("written.ply"),
+}
+
+# The words for an argument in messages, where they are clearer than its name.
+SAID_AS: dict[str, tuple[str, ...]] = {
+    "Cage.require_encloses.points": ("handle 1",),
+    "HandleDragger.handle.value": ("handle",),
+    "Cage.vertices": ("faces",),
+    "CageDisplay.show_faults.vertices": ("faces",),
+    "film.frames": ("film", "targets"),
+    "torus.minor": ("two-manifold",),
+    "Mesh.faces": ("two-manifold",),
+    "Mesh.vertices": ("two-manifold",),
+    "PolyDataTools.deform.n_cage_vertices": ("n_vertices",),
+    "Regions.from_masks.masks": ("membership",),
+    "Session.add_handle.vertices": ("handle",),
+    "Session.drag.targets": ("handle",),
+    "Session.merge_regions.which": ("region",),
+    "Session.move_handle.motion": ("targets",),
+    "Session.move_handle.name": ("handle",),
+    "Session.remove_handle.name": ("handle",),
+    "Session.rename_handle.name": ("handle",),
+    "Session.rename_handle.new_name": ("handle's name",),
+    "Session.set_fixed.vertices": ("fixed",),
+    "blend_at.vertices": ("weights",),
+    "board.cages": ("weights",),
+    "mean_value_coordinates.cage_vertices": ("cage_faces",),
+    "deform.n_cage_vertices": ("n_vertices",),
+    "film.scene": ("view",),
+    "from_meshset.arrays": ("attribute",),
+    "repair.faces": ("nothing to repair",),
+    "repair.vertices": ("nothing to repair",),
+    "replay.source": ("recording",),
+    "to_meshset.what": ("Mesh",),
+    "write_project.what": ("Mesh",),
+    "torus.major": ("two-manifold",),
+    "sphere.radius": ("two-manifold",),
+    "bar.size": ("two-manifold",),
+}

@@ -1,0 +1,523 @@
+"""What is done to the exhibits of the zoo, each ending in an assertion that it was done rightly.
+
+Operations raise what the package raises; what the filter or the command line say instead of
+raising is a `ToldError`.
+"""
+
+from __future__ import annotations
+
+import io
+from contextlib import redirect_stdout
+from functools import lru_cache, partial
+from pathlib import Path
+
+import numpy as np
+import zoo
+from solids import rotation
+
+import vtk_segdeform as sd
+from vtk_segdeform.cli.main import main
+from vtk_segdeform.errors import MeshError, SegDeformError
+from vtk_segdeform.filters.deform_filter import SegmentedCageDeformFilter
+from vtk_segdeform.filters.surfaces import surface
+from vtk_segdeform.io.convert import from_polydata, to_polydata, write_mesh
+from vtk_segdeform.io.polygons import polydata_of
+
+
+class ToldError(SegDeformError):
+    """What the filter or the command line said, neither of which raises."""
+
+
+def volume(vertices, faces):
+    """Return the volume with more digits than the package has."""
+    x = np.asarray(vertices, dtype=np.longdouble)
+    a, b, c = (x - x.mean(axis=0))[faces.T]
+    return (a * np.cross(b, c)).sum() / 6
+
+
+def require_right(mesh, vertices, digits=1e-12):
+    """Assert that *vertices* are a pose of *mesh* with its volume."""
+    assert vertices.shape == mesh.vertices.shape
+    assert np.isfinite(vertices).all()
+    rest, now = volume(mesh.vertices, mesh.faces), volume(vertices, mesh.faces)
+    # A coordinate has 16 digits from the origin; the volume cannot have more of them than that.
+    far = np.abs(vertices).max()
+    rounding = 4 * np.finfo(float).eps * far * mesh.face_areas.sum() / rest
+    assert abs(now - rest) <= max(digits, float(rounding)) * rest
+
+
+def require_met(solution):
+    """Assert that handles are in their places, or that the status says what else."""
+    assert solution.handle_error <= 1e-3 or solution.status is not sd.Status.CONVERGED
+
+
+def ends(mesh):
+    """Return what is at the two ends of *mesh* along its longest side."""
+    extent = np.ptp(mesh.vertices, axis=0)
+    x = mesh.vertices[:, extent.argmax()]
+    x = (x - x.min()) / np.ptp(x)
+    return np.flatnonzero(x <= 0.12), np.flatnonzero(x >= 0.88)
+
+
+def bent(mesh, handle, degrees=20.0):
+    """Return targets: the handle turned about the middle, and shifted by a little."""
+    axis = np.eye(3)[(np.ptp(mesh.vertices, axis=0).argmax() + 1) % 3]
+    middle = mesh.vertices.mean(axis=0)
+    x = (mesh.vertices[handle] - middle) @ rotation(axis, np.radians(degrees)).T
+    return x + middle + 0.02 * mesh.diagonal
+
+
+def fitted(mesh):
+    """Return regions and cages as a beginner would ask for them."""
+    regions = sd.segment(mesh, min(2, mesh.n_vertices))
+    return regions, sd.fit_cages(mesh, regions, 60)
+
+
+# What is done to triangles.
+
+
+def look(vertices, faces):
+    report = sd.find_faults(vertices, faces)
+    if not report.ok:
+        raise ToldError(str(report))
+
+
+def mend(vertices, faces):
+    mended = sd.repair(vertices, faces)
+    if not mended.report.ok:
+        raise ToldError(str(mended.report))
+    mesh = sd.Mesh(mended.vertices, mended.faces)
+    assert volume(mesh.vertices, mesh.faces) > 0
+
+
+def check(vertices, faces):
+    mesh = sd.Mesh(vertices, faces)
+    assert volume(mesh.vertices, mesh.faces) > 0
+    assert np.isfinite(sd.local_volume_change(mesh, mesh.vertices)).all()
+
+
+def segment(vertices, faces):
+    mesh = sd.Mesh(vertices, faces)
+    for n_regions in (None, 1, 3):
+        regions = sd.segment(mesh, n_regions)
+        assert np.allclose(regions.weights.sum(axis=0), 1.0, atol=1e-12)
+        assert n_regions in (None, regions.n_regions)
+
+
+def fit(vertices, faces):
+    mesh = sd.Mesh(vertices, faces)
+    regions, cages = fitted(mesh)
+    for members, cage in zip(regions.membership, cages, strict=True):
+        sd.Cage(cage.vertices, cage.faces).require_encloses(mesh.vertices[members], "members")
+    assert sum(cage.n_vertices for cage in cages) == 60
+
+
+def solve(vertices, faces):
+    mesh = sd.Mesh(vertices, faces)
+    fixed, handle = ends(mesh)
+    deformer = sd.Deformer(mesh, *fitted(mesh), fixed=fixed, handle=handle)
+    for degrees in (20.0, -30.0):
+        solution = deformer.solve(bent(mesh, handle, degrees))
+        require_right(mesh, solution.vertices)
+        require_met(solution)
+
+
+def deform(vertices, faces):
+    mesh = sd.Mesh(vertices, faces)
+    fixed, handle = ends(mesh)
+    solution = sd.deform(mesh, fixed, handle, bent(mesh, handle), n_regions=1, n_cage_vertices=40)
+    require_right(mesh, solution.vertices)
+    require_met(solution)
+
+
+def drag(vertices, faces):
+    mesh = sd.Mesh(vertices, faces)
+    session = sd.Session(mesh)
+    session.segment(min(2, mesh.n_vertices))
+    session.change_options(n_cage_vertices=60)
+    session.fit_cages()
+    fixed, handle = ends(mesh)
+    session.set_fixed(fixed)
+    name = session.add_handle(handle)
+    dragged(session, {name: bent(mesh, handle)})
+
+
+def dragged(session, targets):
+    """Drag, let go, undo, redo; save and load."""
+    for max_steps in (3, None):
+        require_met(session.drag(targets, max_steps=max_steps))
+        require_right(session.mesh, session.vertices)
+    session.commit()
+    there = session.vertices.copy()
+    session.undo()
+    assert np.array_equal(session.vertices, session.mesh.vertices)
+    session.redo()
+    assert np.array_equal(session.vertices, there)
+    sd.save_session("zoo.segdeform", session)
+    assert np.array_equal(sd.load_session("zoo.segdeform").vertices, there)
+
+
+def pipeline(vertices, faces):
+    mesh_free = polydata_of(np.asarray(vertices, float), np.full(len(faces), 3), np.ravel(faces))
+    filtered(mesh_free)
+
+
+def filtered(polydata, *, cages=None, **told):
+    """Run the filter over *polydata*; what it says by an event is raised."""
+    bend, said = SegmentedCageDeformFilter(), []
+    bend.AddObserver("ErrorEvent", lambda *_: said.append("something that VTK says"))
+    bend._tell = said.append  # its one way to say what is wrong
+    bend.SetInputDataObject(0, polydata)
+    if cages is not None:
+        bend.SetInputDataObject(1, cages)
+    if "handle" not in told and polydata.n_points:
+        x = np.nan_to_num(np.asarray(polydata.points, float), posinf=0.0)
+        x = x[:, np.ptp(x, axis=0).argmax()]
+        told["fixed"] = np.flatnonzero(x <= x.min() + 0.12 * np.ptp(x)).tolist()
+        told["handle"] = np.flatnonzero(x >= x.max() - 0.12 * np.ptp(x)).tolist()
+    bend.SetNumberOfRegions(told.pop("n_regions", 2))
+    bend.SetNumberOfCageVertices(60)
+    bend.SetFixed(told.get("fixed", []))
+    bend.SetHandle(told.get("handle", []))
+    if "targets" in told:
+        bend.SetTargets(told["targets"])
+    else:
+        bend.SetRotationAxis(0, 1, 0)
+        bend.SetRotationAngle(15)
+    bend.Update()
+    if said:
+        raise ToldError(said[0])
+    mesh = sd.Mesh(*surface(polydata))
+    require_right(mesh, np.asarray(surface(bend.GetOutputDataObject(0))[0]))
+
+
+def as_off(vertices, faces):
+    """Write triangles, whatever they hold, into a file that is one."""
+    vertices, faces = np.asarray(vertices), np.asarray(faces)
+    rows = [" ".join(map(str, row)) for row in np.atleast_2d(vertices).tolist()]
+    rows += [" ".join(map(str, [len(row), *row])) for row in np.atleast_2d(faces).tolist() if row]
+    Path("zoo.off").write_text("\n".join(["OFF", f"{len(vertices)} {len(faces)} 0", *rows, ""]))
+
+
+def commanded(*words):
+    """Run the command line; what it prints instead of doing it is raised, an error as it is."""
+    with redirect_stdout(io.StringIO()) as printed:
+        try:
+            code = main(["--debug", *words])
+        except MeshError as missed:  # an answer, and it says how good
+            if "is written, but a handle misses its target" not in str(missed):
+                raise
+            code = 0
+    if code:
+        raise ToldError(printed.getvalue())
+
+
+def check_command(vertices, faces):
+    as_off(vertices, faces)
+    commanded("check", "zoo.off")
+
+
+def deform_command(vertices, faces):
+    as_off(vertices, faces)
+    x = np.nan_to_num(np.asarray(vertices, float)).reshape(-1, 3)
+    axis = "xyz"[np.ptp(x, axis=0).argmax() if len(x) else 0]
+    words = ["deform", "zoo.off", "-o", "bent.off", "--fixed", f"{axis}<12%", "--handle"]
+    words += [f"{axis}>88%", "--rotate", "y,15", "--regions", "2", "--cage-vertices", "60"]
+    commanded(*words)
+    mesh = sd.read_mesh("zoo.off")
+    require_right(mesh, sd.read_mesh("bent.off").vertices)
+
+
+OPERATIONS = {
+    "find_faults": look, "repair": mend, "Mesh": check, "segment": segment, "fit_cages": fit,
+    "Deformer": solve, "deform": deform, "Session": drag, "filter": pipeline,
+    "segdeform check": check_command, "segdeform deform": deform_command,
+}  # fmt: skip
+TAKE_ANY_ARRAYS = {name for name in OPERATIONS if name != "filter" and " " not in name}
+
+
+# What is done to the rest: regions, overlaps, cages, what is held, targets, numbers.
+
+
+@lru_cache(maxsize=1)
+def scene():
+    """Return the body in one snug cage."""
+    mesh = sd.Mesh(*zoo.body())
+    return mesh, sd.Regions.single(mesh), (sd.Cage(*zoo.ball()),)
+
+
+def regions_alone(masks):
+    mesh = scene()[0]
+    regions = sd.Regions.from_masks(mesh, masks)
+    assert np.allclose(regions.weights.sum(axis=0), 1.0, atol=1e-12)
+    assert not regions.weights[~regions.membership].any()
+
+
+def regions_solved(masks):
+    mesh = scene()[0]
+    regions = sd.Regions.from_masks(mesh, masks)
+    cages = sd.fit_cages(mesh, regions, 30 * regions.n_regions)
+    deformer = sd.Deformer(mesh, regions, cages, fixed=zoo.LEFT, handle=zoo.RIGHT)
+    require_solved(deformer, bent(mesh, zoo.RIGHT))
+
+
+def regions_dragged(masks):
+    session = sd.Session(scene()[0])
+    session.set_regions(sd.Regions.from_masks(session.mesh, masks))
+    session.change_options(n_cage_vertices=30 * session.regions.n_regions)
+    session.fit_cages()
+    session.set_fixed(zoo.LEFT)
+    dragged(session, {session.add_handle(zoo.RIGHT): bent(session.mesh, zoo.RIGHT)})
+
+
+def overlap_of_labels(rings):
+    mesh = scene()[0]
+    regions = sd.Regions.from_labels(mesh, (mesh.vertices[:, 0] > 0).astype(int), rings)
+    regions_solved(regions.membership)
+
+
+def overlap_of_segments(rings):
+    mesh = scene()[0]
+    regions_solved(sd.segment(mesh, 2, overlap=rings).membership)
+
+
+def overlap_of_halves(rings):
+    session = sd.Session(scene()[0])
+    session.split_region(0, overlap=rings)
+    regions_alone(session.regions.membership)
+
+
+def require_solved(deformer, targets):
+    solution = deformer.solve(targets)
+    require_right(deformer.mesh, solution.vertices)
+    require_met(solution)
+
+
+def cage_alone(vertices, faces):
+    cage = sd.Cage(vertices, faces)
+    cage.require_encloses(scene()[0].vertices, "vertices")
+    sd.Deformer(*scene()[:2], [cage])  # which alone knows what is too large
+
+
+def cage_solved(vertices, faces):
+    mesh, regions, _ = scene()
+    cages = [sd.Cage(vertices, faces)]
+    deformer = sd.Deformer(mesh, regions, cages, fixed=zoo.LEFT, handle=zoo.RIGHT)
+    require_solved(deformer, bent(mesh, zoo.RIGHT))
+
+
+def cage_dragged(vertices, faces):
+    mesh, regions, _ = scene()
+    session = sd.Session(mesh)
+    session.set_regions(regions)
+    session.set_cages([sd.Cage(vertices, faces)])
+    session.set_fixed(zoo.LEFT)
+    dragged(session, {session.add_handle(zoo.RIGHT): bent(mesh, zoo.RIGHT)})
+
+
+def cage_in_a_pipeline(vertices, faces):
+    cage = polydata_of(np.asarray(vertices, float), np.full(len(faces), 3), np.ravel(faces))
+    filtered(to_polydata(scene()[0]), cages=cage)
+
+
+def held_by_a_deformer(fixed, handle):
+    mesh = scene()[0]
+    deformer = sd.Deformer(*scene(), fixed=fixed, handle=handle)
+    require_solved(deformer, bent(mesh, deformer.handle, 5.0))
+
+
+def held_again(fixed, handle):
+    deformer = sd.Deformer(*scene()).hold(fixed=fixed, handle=handle)
+    require_solved(deformer, deformer.mesh.vertices[deformer.handle])
+
+
+def held_in_one_call(fixed, handle):
+    mesh = scene()[0]
+    try:
+        targets = bent(mesh, np.asarray(handle) if len(handle) else np.zeros(0, int), 5.0)
+    except IndexError:  # no such vertices: it is the handle that has to be refused
+        targets = np.zeros((1, 3))
+    solution = sd.deform(mesh, fixed, handle, targets, n_regions=1, n_cage_vertices=40)
+    require_right(mesh, solution.vertices)
+    require_met(solution)
+
+
+def held_in_a_session(fixed, handle):
+    mesh, regions, cages = scene()
+    session = sd.Session(mesh)
+    session.set_regions(regions)
+    session.set_cages(cages)
+    session.set_fixed(fixed)
+    name = session.add_handle(handle)
+    dragged(session, {name: bent(mesh, session.handles[name], 5.0)})
+
+
+def held_in_a_pipeline(fixed, handle):
+    filtered(to_polydata(scene()[0]), n_regions=1, fixed=fixed, handle=handle)
+
+
+def targets_solved(targets):
+    deformer = sd.Deformer(*scene(), fixed=zoo.LEFT, handle=zoo.RIGHT)
+    try:
+        require_solved(deformer, targets)
+    finally:  # and, whatever came of it, it goes on working
+        require_solved(deformer, deformer.mesh.vertices[zoo.RIGHT])
+
+
+def targets_in_one_call(targets):
+    mesh = scene()[0]
+    options = {"n_regions": 1, "n_cage_vertices": 40}
+    solution = sd.deform(mesh, zoo.LEFT, zoo.RIGHT, targets, **options)
+    require_right(mesh, solution.vertices)
+    require_met(solution)
+
+
+def session_of_the_scene():
+    mesh, regions, cages = scene()
+    session = sd.Session(mesh)
+    session.set_regions(regions)
+    session.set_cages(cages)
+    session.set_fixed(zoo.LEFT)
+    session.add_handle(zoo.RIGHT, "right")
+    return session
+
+
+def unchanged_if_refused(session, change):
+    before = session.state
+    try:
+        change()
+    except SegDeformError:
+        assert session.state is before
+        raise
+
+
+def targets_dragged(targets):
+    session = session_of_the_scene()
+    unchanged_if_refused(session, lambda: dragged(session, {"right": targets}))
+
+
+def targets_of_all_dragged(targets):
+    dragged(session_of_the_scene(), targets)
+
+
+def targets_in_a_pipeline(targets):
+    held = {"fixed": zoo.LEFT, "handle": zoo.RIGHT}
+    filtered(to_polydata(scene()[0]), n_regions=1, targets=targets, **held)
+
+
+def motion_of_a_handle(matrix):
+    session = session_of_the_scene()
+    unchanged_if_refused(session, lambda: require_met(session.move_handle("right", matrix)))
+    require_right(session.mesh, session.vertices)
+
+
+def cage_moved(vertices):
+    session = session_of_the_scene()
+    unchanged_if_refused(session, lambda: session.move_cage(0, vertices))
+    require_kept(session)
+    session.commit()
+    session.undo()
+    assert np.array_equal(session.vertices, session.mesh.vertices)
+
+
+def require_kept(session):
+    """Assert that a free pose is finite, and that its volume is what is said of it."""
+    assert np.isfinite(session.vertices).all()
+    now = volume(session.vertices, session.mesh.faces)
+    rest = volume(session.mesh.vertices, session.mesh.faces)
+    assert abs(session.volume_change - (now - rest) / rest) <= 1e-12
+
+
+def number_of_regions(value):
+    sd.segment(scene()[0], value)
+
+
+def number_of_cage_vertices(value):
+    sd.fit_cages(*scene()[:2], value)
+
+
+def offset_of_cages(value):
+    sd.fit_cages(*scene()[:2], 40, offset=value)
+
+
+def smoothness_of_regions(value):
+    sd.Regions(scene()[0], scene()[1].membership, value)
+
+
+def distance_of_welding(value):
+    sd.repair(*zoo.body(), weld_distance=value)
+
+
+def largest_hole(value):
+    sd.repair(*zoo.body(), largest_hole=value)
+
+
+def option_of_a_deformer(value, name):
+    sd.Deformer(*scene(), **{name: value}).solve(np.zeros((0, 3)))
+
+
+def option_of_a_session(value, name):
+    sd.Session(scene()[0]).change_options(**{name: value})
+
+
+def steps_of_a_drag(value):
+    session = session_of_the_scene()
+    session.drag({"right": bent(session.mesh, zoo.RIGHT)}, max_steps=value)
+
+
+def named(operation, name):
+    """Return an operation with a name of its own."""
+    run = partial(operation, name=name)
+    run.__name__ = f"{operation.__name__}: {name}"
+    return run
+
+
+def polydata_to_mesh(polydata):
+    mesh = from_polydata(polydata)
+    assert volume(mesh.vertices, mesh.faces) > 0
+
+
+def polydata_in_a_pipeline(polydata):
+    filtered(polydata)
+
+
+def polydata_in_a_file(polydata):
+    write_mesh("zoo.vtp", polydata)
+    commanded("check", "zoo.vtp")
+
+
+def polydata_deformed(polydata):
+    write_mesh("zoo.vtp", polydata)
+    held = ["--fixed", "x<12%", "--handle", "x>88%", "--rotate", "y,15", "--regions", "1"]
+    commanded("deform", "zoo.vtp", "-o", "bent.vtp", *held, "--cage-vertices", "40")
+    require_right(sd.read_mesh("zoo.vtp"), sd.read_mesh("bent.vtp").vertices)
+
+
+OTHERS = {
+    "regions": (zoo.REGIONS, [regions_alone, regions_solved, regions_dragged]),
+    "overlaps": (zoo.OVERLAPS, [overlap_of_labels, overlap_of_segments, overlap_of_halves]),
+    "cages": (zoo.CAGES, [cage_alone, cage_solved, cage_dragged, cage_in_a_pipeline]),
+    "cage poses": (zoo.CAGE_POSES, [cage_moved]),
+    "held": (zoo.HELD, [
+        held_by_a_deformer, held_again, held_in_one_call, held_in_a_session, held_in_a_pipeline,
+    ]),
+    "targets": (zoo.TARGETS, [
+        targets_solved, targets_in_one_call, targets_dragged, targets_of_all_dragged,
+        targets_in_a_pipeline,
+    ]),
+    "motions": (zoo.MOTIONS, [motion_of_a_handle]),
+    "numbers": (zoo.NUMBERS, [
+        number_of_regions, number_of_cage_vertices, offset_of_cages, smoothness_of_regions,
+        distance_of_welding, largest_hole, steps_of_a_drag,
+        *(named(option_of_a_deformer, name) for name in (
+            "stretch", "tolerance", "max_steps", "window", "rotation_groups", "hold_tolerance",
+        )),
+        *(named(option_of_a_session, name) for name in (
+            "n_cage_vertices", "offset", "stretch", "rotation_groups",
+        )),
+    ]),
+    "PolyData": (zoo.POLYDATA, [
+        polydata_to_mesh, polydata_in_a_pipeline, polydata_in_a_file, polydata_deformed,
+    ]),
+}  # fmt: skip
+TAKE_PAIRS = {"cages", "held"}

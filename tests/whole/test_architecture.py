@@ -1,0 +1,419 @@
+"""The rules of the house, checked by reading the source.
+
+A room is a folder, or a single file at the top; it imports only from rooms before it in `ROOMS`,
+and only what their faces (`__init__.py`) name in `__all__`.  Run as a program, this file prints
+the rooms, their floors and their sizes.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import sys
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = ROOT / "vtk_segdeform"
+WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
+
+# In the order of imports; the second row is the method, in the order of the paper.
+ROOMS = [
+    "version", "errors", "checks", "arrays", "progress", "freezing", "files", "kernels",
+    "mesh", "repair", "geometry", "regions", "cages", "subspace", "energy", "solver", "deformer",
+    "session", "models", "io", "pictures", "filters",
+    "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
+    "widgets.handle_dragger", "widgets.volume_overlay", "widgets.recording", "widgets.editor",
+    "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "benchmarks", "cli", "__main__",
+]  # fmt: skip
+MOST_FLOORS = 24
+MOST_IMPORTS = 330  # pairs of rooms of which one imports from the other
+MOST_FILES = 22  # in one folder
+
+NUMERIC = {"numpy", "scipy"}
+VTK = {"vtkmodules"}
+# Libraries beyond numpy and scipy, by file or by room.
+GRANTED = {
+    "kernels.threads": {"threadpoolctl"},
+    "kernels.compiled.kernels": {"numba"},
+    "cages.contour": VTK,
+    "subspace.gpu": {"cupy", "torch"},
+    "models.implicit": VTK,
+    "io": {"pyvista"},
+    "io.array_names": VTK,
+    "io.convert": VTK,
+    "io.meshlab": {"pymeshlab"},
+    "io.polygons": VTK,
+    "io.vtk_writers": VTK,
+    "pictures": VTK | {"pyvista"},
+    "filters": VTK,
+    "filters.paraview_plugin": {"paraview"},
+    **{room: VTK for room in ROOMS if room.startswith("widgets")},
+    "widgets.plugin": {"pyvista"},
+    "widgets.qt": VTK | {"qtpy"},
+    "widgets.qt.widget": {"pyvista", "pyvistaqt"},
+    "widgets.app": VTK | {"qtpy"},
+    "benchmarks.cage_making": VTK | {"igl", "gpytoolbox"},
+    "benchmarks.charts": {"matplotlib"},
+    "benchmarks.drawing": VTK,
+    "benchmarks.experiments": {"pyvista"},
+    "benchmarks.programs": {"igl", "open3d", "bpy"},
+    "cli.application": {"qtpy"},
+    "cli.outputs": {"pyvista"},
+    "cli.replaying": {"pyvista"},
+}
+
+MAY_PRINT_AND_EXIT = {"cli.main", "__main__", "filters.paraview_plugin"}
+LONGEST = 400
+FILES = {
+    ".".join(path.relative_to(PACKAGE).with_suffix("").parts): path
+    for path in sorted(PACKAGE.rglob("*.py"))
+} | {
+    ".".join(("widgets", *path.relative_to(WIDGETS).with_suffix("").parts)): path
+    for path in sorted(WIDGETS.rglob("*.py"))
+}
+NAMES = [name for name in FILES if not name.endswith("__init__")]
+
+
+class Import(NamedTuple):
+    """One imported name: of which module, and whether that is ours."""
+
+    module: str
+    name: str
+    ours: bool
+
+
+def room_of(name: str) -> str:
+    """Return the room that a file or a module belongs to: the longest that its name begins with."""
+    parts = name.removesuffix(".__init__").split(".")
+    prefixes = (".".join(parts[:n]) for n in range(len(parts), 0, -1))
+    return next((prefix for prefix in prefixes if prefix in ROOMS), "")
+
+
+@functools.cache
+def tree_of(name: str) -> ast.Module:
+    """Return a file as it is parsed; nobody changes it."""
+    return ast.parse(FILES[name].read_text())
+
+
+@functools.cache
+def nodes_of(name: str) -> tuple[ast.AST, ...]:
+    """Return all nodes of a file, which takes longer than what is asked of them."""
+    return tuple(ast.walk(tree_of(name)))
+
+
+@functools.cache
+def calls_in(name: str) -> tuple[tuple[str, ast.Call], ...]:
+    """Return all calls in a file, each with the text of what it calls."""
+    calls = (node for node in nodes_of(name) if isinstance(node, ast.Call))
+    return tuple((ast.unparse(call.func), call) for call in calls)
+
+
+@functools.cache
+def imports(name: str) -> frozenset[Import]:
+    """Return every import anywhere in a file, inside functions too."""
+    return frozenset(_imports(name))
+
+
+def _imports(name: str) -> Iterator[Import]:
+    folder = name.split(".")[:-1]
+    for node in nodes_of(name):
+        if isinstance(node, ast.Import):
+            yield from (Import(alias.name.partition(".")[0], "", False) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            package, _, module = str(node.module or "").partition(".")
+            ours = bool(node.level) or package == "vtk_segdeform"
+            if node.level:
+                parts = [*folder[: len(folder) + 1 - node.level], *filter(None, (package, module))]
+                module = ".".join(parts)
+            for alias in node.names if ours else ():
+                inner = ".".join(filter(None, (module, alias.name)))
+                if alias.name in face(module):
+                    yield Import(module, alias.name, True)
+                elif inner in FILES or (f"{inner}.__init__" in FILES and inner in ROOMS):
+                    yield Import(inner, "", True)
+                else:
+                    yield Import(module, alias.name, True)
+            if not ours:
+                yield Import(package, "", False)
+
+
+@functools.cache
+def face(room: str) -> frozenset[str]:
+    """Return the names in the `__all__` of a room, which is all that other rooms may import."""
+    for node in nodes_of(f"{room}.__init__") if f"{room}.__init__" in FILES else ():
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
+            return frozenset(ast.literal_eval(node.value))
+    return frozenset()
+
+
+def between_rooms() -> Iterator[tuple[str, Import]]:
+    """Yield every file, faces left out, with each of its imports from another room."""
+    for name in NAMES:
+        for what in imports(name):
+            if what.ours and room_of(what.module) != room_of(name):
+                yield name, what
+
+
+def floors() -> dict[str, int]:
+    """Return the floor of each room: one above the highest from which it imports."""
+    found: dict[str, int] = {}
+    for room in ROOMS:
+        below = {room_of(what.module) for name, what in between_rooms() if room_of(name) == room}
+        found[room] = 1 + max((found.get(other, 0) for other in below), default=0)
+    return found
+
+
+def none(offences: Iterable[str]) -> None:
+    """Fail with all the *offences* at once, "file: offence" each."""
+    found = sorted(set(offences))
+    assert not found, "\n" + "\n".join(found)
+
+
+def test_every_file_is_in_a_room():
+    none(f"{name}: in no room" for name in NAMES if not room_of(name))
+    none(f"{room}: no such folder or file" for room in ROOMS if not _exists(room))
+    assert len(set(ROOMS)) == len(ROOMS)
+
+
+def _exists(room: str) -> bool:
+    return room in FILES or f"{room}.__init__" in FILES
+
+
+def test_a_room_imports_only_from_rooms_before_it():
+    place = {room: n for n, room in enumerate(ROOMS)}
+    none(
+        f"{name}: imports {what.name} from {what.module}, a later room"
+        for name, what in between_rooms()
+        if place.get(room_of(what.module), len(ROOMS)) >= place[room_of(name)]
+    )
+
+
+def test_a_room_is_entered_by_its_face():
+    """`from ..mesh import Mesh`, never `from ..mesh.topology import`; only names in `__all__`."""
+    none(
+        f"{name}: imports {what.name or 'all'} of {what.module}; import it from its folder"
+        for name, what in between_rooms()
+        if f"{room_of(what.module)}.__init__" in FILES and not _by_the_face(what)
+    )
+
+
+def _by_the_face(what: Import) -> bool:
+    room = room_of(what.module)
+    return what.module == room and (not what.name or what.name in face(room))
+
+
+def test_the_files_of_a_room_import_each_other_in_one_direction():
+    graph = {
+        name: {w.module for w in imports(name) if w.ours and room_of(w.module) == room_of(name)}
+        for name in NAMES
+    }
+    none(
+        f"{name}: imports itself by way of {graph[name] & _reached(graph, name)}"
+        for name in NAMES
+        if name in _reached(graph, name)
+    )
+
+
+def _reached(graph: dict[str, set[str]], start: str) -> set[str]:
+    found: set[str] = set()
+    todo = [start]
+    while todo:
+        new = graph.get(todo.pop(), set()) - found
+        found |= new
+        todo += new
+    return found
+
+
+def test_the_house_stays_low_and_its_rooms_small():
+    assert max(floors().values()) <= MOST_FLOORS
+    assert (
+        len({(room_of(name), room_of(what.module)) for name, what in between_rooms()})
+        <= MOST_IMPORTS
+    )
+    sizes = Counter(name.rpartition(".")[0] for name in NAMES)
+    none(f"{folder}: {size} files" for folder, size in sizes.items() if size > MOST_FILES)
+
+
+def test_a_face_names_files_that_are_there_and_leaves_none_out():
+    """A folder's docstring lists its files in reading order."""
+    none(
+        f"{folder}: {name} is not in the docstring of __init__.py"
+        for folder, name in (name.rpartition(".")[::2] for name in NAMES)
+        if folder not in {"", "widgets", "kernels.compiled"}
+        and name not in (ast.get_docstring(tree_of(f"{folder}.__init__")) or "").split()
+    )
+
+
+def test_a_room_imports_only_the_libraries_it_is_granted():
+    everywhere = NUMERIC | set(sys.stdlib_module_names)
+    none(
+        f"{name}: imports {what.module}"
+        for name in NAMES
+        for what in imports(name)
+        if not what.ours
+        and what.module
+        not in everywhere | GRANTED.get(name, set()) | GRANTED.get(room_of(name), set())
+    )
+
+
+def test_a_chapter_is_short_enough_to_read_at_once():
+    lengths = {name: path.read_text().count("\n") for name, path in FILES.items()}
+    none(
+        f"{name}: {length} lines; say 'Long because ...' or split it"
+        for name, length in lengths.items()
+        if length > LONGEST and "Long because" not in (ast.get_docstring(tree_of(name)) or "")
+    )
+
+
+def test_a_chapter_begins_by_saying_what_it_is():
+    none(f"{name}: no docstring" for name in FILES if not ast.get_docstring(tree_of(name)))
+
+
+def test_only_the_command_line_prints_or_exits():
+    forbidden = {
+        "print", "exit", "quit", "input", "sys.exit", "os._exit", "sys.stdout.write",
+        "sys.stderr.write",
+    }  # fmt: skip
+    silent = [name for name in FILES if name not in MAY_PRINT_AND_EXIT]
+    none(
+        f"{name}: calls {what}"
+        for name in silent
+        for what in forbidden & {called for called, _ in calls_in(name)}
+    )
+    none(
+        f"{name}: names SystemExit"
+        for name in silent
+        for node in nodes_of(name)
+        if isinstance(node, ast.Name) and node.id == "SystemExit"
+    )
+
+
+def test_a_chapter_changes_no_global_state_and_evaluates_no_text():
+    forbidden = {
+        "eval", "exec", "compile", "np.random.seed", "np.seterr", "warnings.filterwarnings",
+        "warnings.simplefilter", "logging.basicConfig", "pickle.load", "pickle.loads",
+    }  # fmt: skip
+    none(
+        f"{name}: calls {what}"
+        for name in FILES
+        for what in forbidden & {called for called, _ in calls_in(name)}
+    )
+    none(
+        f"{name}: {ast.unparse(node)}"
+        for name in FILES
+        for node in nodes_of(name)
+        if isinstance(node, ast.Global)
+    )
+
+
+def test_public_functions_take_at_most_four_positional_arguments():
+    offences = []
+    for name in FILES:
+        if name.startswith("kernels.compiled."):
+            continue  # numba wants arguments by position
+        for node in nodes_of(name):
+            if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+                positional = [a.arg for a in node.args.posonlyargs + node.args.args]
+                positional = [arg for arg in positional if arg not in ("self", "cls")]
+                if len(positional) > 4:
+                    offences.append(f"{name}: {node.name}({', '.join(positional)}): use keywords")
+    none(offences)
+
+
+# Given a draft to write to; the log of a recording, which grows event by event; and /proc.
+WRITE_TO_WHAT_THEY_ARE_GIVEN = {
+    "io.off", "io.ply", "io.wavefront", "io.vtk_writers", "io.reading_child",
+    "widgets.recording.film_files", "widgets.recording.recording",
+    "benchmarks.measuring",
+}  # fmt: skip
+REPLACING = {
+    "os.replace", "os.rename", "os.renames", "os.link", "shutil.move", "tempfile.mkstemp",
+    "tempfile.mktemp", "tempfile.NamedTemporaryFile", "NamedTemporaryFile", "mkstemp",
+}  # fmt: skip
+
+
+def test_files_are_replaced_in_one_place():
+    none(
+        f"{name}: {ast.unparse(call)}: use files.replacing"
+        for name in FILES
+        if name != "files.atomic"
+        for what, call in calls_in(name)
+        if _replaces(what, call)
+    )
+
+
+def test_files_are_written_only_where_they_are_replaced():
+    none(
+        f"{name}: {ast.unparse(call)}: write to a draft of files.replacing"
+        for name in FILES
+        if name not in {"files.atomic", *WRITE_TO_WHAT_THEY_ARE_GIVEN}
+        for what, call in calls_in(name)
+        if _writes(what, call) and id(call) not in _within_replacing(name)
+    )
+
+
+def _within_replacing(name: str) -> set[int]:
+    """Return the ids of the calls of a file that are within `with replacing(...)`."""
+    return {
+        id(call)
+        for block in nodes_of(name)
+        if isinstance(block, ast.With)
+        and any(_is_replacing(item.context_expr) for item in block.items)
+        for call in ast.walk(block)
+    }
+
+
+def _is_replacing(node: ast.expr) -> bool:
+    return isinstance(node, ast.Call) and ast.unparse(node.func) == "replacing"
+
+
+def _replaces(what: str, call: ast.Call) -> bool:
+    """Tell whether a call puts a file in the place of another one."""
+    renames = what.endswith((".rename", ".replace")) and len(call.args) == 1
+    return what in REPLACING or (renames and not call.keywords)
+
+
+def _writes(what: str, call: ast.Call) -> bool:
+    """Tell whether a call writes a file."""
+    if what.endswith((".write_text", ".write_bytes", ".savefig", ".SetFileName", "np.savez")):
+        return True
+    texts = [*call.args, *(word.value for word in call.keywords)]
+    modes = [str(text.value) for text in texts if isinstance(text, ast.Constant)]
+    opens = what == "open" or what.endswith(".open")
+    return opens and any(set(mode) <= set("wxabt+") and set(mode) & set("wxa") for mode in modes)
+
+
+TIMERS = {
+    "CreateTimer", "CreateOneShotTimer", "CreateRepeatingTimer", "DestroyTimer", "ResetTimer",
+    "add_timer_event", "create_timer", "destroy_timer",
+}  # fmt: skip
+
+
+def test_only_the_view_creates_and_destroys_vtk_timers():
+    """Hosts may have one timer behind all of them, so a second owner would stop the first's."""
+    none(
+        f"{name}: {word}"
+        for name in FILES
+        if name != "widgets.scene.view"
+        for node in nodes_of(name)
+        for word in (getattr(node, "attr", None), getattr(node, "value", None))
+        if isinstance(node, ast.Attribute | ast.Constant)
+        if isinstance(word, str) and word in TIMERS
+    )
+
+
+def _report() -> Iterator[str]:
+    sizes = Counter(room_of(name) for name in NAMES)
+    users = Counter(room_of(what.module) for _, what in between_rooms())
+    for room, floor in sorted(floors().items(), key=lambda each: each[1]):
+        yield f"{floor:3} {room:26} {sizes[room]:3} files, imported {users[room]} times"
+    pairs = {(room_of(name), room_of(what.module)) for name, what in between_rooms()}
+    yield f"{len(ROOMS)} rooms on {max(floors().values())} floors, {len(NAMES)} files"
+    yield f"{len(pairs)} pairs of rooms of which one imports from the other"
+
+
+if __name__ == "__main__":
+    print("\n".join(_report()))

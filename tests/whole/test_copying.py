@@ -1,0 +1,144 @@
+"""Copies and pickles are bit-identical to the original, and independent of it."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from dataclasses import fields
+
+import public_calls
+import pytest
+from numpy.testing import assert_array_equal
+from scenes import sausage
+from test_read_only import CLASSES, _shared
+
+import vtk_segdeform as sd
+from vtk_segdeform import Session
+from vtk_segdeform.session.state import Pose, State
+
+SCENE = sausage()
+
+
+def pickled(thing):
+    """Return *thing* after pickling and unpickling."""
+    return pickle.loads(pickle.dumps(thing))
+
+
+WAYS = [copy.copy, copy.deepcopy, pickled]
+
+
+def working_session() -> Session:
+    """Return a session with an ongoing drag, a step to undo and one to redo."""
+    session = Session(SCENE.mesh)
+    session.set_regions(SCENE.regions)
+    session.set_cages(SCENE.cages)
+    session.rename_region(0, "trunk")
+    session.set_fixed(SCENE.fixed)
+    session.add_handle(SCENE.handle)
+    session.drag(SCENE.turned(10), max_steps=2)
+    session.commit()
+    session.change_options(stretch=5.0)
+    session.undo()
+    session.drag(SCENE.turned(20), max_steps=2)
+    return session
+
+
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
+@pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.__name__)
+def test_the_arrays_of_a_copy_are_read_only_as_well(cls, way):
+    assert _shared(way(public_calls.instance(cls))) == []
+
+
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
+def test_copies_of_a_mesh_regions_and_cages_are_equal_and_have_no_caches(way):
+    mesh = sd.models.sphere(500)
+    regions = sd.Regions.single(mesh)
+    cage = public_calls.cages()[0]
+    for thing, name in ((mesh, "vertices"), (mesh, "faces"), (regions, "membership"),
+                        (cage, "vertices"), (cage, "faces")):  # fmt: skip
+        assert_array_equal(getattr(way(thing), name), getattr(thing, name))
+    before = [len(pickle.dumps(thing)) for thing in (mesh, regions)]
+    asked = mesh.edges, mesh.adjacency, mesh.components, mesh.face_areas, mesh.diagonal
+    assert len(asked) == 5
+    assert_array_equal(way(regions).weights, regions.weights)
+    assert [len(pickle.dumps(thing)) for thing in (mesh, regions)] == before
+    assert set(vars(way(mesh))) == {each.name for each in fields(mesh)}
+
+
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
+def test_a_copied_session_has_the_drag_the_names_and_the_history(way):
+    session = working_session()
+    other = way(session)
+    assert other.is_dragging
+    assert other.region_names == ("trunk", "region 2")
+    assert_array_equal(other.vertices, session.vertices)
+    for one in (session, other):
+        one.start_afresh()
+    again = [one.refine().vertices for one in (session, other)]
+    assert_array_equal(*again)
+    labels = [[one.undo() for _ in range(7)] for one in (session, other)]
+    assert labels[0] == labels[1]
+    assert [one.redo() for one in (session, other)] == ["set regions"] * 2
+    while session.redo():
+        other.redo()
+        assert_array_equal(other.vertices, session.vertices)
+
+
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
+def test_a_copied_session_is_independent_and_has_no_listeners(way):
+    session = working_session()
+    heard: list[sd.Change] = []
+    session.on_change(heard.append)
+    other = way(session)
+    before, label = session.state, session.undo_label
+    other.undo()
+    other.set_fixed([])
+    other.remove_handle("handle 1")
+    assert heard == []
+    assert session.state is before
+    assert (session.undo_label, session.redo_label) == (label, None)
+    assert session.effort == way(session).effort
+    session.revert()
+    assert heard
+    assert other.undo_label == "remove handle 1"
+
+
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
+def test_a_copied_deformer_solves_the_same_bits_from_the_same_pose(way):
+    untouched, deformer = SCENE.held(), SCENE.held()
+    for one in (untouched, deformer):
+        one.solve(SCENE.turned(15))
+    expected = untouched.solve(SCENE.turned(30))
+    other, astray = way(deformer), way(deformer)
+    astray.solve(SCENE.turned(-20))
+    for one in (deformer, other):
+        solution = one.solve(SCENE.turned(30))
+        assert_array_equal(solution.vertices, expected.vertices)
+        assert solution.steps == expected.steps
+    points = SCENE.mesh.vertices[:5]
+    assert_array_equal(other.carry(points), deformer.carry(points))
+    poses = [one.hold(handle=SCENE.handle).solve(SCENE.turned(10)) for one in (deformer, other)]
+    assert_array_equal(poses[1].vertices, poses[0].vertices)
+
+
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
+def test_a_copied_solution_has_the_same_values_and_no_deformer(way):
+    solution = SCENE.held().solve(SCENE.turned(15))
+    other = way(solution)
+    assert_array_equal(other.vertices, solution.vertices)
+    for name in ("handle_error", "fixed_error", "volume_change", "steps", "status", "merits"):
+        assert getattr(other, name) == getattr(solution, name)
+    assert_array_equal(other.region_volume_change, solution.region_volume_change)
+    assert len(pickle.dumps(solution)) < 4 * solution.vertices.nbytes
+
+
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
+def test_a_state_is_copied_with_its_pose_and_fits_another_session(way):
+    session = working_session()
+    state = way(session.state)
+    assert isinstance(state, State)
+    assert isinstance(state.pose, Pose)
+    assert_array_equal(Session(SCENE.mesh, state=state).vertices, session.vertices)
+    with pytest.raises(TypeError):
+        state.handles["x"] = state.fixed
+    assert way(session.options) == session.options

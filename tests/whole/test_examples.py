@@ -1,0 +1,79 @@
+"""Every example runs, and one number of each is right."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+from vtk_segdeform import models
+from vtk_segdeform.errors import MissingDependencyError
+from vtk_segdeform.pictures.canvas import require_offscreen
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+RIGHT = {
+    "bend_the_cactus": lambda names: abs(names["solution"].volume_change) < 1e-12,
+    "with_and_without_volume": lambda names: (
+        abs(names["changes"][True]) < 1e-12 and abs(names["changes"][False]) > 1e-3
+    ),
+    "one_cage_or_several": lambda names: names["distortions"][1] < 0.6 * names["distortions"][0],
+    "dinosaur": lambda names: (
+        abs(names["session"].volume_change) < 1e-12 and names["solution"].handle_error < 1e-3
+    ),
+    "custom_regions": lambda names: (
+        names["session"].regions.n_regions == 3 and abs(names["session"].volume_change) < 1e-12
+    ),
+    "custom_cage": lambda names: (
+        max(abs(names["by_hand"][0]), abs(names["session"].volume_change)) < 1e-12
+    ),
+    "editor_in_a_plotter": lambda names: (
+        names["moved"] > 0.2 and abs(names["session"].volume_change) < 1e-12
+    ),
+    "editor_by_itself": lambda names: (
+        names["moved"] > 0.3 and abs(names["session"].volume_change) < 1e-12
+    ),
+    "carry_a_grid": lambda names: names["sizes"].min() > 0.2 and len(names["sizes"]) > 1000,
+    "film_a_drag": lambda names: (
+        len(names["changes"]) > 14 and max(map(abs, names["changes"])) < 1e-12
+    ),
+}
+
+LEAVES = {"carry_a_grid": ["bent.vtu", "grid.vtu"]}  # the others' pictures: `make docs`
+WHOLE = {"bend_the_cactus"}  # the README's runs as it is; the others do so in the campaign
+FEW = 1500  # vertices
+DRAW = {"editor_by_itself", "editor_in_a_plotter", "film_a_drag"}  # in any case
+ELSEWHERE = {"qt_application"}  # in test_qt_widget, which has a screen
+
+
+def test_every_example_has_a_number_to_hold():
+    assert sorted([*RIGHT, *ELSEWHERE]) == sorted(path.stem for path in EXAMPLES.glob("*.py"))
+
+
+@pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize("name", RIGHT)
+@pytest.mark.usefixtures("cached_models")
+def test_the_example_runs_and_its_number_is_right(name, whole, monkeypatch, tmp_path):
+    folder = tmp_path / "some" / "where"  # which it makes
+    monkeypatch.setattr("sys.argv", [name, str(folder)] if name in LEAVES else [name])
+    if not (whole or name in WHOLE):
+        for model in (models.cactus, models.dinosaur):
+            monkeypatch.setattr(models, model.__name__, smaller(model))
+    if name in DRAW:
+        try:
+            require_offscreen()
+        except MissingDependencyError as missing:
+            pytest.skip(str(missing))
+    assert RIGHT[name](runpy.run_path(str(EXAMPLES / f"{name}.py")))
+    assert sorted(path.name for path in folder.glob("*")) == LEAVES.get(name, [])
+
+
+def smaller(model):
+    """Return what makes a model of few vertices, whatever is asked for."""
+    return lambda n_vertices=FEW: model(min(n_vertices, FEW))
+
+
+def test_the_readme_shows_the_first_example_as_it_is():
+    readme = (EXAMPLES.parent / "README.md").read_text()
+    code = (EXAMPLES / "bend_the_cactus.py").read_text().split("\n", 2)[2].strip()
+    assert code in readme

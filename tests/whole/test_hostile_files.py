@@ -1,0 +1,458 @@
+"""Files that were cut off, scrambled or made to harm: a clear error, soon, and nothing else.
+
+Every reader that takes a path reads files that something was done to: in a process of its own,
+with 2 GB and 20 seconds, because VTK's readers are native code.  A file is either read, or refused
+by an error of ours that names it; it never ends the process, hangs, or takes all the memory.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import re
+import struct
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gltf_files import glb, octahedron
+from scenes import sausage
+from solids import OCTAHEDRON, icosphere
+from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+import vtk_segdeform as sd
+from vtk_segdeform.io import meshlab
+from vtk_segdeform.io.convert import to_polydata, write_mesh
+from vtk_segdeform.io.meshlab_project import write_project
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="needs fork and memory limits")
+
+ROOT = Path(__file__).resolve().parents[2]
+SUPPORT = ROOT / "tests" / "support"
+RECORDING = """vtk_segdeform recording 1
+0.0 Window 400 300
+0.1 Camera position 0 0 5 focus 0 0 0 up 0 1 0 angle 30 parallel 0 scale 1 range 0.1 100
+0.2 MouseMove 10 20
+0.3 LeftButtonPress 10 20 shift
+0.4 KeyPress 10 20 key=g code=103
+0.5 Timer 3
+"""
+STRIPS = """ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+element tristrips 1
+property list int int vertex_indices
+end_header
+1 1 1
+1 -1 -1
+-1 1 -1
+-1 -1 1
+7 0 1 2 3 0 1 -1
+"""
+MATRIX = "1 0 0 0.5\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
+MESHES = [".ply", ".obj", ".off", ".stl", ".vtk", ".vtp", ".vtkhdf"]
+HUGE = [b"4294967295", b"2147483647", b"99999999999999999999", b"-1", b"1e308", b"nan", b"0"]
+
+
+def originals(folder):
+    """Write a sound file of every kind; return [(reader, path)]."""
+    mesh = sd.Mesh(*icosphere(1))
+    surface = to_polydata(mesh)
+    surface.point_data["red"] = np.arange(mesh.n_vertices, dtype=np.uint8)
+    surface.point_data["weight"] = np.linspace(0.0, 1.0, mesh.n_vertices)
+    files = []
+    for suffix in MESHES:
+        path = folder / f"sound{suffix}"
+        write_mesh(path, surface)
+        files.append(("mesh", path))
+    text = folder / "text.ply"
+    surface.save(text, binary=False)
+    files.append(("mesh", text))
+    surface.save(folder / "text.vtk", binary=False)
+    files.append(("mesh", folder / "text.vtk"))
+    surface.save(folder / "text.stl", binary=False)
+    files.append(("mesh", folder / "text.stl"))
+    surface.cast_to_unstructured_grid().save(folder / "sound.vtu")
+    files.append(("mesh", folder / "sound.vtu"))
+    for suffix in (".glb", ".gltf"):
+        files.append(("mesh", octahedron(*OCTAHEDRON).save(folder / f"sound{suffix}")))
+    if meshlab.available():
+        for suffix in (".x3d", ".wrl", ".dae"):
+            write_mesh(folder / f"sound{suffix}", mesh)
+            files.append(("mesh", folder / f"sound{suffix}"))
+    files.append(("mesh", folder / "strips.ply"))
+    files[-1][1].write_text(STRIPS)
+    files.append(("mesh", folder / "raw.vtp"))
+    save_raw(files[-1][1], surface)
+    sd.save_session(folder / "sound.segdeform", session())
+    files.append(("session", folder / "sound.segdeform"))
+    write_project(folder / "sound.mlp", mesh)
+    files.append(("project", folder / "sound.mlp"))
+    for name, text, reader in [
+        ("sound.recording.txt", RECORDING, "recording"),
+        ("sound.def", MATRIX, "matrix"),
+        ("sound.sel", "0 0 1 1 2 2\n", "selection"),
+        ("ids.txt", "0, 1 2 # three of them\n5\n", "selection"),
+    ]:
+        (folder / name).write_text(text)
+        files.append((reader, folder / name))
+    return files
+
+
+def save_raw(path, surface):
+    """Write an XML file whose numbers follow it as they are."""
+    writer = vtkXMLPolyDataWriter()
+    writer.SetInputData(surface)
+    writer.SetFileName(str(path))
+    writer.SetDataModeToAppended()
+    writer.EncodeAppendedDataOff()
+    writer.SetCompressorTypeToNone()
+    writer.Write()
+
+
+def session():
+    """Return a small session with something of everything."""
+    scene = sausage(1)
+    result = sd.Session(sd.Mesh(*OCTAHEDRON))
+    result.set_regions(sd.Regions.single(result.mesh))
+    result.set_cages([sd.Cage(scene.cages[0].vertices, scene.cages[0].faces)])
+    result.add_handle([0], "h")
+    result.drag(result.targets["h"] + [0.2, 0.1, 0.0], max_steps=2)
+    return result
+
+
+def harmed(data, rng):
+    """Return *data* after one of the things that happen to files."""
+    data = bytearray(data)
+    at = int(rng.integers(len(data)))
+    kind = int(rng.integers(9))
+    if kind == 0:
+        del data[at:]
+    elif kind == 1:
+        for place in rng.integers(len(data), size=rng.integers(1, 9)):
+            data[place] ^= 1 << int(rng.integers(8))
+    elif kind == 2:
+        data[at : at + int(rng.integers(1, 200))] = rng.bytes(int(rng.integers(1, 200)))
+    elif kind == 3:  # a number, in words, is another one
+        found = list(re.finditer(rb"\d+", data[:4000]))
+        if found:
+            match = found[int(rng.integers(len(found)))]
+            data[match.start() : match.end()] = HUGE[int(rng.integers(len(HUGE)))]
+    elif kind == 4:  # a number, in bytes, is another one
+        data[at : at + 4] = [b"\xff\xff\xff\x7f", b"\xff" * 4, b"\0\0\0\x40"][int(rng.integers(3))]
+    elif kind == 5:
+        other = int(rng.integers(len(data)))
+        data[at:at] = data[min(at, other) : max(at, other)]
+    elif kind == 8:  # two pieces change places
+        a, b, c = np.sort(rng.integers(len(data), size=3)).tolist()
+        data[a:c] = data[b:c] + data[a:b]
+    elif kind == 6:
+        del data[at : at + int(rng.integers(1, 400))]
+    else:
+        data[at : at + int(rng.integers(1, 400))] = b"\0" * int(rng.integers(1, 400))
+    return bytes(data)
+
+
+def places(value):
+    """Yield (container, key) of everything in a JSON value."""
+    if isinstance(value, dict | list):
+        for key in list(value) if isinstance(value, dict) else range(len(value)):
+            yield value, key
+            yield from places(value[key])
+
+
+WORTHS = [
+    0,
+    1,
+    -1,
+    2,
+    3,
+    5,
+    7,
+    255,
+    2**31,
+    2**32,
+    2**53,
+    2**63,
+    1.5,
+    -0.0,
+    1e308,
+    float("nan"),
+    True,
+    None,
+    "",
+    "x",
+    [],
+    {},
+    [0],
+    [[0]],
+    [0, 0],
+    {"0": 0},
+    "VEC3",
+    "../a",
+    "POSITION",
+]
+
+
+def harmed_json(head, rng):
+    """Return a JSON document with a value replaced, moved, removed or duplicated."""
+    head = json.loads(json.dumps(head))
+    found = list(places(head))
+    container, key = found[int(rng.integers(len(found)))]
+    other, there = found[int(rng.integers(len(found)))]
+    kind = int(rng.integers(5))
+    if kind <= 1:
+        container[key] = WORTHS[int(rng.integers(len(WORTHS)))]
+    elif kind == 2:
+        del container[key]
+    elif kind == 3:  # as another value is
+        container[key] = json.loads(json.dumps(other[there]))
+    elif isinstance(container, list):
+        container.append(json.loads(json.dumps(container[key])))
+    else:
+        container[str(there)] = container[key]
+    return head
+
+
+def save_harmed(path, document):
+    """Write any JSON, with the buffer that belongs to it."""
+    if path.suffix == ".glb":
+        path.write_bytes(glb(json.dumps(document.head).encode(), document.blob))
+        return
+    buffers = document.head.get("buffers")
+    if isinstance(buffers, list) and buffers and isinstance(buffers[0], dict):
+        code = base64.b64encode(document.blob).decode()
+        buffers[0].setdefault("uri", f"data:application/octet-stream;base64,{code}")
+    path.write_text(json.dumps(document.head))
+
+
+def mutants(folder, sound, count, seed):
+    """Write *count* harmed files; return [(reader, path)]."""
+    rng = np.random.default_rng(seed)
+    files = []
+    for number in range(count):
+        reader, path = sound[number % len(sound)]
+        place = folder / f"m{number}{path.suffix}"
+        if path.suffix in (".glb", ".gltf") and rng.random() < 0.8:
+            document = octahedron(*OCTAHEDRON)
+            for _ in range(int(rng.integers(1, 4))):
+                document.head = harmed_json(document.head, rng)
+            save_harmed(place, document)
+        else:
+            data = path.read_bytes()
+            for _ in range(int(rng.integers(1, 3))):
+                data = harmed(data or b"\0", rng)
+            place.write_bytes(data)
+        files.append((reader, place))
+    return files
+
+
+VTP = """<?xml version="1.0"?>{before}
+<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64"><PolyData>
+<Piece NumberOfPoints="{n}" NumberOfPolys="4">
+<PointData>{arrays}</PointData>
+<Points><DataArray type="Float32" NumberOfComponents="3" format="ascii">
+1 1 1 1 -1 -1 -1 1 -1 -1 -1 1</DataArray></Points>
+<Polys><DataArray type="Int64" Name="connectivity" format="ascii">{corners}</DataArray>
+<DataArray type="Int64" Name="offsets" format="ascii">{ends}</DataArray></Polys>
+</Piece></PolyData>{after}</VTKFile>
+"""
+SOUND = {"n": 4, "corners": "0 1 2 0 3 1 0 2 3 1 3 2", "ends": "3 6 9 12", "before": "",
+         "arrays": "", "after": ""}  # fmt: skip
+LEGACY = """# vtk DataFile Version 3.0
+x
+ASCII
+DATASET POLYDATA
+POINTS {points} float
+1 1 1 1 -1 -1 -1 1 -1 -1 -1 1
+POLYGONS {cells} {size}
+3 0 1 2 3 0 3 1 3 0 2 3 3 1 3 {last}
+"""
+FACES = {"points": 4, "cells": 4, "size": 16, "last": 2}
+BOMB = (
+    '<!DOCTYPE x [<!ENTITY a0 "aaaaaaaaaa">'
+    + "".join(f'<!ENTITY a{k} "{10 * f"&a{k - 1};"}">' for k in range(1, 12))
+    + "]>"
+)
+X3D = '<?xml version="1.0"?>{}<X3D version="3.0"><Scene>{}</Scene></X3D>'
+OUTSIDE = '<DataArray type="Float64" Name="a" format="appended" offset="{}"/>'
+
+
+def lies(folder):
+    """Write files with counts or nesting beyond any reader's limits; return [(reader, path)]."""
+    texts = {
+        "sound.vtp": VTP.format(**SOUND),
+        "corner.vtp": VTP.format(**SOUND | {"corners": "0 1 2 0 3 1 0 2 3 1 3 900000000"}),
+        "negative.vtp": VTP.format(**SOUND | {"corners": "0 1 2 0 3 1 0 2 3 1 3 -900000000"}),
+        "end.vtp": VTP.format(**SOUND | {"ends": "3 6 9 1200000000"}),
+        "back.vtp": VTP.format(**SOUND | {"ends": "3 -600000000 9 12"}),
+        "points.vtp": VTP.format(**SOUND | {"n": 999999999999}),
+        "few.vtp": VTP.format(**SOUND | {"n": 3}),
+        "deep.vtp": VTP.format(**SOUND | {"after": 300_000 * "<a>" + 300_000 * "</a>"}),
+        "bomb.vtp": VTP.format(**SOUND | {"before": BOMB, "arrays": "&a11;"}),
+        "offset.vtp": VTP.format(
+            **SOUND | {"arrays": OUTSIDE.format(2**62), "after": '<AppendedData encoding="raw">_x'}
+        ),
+        "minus.vtp": VTP.format(
+            **SOUND | {"arrays": OUTSIDE.format(-9), "after": '<AppendedData encoding="raw">_x'}
+        ),
+        "sound.vtk": LEGACY.format(**FACES),
+        "points.vtk": LEGACY.format(**FACES | {"points": 999999999999}),
+        "minus.vtk": LEGACY.format(**FACES | {"points": -4}),
+        "cells.vtk": LEGACY.format(**FACES | {"cells": 999999999999}),
+        "size.vtk": LEGACY.format(**FACES | {"size": 999999999999}),
+        "corner.vtk": LEGACY.format(**FACES | {"last": 900000000}),
+        "scalars.vtk": LEGACY.format(**FACES)
+        + "POINT_DATA 999999999999\nSCALARS a float 4\nLOOKUP_TABLE default\n1 2 3\n",
+        "name.vtk": LEGACY.format(**FACES) + f"POINT_DATA 4\nSCALARS {'a' * 100_000} float\n",
+        "many.off": "OFF\n1000000000000 1000000000000 0\n0 0 0\n",
+        "minus.off": "OFF\n-1 -1 0\n0 0 0\n",
+        "long.off": "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n1000000000000 0 1 2\n",
+        "many.ply": STRIPS.replace("vertex 4", "vertex 1000000000000"),
+        "strips.ply": STRIPS.replace("tristrips 1", "tristrips 1000000000000"),
+        "list.ply": STRIPS.replace("7 0 1", "1000000000000 0 1"),
+        "nothing.ply": STRIPS.replace("element tri", "element x 1000000000000\nelement tri"),
+        "corner.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999\n",
+    }
+    if meshlab.available():
+        deep = 20_000 * "<Group>" + 20_000 * "</Group>"
+        again = '<Group DEF="a"><Group USE="a"/></Group>'
+        texts |= {
+            "deep.x3d": X3D.format("", deep),
+            "bomb.x3d": X3D.format(BOMB, "<Shape>&a11;</Shape>"),
+            "use.x3d": X3D.format("", again),
+            "deep.wrl": "#VRML V2.0 utf8\n" + 20_000 * "Group { children [ " + 20_000 * "] }",
+            "use.wrl": "#VRML V2.0 utf8\nDEF a Group { children [ USE a ] }\n",
+        }
+    files = []
+    for name, text in texts.items():
+        (folder / name).write_text(text)
+        files.append(("mesh", folder / name))
+    for count in (0, 1, 31, 33, 2**31, 2**32 - 1):
+        path = folder / f"{count}.stl"
+        write_mesh(path, sd.Mesh(*icosphere(1)))  # 32 triangles
+        data = path.read_bytes()
+        path.write_bytes(data[:80] + struct.pack("<I", count) + data[84:])
+        files.append(("mesh", path))
+    return files
+
+
+def answers(files):
+    """Return (answer, text) for each of [(reader, path)]."""
+    text = "".join(f"{reader}\t{path}\n" for reader, path in files)
+    done = subprocess.run(
+        [sys.executable, SUPPORT / "careful_reader.py"],
+        input=text, capture_output=True, text=True, timeout=60 + 21 * len(files), check=False,
+        env={**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": f"{SUPPORT}:{ROOT}"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-2000:]
+    lines = [line.partition("\t")[::2] for line in done.stdout.splitlines()]
+    assert len(lines) == len(files)
+    return lines
+
+
+def wrong_among(files, told):
+    """Return in words what was neither read nor refused by name."""
+    return [
+        f"{path}: {answer}: {text[:300]}"
+        for (_, path), (answer, text) in zip(files, told, strict=True)
+        if answer not in ("read", "refused")
+    ]
+
+
+def special(folder, sound):
+    """Write, or name, what is no file, or another file than its name says."""
+    by_suffix = {path.suffix: path for _, path in sound}
+    files = []
+    for reader, path in sound:
+        (folder / f"folder{path.suffix}").mkdir(exist_ok=True)
+        (folder / f"empty{path.suffix}").write_bytes(b"")
+        for name, target in (("device", "/dev/zero"), ("circle", folder / f"circle{path.suffix}"),
+                             ("nowhere", folder / "not there")):  # fmt: skip
+            link = folder / f"{name}{path.suffix}"
+            if not link.is_symlink():
+                link.symlink_to(target)
+        files += [
+            (reader, folder / f"{name}{path.suffix}")
+            for name in ("folder", "empty", "device", "circle", "nowhere", "missing")
+        ]
+        for other in (".glb", ".segdeform", ".off"):
+            wrong = folder / f"is{other}{path.suffix}"
+            wrong.write_bytes(by_suffix[other].read_bytes())
+            files.append((reader, wrong))
+    return files
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory):
+    """Have a few files of every kind read, by one program: [(files, answers)] of three sorts."""
+    folder = tmp_path_factory.mktemp("files")
+    sound = originals(folder)
+    harmed = mutants(folder, sound, 34, seed=1)
+    (folder / "lies").mkdir()
+    sorts = [sound, harmed, special(folder, sound)[::7], lies(folder / "lies")[::2]]
+    before = sorted(folder.rglob("*"))
+    told = iter(answers([file for files in sorts for file in files]))
+    assert sorted(folder.rglob("*")) == before  # reading writes nothing
+    return [(files, [next(told) for _ in files]) for files in sorts]
+
+
+def test_sound_files_of_every_kind_are_read(seen):
+    files, told = seen[0]
+    assert {path.name: answer for (_, path), (answer, _) in zip(files, told, strict=True)} == {
+        path.name: "read" for _, path in files
+    }
+
+
+def test_harmed_files_of_every_kind_are_read_or_refused_by_their_names(seen):
+    assert not wrong_among(*seen[1])
+
+
+def test_what_is_no_file_or_another_kind_is_refused_by_its_name(seen):
+    files, told = seen[2]
+    assert not wrong_among(files, told)
+    assert Counter(answer for answer, _ in told)["refused"] > 0.9 * len(files)
+
+
+def test_counts_in_a_file_are_checked_against_its_size(seen):
+    files, told = seen[3]
+    assert not wrong_among(files, told)
+    refused = {
+        path.name for (_, path), (answer, _) in zip(files, told, strict=True) if answer != "read"
+    }
+    assert len(refused) > 0.7 * len(files)
+
+
+@pytest.mark.campaign
+def test_no_false_count_is_accepted(tmp_path):
+    files = lies(tmp_path)
+    told = answers(files)
+    assert not wrong_among(files, told)
+    read = [
+        path.name for (_, path), (answer, _) in zip(files, told, strict=True) if answer == "read"
+    ]
+    # An unused offset, a count that VTK computes itself, a long name: all of these are valid.
+    assert read == ["sound.vtp", "minus.vtp", "sound.vtk", "cells.vtk", "name.vtk", "nothing.ply"]
+
+
+@pytest.mark.campaign
+def test_two_thousand_harmed_files_are_read_or_refused(tmp_path):
+    counts, wrong = Counter(), []
+    sound = originals(tmp_path)
+    for seed in range(10):
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        files = mutants(folder, sound, 200, seed=100 + seed)
+        files += [] if seed else special(tmp_path, sound)
+        told = answers(files)
+        counts += Counter(answer for answer, _ in told)
+        wrong += wrong_among(files, told)
+    print(f"\n{sum(counts.values())} files: {dict(counts)}")
+    assert not wrong, "\n".join(wrong)

@@ -1,0 +1,155 @@
+"""What an installed package holds, checked against the folder it is built from."""
+
+from __future__ import annotations
+
+import ast
+import configparser
+import importlib
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import vtk_segdeform
+
+ROOT = Path(__file__).resolve().parents[2]
+LIBRARY_OF = {"vtkmodules": "vtk"}  # imported name -> name to install, where they differ
+
+
+@pytest.fixture(scope="module")
+def setup_cfg():
+    parser = configparser.ConfigParser()
+    parser.read(ROOT / "setup.cfg", encoding="utf-8")
+    return parser
+
+
+def names_in(text: str) -> set[str]:
+    """Return the packages of a requirement list, without their versions."""
+    return {re.split(r"[^\w.-]", line.strip())[0] for line in text.splitlines() if line.strip()}
+
+
+def imported_by(folder: str) -> set[str]:
+    """Return the top-level names that the sources of a folder import from elsewhere."""
+    found = set()
+    for path in (ROOT / folder).glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                found |= {alias.name.partition(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and not node.level:
+                found.add(str(node.module).partition(".")[0])
+    return found - set(sys.stdlib_module_names) - {"vtk_segdeform"}
+
+
+def test_every_library_imported_is_declared(setup_cfg):
+    declared = names_in(setup_cfg["options"]["install_requires"])
+    for extra in ("meshlab", "qt"):
+        declared |= names_in(setup_cfg["options.extras_require"][extra])
+    used = imported_by("vtk_segdeform") | imported_by("widgets")
+    used -= {"paraview"}  # where it is, it runs us; no package has it
+    assert {LIBRARY_OF.get(name, name) for name in used} <= declared
+
+
+def test_a_plain_install_includes_the_libraries_for_speed(setup_cfg):
+    required = setup_cfg["options"]["install_requires"]
+    assert {"numba", "threadpoolctl"} <= names_in(required)
+    # Where numba has no wheel, pip would try to build LLVM: a marker keeps it away.
+    numba = [line for line in required.splitlines() if line.startswith("numba")]
+    assert all("python_version<" in line for line in numba)
+    assert "fast" not in setup_cfg["options.extras_require"]
+
+
+def test_one_extra_installs_the_whole_desktop_program(setup_cfg):
+    app = setup_cfg["options.extras_require"]["app"]
+    assert {"PySide6-Essentials", "pyvistaqt", "qtpy"} <= names_in(app)
+    assert '!=6.12.0; python_version<"3.12"' in app
+
+
+def test_every_folder_with_code_is_a_declared_package(setup_cfg):
+    declared = set(setup_cfg["options"]["packages"].split())
+    core = {path.relative_to(ROOT) for path in (ROOT / "vtk_segdeform").rglob("__init__.py")}
+    widgets = {path.relative_to(ROOT) for path in (ROOT / "widgets").rglob("__init__.py")}
+    there = core | {Path("vtk_segdeform", path) for path in widgets}
+    assert declared == {".".join(path.parent.parts) for path in there}
+
+
+def test_the_command_points_at_a_function(setup_cfg):
+    entry = setup_cfg["options.entry_points"]["console_scripts"].split("=")[1].strip()
+    module, function = entry.split(":")
+    assert callable(getattr(importlib.import_module(module), function))
+
+
+def test_the_widgets_are_a_subpackage_of_the_checkout_too():
+    widgets = importlib.import_module("vtk_segdeform.widgets")
+    assert Path(widgets.__file__).parent in (
+        ROOT / "widgets",
+        Path(vtk_segdeform.__file__).parent / "widgets",
+    )
+
+
+def test_importing_the_package_is_silent_and_loads_no_toolkit():
+    code = (
+        "import sys, vtk_segdeform; "
+        "print(sorted({'PySide6', 'pymeshlab', 'matplotlib', 'numba'} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], cwd=ROOT, capture_output=True, text=True
+    )
+    assert (done.stdout.strip(), done.stderr) == ("[]", "")
+
+
+def test_the_wheel_holds_both_packages_and_the_licence(tmp_path):
+    pytest.importorskip("setuptools", minversion="77", reason="an older one needs wheel")
+    source = tmp_path / "source"
+    source.mkdir()
+    for folder in ("vtk_segdeform", "widgets"):
+        shutil.copytree(
+            ROOT / folder, source / folder, ignore=shutil.ignore_patterns("__pycache__")
+        )
+    for name in ("setup.cfg", "pyproject.toml", "LICENSE"):
+        shutil.copy(ROOT / name, source)
+    (source / "README.md").write_text("readme\n")
+    build = "import sys; from setuptools import build_meta; build_meta.build_wheel(sys.argv[1])"
+    done = subprocess.run(
+        [sys.executable, "-c", build, str(tmp_path)], cwd=source, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    (wheel,) = tmp_path.glob("*.whl")
+    inside = set(zipfile.ZipFile(wheel).namelist())
+    for folder, place in (("vtk_segdeform", "vtk_segdeform"), ("widgets", "vtk_segdeform/widgets")):
+        ours = {path.relative_to(ROOT / folder) for path in (ROOT / folder).rglob("*.py")}
+        assert {f"{place}/{path.as_posix()}" for path in ours} <= inside
+    assert "vtk_segdeform/py.typed" in inside
+    assert any(name.endswith("LICENSE") for name in inside)
+    assert not any(name.startswith(("tests/", "widgets/", "examples/")) for name in inside)
+    assert vtk_segdeform.__version__ in wheel.name
+
+
+def test_the_conda_recipe_builds_this_version_with_the_same_requirements(setup_cfg):
+    recipe = (ROOT / "conda" / "recipe.yaml").read_text(encoding="utf-8")
+    assert re.findall(r'version: "(.+)"', recipe) == [vtk_segdeform.__version__]
+    listed = re.findall(r"(?m)^    - (\S+) (>=\S+)$", recipe.partition("\n  run:\n")[2])
+    required = (
+        setup_cfg["options"]["install_requires"]
+        + "\npython"
+        + setup_cfg["options"]["python_requires"]
+    )
+    lowest = dict(re.findall(r"(?m)^([\w-]+)(>=[\d.]+)", required))
+    assert dict(listed) == lowest
+
+
+def test_the_newest_release_of_the_changelog_is_this_version():
+    headings = re.findall(r"(?m)^## (.+)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"))
+    releases = [heading for heading in headings if heading != "Unreleased"]
+    assert re.fullmatch(rf"{re.escape(vtk_segdeform.__version__)} - \d{{4}}-\d\d-\d\d", releases[0])
+
+
+def test_no_file_speaks_of_the_machine_it_was_written_on():
+    private = re.compile(r"/work/|/root/|/home/\w+/")
+    for folder in ("vtk_segdeform", "widgets", "examples", "tests"):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            if path != Path(__file__):
+                assert not private.search(path.read_text()), path

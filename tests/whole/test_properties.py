@@ -1,0 +1,282 @@
+"""What is true of every mesh, region, cage and drag, asked of those that hypothesis makes up.
+
+Each is a test that asks for a few examples; the campaign asks all of them for a thousand.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+from scenes import sausage
+from scipy.spatial import ConvexHull
+from solids import icosphere, rotation
+
+import vtk_segdeform as sd
+from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.session.state import State
+
+FEW, MANY = 3, int(os.environ.get("SEGDEFORM_EXAMPLES", "1000"))
+NUMBERS = st.floats(-1.0, 1.0, allow_nan=False, width=32)
+SEEDS = st.integers(0, 2**32 - 1)
+TRUTHS = []
+
+
+def truth(**given_):
+    """Mark a function as true for all of what is given; `test_in_the_long_run` asks it again."""
+
+    def mark(claim):
+        TRUTHS.append((claim, given_))
+        return asked(claim, given_, FEW)
+
+    return mark
+
+
+def asked(claim, given_, count):
+    """Return a test that asks *count* times, the same every time."""
+
+    def ask(**values):
+        claim(**values)
+
+    ask.__name__ = claim.__name__
+    quiet = settings(
+        max_examples=count, deadline=None, derandomize=True, database=None,
+        suppress_health_check=list(HealthCheck),
+    )  # fmt: skip
+    return quiet(given(**given_)(ask))
+
+
+@lru_cache(maxsize=4)
+def scene(n_regions=2):
+    """Return a small sausage with everything, its mesh of 1026 vertices."""
+    return sausage(n_regions)
+
+
+@lru_cache(maxsize=1)
+def bound():
+    """Return a deformer of it."""
+    return scene().deformer()
+
+
+def body(seed, subdivisions=2):
+    """Return a star-shaped body of random radii: closed, outward, of any unevenness."""
+    rng = np.random.default_rng(seed)
+    vertices, faces = icosphere(subdivisions)
+    waves = np.cos(vertices @ rng.normal(0, 3, (3, 6)) + rng.uniform(0, 6, 6)) @ rng.normal(0, 1, 6)
+    radii = np.exp(rng.uniform(0.0, 0.4) * waves / 2.0)
+    stretch = np.exp(rng.uniform(-1.0, 1.0, 3))
+    return sd.Mesh(vertices * radii[:, None] * stretch, faces)
+
+
+def motion(seed):
+    """Return a random turn (3, 3), scale and shift (3,)."""
+    rng = np.random.default_rng(seed)
+    turn = rotation(rng.normal(size=3), rng.uniform(0, np.pi))
+    return turn, float(np.exp(rng.uniform(-5, 5))), rng.uniform(-3, 3, 3)
+
+
+def cage(seed, points):
+    """Return a convex cage around *points*: the hull of a random few, pushed outward."""
+    rng = np.random.default_rng(seed)
+    around = rng.normal(size=(int(rng.integers(8, 40)), 3))
+    around /= np.linalg.norm(around, axis=1, keepdims=True)
+    hull = ConvexHull(around)
+    faces = hull.simplices.astype(np.int64)
+    a, b, c = around[faces.T]
+    inward = np.einsum("fi,fi->f", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    faces[inward] = faces[inward, ::-1]
+    nearest = -hull.equations[:, 3].max()
+    assume(nearest > 0.05)  # the origin is well inside
+    centre = points.mean(axis=0)
+    reach = np.linalg.norm(points - centre, axis=1).max() / nearest * rng.uniform(1.05, 2.0)
+    return sd.Cage(around * reach + centre, faces)
+
+
+@truth(seed=SEEDS)
+def test_volume_turns_and_scales_as_a_volume_does(seed):
+    mesh = body(seed)
+    turn, scale, shift = motion(seed)
+    before = signed_volume(mesh.vertices, mesh.faces)
+    after = signed_volume(scale * mesh.vertices @ turn.T + shift, mesh.faces)
+    assert before > 0
+    digits = 1e-13 * (1.0 + np.linalg.norm(shift) / (scale * mesh.diagonal)) ** 3
+    assert abs(after / scale**3 - before) <= digits * before * 10
+
+
+@truth(seed=SEEDS, count=st.integers(1, 5))
+def test_blend_weights_of_any_regions_are_a_partition_of_unity(seed, count):
+    mesh = body(seed)
+    rng = np.random.default_rng(seed)
+    masks = rng.random((count, mesh.n_vertices)) < rng.uniform(0.05, 0.95)
+    masks[0] |= ~masks.any(axis=0)
+    assume(masks.any(axis=1).all())
+    weights = sd.Regions.from_masks(mesh, masks).grow(int(rng.integers(0, 4))).weights
+    assert np.abs(weights.sum(axis=0) - 1.0).max() < 1e-12
+    assert weights.min() >= 0.0
+
+
+@truth(seed=SEEDS, labels=st.integers(1, 6), overlap=st.integers(0, 8))
+def test_labels_grow_and_weights_stay_inside_their_regions(seed, labels, overlap):
+    mesh = body(seed)
+    numbers = np.random.default_rng(seed).integers(0, labels, mesh.n_vertices)
+    regions = sd.Regions.from_labels(mesh, numbers, overlap)
+    assert regions.n_regions == len(np.unique(numbers))
+    assert (
+        regions.membership[np.searchsorted(np.unique(numbers), numbers), np.arange(len(numbers))]
+    ).all()
+    assert not regions.weights[~regions.membership].any()
+
+
+@truth(seed=SEEDS)
+def test_coordinates_in_any_convex_cage_sum_to_one_and_reproduce_the_points(seed):
+    points = body(seed).vertices
+    around = cage(seed, points)
+    weights = sd.mean_value_coordinates(points, around.vertices, around.faces)
+    size = np.abs(around.vertices).max()
+    assert np.abs(weights.sum(axis=1) - 1.0).max() < 1e-12
+    assert np.abs(weights @ around.vertices - points).max() < 1e-9 * size
+    assert weights.min() > -1e-9  # inside a convex cage none is negative
+
+
+@truth(seed=SEEDS)
+def test_coordinates_do_not_depend_on_place_turn_or_unit(seed):
+    points = body(seed, 1).vertices
+    around = cage(seed, points)
+    turn, scale, shift = motion(seed)
+    weights = sd.mean_value_coordinates(points, around.vertices, around.faces)
+    moved = [scale * x @ turn.T + shift * scale for x in (points, around.vertices)]
+    again = sd.mean_value_coordinates(*moved, around.faces)
+    assert np.abs(again - weights).max() < 1e-7
+
+
+@truth(seed=SEEDS, n=st.integers(12, 60))
+def test_a_fitted_cage_is_a_cage_around_its_region_with_the_vertices_asked_for(seed, n):
+    mesh = body(seed)
+    rng = np.random.default_rng(seed)
+    x = mesh.vertices @ rng.normal(size=3)
+    masks = np.array([x <= np.quantile(x, 0.6), x >= np.quantile(x, 0.4)])
+    cages = sd.fit_cages(mesh, sd.Regions.from_masks(mesh, masks), 2 * n)
+    for mask, each in zip(masks, cages, strict=True):
+        sd.Cage(each.vertices, each.faces).require_encloses(mesh.vertices[mask], "members")
+    assert sum(each.n_vertices for each in cages) == 2 * n
+
+
+@truth(move=st.tuples(NUMBERS, NUMBERS, NUMBERS), degrees=st.floats(-90, 90), axis=SEEDS)
+def test_the_volume_is_exact_wherever_a_handle_is_put(move, degrees, axis):
+    axis = np.random.default_rng(axis).normal(size=3)
+    deformer = bound()
+    solution = deformer.solve(scene().turned(degrees, axis) + move, max_steps=5)
+    mesh = deformer.mesh
+    now, rest = (signed_volume(x, mesh.faces) for x in (solution.vertices, mesh.vertices))
+    assert np.isfinite(solution.vertices).all()
+    assert abs(now - rest) <= 1e-12 * rest
+    # Back at rest the objective is what is left of two sums as large as its constant.
+    rounding = 2e-13 * deformer._energy.constant
+    assert all(
+        b <= a * (1 + 1e-12) + rounding
+        for a, b in zip(solution.merits, solution.merits[1:], strict=False)
+    )
+
+
+@truth(seed=SEEDS)
+def test_regions_cages_and_handles_at_random_hold_the_volume(seed):
+    mesh = body(seed)
+    rng = np.random.default_rng(seed)
+    x = mesh.vertices @ rng.normal(size=3)
+    masks = np.array([x <= np.quantile(x, 0.7), x >= np.quantile(x, 0.3)])
+    regions = sd.Regions.from_masks(mesh, masks)
+    cages = [cage(seed + k, mesh.vertices[mask]) for k, mask in enumerate(masks)]
+    ids = rng.permutation(mesh.n_vertices)
+    fixed, handle = ids[: rng.integers(0, 20)], ids[20 : 21 + rng.integers(0, 20)]
+    deformer = sd.Deformer(mesh, regions, cages, fixed=fixed, handle=handle)
+    targets = mesh.vertices[handle] + rng.normal(0, 0.2, (len(handle), 3))
+    solution = deformer.solve(targets, max_steps=20)
+    now, rest = (signed_volume(v, mesh.faces) for v in (solution.vertices, mesh.vertices))
+    assert np.isfinite(solution.vertices).all()
+    assert abs(now - rest) <= 1e-12 * rest
+
+
+def session():
+    """Return a session of the scene, at rest."""
+    result = sd.Session(scene().mesh, state=State(scene().regions, scene().cages))
+    result.set_fixed(scene().fixed)
+    result.add_handle(scene().handle, "tip")
+    return result
+
+
+ACTIONS = st.lists(
+    st.tuples(
+        st.sampled_from(["drag", "paint", "fix", "handle", "options", "undo", "redo", "rest"]),
+        SEEDS,
+    ),
+    max_size=6,
+)
+
+
+def act(work, action, seed):
+    """Do one thing that a person might do."""
+    rng = np.random.default_rng(seed)
+    some = rng.permutation(work.mesh.n_vertices)[: rng.integers(1, 30)]
+    if action == "drag" and work.handles and work.cages:
+        name = sorted(work.handles)[0]
+        work.drag({name: work.targets[name] + rng.normal(0, 0.1, 3)}, max_steps=2)
+        work.commit()
+    elif action == "paint":
+        work.paint_region(int(rng.integers(0, work.regions.n_regions)), some)
+    elif action == "fix":
+        work.set_fixed(np.setdiff1d(some, work.state.handle))
+    elif action == "handle":
+        taken = np.concatenate([work.fixed, work.state.handle])
+        free = np.setdiff1d(some, taken)
+        if len(free):
+            work.add_handle(free)
+    elif action == "options":
+        work.change_options(stretch=float(rng.uniform(0, 20)))
+    elif action == "undo":
+        work.undo()
+    elif action == "redo":
+        work.redo()
+    elif action == "rest":
+        work.reset_pose()
+
+
+@truth(actions=ACTIONS)
+def test_undo_and_redo_of_anything_is_nothing_and_the_volume_stays(actions):
+    work = session()
+    for action, seed in actions:
+        act(work, action, seed)
+        there, label = work.vertices.copy(), work.undo_label
+        if label:
+            work.undo()
+            work.redo()
+        assert np.array_equal(work.vertices, there)
+        assert work.undo_label == label
+        assert abs(work.volume_change) <= 1e-12
+
+
+@truth(actions=ACTIONS)
+def test_saving_and_loading_anything_is_nothing(actions):
+    work = session()
+    for action, seed in actions:
+        act(work, action, seed)
+    with tempfile.TemporaryDirectory() as folder:
+        one, two = Path(folder) / "one", Path(folder) / "two"
+        sd.save_session(one, work)
+        again = sd.load_session(one)
+        sd.save_session(two, again)
+        assert one.read_bytes() == two.read_bytes()
+    assert np.array_equal(again.vertices, work.vertices)
+    assert again.options == work.options
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(("claim", "given_"), TRUTHS, ids=[c.__name__[5:] for c, _ in TRUTHS])
+def test_in_the_long_run(claim, given_):
+    asked(claim, given_, MANY)()
+    print(f"\n{MANY} examples: {claim.__name__[5:].replace('_', ' ')}")

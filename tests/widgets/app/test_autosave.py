@@ -1,0 +1,355 @@
+"""Where unsaved work is kept: whose it is, what is left of a crash, and that nothing is halved."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from vtk_segdeform import Session, models
+from vtk_segdeform.errors import SessionError
+from vtk_segdeform.files import lock
+from vtk_segdeform.files.lock import hold
+from vtk_segdeform.widgets.app import autosave
+from vtk_segdeform.widgets.app.autosave import About, Autosaves, user_folder
+
+BALL = models.sphere(300)
+ABOUT = About("ball.ply", "/saved/ball.segdeform", "/meshes/ball.ply")
+
+
+def no_progress(fraction, text):
+    """Hear of progress."""
+
+
+def work(top=0.8):
+    """Return a session with something to lose."""
+    session = Session(BALL)
+    session.add_handle(BALL.vertices[:, 2] > top)
+    return session
+
+
+@pytest.fixture
+def folder(tmp_path) -> Path:
+    return tmp_path / "there" / "unsaved"
+
+
+def crash(folder, session=None, about=ABOUT):
+    """Leave work behind, as a program does that is killed; return its folder."""
+    slot = Autosaves(folder).new(about)
+    slot.write(session or work())
+    slot.release()
+    return slot.path.parent
+
+
+def test_what_a_program_that_is_gone_has_left_is_found_as_it_was(folder):
+    crash(folder)
+    (slot,) = Autosaves(folder).left()
+    assert slot.about == ABOUT
+    assert abs((slot.when - datetime.now()).total_seconds()) < 100
+    session = slot.read(no_progress)
+    assert_array_equal(session.mesh.vertices, BALL.vertices)
+    assert_array_equal(session.handles["handle 1"], work().handles["handle 1"])
+
+
+def test_work_of_a_program_that_runs_is_nobody_elses(folder):
+    mine = Autosaves(folder).new(ABOUT)
+    mine.write(work())
+    theirs = subprocess.run(
+        [sys.executable, "-c", _HOLD, lock.__file__, mine.path.with_name("lock")],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert theirs.stdout.split() == ["None"]
+    assert Autosaves(folder).left() == []  # nor another window's of the same program
+    mine.release()
+    assert len(Autosaves(folder).left()) == 1
+
+
+_HOLD = """
+import pathlib, runpy, sys
+print(runpy.run_path(sys.argv[1])["hold"](pathlib.Path(sys.argv[2])))
+"""
+
+
+def test_of_two_that_ask_at_once_one_gets_it(folder):
+    for _ in range(5):
+        crash(folder)
+    found, ready = [], threading.Barrier(4)
+
+    def ask():
+        ready.wait()
+        found.extend(Autosaves(folder).left())
+
+    threads = [threading.Thread(target=ask) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == len({slot.path for slot in found}) == 5
+
+
+def test_what_is_left_is_offered_until_it_is_removed_and_the_latest_first(folder):
+    for name, seconds in (("old", 1000.0), ("new", 3000.0), ("older", 2000.0)):
+        path = crash(folder, about=About(name)) / "session.segdeform"
+        os.utime(path, (seconds, seconds))
+    autosaves = Autosaves(folder)
+    for _ in range(2):
+        left = autosaves.left()
+        assert [slot.about.name for slot in left] == ["new", "older", "old"]
+        for slot in left:
+            slot.release()
+    left = autosaves.left()
+    left[0].remove()
+    left[0].remove()  # nothing more happens
+    for slot in left[1:]:
+        slot.release()
+    assert [slot.about.name for slot in autosaves.left()] == ["older", "old"]
+
+
+def test_removing_leaves_nothing_and_what_a_killed_write_left_goes_too(folder):
+    slot = Autosaves(folder).new(ABOUT)
+    slot.write(work())
+    (slot.path.parent / ".segdeform-0123456789abcdef.part").write_bytes(b"half")
+    slot.remove()
+    assert list(folder.iterdir()) == []
+
+
+def test_a_slot_with_nothing_in_it_is_swept_away_but_not_one_that_is_held(folder):
+    autosaves = Autosaves(folder)
+    begun, gone = autosaves.new(ABOUT), autosaves.new(ABOUT)
+    gone.release()
+    assert autosaves.left() == []
+    assert list(folder.iterdir()) == [begun.path.parent]
+    begun.write(work())
+
+
+def test_work_without_a_word_of_what_it_is_on_is_work_all_the_same(folder):
+    for damage in (None, "", "{", "[]", '{"name": 3}', json.dumps({"name": "x"})):
+        about = crash(folder) / "about.json"
+        if damage is None:
+            about.unlink()
+        else:
+            about.write_text(damage)
+    assert {slot.about for slot in Autosaves(folder).left()} == {About()}
+
+
+def test_damaged_work_is_told_of_and_stays(folder):
+    path = crash(folder) / "session.segdeform"
+    path.write_bytes(path.read_bytes()[:-100])
+    (slot,) = Autosaves(folder).left()
+    with pytest.raises(SessionError, match="readable"):
+        slot.read(no_progress)
+    slot.release()
+    assert len(Autosaves(folder).left()) == 1
+
+
+def test_a_write_that_fails_leaves_what_was_there(folder, monkeypatch):
+    slot = Autosaves(folder).new(ABOUT)
+    slot.write(work(0.8))
+    monkeypatch.setattr("os.replace", _full)
+    with pytest.raises(SessionError, match="No space"):
+        slot.write(work(0.3))
+    monkeypatch.undo()
+    kept = slot.read(no_progress).handles["handle 1"]
+    assert_array_equal(kept, work(0.8).handles["handle 1"])
+    assert not list(slot.path.parent.glob("*.part"))
+
+
+def _full(*_):
+    raise OSError(28, "No space left on device")
+
+
+def test_where_nothing_can_be_kept_that_is_said(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SessionError, match="file"):
+        Autosaves(tmp_path / "file" / "unsaved").new(ABOUT)
+    assert Autosaves(tmp_path / "nowhere").left() == []
+    monkeypatch.setattr(autosave, "hold", lambda _: None)
+    with pytest.raises(SessionError, match="locked"):
+        Autosaves(tmp_path).new(ABOUT)
+
+
+def test_a_lock_is_held_once_and_not_on_a_file_that_went(tmp_path):
+    path = tmp_path / "lock"
+    first = hold(path)
+    assert first is not None
+    assert hold(path) is None
+    if os.name == "posix":
+        path.unlink()
+        second = hold(path)  # another file of that name
+        assert second is not None
+        os.close(second)
+    os.close(first)
+    third = hold(path)
+    assert third is not None
+    os.close(third)
+
+
+def test_the_folder_is_the_users_own(monkeypatch, tmp_path):
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    assert user_folder() == tmp_path / "segdeform" / "unsaved"
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.delenv("XDG_DATA_HOME")
+    assert user_folder() == tmp_path / ".local" / "share" / "segdeform" / "unsaved"
+    monkeypatch.setattr(sys, "platform", "darwin")
+    assert "Library" in user_folder().parts
+    monkeypatch.setattr(sys, "platform", "win32")
+    monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "local"))
+    assert user_folder() == tmp_path / "local" / "segdeform" / "unsaved"
+
+
+def test_a_session_can_be_kept_by_another_thread_while_it_is_changed(folder):
+    session, slot = work(), Autosaves(folder).new(ABOUT)
+    done = threading.Event()
+    kept = []
+
+    def keep():
+        while not done.is_set():
+            slot.write(session)
+            kept.append(slot.read(no_progress).handles["handle 1"])
+
+    thread = threading.Thread(target=keep)
+    thread.start()
+    tops = np.linspace(0.1, 0.9, 9)
+    known = [tuple(np.flatnonzero(BALL.vertices[:, 2] > top)) for top in (*tops, 0.8)]
+    while len(kept) < 10:
+        for top in tops:
+            session.add_handle(BALL.vertices[:, 2] > top, "handle 1")
+    done.set()
+    thread.join()
+    assert {tuple(ids) for ids in kept} <= set(known)
+
+
+SLOT = "0123456789abcdef"
+posix = pytest.mark.skipif(os.name != "posix", reason="links, pipes and owners of files")
+
+
+def tree_of(folder):
+    """Return all files below a folder with their content, links not followed."""
+    return {
+        str(path.relative_to(folder)): (
+            os.readlink(path) if path.is_symlink() else path.is_file() and path.read_bytes()
+        )
+        for path in sorted(folder.rglob("*"))
+    }
+
+
+def ask(folder):
+    """List the remaining slots twice, and release all of them."""
+    for _ in range(2):
+        for slot in Autosaves(folder).left():
+            slot.release()
+
+
+@pytest.mark.parametrize("name", ["photos", SLOT, "notes.txt", "8f31"])
+@pytest.mark.parametrize(
+    "inside", [["a.txt"], ["lock"], ["lock", "about.json"], [], ["lock", "x/y"]]
+)
+def test_a_foreign_folder_is_unchanged(folder, name, inside):
+    for each in inside:
+        path = folder / name / each
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("mine")
+    (folder / name).mkdir(parents=True, exist_ok=True)
+    before = tree_of(folder)
+    ask(folder)
+    assert tree_of(folder) == before
+
+
+@posix
+def test_links_are_never_followed(folder, tmp_path):
+    outside = tmp_path / "outside"
+    slot = crash(folder)
+    (folder / "copy").mkdir()
+    slot.rename(outside)  # a whole slot, with its mark, but somewhere else
+    (folder / SLOT).symlink_to(outside)
+    (folder / "fedcba9876543210").symlink_to("nowhere")
+    (folder / "circle").symlink_to("circle")
+    linked = crash(folder)
+    (linked / "session.segdeform").unlink()
+    (linked / "session.segdeform").symlink_to(outside / "session.segdeform")
+    empty = Autosaves(folder).new(ABOUT)
+    empty.release()
+    lock = empty.path.with_name("lock")
+    lock.unlink()
+    lock.symlink_to(outside / "lock")
+    before = tree_of(tmp_path)
+    assert Autosaves(folder).left() == []
+    ask(folder)
+    assert tree_of(tmp_path) == before
+
+
+@posix
+def test_unsaved_work_is_not_written_through_a_link(folder, tmp_path):
+    slot = Autosaves(folder).new(ABOUT)
+    (tmp_path / "precious").write_text("mine")
+    slot.path.symlink_to(tmp_path / "precious")
+    with pytest.raises(SessionError, match="is a link"):
+        slot.write(work())
+    slot.remove()
+    assert (tmp_path / "precious").read_text() == "mine"
+    assert slot.path.is_symlink()
+
+
+@posix
+def test_pipes_and_folders_with_our_names_neither_block_nor_are_deleted(folder):
+    for number, name in enumerate(("lock", "about.json", "session.segdeform")):
+        for make, digit in ((os.mkfifo, "a"), (os.mkdir, "b")):
+            slot = Autosaves(folder).new(ABOUT)
+            slot.release()
+            path = slot.path.with_name(name)
+            path.unlink(missing_ok=True)
+            make(path)
+            slot.path.parent.rename(folder / f"{digit}{number:015d}")
+    ask(folder)
+    left = {path for path in tree_of(folder) if path.count("/")}
+    for number, name in enumerate(("lock", "about.json", "session.segdeform")):
+        assert {f"{digit}{number:015d}/{name}" for digit in "ab"} <= left
+
+
+def test_a_foreign_file_in_a_slot_is_kept_and_so_is_the_folder(folder):
+    slot = Autosaves(folder).new(ABOUT)
+    slot.write(work())
+    mine = slot.path.with_name("precious.ply")
+    mine.write_text("mine")
+    deeper = slot.path.parent / "more" / "precious.ply"
+    deeper.parent.mkdir()
+    deeper.write_text("mine")
+    slot.remove()
+    assert tree_of(slot.path.parent) == {
+        "more": False, "more/precious.ply": b"mine", "precious.ply": b"mine",
+    }  # fmt: skip
+    ask(folder)
+    assert mine.read_text() == deeper.read_text() == "mine"
+
+
+def test_slots_of_earlier_versions_are_found_and_removed_too(folder):
+    path = crash(folder)
+    begun = Autosaves(folder).new(ABOUT)
+    begun.release()
+    for each in (path, begun.path.parent):  # they left the lock empty
+        (each / "lock").write_bytes(b"")
+    (slot,) = Autosaves(folder).left()
+    assert slot.about == ABOUT
+    slot.remove()
+    assert list(folder.iterdir()) == []
+
+
+@posix
+@pytest.mark.skipif(os.name == "posix" and os.geteuid() != 0, reason="only root gives files away")
+def test_files_of_another_user_are_unchanged(folder):
+    path = crash(folder)
+    os.chown(path, 12345, 12345)
+    assert Autosaves(folder).left() == []
+    os.chown(path, 0, 0)
+    os.chown(path / "session.segdeform", 12345, 12345)
+    assert Autosaves(folder).left() == []
+    assert (path / "session.segdeform").exists()

@@ -1,0 +1,159 @@
+"""The desktop program is killed, as by ``kill -9``, and nothing is lost but what is told here.
+
+A program in another process drags, or saves, and tells of every pose it had and of every one it
+kept.  After it is killed at some moment, a new window is asked to recover; what it then has is one
+of those poses to the last bit, no older than the last that was kept.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from app_hands import (
+    AppHand,
+    Boxes,
+    Window,
+    delete,
+    digest,
+    ready_session,
+    settings_in,
+    slots,
+)
+from qt_hands import application, until
+
+from vtk_segdeform.session.store import load_session, save_session
+from vtk_segdeform.widgets.app.autosave import Autosaves
+
+MANY = pytest.mark.campaign
+
+
+class Program:
+    """The program that works in a folder, and what it told until it was killed."""
+
+    def __init__(self, folder: Path):
+        self._path = folder / "told"
+        self._number = int(self.wait_for("number")[0][1])
+
+    @property
+    def told(self) -> list[list[str]]:
+        """All lines that are whole, in words."""
+        lines = self._path.read_text().split("\n")[:-1] if self._path.exists() else []
+        return [line.split() for line in lines]
+
+    def wait_for(self, word: str, times: int = 1) -> list[list[str]]:
+        """Wait until it told of *word* so many times more than now, or at all if it is once."""
+        before = len(self.all(word)) if times > 1 else 0
+        until(lambda: len(self.all(word)) >= before + times, word, 120.0)
+        return self.all(word)
+
+    def all(self, word: str) -> list[list[str]]:
+        return [line for line in self.told if line[0] == word]
+
+    @property
+    def poses(self) -> list[str]:
+        """The poses it had, in their order."""
+        return [pose for _, pose in self.all("pose")]
+
+    def kill(self) -> None:
+        """Kill it as nothing can be killed more."""
+        os.kill(self._number, signal.SIGKILL)
+        until(lambda: not is_alive(self._number), "its end")
+
+
+def is_alive(number: int) -> bool:
+    try:
+        os.kill(number, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+@pytest.fixture(scope="module")
+def programs():
+    """Return a callable that starts the program in a folder."""
+    application()  # or skip
+    root = Path(__file__).resolve().parents[3]
+    forks = subprocess.Popen(
+        [sys.executable, root / "tests" / "support" / "app_hands.py"],
+        stdin=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONPATH": str(root)}, start_new_session=True,
+    )  # fmt: skip
+
+    def start(what: str, folder: Path) -> Program:
+        print(what, folder, file=forks.stdin, flush=True)
+        return Program(folder)
+
+    yield start
+    os.killpg(forks.pid, signal.SIGKILL)  # and all it started, also what was too late to be told
+    forks.stdin.close()
+    forks.wait()
+
+
+@pytest.fixture
+def folder(tmp_path) -> Path:
+    save_session(tmp_path / "arm.segdeform", ready_session())
+    return tmp_path
+
+
+def recovered(folder: Path) -> str | None:
+    """Start the program anew and recover what is offered; return its pose, None if nothing is."""
+    boxes = Boxes()
+    boxes.answers.append("Recover")
+    hand = AppHand(Window(settings_in(folder), Autosaves(folder / "unsaved")))
+    hand.window.begin()
+    hand.settle()
+    pose = digest(hand.window.session) if hand.window.has_mesh else None
+    if pose is not None:
+        assert boxes.seen[0].startswith("Recover unsaved work on arm.segdeform from ")
+        assert hand.title == "arm.segdeform* - segdeform"
+        boxes.answers[:] = ["Discard"]
+    delete(hand.window)
+    assert slots(folder) == []
+    del hand
+    gc.collect()
+    return pose
+
+
+def later(poses: list[str], pose: str) -> list[str]:
+    """Return a pose, and those that came after it."""
+    return poses[poses.index(pose) :]
+
+
+@pytest.mark.parametrize("seed", [3, 4, *(pytest.param(k, marks=MANY) for k in range(5, 54))])
+def test_killed_in_a_drag_it_offers_the_last_pose_that_was_kept_or_a_later_one(
+    programs, folder, seed
+):
+    rests = seed % 4 == 0  # after a drag that was finished
+    program = programs("rest" if rests else "drag", folder)
+    ((_, finished),) = program.wait_for("finished")
+    assert Autosaves(folder / "unsaved").left() == []  # as long as it runs, it is its own
+    if rests:
+        time.sleep(random.Random(seed).uniform(0.0, 0.4))
+        program.kill()
+        assert recovered(folder) == finished == program.poses[-1]
+        return
+    program.wait_for("kept", times=2 + seed % 3)
+    time.sleep(random.Random(seed).uniform(0.0, 0.4))
+    program.kill()
+    found = recovered(folder)
+    assert found in later(program.poses, program.all("kept")[-1][1])
+    assert found in later(program.poses, finished)
+
+
+@pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=MANY) for k in range(2, 52))])
+def test_killed_while_it_saves_every_file_is_whole_and_old_or_new(programs, folder, seed):
+    program = programs("save", folder)
+    program.wait_for("saving", times=2)  # and one is saved
+    time.sleep(random.Random(seed).uniform(0.0, 0.06))
+    program.kill()
+    saved = program.all("saved")[-1][1]
+    assert digest(load_session(folder / "arm.segdeform")) in later(program.poses, saved)
+    assert recovered(folder) in [None, *later(program.poses, saved)]

@@ -1,0 +1,435 @@
+"""Cages as wires: seen in their colours, following the pose, dragged by the vertex."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - a plain window needs it
+from hands import Hand, picture, plain_view
+from scenes import Scene, sausage
+from vtkmodules.vtkRenderingCore import vtkTextActor
+
+from vtk_segdeform import Session
+from vtk_segdeform.cages.cage import Cage
+from vtk_segdeform.errors import CageError
+from vtk_segdeform.pictures.palette import HANDLE, of_region, rgb
+from vtk_segdeform.session.state import State
+from vtk_segdeform.widgets.cage_display.cage_display import CageDisplay
+from vtk_segdeform.widgets.cage_display.rejected_cage import WARNING
+from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
+
+
+@functools.lru_cache(maxsize=1)
+def fitted() -> tuple[Scene, State]:
+    scene = sausage(3)
+    session = Session(scene.mesh)
+    session.set_regions(scene.regions)
+    session.fit_cages()
+    session.set_fixed(scene.fixed)
+    session.add_handle(scene.handle)
+    session.change_options(preserve_volume=False)
+    return scene, session.state
+
+
+@pytest.fixture
+def surface():
+    """Return a sausage along x, in a plain window, seen from -y and a little from above."""
+    scene, state = fitted()
+    view = plain_view((500, 400))
+    surface = SurfaceDisplay(view, Session(scene.mesh, state=state))
+    view.camera.SetPosition(0.0, -10.0, 2.0)
+    view.camera.SetViewUp(0.0, 0.0, 1.0)
+    view.renderer.ResetCamera()
+    view.render()
+    yield surface
+    surface.remove()
+
+
+@pytest.fixture
+def cages(surface):
+    """Return three cages around it; switched on, with a free volume."""
+    display = CageDisplay(surface.view, surface.session)
+    display.On()
+    yield display
+    display.remove()
+
+
+@pytest.fixture
+def hand(cages):
+    return Hand(cages.view)
+
+
+def top_of(display, region: int) -> int:
+    """Return the vertex of a cage that is highest as it is seen: beside the body."""
+    return int(np.argmax(display.view.to_display(display.session.cage_vertices[region])[:, 1]))
+
+
+def count(display, colour) -> int:
+    """Return the number of pixels that are *colour* as it is, or a little shaded."""
+    hue = np.asarray(colour, float) / np.linalg.norm(colour)
+    image = picture(display.view).astype(float)
+    bright = np.linalg.norm(image, axis=2)
+    alike = image @ hue > 0.995 * bright
+    return int((alike & (bright > 0.4 * np.linalg.norm(colour))).sum())
+
+
+def near(display, point, colour) -> bool:
+    """Tell whether *colour* is seen within two pixels of a world *point*."""
+    x, y = (round(float(p)) for p in display.view.to_display(np.array([point]))[0, :2])
+    image = picture(display.view)[::-1][y - 2 : y + 3, x - 2 : x + 3].reshape(-1, 3).astype(float)
+    hue = np.asarray(colour, float) / np.linalg.norm(colour)
+    return bool((image @ hue > 0.995 * np.linalg.norm(image, axis=1)).any())
+
+
+def ball(display, point, colour) -> bool:
+    """Tell whether *colour* fills the pixels around a world *point*."""
+    x, y = (round(float(p)) for p in display.view.to_display(np.array([point]))[0, :2])
+    image = picture(display.view)[::-1][y - 1 : y + 2, x - 1 : x + 2].reshape(-1, 3).astype(float)
+    hue = np.asarray(colour, float) / np.linalg.norm(colour)
+    return bool((image @ hue > 0.99 * np.linalg.norm(image, axis=1)).all())
+
+
+def test_each_cage_is_seen_in_the_colour_of_its_region(cages):
+    for region in range(3):
+        assert count(cages, of_region(region)) > 500
+        vertex = cages.session.cage_vertices[region][top_of(cages, region)]
+        assert near(cages, vertex, of_region(region))
+
+
+def test_a_cage_is_switched_off_alone_and_all_are_hidden_together(cages):
+    cages.set_visible(1, False)
+    assert not cages.is_visible(1)
+    assert count(cages, of_region(1)) < 20
+    assert count(cages, of_region(0)) > 500
+    cages.set_visible(1, True)
+    cages.hide()
+    assert not cages.is_shown
+    assert all(count(cages, of_region(region)) < 20 for region in range(3))
+    cages.show()
+    assert all(count(cages, of_region(region)) > 500 for region in range(3))
+
+
+def test_wires_fade_with_their_opacity(cages):
+    solid = picture(cages.view).astype(int)
+    cages.opacity = 0.3
+    faint = picture(cages.view).astype(int)
+    assert (255 - faint).sum() < (255 - solid).sum()
+    for wrong in (0.0, 1.5, float("nan")):
+        with pytest.raises(ValueError, match="opacity must be"):
+            cages.opacity = wrong
+
+
+def test_wires_in_front_of_the_body_are_seen_and_those_behind_are_not(cages, surface):
+    p = cages.session.cage_vertices[1]
+    in_front = p[(p[:, 1] < -0.6) & (np.abs(p[:, 2]) < 0.5)]
+    assert len(in_front)
+    assert all(ball(cages, point, of_region(1)) for point in in_front)
+    with_body = [count(cages, of_region(region)) for region in range(3)]
+    surface.actor.VisibilityOff()
+    assert all(count(cages, of_region(region)) > 1.2 * with_body[region] for region in range(3))
+
+
+def test_cages_follow_the_pose(cages):
+    session, (scene, _) = cages.session, fitted()
+    session.drag(scene.turned(40.0), max_steps=3)
+    assert np.abs(session.cage_vertices[2] - session.cages[2].vertices).max() > 1.0
+    for _ in range(2):
+        for region in range(3):
+            vertex = session.cage_vertices[region][top_of(cages, region)]
+            assert near(cages, vertex, of_region(region))
+        session.undo()
+    assert session.state.pose is None
+
+
+def test_other_regions_bring_other_wires(cages):
+    session = cages.session
+    session.merge_regions([1, 2])
+    assert all(count(cages, of_region(region)) < 20 for region in range(3))
+    session.undo()
+    assert all(count(cages, of_region(region)) > 500 for region in range(3))
+
+
+def test_the_vertex_under_the_pointer_is_marked(cages, hand):
+    before = picture(cages.view)
+    vertex = cages.session.cage_vertices[1][top_of(cages, 1)]
+    x, y = hand.at(vertex)
+    hand.hover((x + 5, y - 3))
+    assert near(cages, vertex, rgb(HANDLE))
+    hand.hover((x, y + 40))
+    assert (picture(cages.view) == before).all()
+    hand.hover((x, y))
+    cages.Off()
+    assert (picture(cages.view) == before).all()
+    assert not hand.failures
+
+
+def test_a_dragged_vertex_is_where_the_pointer_is_and_as_far_away_as_before(cages, hand):
+    session, view = cages.session, cages.view
+    k = top_of(cages, 1)
+    start, rest = session.cage_vertices[1][k], session.vertices
+    camera = view.camera.GetPosition()
+    x, y = hand.at(start)
+    hand.press((x + 4, y))  # the pointer is a little beside it, and stays so
+    for step in range(1, 5):
+        hand.move((x + 4 + 8 * step, y + 6 * step))
+        now = session.cage_vertices[1]
+        seen = view.to_display(now[k : k + 1])[0]
+        assert np.abs(seen[:2] - [x + 8 * step, y + 6 * step]).max() <= 1.0  # events have pixels
+        assert (now[k] - start) @ view.towards_scene == pytest.approx(0.0, abs=1e-9)
+        assert near(cages, now[k], rgb(HANDLE))
+    others = np.delete(np.arange(len(now)), k)
+    assert np.array_equal(now[others], session.cages[1].vertices[others])
+    assert np.abs(session.vertices - rest).max() > 0.01
+    hand.release()
+    assert view.camera.GetPosition() == camera
+    assert session.undo_label == "drag the cage of region 2"
+    assert not session.is_dragging
+    session.undo()
+    assert np.array_equal(session.vertices, rest)
+    assert session.undo_label != "drag the cage of region 2"
+    assert not hand.failures
+
+
+def test_the_volume_is_kept_at_every_move_if_asked(cages, hand):
+    session = cages.session
+    session.change_options(preserve_volume=True)
+    x, y = hand.at(session.cage_vertices[1][top_of(cages, 1)])
+    hand.press((x, y))
+    for step in range(1, 6):
+        hand.move((x, y + 10 * step))
+        assert abs(session.volume_change) < 1e-12
+    hand.release()
+    assert not hand.failures
+
+
+def test_escape_and_the_right_button_leave_no_trace(cages, hand):
+    session = cages.session
+    before, step = picture(cages.view), session.undo_label
+    x, y = hand.at(session.cage_vertices[1][top_of(cages, 1)])
+    for cancel in (lambda: hand.key("Escape"), lambda: hand.event("RightButtonPressEvent")):
+        hand.press((x, y))
+        hand.move((x + 20, y + 20))
+        assert session.state.pose is not None
+        cancel()
+        assert session.state.pose is None
+        assert not cages.is_grabbing
+        hand.release((x + 20, y + 20))
+        hand.event("RightButtonReleaseEvent")
+        hand.hover((5, 5))
+        assert (picture(cages.view) == before).all()
+    assert session.undo_label == step
+    assert not hand.failures
+
+
+def test_a_click_is_no_step(cages, hand):
+    step = cages.session.undo_label
+    hand.click(hand.at(cages.session.cage_vertices[1][top_of(cages, 1)]))
+    assert cages.session.undo_label == step
+    assert cages.session.state.pose is None
+
+
+def test_a_drag_that_was_left_in_hand_is_not_taken_back_with_ours(cages, hand):
+    session = cages.session
+    moved = session.cage_vertices[0] * 1.1
+    session.move_cage(0, moved)
+    x, y = hand.at(session.cage_vertices[1][top_of(cages, 1)])
+    hand.press((x, y))
+    hand.move((x, y + 30))
+    hand.key("Escape")
+    assert np.array_equal(session.cage_vertices[0], moved)
+
+
+def test_a_vertex_behind_the_body_is_only_dragged_through_it(cages, hand):
+    session, view = cages.session, cages.view
+    for region in (0, 2):
+        cages.set_visible(region, False)
+    p = session.cage_vertices[1]
+    seen = view.to_display(p)[:, :2]
+    alone = [
+        k
+        for k in np.flatnonzero((p[:, 1] > 0.5) & (np.abs(p[:, 2]) < 0.4))
+        if np.partition(np.linalg.norm(seen - seen[k], axis=1), 1)[1] > 10
+    ]
+    assert alone
+    before = session.cage_vertices[1]
+    x, y = seen[alone[0]]
+    hand.drag([(x, y), (x + 10, y)])
+    assert session.cage_vertices[1] is before  # the camera has turned
+    cages.through = True
+    x, y = hand.at(p[alone[0]])
+    hand.drag([(x, y), (x + 10, y)])
+    moved = np.flatnonzero((session.cage_vertices[1] != before).any(axis=1))
+    assert moved.tolist() == [alone[0]]
+    assert not hand.failures
+
+
+def test_of_two_vertices_in_line_the_nearer_is_dragged(cages, hand):
+    session, view = cages.session, cages.view
+    session.set_cages(fitted()[0].cages)  # symmetrical: y and -y in line
+    view.camera.SetPosition(0.0, -10.0, 0.0)
+    view.camera.SetParallelProjection(True)
+    view.camera.Azimuth(2.0)
+    view.renderer.ResetCamera()
+    view.render()
+    p = session.cage_vertices[1]
+    above = np.flatnonzero((p[:, 1] < -0.4) & (p[:, 2] > 1.0))  # where no body hides anything
+    front = above[0]
+    back = int(np.argmin(np.linalg.norm(p - p[front] * [1, -1, 1], axis=1)))
+    x, y = hand.at(p[back])
+    assert 2.0 < abs(hand.at(p[front])[0] - x) < 7.0
+    hand.drag([(x, y), (x, y + 20)])
+    assert np.flatnonzero((session.cage_vertices[1] != p).any(axis=1)).tolist() == [front]
+
+
+def test_only_what_is_shown_is_dragged_and_only_while_on(cages, hand):
+    session = cages.session
+    path = [hand.at(session.cage_vertices[1][top_of(cages, 1)]), (10, 10)]
+    camera = cages.view.camera.GetPosition()
+
+    def turns_the_camera():
+        hand.drag(path)
+        turned = cages.view.camera.GetPosition() != camera
+        cages.view.camera.SetPosition(*camera)
+        cages.view.camera.SetViewUp(0.0, 0.0, 1.0)
+        return turned and session.state.pose is None
+
+    cages.set_visible(1, False)
+    assert turns_the_camera()
+    cages.set_visible(1, True)
+    cages.hide()
+    assert turns_the_camera()
+    cages.show()
+    cages.Off()
+    assert turns_the_camera()
+    cages.On()
+    assert not turns_the_camera()
+
+
+def test_a_move_that_is_refused_is_told_and_takes_everything_back(cages, hand):
+    session = cages.session
+    x, y = hand.at(session.cage_vertices[1][top_of(cages, 1)])
+    hand.press((x, y))
+    hand.move((x + 10, y))
+    hand.move((1_000_000, y))
+    assert ["diagonals of the mesh away" in str(failure) for failure in hand.failures] == [True]
+    assert session.state.pose is None
+    assert not session.is_dragging
+    assert not cages.is_grabbing
+    hand.release((x, y))
+    hand.drag([(x, y), (x + 10, y)])
+    assert session.undo_label == "drag the cage of region 2"
+    assert len(hand.failures) == 1
+
+
+def test_cages_that_come_during_a_drag_end_it(cages, hand):
+    session = cages.session
+    x, y = hand.at(session.cage_vertices[1][top_of(cages, 1)])
+    hand.press((x, y))
+    hand.move((x + 10, y))
+    session.set_cages([Cage(c.vertices * 1.2, c.faces) for c in session.cages])
+    assert not cages.is_grabbing
+    hand.move((x + 20, y))
+    assert session.state.pose is None
+    assert not hand.failures
+
+
+def test_an_open_cage_is_marked_along_its_hole(cages):
+    cage = cages.session.cages[1]
+    hole = int(np.argmin(cage.vertices[cage.faces].mean(axis=1)[:, 1]))  # in front
+    faces = np.delete(cage.faces, hole, axis=0)
+    assert count(cages, WARNING) == 0
+    assert cages.show_faults(cage.vertices, faces, 1) == (
+        "3 edges border one face only: the cage is open"
+    )
+    assert count(cages, of_region(1)) < 20  # it stands in the place of that region's own
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        middle = cage.vertices[cage.faces[hole][[a, b]]].mean(axis=0)
+        assert near(cages, middle, WARNING)
+    far = int(np.argmax(np.linalg.norm(cage.vertices - middle, axis=1)))
+    assert not near(cages, cage.vertices[far], WARNING)
+    cages.clear_faults()
+    assert count(cages, WARNING) == 0
+    assert count(cages, of_region(1)) > 500
+
+
+def test_what_a_cage_leaves_out_is_marked(cages):
+    session, cage = cages.session, cages.session.cages[1]
+    tight = Cage(cage.vertices * [1.0, 0.8, 0.8], cage.faces)
+    with pytest.raises(CageError, match="are outside the cage") as refused:
+        session.set_cages([session.cages[0], tight, session.cages[2]])
+    outside = session.mesh.vertices[session.regions.membership[1]]
+    outside = outside[~tight.contains(outside)]
+    words = cages.show_faults(tight.vertices, tight.faces, 1, message=str(refused.value))
+    assert words == str(refused.value)
+    facing = outside[outside[:, 1] < -0.2]
+    assert len(facing)
+    assert all(near(cages, point, WARNING) for point in facing[::5])
+    shown = [p.GetInput() for p in cages.view.front.GetViewProps() if isinstance(p, vtkTextActor)]
+    assert [" ".join(text.split()) for text in shown] == [words]
+
+
+@pytest.mark.parametrize("fault", ["crossing", "flat", "inside-out", "loose vertex", "no fault"])
+def test_other_faults_are_marked_and_told(cages, fault):
+    cage = cages.session.cages[1]
+    vertices, faces = cage.vertices.copy(), cage.faces
+    if fault == "crossing":
+        vertices[5] = 2.0 * vertices.mean(axis=0) - vertices[5]
+    elif fault == "flat":
+        vertices[faces[0, 0]] = vertices[faces[0, 1]]
+    elif fault == "inside-out":
+        faces = faces[:, ::-1]
+    elif fault == "loose vertex":
+        vertices = np.concatenate([vertices, [[0.0, -1.0, 1.5]]])
+    words = {
+        "crossing": "intersects itself",
+        "flat": "no area",
+        "inside-out": "inside-out",
+        "loose vertex": "in no face",
+        "no fault": "",
+    }
+    told = cages.show_faults(vertices, faces)
+    assert words[fault] in told
+    assert (told == "") == (fault == "no fault")
+    assert (count(cages, WARNING) > 0) == (fault != "no fault")
+    if fault == "loose vertex":
+        assert near(cages, vertices[-1], WARNING)
+        assert not near(cages, vertices[top_of(cages, 1)], WARNING)
+
+
+@pytest.mark.parametrize("zoom", [0.5, 1.6, 4.0])
+def test_words_stay_inside_the_window_and_off_the_marks(cages, zoom):
+    cage = cages.session.cages[2]
+    view = cages.view
+    view.camera.Zoom(zoom)
+    cages.show_faults(cage.vertices, cage.faces[:-1], 2)
+    picture(view)
+    words = next(p for p in view.front.GetViewProps() if isinstance(p, vtkTextActor))
+    low, size = np.array(words.GetPosition()), np.zeros(2)
+    words.GetSize(view.front, size)
+    assert (low >= 0).all()
+    assert (low + size <= view.renderer.GetSize()).all()
+    marks = view.to_display(cage.vertices[cage.faces[-1]])[:, :2]
+    assert not ((marks > low) & (marks < low + size)).all(axis=1).any()
+
+
+def test_faults_go_when_good_cages_come(cages):
+    session = cages.session
+    cages.show_faults(session.cages[0].vertices, session.cages[0].faces[1:], 0)
+    session.set_cages([Cage(c.vertices * 1.05, c.faces) for c in session.cages])
+    assert count(cages, WARNING) == 0
+    assert count(cages, of_region(0)) > 500
+    with pytest.raises(CageError, match="no region 7"):
+        cages.show_faults(session.cages[0].vertices, session.cages[0].faces, 7)
+
+
+def test_removed_it_leaves_nothing_behind(cages, hand):
+    view = cages.view
+    cages.show_faults(cages.session.cages[0].vertices, cages.session.cages[0].faces[1:], 0)
+    hand.hover(hand.at(cages.session.cage_vertices[1][top_of(cages, 1)]))
+    cages.remove()
+    assert view.renderer.GetViewProps().GetNumberOfItems() == 1  # the surface
+    assert view.front.GetViewProps().GetNumberOfItems() == 0
+    cages.session.move_cage(1, cages.session.cage_vertices[1] * 1.1)
+    assert not hand.failures

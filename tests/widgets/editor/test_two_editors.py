@@ -1,0 +1,80 @@
+"""Two editors side by side in one window: each hears what is meant for it, alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hands import Hand, picture, plain_view
+from scenes import sausage
+from vtkmodules.vtkRenderingCore import vtkRenderer
+
+from vtk_segdeform.widgets import DeformEditor, Mode
+from vtk_segdeform.widgets.scene.view import View
+
+LEFT, RIGHT = (200, 200), (600, 200)
+
+
+@pytest.fixture
+def halves():
+    """Return two editors, in the left and right half of a window, and a hand in it."""
+    left = plain_view((800, 400))
+    left.renderer.SetViewport(0.0, 0.0, 0.5, 1.0)
+    renderer = vtkRenderer()
+    renderer.SetViewport(0.5, 0.0, 1.0, 1.0)
+    left.window.AddRenderer(renderer)
+    right = View(renderer, left.interactor)
+    editors = [DeformEditor(view, sausage(2).mesh) for view in (left, right)]
+    for editor in editors:
+        editor.On()
+    left.render()
+    hand = Hand(left)
+    right.on_failure(hand.failures.append)
+    yield editors, hand
+    assert hand.failures == []
+    for editor in editors:
+        editor.remove()
+
+
+def test_keys_go_to_the_one_under_the_pointer(halves):
+    (left, right), hand = halves
+    hand.move(RIGHT)
+    hand.key("3")
+    assert (left.mode, right.mode) == (Mode.REGIONS, Mode.HANDLES)
+    hand.move(LEFT)
+    hand.key("2")
+    assert (left.mode, right.mode) == (Mode.CAGES, Mode.HANDLES)
+
+
+def test_a_widgets_keys_too(halves):
+    (left, right), hand = halves
+    before = left.stage.selector.radius, right.stage.selector.radius
+    hand.move(RIGHT)
+    hand.key("bracketright")
+    assert left.stage.selector.radius == before[0]
+    assert right.stage.selector.radius > before[1]
+
+
+def test_removing_one_leaves_the_other_as_it_is_drawn(halves, capfd):
+    (left, right), _ = halves
+    before = picture(right.view)[:, 400:]
+    left.remove()
+    assert np.array_equal(picture(right.view)[:, 400:], before)
+    assert (before[-20:] < 128).mean() > 0.5  # the status line is there
+    assert capfd.readouterr().err == ""
+    right.remove()
+    assert right.view.window.GetNumberOfLayers() == 1
+
+
+def test_one_that_was_removed_cannot_be_woken(halves):
+    (left, _), _ = halves
+    left.remove()
+    with pytest.raises(RuntimeError, match="make another one"):
+        left.On()
+
+
+def test_an_editor_alone_hears_keys_wherever_the_pointer_is(halves):
+    (left, right), hand = halves
+    right.remove()
+    hand.move(RIGHT)
+    hand.key("3")
+    assert left.mode is Mode.HANDLES

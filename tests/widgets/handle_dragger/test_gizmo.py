@@ -1,0 +1,221 @@
+"""The gizmo: as large everywhere, seen through everything, and hit where it is drawn."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hands import picture, plain_view
+from solids import rotation
+
+from vtk_segdeform import Session, models
+from vtk_segdeform.pictures.palette import COLOURS, INK, rgb
+from vtk_segdeform.widgets.handle_dragger.gizmo import AXIS_COLOURS, Gizmo
+from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import FREE, PARTS, Part, Way
+from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
+from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
+
+CENTRE = np.array([0.2, 0.1, -0.1])  # within the ball that is in the view
+TURNED = rotation([1.0, 2.0, 3.0], 0.7)
+LOOKS = [(4.0, -9.0, 5.0), (-6.0, 5.0, 3.0), (3.0, 4.0, -8.0)]
+VIEW_RING = Part(Way.ABOUT)
+
+
+@pytest.fixture
+def view():
+    view = plain_view()
+    SurfaceDisplay(view, Session(models.sphere(300)))
+    look_from(view, LOOKS[0])
+    return view
+
+
+def look_from(view, place):
+    view.camera.SetPosition(*place)
+    view.camera.SetViewUp(0.0, 0.0, 1.0)
+    view.renderer.ResetCamera()
+    view.render()
+
+
+def pointer(place):
+    return Pointer(Phase.HOVER, *np.asarray(place, dtype=float)[:2])
+
+
+def seen_lines(gizmo, part):
+    """Return the points where a part is drawn, (k, 2), none for one that points at the viewer."""
+    line = gizmo.line(part)[:, :2]
+    if part.way is Way.ALONG:
+        line = line[0] + np.linspace(0.3, 0.9, 7)[:, None] * (line[1] - line[0])
+    elif part.way is Way.WITHIN:
+        line = line[:4].mean(axis=0)[None]
+    else:
+        line = line[np.isfinite(line).all(axis=1)][::3]
+    return line
+
+
+def is_painted(image, place, colour):
+    """Tell whether a *colour* is at a display *place*, within a pixel."""
+    x, y = np.round(place).astype(int)
+    row = len(image) - 1 - y
+    near = image[row - 1 : row + 2, x - 1 : x + 2].astype(int)
+    return bool((np.abs(near - rgb(colour).astype(int)).max(axis=2) <= 2).any())
+
+
+@pytest.mark.parametrize("parallel", [False, True], ids=["perspective", "parallel"])
+def test_it_is_as_large_on_the_screen_from_near_and_far(view, parallel):
+    view.camera.SetParallelProjection(parallel)
+    gizmo = Gizmo(view)
+    gizmo.place(CENTRE)
+    sizes = []
+    for zoom in (1.0, 2.5, 0.3):
+        view.camera.Dolly(zoom)
+        view.camera.SetParallelScale(view.camera.GetParallelScale() / zoom)
+        view.renderer.ResetCameraClippingRange()
+        image = picture(view)
+        middle = view.to_display(CENTRE[None])[0, :2]
+        ring = gizmo.line(VIEW_RING)[:, :2]
+        sizes.append(np.linalg.norm(ring - middle, axis=1).mean())
+        drawn = [is_painted(image, place, INK) for place in ring[::9]]
+        assert np.mean(drawn) > 0.8  # and it is there that it is drawn
+    assert np.ptp(sizes) < 1.0
+    assert 60.0 < sizes[0] < 130.0
+
+
+def test_it_grows_a_little_with_the_window():
+    def size(height):
+        view = plain_view((height, height))
+        gizmo = Gizmo(view)
+        gizmo.place(np.zeros(3))
+        return gizmo.radius / view.pixel_at(np.zeros(3))
+
+    assert size(600) == pytest.approx(90.0)
+    assert 100.0 < size(1200) < 150.0
+
+
+def test_the_body_does_not_hide_it(view):
+    gizmo = Gizmo(view)
+    before = picture(view)
+    gizmo.place(CENTRE)
+    middle = view.to_display(CENTRE[None])[0, :2]
+    assert not is_painted(before, middle, INK)
+    assert is_painted(picture(view), middle, INK)
+    gizmo.place(None)
+    assert np.array_equal(picture(view), before)
+
+
+@pytest.mark.parametrize("axes", [np.eye(3), TURNED], ids=["world", "turned"])
+@pytest.mark.parametrize("place", LOOKS)
+def test_what_is_drawn_is_what_is_hit(view, place, axes):
+    view.camera.SetParallelProjection(place == LOOKS[1])
+    look_from(view, place)
+    gizmo = Gizmo(view)
+    gizmo.place(CENTRE, axes)
+    image = picture(view)
+    for part in PARTS:
+        places = seen_lines(gizmo, part)
+        found = [gizmo.under(pointer(p)) for p in places]
+        own = INK if part.axis is None else AXIS_COLOURS[part.axis]
+        drawn = [is_painted(image, p, own) for p in places]
+        if part in found or part.way in (Way.FREE, Way.ABOUT):
+            assert found.count(part) > 0.4 * len(found), part  # the rest is crossed by others
+            assert np.mean(drawn) > 0.4, part
+        else:  # it is seen from its side, or end on: neither drawn nor hit
+            edge = abs(axes[part.axis] @ view.towards_scene)
+            assert edge > 0.9 if part.way is Way.ALONG else edge < 0.4
+
+
+def test_the_far_half_of_a_ring_is_not_there(view):
+    gizmo = Gizmo(view)
+    gizmo.place(CENTRE)
+    ring = Part(Way.ABOUT, 2)
+    turn = np.linspace(0.0, 2.0 * np.pi, 90, endpoint=False)
+    around = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(90)])
+    hidden = around[around @ np.array(LOOKS[0]) < -3.0]
+    shown = around[around @ np.array(LOOKS[0]) > 3.0]
+
+    def hits(points):
+        places = view.to_display(CENTRE + gizmo.radius * points)
+        return [gizmo.under(pointer(place)) for place in places]
+
+    def drawn(points):
+        image, places = picture(view), view.to_display(CENTRE + gizmo.radius * points)[:, :2]
+        return np.mean([is_painted(image, place, AXIS_COLOURS[2]) for place in places])
+
+    assert ring not in hits(hidden)
+    assert hits(shown).count(ring) > 0.7 * len(shown)
+    assert drawn(hidden) < 0.2  # where something else is
+    assert drawn(shown) > 0.7
+    gizmo.show_only(ring)
+    assert drawn(hidden) > 0.9
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_what_is_seen_end_on_is_not_there(view, axis):
+    view.camera.SetParallelProjection(axis == 1)
+    place = 9.0 * np.eye(3)[axis]
+    view.camera.SetViewUp(*np.eye(3)[axis - 1])
+    view.camera.SetPosition(*place)
+    view.renderer.ResetCamera()
+    gizmo = Gizmo(view)
+    gizmo.place(np.zeros(3))
+    x, y = view.to_display(np.zeros((1, 3)))[0, :2]
+    grid = [(x + i, y + j) for i in range(-99, 100, 11) for j in range(-99, 100, 11)]
+    found = {gizmo.under(pointer(p)) for p in grid}
+    others = [a for a in range(3) if a != axis]
+    assert found == {
+        None, FREE, VIEW_RING, *(Part(Way.ABOUT, a) for a in range(3)),
+        Part(Way.WITHIN, axis), *(Part(Way.ALONG, a) for a in others),
+    }  # fmt: skip
+
+
+def test_beside_it_and_while_it_is_hidden_nothing_is_hit(view):
+    gizmo = Gizmo(view)
+    middle = view.to_display(CENTRE[None])[0]
+    assert gizmo.under(pointer(middle)) is None
+    gizmo.place(CENTRE)
+    assert gizmo.under(pointer(middle)) == FREE
+    outer = 1.14 * gizmo.radius / view.pixel_at(CENTRE)
+    assert gizmo.under(pointer(middle[:2] + [0.0, outer + 2.0])) == VIEW_RING
+    assert gizmo.under(pointer(middle[:2] + [0.0, outer + 12.0])) is None
+    gizmo.place(None)
+    assert gizmo.under(pointer(middle)) is None
+
+
+def test_the_part_that_is_pointed_at_is_yellow_and_the_one_in_hand_is_alone(view):
+    gizmo = Gizmo(view)
+    gizmo.place(CENTRE)
+    arrow, ring = Part(Way.ALONG, 0), Part(Way.ABOUT, 2)
+    there, other = seen_lines(gizmo, arrow)[3], seen_lines(gizmo, ring)
+    gizmo.point_at(arrow)
+    image = picture(view)
+    assert is_painted(image, there, COLOURS[4])
+    assert any(is_painted(image, place, AXIS_COLOURS[2]) for place in other)
+    gizmo.show_only(arrow)
+    image = picture(view)
+    assert is_painted(image, there, COLOURS[4])
+    assert not any(is_painted(image, place, AXIS_COLOURS[2]) for place in other)
+    gizmo.show_only(None)
+    gizmo.point_at(None)
+    assert is_painted(picture(view), there, AXIS_COLOURS[0])
+
+
+def test_after_a_step_of_the_camera_the_first_picture_is_right():
+    view = plain_view()
+    SurfaceDisplay(view, Session(models.sphere(300)))
+    look_from(view, LOOKS[0])
+    assert view.front.GetLayer() == 1  # somebody else was there first
+    gizmo = Gizmo(view)
+    gizmo.place(np.array([0.0, -0.9, 0.4]))
+    for zoom in (0.2, 0.3, 4.0):
+        view.camera.Dolly(zoom)
+        first = picture(view)
+        assert np.array_equal(first, picture(view))
+
+
+def test_removed_it_leaves_nothing(view):
+    before = picture(view)
+    gizmo = Gizmo(view)
+    gizmo.place(CENTRE)
+    gizmo.say("30.0°")
+    assert (picture(view) != before).any()
+    gizmo.remove()
+    assert np.array_equal(picture(view), before)
+    assert view.front.GetViewProps().GetNumberOfItems() == 0

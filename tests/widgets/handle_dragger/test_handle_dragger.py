@@ -1,0 +1,750 @@
+"""Handles moved and turned by the mouse: where targets go, what is kept, what is taken back."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hands import Hand, picture, plain_view
+from scenes import sausage
+from solids import rotation
+
+from vtk_segdeform import Session
+from vtk_segdeform.errors import ConstraintError
+from vtk_segdeform.geometry.rotations import rigid_fit
+from vtk_segdeform.solver.solution import Status
+from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import FREE, PARTS, Part, Way
+from vtk_segdeform.widgets.handle_dragger.handle_dragger import HandleDragger
+from vtk_segdeform.widgets.handle_dragger.handle_motion import Grip, Motion
+from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
+
+SCENE = sausage()
+TIP, TOP = "handle 1", "handle 2"
+LOOKS = [(10.0, -8.0, 6.0), (9.0, 7.0, 4.0), (-5.0, 6.0, -8.0)]
+VIEW_RING = Part(Way.ABOUT)
+
+
+class Bench:
+    """A session with two handles, a dragger that is on, and a hand."""
+
+    def __init__(self, look=LOOKS[0], *, parallel=False, up=(0.0, 0.0, 1.0)):
+        self.session = Session(SCENE.mesh)
+        self.session.set_regions(SCENE.regions)
+        self.session.set_cages(SCENE.cages)
+        self.session.set_fixed(SCENE.fixed)
+        x, _, z = SCENE.mesh.vertices.T
+        self.session.add_handle(SCENE.handle)
+        self.session.add_handle((np.abs(x) < 0.5) & (z > 0.6))
+        self.view = plain_view()
+        self.dragger = HandleDragger(self.view, self.session)
+        self.gizmo = self.dragger.gizmo
+        self.view.camera.SetParallelProjection(parallel)
+        self.view.camera.SetPosition(*look)
+        self.view.camera.SetViewUp(*up)
+        self.view.renderer.ResetCamera()
+        self.view.camera.Zoom(0.7)
+        self.view.render()
+        self.dragger.On()
+        self.hand = Hand(self.view)
+        self.timers: set[int] = set()
+        self.watch_timers()
+
+    def targets(self, name=TIP):
+        return self.session.targets[name]
+
+    def shift(self, name=TIP):
+        """Return how far the targets were shifted, all alike, (3,)."""
+        away = self.targets(name) - SCENE.mesh.vertices[self.session.handles[name]]
+        assert np.ptp(away, axis=0).max() < 1e-12
+        return away[0]
+
+    def aim(self, part):
+        """Return a pixel at which a press takes *part*."""
+        line = self.gizmo.line(part)[:, :2]
+        if part.way is Way.WITHIN:
+            line = np.concatenate([line[:4].mean(axis=0)[None], 0.5 * (line[:4] + line[1:])])
+        elif part.way is Way.ALONG:
+            line = line[0] + np.linspace(0.2, 0.9, 15)[:, None] * (line[1] - line[0])
+        places = np.round(line[np.isfinite(line).all(axis=1)])
+        places = places[:: 1 + len(places) // 10]
+        taken = [p for p in places if self.gizmo.under(Pointer(Phase.HOVER, *p)) == part]
+        assert taken, f"{part} is not to be seen"
+        place = taken[len(taken) // 2]
+        assert 20.0 < place.min() <= place.max() < 380.0
+        return place
+
+    def watch_timers(self):
+        """Keep in `timers` the numbers of the timers that run, as a window would."""
+        interactor = self.view.interactor
+
+        def create(*_):
+            self.timers.add(len(self.timers) + 1)
+            interactor.SetTimerEventPlatformId(max(self.timers))
+
+        interactor.AddObserver("CreateTimerEvent", create)
+        interactor.AddObserver(
+            "DestroyTimerEvent",
+            lambda *_: self.timers.remove(interactor.GetTimerEventPlatformId()),
+        )
+
+    @property
+    def has_timer(self):
+        assert bool(self.timers) is self.dragger.is_refining
+        return bool(self.timers)
+
+
+@pytest.fixture
+def bench():
+    bench = Bench()
+    yield bench
+    assert not bench.hand.failures
+    bench.dragger.remove()
+
+
+each_view = pytest.mark.parametrize(
+    ("look", "parallel"), [(LOOKS[0], False), (LOOKS[1], True), (LOOKS[2], False)]
+)
+
+
+def turned(bench):
+    """Turn the active handle a bit, and have its axes turned with it; return them."""
+    turn = np.eye(4)
+    turn[:3, :3] = rotation([1.0, 2.0, 0.5], 0.2)
+    centre = bench.targets().mean(axis=0)
+    turn[:3, 3] = centre - turn[:3, :3] @ centre
+    bench.session.move_handle(TIP, turn, max_steps=3)
+    bench.session.commit()
+    bench.dragger.local = True
+    return turn[:3, :3].T
+
+
+# What moves where.
+
+
+@pytest.mark.parametrize(
+    ("look", "parallel", "local"),
+    [(LOOKS[0], False, False), (LOOKS[1], True, True), (LOOKS[2], False, True)],
+)
+def test_every_part_moves_as_it_says(look, parallel, local):
+    bench = Bench(look, parallel=parallel)
+    axes = turned(bench) if local else np.eye(3)
+    assert np.allclose(bench.gizmo.axes, axes, atol=1e-9)
+    hand = bench.hand
+    for way in (Way.ALONG, Way.WITHIN, Way.ABOUT):
+        for axis in range(3):
+            place = bench.aim(Part(way, axis))
+            start, centre = bench.targets(), bench.gizmo.centre
+            step = np.array([9.0, 7.0])
+            if way is Way.ALONG:
+                step = np.diff(bench.gizmo.line(Part(way, axis))[:, :2], axis=0)[0]
+                step *= 12.0 / np.linalg.norm(step)
+            hand.press(place)
+            hand.move(place + step)
+            after = bench.targets()
+            if way is Way.ABOUT:
+                R, shift = rigid_fit(start, after)
+                assert np.allclose(R @ axes[axis], axes[axis], atol=1e-9)
+                assert np.allclose(start @ R.T + shift, after, atol=1e-9)
+                assert np.allclose(R @ centre + shift, centre, atol=1e-9)
+                assert 0.01 < np.arccos((np.trace(R) - 1.0) / 2.0) < 2.0
+            else:
+                away = (after - start) @ axes.T
+                assert np.ptp(away, axis=0).max() < 1e-12
+                still = np.arange(3) != axis if way is Way.ALONG else np.arange(3) == axis
+                assert np.abs(away[:, still]).max() < 1e-12
+                assert 0.02 < np.linalg.norm(away[0]) < 3.0
+            hand.key("Escape")
+            assert np.array_equal(bench.targets(), start)
+    assert not hand.failures
+
+
+@each_view
+def test_what_is_grabbed_stays_under_the_pointer(look, parallel):
+    bench = Bench(look, parallel=parallel)
+    hand, view, centre = bench.hand, bench.view, bench.gizmo.centre
+    for part, normal in ((FREE, view.towards_scene), (Part(Way.WITHIN, 1), np.eye(3)[1])):
+        place = bench.aim(part)
+        near, far = view.ray(Pointer(Phase.PRESS, *place))
+        grabbed = near + ((centre - near) @ normal) / ((far - near) @ normal) * (far - near)
+        hand.press(place)
+        hand.move(place + [-25.0, 31.0])
+        assert np.allclose(hand.at(grabbed + bench.shift()), place + [-25.0, 31.0], atol=1e-6)
+        assert abs(bench.shift() @ normal) < 1e-12
+        hand.key("Escape")
+    arrow = Part(Way.ALONG, 2)
+    start, end = bench.gizmo.line(arrow)[:, :2]
+    place, along = bench.aim(arrow), (end - start) / np.linalg.norm(end - start)
+    hand.press(place)
+    hand.move(place + 30.0 * along)
+    way = hand.at(centre + bench.shift()) - np.array(hand.at(centre))
+    assert way @ along == pytest.approx(30.0, rel=0.15)  # it gets nearer or farther on the way
+    assert not hand.failures
+
+
+@pytest.mark.parametrize(("ring", "parallel"), [(VIEW_RING, False), (Part(Way.ABOUT, 1), True)])
+def test_a_ring_turns_by_the_very_angle_seen_on_the_screen(ring, parallel):
+    bench = Bench((0.0, -12.0, 0.0), parallel=parallel)
+    hand, start, centre = bench.hand, bench.targets(), bench.gizmo.centre
+    if not parallel:  # the centre in the middle, so that its line of sight is y
+        offset = np.array([centre[0], 0.0, centre[2]])
+        bench.view.camera.SetPosition(*(offset + [0.0, -12.0, 0.0]))
+        bench.view.camera.SetFocalPoint(*offset)
+        bench.view.render()
+    middle = bench.view.to_display(centre[None])[0, :2]
+    place = bench.aim(ring)
+    hand.press(place)
+    for degrees in (20.0, 90.0, 150.0, 210.0):  # more than half a turn
+        arm = rotation([0.0, 0.0, 1.0], np.radians(degrees))[:2, :2] @ (place - middle)
+        there = np.round(middle + arm)
+        a, b = place - middle, there - middle
+        angle = np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b)
+        hand.move(there)
+        R = rotation([0.0, -1.0, 0.0], angle)  # towards the viewer, counterclockwise
+        assert np.allclose(bench.targets(), centre + (start - centre) @ R.T, atol=1e-9)
+    hand.release(there)
+    assert bench.session.undo_label == "turn handle 1"
+    assert not hand.failures
+
+
+def test_there_and_back_the_targets_are_where_they_were(bench):
+    bench.session.drag({TIP: bench.targets() + [0.1, 0.2, 0.0]})
+    bench.session.commit()
+    before, pose = bench.targets(), bench.session.vertices
+    for part in (FREE, Part(Way.ALONG, 0), VIEW_RING):
+        place = bench.aim(part)
+        bench.hand.press(place)
+        for step in (10.0, 25.0, 10.0, 0.0):
+            bench.hand.move(place + [step, -0.5 * step])
+        assert np.abs(bench.targets() - before).max() < 1e-13
+        bench.hand.release(place)
+        bench.session.refine()
+        away = np.linalg.norm(bench.session.vertices - pose, axis=1).max()
+        assert away < 1e-4 * SCENE.mesh.diagonal
+        bench.session.undo()
+
+
+def test_the_volume_is_exact_at_every_move_of_a_long_turn():
+    bench = Bench((0.0, -12.0, 0.0), parallel=True)
+    middle = np.array(bench.hand.at(bench.gizmo.centre))
+    place = bench.aim(VIEW_RING)
+    bench.hand.press(place)
+    for degrees in np.linspace(2.0, 60.0, 30):
+        arm = rotation([0.0, 0.0, 1.0], np.radians(degrees))[:2, :2] @ (place - middle)
+        bench.hand.move(middle + arm)
+        assert abs(bench.session.volume_change) <= 1e-12
+        solution = bench.session.solution
+        assert solution.status is Status.STEP_LIMIT or solution.status is Status.CONVERGED
+    bench.hand.release()
+    R, _ = rigid_fit(SCENE.mesh.vertices[SCENE.handle], bench.targets())
+    assert np.degrees(np.arccos((np.trace(R) - 1.0) / 2.0)) == pytest.approx(60.0, abs=1.0)
+    assert not bench.hand.failures
+
+
+# Seen from the side.
+
+
+@pytest.mark.parametrize(("axis", "parallel"), [(0, True), (1, False)])
+def test_seen_from_its_side_nothing_flies_away(axis, parallel):
+    bench = Bench(12.0 * np.eye(3)[axis], parallel=parallel, up=np.eye(3)[axis - 2])
+    hand, centre = bench.hand, bench.gizmo.centre
+    bench.dragger.refine_while_resting = False
+    window = 400.0 * bench.view.pixel_at(centre)
+    for first in (FREE, Part(Way.ABOUT, (axis - 1) % 3)):
+        place = bench.aim(first)
+        hand.press(place)
+        hand.move(place + [2.0, 3.0])
+        for key in ("xyz"[axis], "xyz"[axis], "xyz"[axis - 1]):
+            hand.key(key)
+            for step in ([20.0, 30.0], [-30.0, 10.0])[: 1 + (key == "xyz"[axis])]:
+                hand.move(place + step)
+                assert np.isfinite(bench.targets()).all()
+                away = np.linalg.norm(bench.targets().mean(axis=0) - centre)
+                assert away < 0.5 * window
+        hand.key("Escape")
+    assert not hand.failures
+    assert bench.session.state.pose is None
+
+
+@pytest.mark.parametrize("parallel", [False, True], ids=["perspective", "parallel"])
+@pytest.mark.parametrize("tilt", [0.0, 1e-9, 0.19, 0.21, 1.0])
+def test_whatever_the_pointer_does_a_motion_is_rigid_and_near(parallel, tilt):
+    view = plain_view()
+    view.camera.SetParallelProjection(parallel)
+    view.camera.SetParallelScale(3.0)
+    centre, axes = np.array([0.4, 0.3, 0.2]), rotation([1.0, 2.0, 3.0], 0.5).T
+    grip = Grip(centre + 0.1, centre, axes, 0.7)
+    corners = [(x, y) for x in (0, 150, 399) for y in (0, 210, 399)]
+    for axis, side in itertools.product(range(3), (-1.0, 1.0)):
+        look = axes[axis] + side * tilt * axes[axis - 1]
+        view.camera.SetFocalPoint(*centre)
+        view.camera.SetPosition(*(centre + 11.0 * look / np.linalg.norm(look)))
+        view.camera.SetViewUp(*axes[axis - 2])
+        view.camera.SetClippingRange(5.0, 20.0)
+        window = 400.0 * view.pixel_at(centre)
+        for part in PARTS:
+            motion = Motion(view, part, grip, Pointer(Phase.PRESS, 220.0, 190.0))
+            for x, y in corners:
+                matrix = motion.matrix(Pointer(Phase.MOVE, x, y))
+                assert np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-12)
+                assert np.linalg.det(matrix) == pytest.approx(1.0)
+                if part.way is not Way.ABOUT:
+                    farthest = {Way.FREE: 1.0, Way.ALONG: 5.0, Way.WITHIN: 5.0}[part.way]
+                    assert np.linalg.norm(matrix[:3, 3]) < farthest * window
+            back = motion.matrix(Pointer(Phase.MOVE, 220.0, 190.0))
+            if part.way is not Way.ABOUT:
+                assert np.allclose(back, np.eye(4), atol=1e-12)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_ring_seen_edge_on_turns_with_what_is_in_front(axis):
+    bench = Bench(12.0 * np.eye(3)[axis - 1], parallel=True, up=np.eye(3)[axis])
+    ring = Part(Way.ABOUT, axis)
+    middle, place = np.array(bench.hand.at(bench.gizmo.centre)), bench.aim(ring)
+    centre, start = bench.gizmo.centre, bench.targets()
+    across = np.array([1.0, 0.0])  # the ring is level
+    bench.hand.press(place)
+    bench.hand.move(place + 45.0 * across)
+    radius = bench.gizmo.radius / bench.view.pixel_at(centre)
+    right = np.cross(np.eye(3)[axis], np.eye(3)[axis - 1])  # of the viewer
+    R = rotation(np.eye(3)[axis], 45.0 / radius)
+    assert np.allclose(bench.targets(), centre + (start - centre) @ R.T, atol=1e-9)
+    assert R @ np.eye(3)[axis - 1] @ right > 0.0
+    assert abs((place - middle)[1]) < 8.0
+    bench.hand.key("Escape")
+    assert not bench.hand.failures
+
+
+# Keys.
+
+
+def test_keys_bind_a_move_to_an_axis_then_across_it_then_to_nothing(bench):
+    hand, place = bench.hand, bench.aim(FREE)
+    hand.press(place)
+    hand.move(place + [-30.0, 40.0])
+    free = bench.shift()
+    assert np.abs(free).min() > 1e-3
+    for axis, key in enumerate("xyz"):
+        others = np.arange(3) != axis
+        hand.key(key)
+        assert abs(bench.shift()[axis]) > 0.01
+        assert np.array_equal(bench.shift()[others], [0.0, 0.0])
+        hand.key(key)
+        assert abs(bench.shift()[axis]) < 1e-12
+        assert np.linalg.norm(bench.shift()[others]) > 0.01
+        hand.key(key)
+        assert np.allclose(bench.shift(), free, atol=1e-12)
+    hand.key("x")
+    hand.key("z")
+    assert np.array_equal(bench.shift()[:2], [0.0, 0.0])
+    hand.release(place + [-30.0, 40.0])
+    assert bench.session.undo_label == "drag handle 1"
+
+
+def test_keys_bind_a_turn_to_an_axis_then_to_its_own(bench):
+    hand, place, start = bench.hand, bench.aim(VIEW_RING), bench.targets()
+    hand.press(place)
+    hand.move(place + [12.0, -30.0])
+    own = bench.targets()
+    for axis, key in enumerate("xyz"):
+        hand.key(key)
+        R, _ = rigid_fit(start, bench.targets())
+        assert np.allclose(R @ np.eye(3)[axis], np.eye(3)[axis], atol=1e-9)
+        assert np.trace(R) < 2.999
+        hand.key(key)
+        assert np.allclose(bench.targets(), own, atol=1e-12)
+
+
+def test_keys_are_left_to_others_while_nothing_is_dragged(bench):
+    heard = []
+    bench.view.interactor.AddObserver("KeyPressEvent", lambda *_: heard.append("key"), 0.5)
+    bench.hand.key("x")
+    bench.hand.press(bench.aim(FREE))
+    bench.hand.key("x")
+    bench.hand.key("z", control=True)  # undo, to an editor
+    bench.hand.key("w")
+    assert heard == ["key"] * 3
+
+
+def test_shift_moves_a_fifth_and_without_it_goes_on_from_there(bench):
+    hand, place = bench.hand, bench.aim(Part(Way.ALONG, 0))
+    hand.press(place)
+    hand.move(place + [40.0, 0.0])
+    whole = bench.shift()
+    hand.move(place + [40.0, 0.0], shift=True)
+    assert np.allclose(bench.shift(), whole, atol=1e-12)  # no jump
+    hand.move(place, shift=True)
+    assert np.allclose(bench.shift(), 0.8 * whole, atol=1e-12)
+    hand.move(place)
+    assert np.allclose(bench.shift(), 0.8 * whole, atol=1e-12)
+    hand.move(place + [-40.0, 0.0])
+    assert bench.shift()[0] < 0.0
+
+
+def test_a_slow_turn_goes_on_past_half_a_turn_of_the_hand():
+    bench = Bench((0.0, -12.0, 0.0), parallel=True)
+    middle, start = np.array(bench.hand.at(bench.gizmo.centre)), bench.targets()
+    place = bench.aim(VIEW_RING)
+    bench.hand.press(place, shift=True)
+    for degrees in (-90.0, -170.0, -250.0, -340.0):
+        arm = rotation([0.0, 0.0, 1.0], np.radians(degrees))[:2, :2] @ (place - middle)
+        bench.hand.move(middle + arm, shift=True)
+        R, _ = rigid_fit(start, bench.targets())
+        assert np.allclose(R, rotation([0.0, -1.0, 0.0], np.radians(0.2 * degrees)), atol=0.005)
+    assert not bench.hand.failures
+
+
+def test_control_turns_by_fifteen_degrees_at_a_time():
+    bench = Bench((0.0, -12.0, 0.0), parallel=True)
+    middle, start = np.array(bench.hand.at(bench.gizmo.centre)), bench.targets()
+    place = bench.aim(VIEW_RING)
+    bench.hand.press(place, control=True)
+    for seen, snapped in ((5.0, 0.0), (10.0, 15.0), (37.0, 30.0), (-8.0, -15.0)):
+        arm = rotation([0.0, 0.0, 1.0], np.radians(seen))[:2, :2] @ (place - middle)
+        bench.hand.move(middle + arm, control=True)
+        R, _ = rigid_fit(start, bench.targets())
+        assert np.allclose(R, rotation([0.0, -1.0, 0.0], np.radians(snapped)), atol=1e-9)
+    assert not bench.hand.failures
+
+
+# Handles.
+
+
+def test_a_press_on_a_patch_takes_that_handle_by_the_point_of_the_surface(bench):
+    hand, view = bench.hand, bench.view
+    ids = bench.session.handles[TOP]
+    vertex = ids[np.abs(SCENE.mesh.vertices[ids] - [0.0, -0.4, 0.7]).sum(axis=1).argmin()]
+    point = SCENE.mesh.vertices[vertex]
+    place = np.round(hand.at(point))
+    assert bench.dragger.handle == TIP
+    hand.press(place)
+    assert bench.dragger.handle == TOP
+    hand.move(place + [2.0, 0.0])  # a hand that trembles
+    assert not bench.session.is_dragging
+    hand.move(place + [30.0, 20.0])
+    seen = hand.at(point + bench.shift(TOP))
+    assert np.abs(seen - (place + [30.0, 20.0])).max() < 1.5
+    assert abs(bench.shift(TOP) @ view.towards_scene) < 1e-12
+    hand.release(place + [30.0, 20.0])
+    assert bench.session.undo_label == "drag handle 2"
+    assert np.array_equal(bench.targets(TIP), SCENE.mesh.vertices[SCENE.handle])
+
+
+def test_the_other_handle_keeps_its_targets(bench):
+    hand = bench.hand
+    hand.drag([bench.aim(FREE), bench.aim(FREE) + [-20.0, 30.0]])
+    kept = bench.targets(TIP)
+    bench.dragger.handle = TOP
+    hand.drag([bench.aim(FREE), bench.aim(FREE) + [0.0, 20.0]])
+    assert np.array_equal(bench.targets(TIP), kept)
+    assert np.linalg.norm(bench.shift(TOP)) > 0.05
+
+
+def test_a_click_chooses_and_makes_no_step(bench):
+    label = bench.session.undo_label
+    top = SCENE.mesh.vertices[bench.session.handles[TOP]].mean(axis=0)
+    bench.hand.click(bench.hand.at(top))
+    assert bench.dragger.handle == TOP
+    bench.hand.click(bench.aim(FREE))
+    assert bench.session.undo_label == label
+    assert np.allclose(bench.gizmo.centre, top)
+
+
+def test_a_patch_on_the_far_side_and_bare_skin_are_left_to_the_camera():
+    bench = Bench((0.0, -3.0, -12.0))
+    top = SCENE.mesh.vertices[bench.session.handles[TOP]].mean(axis=0)
+    for place in (bench.hand.at(top), bench.hand.at([-1.0, 0.0, -0.8]), (5, 5)):
+        camera = bench.view.camera.GetPosition()
+        bench.hand.drag([place, np.array(place) + [30.0, 0.0]])
+        assert bench.view.camera.GetPosition() != camera
+        assert bench.dragger.handle == TIP
+    assert bench.session.state.pose is None
+    assert not bench.hand.failures
+
+
+def test_a_handle_that_goes_makes_room_for_another_and_one_renamed_stays(bench):
+    session, dragger = bench.session, bench.dragger
+    dragger.handle = TOP
+    session.rename_handle(TOP, "back")
+    assert dragger.handle == "back"
+    session.remove_handle("back")
+    assert dragger.handle == TIP
+    session.remove_handle(TIP)
+    assert dragger.handle is None
+    assert bench.gizmo.centre is None
+    session.undo()
+    assert dragger.handle == TIP
+    assert bench.gizmo.centre is not None
+    with pytest.raises(ConstraintError, match="there is no handle 'nose'"):
+        dragger.handle = "nose"
+    dragger.handle = None
+    assert bench.gizmo.centre is None
+
+
+def test_a_handle_that_goes_in_mid_drag_ends_the_drag(bench):
+    place = bench.aim(FREE)
+    for end in (lambda: bench.session.remove_handle(TIP), bench.session.undo):
+        bench.dragger.handle = TIP
+        bench.hand.press(place)
+        bench.hand.move(place + [20.0, 0.0])
+        end()
+        bench.hand.move(place + [30.0, 0.0])
+        assert not bench.dragger.is_grabbing
+        bench.hand.release(place)
+        while bench.session.undo_label != "mark handle 2":
+            bench.session.undo()
+    bench.hand.press(place)
+    bench.session.remove_handle(bench.dragger.handle)
+    bench.hand.move(place + [20.0, 0.0])
+    assert not bench.dragger.is_grabbing
+
+
+def test_before_there_are_cages_there_is_nothing_to_see_or_grab():
+    session, view = Session(SCENE.mesh), plain_view()
+    session.add_handle(SCENE.handle)
+    dragger, hand = HandleDragger(view, session), Hand(view)
+    view.renderer.ResetCamera()
+    before = picture(view)
+    dragger.On()
+    assert np.array_equal(picture(view), before)
+    tip = hand.at(SCENE.mesh.vertices[SCENE.handle].mean(axis=0))
+    camera = view.camera.GetPosition()
+    hand.drag([tip, (200, 300)])
+    assert view.camera.GetPosition() != camera
+    session.set_regions(SCENE.regions)
+    session.set_cages(SCENE.cages)
+    assert dragger.gizmo.centre is not None
+    session.undo()
+    assert dragger.gizmo.centre is None
+    dragger.remove()
+    assert not hand.failures
+
+
+# Solving on, and going back.
+
+
+def test_it_solves_on_until_it_has_converged_and_then_no_timer_runs(bench):
+    hand, place = bench.hand, bench.aim(FREE)
+    assert not bench.has_timer
+    hand.press(place)
+    hand.move(place + [-20.0, 30.0])
+    assert bench.session.solution.status is Status.STEP_LIMIT
+    assert bench.has_timer
+    hand.tick(2)
+    hand.release()
+    assert bench.session.undo_label == "drag handle 1"
+    assert not bench.session.is_dragging
+    for _ in range(400):
+        hand.tick()
+        assert abs(bench.session.volume_change) <= 1e-12
+        if not bench.has_timer:
+            break
+    assert bench.session.solution.status is Status.CONVERGED
+    assert not bench.has_timer
+    assert bench.session.solution.handle_error < 1e-3
+    assert np.allclose(bench.gizmo.centre, bench.targets().mean(axis=0), atol=0.02)
+    assert bench.session.undo() == "drag handle 1"  # all of it is one step
+    assert bench.session.state.pose is None
+
+
+def test_no_timer_runs_after_undo_off_or_remove_nor_where_it_is_not_wanted(bench):
+    hand, place = bench.hand, bench.aim(FREE)
+
+    def drag():
+        hand.drag([place, place + [-40.0, 60.0]])
+
+    drag()
+    bench.session.undo()
+    hand.tick()
+    assert not bench.has_timer
+    assert bench.session.state.pose is None
+    drag()
+    assert bench.has_timer
+    bench.dragger.Off()
+    bench.dragger.refine_while_resting = True
+    assert not bench.has_timer
+    bench.session.undo()
+    bench.dragger.On()
+    drag()
+    bench.dragger.refine_while_resting = False
+    assert not bench.has_timer
+    bench.session.undo()
+    drag()
+    assert not bench.has_timer
+    bench.dragger.refine_while_resting = True
+    assert bench.has_timer
+    bench.dragger.remove()
+    assert not bench.has_timer
+
+
+def test_escape_and_the_right_button_go_back_to_the_pose_before_the_press(bench):
+    hand, place = bench.hand, bench.aim(FREE)
+    bench.session.drag({TIP: bench.targets() + [0.0, 0.1, 0.2]})
+    bench.session.commit("before")
+    pose, place = bench.session.state.pose, bench.aim(FREE)
+    for cancel in (lambda: hand.key("Escape"), lambda: hand.event("RightButtonPressEvent")):
+        hand.press(place)
+        hand.move(place + [-40.0, 60.0])
+        hand.tick()
+        assert bench.session.state.pose is not pose
+        cancel()
+        assert bench.session.state.pose is pose
+        assert bench.session.undo_label == "before"
+        assert not bench.has_timer
+        hand.move(place)
+        hand.release(place)
+        assert bench.session.state.pose is pose
+    assert np.allclose(hand.at(bench.gizmo.centre), place, atol=1.0)
+
+
+def test_what_somebody_else_has_left_in_hand_is_not_taken_back(bench):
+    bench.session.drag({TIP: bench.targets() + [0.0, 0.1, 0.2]})
+    pose, place = bench.session.state.pose, bench.aim(FREE)
+    bench.hand.press(place)
+    bench.hand.move(place + [-40.0, 60.0])
+    bench.hand.key("Escape")
+    assert bench.session.state.pose is pose
+    assert bench.session.undo_label == "drag handle 1"
+
+
+def test_what_is_undone_is_not_refined(bench):
+    place = bench.aim(FREE)
+    bench.hand.drag([place, place + [-40.0, 60.0]])
+    place = bench.aim(FREE)
+    bench.hand.drag([place, place + [-40.0, 0.0]])
+    assert bench.has_timer
+    bench.session.undo()
+    pose = bench.session.state.pose
+    bench.hand.tick()
+    assert bench.session.state.pose is pose
+    assert not bench.has_timer
+
+
+def test_off_in_mid_drag_keeps_one_step_and_on_continues_refining(bench):
+    place = bench.aim(FREE)
+    bench.hand.press(place)
+    bench.hand.move(place + [-40.0, 60.0])
+    pose = bench.session.state.pose
+    bench.dragger.Off()
+    assert bench.session.state.pose is pose is not None
+    assert not bench.session.is_dragging
+    assert not bench.has_timer
+    assert bench.gizmo.centre is None
+    bench.dragger.On()
+    assert bench.has_timer
+    bench.hand.tick(60)
+    assert not bench.has_timer
+    assert bench.session.solution.status is Status.CONVERGED
+    assert bench.session.undo() == f"drag {TIP}"
+    assert bench.session.state.pose is None
+
+
+def test_a_pose_that_must_be_bound_first_is_not_refined(bench):
+    place = bench.aim(FREE)
+    bench.hand.drag([place, place + [-40.0, 60.0]])
+    assert bench.has_timer
+    pose = bench.session.state.pose
+    bench.session.change_options(stretch=3.0)
+    bench.hand.tick()
+    assert not bench.has_timer
+    assert not bench.session.is_bound
+    assert bench.session.state.pose is pose
+    bench.session.bind()
+    bench.dragger.Off()
+    bench.dragger.On()
+    assert bench.has_timer
+    bench.hand.tick(60)
+    assert bench.session.solution.status is Status.CONVERGED
+    assert bench.session.state.pose is not pose
+
+
+@pytest.mark.parametrize("fails", ["move_handle", "refine"])
+def test_a_solve_that_fails_takes_the_drag_back_and_is_told(fails, monkeypatch):
+    bench = Bench()
+    hand, place = bench.hand, bench.aim(FREE)
+    hand.press(place)
+    hand.move(place + [-20.0, 30.0])
+
+    def fail(*_, **__):
+        raise ConstraintError("these targets lead to no finite pose")
+
+    monkeypatch.setattr(bench.session, fails, fail)
+    hand.move(place + [-40.0, 60.0])
+    hand.tick()
+    assert [str(failure) for failure in hand.failures] == ["these targets lead to no finite pose"]
+    assert bench.session.state.pose is None
+    assert not bench.dragger.is_grabbing
+    assert not bench.has_timer
+    monkeypatch.undo()
+    hand.release(place)
+    hand.drag([place, place + [-20.0, 30.0]])
+    assert len(hand.failures) == 1
+    assert bench.session.undo_label == "drag handle 1"
+
+
+def test_targets_too_far_away_are_refused_and_the_drag_is_taken_back():
+    bench = Bench(parallel=True)
+    bench.view.camera.SetParallelScale(1e5)
+    bench.view.render()
+    place = bench.aim(FREE)
+    bench.hand.press(place)
+    bench.hand.move(place + [150.0, 0.0])
+    assert len(bench.hand.failures) == 1
+    assert "diagonals of the mesh away" in str(bench.hand.failures[0])
+    assert not bench.dragger.is_grabbing
+    assert bench.session.state.pose is None
+
+
+# What is seen.
+
+
+def test_the_gizmo_goes_where_the_handle_is(bench):
+    session = bench.session
+    rest = SCENE.mesh.vertices[SCENE.handle].mean(axis=0)
+    assert np.allclose(bench.gizmo.centre, rest)
+    bench.hand.drag([bench.aim(FREE), bench.aim(FREE) + [-30.0, 40.0]])
+    there = session.vertices[SCENE.handle].mean(axis=0)
+    assert np.linalg.norm(there - rest) > 0.1
+    assert np.array_equal(bench.gizmo.centre, there)
+    session.undo()
+    assert np.allclose(bench.gizmo.centre, rest)
+    session.redo()
+    assert np.array_equal(bench.gizmo.centre, session.vertices[SCENE.handle].mean(axis=0))
+    session.reset_pose()
+    assert np.allclose(bench.gizmo.centre, rest)
+
+
+def test_idle_hover_and_active_look_different_and_off_shows_nothing(bench):
+    hand, view = bench.hand, bench.view
+    bench.dragger.Off()
+    off = picture(view)
+    bench.dragger.On()
+    idle = picture(view)
+    place = bench.aim(Part(Way.ABOUT, 2))
+    hand.hover(place)
+    hover = picture(view)
+    hand.hover(hand.at(SCENE.mesh.vertices[bench.session.handles[TOP]].mean(axis=0)))
+    patch = picture(view)
+    hand.press(place)
+    active = picture(view)
+    hand.key("Escape")
+    hand.hover((5, 5))
+    pictures = [off, idle, hover, patch, active]
+    for k, one in enumerate(pictures):
+        for other in pictures[:k]:
+            assert (one != other).any(axis=2).sum() > 20
+    assert np.array_equal(picture(view), idle)
+    bench.dragger.Off()
+    assert np.array_equal(picture(view), off)
+
+
+def test_how_far_it_is_turned_is_told(bench):
+    before = picture(bench.view)
+    place = bench.aim(VIEW_RING)
+    bench.hand.press(place, control=True)
+    held = picture(bench.view)
+    bench.hand.move(place + [1.0, 0.0], control=True)
+    assert np.array_equal(picture(bench.view), held)  # nothing yet
+    bench.hand.key("Escape")
+    bench.hand.hover((5, 5))
+    assert np.array_equal(picture(bench.view), before)

@@ -1,0 +1,309 @@
+"""From the window to the mesh, checked against brute force."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hands import plain_view
+from scenes import sausage
+from scipy.sparse import csgraph
+from solids import icosphere, two_components
+
+from vtk_segdeform import Mesh, Session, models
+from vtk_segdeform.widgets.picking.picking import Picker
+from vtk_segdeform.widgets.picking.surface_distance import SurfaceDistance
+from vtk_segdeform.widgets.picking.visibility import seen_vertices
+from vtk_segdeform.widgets.region_selector.strokes import Lasso
+from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
+from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
+
+RNG = np.random.default_rng(3)
+
+
+def over(mesh, size=(400, 400), *, parallel=False):
+    view = plain_view(size)
+    session = Session(mesh)
+    surface = SurfaceDisplay(view, session)
+    view.camera.SetParallelProjection(parallel)
+    view.camera.SetPosition(1.0, -3.0, 0.7)
+    view.camera.SetViewUp(0.0, 0.0, 1.0)
+    view.renderer.ResetCamera()
+    view.render()
+    return view, session, surface, Picker(surface)
+
+
+def first_crossing(points, faces, near, far):
+    """Return (face, share of the way) of the first triangle on the way from near to far."""
+    a, b, c = points[faces.T]
+    way = far - near
+    normal = np.cross(b - a, c - a)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = np.einsum("ij,ij->i", a - near, normal) / (normal @ way)
+    place = near + t[:, None] * way
+    sides = [np.cross(q - p, place - p) for p, q in ((a, b), (b, c), (c, a))]
+    inside = np.all([np.einsum("ij,ij->i", s, normal) >= 0.0 for s in sides], axis=0)
+    t = np.where(inside & (t >= 0.0) & (t <= 1.0), t, np.inf)
+    return int(t.argmin()), float(t.min())
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+def test_the_point_under_the_pointer_is_the_first_crossing(parallel):
+    view, session, surface, picker = over(models.cactus(1200), parallel=parallel)
+    met = 0
+    for x, y in RNG.uniform(60, 340, (60, 2)):
+        pointer = Pointer(Phase.HOVER, x, y)
+        near, far = view.ray(pointer)
+        face, share = first_crossing(surface.points, session.mesh.faces, near, far)
+        hit = picker.hit(pointer)
+        assert (hit is None) == np.isinf(share)
+        if hit is not None:
+            met += 1
+            assert hit.face == face
+            assert np.allclose(hit.point, near + share * (far - near), atol=1e-6)
+            assert hit.vertex in session.mesh.faces[face]
+    assert met > 5
+
+
+def test_the_pose_that_is_drawn_is_the_one_that_is_asked():
+    scene = sausage()
+    view, session, surface, picker = over(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.set_fixed(scene.fixed)
+    session.add_handle(scene.handle)
+    side = np.abs(scene.mesh.vertices - [2.7, -0.3, 0.1]).sum(axis=1)
+    tip = int(np.argmin(side))
+
+    def where():
+        return view.to_display(surface.points[[tip]])[0]
+
+    before = where()
+    assert picker.hit(Pointer(Phase.HOVER, *before[:2])) is not None
+    session.drag(scene.turned(60.0), max_steps=20)
+    after = where()
+    assert np.linalg.norm(after[:2] - before[:2]) > 50
+    hit = picker.hit(Pointer(Phase.HOVER, *after[:2]))
+    assert np.linalg.norm(hit.point - surface.points[tip]) < 0.3
+    assert picker.hit(Pointer(Phase.HOVER, *before[:2])) is None
+
+
+def test_a_brush_does_not_leak_to_what_is_near_in_space_only():
+    # Two leaves of one folded sheet: a flat box bent to a U by its coordinates.
+    u, v = np.meshgrid(np.linspace(-1, 1, 81), np.linspace(0, 1, 21), indexing="ij")
+    angle = np.pi * np.clip((u + 0.1) / 0.2, 0.0, 1.0)
+    middle = np.stack([np.abs(u), v, np.where(u < 0, -0.05, 0.05)], axis=-1)
+    bend = np.abs(u) <= 0.1
+    middle[bend] = np.stack([0.1 - 0.05 * np.sin(angle), v, -0.05 * np.cos(angle)], axis=-1)[bend]
+    count = u.size
+    across = np.gradient(middle, axis=0)
+    normal = np.cross(across, [0.0, 1.0, 0.0])
+    normal /= np.linalg.norm(normal, axis=-1)[..., None]
+    vertices = np.concatenate([(middle + s * 0.01 * normal).reshape(-1, 3) for s in (-1, 1)])
+    i, j = np.meshgrid(np.arange(80), np.arange(20), indexing="ij")
+    a = (i * 21 + j).ravel()
+    b, c, d = a + 21, a + 22, a + 1
+    upper = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    rim = np.concatenate([
+        np.arange(80) * 21, 80 * 21 + np.arange(20), (80 - np.arange(80)) * 21 + 20,
+        20 - np.arange(20),
+    ])  # fmt: skip
+    after = np.roll(rim, -1)
+    wall = np.concatenate([
+        np.stack([rim, after, after + count], 1), np.stack([rim, after + count, rim + count], 1)
+    ])  # fmt: skip
+    faces = np.concatenate([upper[:, ::-1], upper + count, wall])
+    if np.einsum("ij,ij", vertices[faces[:, 0]], np.cross(*vertices[faces[:, 1:].T])) < 0:
+        faces = faces[:, ::-1]
+    mesh = Mesh(vertices, faces)
+    view, _, surface, picker = over(mesh)
+    view.camera.SetPosition(0.6, 0.5, 4.0)
+    view.camera.SetFocalPoint(0.6, 0.5, 0.0)
+    view.camera.SetViewUp(0.0, 1.0, 0.0)
+    view.renderer.ResetCamera()
+    x, y, _ = view.to_display(np.array([[0.6, 0.5, 0.06]]))[0]
+    taken = picker.distances([picker.hit(Pointer(Phase.HOVER, x, y))], 0.2) <= 0.2
+    assert np.count_nonzero(taken) > 20
+    assert (surface.points[taken, 2] > 0.0).all()  # the other leaf is half as far as the brush
+    near = np.linalg.norm(surface.points - [0.6, 0.5, 0.06], axis=1) < 0.15
+    assert (near & (surface.points[:, 2] < 0.0)).any()
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_along_a_sphere_it_is_as_far_as_along_its_great_circles(count):
+    vertices, faces = icosphere(4)
+    wave = SurfaceDistance(len(vertices), faces)
+    where = RNG.choice(len(faces), count, replace=False)
+    points = np.einsum("kij,ki->kj", vertices[faces[where]], RNG.dirichlet([1, 1, 1], count))
+    distance = wave.within(vertices, points, where, 0.8)
+    directions = points / np.linalg.norm(points, axis=1)[:, None]
+    exact = np.arccos(np.clip(vertices @ directions.T, -1.0, 1.0)).min(axis=1)
+    reached = distance <= 0.8
+    assert np.count_nonzero(reached) > 100
+    assert reached[exact < 0.78].all()
+    assert not reached[exact > 0.81].any()
+    assert np.allclose(distance[reached], exact[reached], rtol=0.02, atol=0.01)
+
+
+def test_along_a_plane_it_is_exactly_as_far_as_straight():
+    n = 30
+    u, v = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+    flat = np.stack([u + 0.3 * v, v, 0.5 * u], axis=-1).reshape(-1, 3)  # skew triangles
+    k = (u * n + v)[:-1, :-1].ravel()
+    faces = np.concatenate([np.stack([k, k + n, k + n + 1], 1), np.stack([k, k + n + 1, k + 1], 1)])
+    middle = len(faces) // 4 + n // 2
+    point = flat[faces[middle]].mean(axis=0)
+    distance = SurfaceDistance(len(flat), faces).within(flat, point[None], np.array([middle]), 9.0)
+    straight = np.linalg.norm(flat - point, axis=1)
+    reached = distance <= 9.0
+    assert np.count_nonzero(reached) > 100
+    assert np.array_equal(reached, straight <= 9.0)
+    assert np.allclose(distance[reached], straight[reached], rtol=1e-5)
+
+
+def test_it_is_never_nearer_than_straight_nor_further_than_along_the_edges():
+    mesh = models.cactus(1500)
+    start = 700
+    face = int(np.flatnonzero((mesh.faces == start).any(axis=1))[0])
+    radius = 0.3 * mesh.diagonal
+    point = mesh.vertices[start]
+    wave = SurfaceDistance(mesh.n_vertices, mesh.faces)
+    distance = wave.within(mesh.vertices, point[None], np.array([face]), radius)
+    edges = csgraph.dijkstra(mesh.adjacency, indices=start)
+    straight = np.linalg.norm(mesh.vertices - point, axis=1)
+    slack = 1e-4 * radius
+    assert (distance >= straight - slack).all()
+    assert (distance[edges <= radius] <= edges[edges <= radius] + slack).all()
+    assert np.isinf(distance[straight > 1.5 * radius]).all()
+    inside = distance[mesh.edges] <= radius
+    around = mesh.edges[inside[:, 0] != inside[:, 1]]
+    assert np.isfinite(distance[around]).all()  # what a ring is drawn through
+
+
+def test_nothing_is_near_to_no_point():
+    _, _, _, picker = over(models.sphere(300))
+    assert np.isinf(picker.distances([], 1.0)).all()
+
+
+def test_a_needle_goes_through_front_and_back():
+    view, _, surface, picker = over(models.sphere(800))
+    front, back = picker.hits(Pointer(Phase.HOVER, 205, 213))
+    assert back.face != front.face
+    eye = np.array(view.camera.GetPosition())
+    assert np.linalg.norm(front.point - eye) < np.linalg.norm(back.point - eye)
+    near = np.linalg.norm(surface.points - front.point, axis=1)
+    assert near[front.vertex] == pytest.approx(near.min())
+    assert picker.hits(Pointer(Phase.HOVER, 2, 2)) == []
+
+
+def test_a_component_is_all_that_hangs_together():
+    vertices, faces = two_components()
+    _, _, _, picker = over(Mesh(vertices, faces))
+    second = picker.component(len(vertices) - 1)
+    assert np.array_equal(np.flatnonzero(second), np.arange(len(vertices) // 2, len(vertices)))
+
+
+def test_what_is_seen_is_what_no_triangle_hides():
+    mesh = models.cactus(1500)
+    view, _, surface, _ = over(mesh, (500, 500))
+    display = view.to_display(surface.points)
+    seen = seen_vertices(display, mesh.faces)
+    eye = np.array(view.camera.GetPosition())
+    exact = np.zeros(len(seen), dtype=bool)
+    sample = RNG.choice(mesh.n_vertices, 400, replace=False)
+    for k in sample:
+        elsewhere = mesh.faces[~(mesh.faces == k).any(axis=1)]
+        _, share = first_crossing(surface.points, elsewhere, eye, surface.points[k])
+        exact[k] = share > 1.0 - 1e-9
+    assert 0.2 < exact[sample].mean() < 0.8
+    assert np.array_equal(seen[sample], exact[sample])
+
+
+def test_few_large_triangles_hide_as_well_as_many_small_ones():
+    cube = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+    square = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+              [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]  # fmt: skip
+    mesh = Mesh(cube, np.array(square))
+    view, *_ = over(mesh)
+    seen = seen_vertices(view.to_display(cube), mesh.faces)
+    assert np.count_nonzero(~seen) == 1  # of a cube's corners one is behind
+    far = np.linalg.norm(cube - view.camera.GetPosition(), axis=1)
+    assert not seen[far.argmax()]
+
+
+def test_what_is_behind_the_camera_is_not_seen():
+    display = np.array([[10.0, 10, 0.5], [20, 10, 0.5], [10, 20, 0.5], [np.nan] * 3])
+    seen = seen_vertices(display, np.array([[0, 1, 2], [1, 3, 2]]))
+    assert seen.tolist() == [True, True, True, False]
+    assert not seen_vertices(np.full((3, 3), np.nan), np.array([[0, 1, 2]])).any()
+
+
+def crossings_above(point, corners):
+    """Return how often a ray straight up crosses a closed line; side by side, in plain Python."""
+    count = 0
+    for (x0, y0), (x1, y1) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        if (x0 > point[0]) != (x1 > point[0]):
+            count += y0 + (point[0] - x0) * (y1 - y0) / (x1 - x0) > point[1]
+    return count
+
+
+def test_a_lasso_goes_round_what_is_crossed_an_odd_number_of_times():
+    _, _, _, picker = over(models.cactus(800))
+    corners = (200 + 170 * RNG.uniform(-1, 1, (9, 2))).tolist()  # crosses itself
+    lasso = Lasso(picker, Pointer(Phase.PRESS, *corners[0]), through=True)
+    for corner in corners[1:]:
+        lasso.extend(Pointer(Phase.MOVE, *corner))
+        so_far = lasso.outline.tolist()
+        odd = [crossings_above(p, so_far) % 2 == 1 for p in picker.places()]
+        assert lasso.mask.tolist() == (odd if len(so_far) > 2 else [False] * len(odd))
+    assert 20 < lasso.mask.sum() < 780
+
+
+def test_what_is_seen_is_looked_at_again_when_the_camera_or_the_pose_has_changed():
+    scene = sausage()
+    view, session, surface, picker = over(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.set_fixed(scene.fixed)
+    session.add_handle(scene.handle)
+
+    def now():
+        return seen_vertices(view.to_display(surface.points), scene.mesh.faces)
+
+    first = picker.seen()
+    assert np.array_equal(first, now())
+    view.renderer.ResetCameraClippingRange(-9, 9, -9, 9, -9, 9)
+    assert picker.seen() is first  # no need to look
+    view.camera.Azimuth(50)
+    assert not np.array_equal(picker.seen(), first)
+    assert np.array_equal(picker.seen(), now())
+    second = picker.seen()
+    session.drag(scene.turned(60.0), max_steps=5)
+    assert not np.array_equal(picker.seen(), second)
+    assert np.array_equal(picker.seen(), now())
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+def test_asked_about_some_vertices_it_tells_of_them_what_it_would_tell_of_all(parallel):
+    mesh = models.cactus(1500)
+    view, _, surface, picker = over(mesh, parallel=parallel)
+    view.camera.Zoom(3.0)  # some are beside the window
+    everything = seen_vertices(view.to_display(surface.points), mesh.faces)
+    assert 0.2 < everything.mean() < 0.8
+    nowhere = np.zeros(mesh.n_vertices, dtype=bool)
+    assert not picker.seen(nowhere).any()
+    for share in (0.002, 0.1, 0.5):
+        some = RNG.random(mesh.n_vertices) < share
+        assert np.array_equal(picker.seen(some), everything & some)
+    near = view.to_display(surface.points)
+    near = np.hypot(*(near - near[7])[:, :2].T) < 25.0
+    assert np.array_equal(Picker(surface).seen(near), everything & near)
+    assert np.array_equal(picker.seen(), everything)
+
+
+def test_what_is_drawn_in_front_of_the_mesh_hides_none_of_it():
+    view, session, surface, picker = over(models.sphere(300))
+    before = picker.seen()
+    other = SurfaceDisplay(view, Session(Mesh(1.5 * surface.points, session.mesh.faces)))
+    view.render()
+    assert np.array_equal(Picker(surface).seen(), before)
+    other.remove()

@@ -1,0 +1,176 @@
+"""The editor in pyvistaqt's views: real Qt events, its jobs beside Qt's event loop, and the end."""
+
+from __future__ import annotations
+
+import gc
+import os
+import subprocess
+import sys
+import time
+import weakref
+
+import numpy as np
+import pytest
+from qt_hands import Qt, QtHand, QtWidgets, application, until
+
+import pyvistaqt  # isort: skip
+import vtk_segdeform.widgets.plugin  # noqa: F401 - pyvistaqt does not ask pyvista's entry points
+from vtk_segdeform import Regions, models
+from vtk_segdeform.widgets.editor import actions
+from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
+from vtk_segdeform.widgets.scene.view import View
+
+MESH = models.cactus(700)
+
+
+def in_a_window():
+    """Return a QtInteractor in a window of an application, and the window."""
+    window = QtWidgets.QMainWindow()
+    plotter = pyvistaqt.QtInteractor(window, auto_update=False, off_screen=False)
+    window.setCentralWidget(plotter)
+    window.resize(700, 500)
+    window.show()
+    return plotter, window
+
+
+def in_the_background():
+    """Return a BackgroundPlotter and its window."""
+    plotter = pyvistaqt.BackgroundPlotter(
+        show=True, off_screen=False, auto_update=False, window_size=(700, 500),
+        app=application(), toolbar=False, menu_bar=False, editor=False,
+    )  # fmt: skip
+    return plotter, plotter.app_window
+
+
+@pytest.fixture(params=[in_a_window, in_the_background], ids=["QtInteractor", "BackgroundPlotter"])
+def qt(request):
+    """Yield a plotter with the editor in it, the editor, a hand and the window."""
+    app = application()
+    plotter, window = request.param()
+    until(lambda: window.isVisible() and window.windowHandle().isExposed(), "the window")
+    editor = plotter.segdeform.edit(MESH)
+    plotter.camera_position = "xz"
+    plotter.render()
+    app.processEvents()
+    hand = QtHand(plotter.interactor, editor.view)
+    plotter.interactor.setFocus()
+    yield plotter, editor, hand, window
+    assert hand.failures == []
+    if not plotter._closed:
+        plotter.close()
+    window.close()
+    app.processEvents()
+
+
+def around(editor, mask):
+    """Return two corners of a rectangle around some vertices, as they are seen."""
+    seen = editor.view.to_display(editor.session.vertices[mask])[:, :2]
+    return seen.min(axis=0) - 4.0, seen.max(axis=0) + 4.0
+
+
+def test_the_whole_story_in_qt(qt):
+    _, editor, hand, _ = qt
+    session, height = editor.session, MESH.vertices[:, 2]
+    changes, said = [], set()
+    session.on_change(lambda _: changes.append(session.volume_change))
+
+    def is_done():
+        said.add(editor.status)
+        return not editor.is_busy
+
+    hand.key("g")
+    until(lambda: is_done() and session.regions is not None, "regions")
+    hand.key("f")
+    until(lambda: is_done() and session.cages, "cages")
+    assert sum("%" in text for text in said) > 2  # it told how far it was, meanwhile
+    assert len(session.cages) == session.regions.n_regions
+
+    for key in "3tvs":
+        hand.key(key)
+    hand.drag(around(editor, height < 0.08))
+    hand.key("d")
+    hand.drag(around(editor, height > 0.92))
+    assert len(session.fixed) > 5
+    assert set(session.fixed) <= set(np.flatnonzero(height < 0.12))
+    (name,) = session.handles
+    assert set(session.handles[name]) <= set(np.flatnonzero(height > 0.88))
+
+    hand.key("4")
+    until(is_done, "binding")
+    assert editor.mode is Mode.DEFORM
+    start = np.array(hand.at(editor.stage.dragger.gizmo.centre))
+    changes.clear()
+    hand.drag(start + t * np.array([80.0, -25.0]) for t in np.linspace(0.0, 1.0, 12))
+    moved = np.array(hand.at(editor.stage.dragger.gizmo.centre)) - start
+    assert moved == pytest.approx([80.0, -25.0], abs=3.0)  # y is up, and a pixel is a pixel
+    until(lambda: not editor.stage.dragger.is_refining, "refinement, by timers of Qt")
+    assert len(changes) >= 12
+    assert max(map(abs, changes)) < 1e-12
+    bent = session.vertices
+    hand.key("z")
+    assert np.array_equal(session.vertices, MESH.vertices)
+    hand.key("y")
+    assert np.array_equal(session.vertices, bent)
+    assert abs(session.volume_change) < 1e-12
+
+
+def test_a_job_is_stopped_by_escape_while_qt_runs(qt, monkeypatch):
+    _, editor, hand, _ = qt
+    end = time.monotonic() + 60.0
+
+    def endless(mesh, *, progress):  # the real one may be done before the key is down
+        while time.monotonic() < end:
+            progress(0.5, "looking everywhere")
+            time.sleep(0.001)
+        return Regions.single(mesh)
+
+    monkeypatch.setattr(actions, "segmented", endless)
+    hand.key("g")
+    until(lambda: "looking everywhere" in editor.status, "the job")
+    hand.key("Escape")
+    until(lambda: not editor.is_busy, "the end")
+    assert editor.session.regions is None
+    assert "cancelled" in editor.status
+
+
+def test_the_camera_is_turned_beside_the_mesh_and_ctrl_takes_away(qt):
+    _, editor, hand, _ = qt
+    before = editor.view.camera.GetPosition()
+    hand.drag([(30, 400), (60, 380), (90, 380)])
+    assert editor.view.camera.GetPosition() != before
+    editor.session.set_fixed(MESH.vertices[:, 2] < 0.3)
+    for key in "3tvs":
+        hand.key(key)
+    hand.drag(around(editor, slice(None)), held=Qt.ControlModifier)
+    assert len(editor.session.fixed) == 0
+
+
+def test_a_window_that_is_closed_lets_the_editor_go(qt):
+    plotter, editor, hand, window = qt
+    hand.key("g")  # in the middle of a job
+    plotter.close()
+    window.close()
+    assert not editor.is_busy
+    assert not editor.GetEnabled()
+
+
+def test_an_editor_that_was_removed_leaves_nothing_alive(qt):
+    plotter, *_ = qt
+    view = View.of(plotter)
+    editor = DeformEditor(view, MESH)
+    editor.On()
+    editor.remove()
+    gone = weakref.ref(editor)
+    del editor
+    gc.collect()
+    assert gone() is None
+
+
+@pytest.mark.campaign
+def test_the_story_on_a_screen_with_larger_pixels():
+    application()  # or skip
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", __file__, "-k", "whole_story and QtInteractor"],
+        env={**os.environ, "QT_SCALE_FACTOR": "1.5"}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert "1 passed" in done.stdout, done.stdout + done.stderr

@@ -1,0 +1,723 @@
+"""The editor as a Qt widget and as a dock: real mouse and keys on the view and on the panel."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bad_values import BAD
+from hands import plain_view
+from numpy.testing import assert_array_equal
+from PIL import Image
+from qt_hands import (
+    Qt,
+    QtCore,
+    QtHand,
+    QtTest,
+    QtWidgets,
+    application,
+    new_screen,
+    small,
+    until,
+)
+from qtpy import QtGui
+
+import pyvistaqt  # isort: skip
+from vtk_segdeform import Session, models
+from vtk_segdeform.errors import SegDeformError
+from vtk_segdeform.io.convert import read_mesh, read_polydata, to_polydata
+from vtk_segdeform.session.store import load_session
+from vtk_segdeform.widgets import Mode, Paint, Tool
+from vtk_segdeform.widgets.qt.widget import DeformDock, DeformWidget, deform_dock
+
+MESH = models.cactus(500)
+
+
+@pytest.fixture
+def state():
+    """Return the mesh and the state of a session that lacks nothing but a pose."""
+    return small()
+
+
+class Seen:
+    """A widget on the screen, what it told of, and a hand on it."""
+
+    def __init__(self, widget, window=None):
+        window = window or widget
+        window.resize(760, 560)
+        window.show()
+        until(lambda: window.windowHandle() and window.windowHandle().isExposed(), "the window")
+        window.activateWindow()
+        until(window.isActiveWindow, "the focus")
+        self.widget, self.panel, self.editor = widget, widget.panel, widget.editor
+        self.deformed, self.errors, self.sessions, self.regions = [], [], [], []
+        widget.deformed.connect(lambda: self.deformed.append(self.session.volume_change))
+        widget.regions_changed.connect(lambda: self.regions.append(self.session.regions))
+        widget.error.connect(self.errors.append)
+        widget.session_changed.connect(self.sessions.append)
+
+    @property
+    def session(self):
+        return self.editor.session
+
+    def view_hand(self):
+        """Return a hand on the view, which looks from the front."""
+        plotter = self.widget.plotter
+        plotter.camera_position = "xz"
+        plotter.render()
+        plotter.setFocus()
+        return QtHand(plotter.interactor, self.editor.view)
+
+    def settle(self):
+        """Let Qt work until no job is running and the panel shows how things are."""
+        application().processEvents()
+        until(lambda: not self.editor.is_busy, "the job")
+        until(lambda: not self.panel._patience.isActive(), "the panel")
+
+    def click(self, button):
+        """Click in the middle of a button, or on the box of a check box."""
+        assert button.isVisible()
+        assert button.isEnabled()
+        check = isinstance(button, QtWidgets.QCheckBox)
+        place = QtCore.QPoint(8, button.height() // 2) if check else button.rect().center()
+        QtTest.QTest.mouseClick(button, Qt.LeftButton, Qt.NoModifier, place)
+        self.settle()
+
+    def click_row(self, tree, row, column=0, held=Qt.NoModifier):
+        """Click on a row of a list; in a column with a tick on the tick."""
+        box = tree.visualItemRect(tree.topLevelItem(row))
+        box = tree.visualRect(tree.indexFromItem(tree.topLevelItem(row), column)) if column else box
+        place = QtCore.QPoint(box.left() + 10, box.center().y())
+        QtTest.QTest.mouseClick(tree.viewport(), Qt.LeftButton, held, place)
+        self.settle()
+
+    def type_number(self, box, number):
+        """Type a number into a field, and Enter."""
+        box.setFocus()
+        box.selectAll()
+        QtTest.QTest.keyClicks(box, box.locale().toString(number))
+        QtTest.QTest.keyClick(box, Qt.Key_Return)
+        self.settle()
+
+    def mode(self, mode):
+        self.click(self.panel.head.modes[mode])
+
+
+@pytest.fixture
+def make():
+    """Yield a callable that puts a widget over a session on the screen."""
+    application()
+    made = []
+
+    def over(mesh):
+        made.append(Seen(DeformWidget(mesh)))
+        return made[-1]
+
+    yield over
+    for seen in made:
+        seen.widget.close()
+        seen.widget.deleteLater()
+    delete_now()
+
+
+@pytest.fixture
+def seen(make, state):
+    """Return a widget over a session that is ready to be deformed."""
+    mesh, now = state
+    return make(Session(mesh, state=now))
+
+
+def delete_now():
+    """Let Qt delete what is to be deleted later, and then what PyQt has for that."""
+    for _ in range(2):
+        application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
+        application().processEvents()
+
+
+def rows(tree):
+    return [
+        tuple(tree.topLevelItem(k).text(c) for c in range(tree.columnCount()))
+        for k in range(tree.topLevelItemCount())
+    ]
+
+
+def around(seen, mask):
+    """Return two corners of a rectangle around some vertices, as they are seen."""
+    places = seen.editor.view.to_display(seen.session.vertices[mask])[:, :2]
+    return places.min(axis=0) - 4.0, places.max(axis=0) + 4.0
+
+
+def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
+    seen = make(MESH)
+    panel, hand, height = seen.panel, seen.view_hand(), MESH.vertices[:, 2]
+    seen.click(panel.regions.find)
+    assert seen.session.regions.n_regions == len(rows(panel.regions.list)) > 1
+    seen.mode(Mode.CAGES)
+    seen.click(panel.cages.fit)
+    assert [f"{cage.n_vertices} vertices" for cage in seen.session.cages] == [
+        cage for _, cage, _ in rows(panel.regions.list)
+    ]
+
+    seen.mode(Mode.HANDLES)
+    seen.click(panel.painting.tools[Tool.RECTANGLE])
+    seen.click(panel.painting.through)
+    seen.click_row(panel.handles.list, 0)  # what stays
+    hand.drag(around(seen, height < 0.08))
+    seen.click(panel.handles.new)
+    hand.drag(around(seen, height > 0.92))
+    seen.settle()
+    assert set(seen.session.fixed) <= set(np.flatnonzero(height < 0.12))
+    (name,) = seen.session.handles
+    counts = [len(seen.session.fixed), len(seen.session.handles[name])]
+    assert [int(count) for _, count in rows(panel.handles.list)] == counts
+    assert min(counts) > 5
+
+    seen.mode(Mode.DEFORM)
+    start = np.array(hand.at(seen.editor.stage.dragger.gizmo.centre))
+    seen.deformed.clear()
+    hand.drag(start + t * np.array([80.0, -25.0]) for t in np.linspace(0.0, 1.0, 12))
+    moved = np.array(hand.at(seen.editor.stage.dragger.gizmo.centre)) - start
+    assert moved == pytest.approx([80.0, -25.0], abs=3.0)
+    until(lambda: not seen.editor.stage.dragger.is_refining, "refinement")
+    assert len(seen.deformed) >= 12
+    assert max(map(abs, seen.deformed)) < 1e-12
+    bent = seen.session.vertices
+    seen.settle()
+    volumes = [text for _, _, text in rows(panel.regions.list)]
+    assert any(text not in ("", "0 %") for text in volumes)
+    seen.click(panel.head.undo)
+    assert_array_equal(seen.session.vertices, MESH.vertices)
+    seen.click(panel.head.redo)
+    assert_array_equal(seen.session.vertices, bent)
+    seen.click(panel.deform.rest)
+    assert seen.session.state.pose is None
+    assert seen.errors == hand.failures == []
+
+
+def test_the_whole_mesh_is_seen_at_first(seen):
+    view = seen.editor.view
+    view.render()
+    places = view.to_display(seen.session.vertices)[:, :2] / view.renderer.GetSize()
+    assert places.min() > 0.0
+    assert places.max() < 1.0
+    assert np.ptp(places, axis=0).max() > 0.4
+
+
+def test_regions_are_chosen_merged_and_cut_in_the_list(seen):
+    panel, session = seen.panel, seen.session
+    seen.click_row(panel.regions.list, 1)
+    assert seen.editor.stage.selector.region == 1
+    assert not panel.regions.merge.isEnabled()
+    seen.click_row(panel.regions.list, 0, held=Qt.ControlModifier)
+    seen.click(panel.regions.merge)
+    assert session.regions.n_regions == 1
+    assert "are one" in panel.foot.words.text()
+    seen.click(panel.regions.split)
+    assert session.regions.n_regions == 2
+    seen.click(panel.regions.new)
+    assert rows(panel.regions.list)[2][0] == "region 3, to be painted"
+    assert seen.editor.stage.selector.region == 2
+    assert not panel.regions.split.isEnabled()
+
+
+def rename(tree, name):
+    """Type another name for the row that is chosen."""
+    tree.setFocus()
+    QtTest.QTest.keyClick(tree, Qt.Key_F2)
+    field = tree.viewport().findChild(QtWidgets.QLineEdit)
+    field.setText(name)  # a keyboard has no keys for all of them
+    QtTest.QTest.keyClick(field, Qt.Key_Return)
+
+
+def test_regions_are_renamed_in_the_list_and_names_are_told_everywhere(seen):
+    tree, session = seen.panel.regions.list, seen.session
+    assert [name for name, *_ in rows(tree)] == ["region 1", "region 2"]
+    seen.click_row(tree, 1, column=2)  # beside the name
+    rename(tree, " the left arm\N{WHITE SMILING FACE} ")
+    seen.settle()
+    assert session.region_names == ("region 1", "the left arm\N{WHITE SMILING FACE}")
+    assert rows(tree)[1][0] == session.region_names[1]
+    assert seen.panel.foot.words.text().startswith("Region 2 is now the left arm")
+    assert len(seen.regions) == 1
+    rename(tree, "region 1")
+    seen.settle()
+    assert "another name" in seen.errors.pop()
+    assert rows(tree)[1][0] == session.region_names[1]
+    rename(tree, "arm")
+    seen.settle()
+    assert "brush for arm," in seen.editor.status
+    seen.click(seen.panel.regions.split)
+    assert [name for name, *_ in rows(tree)] == ["region 1", "arm", "arm 2"]
+    seen.click_row(tree, 2, held=Qt.ControlModifier)
+    seen.click(seen.panel.regions.merge)
+    assert "Arm and arm 2 are one" in seen.panel.foot.words.text()
+    box = tree.visualItemRect(tree.topLevelItem(0))
+    QtTest.QTest.mouseDClick(tree.viewport(), Qt.LeftButton, Qt.NoModifier, box.center())
+    QtTest.QTest.keyClick(tree.viewport().findChild(QtWidgets.QLineEdit), Qt.Key_Escape)
+    seen.settle()
+    assert session.region_names == ("region 1", "arm")
+    assert seen.errors == []
+
+
+def test_a_tick_shows_one_cage_and_hides_it(seen):
+    seen.mode(Mode.CAGES)
+    cages = seen.editor.stage.cages
+    assert cages.is_shown
+    seen.click_row(seen.panel.regions.list, 1, column=1)
+    assert [cages.is_visible(region) for region in (0, 1)] == [True, False]
+    seen.click_row(seen.panel.regions.list, 1, column=1)
+    assert cages.is_visible(1)
+
+
+def test_handles_are_renamed_chosen_and_removed_in_the_list(seen):
+    seen.mode(Mode.HANDLES)
+    tree = seen.panel.handles.list
+    seen.click_row(tree, 1)
+    rename(tree, "tail")
+    seen.settle()
+    assert list(seen.session.handles) == ["tail"]
+    assert rows(tree)[1][0] == "tail"
+    assert seen.editor.stage.selector.handle == "tail"
+    seen.click_row(tree, 0)
+    assert seen.editor.stage.selector.paints is Paint.FIXED
+    seen.click_row(tree, 1)
+    assert seen.editor.stage.selector.paints is Paint.HANDLE
+    seen.click(seen.panel.handles.remove)
+    assert not seen.session.handles
+    assert [name for name, _ in rows(tree)] == ["what stays", "new handle, to be painted"]
+
+
+def test_options_are_steps_and_are_shown_when_they_are_undone(make):
+    seen = make(models.sphere(300))
+    seen.mode(Mode.CAGES)
+    seen.type_number(seen.panel.cages.total, 90)
+    seen.type_number(seen.panel.cages.offset, 0.5)
+    seen.mode(Mode.DEFORM)
+    part, options = seen.panel.deform, lambda: seen.session.options
+    seen.type_number(part.stretch, 3.0)
+    seen.type_number(part.groups, 0)
+    seen.click(part.hold)
+    seen.click(part.hold_each)
+    assert (options().n_cage_vertices, options().offset) == (90, 0.5)
+    assert (options().stretch, options().rotation_groups) == (3.0, None)
+    assert (options().preserve_volume, options().preserve_region_volumes) == (False, True)
+    for _ in range(6):
+        seen.click(seen.panel.head.undo)
+    assert seen.panel.deform.stretch.value() == 10.0
+    assert seen.panel.deform.groups.value() == 300
+    assert seen.panel.deform.hold.isChecked()
+    assert not seen.panel.deform.hold_each.isChecked()
+    seen.mode(Mode.CAGES)
+    assert seen.panel.cages.total.value() == 155
+    assert seen.panel.cages.offset.text() == "by itself"
+    assert seen.panel.head.undo.toolTip() == "Nothing to undo"
+
+
+def test_what_keys_and_the_wheel_do_is_shown_in_the_panel(seen):
+    hand, part = seen.view_hand(), seen.panel.painting
+    hand.key("l")
+    seen.settle()
+    assert part.tools[Tool.LASSO].isChecked()
+    assert not part.radius.isEnabled()
+    for key in "bv":
+        hand.key(key)
+    seen.settle()
+    assert part.through.isChecked()
+    before = part.radius.value()
+    QtTest.QTest.keyClick(hand.widget, "]")
+    seen.settle()
+    assert part.radius.value() == pytest.approx(1.2 * before, rel=1e-3)
+    seen.type_number(part.radius, 0.25)
+    assert seen.editor.stage.selector.radius == pytest.approx(0.25)
+    for key in "qe4":  # the first two would end a window of pyvista's, or VTK's
+        hand.key(key)
+    seen.settle()
+    assert seen.panel.head.modes[Mode.DEFORM].isChecked()
+    assert part.isHidden()
+    seen.click(seen.panel.deform.overlay)
+    assert seen.editor.stage.overlay.is_shown
+
+
+def test_a_click_on_a_button_leaves_the_keys_to_the_view(seen):
+    hand = seen.view_hand()
+    seen.click(seen.panel.painting.tools[Tool.LASSO])
+    assert seen.widget.plotter.hasFocus()
+    hand.key("b")
+    assert seen.editor.stage.selector.tool is Tool.BRUSH
+
+
+def test_a_job_shows_how_far_it_is_and_is_cancelled(seen):
+    go_on, delivered = threading.Event(), []
+
+    def work(progress):
+        progress(0.4, "by hand")
+        assert go_on.wait(30.0)
+        progress(0.5, "by foot")
+
+    seen.editor.do(lambda desk: desk.start("counting", work, delivered.append))
+    foot = seen.panel.foot
+    until(lambda: foot.bar.isVisible() and foot.bar.value() == 400, "the bar")
+    assert foot.words.text() == "Counting: by hand · 40 % · Esc cancels"
+    assert not seen.panel.regions.find.isEnabled()  # nothing else is done meanwhile
+    assert not seen.panel.head.modes[Mode.DEFORM].isEnabled()
+    QtTest.QTest.mouseClick(foot.cancel, Qt.LeftButton)
+    until(lambda: "stopping" in foot.words.text(), "the answer")
+    go_on.set()
+    seen.settle()
+    assert delivered == []
+    assert "cancelled" in foot.words.text().lower()
+    assert not foot.bar.isVisible()
+    assert seen.panel.regions.find.isEnabled()
+
+
+def bend(seen, height=0.4):
+    """Lift the handle, by a script."""
+    shift = np.eye(4)
+    shift[2, 3] = height
+    seen.session.move_handle("handle 1", shift)
+    seen.session.commit()
+
+
+def test_the_log_unfolds_is_copied_and_cleared(seen):
+    part, clipboard = seen.panel.log, application().clipboard()
+    bend(seen)
+    seen.click(part.fold)
+    texts = [entry.text for entry in seen.editor.desk.log.entries]
+    assert [part.list.item(k).text() for k in range(part.list.count())] == texts
+    assert "drag handle 1" in texts[-1]
+    bend(seen, 0.3)
+    until(lambda: part.list.count() == len(texts) + 1, "the second drag")
+    seen.click(part.copy)
+    assert clipboard.text() == "\n\n".join(e.text for e in seen.editor.desk.log.entries)
+    part.list.setCurrentRow(part.list.count() - 2)
+    part.list.setFocus()
+    QtTest.QTest.keyClick(part.list, Qt.Key_C, Qt.ControlModifier)
+    assert clipboard.text() == texts[-1]
+    for _ in range(2):  # more than the log holds
+        for k in range(150):
+            seen.editor.desk.log.add_job(f"job {k}", 1.0, "done")
+        part.refresh()
+    assert part.list.count() == 200
+    assert "job 149" in part.list.item(199).text()
+    seen.click(part.clear)
+    assert part.list.count() == 0
+    assert not part.copy.isEnabled()
+    seen.click(part.fold)
+    assert not part.list.isVisible()
+
+
+def test_the_range_of_the_colours_is_typed_and_kept_for_the_next_session(seen, tmp_path):
+    seen.mode(Mode.DEFORM)
+    part, overlay = seen.panel.deform, lambda: seen.editor.stage.overlay
+    assert not part.range.isEnabled()
+    seen.click(part.overlay)
+    bend(seen)
+    chosen = overlay().half_range
+    seen.type_number(part.range, 37.5)
+    assert overlay().half_range == 0.375 != chosen
+    assert seen.session.undo_label == "drag handle 1"  # it is no step
+    seen.editor.save(tmp_path / "a.segdeform")
+    seen.editor.load(tmp_path / "a.segdeform")
+    seen.settle()
+    assert overlay().half_range == 0.375
+    assert part.range.value() == 37.5
+    seen.type_number(part.range, 0)
+    assert part.range.text() == "by itself"
+    assert overlay().half_range == chosen
+
+
+def test_what_goes_wrong_is_said_told_and_then_forgotten(seen):
+    seen.mode(Mode.HANDLES)
+    seen.panel.handles.list.topLevelItem(1).setText(0, "")  # no name for a handle
+    seen.settle()
+    (error,) = seen.errors
+    assert "name" in error
+    assert seen.panel.foot.words.text().lower() == error.lower()
+    assert seen.panel.foot.sign.isVisible()
+    assert rows(seen.panel.handles.list)[1][0] == "handle 1"
+    seen.mode(Mode.DEFORM)
+    assert not seen.panel.foot.sign.isVisible()
+
+
+# Files.
+
+
+def answer(monkeypatch, path):
+    for name in ("getOpenFileName", "getSaveFileName"):
+        monkeypatch.setattr(QtWidgets.QFileDialog, name, lambda *_: (str(path), ""))
+
+
+def test_a_session_is_saved_and_opened_again(seen, tmp_path, monkeypatch):
+    path = tmp_path / "arm.segdeform"
+    answer(monkeypatch, tmp_path / "arm")
+    seen.panel.head.ask_and_save()
+    assert list(load_session(path).handles) == ["handle 1"]
+    before = seen.session
+    answer(monkeypatch, path)
+    seen.click(seen.panel.head.open)  # saved: no question
+    assert seen.sessions == [seen.session]
+    assert seen.session is not before
+    assert seen.session.regions.n_regions == len(rows(seen.panel.regions.list)) == 2
+    before.merge_regions([0, 1])  # the one that went is nobody's business any more
+    assert seen.regions == []
+    seen.session.merge_regions([0, 1])
+    assert seen.regions == [seen.session.regions]
+    seen.session.remove_handle("handle 1")
+    seen.mode(Mode.HANDLES)
+    assert len(seen.session.fixed) == int(rows(seen.panel.handles.list)[0][1]) > 0
+
+
+def test_what_is_not_saved_is_given_up_only_when_asked(seen, tmp_path, monkeypatch):
+    path = tmp_path / "ball.ply"
+    from vtk_segdeform.io.convert import write_mesh
+
+    write_mesh(path, models.sphere(300))
+    answer(monkeypatch, path)
+    seen.session.set_fixed([])
+    before, buttons = seen.session, QtWidgets.QMessageBox.StandardButton
+    for button, goes in ((buttons.Cancel, False), (buttons.Discard, True)):
+        monkeypatch.setattr(QtWidgets.QMessageBox, "question", lambda *_, b=button: b)
+        seen.click(seen.panel.head.open)
+        assert (seen.session is not before) is goes
+    assert seen.session.mesh.n_vertices == models.sphere(300).n_vertices
+    assert seen.editor.path == tmp_path / "ball.segdeform"  # a mesh is not written over
+
+
+def test_the_mesh_is_written_as_it_is_now(seen, tmp_path, monkeypatch):
+    bend(seen)
+    answer(monkeypatch, tmp_path / "bent.ply")
+    seen.panel.head.ask_and_export()
+    assert_array_equal(read_mesh(tmp_path / "bent.ply").vertices, seen.session.vertices)
+    answer(monkeypatch, tmp_path / "nowhere" / "bent.ply")
+    seen.panel.head.ask_and_export()
+    assert len(seen.errors) == 1
+
+
+def with_arrays():
+    """Return an ellipsoid with something of everything that a surface can have."""
+    mesh, _ = small()
+    surface = to_polydata(mesh)
+    rng = np.random.default_rng(1)
+    surface.point_data["heat"] = rng.random(surface.n_points)
+    surface.point_data["RGB"] = rng.integers(0, 255, (surface.n_points, 3), dtype=np.uint8)
+    surface.point_data["flow"] = rng.random((surface.n_points, 3))
+    surface.point_data["uv"] = rng.random((surface.n_points, 2))
+    surface.point_data.active_texture_coordinates_name = "uv"
+    surface.cell_data["part"] = np.arange(surface.n_cells)
+    surface.field_data["unit"] = ["mm"]
+    return surface
+
+
+def test_a_surface_is_given_and_written_back_with_all_that_it_has(make, tmp_path, monkeypatch):
+    surface, (mesh, state) = with_arrays(), small()
+    seen = make(surface)
+    seen.session.set_regions(state.regions)
+    seen.session.set_cages(state.cages)
+    seen.session.add_handle(state.handle)
+    bend(seen)
+    now = seen.widget.deformed_polydata()
+    assert_array_equal(now.points, seen.session.vertices)
+    assert_array_equal(surface.points, mesh.vertices)
+    surface.point_data.clear()  # ours is as it was when it was given
+    everything = {"heat", "RGB", "flow", "uv"}
+    for name, holds in {
+        "a.vtp": everything, "a.vtk": everything, "a.vtkhdf": everything, "a.ply": {"heat", "RGB"},
+    }.items():  # fmt: skip
+        answer(monkeypatch, tmp_path / name)
+        seen.panel.head.ask_and_export()
+        read = read_polydata(tmp_path / name)
+        assert_array_equal(read.points, seen.session.vertices)
+        assert holds <= set(read.point_data.keys())
+        for each in holds:
+            assert_array_equal(read.point_data[each], now.point_data[each])
+        assert_array_equal(read.cell_data["part"], np.arange(mesh.n_faces))
+        assert_array_equal(read.active_texture_coordinates, now.point_data["uv"])
+    assert seen.errors == []
+
+    # The same from a file, of which a session file remembers the mesh alone.
+    answer(monkeypatch, tmp_path / "a.vtp")
+    seen.editor.save(tmp_path / "a.segdeform")
+    seen.click(seen.panel.head.open)
+    assert_array_equal(seen.session.mesh.vertices, now.points)
+    again = seen.widget.deformed_polydata()
+    assert set(again.point_data.keys()) == everything
+    seen.editor.save(tmp_path / "b.segdeform")
+    seen.editor.load(tmp_path / "b.segdeform")
+    assert set(seen.widget.deformed_polydata().point_data.keys()) == everything
+    seen.editor.load(tmp_path / "a.segdeform")  # of another mesh
+    assert seen.widget.deformed_polydata().point_data.keys() == []
+    assert_array_equal(seen.widget.deformed_polydata().points, seen.session.vertices)
+
+
+# Hosts.
+
+
+def test_two_widgets_in_one_window_and_a_dock_mind_their_own_business(state):
+    app, (mesh, now) = application(), state
+    window = QtWidgets.QMainWindow()
+    tabs = QtWidgets.QSplitter(window)
+    first, second = (DeformWidget(Session(mesh, state=now)) for _ in range(2))
+    plotter = pyvistaqt.QtInteractor(tabs, auto_update=False, off_screen=False)
+    dock = deform_dock(plotter, Session(mesh, state=now), window)
+    for each in (first, second, plotter):
+        tabs.addWidget(each)
+    window.setCentralWidget(tabs)
+    window.addDockWidget(Qt.RightDockWidgetArea, dock)
+    window.resize(1500, 650)
+    hands = [Seen(widget, window) for widget in (first, second, dock)]
+    window.resize(1500, 650)
+    app.processEvents()
+    hands[0].mode(Mode.DEFORM)
+    hands[2].mode(Mode.CAGES)
+    assert [seen.editor.mode for seen in hands] == [Mode.DEFORM, Mode.REGIONS, Mode.CAGES]
+    bend(hands[0])
+    assert [len(seen.deformed) for seen in hands] == [1, 0, 0]
+    hands[1].click_row(second.panel.regions.list, 1)
+    hands[1].click(second.panel.regions.split)
+    assert [seen.session.regions.n_regions for seen in hands] == [2, 3, 2]
+    first.close()  # one goes, the others stay
+    hands[2].mode(Mode.DEFORM)
+    assert not first.editor.GetEnabled()
+    assert second.editor.GetEnabled()
+    plotter.close()  # the dock's editor goes with the view it is in
+    assert not dock.editor.GetEnabled()
+    until(lambda: not dock.panel.isEnabled(), "the panel")
+    second.close()
+    window.close()
+    window.deleteLater()
+    delete_now()
+
+
+def test_a_window_that_is_deleted_without_a_word_takes_all_with_it(state):
+    application()
+    mesh, now = state
+    session, window = Session(mesh, state=now), QtWidgets.QMainWindow()
+    widget = DeformWidget(session, window)
+    window.setCentralWidget(widget)
+    Seen(widget, window)
+    editor = widget.editor
+    window.deleteLater()
+    delete_now()
+    assert not editor.GetEnabled()
+    session.merge_regions([0, 1])  # and nobody listens any more, nor fails to
+    application().processEvents()
+
+
+def test_a_dock_that_is_deleted_leaves_the_editor_as_it_is(state):
+    application()
+    mesh, now = state
+    window = QtWidgets.QMainWindow()
+    plotter = pyvistaqt.QtInteractor(window, auto_update=False, off_screen=False)
+    window.setCentralWidget(plotter)
+    dock = deform_dock(plotter, Session(mesh, state=now), window)
+    window.show()
+    editor, failures = dock.editor, []
+    editor.view.on_failure(failures.append)
+    dock.deleteLater()
+    delete_now()
+    editor.mode = Mode.CAGES
+    editor.session.merge_regions([0, 1])
+    application().processEvents()
+    assert editor.GetEnabled()
+    assert failures == []
+    plotter.close()
+    window.close()
+    window.deleteLater()
+    delete_now()
+
+
+# For everybody.
+
+
+@pytest.mark.parametrize("mode", list(Mode))
+def test_everything_is_reached_by_tab_and_tells_what_it_is(seen, mode):
+    seen.mode(mode)
+    kinds = (QtWidgets.QAbstractButton, QtWidgets.QAbstractSpinBox, QtWidgets.QTreeWidget)
+    wanted = {
+        each
+        for kind in kinds
+        for each in seen.panel.findChildren(kind)
+        if each.isVisible() and each.isEnabled()
+    }
+    assert len(wanted) > 8
+    assert [each for each in wanted if not each.toolTip()] == []
+    reached, heights = set(), []
+    seen.panel.head.open.setFocus()
+    until(seen.panel.head.open.hasFocus, "the focus")
+    for _ in range(60):
+        here = application().focusWidget()
+        if here in wanted and here not in reached:
+            reached.add(here)
+            heights.append(here.mapTo(seen.panel, here.rect().topLeft()).y())
+        QtTest.QTest.keyClick(here, Qt.Key_Tab)
+    assert heights == sorted(heights)  # from the top down
+    assert {each for each in wanted if each.focusPolicy() != Qt.NoFocus} <= reached
+    exclusive = {each for each in wanted - reached if each.group() is not None}
+    assert wanted - reached == exclusive  # where arrows lead
+    here = seen.panel.head.modes[mode]
+    here.setFocus()
+    QtTest.QTest.keyClick(here, Qt.Key_Left if mode is Mode.DEFORM else Qt.Key_Right)
+    assert seen.editor.mode is not mode
+
+
+def test_in_a_dark_palette_the_panel_is_dark_and_its_words_are_light(seen, tmp_path):
+    before = application().palette()
+    application().setPalette(QtGui.QPalette(QtGui.QColor("#3a3a3a"), QtGui.QColor("#2b2b2b")))
+    try:
+        seen.settle()
+        application().processEvents()
+        seen.panel.grab().save(str(tmp_path / "panel.png"))
+        grey = np.array(Image.open(tmp_path / "panel.png").convert("L"))
+        assert np.median(grey) < 60
+        assert grey.max() > 200
+    finally:
+        application().setPalette(before)
+
+
+def test_it_works_where_pixels_are_smaller_than_points():
+    application()  # or skip
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", __file__, "-k", "a_tick"],
+        env={**os.environ, "QT_SCALE_FACTOR": "1.5"}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert "1 passed" in done.stdout, done.stdout + done.stderr
+
+
+def test_the_example_of_an_application_runs(tmp_path):
+    application()  # or skip
+    example = Path(__file__).resolve().parents[3] / "examples" / "qt_application.py"
+    screen = {
+        "DISPLAY": new_screen(),
+        "QT_QPA_PLATFORM": "xcb",
+        "PYTHONPATH": example.parent.parent,
+    }
+    subprocess.run(
+        [sys.executable, example, "--picture", tmp_path / "window.png"],
+        env={**os.environ, **screen}, check=True, timeout=100,
+    )  # fmt: skip
+    colours = np.array(Image.open(tmp_path / "window.png").convert("RGB")).astype(int)
+    body = (np.ptp(colours, axis=2) > 10) & (colours.mean(axis=2) < 220)
+    assert 0.04 < body.mean() < 0.5  # the cactus, the mode that is on, the status line
+
+
+def test_a_bad_argument_is_one_of_our_errors_before_anything_is_created():
+    application()
+    mesh, view = models.sphere(100), plain_view((64, 64))
+    before = len(QtWidgets.QApplication.allWidgets())
+    for kind in sorted(set(BAD) - {"None"}):
+        calls = [
+            lambda bad: DeformWidget(bad),
+            lambda bad: DeformWidget(mesh, bad),
+            lambda bad: deform_dock(bad, mesh),
+            lambda bad: deform_dock(view, bad),
+            lambda bad: DeformDock(bad),
+        ]
+        for call in calls:
+            with pytest.raises(SegDeformError):
+                call(BAD[kind]())
+    assert len(QtWidgets.QApplication.allWidgets()) == before

@@ -1,0 +1,230 @@
+"""Films: what is in the files is what was seen, and a file is there whole or not at all."""
+
+from __future__ import annotations
+
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hands import Hand, picture, plain_view
+from PIL import Image
+from scenes import sausage
+
+from vtk_segdeform import Session, models
+from vtk_segdeform.errors import (
+    ArgumentError,
+    CageError,
+    Cancelled,
+    MissingDependencyError,
+    SessionError,
+)
+from vtk_segdeform.pictures.canvas import require_offscreen
+from vtk_segdeform.widgets.recording.film import Film, film
+from vtk_segdeform.widgets.recording.film_files import require_film
+from vtk_segdeform.widgets.recording.recording import replay
+from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
+
+SCENE = sausage()
+SIZE = (120, 90)
+TURNS = [SCENE.turned(angle) for angle in (0.0, 10.0, 20.0)]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def renderer():
+    try:
+        require_offscreen()
+    except MissingDependencyError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture
+def session():
+    session = Session(SCENE.mesh)
+    session.set_regions(SCENE.regions)
+    session.set_cages(SCENE.cages)
+    session.set_fixed(SCENE.fixed)
+    session.add_handle(SCENE.handle)
+    return session
+
+
+@pytest.fixture
+def ball():
+    view = plain_view(SIZE)
+    SurfaceDisplay(view, Session(models.sphere(200)))
+    view.renderer.ResetCamera()
+    view.render()
+    return view
+
+
+def read(path) -> list[np.ndarray]:
+    """Return the pictures of a GIF or of a folder, (h, w, 3) int."""
+    if path.is_dir():
+        return [np.asarray(Image.open(p).convert("RGB"), int) for p in sorted(path.iterdir())]
+    found = []
+    with Image.open(path) as image:
+        for k in range(image.n_frames):
+            image.seek(k)
+            found.append(np.asarray(image.convert("RGB"), int))
+    return found
+
+
+def red(image: np.ndarray) -> np.ndarray:
+    return (image[..., 0] > 120) & (image[..., 1] < 100) & (image[..., 2] < 100)
+
+
+def test_a_drag_becomes_a_picture_for_each_target_and_one_step(tmp_path, session):
+    path = tmp_path / "bend.gif"
+    film(path, session, TURNS, size=SIZE, fps=10)
+    pictures = read(path)
+    assert [p.shape for p in pictures] == [(90, 120, 3)] * 3
+    heights = [np.nonzero(red(p))[0].mean() for p in pictures]
+    assert heights[0] + 5 < heights[1] < heights[2] - 5  # the handle goes down
+    with Image.open(path) as image:
+        assert image.info["duration"] == 100
+        assert image.info["loop"] == 0
+    assert np.array_equal(session.targets["handle 1"], TURNS[-1])
+    assert session.undo() == "drag handle 1"
+    assert np.array_equal(session.vertices, SCENE.mesh.vertices)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_targets_may_be_named_or_come_one_by_one(tmp_path, session):
+    film(tmp_path / "a", session, [{"handle 1": t} for t in TURNS], size=SIZE)
+    film(tmp_path / "b", session, iter(TURNS), size=SIZE)
+    assert len(read(tmp_path / "a")) == len(read(tmp_path / "b")) == 3
+
+
+def test_a_folder_holds_the_very_pixels(tmp_path, ball):
+    film(tmp_path / "turn", ball, [None, lambda: ball.camera.Roll(20)] * 2)
+    pictures = read(tmp_path / "turn")
+    assert [p.name for p in sorted((tmp_path / "turn").iterdir())] == [
+        "0000.png", "0001.png", "0002.png", "0003.png"
+    ]  # fmt: skip
+    assert np.array_equal(pictures[-1], picture(ball))
+    assert np.array_equal(pictures[1], pictures[2])
+    assert (pictures[0] != pictures[1]).any()
+
+
+def test_a_gif_is_true_to_shades_and_its_white_is_white(tmp_path, ball):
+    film(tmp_path / "a.gif", ball, [None, lambda: ball.camera.Azimuth(40)])
+    film(tmp_path / "a", ball, [lambda: ball.camera.Azimuth(-40), lambda: ball.camera.Azimuth(40)])
+    for shown, seen in zip(read(tmp_path / "a.gif"), read(tmp_path / "a"), strict=True):
+        assert np.abs(shown - seen).max() <= 16
+        assert (shown[0] == 255).all()
+
+
+def test_what_is_drawn_by_hand_or_in_a_replay_is_watched(tmp_path, ball):
+    made = Film(ball)
+    stop = made.watch()
+    replay(ball, ["vtk_segdeform recording 1", "0 LeftButtonPress 40 40", "0 MouseMove 50 45"])
+    Hand(ball).release((60, 60))
+    stop()
+    ball.render()
+    assert len(made) >= 2
+    assert np.array_equal(made[-1], picture(ball))
+    made.save(tmp_path / "work.gif")
+    assert (tmp_path / "work.gif").exists()
+
+
+def test_a_window_that_changes_its_size_and_odd_sizes_make_one_film(tmp_path):
+    view = plain_view((61, 41))
+    made = Film(view)
+    for size in ((61, 41), (30, 80)):
+        view.window.SetSize(*size)
+        made.snap()
+    assert [made[k].shape for k in range(2)] == [(40, 60, 3)] * 2
+    assert (made[1] == 255).all()
+
+
+def test_a_failure_leaves_no_file_and_the_session_as_it_was(tmp_path, session):
+    before = session.state
+    with pytest.raises(ValueError, match="targets"):
+        film(tmp_path / "a.gif", session, iter([*TURNS[:2], np.zeros((2, 3))]), size=SIZE)
+    assert session.state is before
+    assert not session.is_dragging
+    with pytest.raises(ValueError, match="targets require a session"):
+        film(tmp_path / "a.gif", plain_view(SIZE), TURNS)
+    empty = Session(SCENE.mesh)
+    empty.add_handle(SCENE.handle)
+    with pytest.raises(CageError):
+        film(tmp_path / "a.gif", empty, TURNS, size=SIZE)
+    with pytest.raises(SessionError, match="without pictures"):
+        film(tmp_path / "a.gif", session, [], size=SIZE)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_film_that_is_cancelled_leaves_no_file(tmp_path, ball):
+    made, told = Film(ball), []
+    for _ in range(3):
+        made.snap()
+
+    def progress(fraction, text):
+        told.append((fraction, text))
+        if len(told) == 3:
+            raise Cancelled("enough")
+
+    with pytest.raises(Cancelled, match="enough"):
+        made.save(tmp_path / "ball.gif", progress=progress)
+    assert told[0] == (0.0, "picture 1")
+    assert list(tmp_path.iterdir()) == []
+    made.save(tmp_path / "ball.gif", progress=lambda *said: told.append(said))
+    assert max(fraction for fraction, _ in told) <= 1.0
+
+
+def test_what_says_when_to_take_a_picture_is_asked_for_at_once(ball):
+    with pytest.raises(ArgumentError, match="when must be callable; got 3"):
+        Film(ball).watch(3)
+
+
+def test_what_cannot_be_written_is_refused_before_anything_is_done(tmp_path, ball):
+    (tmp_path / "there").mkdir()
+    done = []
+    for path, says in [
+        ("a.avi", "a film is a .gif, an .mp4 or"),
+        ("there", "is there already"),
+        ("no/a.gif", "there is no folder"),
+    ]:
+        with pytest.raises(SessionError, match=says):
+            film(tmp_path / path, ball, [lambda: done.append("work")])
+    with pytest.raises(SessionError, match="fps must be"):
+        film(tmp_path / "a.gif", ball, [lambda: done.append("work")], fps=0)
+    assert done == []
+
+
+@pytest.mark.parametrize(("suffix", "module"), [("mp4", "imageio_ffmpeg"), ("gif", "PIL.Image")])
+def test_a_library_that_is_absent_is_named_with_the_way_to_get_it(
+    tmp_path, monkeypatch, suffix, module
+):
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(MissingDependencyError, match="pip install") as error:
+        require_film(tmp_path / f"a.{suffix}")
+    assert {"mp4": "'imageio[ffmpeg]'", "gif": "pillow"}[suffix] in str(error.value)
+
+
+def test_a_video_is_fed_picture_by_picture_and_its_writer_closed(tmp_path, monkeypatch, ball):
+    fed = []
+
+    def write_frames(path, size, *, fps, macro_block_size):
+        assert size[0] % macro_block_size == size[1] % macro_block_size == 0
+        with open(path, "wb") as file:
+            try:
+                while True:
+                    frame = yield
+                    fed.append((fps, size, len(frame)))
+            finally:
+                file.write(b"video")
+
+    fake = SimpleNamespace(write_frames=write_frames)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", fake)
+    film(tmp_path / "a.mp4", ball, [None, None], fps=25)
+    assert fed == [(25, SIZE, 3 * SIZE[0] * SIZE[1])] * 2
+    assert (tmp_path / "a.mp4").read_bytes() == b"video"
+
+
+def test_a_real_video_where_ffmpeg_is(tmp_path, ball):
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    film(tmp_path / "a.mp4", ball, [lambda: ball.camera.Roll(5)] * 4)
+    about, *frames = ffmpeg.read_frames(str(tmp_path / "a.mp4"))
+    assert about["size"] == SIZE
+    assert len(frames) == 4

@@ -1,0 +1,490 @@
+"""Painting, by events only: what a hand does, what the session then holds, what is seen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hands import Hand, picture, plain_view
+from scenes import sausage
+
+from vtk_segdeform import Regions, Session, models
+from vtk_segdeform.errors import ConstraintError, RegionError, SegDeformError
+from vtk_segdeform.pictures.palette import FIXED, HANDLE, rgb
+from vtk_segdeform.widgets.region_selector.region_selector import Paint, RegionSelector, Tool
+
+WHOLE = [(2, 2), (398, 2), (398, 398), (2, 398)]
+
+
+class Desk:
+    """A sphere seen along y, z up, a selector over it and a hand."""
+
+    def __init__(self, *, halves=True):
+        self.view = plain_view()
+        self.session = Session(models.sphere(600))
+        if halves:
+            z = self.session.mesh.vertices[:, 2]
+            self.session.set_regions(Regions.from_masks(self.session.mesh, [z > -0.2, z < 0.2]))
+        self.selector = RegionSelector(self.view, self.session)
+        self.view.camera.SetPosition(0.0, -4.0, 0.0)
+        self.view.camera.SetViewUp(0.0, 0.0, 1.0)
+        self.view.renderer.ResetCamera()
+        self.view.render()
+        self.hand = Hand(self.view)
+        self.selector.On()
+
+    @property
+    def points(self):
+        return self.session.mesh.vertices
+
+    def under(self, x, z):
+        """Return where the near side of the sphere has these two coordinates."""
+        return self.hand.at([x, -np.sqrt(max(0.0, 1.0 - x * x - z * z)), z])
+
+
+@pytest.fixture
+def desk():
+    made = Desk()
+    yield made
+    assert made.hand.failures == []
+    assert not made.selector.is_grabbing
+    made.selector.remove()
+
+
+def test_a_stroke_of_the_brush_adds_what_it_passes_over_in_one_step(desk):
+    before = desk.session.regions.membership[1].copy()
+    desk.selector.region, desk.selector.radius = 1, 0.3
+    # A fast hand: one move over half the sphere must leave no gap.
+    desk.hand.drag([desk.under(-0.6, 0.6), desk.under(0.6, 0.6)])
+    added = desk.session.regions.membership[1] & ~before
+    places = desk.points[added]
+    assert len(places) > 10
+    assert (places[:, 1] < 0.0).all()  # not through to the far side
+    assert np.abs(places[:, 2] - 0.6).max() < 0.35
+    for x in (-0.6, -0.3, 0.0, 0.3, 0.6):
+        assert np.abs(places[:, 0] - x).min() < 0.15
+    assert desk.session.undo() == "paint region 2"
+    assert np.array_equal(desk.session.regions.membership[1], before)
+
+
+def test_control_takes_away(desk):
+    desk.selector.region, desk.selector.radius = 0, 0.15
+    both = desk.session.regions.membership.all(axis=0)
+    desk.hand.drag([desk.under(0.0, 0.0), desk.under(0.2, 0.0)], control=True)
+    out = both & ~desk.session.regions.membership[0]
+    assert out.any()
+    assert desk.session.regions.membership[1][out].all()
+
+
+def test_the_first_stroke_makes_regions_where_there_are_none():
+    desk = Desk(halves=False)
+    desk.selector.region = 1
+    desk.hand.click(desk.under(0.3, 0.3))
+    assert desk.hand.failures == []
+    assert desk.session.regions.n_regions == 2
+    assert desk.session.regions.membership[0].all()
+    desk.selector.remove()
+
+
+def test_a_stroke_is_seen_while_it_is_made_and_escape_ends_it(desk):
+    idle = picture(desk.view)
+    desk.selector.region, desk.selector.radius = 1, 0.3
+    desk.hand.press(desk.under(0.0, 0.6))
+    desk.hand.move(desk.under(0.2, 0.6))
+    assert (picture(desk.view) != idle).any(axis=2).sum() > 500
+    membership = desk.session.regions.membership
+    desk.hand.key("Escape")
+    desk.hand.release(desk.under(0.2, 0.6))
+    assert desk.session.regions.membership is membership
+    assert not desk.session.can_undo or desk.session.undo_label == "set regions"
+    desk.hand.hover((5, 5))
+    assert (picture(desk.view) == idle).all()
+
+
+def test_a_press_beside_the_mesh_or_with_shift_turns_the_camera(desk):
+    camera, regions = desk.view.camera.GetPosition(), desk.session.regions
+    desk.hand.drag([(5, 5), (40, 40), (60, 50)])
+    assert desk.view.camera.GetPosition() != camera
+    camera = desk.view.camera.GetFocalPoint(), desk.view.camera.GetPosition()
+    desk.hand.drag([desk.under(0.0, 0.0), desk.under(0.3, 0.2)], shift=True)
+    assert (desk.view.camera.GetFocalPoint(), desk.view.camera.GetPosition()) != camera
+    assert desk.session.regions is regions
+
+
+@pytest.mark.parametrize("through", [False, True])
+def test_a_rectangle_takes_what_is_in_it_seen_or_all(desk, through):
+    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
+    desk.selector.through = through
+    (x0, y0), (x1, y1) = (2, 2), desk.under(0.99, -0.5)
+    desk.hand.drag([(x0, y0), (100, 60), (398, y1)])
+    places = desk.points[desk.session.fixed]
+    lower = desk.points[:, 2] < -0.6
+    assert (places[:, 2] < -0.35).all()
+    assert (places[:, 1] > 0.2).any() == through
+    taken = np.isin(np.flatnonzero(lower), desk.session.fixed)
+    assert taken.all() if through else 0.2 < taken.mean() < 0.8
+    assert x1 > x0
+
+
+def test_a_lasso_takes_what_it_goes_around(desk):
+    desk.selector.tool, desk.selector.paints = Tool.LASSO, Paint.HANDLE
+    angle = np.linspace(0, 2 * np.pi, 40)
+    x, z = 0.3 * np.cos(angle), 0.5 + 0.3 * np.sin(angle)
+    desk.hand.drag([desk.under(a, b) for a, b in zip(x, z, strict=True)])
+    assert list(desk.session.handles) == ["handle 1"]
+    assert desk.selector.handle == "handle 1"
+    places = desk.points[desk.session.handles["handle 1"]]
+    assert len(places) > 5
+    assert np.hypot(places[:, 0], places[:, 2] - 0.5).max() < 0.33
+    assert (places[:, 1] < 0.0).all()
+
+
+def test_the_line_is_drawn_while_the_button_is_down(desk):
+    idle = picture(desk.view)
+    desk.selector.tool = Tool.RECTANGLE
+    desk.hand.press((20, 20))
+    desk.hand.move((380, 380))
+    changed = (picture(desk.view) != idle).any(axis=2)
+    assert changed[18:23, 30:370].any(axis=0).all()
+    assert changed[30:370, 378:383].any(axis=1).all()
+    assert not changed[30:60, 30:60].any()  # a line, no area
+    desk.hand.key("Escape")
+    desk.hand.release()
+    assert (picture(desk.view) == idle).all()
+
+
+def test_a_slip_of_the_hand_takes_nothing(desk):
+    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
+    nearest = desk.points[desk.points[:, 1].argmin()]
+    x, y = (int(p) for p in desk.hand.at(nearest))  # just below and left of a vertex
+    desk.hand.drag([(x, y), (x + 1, y + 1)])
+    desk.hand.click((x, y))
+    assert len(desk.session.fixed) == 0
+    desk.hand.drag([(x - 2, y - 2), (x + 3, y + 3)])
+    assert len(desk.session.fixed) == 1
+
+
+def test_a_click_takes_a_whole_component(desk):
+    desk.selector.tool, desk.selector.paints = Tool.COMPONENT, Paint.HANDLE
+    desk.hand.click(desk.under(0.1, 0.1))
+    assert len(desk.session.handles["handle 1"]) == desk.session.mesh.n_vertices
+    desk.hand.click(desk.under(0.1, 0.1), control=True)
+    assert not desk.session.handles
+    assert desk.selector.handle is None
+
+
+def test_what_is_fixed_stays_out_of_a_handle_and_the_other_way_round(desk):
+    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
+    desk.selector.through = True
+    desk.hand.drag([(2, 2), (398, 150)])
+    fixed = desk.session.fixed.copy()
+    desk.selector.paints = Paint.HANDLE
+    desk.hand.drag([(2, 2), (398, 398)])  # all of it
+    handle = desk.session.handles["handle 1"]
+    assert len(fixed) + len(handle) == desk.session.mesh.n_vertices
+    assert np.array_equal(desk.session.fixed, fixed)
+    desk.selector.paints = Paint.FIXED
+    desk.hand.drag([(2, 300), (398, 398)])
+    assert isinstance(desk.hand.failures.pop(), ConstraintError)
+
+
+def test_a_second_handle_is_another_one(desk):
+    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
+    desk.hand.drag([(100, 300), (200, 390)])
+    desk.selector.handle = None
+    desk.hand.drag([(200, 300), (300, 390)])
+    assert list(desk.session.handles) == ["handle 1", "handle 2"]
+    one, two = desk.session.handles.values()
+    assert not np.intersect1d(one, two).size
+
+
+def test_what_no_other_region_holds_stays_and_where_that_is_all_of_it_one_is_told(desk):
+    desk.selector.tool, desk.selector.through = Tool.RECTANGLE, True
+    first, second = desk.session.regions.membership
+    desk.hand.drag([(2, 2), (398, 398)], control=True)
+    assert np.array_equal(desk.session.regions.membership, [first & ~second, second])
+    regions = desk.session.regions
+    desk.hand.drag([(2, 2), (398, 398)], control=True)
+    error = desk.hand.failures.pop()
+    assert isinstance(error, RegionError)
+    assert "are in no region but region 1; add them to another one first" in str(error)
+    assert desk.session.regions is regions
+
+
+def test_a_region_cannot_be_emptied(desk):
+    desk.session.paint_region(1, desk.points[:, 2] < np.inf)  # holds all of region 0 too
+    desk.selector.tool, desk.selector.through = Tool.RECTANGLE, True
+    regions = desk.session.regions
+    desk.hand.drag([(2, 2), (398, 398)], control=True)
+    error = desk.hand.failures.pop()
+    assert isinstance(error, RegionError)
+    assert "region 1 would be empty; merge it" in str(error)
+    assert desk.session.regions is regions
+
+
+def test_brackets_and_the_wheel_over_the_mesh_change_the_brush(desk):
+    here, radius = desk.under(0.0, 0.0), desk.selector.radius
+    camera = desk.view.camera.GetDistance()
+    desk.hand.wheel(+2, here)
+    assert desk.selector.radius > 1.3 * radius
+    desk.hand.wheel(-2, here)
+    assert desk.selector.radius == pytest.approx(radius)
+    desk.hand.key("bracketright", here)
+    assert desk.selector.radius > radius
+    desk.hand.key("bracketleft", here)
+    assert desk.selector.radius == pytest.approx(radius)
+    assert desk.view.camera.GetDistance() == camera
+
+
+def test_the_wheel_zooms_beside_the_mesh_and_with_a_key_held_but_not_during_a_stroke(desk):
+    here, radius = desk.under(0.0, 0.0), desk.selector.radius
+    for place, held in (((5, 5), {}), (here, {"shift": True}), (here, {"control": True})):
+        camera = desk.view.camera.GetDistance()
+        desk.hand.wheel(+1, place, **held)
+        assert desk.view.camera.GetDistance() < camera
+    assert desk.selector.radius == radius
+    desk.selector.tool = Tool.LASSO
+    desk.hand.press((50, 50))
+    camera = desk.view.camera.GetDistance()
+    desk.hand.wheel(+1, (60, 60))
+    assert desk.view.camera.GetDistance() == camera
+    desk.hand.key("Escape")
+    desk.hand.release()
+
+
+def test_the_brush_stays_between_a_speck_and_everything(desk):
+    here, size = desk.under(0.0, 0.0), desk.session.mesh.diagonal
+    desk.hand.wheel(+80, here)
+    assert desk.selector.radius == pytest.approx(2.0 * size)
+    desk.hand.wheel(-120, here)
+    assert 0.0 < desk.selector.radius < 1e-3 * size
+    desk.selector.paints = Paint.FIXED
+    desk.hand.click(here)
+    assert len(desk.session.fixed) == 1  # at least the nearest vertex
+    for radius in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="radius must be above 0"):
+            desk.selector.radius = radius
+
+
+def test_a_brush_paints_what_is_seen_or_right_through(desk):
+    desk.selector.paints, desk.selector.radius = Paint.FIXED, 0.5
+    desk.hand.click(desk.under(0.9, 0.0))  # reaches round the side
+    assert (desk.points[desk.session.fixed, 1] < -0.05).all()
+    assert (desk.points[desk.session.fixed, 1] > -0.3).any()
+    desk.session.undo()
+    desk.selector.through = True
+    desk.hand.click(desk.under(0.3, 0.0))
+    sides = desk.points[desk.session.fixed, 1]
+    assert (sides < -0.8).any()
+    assert (sides > +0.8).any()
+    assert not ((sides > -0.6) & (sides < 0.6)).any()
+
+
+def test_what_a_lasso_would_take_is_seen_before_it_is_taken(desk):
+    desk.selector.tool, desk.selector.paints = Tool.LASSO, Paint.FIXED
+    corners = [(100, 100), (300, 100), (300, 300), (100, 300)]
+
+    def grey():
+        pixel = picture(desk.view)[200, 200].astype(int)
+        return np.ptp(pixel) < 30
+
+    assert not grey()
+    desk.hand.press(corners[0])
+    for corner in corners[1:]:
+        desk.hand.move(corner)
+    assert grey()
+    assert not len(desk.session.fixed)
+    desk.hand.event("RightButtonPressEvent")
+    assert not grey()
+    desk.hand.release(corners[0])
+    assert not len(desk.session.fixed)
+
+
+def test_only_what_would_change_is_shown(desk):
+    desk.session.set_fixed(desk.points[:, 2] > 0.5)
+    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
+    idle = picture(desk.view).astype(int)
+    desk.hand.press((2, 2))
+    desk.hand.move((398, 398))
+    now = picture(desk.view).astype(int)
+    (x, above), (_, below) = desk.under(0.0, 0.7), desk.under(0.0, 0.2)
+    assert np.array_equal(now[400 - round(above), round(x)], idle[400 - round(above), round(x)])
+    red, green, blue = now[400 - round(below), round(x)]
+    assert red > 3 * max(green, blue)
+    desk.hand.key("Escape")
+    desk.hand.release()
+
+
+def test_over_the_ground_nothing_is_taken_and_there_is_nothing_to_undo(desk):
+    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
+    label = desk.session.undo_label
+    desk.hand.drag([(2, 2), (30, 30)])
+    desk.hand.drag([(2, 2), (30, 30)], control=True)
+    desk.hand.drag([desk.under(-0.2, -0.2), desk.under(0.2, 0.2)], control=True)
+    assert desk.session.undo_label == label
+
+
+def test_control_takes_vertices_out_of_a_chosen_handle_and_the_last_one_ends_it(desk):
+    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
+    desk.hand.drag([(2, 200), (398, 398)])
+    count = len(desk.session.handles["handle 1"])
+    desk.hand.drag([(2, 200), (398, 300)], control=True)
+    assert 0 < len(desk.session.handles["handle 1"]) < count
+    desk.selector.handle = None
+    desk.hand.drag([(2, 200), (398, 398)], control=True)
+    assert "choose the handle" in str(desk.hand.failures.pop())
+    desk.selector.handle = "handle 1"
+    desk.hand.drag([(2, 200), (398, 398)], control=True)
+    assert not desk.session.handles
+    assert desk.session.undo() == "remove handle 1"
+    assert len(desk.session.handles["handle 1"])
+
+
+def test_the_pose_stays_for_handles_and_goes_to_rest_for_regions():
+    scene = sausage()
+    view = plain_view()
+    session = Session(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.set_fixed(scene.fixed)
+    session.add_handle(scene.handle)
+    selector = RegionSelector(view, session)
+    view.camera.SetPosition(0.0, -9.0, 1.0)
+    view.camera.SetViewUp(0.0, 0.0, 1.0)
+    view.renderer.ResetCamera()
+    selector.On()
+    hand = Hand(view)
+    session.drag(scene.turned(40.0), max_steps=5)
+    session.commit()
+    pose = session.vertices.copy()
+    middle = int(np.argmin(np.linalg.norm(scene.mesh.vertices - [0.0, -0.8, 0.0], axis=1)))
+    selector.paints = Paint.HANDLE
+    hand.click(hand.at(pose[middle]))  # where it is now
+    assert middle in session.handles["handle 2"]
+    assert np.array_equal(session.vertices, pose)
+    selector.paints, selector.region = Paint.REGION, 2
+    hand.click(hand.at(pose[middle]))
+    assert session.regions.membership[2, middle]
+    assert np.array_equal(session.vertices, scene.mesh.vertices)
+    assert session.undo() == "paint region 3"
+    assert np.array_equal(session.vertices, pose)
+    assert not hand.failures
+    selector.remove()
+
+
+def test_what_is_under_the_pointer_tells_its_region(desk):
+    for z, region in ((0.6, 0), (-0.6, 1)):
+        desk.hand.hover(desk.under(0.0, z))
+        assert desk.selector.region_under_pointer() == region
+    desk.hand.hover((3, 3))
+    assert desk.selector.region_under_pointer() is None
+
+
+def test_random_strokes_leave_nothing_behind(desk):
+    dice = np.random.default_rng(5)
+    for _ in range(60):
+        desk.selector.tool = list(Tool)[dice.integers(4)]
+        desk.selector.paints = list(Paint)[dice.integers(3)]
+        desk.selector.region = int(dice.integers(3))
+        desk.selector.through = bool(dice.integers(2))
+        held = {"control": bool(dice.integers(2)), "shift": dice.random() < 0.1}
+        desk.hand.press(dice.integers(-20, 420, 2), **held)
+        for _ in range(dice.integers(4)):
+            desk.hand.move(dice.integers(-20, 420, 2), **held)
+        if dice.random() < 0.2:
+            desk.hand.key("Escape")
+        desk.hand.release(dice.integers(-20, 420, 2), **held)
+        assert not desk.selector.is_grabbing
+    assert all(isinstance(error, SegDeformError) for error in desk.hand.failures)
+    desk.hand.failures.clear()
+    while desk.session.undo():
+        pass
+    desk.selector.tool = Tool.LASSO
+    desk.hand.hover((3, 3))
+    assert desk.session.regions is None
+    reds = picture(desk.view).astype(int)
+    assert not ((reds[..., 0] > 150) & (reds[..., 1] < 90)).any()  # no preview stays
+
+
+def test_the_ring_is_as_large_as_the_brush(desk):
+    idle = picture(desk.view)
+    widths = []
+    for radius in (0.2, 0.4):
+        desk.selector.radius = radius
+        desk.hand.hover(desk.under(0.0, 0.0))
+        changed = (picture(desk.view) != idle).any(axis=2)
+        widths.append(np.ptp(np.flatnonzero(changed.any(axis=0))))
+    left, right = desk.hand.at([-0.4, -1.0, 0.0]), desk.hand.at([0.4, -1.0, 0.0])
+    assert widths[1] == pytest.approx(right[0] - left[0], abs=8)
+    assert widths[1] / widths[0] == pytest.approx(2.0, abs=0.2)
+    desk.hand.hover((5, 5))
+    assert (picture(desk.view) == idle).all()
+
+
+def test_the_ring_goes_with_the_pointer_and_with_the_tool(desk):
+    idle = picture(desk.view)
+    leave = [
+        lambda: desk.hand.event("LeaveEvent"),
+        lambda: setattr(desk.selector, "tool", Tool.LASSO),
+        lambda: desk.selector.Off(),
+    ]
+    for leaves in leave:
+        desk.selector.tool = Tool.BRUSH
+        desk.hand.hover(desk.under(0.0, 0.0))
+        assert (picture(desk.view) != idle).any()
+        leaves()
+        assert (picture(desk.view) == idle).all()
+
+
+def test_growing_and_shrinking_are_rings_of_edges(desk):
+    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
+    desk.selector.through = True
+    desk.hand.drag([(2, 300), (398, 398)])
+    small = desk.session.handles["handle 1"]
+    desk.selector.grow()
+    large = desk.session.handles["handle 1"]
+    mesh = desk.session.mesh
+    reached = mesh.adjacency[small].indices
+    assert np.array_equal(large, np.union1d(small, reached))
+    desk.selector.shrink()
+    assert np.array_equal(desk.session.handles["handle 1"], small)
+
+
+def test_fixed_is_grey_handles_are_red_and_an_overlap_is_a_bit_of_both(desk):
+    def colour(x, z):
+        px, py = desk.under(x, z)
+        pixel = picture(desk.view)[400 - round(py), round(px)].astype(float)
+        return pixel / pixel.max()
+
+    upper, lower, between = colour(0.0, 0.8), colour(0.0, -0.8), colour(0.0, 0.0)
+    assert np.abs(upper - lower).max() > 0.3
+    assert np.abs(between - (upper + lower) / 2 / ((upper + lower) / 2).max()).max() < 0.25
+    desk.session.set_fixed(desk.points[:, 2] < -0.7)
+    desk.session.add_handle(desk.points[:, 2] > 0.7)
+    for (x, z), name in (((0.0, -0.85), FIXED), ((0.0, 0.85), HANDLE)):
+        wanted = rgb(name) / rgb(name).max()
+        assert np.abs(colour(x, z) - wanted).max() < 0.12
+
+
+def test_undo_and_redo_are_seen(desk):
+    before = picture(desk.view)
+    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
+    desk.hand.drag([(2, 300), (398, 398)])
+    after = picture(desk.view)
+    assert (after != before).any()
+    desk.session.undo()
+    assert (picture(desk.view) == before).all()
+    desk.session.redo()
+    assert (picture(desk.view) == after).all()
+
+
+def test_removed_it_leaves_the_view_as_it_was():
+    view = plain_view()
+    props = view.renderer.GetViewProps().GetNumberOfItems()
+    selector = RegionSelector(view, Session(models.sphere(200)))
+    selector.On()
+    view.render()
+    selector.remove()
+    assert view.renderer.GetViewProps().GetNumberOfItems() == props
+    idle = picture(view)
+    Hand(view).drag([(200, 200), (210, 210)])
+    assert (picture(view) == idle).all()

@@ -1,0 +1,224 @@
+"""A user's callback that raises, at whatever moment of a drag, does not break the editor.
+
+By real events: a drag during which it raises, and what it raises is told; then one that goes as if
+nothing had been, to the exact volume, and is undone.
+"""
+
+from __future__ import annotations
+
+import itertools
+import sys
+
+import numpy as np
+import pytest
+from hands import Hand, plain_view
+from soaking import NAME, session_of, slender
+
+from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
+
+WAY = np.array([[0, 0], [5, 4], [14, 12]])
+
+
+class Fault(Exception):
+    """What a callback of a user raises."""
+
+
+class Raiser:
+    """A callback that raises when it is called the *moment*-th time, or always."""
+
+    def __init__(self, moment: int | None = None) -> None:
+        self.moment, self.calls = moment, 0
+
+    def __call__(self, *_):
+        self.calls += 1
+        if self.calls == (self.moment or self.calls):
+            raise Fault(f"at call {self.calls}")
+
+
+class Bench:
+    """An editor at work, and a hand."""
+
+    def __init__(self) -> None:
+        self.session = session_of(slender())
+        self.view = plain_view((200, 160))
+        self.editor = DeformEditor(self.view, self.session)
+        self.stage = self.editor.stage
+        self.dragger = self.stage.dragger
+        self.view.camera.SetPosition(0.0, -9.0, 2.0)
+        self.view.renderer.ResetCamera()
+        self.view.render()
+        self.hand = Hand(self.view)
+        self.editor.On()
+        self.editor.mode = Mode.DEFORM
+        self.editor.wait()
+        self.require_works()
+
+    def drags(self) -> None:
+        """Drag the ball of the gizmo, and let the pose be refined."""
+        self.hand.drag(self.hand.at(self.dragger.gizmo.centre) + WAY)
+        for _ in range(50):
+            if self.dragger.is_refining:
+                self.hand.tick()
+        assert not self.dragger.is_refining
+
+    def require_works(self) -> None:
+        """Assert that a drag drags and is undone, and that nobody holds on to anything."""
+        session, before = self.session, self.session.vertices
+        step, camera = session.undo_label, self.view.camera.GetPosition()
+        assert not session.is_dragging
+        assert not any(widget.is_grabbing for widget in self.stage.widgets)
+        self.hand.failures.clear()
+        self.drags()
+        assert session.undo_label == f"drag {NAME}"
+        assert np.abs(session.vertices - before).max() > 0.01
+        faces, rest = session.mesh.faces, session.mesh.vertices
+        change = signed_volume(session.vertices, faces) / signed_volume(rest, faces) - 1.0
+        assert abs(change) <= 1e-12
+        self.require_seen()
+        self.hand.key("z", control=True)
+        assert np.array_equal(session.vertices, before)
+        assert session.undo_label == step
+        self.require_seen()
+        self.hand.move((10, 10))
+        assert self.view.camera.GetPosition() == camera
+        assert self.hand.failures == []
+
+    def require_seen(self) -> None:
+        """Assert that what is drawn is the pose, and the gizmo at the handle."""
+        self.view.render()
+        x = self.session.vertices
+        assert np.array_equal(self.stage.surface.points, x)
+        assert np.allclose(self.dragger.gizmo.centre, x[self.session.handles[NAME]].mean(axis=0))
+
+    def told(self) -> bool:
+        """Tell whether a fault was told to the listeners of failures; forget of it."""
+        found = any(isinstance(failure, Fault) for failure in self.hand.failures)
+        self.hand.failures.clear()
+        return found
+
+
+@pytest.fixture(scope="module")
+def bench():
+    """Yield an editor that all must leave as it was."""
+    made = Bench()
+    yield made
+    made.editor.remove()
+
+
+def observer(event):
+    """Return what adds an observer to the dragger."""
+
+    def add(bench, callback):
+        tag = bench.dragger.AddObserver(event, callback)
+        return lambda: bench.dragger.RemoveObserver(tag)
+
+    return add
+
+
+PLACES = {
+    "a listener of the session": lambda bench, call: bench.session.on_change(call),
+    "an observer of the beginning": observer("StartInteractionEvent"),
+    "an observer of the drag": observer("InteractionEvent"),
+    "an observer of the end": observer("EndInteractionEvent"),
+    "a callback before a picture": lambda bench, call: bench.view.before_render(call),
+    "a callback of the mouse": lambda bench, call: bench.view.observe("MouseMoveEvent", call, 2.0),
+    "a callback of the press": lambda bench, call: bench.view.observe(
+        "LeftButtonPressEvent", call, 2.0
+    ),
+    "a callback of a timer": lambda bench, call: bench.view.pulse(call),
+    "a listener of what is said": lambda bench, call: bench.editor.desk.voice.on_word(call),
+}
+
+
+@pytest.fixture(autouse=True)
+def unheard(monkeypatch):
+    """Return what reaches nobody: VTK would print it."""
+    faults = []
+    monkeypatch.setattr(sys, "excepthook", lambda _type, fault, _trace: faults.append(fault))
+    return faults
+
+
+def raises_in_a_drag(bench, place, moment=None) -> bool:
+    """Drag while a callback raises, and then without; return whether it did raise."""
+    raiser = Raiser(moment)
+    stop = PLACES[place](bench, raiser)
+    try:
+        bench.drags()
+        has_raised = raiser.calls >= (moment or 1)
+        assert bench.told() == has_raised
+    finally:
+        stop()
+    if bench.session.undo_label == f"drag {NAME}":  # it was kept, as what it raised came after
+        bench.session.undo()
+    bench.require_works()
+    return has_raised
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_what_raises_during_a_drag_does_not_harm_the_next(bench, place):
+    assert raises_in_a_drag(bench, place)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("place", PLACES)
+def test_nor_does_what_raises_once_at_whatever_moment(bench, place):
+    moments = next(k for k in itertools.count(1) if not raises_in_a_drag(bench, place, k)) - 1
+    print(f"\n{place}: raised at {moments} moments")
+
+
+@pytest.mark.parametrize("place", ["a listener of the session", "an observer of the beginning"])
+def test_nor_where_the_listener_of_failures_raises_as_well(bench, place, unheard):
+    handler = Raiser()
+    stop = bench.view.on_failure(handler)
+    try:
+        assert raises_in_a_drag(bench, place)
+    finally:
+        stop()
+    assert handler.calls > 0
+    assert all(isinstance(fault, Fault) for fault in unheard)
+    assert len(unheard) == handler.calls
+
+
+def test_one_that_raises_keeps_no_other_from_hearing(bench):
+    heard = []
+    tags = [
+        bench.dragger.AddObserver("EndInteractionEvent", call)
+        for call in (Raiser(), lambda *_: heard.append("end"))
+    ]
+    bench.drags()
+    for tag in tags:
+        bench.dragger.RemoveObserver(tag)
+    assert bench.told()
+    assert heard == ["end"]
+    bench.session.undo()
+    bench.require_works()
+
+
+def test_a_drag_that_a_listener_has_ended_leaves_no_key_to_it(bench):
+    stop = bench.session.on_change(Raiser())
+    bench.drags()
+    stop()
+    assert bench.told()
+    ended = []
+    tag = bench.dragger.AddObserver("EndInteractionEvent", lambda *_: ended.append(1))
+    bench.hand.key("x")  # binds a drag in hand to an axis
+    bench.dragger.RemoveObserver(tag)
+    assert ended == []
+    bench.require_works()
+
+
+@pytest.mark.parametrize("part", ["work", "report", "done"])
+def test_work_of_a_user_that_raises_ends_and_the_next_drag_works(bench, part):
+    def work(progress):
+        if part == "work":
+            raise Fault("in another thread")
+        for k in range(10):
+            progress(Raiser()() if part == "report" and k == 5 else k / 10, "working")
+
+    bench.editor.desk.start("my work", work, Raiser())
+    with bench.view.guarded():
+        bench.editor.wait()
+    assert bench.told()
+    assert "Fault" in bench.editor.status
+    bench.require_works()

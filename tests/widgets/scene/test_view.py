@@ -1,0 +1,350 @@
+"""The border to VTK: where things are, who hears of an event, what becomes of an exception."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import pyvista as pv
+from hands import Hand, picture, plain_view
+from scenes import sausage
+from solids import icosphere
+from vtkmodules.vtkInteractionStyle import (
+    vtkInteractorStyleSwitch,
+    vtkInteractorStyleTrackballCamera,
+)
+from vtkmodules.vtkRenderingCore import vtkRenderer
+
+from vtk_segdeform import Mesh, Session, models
+from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.widgets.scene.gestures import Gesture, Phase, Pointer
+from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
+from vtk_segdeform.widgets.scene.view import View
+from vtk_segdeform.widgets.scene.widget import Widget
+
+RNG = np.random.default_rng(7)
+
+
+class Scribble(Widget):
+    """A widget that takes presses in the left half and remembers what it was told."""
+
+    def __init__(self, view, session):
+        super().__init__(view, session)
+        self.strokes, self.keys = [], []
+        self.fail_on = None
+
+    def begins(self, press: Pointer) -> Gesture | None:
+        return self._stroke(press) if press.x < 200 else None
+
+    def types(self, key, pointer):
+        self.keys.append(key)
+        return key == "w"
+
+    def remove(self):
+        self.Off()
+
+    def _stroke(self, press):
+        places = [press.position]
+        while (pointer := (yield)).phase is Phase.MOVE:
+            if pointer.x == self.fail_on:
+                raise RuntimeError("a pen without ink")
+            places.append(pointer.position)
+        if pointer.phase is Phase.RELEASE:
+            self.strokes.append(len(places))
+
+
+@pytest.fixture
+def scribble():
+    view = plain_view()
+    session = Session(Mesh(*icosphere(2)))
+    surface = SurfaceDisplay(view, session)
+    view.renderer.ResetCamera()
+    view.render()
+    widget = Scribble(view, session)
+    widget.On()
+    yield widget
+    widget.remove()
+    surface.remove()
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+def test_display_and_world_undo_each_other(parallel):
+    view = plain_view((320, 240))
+    SurfaceDisplay(view, Session(models.sphere(200)))
+    view.camera.SetParallelProjection(parallel)
+    view.camera.SetPosition(3.0, 2.0, 1.0)
+    view.renderer.ResetCamera()
+    points = RNG.normal(size=(20, 3)) * 0.5
+    there = view.to_display(points)
+    assert np.allclose(view.to_world(there), points, atol=1e-9)
+    view.renderer.SetWorldPoint(*points[0], 1.0)
+    view.renderer.WorldToDisplay()
+    assert np.allclose(there[0], view.renderer.GetDisplayPoint(), atol=1e-6)  # VTK's own word
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+def test_a_pixel_is_as_long_as_what_it_covers(parallel):
+    view = plain_view((300, 300))
+    SurfaceDisplay(view, Session(models.sphere(200)))
+    view.camera.SetParallelProjection(parallel)
+    view.renderer.ResetCamera()
+    point = np.array([0.1, 0.2, 0.3])
+    here = view.to_display(point[None])
+    beside = view.to_world(here + [1.0, 0.0, 0.0])[0]
+    assert view.pixel_at(point) == pytest.approx(np.linalg.norm(beside - point), rel=1e-6)
+
+
+def test_a_view_is_made_from_a_plotter_or_a_pair_and_from_nothing_else():
+    plotter = pv.Plotter(off_screen=True)
+    try:
+        view = View.of(plotter)
+        assert view.renderer is plotter.renderer
+        assert View.of(view) is view
+        assert View.of((view.renderer, view.interactor)).renderer is view.renderer
+        with pytest.raises(ArgumentError, match="view must be a pyvista plotter"):
+            View.of("window")
+        with pytest.raises(
+            ArgumentError, match=r"must be \(vtkRenderer, vtkRenderWindowInteractor\)"
+        ):
+            View.of((view.renderer, None))
+        with pytest.raises(ValueError, match="AddRenderer"):
+            View.of((vtkRenderer(), view.interactor))
+    finally:
+        plotter.close()
+
+
+def test_a_gesture_has_the_pointer_from_press_to_release_and_the_camera_rests(scribble):
+    hand = Hand(scribble.view)
+    camera = scribble.view.camera.GetPosition()
+    hand.drag([(50, 50), (60, 60), (300, 70)])
+    assert scribble.strokes == [3]
+    assert scribble.view.camera.GetPosition() == camera
+    hand.drag([(300, 50), (320, 60), (340, 90)])  # not the widget's
+    assert scribble.strokes == [3]
+    assert scribble.view.camera.GetPosition() != camera
+    assert not hand.failures
+
+
+def test_escape_and_the_right_button_cancel(scribble):
+    hand = Hand(scribble.view)
+    for cancel in (lambda: hand.key("Escape"), lambda: hand.event("RightButtonPressEvent")):
+        hand.press((50, 50))
+        assert scribble.is_grabbing
+        cancel()
+        assert not scribble.is_grabbing
+        hand.release((60, 60))
+    assert scribble.strokes == []
+
+
+def test_a_press_without_a_previous_release_finishes_the_gesture(scribble):
+    hand = Hand(scribble.view)
+    hand.press((50, 50))
+    hand.move((60, 60))
+    hand.drag([(70, 70), (80, 80), (90, 90)])
+    assert scribble.strokes == [3, 3]  # a press comes with a move to where it is
+
+
+@pytest.mark.parametrize("end", ["finish", "Off"])
+def test_a_gesture_ended_from_outside_is_finished_and_not_cancelled(scribble, end):
+    hand = Hand(scribble.view)
+    hand.press((50, 50))
+    hand.move((60, 60))
+    getattr(scribble, end)()
+    assert not scribble.is_grabbing
+    hand.move((70, 70))
+    hand.release((70, 70))
+    assert scribble.strokes == [2]
+    assert not scribble.finish()
+    assert hand.failures == []
+
+
+def test_a_gesture_that_fails_when_it_is_finished_does_not_keep_a_widget_on(scribble):
+    hand = Hand(scribble.view)
+
+    def stroke(press):
+        yield
+        raise RuntimeError("a pen without ink")
+
+    scribble.begins = stroke
+    hand.press((50, 50))
+    with pytest.raises(RuntimeError, match="without ink"):
+        scribble.Off()
+    assert not scribble.GetEnabled()
+    assert not scribble.is_grabbing
+
+
+def test_vtks_words_are_spoken_in_vtks_order(scribble):
+    said = []
+    for event in ("StartInteractionEvent", "InteractionEvent", "EndInteractionEvent"):
+        scribble.AddObserver(event, lambda widget, name: said.append(name))
+    hand = Hand(scribble.view)
+    hand.drag([(50, 50), (60, 60), (70, 70)])
+    assert [name.removesuffix("InteractionEvent") for name in said] == ["Start", "", "", "End"]
+
+
+def test_an_exception_is_collected_and_leaves_no_grab(scribble):
+    hand = Hand(scribble.view)
+    scribble.fail_on = 60
+    hand.press((50, 50))
+    hand.move((60, 60))
+    assert [str(failure) for failure in hand.failures] == ["a pen without ink"]
+    assert not scribble.is_grabbing
+    scribble.fail_on = None
+    hand.release((60, 60))
+    hand.drag([(50, 50), (60, 60)])
+    assert scribble.strokes == [2]
+
+
+def test_an_event_within_an_event_waits_for_its_turn(scribble):
+    """For example, a listener runs the event loop, which delivers moves and the release."""
+    hand = Hand(scribble.view)
+    seen, inside = [], {20: ("move", 30), 40: ("release", 40), 50: ("press", 70)}
+
+    def stroke(press):
+        while (pointer := (yield)).phase is Phase.MOVE:
+            seen.append(pointer.x)
+            if pointer.x in inside:
+                what, x = inside[pointer.x]
+                getattr(hand, what)((x, 50))
+                assert scribble.is_grabbing
+        seen.append(pointer.phase)
+
+    scribble.begins = stroke
+    hand.press((10, 50))
+    hand.move((20, 50))
+    assert seen == [20, 30]
+    hand.move((40, 50))
+    assert seen == [20, 30, 40, Phase.RELEASE]
+    assert not scribble.is_grabbing
+    hand.press((10, 50))
+    hand.move((50, 50))
+    assert seen[4:] == [50, 70, Phase.RELEASE]  # a press can only mean that a release was lost
+    assert not scribble.is_grabbing
+    assert hand.failures == []
+
+
+def test_a_key_that_is_taken_stays_from_the_camera_and_others_do_not(scribble):
+    hand = Hand(scribble.view)
+    heard = []
+    scribble.view.interactor.AddObserver("CharEvent", lambda *_: heard.append("char"), -1.0)
+    hand.key("w")  # VTK would show wires
+    assert heard == []
+    hand.key("s")
+    assert heard == ["char"]
+    assert scribble.keys == ["w", "s"]
+
+
+@pytest.mark.parametrize("style", [vtkInteractorStyleTrackballCamera, vtkInteractorStyleSwitch])
+def test_a_key_in_the_middle_of_a_camera_drag_is_the_widgets_and_not_vtks(scribble, style):
+    interactor, camera = scribble.view.interactor, scribble.view.camera
+    interactor.SetInteractorStyle(style := style())
+    if isinstance(style, vtkInteractorStyleSwitch):
+        style.SetCurrentStyleToTrackballCamera()
+    hand = Hand(scribble.view)
+    heard = []
+    interactor.AddObserver("CharEvent", lambda *_: heard.append("char"), -1.0)
+    hand.press((300, 200))
+    hand.move((320, 210))
+    before = camera.GetPosition()
+    hand.key("Shift_L")  # which changes nothing
+    hand.move((340, 220))
+    turned = camera.GetPosition()
+    assert turned != before
+    hand.key("w")  # VTK would show wires
+    assert (scribble.keys, heard) == (["w"], [])
+    hand.move((360, 230))
+    assert camera.GetPosition() == turned
+    hand.release((360, 230))
+    hand.drag([(300, 200), (320, 220)])
+    assert camera.GetPosition() != turned
+    assert hand.failures == []
+
+
+def test_a_closed_window_is_none_and_drawing_in_it_does_nothing():
+    plotter = pv.Plotter(off_screen=True)
+    view = View.of(plotter)
+    assert view.window is not None
+    plotter.show(auto_close=False, interactive=False)
+    assert view.window is not None
+    plotter.close()
+    assert view.window is None
+    view.render()
+    view.touch()
+
+
+def test_off_hears_nothing(scribble):
+    scribble.Off()
+    Hand(scribble.view).drag([(50, 50), (60, 60)])
+    assert scribble.strokes == []
+    assert not scribble.GetEnabled()
+
+
+def test_the_surface_follows_the_pose_in_place():
+    view = plain_view()
+    scene = sausage()
+    session = Session(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.set_fixed(scene.fixed)
+    session.add_handle(scene.handle)
+    surface = SurfaceDisplay(view, session)
+    before, memory = picture(view), surface.points
+    session.drag(scene.turned(30.0), max_steps=5)
+    assert surface.points is memory
+    assert np.array_equal(surface.points, session.vertices)
+    assert np.array_equal(session.mesh.vertices, scene.mesh.vertices)
+    assert (picture(view) != before).any()
+    surface.remove()
+
+
+def test_one_event_draws_once_whatever_it_changes(scribble):
+    drawn = []
+    scribble.view.renderer.AddObserver("EndEvent", lambda *_: drawn.append("once"))
+    scribble.view.touch()  # outside of any event: now
+    assert len(drawn) == 1
+
+    def types(key, pointer):
+        for _ in range(3):
+            scribble.view.touch()
+        return True
+
+    scribble.types = types
+    scribble.view.before_render(scribble.view.touch)  # must not go on for ever
+    Hand(scribble.view).event("KeyPressEvent", key="a")
+    assert len(drawn) == 2
+
+
+def test_the_newest_layer_of_colours_is_seen():
+    view = plain_view((60, 60))
+    session = Session(models.sphere(200))
+    surface = SurfaceDisplay(view, session)
+    view.renderer.ResetCamera()
+
+    def middle():
+        return picture(view)[30, 30].astype(int)
+
+    n = session.mesh.n_vertices
+    surface.set_colours("regions", np.tile(np.uint8([0, 200, 0]), (n, 1)))
+    assert middle()[1] > 3 * middle()[0]
+    surface.set_colours("volume", np.tile(np.uint8([200, 0, 0]), (n, 1)))
+    assert middle()[0] > 3 * middle()[1]
+    surface.set_colours("volume", None)
+    assert middle()[1] > 3 * middle()[0]
+    surface.remove()
+
+
+def test_what_is_in_front_is_hidden_by_nothing():
+    view = plain_view((60, 60))
+    session = Session(models.sphere(200))
+    surface = SurfaceDisplay(view, session)
+    view.renderer.ResetCamera()
+    inner = SurfaceDisplay(
+        View(view.front, view.interactor),
+        Session(Mesh(0.2 * session.mesh.vertices, session.mesh.faces)),
+    )
+    inner.set_colours("all", np.tile(np.uint8([200, 0, 0]), (session.mesh.n_vertices, 1)))
+    pixel = picture(view)[30, 30].astype(int)
+    assert pixel[0] > 3 * pixel[1]
+    view.remove_front()
+    pixel = picture(view)[30, 30].astype(int)
+    assert pixel[0] < 2 * pixel[1]
+    surface.remove()

@@ -1,0 +1,153 @@
+"""What each widget looks like, idle, hovered and in use, beside small pictures kept for it.
+
+A picture may differ in a few pixels, as renderers do.  After a change of looks that is meant:
+SEGDEFORM_NEW_LOOKS=1 python -m pytest tests/widgets/test_looks.py, then check the pictures in
+tests/widgets/looks.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+from hands import Hand, picture, plain_view
+from scenes import sausage
+
+from vtk_segdeform import Options, Session
+from vtk_segdeform.widgets import CageDisplay, HandleDragger, RegionSelector, Tool, VolumeOverlay
+from vtk_segdeform.widgets.region_selector.region_colours import RegionColours
+from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
+
+LOOKS = Path(__file__).resolve().parent / "looks"
+SIZE = (240, 160)
+NEAR = 40  # of 255: shades of one colour on two renderers
+MOST = 0.02  # share of pixels that may be further off; text and thin lines never agree to the pixel
+
+
+@pytest.fixture(scope="module")
+def ready():
+    scene = sausage()
+    session = Session(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.set_fixed(scene.fixed)
+    session.add_handle(scene.handle)
+    return scene, session.state
+
+
+class Scene:
+    """A session in a small view, from the front, with its colours."""
+
+    def __init__(self, ready, **options):
+        self.scene, state = ready
+        self.session = Session(
+            self.scene.mesh, state=replace(state, options=Options(**options)) if options else state
+        )
+        self.view = plain_view(SIZE)
+        self.surface = SurfaceDisplay(self.view, self.session)
+        self.colours = RegionColours(self.surface)
+        self.view.camera.SetPosition(0.0, -20.0, 4.0)
+        self.view.camera.SetViewUp(0.0, 0.0, 1.0)
+        self.view.renderer.ResetCamera()
+        self.view.camera.Zoom(1.6)
+        self.view.render()
+        self.hand = Hand(self.view)
+
+    def looks(self, name):
+        """Compare what is seen with the picture kept under *name*."""
+        assert self.hand.failures == []
+        seen, path = picture(self.view), LOOKS / f"{name}.png"
+        if os.environ.get("SEGDEFORM_NEW_LOOKS"):
+            from PIL import Image
+
+            LOOKS.mkdir(exist_ok=True)
+            Image.fromarray(seen).save(path, optimize=True)
+        kept = np.asarray(pv.read(path).active_scalars).reshape(SIZE[1], SIZE[0], -1)[::-1, :, :3]
+        off = np.abs(seen.astype(int) - kept).max(axis=2) > NEAR
+        assert off.mean() <= MOST, f"{name}: {100 * off.mean():.1f} % of the pixels are off"
+
+
+def test_painting(ready):
+    scene = Scene(ready)
+    selector = RegionSelector(scene.view, scene.session, scene.surface, scene.colours)
+    selector.On()
+    selector.region, selector.radius = 1, 0.5
+    scene.looks("painting-idle")
+    here = scene.hand.at([-1.2, -0.7, 0.0])
+    scene.hand.hover(here)
+    scene.looks("painting-hover")
+    scene.hand.press(here)
+    scene.hand.move(scene.hand.at([-0.6, -0.7, 0.2]))
+    scene.looks("painting-stroke")
+    scene.hand.key("Escape")
+    scene.hand.release()
+    selector.tool = Tool.LASSO
+    angle = np.linspace(0.0, 5.5, 20)
+    way = np.add(here, 30 * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    scene.hand.press(way[0])
+    for place in way[1:]:
+        scene.hand.move(place)
+    scene.looks("painting-lasso")
+    scene.hand.key("Escape")
+    selector.remove()
+
+
+def test_cages(ready):
+    scene = Scene(ready)
+    cages = CageDisplay(scene.view, scene.session)
+    cages.On()
+    scene.looks("cages-idle")
+    corner = scene.session.cage_vertices[1]
+    front = corner[np.argmin(corner[:, 1])]
+    scene.hand.hover(scene.hand.at(front))
+    scene.looks("cages-hover")
+    scene.hand.press(scene.hand.at(front))
+    scene.hand.move(np.add(scene.hand.at(front), [10, 25]))
+    scene.looks("cages-drag")
+    scene.hand.key("Escape")
+    cages.remove()
+
+
+def test_dragging(ready):
+    scene = Scene(ready)
+    dragger = HandleDragger(scene.view, scene.session, scene.surface)
+    dragger.refine_while_resting = False
+    scene.session.bind()
+    dragger.On()
+    scene.looks("dragging-idle")
+    centre = scene.hand.at(dragger.gizmo.centre)
+    scene.hand.hover(centre)
+    scene.looks("dragging-hover")
+    scene.hand.press(centre)
+    for share in np.linspace(0.1, 1.0, 10):  # few steps a move: many moves, and it arrives
+        scene.hand.move(np.add(centre, share * np.array([-20.0, 40.0])))
+    for _ in range(10):
+        scene.session.refine(max_steps=20)
+    scene.looks("dragging-drag")
+    scene.hand.key("Escape")
+    dragger.remove()
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_volume(ready, held):
+    scene = Scene(ready, preserve_volume=held)
+    overlay = VolumeOverlay(scene.view, scene.session, scene.surface)
+    overlay.show()
+    if held:
+        scene.looks("volume-rest")
+    scene.session.drag(scene.scene.turned(50.0))
+    scene.looks("volume-held" if held else "volume-free")
+    overlay.remove()
+
+
+def test_the_pictures_tell_one_state_from_another():
+    kept = {path.stem: np.asarray(pv.read(path).active_scalars) for path in LOOKS.glob("*.png")}
+    assert len(kept) == 13
+    names = sorted(kept)
+    for k, name in enumerate(names):
+        for other in names[:k]:
+            assert (np.abs(kept[name].astype(int) - kept[other]).max(axis=1) > NEAR).any()

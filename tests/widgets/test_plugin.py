@@ -1,0 +1,293 @@
+"""pyvista's extension points: plotters and meshes that can be deformed, and a window of its own."""
+
+from __future__ import annotations
+
+import configparser
+import importlib
+import logging
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+from hands import Hand, picture
+from numpy.testing import assert_array_equal
+from scenes import sausage
+from solids import OCTAHEDRON
+
+import vtk_segdeform as sd
+from vtk_segdeform import models
+from vtk_segdeform.cli.main import main
+from vtk_segdeform.errors import MeshError, MissingDependencyError
+from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.io import convert
+from vtk_segdeform.pictures import canvas
+from vtk_segdeform.widgets import plugin
+from vtk_segdeform.widgets.scene.view import View
+
+ROOT = Path(__file__).resolve().parents[2]
+SCENE = sausage()
+
+
+@pytest.fixture
+def bar() -> pv.PolyData:
+    surface = convert.to_polydata(models.bar(divisions=(3, 3, 15)))
+    surface.point_data["number"] = np.arange(surface.n_points)
+    surface.cell_data["half"] = np.arange(surface.n_cells) % 2
+    surface.field_data["author"] = ["me"]
+    return surface
+
+
+@pytest.fixture
+def session() -> sd.Session:
+    session = sd.Session(SCENE.mesh)
+    session.set_regions(SCENE.regions)
+    session.set_cages(SCENE.cages)
+    session.set_fixed(SCENE.fixed)
+    session.add_handle(SCENE.handle)
+    return session
+
+
+@pytest.fixture
+def plotter():
+    plotter = pv.Plotter(off_screen=True, window_size=(300, 300))
+    plotter.disable_anti_aliasing()
+    yield plotter
+    plotter.close()
+
+
+# Meshes.
+
+
+def test_a_surface_is_deformed_into_a_copy_with_its_arrays_and_its_volume(bar):
+    before = bar.copy()
+    height = bar.points[:, 2]
+    fixed, handle = height < 0.1, height > 0.9
+    targets = bar.points[handle] + [0.2, 0.0, -0.05]
+    bent = bar.segdeform.deform(fixed, handle, targets, n_regions=2, n_cage_vertices=60)
+    assert bar == before
+    assert np.abs(bent.points[handle] - targets).max() < 1e-3
+    assert np.abs(bent.points[fixed] - bar.points[fixed]).max() < 1e-3
+    assert_array_equal(bent.faces, bar.faces)
+    assert_array_equal(bent["number"], bar["number"])
+    assert_array_equal(bent.cell_data["half"], bar.cell_data["half"])
+    assert list(bent.field_data["author"]) == ["me"]
+    faces = bar.regular_faces
+    volumes = [signed_volume(np.asarray(s.points, float), faces) for s in (bar, bent)]
+    assert volumes[1] == pytest.approx(volumes[0], rel=1e-12)
+
+
+def test_a_handle_that_misses_its_target_is_logged(bar, caplog):
+    height = bar.points[:, 2]
+    handle = height > 0.9
+    with caplog.at_level(logging.WARNING, logger="vtk_segdeform.widgets.plugin"):
+        bar.segdeform.deform(
+            height < 0.1, handle, bar.points[handle] + [0, 0, 15.0], n_regions=1, n_cage_vertices=12
+        )
+    assert "handle off by" in caplog.text
+
+
+def test_regions_come_as_arrays_of_a_copy(bar):
+    coloured = bar.segdeform.regions(2)
+    assert "region" not in bar.point_data
+    assert set(coloured["region"]) == {0, 1}
+    assert coloured["region_weights"].shape == (bar.n_points, 2)
+    assert_array_equal(coloured["region_weights"].argmax(axis=1), coloured["region"])
+    assert np.allclose(coloured["region_weights"].sum(axis=1), 1.0)
+    assert set(coloured["regions_here"]) == {1, 2}
+    assert (coloured["region_weights"][coloured["regions_here"] == 1].max(axis=1) == 1.0).all()
+    assert_array_equal(coloured["number"], bar["number"])
+
+
+def test_check_names_the_faults_of_a_surface(bar):
+    assert bar.segdeform.check().ok
+    vertices, faces = OCTAHEDRON
+    report = pv.make_tri_mesh(vertices, faces[:-1]).segdeform.check()
+    assert not report.ok
+    assert "3 open edges" in str(report)
+    with pytest.raises(MeshError, match="3 open edges"):
+        pv.make_tri_mesh(vertices, faces[:-1]).segdeform.regions()
+
+
+# Plotters.
+
+
+def test_the_overlay_shows_in_a_plotter_and_goes_with_it(plotter, session):
+    blank = picture(View.of(plotter))
+    overlay = plotter.segdeform.add_volume_overlay(session)
+    plotter.show(auto_close=False, interactive=False)
+    assert overlay.is_shown
+    assert (picture(View.of(plotter)) != blank).any()
+    plotter.close()
+    assert not overlay.is_shown
+    session.drag(SCENE.turned(10.0))  # nobody draws any more
+
+
+def test_the_editor_takes_the_place_of_the_mesh_and_goes_with_the_plotter(plotter, bar):
+    actor = plotter.add_mesh(bar)
+    other = plotter.add_mesh(pv.Sphere(center=(2, 0, 0)))
+    editor = plotter.segdeform.edit(bar, path="bar.segdeform")
+    plotter.show(auto_close=False, interactive=False)
+    assert editor.GetEnabled()
+    assert editor.path == Path("bar.segdeform")
+    assert not actor.visibility
+    assert other.visibility
+    assert_array_equal(editor.session.vertices, bar.points)
+    plotter.close()
+    assert not editor.GetEnabled()
+    editor.session.segment(2)  # nobody shows it any more
+
+
+def test_a_handle_is_dragged_in_a_plotter_by_hand(plotter, session):
+    editor = plotter.segdeform.edit(session)
+    plotter.show(auto_close=False, interactive=False)
+    hand = Hand(editor.view)
+    pull(hand, editor)
+    assert editor.session is session
+    assert not hand.failures
+    assert abs(session.volume_change) < 1e-12
+    assert session.undo_label == "drag handle 1"
+
+
+# Finding it.
+
+
+def test_pyvista_is_led_to_the_plugin():
+    parser = configparser.ConfigParser()
+    parser.read(ROOT / "setup.cfg", encoding="utf-8")
+    for group in ("pyvista.plotter_components", "pyvista.accessors"):
+        name, module = parser["options.entry_points"][group].strip().split(" = ")
+        assert name == "segdeform"
+        assert importlib.import_module(module) is plugin
+
+
+@pytest.mark.parametrize(
+    ("imports", "there"),
+    [
+        ("import pyvista, vtk_segdeform", [True, True]),
+        ("import vtk_segdeform; import pyvista, vtk_segdeform.widgets.plugin", [True, True]),
+        ("import vtk_segdeform; vtk_segdeform.edit; import pyvista", [True, True]),
+    ],
+)
+def test_it_is_registered_whichever_is_imported_first(imports, there):
+    code = (
+        f"{imports}; import pyvista.plotting as p; "
+        "print([hasattr(c, 'segdeform') for c in (pyvista.BasePlotter, pyvista.PolyData)])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], cwd=ROOT, capture_output=True, text=True
+    )
+    assert (done.stdout.strip(), done.stderr) == (str(there), "")
+
+
+def test_the_package_alone_does_not_load_pyvista():
+    code = "import sys, vtk_segdeform; print('pyvista' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert done.stdout.strip() == "False"
+
+
+# A window of its own.
+
+
+def pull(hand: Hand, editor) -> None:
+    """Go to the mode for it, and drag the middle of the handle aside."""
+    hand.key("4")
+    editor.wait()
+    session = editor.session
+    x, y = hand.at(session.vertices[session.handles["handle 1"]].mean(axis=0))
+    hand.drag([(x, y), (x + 6, y + 9), (x + 12, y + 21)])
+
+
+@pytest.mark.parametrize("kind", [sd.Mesh, pv.PolyData, sd.Session])
+def test_off_screen_the_window_closes_at_once_and_nothing_is_changed(kind, bar):
+    mesh = convert.from_polydata(bar)
+    given = {sd.Mesh: mesh, pv.PolyData: bar, sd.Session: sd.Session(mesh)}[kind]
+    back = sd.edit(given)
+    assert isinstance(back, kind)
+    vertices = back.points if kind is pv.PolyData else back.vertices
+    assert_array_equal(vertices, mesh.vertices)
+    if kind is pv.PolyData:
+        assert_array_equal(back["number"], bar["number"])
+
+
+def test_what_is_done_in_the_window_comes_back(session, monkeypatch):
+    show, failures = pv.Plotter.show, []
+
+    def show_and_work(plotter):
+        (editor,) = plotter.segdeform.added
+        show(plotter, auto_close=False, interactive=False)
+        hand = Hand(editor.view)
+        pull(hand, editor)
+        failures.extend(hand.failures)
+
+    monkeypatch.setattr(pv.Plotter, "show", show_and_work)
+    assert sd.edit(session) is session
+    assert failures == []
+    assert session.undo_label == "drag handle 1"
+    assert np.abs(session.vertices - session.mesh.vertices).max() > 0.1
+    surface = convert.to_polydata(session.mesh)
+    assert_array_equal(plugin.deformed(surface, session).points, session.vertices)
+    other = plugin.deformed(pv.Sphere(), session)  # another session was opened meanwhile
+    assert_array_equal(other.points, session.vertices)
+
+
+def test_the_command_writes_what_came_of_it(tmp_path, session, monkeypatch, capsys):
+    saved, out = tmp_path / "work.segdeform", tmp_path / "out.vtp"
+    sd.save_session(saved, session)
+
+    def edit(session, *, path, title):
+        assert path == saved
+        assert "work.segdeform" in title
+        session.drag(SCENE.turned(20.0))
+        return session
+
+    monkeypatch.setattr(plugin, "edit", edit)
+    monkeypatch.setattr("vtk_segdeform.cli.commands.require_screen", lambda: None)
+    assert main(["edit", str(saved), "-o", str(out)]) == 0
+    assert "volume          changed by" in capsys.readouterr().out
+    session.drag(SCENE.turned(20.0))
+    assert_array_equal(convert.read_polydata(out).points, session.vertices)
+
+
+def without_screen() -> dict[str, str]:
+    """Return an environment in which no window can be seen."""
+    hidden = ("DISPLAY", "WAYLAND_DISPLAY", "PYVISTA_OFF_SCREEN")
+    return {name: value for name, value in os.environ.items() if name not in hidden}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is always a screen")
+def test_without_a_screen_the_command_says_so_in_one_line(tmp_path, bar):
+    path = tmp_path / "bar.vtp"
+    convert.write_mesh(path, bar)
+    done = subprocess.run(
+        [sys.executable, "-m", "vtk_segdeform", "edit", str(path), "-o", str(tmp_path / "o.vtp")],
+        cwd=ROOT, env=without_screen(), capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert "there is no screen to open a window on; set DISPLAY" in done.stderr
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_off_screen_the_command_says_that_nothing_can_be_edited(tmp_path, bar, capsys):
+    path = tmp_path / "bar.vtp"
+    convert.write_mesh(path, bar)
+    assert main(["edit", str(path)]) == 1
+    assert "pyvista draws off-screen" in capsys.readouterr().err
+
+
+def test_the_command_explains_itself(capsys):
+    assert main(["edit", "--help"]) == 0
+    text = capsys.readouterr().out
+    assert "open a window" in text.lower()
+    assert "-o OUT" in text
+
+
+def test_what_is_no_mesh_is_refused():
+    with pytest.raises(ValueError, match="a PolyData or a Session; got 'cactus'"):
+        sd.edit("cactus")
+    with pytest.raises(MissingDependencyError, match="off-screen"):
+        canvas.require_screen()

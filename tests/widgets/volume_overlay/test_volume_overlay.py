@@ -1,0 +1,376 @@
+"""The local volume change: the right colours, the right words, and no work while hidden."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - a plain window needs it
+from hands import Hand, picture, plain_view
+from scenes import sausage
+from solids import rotation
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkRenderingAnnotation import vtkScalarBarActor
+from vtkmodules.vtkRenderingCore import vtkTextActor
+
+from vtk_segdeform import Regions, Session
+from vtk_segdeform.geometry.local_volume import LocalVolume
+from vtk_segdeform.pictures.palette import of_region
+from vtk_segdeform.solver.volume_constraints import region_volumes
+from vtk_segdeform.widgets.cage_display.cage_display import CageDisplay
+from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
+from vtk_segdeform.widgets.volume_overlay.diverging import (
+    HALF_RANGES,
+    NEUTRAL,
+    colours_of,
+    half_range_for,
+    lookup_table,
+)
+from vtk_segdeform.widgets.volume_overlay.volume_overlay import VolumeOverlay
+
+RNG = np.random.default_rng(5)
+
+
+def session_of(n_regions: int) -> Session:
+    scene = sausage(n_regions)
+    session = Session(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.set_fixed(scene.fixed)
+    session.add_handle(scene.handle)
+    session.change_options(preserve_volume=False)
+    return session
+
+
+@pytest.fixture
+def overlay(request):
+    """Return the overlay over a sausage along x seen from -y, in one region or as asked for."""
+    session = session_of(getattr(request, "param", 1))
+    view = plain_view((400, 300))
+    surface = SurfaceDisplay(view, session)
+    view.camera.SetPosition(0.0, -10.0, 0.0)
+    view.camera.SetViewUp(0.0, 0.0, 1.0)
+    view.renderer.ResetCamera()
+    view.render()
+    overlay = VolumeOverlay(view, session, surface)
+    overlay.surface = surface
+    yield overlay
+    overlay.remove()
+    surface.remove()
+
+
+def several(n_regions):
+    return pytest.mark.parametrize("overlay", [n_regions], indirect=True)
+
+
+def colours(overlay):
+    return vtk_to_numpy(overlay.surface.polydata.GetPointData().GetScalars())
+
+
+def props(overlay, kind):
+    return [prop for prop in overlay.view.renderer.GetViewProps() if isinstance(prop, kind)]
+
+
+def words(overlay):
+    """Return what is written, from the top."""
+    lines = sorted(props(overlay, vtkTextActor), key=lambda line: -line.GetPosition()[1])
+    return [line.GetInput().strip() for line in lines]
+
+
+def move_all(session, matrix, shift=(0.0, 0.0, 0.0)):
+    """Move every cage, and so the mesh, by an affine map."""
+    for region, cage in enumerate(session.cages):
+        session.move_cage(region, cage.vertices @ np.asarray(matrix).T + shift)
+    session.commit()
+
+
+# The colours.
+
+
+def lightness(rgb):
+    """Return CIELAB L* of (n, 3) colours."""
+    c = np.asarray(rgb) / 255.0
+    linear = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+    y = linear @ [0.2126, 0.7152, 0.0722]
+    return np.where(y > (6 / 29) ** 3, 116 * np.cbrt(y) - 16, y * (29 / 3) ** 3)
+
+
+def test_zero_and_what_rounds_to_it_is_one_colour_and_only_that():
+    tiny = np.array([-1e-12, 0.0, 1e-12, -1e-4, 1e-4])
+    assert (colours_of(tiny, 0.1) == NEUTRAL).all()
+    others = colours_of(np.array([-0.05, -0.002, 0.002, 0.05]), 0.1)
+    assert (others != NEUTRAL).any(axis=1).all()
+
+
+def test_lightness_falls_evenly_and_alike_on_both_sides():
+    size = np.linspace(0.0, 1.0, 101)
+    below, above = lightness(colours_of(-size, 1.0)), lightness(colours_of(size, 1.0))
+    expected = np.interp(size, [0.0, 1.0], [below[0], below[-1]])
+    for side in (below, above):
+        assert np.abs(side - expected).max() < 2.0
+        assert (np.diff(side) <= 0.3).all()  # colours are whole numbers
+    assert below[-1] < 40 < 85 < below[0]
+
+
+def test_the_two_sides_stay_apart_for_colour_blind_eyes():
+    # Vienot, Brettel, Mollon 1999: what is seen without red or without green receptors.
+    blind = {
+        "protanope": [[0.1124, 0.8876, 0.0], [0.1124, 0.8876, 0.0], [0.004, -0.004, 1.0]],
+        "deuteranope": [[0.2928, 0.7072, 0.0], [0.2928, 0.7072, 0.0], [-0.0223, 0.0223, 1.0]],
+    }
+    size = np.linspace(0.25, 1.0, 16)
+    for matrix in blind.values():
+        seen = [(colours_of(s, 1.0) / 255.0) ** 2.2 @ np.array(matrix).T for s in (-size, size)]
+        below, above = (np.clip(s, 0.0, 1.0) ** (1 / 2.2) * 255 for s in seen)
+        assert (np.linalg.norm(below - above, axis=1) > 50).all()
+
+
+@pytest.mark.parametrize("half_range", HALF_RANGES)
+def test_the_scale_shows_the_very_colours_of_the_mesh(half_range):
+    shares = RNG.uniform(-1.3 * half_range, 1.3 * half_range, 500)
+    table, got = lookup_table(half_range), np.zeros(3)
+    for share, colour in zip(shares, colours_of(shares, half_range), strict=True):
+        table.GetColor(share, got)
+        assert np.array_equal(np.round(255 * got), colour)
+
+
+def test_the_range_is_wide_enough_but_not_for_a_few_wild_values():
+    shares = np.full(1000, 0.07)
+    assert half_range_for(shares) == 0.1
+    shares[:5] = 40.0
+    assert half_range_for(shares) == 0.1
+    assert half_range_for(np.zeros(3)) == 0.05
+    assert half_range_for(np.array([-7.0])) == 1.0
+
+
+def test_the_range_does_not_flicker_where_a_value_trembles():
+    half_range, seen = None, []
+    for size in 0.1 + 0.01 * np.sin(np.arange(50)):
+        half_range = half_range_for(np.array([size]), half_range)
+        seen.append(half_range)
+    assert set(seen[3:]) == {0.2}
+    assert half_range_for(np.array([0.01]), 0.2) == 0.05  # but it does become smaller
+
+
+# Over the mesh.
+
+
+def test_hidden_it_computes_nothing_and_changes_no_pixel(overlay, monkeypatch):
+    asked = []
+    change = LocalVolume.change
+    monkeypatch.setattr(LocalVolume, "change", lambda *a: asked.append("change") or change(*a))
+    before = picture(overlay.view)
+    move_all(overlay.session, np.diag([1.0, 1.1, 1.0]))
+    assert not overlay.is_shown
+    assert overlay.change is None
+    assert not asked
+    overlay.show()
+    assert overlay.is_shown
+    assert (picture(overlay.view) != before).any()
+    overlay.session.undo()
+    assert len(asked) == 2
+    overlay.hide()
+    assert (picture(overlay.view) == before).all()
+    overlay.session.redo()
+    assert len(asked) == 2
+
+
+def test_it_is_neutral_under_any_rigid_motion(overlay):
+    overlay.show()
+    assert (colours(overlay) == NEUTRAL).all()
+    for axis, angle in (([1.0, 2.0, 3.0], 1.0), ([0.0, 1.0, -1.0], 2.5)):
+        move_all(overlay.session, rotation(axis, angle), (1.0, 2.0, -0.5))
+        assert np.abs(overlay.session.vertices - overlay.session.mesh.vertices).max() > 1.0
+        assert (colours(overlay) == NEUTRAL).all()
+        assert words(overlay)[1] == "local: 0 to 0 %"
+
+
+@pytest.mark.parametrize("factor", [0.96, 1.17])
+def test_a_stretch_is_one_colour_everywhere_that_of_its_determinant(overlay, factor):
+    overlay.show()
+    move_all(overlay.session, np.diag([1.0, 1.0, factor]))
+    assert np.allclose(overlay.change, factor - 1.0, atol=1e-9)
+    expected = colours_of(np.full(1, factor - 1.0), overlay.half_range)
+    assert np.abs(colours(overlay).astype(int) - expected).max() <= 2  # a neighbour in the table
+    assert words(overlay)[0] == f"volume: {100 * (factor - 1):+.0f} %"
+
+
+def bent(overlay):
+    """Bend it, look at it, and return the mean colour seen inside the bend and at its end."""
+    scene = sausage(1)
+    overlay.session.drag(scene.turned(75.0))
+    view = overlay.view
+    view.renderer.ResetCamera()
+    x = overlay.session.vertices
+    image = picture(view)[::-1].astype(float)
+    middle = np.abs(scene.mesh.vertices[:, 0]) < 0.25
+    inside = x[middle][np.argmin(x[middle][:, 1] + 2.0 * x[middle][:, 2])]
+    seen = []
+    for point in (inside, x[scene.fixed].mean(axis=0)):
+        u, v = (round(float(p)) for p in view.to_display(point[None])[0, :2])
+        seen.append(image[v - 1 : v + 4, u - 2 : u + 3].reshape(-1, 3).mean(axis=0))
+    return seen
+
+
+def test_a_bend_that_loses_volume_is_seen_to_be_pinched(overlay):
+    overlay.show()
+    pinch, end = bent(overlay)
+    assert overlay.session.volume_change < -0.05
+    assert overlay.change.min() < -0.3
+    assert pinch[2] > pinch[0] + 25  # blue
+    assert abs(end[2] - end[0]) < 12  # pale grey
+    before = (overlay.change < -0.15).mean()
+    overlay.session.reset_pose()
+    overlay.session.change_options(preserve_volume=True)
+    bent(overlay)
+    assert (overlay.change < -0.15).mean() < 0.7 * before
+    assert abs(overlay.session.volume_change) < 1e-12
+
+
+# The words.
+
+
+@several(3)
+def test_the_words_tell_totals_regions_and_steps(overlay):
+    session = overlay.session
+    overlay.show()
+    regions = [f"region {r}: 0 %" for r in (1, 2, 3)]
+    assert words(overlay) == ["volume: 0 %", "local: 0 to 0 %", *regions]
+    session.change_options(preserve_volume=True)
+    solution = session.drag(sausage(3).turned(30.0), max_steps=4)
+    told = words(overlay)
+    exact = session.volume_change
+    assert told[0] == (f"volume: {exact:+.1e}" if exact else "volume: 0 %")
+    s = LocalVolume(session.mesh).change(session.vertices)
+    assert told[1] == f"local: {100 * s.min():+.0f} to {100 * s.max():+.0f} %"
+    for r, volume in enumerate(region_volumes(session.mesh, session.regions.labels)):
+        share = volume.violation(session.vertices) / volume.target
+        assert float(told[2 + r].split()[2]) == pytest.approx(100 * share, abs=0.051)
+    assert any("region" in line and line.split()[2] != "0" for line in told)
+    assert told[-1] == f"{solution.steps} steps"
+    overlay.hide()
+    loaded = Session(session.mesh, state=session.state)  # nothing was solved for here,
+    assert loaded.solution is None
+    again = VolumeOverlay(overlay.view, loaded, overlay.surface)
+    again.show()
+    assert words(again) == told[:-1]  # so the regions' volumes are measured
+    again.remove()
+
+
+@several(3)
+def test_each_region_is_told_on_its_colour(overlay):
+    overlay.show()
+    lines = {
+        line.GetInput().strip(): line.GetTextProperty() for line in props(overlay, vtkTextActor)
+    }
+    for region in range(3):
+        style = lines[f"region {region + 1}: 0 %"]
+        assert np.allclose(style.GetBackgroundColor(), of_region(region) / 255.0)
+        assert style.GetBackgroundOpacity() == 1.0
+    overlay.session.merge_regions([0, 1])
+    assert len(words(overlay)) == 4
+    overlay.session.merge_regions([0, 1])
+    assert len(words(overlay)) == 2  # one region is the whole
+
+
+def test_the_time_of_a_frame_is_told_from_the_second_on(overlay):
+    cages = CageDisplay(overlay.view, overlay.session)
+    cages.through = True
+    cages.On()
+    overlay.show()
+    hand = Hand(overlay.view)
+    cage = overlay.session.cage_vertices[0]
+    x, y = hand.at(cage[np.argmin(np.abs(cage).sum(axis=1))])
+    hand.press((x, y))
+    hand.move((x - 5, y))
+    assert not any("ms" in line for line in words(overlay))
+    hand.move((x - 9, y))
+    assert words(overlay)[-1].endswith(" ms a frame")
+    assert 1 <= int(words(overlay)[-1].split()[0]) < 5000
+    hand.release()
+    overlay.session.undo()  # by nobody's hand
+    assert not any("ms" in line for line in words(overlay))
+    cages.remove()
+    assert not hand.failures
+
+
+@several(3)
+@pytest.mark.parametrize("size", [(400, 300), (800, 600), (1600, 1200)])
+@pytest.mark.parametrize("background", [(1.0, 1.0, 1.0), (0.0, 0.0, 0.0)])
+def test_words_and_scale_are_legible_and_apart(overlay, size, background):
+    view = overlay.view
+    view.window.SetSize(*size)
+    view.renderer.SetBackground(*background)
+    overlay.show()
+    view.render()
+    boxes = []
+    for line in props(overlay, vtkTextActor):
+        place, extent = np.array(line.GetPosition()), np.zeros(2)
+        line.GetSize(view.renderer, extent)
+        assert extent[1] >= max(9, size[1] / 60)
+        boxes.append((place, place + extent))
+        style = line.GetTextProperty()
+        on = style.GetBackgroundColor() if style.GetBackgroundOpacity() else background
+        ink, paper = (float(lightness(255 * np.array([c]))[0]) for c in (style.GetColor(), on))
+        assert abs(ink - paper) > 35
+    assert all((low >= 0).all() and (high <= size).all() for low, high in boxes)
+    boxes.sort(key=lambda box: -box[0][1])
+    assert all(below[1][1] <= above[0][1] for above, below in itertools.pairwise(boxes))
+    (bar,) = props(overlay, vtkScalarBarActor)
+    assert bar.GetPosition()[0] * size[0] > max(high[0] for _, high in boxes)
+    table = bar.GetLookupTable()
+    ticks = [table.GetAnnotation(k) for k in range(table.GetNumberOfAnnotatedValues())]
+    assert ticks == ["-5 %", "-2.5 %", "0", "+2.5 %", "+5 %"]
+
+
+def test_the_ticks_follow_the_range(overlay):
+    overlay.show()
+    move_all(overlay.session, np.diag([1.0, 1.0, 1.15]))
+    (bar,) = props(overlay, vtkScalarBarActor)
+    table = bar.GetLookupTable()
+    assert table.GetAnnotation(0) == "-20 %"
+    assert table.GetAnnotation(4) == "+20 %"
+    assert overlay.half_range == 0.2
+
+
+def test_the_range_does_not_flicker_during_a_drag(overlay):
+    overlay.show()
+    seen = []
+    for factor in (1.102, 1.098, 1.102, 1.098):
+        overlay.session.move_cage(0, overlay.session.cages[0].vertices * [1.0, 1.0, factor])
+        seen.append(overlay.half_range)
+    assert seen == [0.2] * 4
+    overlay.session.revert()
+    assert overlay.half_range == 0.05
+
+
+def test_a_region_without_a_face_is_left_out():
+    scene = sausage(1)
+    x = scene.mesh.vertices[:, 0]
+    masks = np.array([x < 0.3, np.arange(len(x)) == 0, x > -0.3])
+    session = Session(scene.mesh)
+    session.set_regions(Regions.from_masks(scene.mesh, masks | (masks.sum(axis=0) == 0)))
+    session.set_cages(scene.cages * 3)
+    view = plain_view()
+    overlay = VolumeOverlay(view, session)
+    overlay.show()
+    assert words(overlay)[2:] == ["region 1: 0 %", "region 3: 0 %"]
+    session.change_options(preserve_volume=False)
+    move_all(session, np.diag([1.0, 1.0, 1.1]))
+    assert words(overlay)[2:] == ["region 1: +10 %", "region 3: +10 %"]
+    overlay.remove()
+
+
+def test_removed_it_leaves_the_surface_as_it_was(overlay):
+    view = overlay.view
+    before = picture(view)
+    overlay.show()
+    overlay.show()
+    overlay.remove()
+    assert (picture(view) == before).all()
+    assert view.renderer.GetViewProps().GetNumberOfItems() == 1
+    own = VolumeOverlay(view, overlay.session)
+    own.show()
+    own.remove()
+    assert view.renderer.GetViewProps().GetNumberOfItems() == 1

@@ -1,0 +1,165 @@
+"""What a valid cage is: a closed surface seen from outside, around all it is to move.
+
+A cage bounds a solid.  Each directed edge occurs once and its reverse once, the faces around a
+vertex form one fan, no two faces cross, and the enclosed volume is positive.  It may have several
+components that stay clear of each other; one inside another is a cavity and faces inward.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
+from ..checks import require
+from ..errors import CageError
+from ..freezing import Frozen
+from ..mesh import (
+    components,
+    connectivity_faults,
+    counted,
+    distance_to_surface,
+    flat_faces,
+    inside_points,
+    self_intersections,
+    winding_number,
+)
+
+MOST_CAGE_VERTICES = 1600
+"""Limit of all cages together: the solver factors matrices with three rows per cage vertex."""
+
+_LONGEST_NAME = 100  # characters of a cage's name in a message
+_LARGEST = 1e70  # as of a mesh, see `faults`
+
+__all__ = ["Cage", "cage_faults", "self_intersections", "winding_number"]
+
+
+@dataclass(frozen=True, init=False, eq=False)
+class Cage(Frozen):
+    """A closed, outward oriented triangle mesh that does not cross itself; frozen.
+
+    Parameters
+    ----------
+    vertices : (m, 3) float
+        In the length unit of the mesh it is to move.
+    faces : (k, 3) int
+        Counter-clockwise seen from outside.
+
+    Raises
+    ------
+    ValueError
+        If an array has the wrong shape or type.
+    CageError
+        If `cage_faults` finds any; the text lists them.
+
+    Examples
+    --------
+    >>> corners = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+    >>> cage = Cage(corners, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+    >>> cage.contains([[0, 0, 0], [1, 1, 0]])
+    array([ True, False])
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
+        points = as_points(vertices, "vertices").copy()
+        triangles = as_faces(faces, len(points), "faces").copy()
+        faults = cage_faults(points, triangles)
+        if faults:
+            raise CageError(
+                f"not a valid cage: {'; '.join(faults)}; mend it, or let fit_cages make one"
+            )
+        points.flags.writeable = triangles.flags.writeable = False
+        object.__setattr__(self, "vertices", points)
+        object.__setattr__(self, "faces", triangles)
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices, m."""
+        return len(self.vertices)
+
+    @property
+    def n_faces(self) -> int:
+        """Number of triangles, k."""
+        return len(self.faces)
+
+    @property
+    def volume(self) -> float:
+        """The enclosed volume; positive."""
+        return float(_six_volumes(self.vertices, self.faces).sum() / 6.0)
+
+    def contains(self, points: ArrayLike) -> BoolArray:
+        """Tell which of (n, 3) *points* are inside; on the cage itself either answer may come."""
+        x = as_points(points, "points")
+        low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
+        inside = ((x >= low) & (x <= high)).all(axis=1)
+        inside[inside] = inside_points(x[inside], self.vertices, self.faces)
+        return np.asarray(inside)
+
+    def require_encloses(self, points: ArrayLike, name: str) -> None:
+        """Raise a CageError that counts the (n, 3) *points* outside, unless there are none."""
+        name = require(name, str, "name")[:_LONGEST_NAME]
+        x = as_points(points, name)
+        if np.abs(x).max(initial=0.0) > _LARGEST:
+            raise CageError(f"{name} are too large to compute with, above {_LARGEST:.0e}")
+        outside = x[~self.contains(x)]
+        if len(outside):
+            farthest = distance_to_surface(outside, self.vertices, self.faces).max()
+            raise CageError(
+                f"{len(outside)} of {len(x)} {name} are outside the cage, "
+                f"the farthest by {farthest:.3g}; enlarge the cage"
+            )
+
+
+def cage_faults(vertices: ArrayLike, faces: ArrayLike) -> tuple[str, ...]:
+    """Return what keeps a surface from being a cage, one sentence each; empty if nothing does.
+
+    Geometry is only looked at once the connectivity is sound.
+
+    Examples
+    --------
+    >>> corners = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+    >>> cage_faults(corners, [[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]])
+    ('it is inside-out, volume -2.67: reverse its faces',)
+    """
+    points = as_points(vertices, "vertices")
+    triangles = as_faces(faces, len(points), "faces")
+    if np.abs(points).max(initial=0.0) > _LARGEST:
+        return (f"its vertices are too large to compute with, above {_LARGEST:.0e}: scale it down",)
+    faults = connectivity_faults(len(points), triangles)
+    return tuple(faults or _flat_faults(points, triangles) or _solid_faults(points, triangles))
+
+
+def _flat_faults(points: FloatArray, faces: IntArray) -> list[str]:
+    flat = len(flat_faces(points, faces))
+    return [f"{counted(flat, 'face has', 'faces have')} no area"] if flat else []
+
+
+def _solid_faults(points: FloatArray, faces: IntArray) -> list[str]:
+    crossings = len(self_intersections(points, faces))
+    if crossings:
+        pairs = counted(crossings, "pair of faces crosses", "pairs of faces cross")
+        return [f"{pairs} or touch: the cage intersects itself"]
+    part_of_face = components(len(points), faces)[faces[:, 0]]
+    volumes = np.bincount(part_of_face, _six_volumes(points, faces)) / 6.0
+    if len(volumes) == 1:
+        inward = volumes[0] <= 0
+        return [f"it is inside-out, volume {volumes[0]:.3g}: reverse its faces"] if inward else []
+    faults = []
+    for part, volume in enumerate(volumes):
+        own = part_of_face == part
+        seed = points[faces[own][0, :1]]
+        depth = round(float(winding_number(seed, points, faces[~own])[0]))
+        if (depth, volume > 0) not in ((0, True), (1, False)):
+            where = "inside another and faces outward" if depth else "faces inward"
+            faults.append(f"component {part + 1} of {len(volumes)} {'is ' if depth else ''}{where}")
+    return faults
+
+
+def _six_volumes(points: FloatArray, faces: IntArray) -> FloatArray:
+    a, b, c = (points - points.mean(axis=0))[faces.T]
+    return np.asarray(np.einsum("fj,fj->f", a, np.cross(b, c)))

@@ -1,1 +1,0 @@
-"""How `cage_fit` makes a cage: the region as a solid, edge collapses."""

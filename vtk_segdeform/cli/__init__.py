@@ -1,0 +1,20 @@
+"""The command line, ``segdeform``.
+
+The files, in reading order:
+
+    main            the parser, and exit codes
+    commands        one function for each command
+    selection       vertex sets such as ``z>80%``
+    motion          motions such as ``--rotate z,60``
+    outputs         printed lines and written surfaces
+    demo            ``segdeform demo``
+    bench           ``segdeform bench``
+    application     ``segdeform app``
+    interactive     ``segdeform bench --interactive``
+    replaying       ``segdeform replay``
+    progress_bar    progress in the terminal
+"""
+
+from .main import main
+
+__all__ = ["main"]

@@ -1,0 +1,56 @@
+"""``segdeform bench``: the experiments of `benchmarks`, as a report in a folder."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from dataclasses import replace
+
+from ..benchmarks import (
+    FULL,
+    NAME,
+    QUICK,
+    USUAL,
+    plot_history,
+    read_history,
+    record,
+    write_report,
+)
+from ..progress import Progress
+from .interactive import interactive_table
+from .outputs import Say
+
+
+def bench(options: Namespace, say: Say, progress: Progress) -> bool:
+    """Measure, leave a report, and say what does not hold; or plot earlier runs, or time a drag."""
+    if options.history:
+        plot = options.output / "history.png"
+        runs = read_history(options.history)
+        options.output.mkdir(parents=True, exist_ok=True)
+        plot_history(runs, plot)
+        say(f"written         {plot}")
+        return True
+    if options.record:
+        read_history(options.record)  # refused now rather than after the measurements
+    if options.interactive:
+        say(interactive_table(n_cage_vertices=options.cage_vertices, progress=progress))
+        return True
+    scale = QUICK if options.quick else FULL if options.full else USUAL
+    scale = replace(scale, n_cage_vertices=options.cage_vertices)
+    if options.size is not None:
+        one = (options.size,)
+        scale = replace(
+            scale, paper_size=options.size, drag_sizes=one, peer_sizes=one, cage_sizes=one
+        )
+    sections = write_report(options.output, scale, options.only, progress)
+    ratios = [ratio for section in sections for ratio in section.ratios]
+    for ratio in ratios:
+        verdict = ratio.verdict.strip("*").lower()
+        say(f"{verdict:15} {ratio.what}: {ratio.value:.3g}, wanted {ratio.limit:.3g}")
+    for section in sections:
+        for line in section.absent:
+            say(f"not measured    {line}")
+    if options.record:
+        record(options.record, scale.name, ratios)
+        say(f"recorded        {options.record}")
+    say(f"written         {options.output / NAME}")
+    return True

@@ -1,0 +1,120 @@
+"""The demonstration: the cactus, its trunk bent over by 60 degrees, from nothing to pictures.
+
+The bottom stands still and the tip of the trunk is the handle.  It turns about a horizontal line
+through the trunk, below the arm on its inner side, so that the arm swings out of the way.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from .. import io
+from ..arrays import FloatArray, IntArray
+from ..cages import fit_cages
+from ..deformer import Deformer
+from ..errors import MissingDependencyError
+from ..geometry import local_volume_change
+from ..mesh import Mesh
+from ..models import cactus
+from ..pictures import (
+    picture_before_after,
+    picture_regions_and_cages,
+    picture_volume_change,
+)
+from ..progress import Progress, part
+from ..regions import segment
+from . import motion
+from .outputs import Say, coloured_cages, coloured_regions, tell_cages, tell_regions, tell_solution
+from .selection import parse_selection
+
+FIXED, HANDLE = "z<8%", "z>92%"
+_PIVOT_HEIGHT = 0.4  # of the height
+HANDLE_MET = 1e-3  # of the diagonal: what a deformation promises
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """What is held, what is moved, and where to."""
+
+    fixed: IntArray  # (f,) vertex numbers
+    handle: IntArray  # (k,) vertex numbers
+    targets: FloatArray  # (k, 3)
+
+
+def bent_top(mesh: Mesh, angle: float, *, pivot_height: float = _PIVOT_HEIGHT) -> Pose:
+    """Return the pose that turns the top of a standing *mesh* over towards +x.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Standing along z.
+    angle : float
+        In radians, about the y direction.
+    pivot_height : float
+        Where the axis passes, as a share of the mesh's height.
+
+    Examples
+    --------
+    >>> import math
+    >>> from vtk_segdeform.models import bar
+    >>> pose = bent_top(bar(), math.radians(90), pivot_height=0.0)
+    >>> float(pose.targets[:, 0].max().round(12))  # what stood 1 high now lies 1 wide
+    1.0
+    """
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    pivot = 0.5 * (low + high)
+    pivot[2] = low[2] + pivot_height * (high[2] - low[2])
+    handle = parse_selection(HANDLE, mesh)
+    turned = motion.transform(mesh.vertices[handle], motion.rotation([0, 1, 0], angle, pivot))
+    return Pose(parse_selection(FIXED, mesh), handle, turned)
+
+
+def run(
+    folder: Path, say: Say, progress: Progress, *, n_vertices: int = 5430, draw: bool = True
+) -> bool:
+    """Bend the cactus and leave meshes and pictures in *folder*; return whether all went well."""
+    mesh = cactus(n_vertices)
+    say(f"cactus          {mesh.n_vertices} vertices, {mesh.n_faces} triangles")
+    start = time.perf_counter()
+    regions = segment(mesh, n_regions=3, progress=part(progress, 0.0, 0.2))
+    tell_regions(regions, say)
+    cages = fit_cages(mesh, regions, n_vertices=155, progress=part(progress, 0.2, 0.5))
+    tell_cages(cages, say)
+    pose = bent_top(mesh, math.radians(60.0))
+    deformer = Deformer(
+        mesh, regions, cages, fixed=pose.fixed, handle=pose.handle,
+        progress=part(progress, 0.5, 0.7),
+    )  # fmt: skip
+    say(f"set up          {time.perf_counter() - start:.1f} s, once")
+    start = time.perf_counter()
+    solution = deformer.solve(pose.targets)
+    tell_solution(solution, time.perf_counter() - start, say)
+    change = local_volume_change(mesh, solution.vertices)
+    say(f"local volume    {100 * change.min():+.0f} % to {100 * change.max():+.0f} %")
+
+    folder.mkdir(parents=True, exist_ok=True)
+    after = mesh.with_vertices(solution.vertices)
+    bent = coloured_regions(io.to_polydata(after), regions)
+    bent.point_data["local_volume_change"] = change
+    io.write_mesh(folder / "cactus-bent.vtp", bent)
+    io.write_mesh(folder / "cages-bent.vtp", coloured_cages(cages, solution.cage_vertices))
+    say(f"written         {folder / 'cactus-bent.vtp'}, {folder / 'cages-bent.vtp'}")
+    if draw:
+        progress(0.8, "drawing")
+        names = ("regions-and-cages.png", "before-after.png", "cages-bent.png", "volume-change.png")
+        at_rest, before_after, cages_bent, volume = (folder / name for name in names)
+        moved = [Mesh(p, cage.faces) for p, cage in zip(solution.cage_vertices, cages, strict=True)]
+        try:
+            picture_regions_and_cages(at_rest, mesh, regions.membership, cages)
+            picture_before_after(
+                before_after, mesh, after.vertices, fixed=pose.fixed, handle=pose.handle
+            )
+            picture_regions_and_cages(cages_bent, after, regions.membership, moved)
+            picture_volume_change(volume, mesh, after.vertices, change)
+            say(f"drawn           {', '.join(names)}")
+        except MissingDependencyError as missing:
+            say(f"not drawn       {missing}")
+    return solution.handle_error <= HANDLE_MET

@@ -1,1 +1,0 @@
-"""What stands behind `cli`: selections and motions in a few characters, a function a command."""

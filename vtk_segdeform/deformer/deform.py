@@ -1,0 +1,73 @@
+"""From a mesh and its handles to a pose in one call: segment, fit cages, bind, solve."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from ..cages import fit_cages
+from ..checks import as_flag
+from ..mesh import Mesh, require_mesh
+from ..progress import Progress, part
+from ..regions import segment
+from ..solver import Solution, checked_constraints, checked_targets
+from .deformer import Deformer
+
+
+def deform(
+    mesh: Mesh,
+    fixed: ArrayLike,
+    handle: ArrayLike,
+    targets: ArrayLike,
+    *,
+    n_regions: int | None = 3,
+    n_cage_vertices: int = 155,
+    preserve_volume: bool = True,
+    progress: Progress | None = None,
+) -> Solution:
+    """Return *mesh* deformed so that its handle vertices are at *targets*.
+
+    For one pose.  To drag, or to choose regions and cages, keep a `Deformer`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        n vertices.
+    fixed, handle : (k,) int or (n,) bool
+        Vertices held in place, and vertices that move.
+    targets : (len(handle), 3) float
+        Where the handle vertices shall be, in the order of *handle* (of its true entries, if it
+        is a mask).
+    n_regions : int or None
+        How many regions; None lets `segment` choose.
+    n_cage_vertices : int
+        Vertices of all cages together.
+    preserve_volume : bool
+        Hold the enclosed volume exactly.
+    progress : Progress, optional
+        Called while the cages are made and bound, and before every step; may cancel.
+
+    Returns
+    -------
+    Solution
+
+    Raises
+    ------
+    ConstraintError
+        If fixed, handle or targets make no sense.
+    """
+    require_mesh(mesh)
+    as_flag(preserve_volume, "preserve_volume")
+    _, held = checked_constraints(mesh, fixed, handle)
+    checked_targets(targets, len(held))
+    regions = segment(mesh, n_regions, progress=part(progress, 0.0, 0.2))
+    cages = fit_cages(mesh, regions, n_cage_vertices, progress=part(progress, 0.2, 0.7))
+    deformer = Deformer(
+        mesh,
+        regions,
+        cages,
+        fixed=fixed,
+        handle=handle,
+        preserve_volume=preserve_volume,
+        progress=part(progress, 0.7, 0.9),
+    )
+    return deformer.solve(targets, progress=part(progress, 0.9, 1.0))

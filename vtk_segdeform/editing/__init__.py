@@ -1,1 +1,0 @@
-"""What stands behind `session` and `store`: states, their history, painting, handles, poses."""

@@ -1,0 +1,22 @@
+"""Files on disk: atomic replacement, locks between processes, and safe opening.
+
+The files, in reading order:
+
+    atomic          write a draft, then rename it over the old file
+    lock            lock files, released when their process ends
+    regular_file    open regular files only: no pipes, no devices
+"""
+
+from .atomic import is_draft, replacing, require_place
+from .lock import hold
+from .regular_file import fault_of, is_ours, open_regular
+
+__all__ = [
+    "fault_of",
+    "hold",
+    "is_draft",
+    "is_ours",
+    "open_regular",
+    "replacing",
+    "require_place",
+]

@@ -1,0 +1,191 @@
+"""Atomic replacement of files: write to a temporary file in the same folder, then rename it.
+
+    with replacing(path) as draft, open(draft, "wb") as file:
+        file.write(...)
+
+The file at *path* is replaced when the block ends without an error; otherwise it stays unchanged
+and the draft is deleted.  A process that is killed leaves its draft behind, a file named
+``.segdeform-<16 digits>.part``; the next write to the same folder deletes it.  Writers lock their
+drafts (`lock`), so a draft that can be locked is abandoned.  On Windows, where a lock would block
+the writer itself, a draft is abandoned after a day without changes.  Nothing else is ever deleted.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import secrets
+import stat
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from .lock import holds
+from .regular_file import fault_of, is_ours, name_of
+
+_DRAFT = re.compile(r"\.segdeform-[0-9a-f]{16}\.part(\.\w{1,8})?")
+_IN_FOLDER = re.compile(r"\d{4,}\.png")  # the only files written to a folder
+_LOCKS = sys.platform != "win32"  # a locked file cannot be written through another handle there
+_A_DAY = 86_400.0  # seconds
+_TRIES = 50  # a sweep may hold the lock of a new draft for a moment; five were too few under load
+
+
+@contextmanager
+def replacing(
+    path: str | os.PathLike[str],
+    *,
+    folder: bool = False,
+    follow: bool = True,
+    durable: bool = True,
+) -> Iterator[Path]:
+    """Yield an empty file to write to; it replaces *path* when the block succeeds.
+
+    Parameters
+    ----------
+    path : path
+        The new file keeps the mode of the old one.  If *path* is a symbolic link, its target is
+        replaced.
+    folder : bool
+        Create a folder of numbered pictures instead; *path* must not exist yet.
+    follow : bool
+        If False, replace a symbolic link itself.
+    durable : bool
+        Flush the new file to the disk before it replaces the old one.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written; ``strerror`` gives the reason.
+    """
+    target = require_place(path, follow=follow)
+    _sweep(target.parent)
+    mode = _mode_of(target)
+    draft, handle = _begun(target, folder, 0o666 if mode is None else 0o600)
+    try:
+        yield draft
+        if durable and not folder:
+            _flush(draft)
+        if mode not in (None, _mode_of(draft)):  # some file systems have one mode for all
+            os.chmod(draft, mode)
+        os.replace(draft, target)
+    finally:
+        with suppress(OSError):  # do not hide the error that led here
+            _delete(draft)
+        if handle is not None:
+            os.close(handle)
+    if durable:
+        with suppress(OSError):  # folders cannot be flushed on every system
+            _flush(target.parent)
+
+
+def require_place(path: str | os.PathLike[str], *, follow: bool = True) -> Path:
+    """Return the file that *path* names, symbolic links resolved, if it can be written.
+
+    Raises
+    ------
+    OSError
+        If its folder does not exist or is not writable, or *path* exists and is not a regular file.
+    """
+    name = name_of(path)
+    target = Path(os.path.realpath(name)) if follow else Path(os.path.abspath(name))
+    folder = target.parent
+    try:
+        fault = fault_of(os.lstat(target))
+    except FileNotFoundError:
+        fault = ""
+    if fault and (follow or not target.is_symlink()):
+        raise OSError(errno.EINVAL, f"is {fault}; choose another name", name)
+    if not folder.is_dir():
+        raise OSError(errno.ENOENT, f"there is no folder {folder}", name)
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise OSError(errno.EACCES, f"the folder {folder} may not be written to", name)
+    return target
+
+
+def is_draft(name: str) -> bool:
+    """Return whether *name* is that of a draft."""
+    return _DRAFT.fullmatch(name) is not None
+
+
+def _begun(target: Path, folder: bool, mode: int) -> tuple[Path, int | None]:
+    """Return a new draft and the handle that locks it; None where locks do not work."""
+    suffix = target.suffix if re.fullmatch(r"\.\w{1,8}", target.suffix) else ""
+    for last in (*[False] * (_TRIES - 1), True):
+        draft = target.with_name(f".segdeform-{secrets.token_hex(8)}.part{suffix}")
+        handle = None
+        if not folder:
+            handle = os.open(draft, os.O_RDWR | os.O_CREAT | os.O_EXCL, mode)
+        else:
+            draft.mkdir()
+            if _LOCKS:
+                with suppress(FileNotFoundError):  # swept already
+                    handle = _opened(draft, os.O_RDONLY)
+        if handle is not None and _LOCKS and holds(handle, draft):
+            return draft, handle
+        if handle is not None:
+            os.close(handle)
+        if last or not _LOCKS:
+            return draft, None
+        _delete(draft)  # a sweep was faster than the lock: try another one
+    raise AssertionError  # the last attempt returns
+
+
+def _sweep(folder: Path) -> None:
+    """Delete the abandoned drafts in a folder."""
+    # The folder may be writable but not readable, and another process may sweep at the same time.
+    with suppress(OSError), os.scandir(folder) as entries:
+        for draft in [folder / entry.name for entry in entries if is_draft(entry.name)]:
+            with suppress(OSError):
+                _sweep_one(draft)
+
+
+def _sweep_one(draft: Path) -> None:
+    status = os.lstat(draft)
+    if not is_ours(status) or not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
+        return
+    if not _LOCKS:
+        if time.time() - status.st_mtime > _A_DAY:
+            _delete(draft)
+        return
+    handle = _opened(draft, os.O_RDONLY if stat.S_ISDIR(status.st_mode) else os.O_RDWR)
+    try:
+        if holds(handle, draft):
+            _delete(draft)  # while the lock is held
+    finally:
+        os.close(handle)
+
+
+def _opened(draft: Path, how: int) -> int:
+    return os.open(draft, how | os.O_NONBLOCK | os.O_NOFOLLOW)
+
+
+def _delete(draft: Path) -> None:
+    """Delete a draft; of a folder, its pictures, and the folder once it is empty."""
+    if not draft.is_dir():
+        draft.unlink(missing_ok=True)
+        return
+    for each in list(draft.iterdir()):
+        if _IN_FOLDER.fullmatch(each.name) and not each.is_symlink():
+            each.unlink(missing_ok=True)
+    with suppress(OSError):
+        draft.rmdir()
+
+
+def _mode_of(target: Path) -> int | None:
+    """Return the permissions of a file, or None if there is none."""
+    with suppress(FileNotFoundError):
+        status = os.lstat(target)
+        return status.st_mode & 0o777 if stat.S_ISREG(status.st_mode) else None
+    return None
+
+
+def _flush(path: Path) -> None:
+    """Flush a file, or the entries of a folder, to the disk."""
+    handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -1,1 +1,0 @@
-"""Mesh files whose digits, polygons or seams VTK would lose; `convert` is the door."""

@@ -1,0 +1,195 @@
+"""Intrinsic triangulation on which the energy is measured: the mesh without its bad triangles.
+
+The cotangents of caps and needles are unbounded.  Clamping them corner by corner gives values that
+belong to no triangle, and an indefinite matrix.  The energy takes them from an *intrinsic
+triangulation* instead: triangles over the vertices of the mesh, defined by edge lengths alone.
+Lengths that satisfy the triangle inequality are those of a planar triangle, whose Dirichlet energy
+is never negative, so the matrix is positive semi-definite.  The triangulation is the mesh itself
+except for two operations, neither of which changes a mesh of well-shaped triangles:
+
+    mollify     every edge becomes longer by  eps = max(0, d - min (a + b - c)),  the minimum over
+                all corners, so that no triangle has less slack a + b - c than d        [SC20, 4.5]
+    flip        each edge of a bad triangle that is not Delaunay, cot + cot < 0 at the two
+                opposite corners, until there is none left                              [FSSB07]
+
+Mollification alone makes the matrix positive semi-definite, but a cap keeps a cotangent of about
+sqrt(mean / 2 d), whose square enters the detail of eq. (5).  For the same cages and 100 flat caps
+among the 7828 faces of a dinosaur bent by 60 degrees, the distortion is off by 6.2 % with
+mollification alone, and by 0.3 % with flips as well.  Flipping all edges, as [SC20] do, changes
+good meshes, too: on 36 poses of three of them the distortion increased by 4 %.
+
+Source
+------
+[SC20]    N. Sharp, K. Crane, "A Laplacian for nonmanifold triangle meshes", Computer Graphics
+          Forum 39(5), 69-80, 2020.
+[FSSB07]  M. Fisher, B. Springborn, P. Schroeder, A. I. Bobenko, "An algorithm for the construction
+          of intrinsic Delaunay triangulations with applications to digital geometry processing",
+          Computing 81, 199-213, 2007.
+[Kah14]   W. Kahan, "Miscalculating area and angles of a needle-like triangle", 2014.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..arrays import FloatArray, IntArray
+from ..kernels import in_parallel
+from ..mesh import Sides, following
+
+_SLACK = 1e-6  # d, as a share of the mean edge length
+_BAD = 100.0  # cotangent of the smallest angle of a bad triangle: 0.6 degrees
+_DELAUNAY = -1e-9  # cot + cot above which an edge counts as Delaunay, for rounding
+_ROUNDS = 1000  # of flips; more than ten are rare
+_PIECE = 50_000  # faces to a thread
+
+
+@dataclass(frozen=True, eq=False)
+class IntrinsicTriangulation:
+    """Triangles over the vertices of a mesh, with edge lengths of their own.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float
+        Those of the mesh.
+    faces : (m, 3) int
+        Oriented as the mesh is.
+    lengths : (m, 3) float
+        Of the edge opposite each corner; they satisfy the triangle inequality.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    lengths: FloatArray
+
+    @classmethod
+    def of(cls, vertices: FloatArray, faces: IntArray) -> IntrinsicTriangulation:
+        """Return the triangulation of a mesh; open edges are not flipped."""
+        lengths = _mollified(_edge_lengths(vertices, faces))
+        if (np.abs(cotangents(lengths)).max(axis=1, initial=0.0) > _BAD).any():
+            faces, lengths = _flipped(faces, lengths, len(vertices))
+        return cls(vertices, faces, lengths)
+
+    @cached_property
+    def cotangents(self) -> FloatArray:
+        """(m, 3): the cotangent of the angle at each corner of each face."""
+        return cotangents(self.lengths)
+
+    @cached_property
+    def face_areas(self) -> FloatArray:
+        """(m,): the areas of the triangles."""
+        return areas(self.lengths)
+
+
+def areas(lengths: FloatArray) -> FloatArray:
+    """Return (m,): the areas of triangles by their edge *lengths* (m, 3), exact for needles."""
+    found = np.empty(len(lengths))
+
+    def work(start: int, stop: int) -> None:
+        c, b, a = np.sort(lengths[start:stop], axis=1).T
+        product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))  # [Kah14]
+        found[start:stop] = 0.25 * np.sqrt(np.maximum(product, 0.0))
+
+    in_parallel(work, len(lengths), _PIECE)
+    return found
+
+
+def cotangents(lengths: FloatArray) -> FloatArray:
+    """Return (m, 3): the cotangents of the angles opposite edges of *lengths* (m, 3)."""
+    squares = lengths * lengths
+    fourfold = 4.0 * areas(lengths)[:, None]
+    cosines = squares.sum(axis=1, keepdims=True) - 2.0 * squares
+    found: FloatArray = np.zeros_like(cosines)
+    np.divide(cosines, fourfold, where=fourfold > 0.0, out=found)
+    return found
+
+
+def _edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    lengths = np.empty(faces.shape)
+
+    def work(start: int, stop: int) -> None:
+        a, b, c = vertices[faces[start:stop].T]
+        for corner, side in enumerate((c - b, a - c, b - a)):
+            lengths[start:stop, corner] = np.sqrt(np.einsum("ij,ij->i", side, side))
+
+    in_parallel(work, len(faces), _PIECE)
+    return lengths
+
+
+def _mollified(lengths: FloatArray) -> FloatArray:
+    slack = (lengths.sum(axis=1) - 2.0 * lengths.max(axis=1)).min(initial=np.inf)
+    return lengths + max(0.0, _SLACK * float(lengths.mean()) - float(slack))
+
+
+def _flipped(faces: IntArray, lengths: FloatArray, n_vertices: int) -> tuple[IntArray, FloatArray]:
+    """Return faces and lengths after flips, in rounds of edges no two of which share a face.
+
+    A flip never raises the Dirichlet energy of any function [FSSB07], so the rounds terminate.
+    """
+    twin = _twins(faces, n_vertices)
+    corners, opposite = faces.copy().ravel(), lengths.copy().ravel()
+    cot = cotangents(lengths)
+    for _ in range(_ROUNDS):
+        bad = np.flatnonzero(np.abs(cot).max(axis=1) > _BAD)
+        h = _independent(_not_delaunay(bad, twin, cot.ravel()), twin, cot.ravel())
+        if not len(h):
+            break
+        _flip(h, twin, corners, opposite)
+        changed = np.concatenate([h, twin[following(h)]]) // 3
+        cot[changed] = cotangents(opposite.reshape(-1, 3)[changed])
+    return corners.reshape(-1, 3), opposite.reshape(-1, 3)
+
+
+def _twins(faces: IntArray, n_vertices: int) -> IntArray:
+    """Return (3m,): the corner opposite the same edge in the other face; its own at an open edge.
+
+    Corner h = 3 f + c stands for the edge opposite it.
+    """
+    sides = Sides(faces, n_vertices)  # side s runs from corner s to the next one: opposite the last
+    one, other = following(following(sides.pairs)).T
+    twin = np.arange(faces.size)
+    twin[one], twin[other] = other, one
+    return twin
+
+
+def _not_delaunay(bad: IntArray, twin: IntArray, cot: FloatArray) -> IntArray:
+    """Return the edges of the faces *bad* to be flipped, each by one of its corners."""
+    h = (3 * bad[:, None] + np.arange(3)).ravel()
+    h = np.unique(np.minimum(h, twin[h]))
+    inner = h // 3 != twin[h] // 3
+    return np.asarray(h[inner & (cot[h] + cot[twin[h]] < _DELAUNAY)])
+
+
+def _independent(h: IntArray, twin: IntArray, cot: FloatArray) -> IntArray:
+    """Return the edges among *h* that are the worst of both their faces."""
+    worst_first = np.argsort(cot[h] + cot[twin[h]], kind="stable")
+    h = h[worst_first]
+    rank, sides = np.arange(len(h)), np.stack([h // 3, twin[h] // 3])
+    first = np.full(len(cot) // 3, len(h))
+    np.minimum.at(first, sides.ravel(), np.tile(rank, 2))
+    return np.asarray(h[(first[sides] == rank).all(axis=0)])
+
+
+def _flip(h: IntArray, twin: IntArray, corners: IntArray, opposite: FloatArray) -> None:
+    """Flip the edges i j of faces (k, i, j) and (l, j, i) to k l: (k, i, l) and (l, j, k)."""
+    t = twin[h]
+    h1, h2, t1, t2 = following(h), following(following(h)), following(t), following(following(t))
+    k, new = corners[h], corners[t]  # l, which reads as a one
+    ij, jk, ki, il, lj = (opposite[each] for each in (h, h1, h2, t1, t2))
+    above = 2.0 * areas(np.stack([ij, jk, ki], axis=1)) / ij  # both faces unfolded, i j on the axis
+    below = 2.0 * areas(np.stack([ij, il, lj], axis=1)) / ij
+    along = ((ki - jk) * (ki + jk) - (il - lj) * (il + lj)) / (2.0 * ij)
+    kl = np.hypot(along, above + below)
+    # All slots keep their corner except two: l replaces j, and k replaces i.
+    moved = np.arange(len(twin))
+    moved[t1], moved[h1] = h, t  # where the edges i l and j k are now
+    outside = [moved[twin[each]] for each in (t1, h2, h1, t2)]
+    corners[h2], corners[t2] = new, k
+    for slot, length in zip((h, h1, h2, t, t1, t2), (il, kl, ki, jk, kl, lj), strict=True):
+        opposite[slot] = length
+    own = [moved[each] for each in (t1, h2, h1, t2)]
+    for slot, beyond in zip(own, outside, strict=True):
+        twin[slot], twin[beyond] = beyond, slot
+    twin[h1], twin[t1] = t1, h1

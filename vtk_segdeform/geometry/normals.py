@@ -1,0 +1,75 @@
+"""Unit normals at the vertices of a mesh as it moves, for drawing it.
+
+Each is the sum of the cross products of the faces around its vertex, so that a face counts by its
+area: the direction in which the vertex adds most volume.  With the neighbours x_1 ... x_d of a
+vertex x in the order in which they go around it, that is
+
+    sum_k (x_k - x) x (x_{k+1} - x)
+
+over one pass through rings that are found once; every vertex is read from its own ring alone, so
+that all cores can do their share.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..arrays import FloatArray, IntArray
+from ..kernels import compiled_kernels, in_parallel, inputs
+from ..mesh import Mesh
+
+_PIECES = 16  # of the vertices at most
+_PIECE = 1 << 12  # vertices to a thread at least
+
+
+class VertexNormals:
+    """The unit normals of *mesh* in any pose.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        n vertices; its size is the unit that poses are taken in.
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._faces, self._n = mesh.faces, mesh.n_vertices
+        self._scale = 1.0 / mesh.diagonal
+
+    def of(self, x: FloatArray, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
+        """Return the normals (n, 3) of the pose *x* (n, 3), in *out* if it is given.
+
+        Zero where there is no area around a vertex, as in a fan that has shrunk to a point.
+        """
+        out = np.empty((self._n, 3), dtype=np.float32) if out is None else out
+        if kernels := compiled_kernels(len(self._faces)):
+            arguments = inputs(x, *self._rings)
+            size = max(_PIECE, -(-self._n // _PIECES))
+
+            def work(first: int, last: int) -> None:
+                kernels.ring_normals(out, *arguments, self._scale, first, last)
+
+            in_parallel(work, self._n, size)
+            return out
+        a, b, c = (np.take(x, corner, axis=0) * self._scale for corner in self._faces.T)
+        normals = self._around @ np.cross(b - a, c - a)
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        out[:] = np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), 0.0)
+        return out
+
+    @cached_property
+    def _rings(self) -> tuple[NDArray[np.int32], IntArray]:
+        """(3m,) and (n + 1,): the neighbours of all vertices, and where each one's begin."""
+        starts = np.concatenate([[0], np.cumsum(np.bincount(self._faces.ravel()))])
+        ring = np.empty(self._faces.size, dtype=np.int32)
+        compiled_kernels().rings(ring, *inputs(self._faces, starts))
+        return ring, starts
+
+    @cached_property
+    def _around(self) -> sparse.csr_array:
+        """(n, m): 1 where a vertex is a corner of a face."""
+        corners = self._faces.ravel(), np.repeat(np.arange(len(self._faces)), 3)
+        return sparse.coo_array((np.ones(3 * len(self._faces)), corners)).tocsr()

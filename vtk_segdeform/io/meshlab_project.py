@@ -1,0 +1,231 @@
+"""MeshLab projects, .mlp: a mesh and its cages as layers that MeshLab opens together.
+
+    work.mlp              which layers there are, and where each is placed; XML
+    work.layers/*.ply     the layers, with selection, quality, colours and texture coordinates
+
+PyMeshLab is not needed.  MeshLab keeps a selection in a PLY file as bit 32 of the property
+``flags``; here it is the array "selection", as `meshlab_layers` has it.
+
+A project may come from an untrusted source, so only files in its own folder and below are read, at
+most a thousand layers of four gigabytes together, and entities are not expanded.  New layers are
+written next to the old ones and the .mlp last, so that it always refers to layers that belong
+together.  Only *path* and the folder of its layers are touched, and in that folder only files with
+generated names.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pyvista as pv
+
+from ..arrays import FloatArray
+from ..checks import as_path
+from ..errors import MeshError
+from ..files import open_regular, replacing, require_place
+from ..session import Session
+from .convert import read_polydata, with_vertices, write_mesh
+from .meshlab_layers import Surface, as_layers, free_name
+from .neighbours import file_inside
+
+_SELECTED = 0x20  # of MeshLab's flags
+_OURS = re.compile(r"\d+-[0-9a-f]{12}\.ply")
+_HEAD = "<!DOCTYPE MeshLabDocument>\n"
+_LARGEST = 10_000_000  # bytes; projects are lists
+_DEEPEST = 32  # elements within elements; MeshLab's projects have four
+_MOST_LAYERS, _MOST_BYTES = 1000, 4 << 30  # of all of them, however often a file is named
+_IDENTITY = "\n1 0 0 0 \n0 1 0 0 \n0 0 1 0 \n0 0 0 1 \n"
+
+
+def read_project(path: str | Path) -> dict[str, pv.PolyData]:
+    """Return the layers of a MeshLab project, by name, each where its matrix places it.
+
+    Parameters
+    ----------
+    path : str or Path
+        An .mlp file; equal names of layers get a number.
+
+    Raises
+    ------
+    MeshError
+        If it is not a MeshLab project, refers to a layer outside its folder or one that cannot be
+        read, or to more than 1000 layers or 4 GiB of them.
+    MissingDependencyError
+        If only PyMeshLab reads a layer's format, and it is not installed.
+    """
+    path = as_path(path)
+    layers: dict[str, pv.PolyData] = {}
+    elements = _parsed(path).findall("MeshGroup/MLMesh")
+    if len(elements) > _MOST_LAYERS:
+        raise MeshError(f"{path}: has {len(elements)} layers; the limit is {_MOST_LAYERS}")
+    files = [_inside(path, element.get("filename", "")) for element in elements]
+    total = sum(file.stat().st_size for file in files)
+    if total > _MOST_BYTES:
+        raise MeshError(
+            f"{path}: its layers have {total:.3g} bytes; the limit is {_MOST_BYTES:.3g}"
+        )
+    for element, file in zip(elements, files, strict=True):
+        surface = read_polydata(file)
+        for attributes in (surface.point_data, surface.cell_data):
+            if "flags" in attributes:
+                chosen = np.asarray(attributes.pop("flags")).astype(np.int64) & _SELECTED != 0
+                if chosen.any():
+                    attributes["selection"] = chosen.astype(np.uint8)
+        matrix = _matrix(path, element)
+        if not np.array_equal(matrix, np.eye(4)):
+            points = np.asarray(surface.points, dtype=np.float64)
+            surface = with_vertices(surface, points @ matrix[:3, :3].T + matrix[:3, 3])
+        layers[free_name(element.get("label") or file.stem, layers)] = surface
+    if not layers:
+        raise MeshError(f"{path}: the project has no layers")
+    return layers
+
+
+def write_project(path: str | Path, what: Surface | Session | Mapping[str, Surface]) -> None:
+    """Write layers as a MeshLab project.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``work.mlp``; the layers go to a folder ``work.layers`` beside it.
+    what : Mesh, pyvista.PolyData, Session, or dict of str to Mesh or PolyData
+        As `meshlab.to_meshset` takes it.
+
+    Raises
+    ------
+    MeshError
+        If the suffix is not .mlp, the folder is not there, or *what* is none of these.
+    """
+    path = as_path(path)
+    if path.suffix.lower() != ".mlp":
+        raise MeshError(f"{path}: the name of a MeshLab project ends in .mlp")
+    folder = path.with_suffix(".layers")
+    try:
+        require_place(path)
+    except OSError as fault:
+        raise MeshError(f"{path}: {fault.strerror or fault}") from fault
+    if os.path.islink(folder) or (os.path.exists(folder) and not os.path.isdir(folder)):
+        raise MeshError(f"{path}: {folder.name} exists and is not a folder")
+    layers = as_layers(what)
+    project = ElementTree.Element("MeshLabProject")
+    group = ElementTree.SubElement(project, "MeshGroup")
+    try:
+        folder.mkdir(exist_ok=True)
+        names = set()
+        for number, (label, surface) in enumerate(layers.items()):
+            name = f"{number}-{_digest(surface)}.ply"
+            write_mesh(folder / name, _with_flags(surface))
+            names.add(name)
+            place = {"label": _printable(label), "visible": "1"}
+            place["filename"] = f"{folder.name}/{name}"
+            mesh = ElementTree.SubElement(group, "MLMesh", place)
+            ElementTree.SubElement(mesh, "MLMatrix44").text = _IDENTITY
+        ElementTree.SubElement(project, "RasterGroup")
+        ElementTree.indent(project, " ")
+        text = _HEAD + ElementTree.tostring(project, encoding="unicode") + "\n"
+        with replacing(path) as draft:
+            draft.write_text(text, encoding="utf-8")
+        for file in folder.iterdir():
+            if _OURS.fullmatch(file.name) and file.name not in names and not file.is_symlink():
+                file.unlink()
+    except OSError as fault:
+        reason = fault.strerror or str(fault)
+        raise MeshError(
+            f"{path}: cannot be written ({reason}); make room, or choose another place"
+        ) from fault
+
+
+def _digest(surface: pv.PolyData) -> str:
+    """Return a digest of a surface, of twelve digits."""
+    texture = surface.GetPointData().GetTCoords()
+    seen = hashlib.sha256(repr(texture and texture.GetName()).encode())
+    arrays = {"points": surface.points, "corners": surface.faces, "strips": surface.strips}
+    for kind, attributes in (("p", surface.point_data), ("c", surface.cell_data)):
+        arrays |= {f"{kind} {name}": values for name, values in attributes.items()}
+    for name, values in arrays.items():
+        array = np.ascontiguousarray(values)
+        seen.update(repr((name, array.shape, array.dtype.str)).encode())
+        seen.update(array.tobytes())
+    return seen.hexdigest()[:12]
+
+
+def _with_flags(surface: pv.PolyData) -> pv.PolyData:
+    copy = surface.copy(deep=False)
+    for attributes in (copy.point_data, copy.cell_data):
+        if "selection" in attributes:
+            chosen = np.asarray(attributes.pop("selection")) != 0
+            attributes["flags"] = (chosen * _SELECTED).astype(np.int32)
+    return copy
+
+
+def _printable(text: str) -> str:
+    """Return *text* without the control characters that XML cannot hold."""
+    return "".join(letter if letter.isprintable() else " " for letter in text)
+
+
+class _Builder(ElementTree.TreeBuilder):
+    """Refuses deep trees, which are slow to build and to delete."""
+
+    _depth = 0
+
+    def start(self, tag: str, attributes: dict[str, str]) -> ElementTree.Element:
+        """Start an element; ValueError if it is nested too deeply."""
+        self._depth += 1
+        if self._depth > _DEEPEST:
+            raise ValueError(f"elements are nested more than {_DEEPEST} deep")
+        return super().start(tag, attributes)
+
+    def end(self, tag: str) -> ElementTree.Element:
+        """End an element."""
+        self._depth -= 1
+        return super().end(tag)
+
+
+def _parsed(path: Path) -> ElementTree.Element:
+    try:
+        with open_regular(path) as file:
+            data = file.read(_LARGEST + 1)
+    except OSError as fault:
+        raise MeshError(f"{path}: {fault.strerror or fault}") from fault
+    if len(data) > _LARGEST:
+        raise MeshError(f"{path}: too large for a MeshLab project")
+    if b"<!ENTITY" in data.upper() or b"\0" in data:
+        raise MeshError(f"{path}: is no MeshLab project, it declares entities or is not text")
+    try:
+        parser = ElementTree.XMLParser(target=_Builder())
+        parser.feed(data)
+        root = parser.close()
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise MeshError(f"{path}: is no MeshLab project ({error})") from None
+    if root.tag != "MeshLabProject":
+        raise MeshError(f"{path}: is no MeshLab project; its root is {root.tag[:40]!r}")
+    return root
+
+
+def _inside(path: Path, name: str) -> Path:
+    """Return the file of a layer, which must be in the project's own folder or below."""
+    file = file_inside(path.parent, name)
+    if file is None:
+        raise MeshError(
+            f"{path}: the layer {name[:200]!r} is no file in the project's folder; "
+            "copy it there, and save the project again"
+        )
+    return file
+
+
+def _matrix(path: Path, element: ElementTree.Element) -> FloatArray:
+    words = (element.findtext("MLMatrix44") or _IDENTITY).split()
+    try:
+        matrix = np.array([float(word) for word in words]).reshape(4, 4)
+    except ValueError:
+        matrix = np.full((4, 4), np.nan)
+    if not np.isfinite(matrix).all() or not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+        label = element.get("label", "")[:80]
+        raise MeshError(f"{path}: the matrix of layer {label!r} is no affine map")
+    return matrix

@@ -1,0 +1,39 @@
+"""Solving with a triangle for a few right-hand sides, for `hessian`.
+
+LAPACK is made for many, and for two it takes twice as long.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .kernels import kernel
+
+_compile = kernel(fastmath={"reassoc", "contract"})
+
+
+@_compile
+def solve_factored(columns, y):
+    """Put (L L^T)^-1 y in place of each row of *y* (k, n); *columns* (n, n) are those of L.
+
+    Rows of *y* go by twos, so that L is read half as often.
+    """
+    n = len(columns)
+    for k in range(0, len(y), 2):
+        a = y[k]
+        b = y[k + 1] if k + 1 < len(y) else np.zeros(n)
+        for i in range(n):
+            column, rest_a, rest_b = columns[i, i:], a[i:], b[i:]
+            s, t = a[i] / column[0], b[i] / column[0]
+            for j in range(1, n - i):
+                rest_a[j] -= column[j] * s
+                rest_b[j] -= column[j] * t
+            a[i], b[i] = s, t
+        for i in range(n - 1, -1, -1):
+            column, rest_a, rest_b = columns[i, i:], a[i:], b[i:]
+            s = t = 0.0
+            for j in range(1, n - i):
+                s += column[j] * rest_a[j]
+                t += column[j] * rest_b[j]
+            a[i] = (a[i] - s) / column[0]
+            b[i] = (b[i] - t) / column[0]

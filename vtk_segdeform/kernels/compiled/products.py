@@ -1,0 +1,206 @@
+"""Products of W~ with a few columns, for `blocks`; single precision is widened.
+
+Several rows at a time: what is read of the columns then serves all of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .kernels import kernel
+
+_compile = kernel(fastmath={"reassoc", "contract"})
+_IN_A_ROW = 1 << 14  # numbers that are read forwards, so that they are fetched ahead
+
+
+@_compile
+def add_product(x, onto, rows, block, p, start, stop):
+    """Put onto + block @ p.T into the *rows* start..stop of *x*, for *p* (k, m), k by threes.
+
+    *onto* is (n, k), *x* itself for example; None is 0, and this is known when it is compiled.
+    """
+    if len(p) == 6:
+        _add_six(x, onto, rows, block, p, start, stop)
+        return
+    four = start + (stop - start) // 4 * 4
+    for i in range(start, four, 4):
+        b0, b1, b2, b3 = block[i], block[i + 1], block[i + 2], block[i + 3]
+        for c in range(0, len(p), 3):
+            p0, p1, p2 = p[c], p[c + 1], p[c + 2]
+            q0 = q1 = q2 = r0 = r1 = r2 = s0 = s1 = s2 = t0 = t1 = t2 = 0.0
+            for j in range(len(b0)):
+                d0, d1, d2 = p0[j], p1[j], p2[j]
+                q, r, s, t = float(b0[j]), float(b1[j]), float(b2[j]), float(b3[j])
+                q0 += q * d0
+                q1 += q * d1
+                q2 += q * d2
+                r0 += r * d0
+                r1 += r * d1
+                r2 += r * d2
+                s0 += s * d0
+                s1 += s * d1
+                s2 += s * d2
+                t0 += t * d0
+                t1 += t * d1
+                t2 += t * d2
+            for k, d0, d1, d2 in (
+                (np.uint64(rows[i]), q0, q1, q2),
+                (np.uint64(rows[i + 1]), r0, r1, r2),
+                (np.uint64(rows[i + 2]), s0, s1, s2),
+                (np.uint64(rows[i + 3]), t0, t1, t2),
+            ):
+                if onto is not None:
+                    d0, d1, d2 = onto[k, c] + d0, onto[k, c + 1] + d1, onto[k, c + 2] + d2
+                x[k, c], x[k, c + 1], x[k, c + 2] = d0, d1, d2
+    for i in range(four, stop):
+        _add_row(x, onto, rows[i], block[i], p)
+
+
+@_compile
+def _add_six(x, onto, rows, block, p, start, stop):
+    """Do `add_product` for six columns, and read a block once: all sums are in registers still."""
+    p0, p1, p2, p3, p4, p5 = p[0], p[1], p[2], p[3], p[4], p[5]
+    two = start + (stop - start) // 2 * 2
+    for i in range(start, two, 2):
+        b, c, q, r = block[i], block[i + 1], np.uint64(rows[i]), np.uint64(rows[i + 1])
+        s0 = s1 = s2 = s3 = s4 = s5 = t0 = t1 = t2 = t3 = t4 = t5 = 0.0
+        for j in range(len(b)):
+            u0, u1, u2, u3, u4, u5 = p0[j], p1[j], p2[j], p3[j], p4[j], p5[j]
+            v, w = float(b[j]), float(c[j])
+            s0 += v * u0
+            s1 += v * u1
+            s2 += v * u2
+            s3 += v * u3
+            s4 += v * u4
+            s5 += v * u5
+            t0 += w * u0
+            t1 += w * u1
+            t2 += w * u2
+            t3 += w * u3
+            t4 += w * u4
+            t5 += w * u5
+        for row, d0, d1, d2, d3, d4, d5 in (
+            (q, s0, s1, s2, s3, s4, s5),
+            (r, t0, t1, t2, t3, t4, t5),
+        ):
+            if onto is not None:
+                d0, d1, d2 = onto[row, 0] + d0, onto[row, 1] + d1, onto[row, 2] + d2
+                d3, d4, d5 = onto[row, 3] + d3, onto[row, 4] + d4, onto[row, 5] + d5
+            x[row, 0], x[row, 1], x[row, 2] = d0, d1, d2
+            x[row, 3], x[row, 4], x[row, 5] = d3, d4, d5
+    for i in range(two, stop):
+        _add_row(x, onto, rows[i], block[i], p)
+
+
+@_compile
+def _add_row(x, onto, row, b, p):
+    for c in range(len(p)):
+        q, s = p[c], 0.0
+        for j in range(len(b)):
+            s += float(b[j]) * q[j]
+        if onto is not None:
+            s += onto[row, c]
+        x[row, c] = s
+
+
+@_compile
+def add_adjoint(p, rows, block, y):
+    """Add (block.T @ y[rows]).T to *p* (3, m), for *y* (n, 3)."""
+    m = block.shape[1]
+    px, py, pz = p[0], p[1], p[2]
+    four = len(rows) // 4 * 4
+    for i in range(0, four, 4):
+        b0, b1, b2, b3 = block[i], block[i + 1], block[i + 2], block[i + 3]
+        r0, r1 = np.uint64(rows[i]), np.uint64(rows[i + 1])
+        r2, r3 = np.uint64(rows[i + 2]), np.uint64(rows[i + 3])
+        x0, y0, z0 = y[r0, 0], y[r0, 1], y[r0, 2]
+        x1, y1, z1 = y[r1, 0], y[r1, 1], y[r1, 2]
+        x2, y2, z2 = y[r2, 0], y[r2, 1], y[r2, 2]
+        x3, y3, z3 = y[r3, 0], y[r3, 1], y[r3, 2]
+        for j in range(m):
+            s, t, u, v = float(b0[j]), float(b1[j]), float(b2[j]), float(b3[j])
+            px[j] += s * x0 + t * x1 + u * x2 + v * x3
+            py[j] += s * y0 + t * y1 + u * y2 + v * y3
+            pz[j] += s * z0 + t * z1 + u * z2 + v * z3
+    for i in range(four, len(rows)):
+        b0, r0 = block[i], rows[i]
+        x0, y0, z0 = y[r0, 0], y[r0, 1], y[r0, 2]
+        for j in range(m):
+            t = float(b0[j])
+            px[j] += t * x0
+            py[j] += t * y0
+            pz[j] += t * z0
+
+
+@_compile
+def _add_adjoints(p, rows, block, y, z):
+    """Do `add_adjoint` for two, *y* and *z*, to *p* (6, m), and read the block once."""
+    m = block.shape[1]
+    p0, p1, p2, p3, p4, p5 = p[0], p[1], p[2], p[3], p[4], p[5]
+    two = len(rows) // 2 * 2
+    for i in range(0, two, 2):
+        b, c, q, r = block[i], block[i + 1], np.uint64(rows[i]), np.uint64(rows[i + 1])
+        s0, s1, s2, s3, s4, s5 = y[q, 0], y[q, 1], y[q, 2], z[q, 0], z[q, 1], z[q, 2]
+        t0, t1, t2, t3, t4, t5 = y[r, 0], y[r, 1], y[r, 2], z[r, 0], z[r, 1], z[r, 2]
+        for j in range(m):
+            s, t = float(b[j]), float(c[j])
+            p0[j] += s * s0 + t * t0
+            p1[j] += s * s1 + t * t1
+            p2[j] += s * s2 + t * t2
+            p3[j] += s * s3 + t * t3
+            p4[j] += s * s4 + t * t4
+            p5[j] += s * s5 + t * t5
+    if two < len(rows):
+        add_adjoint(p[:3], rows[two:], block[two:], y)
+        add_adjoint(p[3:], rows[two:], block[two:], z)
+
+
+@_compile
+def put_groups(x, base, p, rows, columns, weights, starts):
+    """Put W~ @ p into *x* for all groups of `products.Groups`; *p* is (m, k), k by threes.
+
+    To the first three columns *base* (n, 3) is added; or (0, 3), which is nothing.
+    """
+    here, k = np.empty(p.size), p.shape[1]
+    for g in range(len(starts) - 1):
+        ids = rows[starts[g, 0] : starts[g + 1, 0]]
+        own = columns[starts[g, 1] : starts[g + 1, 1]]
+        n, c = len(ids), len(own)
+        block = weights[starts[g, 2] : starts[g + 1, 2]].reshape((n, c))
+        some = here[: k * c].reshape((k, c))
+        for j in range(c):
+            for d in range(k):
+                some[d, j] = p[own[j], d]
+        add_product(x, None, ids, block, some, 0, n)
+        if len(base) > 0:
+            for i in ids:
+                x[i, 0] += base[i, 0]
+                x[i, 1] += base[i, 1]
+                x[i, 2] += base[i, 2]
+
+
+@_compile
+def add_groups_adjoint(p, y, z, rows, columns, weights, starts):
+    """Add (W~.T @ y).T to *p* (3, m), for *y* (n, 3); or of *y* and *z*, one below the other.
+
+    From the last group to the first, and in each from its last rows on: these are what
+    `put_groups` has left in the cache, as this leaves it the first.
+    """
+    here = np.empty(p.size)
+    for g in range(len(starts) - 2, -1, -1):
+        ids = rows[starts[g, 0] : starts[g + 1, 0]]
+        own = columns[starts[g, 1] : starts[g + 1, 1]]
+        n, c = len(ids), len(own)
+        block = weights[starts[g, 2] : starts[g + 1, 2]].reshape((n, c))
+        some = here[: len(p) * c].reshape((len(p), c))
+        some[:] = 0.0
+        step = max(_IN_A_ROW // c, 4)
+        for k in range((n - 1) // step, -1, -1):
+            piece = slice(k * step, min((k + 1) * step, n))
+            if z is None:
+                add_adjoint(some, ids[piece], block[piece], y)
+            else:
+                _add_adjoints(some, ids[piece], block[piece], y, z)
+        for d in range(len(p)):
+            for j in range(c):
+                p[d, own[j]] += some[d, j]

@@ -1,0 +1,145 @@
+"""Long loops over rows, a piece at a time, on all the cores that this process may use.
+
+    in_parallel(work, n, size)        calls work(start, stop) for pieces of about *size* rows
+
+numpy and the compiled kernels let go of the interpreter while they count, so plain threads do.
+There is one pool for the whole process, however many meshes are open in it, and a host
+application that wants its cores for itself says so by ``SEGDEFORM_THREADS=1``.  Every row is
+computed alike on whatever thread, so results do not depend on how many there are.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import os
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from typing import Any
+
+from ..progress import Progress
+
+
+def in_parallel(
+    work: Callable[[int, int], None],
+    n: int,
+    size: int,
+    *,
+    progress: Progress | None = None,
+    message: str = "",
+) -> None:
+    """Call *work* with (start, stop) for all of 0..n, *size* rows at a time, in any order.
+
+    Parameters
+    ----------
+    work : callable
+        Must not call `in_parallel` itself, and write to its own rows only.
+    n, size : int
+        How many rows there are, and how many make a piece.
+    progress : Progress, optional
+        Called in the caller's thread with the share done; when it raises, what has not begun is
+        left undone.
+    message : str
+        What *progress* is told.
+    """
+    pieces = [(start, min(start + size, n)) for start in range(0, n, size)]
+    if len(pieces) <= 1 or n_threads() == 1:
+        for start, stop in pieces:
+            work(start, stop)
+            if progress is not None:
+                progress(stop / n, message)
+        return
+    with one_blas_thread():
+        waiting = [_pool().submit(work, *piece) for piece in pieces]
+        try:
+            if progress is None:  # to wake for each piece would take a core from the others
+                wait(waiting, return_when=FIRST_EXCEPTION)
+            for piece, future in zip(pieces, waiting, strict=True):
+                future.result()
+                if progress is not None:
+                    progress(piece[1] / n, message)
+        finally:
+            unfinished = [future for future in waiting if not future.cancel()]
+            for future in unfinished:  # nothing writes on after this has returned
+                future.exception()
+
+
+@contextlib.contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Limit BLAS to one thread, in a ``with`` block or, as a decorator, in a function.
+
+    Threads of its own fight with ours where we have several.  And a solver's step is many products
+    too small to share out: waking another thread for each takes longer than the product, and
+    while it waits for more it holds the core that we are to use.
+
+    Most builds of BLAS have one number of threads for the whole process, and the order of summation
+    depends on it.  So the first Python thread to enter sets the limit and the last to leave
+    restores it, and calls in several threads give the same results as one after another, bit for
+    bit.  Without threadpoolctl nothing is limited.
+    """
+    limit = _blas_limit()
+    if limit is None:
+        yield
+        return
+    with limit.of_each_thread.limit(limits=1):
+        limit.enter()
+        try:
+            yield
+        finally:
+            limit.leave()
+
+
+class _BlasLimit:
+    """Limits BLAS to one thread in the whole process while any Python thread requires it."""
+
+    def __init__(self, controller: Any) -> None:
+        self._controller = controller
+        # OpenMP builds have one limit per thread.  Most processes have none of them, but entering
+        # and leaving also tells threadpoolctl that this thread has finished setting limits; until
+        # then no other thread can set any.
+        self.of_each_thread = controller.select(threading_layer="openmp")
+        self._lock = threading.Lock()
+        self._within = 0
+        self._before: Any = None
+
+    def enter(self) -> None:
+        """Limit BLAS, unless it is limited already."""
+        with self._lock:
+            if self._within == 0:
+                self._before = self._controller.limit(limits=1, user_api="blas")
+            self._within += 1
+
+    def leave(self) -> None:
+        """Restore the previous numbers of threads, unless another thread is still inside."""
+        with self._lock:
+            self._within -= 1
+            if self._within == 0:
+                self._before.restore_original_limits()
+
+
+@functools.cache
+def _blas_limit() -> _BlasLimit | None:
+    try:
+        from threadpoolctl import ThreadpoolController
+    except ImportError:
+        return None
+    return _BlasLimit(ThreadpoolController())
+
+
+@functools.cache
+def n_threads() -> int:
+    """Return how many threads work: ``SEGDEFORM_THREADS``, or the cores of this process."""
+    wanted = os.environ.get("SEGDEFORM_THREADS", "")
+    if wanted.isdigit() and int(wanted) > 0:
+        return int(wanted)
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@functools.cache
+def _pool() -> ThreadPoolExecutor:
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(after_in_child=_pool.cache_clear)  # its threads stay with the parent
+    return ThreadPoolExecutor(n_threads(), thread_name_prefix="segdeform")

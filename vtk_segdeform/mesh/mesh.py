@@ -1,0 +1,152 @@
+"""The mesh that is deformed: triangles that close, on a two-manifold, seen from outside.
+
+Volume, and with it the whole method, only means something on such a mesh (section 3.2 of the
+paper), so a `Mesh` cannot be made from anything else: `find_faults` looks, `repair` mends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from ..arrays import FloatArray, IntArray, as_points, frozen
+from ..errors import MeshError
+from ..freezing import Frozen, read_only
+from ..kernels import in_parallel
+from .faults import as_soup, find_faults
+
+_PIECE = 20_000  # faces to a thread; what they need stays in the cache
+
+
+@dataclass(frozen=True, init=False, eq=False)
+class Mesh(Frozen):
+    """A closed, outward oriented triangle mesh; frozen.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float
+        In any length unit.
+    faces : (m, 3) int
+        Counter-clockwise seen from outside.
+
+    Raises
+    ------
+    ValueError
+        If an array has the wrong shape or type.
+    MeshError
+        If the mesh is not a closed oriented two-manifold; names and counts every fault.
+
+    Examples
+    --------
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> mesh = Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> mesh.n_faces, len(mesh.edges), mesh.components
+    (4, 6, array([0, 0, 0, 0]))
+    >>> Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]])
+    Traceback (most recent call last):
+    ...
+    vtk_segdeform.errors.MeshError: not a closed, outward oriented two-manifold: 3 open edges
+    (1-2, 1-3, 2-3), 1 hole (at vertex 1); see find_faults and repair
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
+        report = find_faults(vertices, faces)
+        if not report.ok:
+            faults = ", ".join(map(str, report.faults))
+            raise MeshError(
+                f"not a closed, outward oriented two-manifold: {faults}; see find_faults and repair"
+            )
+        points, triangles = as_soup(vertices, faces)
+        self.__setstate__({"vertices": points.copy(), "faces": triangles.copy()})
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices, n."""
+        return len(self.vertices)
+
+    @property
+    def n_faces(self) -> int:
+        """Number of triangles, m."""
+        return len(self.faces)
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Length of the bounding box's diagonal: the size that tolerances are relative to."""
+        return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+
+    @cached_property
+    def edges(self) -> IntArray:
+        """(e, 2) int: each edge once, smaller vertex first, in lexicographic order."""
+        tails, heads = self.faces.ravel(), self.faces[:, [1, 2, 0]].ravel()
+        once = tails < heads  # every edge is met once from either end
+        keys = np.sort(tails[once] * self.n_vertices + heads[once])
+        return read_only(np.stack(np.divmod(keys, self.n_vertices), axis=1))
+
+    @cached_property
+    def adjacency(self) -> sparse.csr_array:
+        """(n, n) symmetric sparse: the edge length between neighbouring vertices."""
+        i, j = self.edges.T
+        length = np.linalg.norm(self.vertices[i] - self.vertices[j], axis=1)
+        length = np.maximum(length, np.finfo(float).tiny)  # csgraph reads a zero as "no edge"
+        at = self._edge_numbers
+        lengths = sparse.csr_array((length[at.data - 1], at.indices, at.indptr), at.shape)
+        for array in (lengths.data, lengths.indices, lengths.indptr):
+            frozen(array)
+        return lengths
+
+    @cached_property
+    def _edge_numbers(self) -> sparse.csr_array:
+        """(n, n) symmetric sparse: 1 + the number of the edge between neighbouring vertices."""
+        numbers = np.arange(1, len(self.edges) + 1, dtype=np.int32)
+        half = sparse.coo_array((numbers, tuple(self.edges.T)), shape=(self.n_vertices,) * 2)
+        return (half + half.T).tocsr()
+
+    @cached_property
+    def components(self) -> IntArray:
+        """(n,) int: the connected component of each vertex, numbered from 0."""
+        _, labels = csgraph.connected_components(self.adjacency, directed=False)
+        return read_only(labels.astype(np.int64))
+
+    @cached_property
+    def face_areas(self) -> FloatArray:
+        """(m,) float: the triangles' areas."""
+        areas = np.empty(self.n_faces)
+
+        def work(start: int, stop: int) -> None:
+            a, b, c = self.vertices[self.faces[start:stop].T]
+            areas[start:stop] = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+        in_parallel(work, self.n_faces, _PIECE)
+        frozen(areas)
+        return areas
+
+    def with_vertices(self, vertices: ArrayLike) -> Mesh:
+        """Return the same triangles over other positions (n, 3), finite but otherwise unchecked.
+
+        The triangles were checked already; a pose that crosses or inverts itself is still a pose.
+        """
+        points = as_points(vertices, "vertices", self.n_vertices)
+        posed = object.__new__(Mesh)
+        posed.__setstate__({"vertices": points.copy(), "faces": self.faces})
+        # the same at every pose: hand on what is known
+        for name in ("edges", "components", "_edge_numbers"):
+            if name in self.__dict__:
+                posed.__dict__[name] = self.__dict__[name]
+        return posed
+
+
+def require_mesh(mesh: object) -> None:
+    """Raise a MeshError unless *mesh* is a `Mesh`, and say how to make one."""
+    if not isinstance(mesh, Mesh):
+        raise MeshError(
+            f"mesh must be a Mesh; got {type(mesh).__name__}. Make one by Mesh(vertices, faces), "
+            "read_mesh(path) or convert.from_polydata(polydata)"
+        )

@@ -1,1 +1,0 @@
-"""How `models` makes bodies: implicit surfaces, and triangles relaxed on them."""

@@ -1,0 +1,202 @@
+"""Closed meshes made from code: something to try things on, at any resolution.
+
+The cactus and the dinosaur are the paper's two models (its section 5) remade as bodies with
+limbs; the cactus has ribs, the fine detail that a deformation has to keep.  Both stand on z = 0,
+z up, height 1, as `bar` does by default; `sphere` and `torus` are centred on the origin.
+
+Nothing here is random: the same call gives the same mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from ..arrays import IntArray, is_number, is_whole
+from ..checks import shown
+from ..errors import ArgumentError
+from ..mesh import Mesh
+from .implicit import Limb, standing_body
+
+_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # the golden angle, radians
+_MOST, _FINEST = 10_000_000, 1000  # a larger hull or grid takes minutes and gigabytes
+
+
+def cactus(n_vertices: int = 5430) -> Mesh:
+    """Return a saguaro: a ribbed trunk with two arms bent upwards, in the plane y = 0.
+
+    Parameters
+    ----------
+    n_vertices : int
+        Exactly so many vertices, 500 or more.  The paper's cactus has 5430.
+
+    Examples
+    --------
+    >>> cactus().n_vertices
+    5430
+    """
+    trunk = Limb(
+        [(0, 0, -0.1), (0, 0, 0.3), (0, 0, 0.6), (0, 0, 0.9)],
+        [0.095, 0.11, 0.114, 0.1],
+        ribs=9,
+        height=0.075,
+    )
+    left = Limb(
+        [(0, 0, 0.35), (-0.13, 0, 0.36), (-0.245, 0, 0.42), (-0.285, 0, 0.55), (-0.287, 0, 0.74)],
+        [0.055, 0.062, 0.067, 0.068, 0.06],
+        ribs=7,
+        height=0.075,
+    )
+    right = Limb(
+        [(0, 0, 0.52), (0.12, 0, 0.53), (0.21, 0, 0.58), (0.24, 0, 0.69), (0.242, 0, 0.82)],
+        [0.05, 0.056, 0.061, 0.061, 0.054],
+        ribs=7,
+        height=0.075,
+    )
+    _require(n_vertices, 500)
+    return standing_body([trunk, left, right], int(n_vertices), blend=0.035)
+
+
+def dinosaur(n_vertices: int = 8000) -> Mesh:
+    """Return a long-necked dinosaur on four legs, plates along its back; it looks along +x.
+
+    Parameters
+    ----------
+    n_vertices : int
+        Exactly so many vertices, 1000 or more.
+
+    Examples
+    --------
+    >>> dinosaur(3000).n_vertices
+    3000
+    """
+    spine = Limb(
+        [(-1.12, 0, 0.34), (-0.8, 0, 0.28), (-0.45, 0, 0.4), (-0.1, 0, 0.48), (0.22, 0, 0.49)]
+        + [(0.45, 0, 0.64), (0.55, 0, 0.84), (0.62, 0, 0.93)],
+        [0.028, 0.055, 0.12, 0.19, 0.15, 0.082, 0.06, 0.058],
+    )
+    head = Limb([(0.6, 0, 0.945), (0.69, 0, 0.94), (0.79, 0, 0.9)], [0.062, 0.063, 0.042])
+    legs = [
+        Limb(
+            [(x, 0.65 * side * y, 0.42), (x + knee, side * y, 0.21), (x, side * y, -0.05)],
+            [0.115, 0.068, 0.075],
+        )
+        for x, y, knee in [(-0.3, 0.13, 0.03), (0.16, 0.115, -0.03)]
+        for side in (-1, 1)
+    ]
+    plates = [
+        Limb([(x, 0, z), (x - 0.025, 0, z + rise)], [0.035, 0.015])
+        for x, z, rise in [
+            (-0.69, 0.33, 0.08), (-0.57, 0.42, 0.09), (-0.45, 0.51, 0.1), (-0.32, 0.59, 0.11),
+            (-0.18, 0.64, 0.12), (-0.03, 0.65, 0.12), (0.12, 0.64, 0.11), (0.25, 0.625, 0.09),
+            (0.37, 0.66, 0.07),
+        ]
+    ]  # fmt: skip
+    _require(n_vertices, 1000)
+    return standing_body([spine, head, *legs, *plates], int(n_vertices), blend=0.035)
+
+
+def bar(
+    size: tuple[float, float, float] = (0.2, 0.2, 1.0),
+    divisions: tuple[int, int, int] = (8, 8, 40),
+) -> Mesh:
+    """Return a rectangular bar, standing in the middle of z = 0; (8, 8, 40) gives 1410 vertices.
+
+    Parameters
+    ----------
+    size : (width, depth, height)
+        Its edge lengths.
+    divisions : (a, b, c) int
+        How often each edge is divided: 2 (ab + bc + ca) + 2 vertices.
+    """
+    if not (_are_three(size) and all(is_number(each) and each > 0 for each in size)):
+        raise ArgumentError(f"size must be three positive numbers; got {shown(size)}")
+    if not (_are_three(divisions) and all(is_whole(each, 1, _FINEST) for each in divisions)):
+        raise ArgumentError(
+            f"divisions must be three whole numbers, 1 to {_FINEST}; got {shown(divisions)}"
+        )
+    divisions = int(divisions[0]), int(divisions[1]), int(divisions[2])
+    sides, faces, count = [], [], 0
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        for level in (0, divisions[axis]):
+            side = np.empty(((divisions[u] + 1) * (divisions[v] + 1), 3), dtype=np.int64)
+            side[:, axis] = level
+            side[:, [u, v]] = np.indices((divisions[u] + 1, divisions[v] + 1)).reshape(2, -1).T
+            triangles = _chequered(divisions[u], divisions[v])
+            faces.append(count + (triangles if level else triangles[:, ::-1]))
+            sides.append(side)
+            count += len(side)
+    lattice, number = np.unique(np.concatenate(sides), axis=0, return_inverse=True)
+    vertices = (lattice / divisions - [0.5, 0.5, 0.0]) * size
+    return Mesh(vertices, number.ravel()[np.concatenate(faces)])
+
+
+def torus(n_vertices: int = 3000, *, major: float = 1.0, minor: float = 0.35) -> Mesh:
+    """Return a torus about z: its vertices wind around the tube, one after another.
+
+    Parameters
+    ----------
+    n_vertices : int
+        Exactly so many vertices, 30 or more.
+    major, minor : float
+        Radius of the ring and of the tube.
+    """
+    _require(n_vertices, 30)
+    if not (is_number(minor) and is_number(major) and 0 < minor < major):
+        raise ArgumentError(
+            f"a torus needs 0 < minor < major; got {shown(minor)} and {shown(major)}"
+        )
+    n_vertices = int(n_vertices)
+    around = max(3, round(np.sqrt(n_vertices * minor / major)))  # vertices in one winding
+    k = np.arange(n_vertices)
+    a = 2 * np.pi * k / n_vertices
+    b = a * round(n_vertices / around)
+    ring = major + minor * np.cos(b)
+    vertices = np.stack([ring * np.cos(a), ring * np.sin(a), minor * np.sin(b)], axis=-1)
+    next_, above, beyond = ((k + step) % n_vertices for step in (1, around, around + 1))
+    faces = np.concatenate(
+        [np.stack([k, above, beyond], axis=-1), np.stack([k, beyond, next_], axis=-1)]
+    )
+    return Mesh(vertices, faces)
+
+
+def sphere(n_vertices: int = 2562, *, radius: float = 1.0) -> Mesh:
+    """Return a sphere about the origin: points along a spiral of golden angles, their hull."""
+    _require(n_vertices, 4)
+    if not (is_number(radius) and radius > 0):
+        raise ArgumentError(f"radius must be a positive number; got {shown(radius)}")
+    k = np.arange(int(n_vertices))
+    z = 1.0 - (2.0 * k + 1.0) / n_vertices
+    ring = np.sqrt(1.0 - z**2)
+    vertices = np.stack([ring * np.cos(_GOLDEN * k), ring * np.sin(_GOLDEN * k), z], axis=-1)
+    faces = ConvexHull(vertices).simplices.astype(np.int64)
+    a, b, c = vertices[faces.T]
+    inward = np.einsum("ij,ij->i", a, np.cross(b, c)) < 0
+    faces[inward] = faces[inward, ::-1]
+    return Mesh(radius * vertices, faces)
+
+
+def _require(n_vertices: int, least: int) -> None:
+    if not is_whole(n_vertices, least, _MOST):
+        raise ArgumentError(
+            f"n_vertices must be a whole number, {least} to {_MOST}; got {shown(n_vertices)}"
+        )
+
+
+def _are_three(values: object) -> bool:
+    sequence = isinstance(values, Sequence) or (isinstance(values, np.ndarray) and values.ndim == 1)
+    return sequence and len(values) == 3  # type: ignore[arg-type]
+
+
+def _chequered(p: int, q: int) -> IntArray:
+    """Return the (2 p q, 3) triangles of a p by q grid of squares; the diagonals take turns."""
+    i, j = np.indices((p, q)).reshape(2, -1)
+    a = i * (q + 1) + j
+    b, c, d = a + q + 1, a + q + 2, a + 1  # counter-clockwise from a
+    odd = ((i + j) % 2 == 1)[:, None]
+    one = np.where(odd, np.stack([a, b, d], axis=-1), np.stack([a, b, c], axis=-1))
+    two = np.where(odd, np.stack([b, c, d], axis=-1), np.stack([a, c, d], axis=-1))
+    return np.concatenate([one, two])

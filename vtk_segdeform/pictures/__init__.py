@@ -1,0 +1,49 @@
+"""Pictures without a window.
+
+The files, in reading order:
+
+    pictures    before and after, as a PNG file
+    canvas      panels side by side, off-screen
+    palette     the colours of pictures and widgets
+"""
+
+from .canvas import (
+    add_surface,
+    png_of,
+    require_offscreen,
+    require_picture,
+    require_screen,
+    view_of,
+    write_panels,
+)
+from .palette import BODY, COLOURS, FIXED, HANDLE, INK, PAPER, of_region, rgb
+from .pictures import (
+    draw_mesh,
+    picture_before_after,
+    picture_distortion,
+    picture_regions_and_cages,
+    picture_volume_change,
+)
+
+__all__ = [
+    "BODY",
+    "COLOURS",
+    "FIXED",
+    "HANDLE",
+    "INK",
+    "PAPER",
+    "add_surface",
+    "draw_mesh",
+    "of_region",
+    "picture_before_after",
+    "picture_distortion",
+    "picture_regions_and_cages",
+    "picture_volume_change",
+    "png_of",
+    "require_offscreen",
+    "require_picture",
+    "require_screen",
+    "rgb",
+    "view_of",
+    "write_panels",
+]

@@ -1,0 +1,246 @@
+"""Pictures of a deformation, rendered without a window and written as PNG files.
+
+    regions and cages   each region in its own colour, and its cage as wires of that colour
+    before and after    the mesh at rest and deformed, from the same camera; fixed and handle marked
+    volume change       the deformed mesh coloured by a signed share, in per cent, white at zero
+    distortion          the deformed mesh coloured by a size, dark at zero
+
+The colours are those of `palette`.  `canvas` chooses the camera and writes the files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import ArrayLike
+
+from ..arrays import FloatArray, IntArray, as_faces, as_ids, as_numbers, as_points
+from ..checks import as_path, require_sequence, shown
+from ..errors import ArgumentError
+from ..io import polydata_of
+from ..mesh import Mesh, require_mesh
+from ..regions import CageSurface, Regions
+from .canvas import add_surface, require_offscreen, view_of, write_panels
+from .palette import BODY, FIXED, HANDLE, INK, of_region
+
+__all__ = [
+    "draw_mesh", "picture_before_after", "picture_distortion", "picture_regions_and_cages",
+    "picture_volume_change", "require_offscreen",
+]  # fmt: skip
+
+_BAR = 0.17  # share of the height that a colour bar takes
+
+
+def picture_regions_and_cages(
+    path: str | Path,
+    mesh: Mesh,
+    membership: ArrayLike,
+    cages: Sequence[CageSurface] = (),
+) -> None:
+    """Draw the regions in colours, mixed where they overlap; beside them their cages as wires.
+
+    Parameters
+    ----------
+    path : str or Path
+        A PNG file to write.
+    mesh : Mesh
+        n vertices.
+    membership : (r, n) bool
+        Which vertices each region has.
+    cages : sequence with .vertices (m, 3) and .faces (k, 3)
+        One per region, in the same order; without any, only the regions are drawn.
+    """
+    path = as_path(path)
+    belongs = Regions(mesh, as_numbers(membership, "membership").astype(bool)).membership
+    require_sequence(cages, "cages")
+    if len(cages) not in (0, len(belongs)):
+        raise ArgumentError(f"cages must be {len(belongs)}, one for each region; got {len(cages)}")
+    for cage in cages:
+        if not (hasattr(cage, "vertices") and hasattr(cage, "faces")):
+            raise ArgumentError(f"cages must have vertices and faces; got {shown(cage)}")
+        points = as_points(cage.vertices, "vertices of cages")
+        as_faces(cage.faces, len(points), "faces of cages")
+    palette = np.array([of_region(r) for r in range(len(belongs))])
+    shares = belongs / belongs.sum(axis=0)
+    colours = (shares.T @ palette)[mesh.faces].mean(axis=1)
+    everything = np.concatenate([mesh.vertices, *(cage.vertices for cage in cages)])
+
+    def draw_regions(plotter: pv.Plotter) -> None:
+        draw_mesh(plotter, mesh, colours=colours)
+
+    def draw_cages(plotter: pv.Plotter) -> None:
+        draw_mesh(plotter, mesh, colours=0.45 * colours + 0.55 * 255)
+        for cage, colour in zip(cages, palette, strict=True):
+            wires = _surface(cage.faces, cage.vertices).extract_all_edges()
+            plotter.add_mesh(wires, color=tuple(0.8 * colour / 255), line_width=4.0, lighting=False)
+
+    panels = [("regions" if len(belongs) > 1 else "one region", draw_regions)]
+    if len(cages):
+        number = sum(len(cage.vertices) for cage in cages)
+        panels.append((f"cages, {number} vertices", draw_cages))
+    write_panels(path, panels, everything, view_of(mesh.vertices, mesh.vertices))
+
+
+def picture_before_after(
+    path: str | Path,
+    mesh: Mesh,
+    vertices: ArrayLike,
+    *,
+    fixed: ArrayLike,
+    handle: ArrayLike,
+) -> None:
+    """Draw *mesh* at rest and with other *vertices*, from the same camera.
+
+    Parameters
+    ----------
+    path : str or Path
+        A PNG file to write.
+    mesh : Mesh
+        At rest, n vertices.
+    vertices : (n, 3) float
+        Deformed.
+    fixed, handle : (k,) int or (n,) bool
+        Drawn grey and red.
+    """
+    path = as_path(path)
+    require_mesh(mesh)
+    deformed = as_points(vertices, "vertices", mesh.n_vertices)
+    colours = np.tile(pv.Color(BODY).int_rgb, (mesh.n_faces, 1)).astype(float)
+    for ids, name, colour in ((fixed, "fixed", FIXED), (handle, "handle", HANDLE)):
+        chosen = np.zeros(mesh.n_vertices, dtype=bool)
+        chosen[as_ids(ids, mesh.n_vertices, name)] = True
+        colours[chosen[mesh.faces].all(axis=1)] = pv.Color(colour).int_rgb
+
+    def draw_rest(plotter: pv.Plotter) -> None:
+        draw_mesh(plotter, mesh, colours=colours)
+
+    def draw_deformed(plotter: pv.Plotter) -> None:
+        draw_mesh(plotter, mesh, vertices=deformed, colours=colours)
+
+    everything = np.concatenate([mesh.vertices, deformed])
+    panels = [("at rest (grey: fixed, red: handle)", draw_rest), ("deformed", draw_deformed)]
+    write_panels(path, panels, everything, view_of(mesh.vertices, deformed))
+
+
+def picture_volume_change(
+    path: str | Path, mesh: Mesh, vertices: ArrayLike, change: ArrayLike
+) -> None:
+    """Draw the deformed mesh coloured by *change*: red has grown, blue has shrunk.
+
+    Parameters
+    ----------
+    path : str or Path
+        A PNG file to write.
+    mesh : Mesh
+        At rest, n vertices; seen from where `picture_before_after` sees it.
+    vertices : (n, 3) float
+        Deformed.
+    change : (n,) or (m,) float
+        Per vertex or per face, relative: 0.1 is shown as 10 per cent.
+    """
+    percent = 100.0 * _values(mesh, change, "change")
+    most = _largest(np.abs(percent))
+    _picture_values(
+        path, mesh, vertices, percent, "local volume change [%]", ("RdBu_r", -most, most)
+    )
+
+
+def picture_distortion(
+    path: str | Path, mesh: Mesh, vertices: ArrayLike, distortion: ArrayLike
+) -> None:
+    """Draw the deformed mesh coloured by *distortion*, 0 or more, per vertex or per face.
+
+    The arguments are those of `picture_volume_change`.
+    """
+    values = _values(mesh, distortion, "distortion")
+    limits = ("cividis", 0.0, _largest(values))
+    _picture_values(path, mesh, vertices, values, "distortion", limits)
+
+
+def draw_mesh(
+    plotter: pv.Plotter,
+    mesh: Mesh,
+    *,
+    vertices: FloatArray | None = None,
+    colours: FloatArray | None = None,
+) -> Any:
+    """Add *mesh* to a plotter, softly shaded, with its outline; returns the mesh's actor.
+
+    Parameters
+    ----------
+    plotter : pyvista.Plotter
+        Whose camera is already where it will be: the outline depends on it.
+    mesh : Mesh
+        m faces.
+    vertices : (n, 3) float, optional
+        Drawn instead of the mesh's own.
+    colours : (m, 3) float, optional
+        Red, green and blue of each face, 0 to 255.
+    """
+    surface = _surface(mesh.faces, mesh.vertices if vertices is None else vertices)
+    if colours is not None:
+        surface.cell_data["colours"] = np.round(colours).astype(np.uint8)
+        return add_surface(plotter, surface, scalars="colours", rgb=True)
+    return add_surface(plotter, surface, color=BODY)
+
+
+def _picture_values(
+    path: str | Path,
+    mesh: Mesh,
+    vertices: ArrayLike,
+    values: FloatArray,
+    title: str,
+    scale: tuple[str, float, float],
+) -> None:
+    path = as_path(path)
+    deformed = as_points(vertices, "vertices", mesh.n_vertices)
+    surface = _surface(mesh.faces, deformed)
+    attributes = surface.point_data if len(values) == mesh.n_vertices else surface.cell_data
+    attributes["values"] = values
+
+    def draw(plotter: pv.Plotter) -> None:
+        colour_map, low, high = scale
+        add_surface(plotter, surface, scalars="values", cmap=colour_map, clim=(low, high))
+        plotter.add_scalar_bar(
+            " ",  # the panel has the title
+            n_labels=5,
+            fmt="%.3g",
+            color=INK,
+            label_font_size=36,
+            width=0.7,
+            height=0.1,
+            position_x=0.15,
+            position_y=0.02,
+        )
+
+    write_panels(path, [(title, draw)], deformed, view_of(mesh.vertices, deformed), foot=_BAR)
+
+
+def _values(mesh: Mesh, values: ArrayLike, name: str) -> FloatArray:
+    """Return *values* (n,) or (m,), one for each vertex or face of *mesh*."""
+    require_mesh(mesh)
+    array = as_numbers(values, name)
+    if array.shape not in ((mesh.n_vertices,), (mesh.n_faces,)) or not np.isfinite(array).all():
+        raise ArgumentError(
+            f"{name} must be finite, one for each of {mesh.n_vertices} vertices or "
+            f"{mesh.n_faces} faces; got shape {array.shape}"
+        )
+    return array
+
+
+def _surface(faces: IntArray, vertices: FloatArray) -> pv.PolyData:
+    """Return the triangles as they are: a picture may well show that they are folded."""
+    return polydata_of(vertices, np.full(len(faces), 3), faces.ravel())
+
+
+def _largest(values: FloatArray) -> float:
+    """Return the size that all but a hundredth of *values* stay below, rounded up; never 0."""
+    size = float(np.percentile(values, 99.0)) if len(values) else 0.0
+    if size <= 0.0:
+        return 1.0
+    unit = 10.0 ** np.floor(np.log10(size))
+    return float(unit * np.ceil(10.0 * size / unit) / 10.0)

@@ -1,0 +1,24 @@
+"""Overlapping regions of a mesh, painted or found automatically (section 2.2 of the paper).
+
+The files, in reading order:
+
+    regions         `Regions`: membership and blend weights
+    blending        blend weights in the overlaps, eqs. (3) and (4)
+    segmentation    `segment`: automatic regions
+    coarse          a coarse copy of the mesh, on which limbs are searched
+    necks           where to cut a limb off
+    slices          parts of equal area where there are no limbs
+    borders         the borders of parts on the mesh itself
+"""
+
+from .regions import CageSurface, Regions, cage_distance_weights, require_region, require_regions
+from .segmentation import segment
+
+__all__ = [
+    "CageSurface",
+    "Regions",
+    "cage_distance_weights",
+    "require_region",
+    "require_regions",
+    "segment",
+]

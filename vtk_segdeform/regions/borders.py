@@ -1,0 +1,115 @@
+"""The borders of parts on the mesh itself: short, in the creases, and each part connected.
+
+Borders are shortened as those of soap films are, by spreading each part's indicator and giving
+every vertex to the part with the most [MBO].  It spreads slowly across concave edges, so that a
+border near a crease stays in the crease.
+
+Source
+------
+[MBO] B. Merriman, J. Bence, S. Osher, "Diffusion generated motion by mean curvature",
+      Computational Crystal Growers Workshop, 73-83, 1992.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from ..arrays import IntArray
+from ..geometry import distinct_lengths, nearest_of
+from ..mesh import Mesh, connected
+from .coarse import symmetric
+
+_CREASE = 0.06  # of the square root of the area: a concave edge as sharp as this radius halves
+_SCALE = 3000  # borders are smoothed at the scale of so many vertices to the whole
+_ROUNDS = 3  # of spreading
+_MOST_STEPS = 60  # in a round
+
+
+def smooth_borders(mesh: Mesh, labels: IntArray) -> IntArray:
+    """Return labels with short borders that keep to creases; none shrinks by half in a round.
+
+    In a round a border moves by so many rings at most, and what is more than as many steps away
+    does not count: vertices that far from all borders keep their labels and are left out.
+    """
+    area = mesh.face_areas.sum()
+    edge = np.median(mesh.adjacency.data)
+    steps = int(np.clip(np.ceil(4.0 * area / _SCALE / edge**2), 4, _MOST_STEPS))
+    rings = int(np.ceil(np.sqrt(steps))) + 1
+    borders = np.unique(mesh.edges[np.diff(labels[mesh.edges], axis=1)[:, 0] != 0])
+    zone = _within(mesh.adjacency, borders, _ROUNDS * rings + steps + 1)
+    spread = _spreading(mesh, zone, edge)
+    far = np.bincount(np.delete(labels, zone), minlength=labels.max() + 1)
+    label = labels[zone]
+    for _ in range(_ROUNDS):
+        most, smooth = np.zeros(len(zone)), label.copy()
+        for part in np.unique(label):
+            near = _within(spread, np.flatnonzero(label == part), rings)
+            here = spread[near][:, near]
+            amount = (label[near] == part).astype(float)
+            for _ in range(steps):
+                amount = here @ amount
+            more = amount > most[near]
+            most[near[more]] = amount[more]
+            smooth[near[more]] = part
+        before, after = (far + np.bincount(each, minlength=len(far)) for each in (label, smooth))
+        label = np.where((after < before / 2)[label], label, smooth)
+    labels = labels.copy()
+    labels[zone] = label
+    return labels
+
+
+def _within(graph: sparse.csr_array, ids: IntArray, rings: int) -> IntArray:
+    """Return the vertices up to *rings* edges away from *ids*, in order."""
+    reached = np.zeros(graph.shape[0], dtype=bool)
+    reached[ids] = True
+    for _ in range(rings):
+        others = graph[ids].indices
+        ids = np.unique(others[~reached[others]])
+        reached[ids] = True
+    return np.flatnonzero(reached)
+
+
+def _spreading(mesh: Mesh, zone: IntArray, usual: float) -> sparse.csr_array:
+    """Return the matrix of one step among the k vertices *zone*, (k, k); the last ring is rough.
+
+    Half stays, half goes to neighbours, less over creases, and less over edges longer than *usual*,
+    so that it spreads evenly in space.  An edge's bend is its normal curvature,
+    (n_j - n_i).(x_j - x_i) / |x_j - x_i|^2, negative where the surface is concave.
+    """
+    k, number = len(zone), np.full(mesh.n_vertices, -1)
+    number[zone] = np.arange(k)
+    faces = mesh.faces[(number >= 0)[mesh.faces].any(axis=1)]
+    a, b, c = mesh.vertices[faces.T]
+    cross = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+    corner = number[faces.ravel()] + 1  # 0: beyond the zone
+    normal = np.stack([np.bincount(corner, axis, minlength=k + 1) for axis in cross.T], axis=1)[1:]
+    normal = normal / np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
+    edges = number[mesh.edges]
+    edges = edges[(edges >= 0).all(axis=1)]
+    i, j = edges.T
+    along = mesh.vertices[zone[j]] - mesh.vertices[zone[i]]
+    size = np.maximum(np.einsum("ij,ij->i", along, along), np.finfo(float).tiny)
+    bend = np.einsum("ij,ij->i", normal[j] - normal[i], along) / size
+    hollow = _CREASE * np.sqrt(mesh.face_areas.sum()) * np.maximum(-bend, 0.0)
+    share = symmetric(edges, np.minimum(1.0, usual**2 / size) / (1.0 + hollow**2), k)
+    degree = np.maximum(np.diff(share.indptr), 1)
+    moves = sparse.diags_array(0.5 / degree) @ share
+    return sparse.csr_array(moves + sparse.diags_array(1.0 - moves.sum(axis=1)))
+
+
+def connected_parts(mesh: Mesh, labels: IntArray) -> IntArray:
+    """Return labels of which each is connected: stray pieces go to the nearest other vertex."""
+    i, j = mesh.edges[labels[mesh.edges[:, 0]] == labels[mesh.edges[:, 1]]].T
+    piece = connected(len(labels), i, j)
+    label = np.empty(piece.max() + 1, dtype=np.int64)
+    label[piece] = labels
+    order = np.argsort(-np.bincount(piece), kind="stable")
+    _, largest = np.unique(label[order], return_index=True)
+    stray = np.ones(len(label), dtype=bool)
+    stray[order[largest]] = False
+    near = _within(mesh.adjacency, np.flatnonzero(stray[piece]), 1)
+    settled = np.flatnonzero(~stray[piece[near]])
+    labels = labels.copy()
+    labels[near] = labels[near[nearest_of(distinct_lengths(mesh)[near][:, near], settled)]]
+    return labels

@@ -1,0 +1,176 @@
+"""Automatic regions: limbs apart from the trunk, and the trunk in fair shares.
+
+The shape is cut in two at its best neck (`necks`), then whichever part has the best neck left, and
+so on, until there are as many parts as asked or no neck is left.  If more parts are asked than
+there are limbs, the largest are cut into slices of about equal area (`slices`).
+All this happens on a coarse copy (`coarse`), so that it costs about the same for every mesh, and
+the parts hardly depend on how finely the shape is meshed.
+
+On the mesh itself the parts' borders are then shortened, and drawn into creases (`borders`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import FloatArray, IntArray, is_whole
+from ..checks import shown
+from ..errors import ArgumentError, RegionError
+from ..kernels import one_blas_thread
+from ..mesh import Mesh, require_mesh
+from ..progress import Progress, part, tell
+from .borders import connected_parts, smooth_borders
+from .coarse import Surface, coarsen
+from .necks import Neck, best_neck
+from .regions import Regions
+from .slices import fair_slice, quotas
+
+_POINTS = 3000  # of the coarse copy, about
+_POINTS_PER_REGION = 16  # at least
+_TYPICAL = 6  # where the number is open, a region's share is the whole over this
+_OVERLAP = 0.1  # of a region's width, counted in edges
+_TIE_BREAK = 1e-3  # of an edge
+
+
+@one_blas_thread()
+def segment(
+    mesh: Mesh,
+    n_regions: int | None = None,
+    *,
+    overlap: int | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Regions:
+    """Return overlapping regions of sensible shape.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        n vertices, one or several components.
+    n_regions : int, optional
+        How many, 1 to n.  None cuts off every limb (`necks.NECK`) and nothing else: 1 for a sphere,
+        3 for a cactus with two arms.
+    overlap : int, optional
+        Rings of edges by which each region grows over its neighbours.  None takes a tenth of a
+        region's width in edges, sqrt(n / regions) / 10, at least 2: the same width in space on a
+        coarse and on a fine mesh.
+    seed : int
+        Of the order in which vertices are thinned out for the coarse copy.
+    progress : Progress, optional
+        Told how far it is; may raise `errors.Cancelled`.
+
+    Returns
+    -------
+    regions : Regions
+        Each is connected before it is grown, and no region spans two components of the mesh, unless
+        *n_regions* is less than the number of components: then each of the largest components is a
+        region, and every other one belongs to the region nearest to it.
+
+    Raises
+    ------
+    RegionError
+        If *n_regions* is not a whole number in 1..n.
+
+    Notes
+    -----
+    The same for the same arguments, and for a mesh moved, turned or scaled, up to rounding.
+    """
+    require_mesh(mesh)
+    n = mesh.n_vertices
+    if n_regions is not None and not is_whole(n_regions, 1, n):
+        raise RegionError(f"n_regions must be a whole number in 1..{n}; got {shown(n_regions)}")
+    if overlap is not None and not is_whole(overlap, 0):
+        raise RegionError(f"overlap must be a whole number, 0 or more; got {shown(overlap)}")
+    if not is_whole(seed, 0):
+        raise ArgumentError(f"seed must be a whole number, 0 or more; got {shown(seed)}")
+    tell(progress, 0.0, "thinning out vertices")
+    shape = _without_ties(mesh)
+    if n_regions is not None and n_regions <= mesh.components.max() + 1:
+        labels = _merged_components(shape, int(n_regions))
+    else:
+        n_regions = None if n_regions is None else int(n_regions)
+        points = max(_POINTS, _POINTS_PER_REGION * (n_regions or 1))
+        thinning = part(progress, 0.02, 0.1)
+        cell, surface = coarsen(shape, points, np.random.default_rng(int(seed)), thinning)
+        labels = _parts(surface, n_regions, progress)[cell]
+        tell(progress, 0.8, "smoothing borders")
+        labels = smooth_borders(shape, labels)
+        tell(progress, 0.9, "smoothing borders")
+        labels = connected_parts(shape, labels)
+    tell(progress, 0.95, "growing regions")
+    if overlap is None:
+        overlap = max(2, round(_OVERLAP * np.sqrt(n / (labels.max() + 1))))
+    regions = Regions.from_labels(mesh, labels, overlap)
+    tell(progress, 1.0, "regions found")
+    return regions
+
+
+def _without_ties(mesh: Mesh) -> Mesh:
+    """Return the mesh with each vertex moved a little towards its first neighbour.
+
+    On a symmetric shape many distances are equal, and rounding, which is another in every frame,
+    would choose between them.  The moves belong to the numbers of the vertices and turn along.
+    """
+    first = mesh.adjacency.indices[mesh.adjacency.indptr[:-1]]
+    share = _TIE_BREAK * np.random.default_rng(0).random((mesh.n_vertices, 1))
+    return mesh.with_vertices(mesh.vertices + share * (mesh.vertices[first] - mesh.vertices))
+
+
+def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -> IntArray:
+    """Return (k,) int: the part of each point; limbs first, then slices of what is large."""
+    everything = np.ones(len(surface.areas), dtype=bool)
+    labels = np.empty(len(everything), dtype=np.int64)
+    share = surface.areas.sum() / (n_regions or _TYPICAL)
+    wanted = n_regions or np.inf
+
+    def alone(label: int) -> tuple[IntArray, Surface, FloatArray]:
+        ids = np.flatnonzero(labels == label)
+        part = surface.part(ids)
+        rim = surface.contact[ids].sum(axis=1) - part.contact.sum(axis=1)
+        return ids, part, np.where(rim > 1e-9 * np.sqrt(share), rim, 0.0)
+
+    components = surface.pieces(everything)
+    for label, ids in enumerate(components):
+        labels[ids] = label
+    necks: list[Neck | None]
+    necks = []
+    for label in range(len(components)):
+        necks.append(best_neck(*alone(label)[1:], share))
+        tell(progress, 0.1 + 0.2 * len(necks) / len(components), "looking for limbs")
+    while len(necks) < wanted:
+        ranks = [np.inf if neck is None else neck.rank for neck in necks]
+        label = int(np.argmin(ranks))
+        neck = necks[label]
+        if neck is None:
+            break
+        labels[np.flatnonzero(labels == label)[neck.inside]] = len(necks)
+        necks[label] = best_neck(*alone(label)[1:], share)
+        necks.append(best_neck(*alone(len(necks))[1:], share))
+        tell(progress, 0.3 + 0.2 * min(1.0, len(necks) / min(wanted, 20)), "cutting off limbs")
+
+    count = len(necks)
+    areas = np.bincount(labels, surface.areas).astype(float)
+    waiting = list(enumerate(quotas(areas, np.bincount(labels), n_regions or count)))
+    while waiting:
+        label, quota = waiting.pop()
+        ids, part, rim = alone(label)
+        if quota > 1:
+            inside = fair_slice(part, rim, (quota // 2) / quota)
+            labels[ids[inside]] = count
+            size = int(inside.sum())  # no side gets more parts than it has points
+            there = int(np.clip(quota // 2, quota - (len(ids) - size), size))
+            waiting += [(label, quota - there), (count, there)]
+            count += 1
+            tell(progress, 0.5 + 0.3 * count / (n_regions or count), "slicing the rest")
+    return labels
+
+
+def _merged_components(mesh: Mesh, n_regions: int) -> IntArray:
+    """Return one label per large component; the others join the nearest, centre to centre."""
+    component, size = mesh.components, np.bincount(mesh.components)
+    sums = [np.bincount(component, mesh.vertices[:, axis]) for axis in range(3)]
+    centres = np.stack(sums, axis=1) / size[:, None]
+    large = np.sort(np.argsort(-size, kind="stable")[:n_regions])
+    nearest = np.linalg.norm(centres[:, None] - centres[large], axis=2).argmin(axis=1)
+    nearest[large] = np.arange(n_regions)
+    return np.asarray(nearest[component])

@@ -1,1 +1,0 @@
-"""How `segmentation` finds limbs: thinning, a coarse copy, necks, fair slices, borders."""

@@ -1,0 +1,204 @@
+"""A session to and from one file: plain arrays and a header, nothing that could be run.
+
+The file is an `archive`, which ``numpy.load`` reads as any .npz:
+
+    header.json           format, version, counts, names, options
+    mesh_vertices.npy     (n, 3) float     mesh_faces.npy   (m, 3) int
+    membership.npy        (r, n) bool      region by vertex                        if any
+    cage_vertices.npy     (c, 3) float     cage_faces.npy   (k, 3) int             if any
+    fixed.npy             (f,) int         handle.npy       (h,) int
+    pose.npy              (c, 3) float     targets.npy      (h, 3) float           if not at rest
+
+Cages, and the handles, follow one another; the header has their counts.  Loading gives the same
+session to the last bit of its vertices, but without its history: a file is a state.
+
+Nothing in a file is believed: see `archive`, and mesh, regions, cages, handles and pose are then
+checked as if they had come from a caller.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import zipfile
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from ..cages import Cage
+from ..checks import as_path, require
+from ..errors import SessionError
+from ..files import open_regular, replacing
+from ..mesh import Mesh
+from ..regions import Regions
+from .archive import Archive, write_archive
+from .session import Session
+from .state import Options, Pose, State, pieces
+
+FORMAT = "vtk_segdeform session"
+VERSION = 1
+
+# What zipfile, numpy and json raise on bytes they cannot make sense of.
+_FAULTS = (zipfile.BadZipFile, ValueError, KeyError, TypeError, EOFError, OverflowError,
+           RuntimeError, NotImplementedError, struct.error, OSError)  # fmt: skip
+
+
+def save_session(path: str | os.PathLike[str], session: Session) -> None:
+    """Write *session* to a file; it appears whole or, if anything fails, what was there stays.
+
+    Parameters
+    ----------
+    path : path
+        Any name; a file of that name is replaced.  Its folder must be there.
+    session : Session
+        A drag in hand is saved as it is; the history is not saved.
+
+    Raises
+    ------
+    SessionError
+        If the file cannot be written: no such folder, no permission, no space, or what has that
+        name is a folder or a device.
+    """
+    path = as_path(path)
+    require(session, Session, "session")
+    try:
+        with replacing(path) as draft, open(draft, "wb") as file:
+            _write(file, session)
+    except OSError as fault:
+        raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
+
+
+def load_session(path: str | os.PathLike[str]) -> Session:
+    """Return the session in a file that `save_session` wrote.
+
+    Its vertices, regions, cages, fixed vertices, handles, targets and options are those that were
+    saved, bit for bit; there is nothing to undo.
+
+    Raises
+    ------
+    SessionError
+        If there is no such file, it is no session, is damaged, or is of a newer version; the text
+        names the file and the fault.
+    """
+    path = as_path(path)
+    try:
+        file = open_regular(path)
+    except OSError as fault:
+        raise SessionError(f"{path}: cannot be read ({fault.strerror or fault})") from fault
+    try:
+        with file:
+            mesh, state = _read(Archive(file))
+        return Session(mesh, state=state)
+    except _FAULTS as fault:
+        reason = str(fault) or type(fault).__name__
+        raise SessionError(f"{path}: is no readable session file: {reason}") from fault
+
+
+def _write(file: Any, session: Session) -> None:
+    mesh, state = session.mesh, session.state
+    regions, pose = state.regions, state.pose
+    header = {
+        "format": FORMAT,
+        "version": VERSION,
+        "n_vertices": mesh.n_vertices,
+        "n_faces": mesh.n_faces,
+        "n_regions": 0 if regions is None else regions.n_regions,
+        "smoothness": 1.0 if regions is None else float(regions.smoothness),
+        "cages": [[cage.n_vertices, cage.n_faces] for cage in state.cages],
+        "n_fixed": len(state.fixed),
+        "handles": [[name, len(ids)] for name, ids in state.handles.items()],
+        "posed": pose is not None,
+        "options": {name: _plain(value) for name, value in asdict(state.options).items()},
+    }
+    if state.region_names:  # programs that know of none read the file all the same
+        header["region_names"] = list(state.region_names)
+    arrays: dict[str, Any] = {"mesh_vertices": mesh.vertices, "mesh_faces": mesh.faces}
+    arrays |= {"fixed": state.fixed, "handle": state.handle}
+    if regions is not None:
+        arrays["membership"] = regions.membership
+    if state.cages:
+        arrays["cage_vertices"] = np.concatenate([cage.vertices for cage in state.cages])
+        arrays["cage_faces"] = np.concatenate([cage.faces for cage in state.cages])
+    if pose is not None:
+        arrays["pose"] = np.concatenate(pose.cage_vertices)
+        arrays["targets"] = np.concatenate([np.empty((0, 3)), *pose.targets.values()])
+    write_archive(file, header, arrays)
+
+
+def _read(archive: Archive) -> tuple[Mesh, State]:
+    header = _checked_header(archive.header())
+    n, r = _count(header, "n_vertices"), _count(header, "n_regions")
+    mesh = Mesh(
+        archive.array("mesh_vertices", "f", (n, 3)),
+        archive.array("mesh_faces", "i", (_count(header, "n_faces"), 3)),
+    )
+    regions = None
+    if r:
+        membership = archive.array("membership", "b", (r, n))
+        regions = Regions(mesh, membership, _number(header, "smoothness"))
+    counts = [(_whole(m, "cages"), _whole(k, "cages")) for m, k in _list(header, "cages")]
+    total = sum(m for m, _ in counts)
+    cages: tuple[Cage, ...] = ()
+    if counts:
+        vertices = pieces(archive.array("cage_vertices", "f", (total, 3)), [m for m, _ in counts])
+        n_faces = [k for _, k in counts]
+        faces = pieces(archive.array("cage_faces", "i", (sum(n_faces), 3)), n_faces)
+        cages = tuple(Cage(*pair) for pair in zip(vertices, faces, strict=True))
+
+    sizes = {str(name): _whole(k, "handles") for name, k in _list(header, "handles")}
+    if len(sizes) != len(_list(header, "handles")):
+        raise SessionError("two handles have the same name")
+    lengths, held = list(sizes.values()), sum(sizes.values())
+    ids = pieces(archive.array("handle", "i", (held,)), lengths)
+    pose = None
+    if not isinstance(header["posed"], bool):
+        raise SessionError(f"posed must be true or false in the header; got {header['posed']!r}")
+    if header["posed"]:
+        places = pieces(archive.array("pose", "f", (total, 3)), [m for m, _ in counts])
+        targets = pieces(archive.array("targets", "f", (held, 3)), lengths)
+        pose = Pose(tuple(places), dict(zip(sizes, targets, strict=True)))
+    fixed = archive.array("fixed", "i", (_count(header, "n_fixed"),))
+    options = Options(**header["options"])
+    names = tuple(_list(header, "region_names")) if "region_names" in header else ()
+    handles = dict(zip(sizes, ids, strict=True))
+    return mesh, State(regions, cages, fixed, handles, pose, options, names)
+
+
+def _checked_header(header: Any) -> Mapping[str, Any]:
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise SessionError(f"it does not say that it is a {FORMAT}")
+    version = _count(header, "version")
+    if version > VERSION:
+        raise SessionError(f"it has version {version}, newer than {VERSION}; update vtk_segdeform")
+    if version < 1:
+        raise SessionError(f"there never was a version {version}")
+    return header
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _list(header: Mapping[str, Any], name: str) -> list[Any]:
+    value = header[name]
+    if not isinstance(value, list):
+        raise SessionError(f"{name} must be a list in the header; got {value!r}")
+    return value
+
+
+def _count(header: Mapping[str, Any], name: str) -> int:
+    return _whole(header[name], name)
+
+
+def _whole(value: Any, name: str) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+        raise SessionError(f"{name} must be a whole number in the header; got {value!r}")
+    return value
+
+
+def _number(header: Mapping[str, Any], name: str) -> float:
+    if not isinstance(header[name], int | float):
+        raise SessionError(f"{name} must be a number in the header; got {header[name]!r}")
+    return float(header[name])

@@ -1,0 +1,244 @@
+"""Vertices with a place to be: fixed ones (6) and handles (7), as weighted squares.
+
+    sum_i omega_i |x_i - u_i|^2,    x_i = W~_i p
+
+Vertices joined by mesh edges form a *set*: a fixed patch, or a handle that moves on its own.
+Every set weighs the same, shared out evenly over its vertices, so that a handle of one vertex
+holds as well as a patch of a thousand; in a patch of many thousands, neighbours share a place,
+their mean.  A coarse cage cannot put every vertex of a set in place; `PositionTerm.stiffened`
+raises the weight of the sets that are off by too much.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from ..arrays import FloatArray, IntArray, as_ids, as_points
+from ..errors import ConstraintError
+from ..geometry import group_by_position
+from ..mesh import Mesh
+from ..subspace import Subspace
+
+FARTHEST_APART = 20.0
+"""Diagonals of a mesh between places of what it is held by.
+
+So far apart, volumes are rounded to a few 1e-13 of themselves; it grows with the cube of that."""
+
+_MANY, _PLACES = 1000, 500  # vertices of a set beyond which it has so many places
+_STIFFER = 10.0
+_STIFFEST = 1e4  # times the weight it started with
+_Set: TypeAlias = tuple[slice, FloatArray | None, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Pull:
+    """The term for targets that stay, as r rows: sum_i omega_i |rows_i p - aims_i|^2 + beyond."""
+
+    rows: FloatArray  # (r, m)
+    aims: FloatArray  # (r, 3)
+    weights: FloatArray  # (r,)
+    beyond: float
+
+    def value_and_slope(self, p: FloatArray) -> tuple[float, FloatArray]:
+        """Return the term at *p* (m, 3) and half its gradient (m, 3)."""
+        away = self.rows @ p - self.aims
+        pull = away * self.weights[:, None]
+        return self.beyond + float(np.vdot(away, pull)), self.rows.T @ pull
+
+
+@dataclass(frozen=True, eq=False)
+class PositionTerm:
+    """The term for k vertices in sets; `strength` (s,) multiplies the weight of each set.
+
+    A set of many vertices reaches few cage vertices: its rows Q R count as R, with targets Q^T u.
+    What of the targets is beyond Q no pose can meet, and it says nothing of where to go.
+    """
+
+    rows: FloatArray  # W~ at the k places, (k, m)
+    set_of: IntArray  # (k,), in order
+    base: FloatArray  # omega before strength, (k,), the same within a set
+    strength: FloatArray
+    mean: sparse.csr_array | None = None  # (k, v), from the vertices held to the places
+    known: list[_Set] | None = None  # what `_sets` is, if it is known
+
+    @property
+    def weights(self) -> FloatArray:
+        """omega, (k,)."""
+        return self.base * self.strength[self.set_of]
+
+    @cached_property
+    def _sets(self) -> list[_Set]:
+        """For each set its places, Q if it is worth it, and R; or else its rows."""
+        if self.known is not None:
+            return self.known
+        size = np.bincount(self.set_of, minlength=len(self.strength))
+        ends = np.cumsum(size)
+        sets: list[_Set] = []
+        for start, end in zip(ends - size, ends, strict=True):
+            rows = self.rows[start:end]
+            reached = np.flatnonzero(rows.any(axis=0))
+            if len(rows) <= len(reached):
+                sets.append((slice(start, end), None, rows))
+                continue
+            q, r = np.linalg.qr(rows[:, reached])
+            short = np.zeros((len(r), rows.shape[1]))
+            short[:, reached] = r
+            sets.append((slice(start, end), q, short))
+        return sets
+
+    def quadratic(self) -> FloatArray:
+        """Return rows^T omega rows, (m, m)."""
+        return (self.rows.T * self.weights) @ self.rows
+
+    def toward(self, u: FloatArray) -> Pull:
+        """Return the term for targets *u* (k, 3)."""
+        aims, beyond, omega = [np.empty((0, 3))], 0.0, self.weights
+        for places, q, _ in self._sets:
+            aim = u[places]
+            if q is not None:
+                aim = q.T @ u[places]
+                left = u[places] - q @ aim
+                beyond += float(omega[places.start] * np.vdot(left, left))
+            aims.append(aim)
+        rows, weights = self._short
+        return Pull(rows, np.concatenate(aims), weights, beyond)
+
+    @cached_property
+    def _short(self) -> tuple[FloatArray, FloatArray]:
+        """The rows of all sets, (r, m), and their weights (r,)."""
+        omega = self.weights
+        rows = [np.empty((0, self.rows.shape[1])), *(r for *_, r in self._sets)]
+        weights = [np.full(len(r), omega[places.start]) for places, _, r in self._sets]
+        return np.concatenate(rows), np.concatenate([np.empty(0), *weights])
+
+    def value_and_slope(self, p: FloatArray, u: FloatArray) -> tuple[float, FloatArray]:
+        """Return the term at *p* and half its gradient (m, 3), for targets *u* (k, 3)."""
+        return self.toward(u).value_and_slope(p)
+
+    def stiffened(self, errors: FloatArray, tolerance: float) -> PositionTerm | None:
+        """Return the term with more weight where *errors* (k,) pass *tolerance*, or None.
+
+        None means that nothing is off, or that what is off already has all the weight allowed.
+        """
+        worst = np.zeros(len(self.strength))
+        np.maximum.at(worst, self.set_of, errors)
+        raised = (worst > tolerance) & (self.strength < _STIFFEST)
+        if not raised.any():
+            return None
+        strength = np.where(raised, self.strength * _STIFFER, self.strength)
+        return PositionTerm(self.rows, self.set_of, self.base, strength, self.mean, self._sets)
+
+
+def position_term(
+    subspace: Subspace, vertices: FloatArray, held: list[IntArray], weight: float
+) -> PositionTerm:
+    """Return the term for sets of vertices *held*, each of total *weight*.
+
+    Parameters
+    ----------
+    subspace : Subspace
+        W~.
+    vertices : (n, 3) float
+        The mesh at rest.
+    held : list of (k_s,) int
+        The vertices of each set, as they follow each other in the targets.
+    weight : float
+        Of each set.
+    """
+    places = [_places(vertices[ids]) for ids in held]
+    size = np.array([int(place.max()) + 1 for place in places], dtype=np.int64)
+    set_of = np.repeat(np.arange(len(held)), size)
+    base = weight / size[set_of]
+    strength = np.ones(len(held))
+    ids = np.concatenate([np.zeros(0, dtype=np.int64), *held])
+    if len(ids) == len(set_of):
+        return PositionTerm(subspace.at(ids), set_of, base, strength)
+    begins = np.concatenate([[0], np.cumsum(size)])
+    row = np.concatenate([begin + place for begin, place in zip(begins, places, strict=False)])
+    share = 1.0 / np.bincount(row)[row]
+    mean = sparse.coo_array((share, (row, np.arange(len(ids))))).tocsr()
+    on_mesh = sparse.coo_array((share, (row, ids)), (len(set_of), len(vertices))).tocsr()
+    return PositionTerm(subspace.left(on_mesh), set_of, base, strength, mean)
+
+
+def _places(points: FloatArray) -> IntArray:
+    """Return (k,) the place of each point of a set: its own, or one shared by those near by."""
+    if len(points) <= _MANY:
+        return np.arange(len(points))
+    return group_by_position(points, _PLACES)
+
+
+def errors_at(
+    ids: Sequence[IntArray], places: Sequence[FloatArray], unit: float, x: FloatArray
+) -> tuple[float, ...]:
+    """Return, for each list of vertices of *x* (n, 3), how far its farthest is from its place.
+
+    Over *unit*; 0 where none is listed.
+    """
+    ways = [np.take(x, own, axis=0) - there for own, there in zip(ids, places, strict=True)]
+    return tuple(math.sqrt(np.einsum("ij,ij->i", way, way).max(initial=0.0)) / unit for way in ways)
+
+
+def checked_constraints(
+    mesh: Mesh, fixed: ArrayLike, handle: ArrayLike
+) -> tuple[IntArray, IntArray]:
+    """Return the vertex numbers of *fixed* and *handle*, or raise a ConstraintError."""
+    try:
+        fixed = as_ids(fixed, mesh.n_vertices, "fixed")
+        handle = as_ids(handle, mesh.n_vertices, "handle")
+    except ValueError as fault:
+        raise ConstraintError(str(fault)) from None
+    both = np.intersect1d(fixed, handle)
+    if len(both):
+        raise ConstraintError(
+            f"{len(both)} vertices are both fixed and handle (the first is {both[0]}); "
+            "take them out of one of the two"
+        )
+    return fixed, handle
+
+
+def checked_targets(targets: ArrayLike, n_handle: int) -> FloatArray:
+    """Return *targets* as (n_handle, 3), or raise a ConstraintError; without handles, any empty."""
+    try:
+        array = as_points(targets, "targets") if n_handle or np.size(targets) else np.empty((0, 3))
+    except ValueError as fault:
+        raise ConstraintError(str(fault)) from None
+    if len(array) != n_handle:
+        raise ConstraintError(
+            f"targets must give one point for each of the {n_handle} handle vertices; "
+            f"got shape {array.shape}"
+        )
+    return array
+
+
+def require_together(mesh: Mesh, *places: FloatArray) -> None:
+    """Raise a ConstraintError if *places* (k, 3), targets and fixed, are senselessly far apart."""
+    held = [points for points in places if len(points)]
+    if not held:
+        return
+    low = np.min([points.min(axis=0) for points in held], axis=0)
+    high = np.max([points.max(axis=0) for points in held], axis=0)
+    apart = float((high - low).max()) / mesh.diagonal
+    if not apart <= FARTHEST_APART:
+        raise ConstraintError(
+            f"targets and fixed vertices are {apart:.3g} diagonals of the mesh apart; at most "
+            f"{FARTHEST_APART:.0f} are allowed: are both in the same unit?"
+        )
+
+
+def connected_sets(mesh: Mesh, ids: IntArray) -> list[IntArray]:
+    """Return places in *ids* (k,), one array for each set of vertices joined by mesh edges."""
+    if not len(ids):
+        return []
+    among = sparse.csr_array(mesh.adjacency[ids][:, ids])
+    count, label = csgraph.connected_components(among, directed=False)
+    return [np.flatnonzero(label == k) for k in range(count)]

@@ -1,0 +1,139 @@
+"""Points that ride along with a deformation: a lattice, a grid inside the body, a cloud, a line.
+
+A mesh vertex is a blend of what the cages of its regions say, eqs. (2), (3).  Any other point q
+is the same,
+
+    x(q) = sum_r  alpha_r(q)  sum_j w_j(q; r) p_j(r)
+
+with its mean value coordinates w in each cage.  What is missing is alpha away from the mesh.  It
+is interpolated from the mesh vertices i near by, those nearer than the K-th,
+
+    alpha_r(q) = sum_i s_i alpha_ri / sum_i s_i,      s_i = ((d_K - d_i) / (d_K d_i))^2
+
+so that it is continuous, is not negative, sums to 1, and is the mesh's own at a mesh vertex.
+Hence mesh vertices as passengers stay on the mesh, an affine map of all cages is an affine map of
+all passengers, and whatever is on both sides of an overlap follows both.
+
+The exact volume is reached by moving cages, so passengers follow that as well.
+
+Source
+------
+R. Franke, G. Nielson, "Smooth interpolation of large sets of scattered data", Int. J. Numer.
+Methods Eng. 15(11), 1980: the weights s, Shepard's made local.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from ..arrays import FloatArray, as_numbers, as_points
+from ..cages import Cage, mean_value_coordinates
+from ..checks import all_of, require_sequence
+from ..errors import ArgumentError, CageError
+from ..freezing import Frozen, read_only
+from ..mesh import Mesh, require_mesh
+from ..progress import Progress, part
+from .subspace import Subspace
+
+_NEAREST = 24  # K
+_FARTHEST = 1e60  # sizes of the mesh; beyond it, distances overflow
+
+
+@dataclass(frozen=True, eq=False)
+class Passengers(Frozen):
+    """k points bound to the cages; made by `board` or `Deformer.passengers`."""
+
+    points: FloatArray
+    """(k, 3) float: where they are at rest."""
+    subspace: Subspace
+    """x = W~ p for them."""
+
+    def moved(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
+        """Return where they are (k, 3) with the cages at *cage_vertices*, (m_r, 3) each.
+
+        As `Solution.cage_vertices` has them, and `Session.cage_vertices`.
+
+        Raises
+        ------
+        CageError
+            If these are not the cages that the points were bound to.
+        """
+        require_sequence(cage_vertices, "cage_vertices")
+        poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
+        expected, got = [b.shape[1] for b in self.subspace.blocks], [len(p) for p in poses]
+        if got != expected:
+            raise CageError(f"cage_vertices must hold {expected} points, cage by cage; got {got}")
+        p = np.concatenate(poses)
+        centre = p.mean(axis=0)  # about it, so that far from the origin no digits are lost
+        return np.asarray(centre + self.subspace.map(p - centre))
+
+
+def board(
+    mesh: Mesh,
+    weights: FloatArray,
+    cages: Sequence[Cage],
+    points: ArrayLike,
+    *,
+    progress: Progress | None = None,
+) -> Passengers:
+    """Bind *points* to the cages of a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        n vertices, at rest.
+    weights : (r, n) float
+        The blend weights of its regions; columns sum to 1.
+    cages : sequence of r Cage
+        At rest.
+    points : (k, 3) float
+        Where the passengers are, at rest; inside the body, on it, or not far from it.
+    progress : Progress, optional
+        Called as the coordinates in each cage are computed; may cancel.
+    """
+    require_mesh(mesh)
+    cages = all_of(cages, Cage, "cages")
+    points = read_only(as_points(points, "points").copy())
+    weights = as_numbers(weights, "weights")
+    if weights.shape != (len(cages), mesh.n_vertices):
+        expected = len(cages), mesh.n_vertices
+        raise ArgumentError(f"weights must have shape {expected}; got {weights.shape}")
+    alpha = blend_at(mesh.vertices, weights, points)
+    rows, blocks = [], []
+    for r, cage in enumerate(cages):
+        share = part(progress, r / len(cages), (r + 1) / len(cages))
+        riders = np.flatnonzero(alpha[r] > 0.0)
+        block = mean_value_coordinates(points[riders], cage.vertices, cage.faces, progress=share)
+        rows.append(riders)
+        blocks.append(block * alpha[r, riders][:, None])
+    return Passengers(points, Subspace(len(points), tuple(rows), tuple(blocks)))
+
+
+def blend_at(vertices: FloatArray, weights: FloatArray, points: FloatArray) -> FloatArray:
+    """Return the blend weights (r, k) at *points* (k, 3), of those (r, n) at *vertices* (n, 3)."""
+    vertices, points = as_points(vertices, "vertices"), as_points(points, "points")
+    weights = as_numbers(weights, "weights")
+    if not len(vertices) or weights.ndim != 2 or weights.shape[1] != len(vertices):
+        raise ArgumentError(
+            f"weights must have shape (r, {len(vertices)}), a column for each vertex; "
+            f"got {weights.shape}"
+        )
+    if np.abs(points - vertices[0]).max(initial=0.0) > _FARTHEST * np.ptp(vertices, axis=0).max():
+        raise ArgumentError(f"points are more than {_FARTHEST:.0e} sizes of the mesh away")
+    count = min(_NEAREST, len(vertices))
+    distance, near = map(np.asarray, cKDTree(vertices).query(points, k=np.arange(1, count + 1)))
+    farthest = distance[:, -1:]
+    on_vertex = distance[:, 0] <= 1e-12 * farthest[:, 0]
+    distance = np.maximum(distance, np.maximum(1e-12 * farthest, np.finfo(float).tiny))
+    strength = ((farthest - distance) / (farthest * distance)) ** 2
+    strength[on_vertex] = 0.0
+    strength[on_vertex, 0] = 1.0
+    level = strength.max(axis=1) <= 0.0  # all are equally far
+    strength[level] = 1.0
+    strength /= strength.sum(axis=1, keepdims=True)
+    return np.asarray(np.einsum("rks,ks->rk", weights[:, near], strength))

@@ -1,1 +1,0 @@
-"""What showing cages and dragging their vertices takes."""

@@ -1,1 +1,0 @@
-"""What showing a number per vertex takes."""

@@ -1,1 +1,0 @@
-"""What dragging and turning handles takes."""

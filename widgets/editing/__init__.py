@@ -1,1 +1,0 @@
-"""What the editor is made of."""

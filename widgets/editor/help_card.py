@@ -1,0 +1,162 @@
+"""A card over the picture that lists the keys.
+
+White with a dark rim, so that it is read on any background.  Letters are as large as the window
+allows, up to a limit, in one column, two or three, whichever makes them largest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from vtk_segdeform.pictures import INK, PAPER
+
+from ..scene import Panel, Stop, View, Words
+
+Section = tuple[str, Sequence[tuple[str, str]]]
+"""A heading, and for each key its name and what it does."""
+
+_KEYS = "#0B4F82"
+_LARGEST, _SMALLEST = 24.0, 7.0  # pixels
+_LEADING, _MARGIN, _GAP = 1.5, 1.4, 2.0  # from line to line, around, between columns; in letters
+_WIDE, _HIGH, _FOOT = 0.94, 0.86, 0.1  # shares of the window: the most, and what stays free below
+_PROBE = 20.0  # the size in which widths are measured
+
+
+class HelpCard:
+    """A list of keys in the middle of a view, above a status line; hidden until `show`.
+
+    Parameters
+    ----------
+    view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
+        Where it lies, over everything else.  Call `remove` before its window closes.
+    sections : sequence of (heading, rows)
+        Rows are pairs (key, what it does); a section is kept together.
+    """
+
+    def __init__(self, view: Any, sections: Sequence[Section]) -> None:
+        self.view = View.of(view)
+        self.sections = tuple(sections)
+        self._parts: list[Panel | Words] = []
+        self._laid_out = 0, 0
+        self._stop: Stop | None = None
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether it lies there."""
+        return self._stop is not None
+
+    def show(self) -> None:
+        """Lay it there."""
+        if self._stop is None:
+            self._stop = self.view.before_render(self._lay_out)
+            self.view.touch()
+
+    def hide(self) -> None:
+        """Take it away, until it is shown again."""
+        if self._stop is not None:
+            self._stop()
+            self._stop = None
+            self._clear()
+            self.view.touch()
+
+    def toggle(self) -> None:
+        """Show it if it is hidden, hide it if it is shown."""
+        if self.is_shown:
+            self.hide()
+        else:
+            self.show()
+
+    def remove(self) -> None:
+        """Go out of the view, for good."""
+        self.hide()
+
+    def _clear(self) -> None:
+        for part in self._parts:
+            part.remove()
+        self._parts, self._laid_out = [], (0, 0)
+
+    def _lay_out(self) -> None:
+        window = self.view.renderer.GetSize()
+        if tuple(window) == self._laid_out:
+            return
+        self._clear()
+        self._laid_out = window[0], window[1]
+        keys, labels = self._widths()
+        column = keys + _GAP / 2 + labels
+        choices = []
+        for count in (1, 2, 3):
+            columns = _shared(self.sections, count)
+            wide = count * column + (count - 1) * _GAP + 2 * _MARGIN  # in letters
+            high = max(map(_n_lines, columns)) * _LEADING + 2 * _MARGIN
+            fitting = min(_WIDE * window[0] / wide, _HIGH * window[1] / high, _LARGEST)
+            choices.append((fitting, -count, columns, wide, high))
+        size, _, columns, wide, high = max(choices, key=lambda choice: choice[:2])
+        size = max(size, _SMALLEST)
+        x = 0.5 * (window[0] - wide * size)
+        y = 0.5 * ((1.0 + _FOOT) * window[1] - high * size)
+        for rim, colour, layer in ((2.0, INK, 5), (0.0, PAPER, 6)):
+            panel = Panel(self.view.front, colour, layer=layer)
+            panel.place(x - rim, y - rim, wide * size + 2 * rim, high * size + 2 * rim)
+            self._parts.append(panel)
+        for k, sections in enumerate(columns):
+            left = x + (_MARGIN + k * (column + _GAP)) * size
+            self._write(sections, (left, left + (keys + _GAP / 2) * size), y + high * size, size)
+
+    def _write(
+        self, sections: Sequence[Section], tabs: tuple[float, float], top: float, size: float
+    ) -> None:
+        """Write *sections* down from *top*, keys and what they do at the two *tabs*, pixels."""
+        y = top - (_MARGIN + 0.5 * _LEADING) * size
+        for heading, rows in sections:
+            for left, right in ((heading, ""), *rows):
+                is_heading = left is heading
+                colour = INK if is_heading else _KEYS
+                self._put(left, colour, (tabs[0], y), size, bold=True, key=not is_heading)
+                self._put(right, INK, (tabs[1], y), size)
+                y -= _LEADING * size
+            y -= 0.5 * _LEADING * size
+
+    def _put(
+        self, text: str, colour: str, at: tuple[float, float], size: float,
+        *, bold: bool = False, key: bool = False,
+    ) -> Words:  # fmt: skip
+        words = Words(self.view.front, colour, bold=bold or key, typed=key, layer=7)
+        words.say(text, size)
+        words.place(*at)
+        self._parts.append(words)
+        return words
+
+    def _widths(self) -> tuple[float, float]:
+        """Return how wide the keys and what they do are, in letters."""
+        rows = [row for _, rows in self.sections for row in rows]
+        widths = [
+            [self._put(text, INK, (0.0, 0.0), _PROBE, key=key).width() for text in texts]
+            for texts, key in (([key for key, _ in rows], True), ([say for _, say in rows], False))
+        ]
+        self._clear_probes()
+        keys, labels = (float(np.max(w, initial=0.0)) / _PROBE for w in widths)
+        return keys, labels
+
+    def _clear_probes(self) -> None:
+        for part in self._parts:
+            part.remove()
+        self._parts = []
+
+
+def _n_lines(sections: Sequence[Section]) -> float:
+    """Return how many lines *sections* take; half a line is free between two of them."""
+    return sum(1 + len(rows) for _, rows in sections) + 0.5 * max(0, len(sections) - 1)
+
+
+def _shared(sections: Sequence[Section], count: int) -> list[list[Section]]:
+    """Return *sections* in order, in *count* columns about as long as one another."""
+    columns: list[list[Section]] = [[] for _ in range(count)]
+    total, before = _n_lines(sections), 0.0
+    for section in sections:
+        length = _n_lines([section])
+        columns[min(count - 1, int(count * (before + 0.5 * length) / total))].append(section)
+        before += length + 0.5
+    return columns

@@ -1,0 +1,132 @@
+"""One line at the bottom of a view: what to do next, what went wrong, how far a job is.
+
+A warning has another colour and a sign, and stays until something else is said.  What does not
+fit into the window's width is broken into two lines, a warning into four, within a word where it
+is as long as a path; what does not fit then ends in dots.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..scene import Panel, View, Words
+
+_CALM, _WARNING = "#2B2F36", "#8A2B06"  # white on them has a contrast above 7 to 1
+_LETTERS, _TAG, _BAR = "#FFFFFF", "#FFD27F", "#4FA3D9"
+_LINES, _LINES_OF_WARNING = 2, 4
+
+
+class StatusLine:
+    """A strip at the bottom of a view.
+
+    Parameters
+    ----------
+    view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
+        Where it lies, over everything else.  Call `remove` before its window closes.
+    """
+
+    def __init__(self, view: Any) -> None:
+        self.view = View.of(view)
+        front = self.view.front
+        self._strip = Panel(front, _CALM, opacity=0.88, layer=2)
+        self._bar = Panel(front, _BAR, layer=3)
+        self._tag = Words(front, _TAG, bold=True, layer=4)
+        self._lines = [Words(front, _LETTERS, layer=4) for _ in range(_LINES_OF_WARNING)]
+        self._said: tuple[str, str, bool, float | None] = "", "", False, None
+        self._laid_out: tuple[Any, ...] = ()
+        self._stop = self.view.before_render(self._lay_out)
+
+    @property
+    def text(self) -> str:
+        """What it says, whether or not the window is wide enough for it."""
+        return self._said[1]
+
+    @property
+    def is_warning(self) -> bool:
+        """Whether what it says is that something went wrong."""
+        return self._said[2]
+
+    @property
+    def fraction(self) -> float | None:
+        """How far the job is that it tells of, 0..1; or None."""
+        return self._said[3]
+
+    def say(self, text: str, tag: str = "") -> None:
+        """Say *text*; before it stands *tag*, a word or two."""
+        self._now(tag, text, False, None)
+
+    def warn(self, text: str, tag: str = "") -> None:
+        """Say that something went wrong."""
+        self._now(tag, text, True, None)
+
+    def progress(self, fraction: float, text: str, tag: str = "") -> None:
+        """Say how far a job is, 0..1, and what it does."""
+        self._now(tag, text, False, min(max(fraction, 0.0), 1.0))
+
+    def remove(self) -> None:
+        """Go out of the view, for good."""
+        self._stop()
+        parts: list[Panel | Words] = [self._strip, self._bar, self._tag, *self._lines]
+        for part in parts:
+            part.remove()
+
+    def _now(self, tag: str, text: str, warning: bool, fraction: float | None) -> None:
+        said = tag, " ".join(text.split()), warning, fraction
+        if said != self._said:
+            self._said = said
+            self.view.touch()
+
+    def _lay_out(self) -> None:
+        width, height = self.view.renderer.GetSize()
+        if (width, height, self._said) == self._laid_out:
+            return
+        self._laid_out = width, height, self._said
+        tag, text, warning, fraction = self._said
+        size = letter_size(width, height)
+        margin, leading = 0.7 * size, 1.45 * size
+        self._tag.say(tag, size)
+        left = margin + (self._tag.width() + size if tag else 0.0)
+        room, most = width - margin - left, _LINES_OF_WARNING if warning else _LINES
+        lines = self._broken(f"! {text}" if warning else text, size, room, most)
+        foot = 0.35 * size if fraction is None else 0.8 * size  # room for the bar
+        high = foot + leading * len(lines) + 0.35 * size
+        for k, words in enumerate(self._lines):
+            words.say(lines[k] if k < len(lines) else "", size)
+            words.place(left, high - 0.35 * size - (k + 0.5) * leading)
+        self._tag.place(margin, high - 0.35 * size - 0.5 * leading)
+        self._strip.colour(_WARNING if warning else _CALM)
+        self._strip.show(bool(tag or text))
+        self._strip.place(0.0, 0.0, width, high)
+        self._bar.show(fraction is not None)
+        self._bar.place(0.0, 0.0, width * (fraction or 0.0), 0.35 * size)
+
+    def _broken(self, text: str, size: float, room: float, most: int) -> list[str]:
+        """Return *text* in at most *most* lines, each no wider than *room* pixels."""
+        lines = list[str]()
+        while text and len(lines) < most:
+            cut = self._fitting(text, size, room)
+            lines.append(text[:cut].rstrip())
+            text = text[cut:].lstrip()
+        if text:
+            cut = self._fitting(f"{lines[-1]}...", size, room)
+            lines[-1] = lines[-1][: min(cut, len(lines[-1])) - 3].rstrip() + "..."
+        return lines
+
+    def _fitting(self, text: str, size: float, room: float) -> int:
+        """Return after how many letters to break *text*, at best between two words."""
+        probe = self._lines[0]
+        low, high = 1, len(text)  # the first low letters fit, or nothing does
+        while low < high:
+            middle = (low + high + 1) // 2
+            probe.say(text[:middle], size)
+            low, high = (middle, high) if probe.width() <= room else (low, middle - 1)
+        space = text.rfind(" ", 0, low + 1)
+        # Rather in a long word than after the sign of a warning, alone in its line.
+        return space if low < len(text) and space > low // 3 else low
+
+
+def letter_size(width: int, height: int) -> float:
+    """Return how large letters are in a window, pixels: what is read well, and fits."""
+    return float(np.clip(min(height / 36.0, width / 48.0), 11.0, 26.0))

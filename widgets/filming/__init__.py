@@ -1,1 +1,0 @@
-"""What recordings and films are made of."""

@@ -1,1 +1,0 @@
-"""What painting regions, fixed vertices and handles takes."""

@@ -1,0 +1,113 @@
+"""The head of the panel: files, undo and redo, and the four modes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from qtpy import QtWidgets
+
+from ..editor import DeformEditor, Mode, exporting, opening, save, saving
+from .controls import choice_button, column, key_button, push_button, put, row, sentence
+
+_SESSIONS = "Sessions (*.segdeform)"
+_MESHES = "*.obj *.off *.ply *.stl *.vtk *.vtp *.vtkhdf"
+_READ = f"Meshes and sessions (*.segdeform {_MESHES} *.vtu *.glb *.gltf);;All files (*)"
+
+
+class Head(QtWidgets.QWidget):
+    """Buttons over everything else; they are there in every mode.
+
+    Parameters
+    ----------
+    editor : DeformEditor
+        Whose.
+    """
+
+    def __init__(self, editor: DeformEditor) -> None:
+        super().__init__()
+        self._editor = editor
+        self.open = push_button("Open ...", "open a mesh or a session", "ctrl+o")
+        self.save = push_button("Save", "save the session, or the mesh as it is now", "ctrl+s")
+        self.open.clicked.connect(self.ask_and_open)
+        menu = QtWidgets.QMenu(self.save)
+        for text, do in (
+            ("Save session", self.save_session),
+            ("Save session as ...", self.ask_and_save),
+            ("Save mesh as ...", self.ask_and_export),
+        ):
+            menu.addAction(text).triggered.connect(do)
+        self.save.setMenu(menu)
+        self.undo = key_button(editor, "z", Mode.REGIONS, "Undo")
+        self.redo = key_button(editor, "y", Mode.REGIONS, "Redo")
+        self.modes = {
+            mode: choice_button(editor, str(mode.value), mode, f"{mode.value} {mode.name.title()}")
+            for mode in Mode
+        }
+        group = QtWidgets.QButtonGroup(self)
+        for button in self.modes.values():
+            group.addButton(button)
+        column(self, row(self.open, self.save, self.undo, self.redo), row(*self.modes.values()))
+        self.layout().setContentsMargins(0, 0, 0, 0)
+
+    def refresh(self) -> None:
+        """Show what can be undone, and the mode."""
+        session, busy = self._editor.session, self._editor.is_busy
+        for button, label, what, key in (
+            (self.undo, session.undo_label, "undo", "Z"),
+            (self.redo, session.redo_label, "redo", "Y"),
+        ):
+            button.setEnabled(label is not None and not busy)
+            button.setToolTip(
+                sentence(f"{what} {label} ({key})" if label else f"nothing to {what}")
+            )
+        for each in (self.open, self.save, *self.modes.values()):
+            each.setEnabled(not busy)
+        put(self.modes[self._editor.mode], True)
+
+    # Files.
+
+    def ask_and_open(self) -> None:
+        """Ask for a file and go on with what is in it."""
+        path, _ = QtWidgets.QFileDialog.getOpenFileName(self, "Open", self._folder(), _READ)
+        if path and self.may_be_given_up():
+            self._editor.do(opening(Path(path)))
+
+    def may_be_given_up(self) -> bool:
+        """Tell whether what is there is saved; if it is not, ask."""
+        desk = self._editor.desk
+        if not desk.file.is_behind(desk.session):
+            return True
+        buttons = QtWidgets.QMessageBox.StandardButton
+        answer = QtWidgets.QMessageBox.question(
+            self, "Not saved", "What was done is not saved. Give it up?",
+            buttons.Discard | buttons.Cancel, buttons.Cancel,
+        )  # fmt: skip
+        return bool(answer == buttons.Discard)
+
+    def save_session(self) -> None:
+        """Save to the session's file; one that is somebody else's only after asking."""
+        if self._editor.desk.file.is_ours:
+            self._editor.do(save)
+        else:
+            self.ask_and_save()
+
+    def ask_and_save(self) -> None:
+        """Ask for a file and save the session there."""
+        path = self._path_to_write("Save session", str(self._editor.path), _SESSIONS)
+        if path is not None:
+            self._editor.do(saving(path if path.suffix else path.with_suffix(".segdeform")))
+
+    def ask_and_export(self) -> None:
+        """Ask for a file and write the mesh there, as it is in this pose."""
+        proposed = str(self._editor.path.with_suffix(".ply"))
+        path = self._path_to_write("Save mesh", proposed, f"Meshes ({_MESHES})")
+        if path is not None:
+            self._editor.do(exporting(path if path.suffix else path.with_suffix(".ply")))
+
+    def _path_to_write(self, title: str, proposed: str, kinds: str) -> Path | None:
+        path, _ = QtWidgets.QFileDialog.getSaveFileName(self, title, proposed, kinds)
+        return Path(path) if path else None
+
+    def _folder(self) -> Any:
+        return str(self._editor.path.parent)

@@ -1,0 +1,217 @@
+"""A deformation as a moving picture: a GIF, an MP4, or a folder of PNG pictures.
+
+    film("bend.gif", session, targets)             a drag, a picture for each of its targets
+    film("turn.mp4", view, [turn_camera] * 90)     whatever is done before each picture
+    film = Film(view); stop = film.watch()         everything that is drawn from now on,
+    ...; stop(); film.save("work.gif")             say by hand, or by a replay
+
+Pictures are kept compressed until the film is saved; see `film_files` for what it is saved as.
+"""
+
+from __future__ import annotations
+
+import os
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+
+from vtk_segdeform.arrays import as_points, is_whole
+from vtk_segdeform.checks import as_callable, require_sequence, shown
+from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.progress import Progress, tell
+from vtk_segdeform.session import Session
+
+from ..scene import Stop, View
+from .film_files import Picture, require_film, write_film
+from .off_screen import OffScreen
+
+_LARGEST = 16_384  # pixels, of a width or height
+
+Targets = Mapping[str, ArrayLike] | ArrayLike
+Frame = Callable[[], object] | Targets | None
+
+
+class Film:
+    """Pictures of a view, in the order they were taken.
+
+    Parameters
+    ----------
+    view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
+        All its window is seen.
+    """
+
+    def __init__(self, view: Any) -> None:
+        self.view = View.of(view)
+        self._pictures: list[bytes] = []
+        self._shape = (0, 0, 3)
+
+    def __len__(self) -> int:
+        return len(self._pictures)
+
+    def __getitem__(self, number: int) -> Picture:
+        """Return a picture, (h, w, 3) uint8, upper row first."""
+        packed = self._pictures[number]
+        return np.frombuffer(zlib.decompress(packed), np.uint8).reshape(self._shape)
+
+    def snap(self) -> None:
+        """Draw the view and take a picture."""
+        self.view.render()
+        self._take()
+
+    def watch(self, when: Callable[[], bool] | None = None) -> Stop:
+        """Take a picture whenever the window was drawn, until what is returned is called.
+
+        With *when*, only of what is drawn while it returns True.
+        """
+        if when is not None:
+            as_callable(when, "when")
+
+        def called(*_: object) -> None:
+            with self.view.guarded():
+                if when is None or when():
+                    self._take()
+
+        window = self.view.window
+        tag = window.AddObserver("EndEvent", called)
+        return lambda: window.RemoveObserver(tag)
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        fps: float = 20.0,
+        progress: Progress | None = None,
+    ) -> None:
+        """Write the pictures; a file that is there is replaced, a folder is not.
+
+        Parameters
+        ----------
+        path : path
+            A .gif, an .mp4, or without a suffix a new folder for 0000.png, 0001.png, ...
+        fps : float
+            Pictures in a second.
+        progress : Progress, optional
+            Called before every picture; may cancel, in which case nothing is written.
+
+        Raises
+        ------
+        SessionError
+            If there are no pictures, or the film cannot be written there.
+        MissingDependencyError
+            If the library for such a film is absent.
+        """
+        write_film(path, _Told(self, progress), fps)
+
+    def _take(self) -> None:
+        window = self.view.window
+        width, height = window.GetSize()
+        pixels = vtkUnsignedCharArray()
+        window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
+        picture = vtk_to_numpy(pixels).reshape(height, width, 3)[::-1]
+        if not self._pictures:  # the first says how large; videos want even numbers
+            self._shape = (height - height % 2, width - width % 2, 3)
+        whole = np.full(self._shape, 255, dtype=np.uint8)
+        h, w = min(height, self._shape[0]), min(width, self._shape[1])
+        whole[:h, :w] = picture[:h, :w]
+        self._pictures.append(zlib.compress(whole.tobytes(), 1))
+
+
+class _Told:
+    """The pictures of a film; accessing one reports progress."""
+
+    def __init__(self, film: Film, progress: Progress | None) -> None:
+        self._film, self._progress, self._count = film, progress, 0
+
+    def __len__(self) -> int:
+        return len(self._film)
+
+    def __getitem__(self, number: int, /) -> Picture:
+        tell(self._progress, min(1.0, self._count / len(self)), f"picture {number + 1}")
+        self._count += 1
+        return self._film[number]
+
+
+def film(
+    path: str | os.PathLike[str],
+    scene: Any,
+    frames: Sequence[Frame] | Iterator[Frame],
+    *,
+    fps: float = 20.0,
+    size: tuple[int, int] = (800, 600),
+) -> None:
+    """Make a film with one picture for each of *frames*.
+
+    Parameters
+    ----------
+    path : path
+        A .gif, an .mp4, or without a suffix a new folder of PNG pictures.
+    scene : Session, View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
+        A view as it is; or a session, whose mesh is then shown with fixed vertices in grey and
+        handles in red.
+    frames : sequence or iterator of callable, targets or None
+        Before each picture a callable is called, a session dragged to targets, (k, 3) or by the
+        name of the handle, as in `Session.drag`; None does nothing.  All targets together are one
+        step of the session, and none at all if something fails.
+    fps : float
+        Pictures in a second.
+    size : (width, height)
+        Pixels; of a session's film, a view has its own.
+
+    Raises
+    ------
+    SessionError
+        If the film cannot be written there; before anything is done.
+    MissingDependencyError
+        If the library for such a film is absent, or nothing can be rendered here.
+    """
+    require_film(path, fps)
+    require_sequence(size, "size")
+    if len(size) != 2 or not all(is_whole(n, 2, _LARGEST) for n in size):
+        raise ArgumentError(
+            f"size must be (width, height), 2 to {_LARGEST} pixels each; got {shown(size)}"
+        )
+    session = scene if isinstance(scene, Session) else None
+    room: Sequence[Frame] = []
+    if not isinstance(frames, Iterator):
+        require_sequence(frames, "frames")
+        room = frames
+    if session is None:
+        made = Film(scene)
+        _shoot(made, None, frames)
+    else:
+        with OffScreen(session, size, room=_places(room)) as stage:
+            made = Film(stage.view)
+            try:
+                _shoot(made, session, frames)
+            except BaseException:
+                session.revert()
+                raise
+            session.commit()
+    made.save(path, fps=fps)
+
+
+def _shoot(made: Film, session: Session | None, frames: Iterable[Frame]) -> None:
+    for frame in frames:
+        if callable(frame):
+            frame()
+        elif frame is not None:
+            if session is None:
+                raise ArgumentError("targets require a session; to film a view, pass callables")
+            session.drag(frame)
+        made.snap()
+
+
+def _places(frames: Sequence[Frame]) -> list[NDArray[np.float64]]:
+    """Return the targets among *frames*, each (k, 3)."""
+    places: list[NDArray[np.float64]] = []
+    for frame in frames:
+        if isinstance(frame, Mapping):
+            places += [as_points(place, "frames") for place in frame.values()]
+        elif frame is not None and not callable(frame):
+            places.append(as_points(frame, "frames"))
+    return places

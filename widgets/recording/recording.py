@@ -1,0 +1,269 @@
+"""What hands did in a window, as plain text that does it again: for tests and for bug reports.
+
+One line is one event: when, in seconds; what; where, in pixels from the lower left corner; and
+what was held down.  `Timer` is one tick of the event loop or several.  A recording begins with
+the window and the camera, and has them again before a press if they changed, so that a replay is
+exact also where a program moved the camera.
+
+    vtk_segdeform recording 1
+    0.000 Window 800 600
+    0.000 Camera position 0.0 -3.0 0.5 focus 0.0 0.0 0.5 up 0.0 0.0 1.0 angle 30.0 ...
+    0.731 MouseMove 412 300
+    0.802 LeftButtonPress 412 300 control
+    2.004 KeyPress 412 300 control key=z code=26
+    2.310 Timer 3
+    2.310 Steps 5
+
+Lines that are empty or begin with # say nothing.  `Steps` is how many steps of the solver there was
+time for: a replay gives it as many, and ends in the same pose also on a slower machine, to the
+last bit where numpy adds alike.  For the rest it tells only what the hands did: to replay it, begin
+with the session and the view that it began with.
+
+A camera style that drags keeps all events from other observers, as a widget does by its abort
+flag; not from VTK's passive ones, which are called before everybody else.  The recorder is one.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import sys
+import time
+from collections.abc import Callable, Iterable
+from typing import Any, TextIO
+
+from vtkmodules.vtkCommonCore import vtkVersion
+
+from vtk_segdeform.arrays import is_number
+from vtk_segdeform.checks import as_callable, as_path, as_text, require, shown
+from vtk_segdeform.errors import ArgumentError, SessionError
+from vtk_segdeform.files import replacing, require_place
+from vtk_segdeform.version import __version__
+
+from ..scene import View, on_steps, order_steps
+from .confinement import confined
+from .limits import Clock, ReplayLimits
+from .reading import Moment, read_recording
+from .transcript import EVENTS, TITLE, Camera, Entry, Input, Steps, Ticks, Window
+
+_LONGEST_PAUSE = 2.0  # seconds
+_MOST_KEYS = 1000
+
+
+class Recorder:
+    """Writes down every event of a view, from when it is made until `stop`.
+
+    Parameters
+    ----------
+    view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
+        Whose events.
+    path : path, optional
+        A text file that each event is added to at once, so that it is there after a crash.
+    keys : str
+        Letters and digits that a replay is to type first.
+    skips : callable, optional
+        Tells of an `Input` whether to leave it out.
+
+    Raises
+    ------
+    SessionError
+        If *path* cannot be written.
+    """
+
+    def __init__(
+        self,
+        view: Any,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        keys: str = "",
+        skips: Callable[[Input], bool] | None = None,
+    ) -> None:
+        self.view = View.of(view)
+        if len(as_text(keys, "keys")) > _MOST_KEYS:
+            raise ArgumentError(f"keys must be {_MOST_KEYS} at most; got {len(keys)}")
+        self._skips = None if skips is None else as_callable(skips, "skips")
+        self.lines: list[str] = []
+        self._start = time.monotonic()
+        self._told: dict[type, Entry] = {}
+        self._ticks = 0
+        self._file: TextIO | None = None
+        if path is not None:
+            self._file = _opened(path)
+        self._write(TITLE)
+        vtk = vtkVersion.GetVTKVersion()
+        self._write(f"# vtk_segdeform {__version__}, VTK {vtk}, {sys.platform}")
+        self._tell_scene()
+        x, y = self.view.interactor.GetEventPosition()
+        for key, name in itertools.product(keys, ("KeyPress", "Char", "KeyRelease")):
+            self._tell(Input(name, x, y, key=key, code=ord(key)))
+        self._tags = [self._watch(name) for name in (*EVENTS, "Timer")]
+        self._stop_steps = on_steps(self.view.interactor, self._solves)
+
+    def stop(self) -> None:
+        """Write no more; the file is closed."""
+        if not self._tags:
+            return
+        for tag in self._tags:
+            self.view.interactor.RemoveObserver(tag)
+        self._tags = []
+        self._stop_steps()
+        self._tell_ticks()
+        self._tell_scene()
+        if self._file is not None:
+            self._file.close()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write what was recorded so far to a text file; SessionError if that cannot be."""
+        path = as_path(path)
+        try:
+            with replacing(path) as draft:
+                draft.write_text("".join(f"{line}\n" for line in self.lines), encoding="utf-8")
+        except OSError as fault:
+            raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
+
+    def _watch(self, name: str) -> int:
+        def called(*_: object) -> None:
+            with self.view.guarded():
+                self._hear(name)
+
+        interactor = self.view.interactor
+        tag: int = interactor.AddObserver(f"{name}Event", called)
+        interactor.GetCommand(tag).SetPassiveObserver(True)
+        return tag
+
+    def _hear(self, name: str) -> None:
+        if name == "Timer":
+            self._ticks += 1
+            return
+        entry = Input.of(name, self.view.interactor)
+        if self._skips is not None and self._skips(entry):
+            return
+        self._tell_ticks()
+        if name.endswith("Press"):  # what follows depends on where the camera is
+            self._tell_scene()
+        self._tell(entry)
+
+    def _solves(self, steps: int) -> None:
+        with self.view.guarded():
+            self._tell_ticks()  # the last of them made it solve
+            self._tell(Steps(steps))
+
+    def _tell_ticks(self) -> None:
+        if self._ticks:
+            self._tell(Ticks(self._ticks))
+            self._ticks = 0
+
+    def _tell_scene(self) -> None:
+        if _is_closed(self.view.window):
+            return
+        for entry in (Window.of(self.view), Camera.of(self.view)):
+            if self._told.get(type(entry)) != entry:
+                self._told[type(entry)] = entry
+                self._tell(entry)
+
+    def _tell(self, entry: Entry) -> None:
+        self._write(f"{time.monotonic() - self._start:.3f} {entry}")
+
+    def _write(self, line: str) -> None:
+        self.lines.append(line)
+        if self._file is not None:
+            self._file.write(f"{line}\n")
+
+
+def replay(
+    view: Any,
+    source: str | os.PathLike[str] | Iterable[str],
+    *,
+    folder: str | os.PathLike[str] | None = None,
+    limits: ReplayLimits | None = None,
+    pace: float = 0.0,
+    busy: Callable[[], bool] | None = None,
+) -> None:
+    """Do again in *view* what a `Recorder` wrote down.
+
+    The whole of it is read and checked before the first event is sent.  It ends early if one of
+    the events closes the window.
+
+    A recording may come from an untrusted source.  Its keys therefore read and write files only in
+    *folder*, whatever `DeformEditor.path` is, and *limits* bound the duration.
+
+    Parameters
+    ----------
+    view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
+        Where; with the same session as when it was recorded.
+    source : path or iterable of str
+        The file, or its lines.
+    folder : path, optional
+        An existing folder for the files that :kbd:`Ctrl+S`, :kbd:`Ctrl+R` and :kbd:`Ctrl+M` write
+        and :kbd:`Ctrl+O` opens.  Without one these keys fail with an error.
+    limits : ReplayLimits, optional
+        By default 200,000 events, 300 seconds and windows of 16 million pixels.
+    pace : float
+        1 for as fast as it was, 0.5 for twice as fast, long pauses cut short; 0 waits for nothing.
+    busy : callable, optional
+        Tells whether work goes on in the background; the next event then waits for its end, while
+        timers tick.
+
+    Raises
+    ------
+    SessionError
+        If there is no such file or folder, a line is invalid, or a limit is exceeded; the text
+        gives the number of the line and the limit.
+    """
+    view = View.of(view)
+    limits = ReplayLimits() if limits is None else require(limits, ReplayLimits, "limits")
+    if not is_number(pace, 0.0):
+        raise ArgumentError(f"pace must be a number, 0 or more; got {shown(pace)}")
+    if busy is not None:
+        as_callable(busy, "busy")
+    place = None if folder is None else as_path(folder, "folder")
+    if place is not None and not os.path.isdir(place):
+        raise SessionError(f"{place}: there is no such folder to replay into")
+    moments = read_recording(source, limits)
+    _require_short(moments, pace, limits.seconds)
+    clock, tick = Clock(limits.seconds), Ticks(1)
+    before = 0.0
+    with confined(view.interactor, place):
+        for moment, entry, steps in moments:
+            if busy is not None:
+                clock.wait_while(busy, lambda: tick.send(view))
+            time.sleep(_pause(before, moment) * pace)
+            before = moment
+            order_steps(view.interactor, steps)
+            try:
+                for each in [tick] * entry.times if isinstance(entry, Ticks) else [entry]:
+                    clock.check()
+                    if _is_closed(view.window):
+                        return
+                    each.send(view)
+            finally:
+                order_steps(view.interactor, ())
+
+
+def _require_short(moments: list[Moment], pace: float, seconds: float) -> None:
+    """Raise SessionError if the recorded pauses alone exceed the time limit."""
+    times = [0.0, *(moment for moment, _, _ in moments)]
+    planned = pace * sum(itertools.starmap(_pause, itertools.pairwise(times)))
+    if planned > seconds:
+        raise SessionError(
+            f"the replay would take {planned:.0f} seconds, more than its limit of {seconds:g} "
+            "seconds; raise it to replay the recording"
+        )
+
+
+def _pause(before: float, moment: float) -> float:
+    return min(max(0.0, moment - before), _LONGEST_PAUSE)
+
+
+def _is_closed(window: Any) -> bool:
+    """Tell whether a window is gone; one that somebody still holds has lost what it drew with."""
+    return window is None or not (window.GetNeverRendered() or window.GetInitialized())
+
+
+def _opened(path: str | os.PathLike[str]) -> TextIO:
+    """Open a text file, emptied if it exists, that is flushed after every line."""
+    path = as_path(path)
+    try:
+        return open(require_place(path), "w", encoding="utf-8", buffering=1)
+    except OSError as fault:
+        raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault

@@ -1,0 +1,72 @@
+"""A closed line over the picture, dark with a light rim, so that it is seen on any ground."""
+
+from __future__ import annotations
+
+import numpy as np
+from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkCommonCore import vtkPoints
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
+
+from vtk_segdeform.arrays import FloatArray
+from vtk_segdeform.pictures import INK, PAPER, rgb
+
+from ..scene import View
+
+_DESIGNED_FOR = 600  # pixels of height; lines are wider in a higher window
+_WIDTHS = ((PAPER, 4.0), (INK, 1.5))  # pixels
+
+
+class Outline:
+    """A lasso or a rectangle being drawn; nothing until `draw`.
+
+    Parameters
+    ----------
+    view : View
+        Over which it lies.
+    """
+
+    def __init__(self, view: View) -> None:
+        self._view = view
+        self._line = vtkPolyData()
+        self._actors = []
+        for colour, _ in _WIDTHS:
+            mapper = vtkPolyDataMapper2D()
+            mapper.SetInputData(self._line)
+            actor = vtkActor2D()
+            actor.SetMapper(mapper)
+            actor.GetProperty().SetColor(*(rgb(colour) / 255.0))
+            actor.VisibilityOff()
+            view.renderer.AddViewProp(actor)
+            self._actors.append(actor)
+
+    def draw(self, corners: FloatArray) -> None:
+        """Draw the closed line through *corners* (k, 2), pixels of the window."""
+        origin = np.array(self._view.renderer.GetOrigin(), dtype=float)
+        places = np.column_stack([corners - origin, np.zeros(len(corners))])
+        points = vtkPoints()
+        points.SetData(numpy_to_vtk(places, deep=True))
+        cells = vtkCellArray()
+        cells.InsertNextCell(len(corners) + 1)
+        for k in [*range(len(corners)), 0]:
+            cells.InsertCellPoint(k)
+        scale = float(np.clip(self._view.renderer.GetSize()[1] / _DESIGNED_FOR, 0.7, 3.0))
+        for actor, (_, width) in zip(self._actors, _WIDTHS, strict=True):
+            actor.GetProperty().SetLineWidth(scale * width)
+        self._line.SetPoints(points)
+        self._line.SetLines(cells)
+        self._show(True)
+
+    def hide(self) -> None:
+        """Show nothing."""
+        self._show(False)
+
+    def remove(self) -> None:
+        """Take the line out of the view, for good."""
+        for actor in self._actors:
+            self._view.renderer.RemoveViewProp(actor)
+
+    def _show(self, visible: bool) -> None:
+        for actor in self._actors:
+            actor.SetVisibility(visible)
+        self._view.touch()

@@ -1,0 +1,120 @@
+"""The mesh of a session, in its pose, as one actor that every widget shares.
+
+Positions and normals are written in place at every change of the pose; colours are layers, of which
+the one that came last is seen.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
+
+from vtk_segdeform.arrays import plain
+from vtk_segdeform.checks import require
+from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.freezing import read_only
+from vtk_segdeform.geometry import VertexNormals
+from vtk_segdeform.io import polydata_of
+from vtk_segdeform.pictures import BODY, rgb
+from vtk_segdeform.session import Change, Session
+
+from .view import View
+
+
+class SurfaceDisplay:
+    """The deformed mesh in a view.
+
+    Parameters
+    ----------
+    view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
+        Where to draw.
+    session : Session
+        Whose mesh.
+    """
+
+    def __init__(self, view: Any, session: Session) -> None:
+        self.view = View.of(view)
+        self.session = require(session, Session, "session")
+        self._layers: dict[str, NDArray[np.uint8]] = {}
+        faces = session.mesh.faces
+        corners = np.full(len(faces), 3)
+        self.polydata = polydata_of(session.vertices.copy(), corners, faces.ravel())
+        self._points: NDArray[np.float64] = vtk_to_numpy(self.polydata.GetPoints().GetData())
+        self._seen_points: NDArray[np.float64] = read_only(self._points)
+        self._vertex_normals = VertexNormals(session.mesh)
+        self._normals = self._vertex_normals.of(self._points)
+        self._normal_array = numpy_to_vtk(self._normals)
+        self._normal_array.SetName("Normals")
+        self.polydata.GetPointData().SetNormals(self._normal_array)
+        self._mapper = vtkPolyDataMapper()
+        self._mapper.SetInputData(self.polydata)
+        self._mapper.SetScalarVisibility(False)
+        self._mapper.SetResolveCoincidentTopologyToPolygonOffset()  # wires on it stay visible
+        self.actor = vtkActor()
+        self.actor.SetMapper(self._mapper)
+        surface = self.actor.GetProperty()
+        surface.SetInterpolationToPhong()
+        surface.SetColor(*(rgb(BODY) / 255.0))
+        surface.SetAmbient(0.25)
+        surface.SetDiffuse(0.8)
+        surface.SetSpecular(0.05)
+        self.view.renderer.AddActor(self.actor)
+        self._stop = session.on_change(self._changed)
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """(n, 3) float: the displayed vertices; a read-only view, not a copy."""
+        return self._seen_points
+
+    def set_colours(self, layer: str, colours: NDArray[np.uint8] | None) -> None:
+        """Show *colours* (n, 3), 0 to 255, one for each vertex; or None to take a layer away.
+
+        The newest layer is seen; a layer that is there already keeps its place.
+        """
+        require(layer, str, "layer")
+        if colours is None:
+            self._layers.pop(layer, None)
+        else:
+            self._layers[layer] = self._checked(colours)
+        top = next(reversed(self._layers.values()), None)
+        self._mapper.SetScalarVisibility(top is not None)
+        if top is not None:
+            array = numpy_to_vtk(np.ascontiguousarray(top, dtype=np.uint8), deep=True)
+            array.SetName("colours")
+            self.polydata.GetPointData().SetScalars(array)
+        self.view.touch()
+
+    def update(self) -> None:
+        """Draw the pose that the session is in; done by itself at every change."""
+        self._points[:] = self.session.vertices
+        self.polydata.GetPoints().GetData().Modified()
+        self.polydata.GetPoints().Modified()
+        self.update_normals()
+        self.view.touch()
+
+    def update_normals(self) -> None:
+        """Compute the normals of the pose that is drawn; done by itself at every change."""
+        self._vertex_normals.of(self._points, self._normals)
+        self._normal_array.Modified()
+
+    def remove(self) -> None:
+        """Take the mesh out of the view, for good."""
+        self._stop()
+        self.view.renderer.RemoveActor(self.actor)
+
+    def _checked(self, colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        array = plain(colours, "colours")
+        expected = len(self._points), 3
+        if array.shape != expected or array.dtype != np.uint8:
+            raise ArgumentError(
+                f"colours must be uint8 of shape {expected}; got {array.dtype}, {array.shape}"
+            )
+        return array
+
+    def _changed(self, change: Change) -> None:
+        if change & Change.POSE:
+            self.update()

@@ -1,0 +1,175 @@
+"""A diverging scale at the right of a view and lines of text at its upper left.
+
+Sizes follow the window; the ink is dark or white, whichever is read better on what is behind it.
+A line may stand on the colour of a region.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import vtkmodules.vtkRenderingFreeType  # noqa: F401 - without it text is not drawn
+from vtkmodules.vtkRenderingAnnotation import vtkScalarBarActor
+from vtkmodules.vtkRenderingCore import vtkTextActor
+
+from vtk_segdeform.arrays import FloatArray
+from vtk_segdeform.pictures import INK, PAPER, of_region, rgb
+
+from ..scene import Stop, View
+from .diverging import lookup_table
+
+_TICKS = 5
+_LETTERS = 25  # of a name
+_LATIN, _SIGNS = 0x17F, "–—‘’‚“”„†‡•…‰‹›€™"  # the letters of VTK's own font
+_GROUND = 0.7  # opacity of the background's colour under what may lie over the mesh
+
+
+class Legend:
+    """What the colours of a mesh mean, and some words; hidden until `show`.
+
+    Parameters
+    ----------
+    view : View
+        Where to draw.
+    title : str
+        Stands over the scale.
+    """
+
+    def __init__(self, view: View, title: str) -> None:
+        self.view = view
+        self._bar = _scalar_bar(title)
+        self._lines: list[Any] = []
+        self._laid_out: tuple[Any, ...] = ()
+        self._stop: Stop | None = None
+
+    def show(self, half_range: float, lines: Sequence[tuple[str, int | None]]) -> None:
+        """Show a scale up to *half_range*, a share, and *lines*; or other ones than before.
+
+        Parameters
+        ----------
+        half_range : float
+            See `diverging`.
+        lines : sequence of (text, region)
+            From the top; *region* is a number whose colour it stands on, or None.
+        """
+        renderer = self.view.renderer
+        if self._stop is None:
+            self._stop = self.view.before_render(self._lay_out)
+            renderer.AddViewProp(self._bar)
+        table = self._bar.GetLookupTable()
+        if table is None or table.GetTableRange()[1] != half_range:
+            self._bar.SetLookupTable(_annotated_table(half_range))
+        while len(self._lines) > len(lines):
+            renderer.RemoveViewProp(self._lines.pop())
+        while len(self._lines) < len(lines):
+            self._lines.append(vtkTextActor())
+            renderer.AddViewProp(self._lines[-1])
+        for actor, (text, region) in zip(self._lines, lines, strict=True):
+            actor.SetInput(f" {text} ".replace("$", r"\$"))  # which begins TeX
+            style = actor.GetTextProperty()
+            style.SetBackgroundOpacity(_GROUND if region is None else 1.0)
+            style.SetFrame(region is not None)
+            if region is not None:
+                style.SetBackgroundColor(*(of_region(region) / 255.0))
+                style.SetFrameColor(*style.GetBackgroundColor())
+        self._laid_out = ()
+
+    def hide(self) -> None:
+        """Take everything out of the view."""
+        if self._stop is not None:
+            self._stop()
+            self._stop = None
+        for prop in (self._bar, *self._lines):
+            self.view.renderer.RemoveViewProp(prop)
+        self._lines = []
+
+    def _lay_out(self) -> None:
+        renderer = self.view.renderer
+        width, height = renderer.GetSize()
+        now = width, height, renderer.GetBackground()
+        if now == self._laid_out:
+            return
+        self._laid_out = now
+        size = int(np.clip(height / 42, 11, 30))  # pixels; VTK's are as large at 72 dots per inch
+        points = max(6, round(size * 72 / (renderer.GetRenderWindow().GetDPI() or 72)))
+        for k, actor in enumerate(self._lines):
+            style = actor.GetTextProperty()
+            style.SetFontSize(points)
+            style.SetFrameWidth(size // 6)
+            if not style.GetFrame():
+                style.SetBackgroundColor(*now[2])
+            style.SetColor(*_ink_on(style.GetBackgroundColor()))
+            actor.SetPosition(0.6 * size, height - 1.7 * size * (k + 1.2))
+        wide = min(max(0.12, 7.0 * size / width), 0.5)
+        self._bar.SetPosition(0.99 - wide, 0.25)
+        self._bar.SetWidth(wide)
+        for style in (self._bar.GetTitleTextProperty(), self._bar.GetAnnotationTextProperty()):
+            style.SetFontSize(points)
+            style.SetBackgroundColor(*now[2])
+            style.SetBackgroundOpacity(_GROUND)
+            style.SetColor(*_ink_on(now[2]))
+
+
+def signed(number: float, digits: int) -> str:
+    """Write "+2.5", "-10" or "0": no needless zeros, and no sign where there is nothing.
+
+    >>> signed(2.5, 1), signed(-10.0, 1), signed(-0.01, 1)
+    ('+2.5', '-10', '0')
+    """
+    rounded = round(number, digits)
+    return f"{rounded:+.{digits}f}".removesuffix(".0") if rounded else "0"
+
+
+def brief(name: str, place: str) -> str:
+    """Return a name that takes no more of a view than it may, or *place*, if VTK lacks letters.
+
+    >>> brief("the lower half of the left arm", "region 1"), brief("左腕", "region 2")
+    ('the lower half of the ...', 'region 2')
+    """
+    if any(ord(letter) > _LATIN and letter not in _SIGNS for letter in name):
+        return place
+    return name if len(name) <= _LETTERS else f"{name[: _LETTERS - 3].rstrip()} ..."
+
+
+def precise(share: float) -> str:
+    """Write a share in per cent, or with its power of ten where that would read as nothing.
+
+    >>> precise(0.025), precise(2e-16), precise(0.0)
+    ('+2.5 %', '+2.0e-16', '0 %')
+    """
+    return f"{signed(100.0 * share, 1)} %" if abs(share) >= 1e-3 or not share else f"{share:+.1e}"
+
+
+def _scalar_bar(title: str) -> Any:
+    bar = vtkScalarBarActor()
+    bar.SetTitle(title)
+    bar.SetPosition(0.86, 0.25)
+    bar.SetWidth(0.12)
+    bar.SetHeight(0.5)
+    bar.UnconstrainedFontSizeOn()
+    bar.SetMaximumNumberOfColors(255)
+    bar.SetVerticalTitleSeparation(8)
+    # Ticks are annotations: VTK's number formats cannot write "+20 %", "0" and "-20 %" alike.
+    bar.DrawTickLabelsOff()
+    bar.DrawAnnotationsOn()
+    for style in (bar.GetTitleTextProperty(), bar.GetAnnotationTextProperty()):
+        style.ItalicOff()
+        style.BoldOff()
+        style.ShadowOff()
+    return bar
+
+
+def _annotated_table(half_range: float) -> Any:
+    table = lookup_table(half_range)
+    for share in np.linspace(-half_range, half_range, _TICKS):
+        percent = signed(100.0 * float(share), 1 if half_range >= 0.01 else 3)
+        table.SetAnnotation(float(share), percent if percent == "0" else f"{percent} %")
+    return table
+
+
+def _ink_on(colour: Any) -> FloatArray:
+    """Return the one of dark and white that is read better on *colour*."""
+    dark = np.dot(colour, [0.2126, 0.7152, 0.0722]) < 0.45
+    return np.asarray(rgb(PAPER if dark else INK) / 255.0)

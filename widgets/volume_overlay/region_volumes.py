@@ -1,0 +1,67 @@
+"""How the volume of each region of a session has changed, for people to read.
+
+A region is closed at its border as in `vtk_segdeform.solver.volume_constraints`; the change is
+(V - V0) / V0.
+"""
+
+from __future__ import annotations
+
+from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.regions import Regions
+from vtk_segdeform.session import Session
+from vtk_segdeform.solver import VolumeConstraint, region_volumes
+
+
+class RegionVolumes:
+    """The volumes of the regions of one session, whatever its regions and its pose become.
+
+    Parameters
+    ----------
+    session : Session
+        Whose; it is only read.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._volumes: tuple[Regions, list[tuple[int, VolumeConstraint]]] | None = None
+
+    def changes(self) -> list[tuple[int, float]]:
+        """Return the number of each region that owns a face, and its (V - V0) / V0.
+
+        Nothing where there is one region, whose volume is the whole.
+        """
+        session = self._session
+        owned = self._owned()
+        if not owned:
+            return []
+        owners, volumes = zip(*owned, strict=True)
+        if session.state.pose is None:
+            return [(owner, 0.0) for owner in owners]
+        if session.solution is not None:  # the solver has them already
+            shares = session.solution.region_volume_change.tolist()
+        else:
+            x = session.vertices
+            shares = [volume.violation(x) / volume.target for volume in volumes]
+        return list(zip(owners, shares, strict=True))
+
+    def prepare(self) -> None:
+        """Do ahead of time what the first `changes` would have to wait for."""
+        self._owned()
+
+    def _owned(self) -> list[tuple[int, VolumeConstraint]]:
+        mesh, regions = self._session.mesh, self._session.regions
+        if regions is None or regions.n_regions == 1:
+            return []
+        if self._volumes is None or self._volumes[0] is not regions:
+            self._volumes = regions, _owned_volumes(mesh, regions)
+        return self._volumes[1]
+
+
+def _owned_volumes(mesh: Mesh, regions: Regions) -> list[tuple[int, VolumeConstraint]]:
+    """Return the volume of each region that owns a face, with the region's number."""
+    labels = regions.labels
+    owned = []
+    for volume in region_volumes(mesh, labels):
+        a, b, c = labels[volume.faces[0]].tolist()  # its own, and owned by the rule told there
+        owned.append((b if b == c else a, volume))
+    return owned

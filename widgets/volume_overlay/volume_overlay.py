@@ -1,0 +1,239 @@
+"""The local volume change in colours over the mesh, with a scale, and totals as text.
+
+At each vertex i the share s_i by which the flesh under it has swollen (orange) or been pinched
+(blue) since rest.  The flesh under i are the tetrahedra from the triangles around i to o(i), the
+vertex across from it, where the largest inner ball that touches the skin at i touches it again:
+
+    L_i(x) = sum_{T = (a, b, c) at i} det(x_a - x_o, x_b - x_o, x_c - x_o) / 18
+    s_i(x) = sum_j k_ij L_j(x) / sum_j k_ij L_j(rest) - 1
+
+with k a smoothing over the surface.  s is 0 under any rigid motion, and is then one colour to the
+last pixel.  `vtk_segdeform.geometry.local_volume` computes it, and only while it is shown.
+
+The text tells, from top to bottom: (V - V0) / V0 of the whole mesh; the least and the largest s;
+(V - V0) / V0 of each region, closed at its border as in
+`vtk_segdeform.solver.volume_constraints`; the steps of the last solve, and the time from the event
+that changed the pose to the end of drawing it.
+
+Source
+------
+The vertices o(i): J. Ma, S. W. Bae, S. Choi, "3D medial axis point approximation using nearest
+neighbors and the normal field", The Visual Computer 28, 2012.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from vtk_segdeform.arrays import FloatArray, is_number
+from vtk_segdeform.checks import require, shown
+from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.freezing import read_only
+from vtk_segdeform.geometry import LocalVolume
+from vtk_segdeform.session import Change, Session, called
+
+from ..scene import Stop, SurfaceDisplay, View
+from .diverging import colours_of, half_range_for
+from .legend import Legend, brief, precise, signed
+from .region_volumes import RegionVolumes
+
+_LAYER = "volume"
+_OF_REGIONS = Change.REGIONS | Change.NAMES
+_FIRST = 100.0  # priority: hears of an event before whoever changes the pose in it
+_MOST_REGIONS = 8  # more lines would cover the mesh
+_SOFT = 0.55, 0.45, 0.0  # ambient, diffuse, specular light: shadows are not to pass for values
+
+
+class VolumeOverlay:
+    """Colours, scale and text over a mesh; hidden until `show`.
+
+    Parameters
+    ----------
+    view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
+        Where to draw.
+    session : Session
+        Whose pose.
+    surface : SurfaceDisplay, optional
+        The mesh to colour, of the same session; without it there is one of its own.
+    """
+
+    def __init__(self, view: Any, session: Session, surface: SurfaceDisplay | None = None) -> None:
+        self.view = View.of(view)
+        self.session = require(session, Session, "session")
+        if surface is not None:
+            require(surface, SurfaceDisplay, "surface")
+        self._own_surface = surface is None
+        self._surface = SurfaceDisplay(self.view, session) if surface is None else surface
+        self._legend = Legend(self.view, "local volume")
+        self._clock = _FrameClock(self.view)
+        self._local: LocalVolume | None = None
+        self._regions = RegionVolumes(session)
+        self._change: FloatArray | None = None
+        self._half_range: float | None = None
+        self._wanted_range: float | None = None
+        self._light = _SOFT
+        self._stop: Stop | None = None
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether it is to be seen."""
+        return self._stop is not None
+
+    @property
+    def change(self) -> FloatArray | None:
+        """(n,) float: s of the pose that is shown; None while hidden."""
+        return self._change
+
+    @property
+    def half_range(self) -> float | None:
+        """The share at the ends of the scale; None while hidden."""
+        return self._half_range
+
+    @property
+    def wanted_range(self) -> float | None:
+        """The share that is to be at the ends of the scale; None, as at first, chooses.
+
+        Can be set to a number above 0; anything else raises an ArgumentError.
+        """
+        return self._wanted_range
+
+    @wanted_range.setter
+    def wanted_range(self, share: float | None) -> None:
+        if share is not None and not (is_number(share) and share > 0.0):
+            raise ArgumentError(
+                f"wanted_range must be a share above 0, or None; got {shown(share)}"
+            )
+        if share != self._wanted_range:
+            self._wanted_range, self._half_range = share, None
+            if self._change is not None:
+                self._show(self._change)
+
+    @property
+    def is_prepared(self) -> bool:
+        """Whether `prepare` is done, so that `show` takes no longer than drawing."""
+        return self._local is not None
+
+    def prepare(self) -> None:
+        """Do ahead of time what the first `show` would have to wait for.
+
+        It depends on the mesh and its regions alone and draws nothing: another thread may do it.
+        """
+        self._prepared()
+        self._regions.prepare()
+
+    def show(self) -> None:
+        """Show it, and keep it up to date."""
+        if not self.is_shown:
+            self._stop = self.session.on_change(self._changed)
+            self._clock.start()
+            self._swap_light()
+            self._update()
+
+    def hide(self) -> None:
+        """Take it out of the view; nothing more is computed."""
+        if self._stop is None:
+            return
+        self._stop()
+        self._stop = self._change = self._half_range = None
+        self._clock.stop()
+        self._legend.hide()
+        self._swap_light()
+        self._surface.set_colours(_LAYER, None)
+
+    def remove(self) -> None:
+        """Take everything out of the view, for good."""
+        self.hide()
+        if self._own_surface:
+            self._surface.remove()
+
+    def _prepared(self) -> LocalVolume:
+        self._local = self._local or LocalVolume(self.session.mesh)
+        return self._local
+
+    def _changed(self, change: Change) -> None:
+        if change & Change.POSE:
+            self._clock.note()
+            self._update()
+        elif change & _OF_REGIONS and self._change is not None and self._half_range is not None:
+            self._legend.show(self._half_range, self._lines(self._change))
+            self.view.touch()
+
+    def _update(self) -> None:
+        self._change = read_only(self._prepared().change(self.session.vertices))
+        self._show(self._change)
+
+    def _show(self, change: FloatArray) -> None:
+        self._half_range = self._wanted_range or half_range_for(change, self._half_range)
+        self._legend.show(self._half_range, self._lines(change))
+        self._surface.set_colours(_LAYER, colours_of(change, self._half_range))
+
+    def _swap_light(self) -> None:
+        """Give the surface the soft light and keep its own, or the other way round."""
+        skin, light = self._surface.actor.GetProperty(), self._light
+        self._light = skin.GetAmbient(), skin.GetDiffuse(), skin.GetSpecular()
+        skin.SetAmbient(light[0])
+        skin.SetDiffuse(light[1])
+        skin.SetSpecular(light[2])
+
+    def _lines(self, change: FloatArray) -> list[tuple[str, int | None]]:
+        low, high = (signed(100.0 * float(share), 0) for share in (change.min(), change.max()))
+        lines: list[tuple[str, int | None]] = [
+            (f"volume: {precise(self.session.volume_change)}", None),
+            (f"local: {low} to {high} %", None),
+        ]
+        regions = self._regions.changes()
+        lines += [
+            (f"{self._name(region)}: {signed(100.0 * share, 1)} %", region)
+            for region, share in regions[:_MOST_REGIONS]
+        ]
+        if len(regions) > _MOST_REGIONS:
+            lines.append((f"and {len(regions) - _MOST_REGIONS} regions more", None))
+        solution, seconds = self.session.solution, self._clock.seconds
+        work = [f"{solution.steps} step{'s' * (solution.steps != 1)}"] if solution else []
+        work += [f"{1000.0 * seconds:.0f} ms a frame"] if seconds is not None else []
+        return lines + [(", ".join(work), None)] if work else lines
+
+    def _name(self, region: int) -> str:
+        return brief(self.session.region_name(region), called((), region))
+
+
+class _FrameClock:
+    """How long the last change of the pose took, from the event it came by to its picture."""
+
+    def __init__(self, view: View) -> None:
+        self.seconds: float | None = None
+        self._posed = False
+        self._view = view
+        self._began: float | None = None
+        self._stops: list[Stop] = []
+
+    def start(self) -> None:
+        """Wait for events."""
+        window = self._view.window
+        events = ("MouseMoveEvent", "TimerEvent")
+        self._stops = [self._view.observe(event, self._begin, _FIRST) for event in events]
+        if window is not None:
+            tag = window.AddObserver("EndEvent", self._end)
+            self._stops.append(lambda: window.RemoveObserver(tag))
+
+    def note(self) -> None:
+        """Note that the pose has changed, by the event in hand or, untimed, by a script."""
+        self._posed = True
+        if self._began is None:
+            self.seconds = None
+
+    def stop(self) -> None:
+        """Wait no more, and forget."""
+        for stop in self._stops:
+            stop()
+        self._stops, self.seconds, self._began = [], None, None
+
+    def _begin(self) -> bool:
+        self._began, self._posed = time.perf_counter(), False
+        return False
+
+    def _end(self, *_: object) -> None:
+        if self._posed and self._began is not None:
+            self.seconds = time.perf_counter() - self._began
+        self._began, self._posed = None, False
