@@ -15,8 +15,12 @@ from vtk_segdeform.cages.fit import fit_cage, fit_cages
 from vtk_segdeform.cages.region_solid import Patch, Skin, _filled, principal_axes
 from vtk_segdeform.cages.simplify import roundness, simplify
 from vtk_segdeform.errors import CageError, Cancelled, RegionError
-from vtk_segdeform.mesh.columns import inside_nodes, inside_points
-from vtk_segdeform.mesh.inside import distance_to_surface, winding_number
+from vtk_segdeform.mesh.inside import (
+    distance_to_surface,
+    inside_nodes,
+    inside_points,
+    winding_number,
+)
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
 

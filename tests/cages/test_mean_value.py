@@ -223,7 +223,7 @@ def test_no_points_give_no_rows():
 
 def test_an_open_cage_is_refused():
     vertices, faces = OCTAHEDRON
-    with pytest.raises(CageError, match="3 edges border one face only"):
+    with pytest.raises(CageError, match="3 edges border only one face"):
         mean_value_coordinates([[0, 0, 0]], vertices, faces[1:])
 
 

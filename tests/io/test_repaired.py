@@ -127,7 +127,7 @@ def test_a_flipped_polygon_stays_a_polygon_with_flipped_corners():
     surface.cell_data.active_normals_name = "Normals"
     fixed, done = repair_surface(surface)
     assert done.report.ok
-    assert done.steps == ("turn 4 faces round to agree with the neighbours",)
+    assert done.steps == ("flip 4 faces to agree with the neighbours",)
     assert np.flatnonzero(done.face_turned).size == 4
     assert (polygons_of(fixed)[0] == 4).all()
     assert same_corners(surface, fixed) == 0
@@ -149,7 +149,7 @@ def test_a_polygon_that_loses_a_part_becomes_triangles_and_is_reported():
     closed, done = repair_surface(double)
     assert done.report.ok
     assert done.steps == (
-        "drop 1 duplicate face", "cut 1 polygon into triangles where the repair changed a part",
+        "remove 1 duplicate face", "cut 1 polygon into triangles where the repair changed a part",
     )  # fmt: skip
     counts = polygons_of(closed)[0]
     assert sorted(counts)[:3] == [3, 3, 4]

@@ -28,7 +28,7 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..kernels import in_parallel
-from ..mesh import Mesh, count_up, inside_nodes
+from ..mesh import Mesh, inside_nodes, ragged_arange
 
 _STEPS_PER_OFFSET = 1.5  # at least: every point of S then has a node within the offset surface
 _MARGIN = 3.7183  # steps from the offset surface to the end; odd, so that no extreme is on a tie
@@ -241,7 +241,7 @@ def _samples(triangles: FloatArray) -> FloatArray:
     height = np.linalg.norm(np.cross(b - a, c - a), axis=1) / base
     rows = np.ceil(height / _SPACING).astype(np.int64) + 1
     columns = np.ceil(base / _SPACING).astype(np.int64) + 1
-    t, k = count_up(rows * columns)
+    t, k = ragged_arange(rows * columns)
     up = (k // columns[t] / np.maximum(rows - 1, 1)[t])[:, None]
     along = (k % columns[t] / np.maximum(columns - 1, 1)[t])[:, None]
     return np.asarray((1 - up) * ((1 - along) * a[t] + along * b[t]) + up * c[t])
