@@ -1,8 +1,8 @@
-"""A surface in parts of equal area with short borders, where it has no limbs to tell them apart.
+"""Slicing of a surface without limbs into parts of equal area with short borders.
 
-A surface for q parts is cut into two, for q // 2 parts and the rest, along the shortest level set
-that leaves the right area on each side, and each side likewise.  Level sets of the distance from
-the ends of a surface run across it, so a tube comes apart in rings.
+A surface for q parts is cut into two sides, for q // 2 parts and the rest, along the shortest level
+set with the right area on each side, and each side recursively.  Level sets of the distance from
+the ends of a surface run across it, so a tube is cut into rings.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ import numpy as np
 from ..arrays import BoolArray, FloatArray, IntArray
 from .coarse import Surface
 
-_TOLERANCE = 0.15  # by which a side may miss its area
+_TOLERANCE = 0.15  # relative error of the area of a side
 
 
 def quotas(areas: FloatArray, points: IntArray, count: int) -> IntArray:
-    """Return how many of *count* parts each surface is cut into: in proportion, at least one each.
+    """Return the number of parts of each surface, *count* in total: by area, at least one each.
 
-    The next part goes to the surface whose parts are largest so far, if it has *points* enough.
+    Each further part goes to the surface whose parts are largest so far, if it has enough *points*.
     """
     quota = np.ones(len(areas), dtype=np.int64)
     heap = [(-area, k) for k, area in enumerate(areas) if points[k] > 1]
@@ -34,14 +34,14 @@ def quotas(areas: FloatArray, points: IntArray, count: int) -> IntArray:
 
 
 def fair_slice(part: Surface, rim: FloatArray, fraction: float) -> BoolArray:
-    """Return (k,) bool: a side of the surface with about *fraction* of its area.
+    """Return a side of the surface with about *fraction* of its area, (k,) bool.
 
     Parameters
     ----------
     part : Surface
-        Connected, two points or more.
+        Connected, at least two points.
     rim : (k,) float
-        Length of older cuts at each point.
+        Length of earlier cuts at each point.
     fraction : float
         Between 0 and 1.
 
