@@ -1,4 +1,4 @@
-"""Polygons and arrays that a repaired surface keeps, and the report of the others."""
+"""Polygons and arrays that a repaired surface keeps, and the report of losses."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ N = 4
 
 
 def box(drop=(), turn=()):
-    """Return a cube of N by N quads per side, with some dropped and others flipped."""
+    """Return a cube of N by N quads per side, with some removed and others flipped."""
     grid = pv.ImageData(dimensions=(N + 1,) * 3).extract_surface(algorithm=None)
     grid = grid.clean()
     quads = polygons_of(grid)[1].reshape(-1, 4)
@@ -81,7 +81,7 @@ def test_polygons_and_arrays_of_kept_faces_are_kept():
     assert_array_equal(done.vertex_map[corners[: 4 * kept]], polygons_of(surface)[1])
     there = np.flatnonzero(done.vertex_map >= 0)
     was = done.vertex_map[there]
-    assert len(there) == surface.n_points - 1  # the corner of four quads that were not there
+    assert len(there) == surface.n_points - 1  # the corner of four missing quads
     for name in ("number", "RGB", "TextureCoordinates"):
         assert_array_equal(closed.point_data[name][there], surface.point_data[name][was])
         assert closed.point_data[name].dtype == surface.point_data[name].dtype
@@ -143,7 +143,7 @@ def test_a_polygon_that_loses_a_part_becomes_triangles_and_is_reported():
     surface = box()
     points, (counts, corners) = np.asarray(surface.points), polygons_of(surface)
     triangles, quad = cut_into_triangles(points, counts, corners)
-    extra = triangles[quad == 7][0]  # comes first, so that the triangle of the quad is dropped
+    extra = triangles[quad == 7][0]  # first, so that the triangle of the quad is the duplicate
     double = polydata_of(points, np.append(3, counts), np.append(extra, corners))
     double.cell_data["material"] = np.arange(double.n_cells)
     closed, done = repair_surface(double)
@@ -177,8 +177,8 @@ def test_strips_and_loose_cells_are_reported():
     closed, done = repair_surface(strip)
     assert done.report.ok
     assert_array_equal(closed.cell_data["tag"], [8, 8, 0, 0])
-    for told in ("drop 1 vertex cell", "drop 1 line", "cut 1 strip into triangles"):
-        assert told in done.steps
+    for step in ("remove 1 vertex cell", "remove 1 line", "cut 1 strip into triangles"):
+        assert step in done.steps
 
 
 def test_the_accessor_repairs_a_copy_and_logs_each_step(caplog):

@@ -95,7 +95,7 @@ def of_textures(surface):
     return surface.active_texture_coordinates is not None
 
 
-class Told(logging.Handler):
+class Warnings(logging.Handler):
     """Collects the warnings of the package while it writes."""
 
     def __init__(self, path, surface):
@@ -124,7 +124,7 @@ class Told(logging.Handler):
 
 def lost_in(path, surface):
     """Write, read, and return a description of everything that is neither the same nor reported."""
-    told = Told(path, surface)
+    warnings = Warnings(path, surface)
     again = read_polydata(path)
     assert_array_equal(again.points, surface.points)
     assert_array_equal(again.faces, surface.faces)
@@ -134,22 +134,22 @@ def lost_in(path, surface):
         mine, theirs = getattr(surface, f"{sort}_data"), getattr(again, f"{sort}_data")
         for name in list(mine):
             values = np.asarray(mine[name])
-            if told.left_out(sort, name):
+            if warnings.left_out(sort, name):
                 continue
-            other = theirs.get(told.written(f"{sort} array", name))
+            other = theirs.get(warnings.written(f"{sort} array", name))
             if sort == "point" and name == texture and other is None:
                 other = again.active_texture_coordinates
-                if other is None:  # all vertices have a place, but so have all corners
+                if other is None:  # per vertex or per corner, both are valid
                     continue
                 values = values[:, :2]
             if other is None or not equal(
-                path, surface, again, name, values, np.asarray(other), told
+                path, surface, again, name, values, np.asarray(other), warnings
             ):
-                wrong.append(f"{sort} {name!r} {values.dtype}{values.shape}: {told.texts}")
+                wrong.append(f"{sort} {name!r} {values.dtype}{values.shape}: {warnings.texts}")
     return wrong
 
 
-def equal(path, surface, again, name, values, other, told):
+def equal(path, surface, again, name, values, other, warnings):
     """Return whether an array was read back: groups by name, corners where there are any."""
     counts = polygons_of(surface)[0]
     if name == "TextureCorners" and path.suffix in (".ply", ".obj"):
@@ -159,7 +159,7 @@ def equal(path, surface, again, name, values, other, told):
             return theirs is not None and np.array_equal(mine.astype(kind), theirs.astype(kind))
     if name in ("Object", "Group", "Material") and path.suffix == ".obj":
         names, others = get_names(surface, f"{name}Names"), get_names(again, f"{name}Names")
-        mine = [told.written(name.lower(), names[int(k)]) for k in values]
+        mine = [warnings.written(name.lower(), names[int(k)]) for k in values]
         return mine == [others[k] for k in other]
     return np.array_equal(values, other)
 
@@ -187,14 +187,14 @@ def test_every_special_name_is_read_back_or_losses_are_reported(tmp_path, suffix
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".obj"])
-def test_arrays_of_a_surface_with_points_lines_and_strips_stay_with_their_cells(tmp_path, suffix):
+def test_cell_arrays_follow_their_cells_beside_points_lines_and_strips(tmp_path, suffix):
     strips = triangles(*CUBE).strip()
     mixed = prism(4)
     mixed.verts, mixed.lines, mixed.strips = [1, 0, 1, 1], [2, 0, 1], strips.strips
     mixed.cell_data["Group"] = np.arange(mixed.n_cells)
     set_names(mixed, "GroupNames", map(str, range(mixed.n_cells)))
-    told = Told(tmp_path / f"a{suffix}", mixed)
-    assert any("2 vertex cells, 1 line cell: left out" in text for text in told.texts)
+    warnings = Warnings(tmp_path / f"a{suffix}", mixed)
+    assert any("2 vertex cells, 1 line cell: left out" in text for text in warnings.texts)
     again = read_polydata(tmp_path / f"a{suffix}")
     assert again.n_cells == 6 + 12
     names = get_names(again, "GroupNames")
@@ -210,7 +210,7 @@ def test_arrays_of_a_surface_with_points_lines_and_strips_stay_with_their_cells(
 def test_pymeshlab_reads_the_same_surface(tmp_path, suffix, surface):
     pymeshlab = pytest.importorskip("pymeshlab")
     counts, _ = polygons_of(surface)
-    if suffix == ".ply" and counts.max() > 255:  # its own limit, and it is said
+    if suffix == ".ply" and counts.max() > 255:  # its own limit, with a warning
         return
     if suffix == ".stl":
         surface = surface.triangulate()

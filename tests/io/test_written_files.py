@@ -1,4 +1,4 @@
-"""All functions that write a file keep its mode, follow links, refuse pipes and lose no data."""
+"""All functions that write files keep modes, follow links, reject pipes and never lose data."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def name(request):
     return request.param
 
 
-def test_the_mode_is_kept_and_a_link_stays_a_link(tmp_path, name):
+def test_the_mode_and_links_are_kept(tmp_path, name):
     there = tmp_path / "there"
     there.mkdir()
     path, link = there / name, tmp_path / name
@@ -64,7 +64,7 @@ def test_the_mode_is_kept_and_a_link_stays_a_link(tmp_path, name):
     assert os.listdir(there) == [name]
 
 
-def test_anything_but_a_regular_file_is_one_of_our_errors_and_named(tmp_path, name):
+def test_anything_but_a_regular_file_is_an_error_that_names_it(tmp_path, name):
     path = tmp_path / name
     for make in (os.mkfifo, os.mkdir, lambda path: os.symlink(name, path)):
         make(path)
@@ -78,7 +78,7 @@ def test_anything_but_a_regular_file_is_one_of_our_errors_and_named(tmp_path, na
 
 
 @pytest.mark.parametrize("fault", [errno.ENOSPC, errno.EACCES])
-def test_a_failure_is_one_of_our_errors_and_the_old_file_is_kept(
+def test_a_failure_is_an_error_of_the_package_and_keeps_the_old_file(
     tmp_path, monkeypatch, name, fault
 ):
     def refused(*_):
@@ -107,7 +107,7 @@ def test_a_picture_has_the_pixels_it_was_given(tmp_path):
         assert np.array_equal(np.asarray(image), pixels)
 
 
-def test_projects_with_too_many_or_too_large_layers_are_refused_at_once(tmp_path, monkeypatch):
+def test_projects_with_too_many_or_too_large_layers_are_errors_at_once(tmp_path, monkeypatch):
     path = tmp_path / "work.mlp"
     write_project(path, MESH)
     (layer,) = (tmp_path / "work.layers").iterdir()
