@@ -145,7 +145,7 @@ def test_a_pose_may_be_inside_out():
 
 def test_a_pose_must_be_finite_and_have_the_same_number_of_vertices():
     mesh = Mesh(*CUBE)
-    with pytest.raises(ValueError, match="vertices holds 1 points with NaN"):
+    with pytest.raises(ValueError, match="vertices must be finite; 1 of 8 points have NaN"):
         mesh.with_vertices(np.where(np.arange(8)[:, None] == 2, np.nan, mesh.vertices))
     with pytest.raises(ValueError, match=r"vertices must have shape \(8, 3\); got \(7, 3\)"):
         mesh.with_vertices(mesh.vertices[:7])

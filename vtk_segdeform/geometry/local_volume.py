@@ -121,7 +121,7 @@ class _Volumes:
         apex = x[self._opposite]
         volumes = np.asarray(sums[:, 3] - np.einsum("ij,ij->i", apex, sums[:, :3])) / 18.0
         for _ in range(self._rounds):
-            volumes = self._average @ volumes
+            volumes = np.asarray(self._average @ volumes)
         return np.asarray(volumes)
 
 
