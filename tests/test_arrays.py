@@ -71,7 +71,7 @@ def test_ids_keep_their_order_and_a_mask_becomes_ids():
         ([1, 2, 1], "fixed contains a vertex twice"),
         (np.ma.array([1, 2], mask=[0, 1]), "fixed has masked entries"),
         ([0.5], "fixed must hold vertex numbers or be a mask; got float64"),
-        ([[0, 1]], r"fixed must be one row of vertex numbers; got shape \(1, 2\)"),
+        ([[0, 1]], r"fixed must be a list of vertex numbers; got shape \(1, 2\)"),
         ([True, False], r"fixed, a mask, must have shape \(5,\); got \(2,\)"),
     ],
 )

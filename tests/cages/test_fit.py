@@ -12,7 +12,7 @@ from vtk_segdeform.cages import fit
 from vtk_segdeform.cages.cage import Cage, cage_faults
 from vtk_segdeform.cages.contour import contour_surface
 from vtk_segdeform.cages.fit import fit_cage, fit_cages
-from vtk_segdeform.cages.region_solid import Patch, Skin, _filled, principal_axes
+from vtk_segdeform.cages.region_solid import Patch, Surface, _filled, principal_axes
 from vtk_segdeform.cages.simplify import roundness, simplify
 from vtk_segdeform.errors import CageError, Cancelled, RegionError
 from vtk_segdeform.mesh.inside import (
@@ -65,11 +65,11 @@ def around(mesh, rings):
 def assert_holds(cage, mesh, members):
     # `Cage` has checked that it is closed, outward and without self-intersections.
     assert (winding_number(mesh.vertices[members], cage.vertices, cage.faces) > 0.99).all()
-    assert distance_to_skin(cage, mesh, members).min() > 1e-4 * np.ptp(cage.vertices, axis=0).max()
+    assert distance_to_cage(cage, mesh, members).min() > 1e-4 * np.ptp(cage.vertices, axis=0).max()
     assert roundness(cage.vertices, cage.faces).min() > 0.05
 
 
-def distance_to_skin(cage, mesh, members):
+def distance_to_cage(cage, mesh, members):
     return distance_to_surface(mesh.vertices[members], cage.vertices, cage.faces)
 
 
@@ -103,7 +103,7 @@ def test_a_cage_has_the_requested_offset():
     mesh = Mesh(*icosphere(3))
     for offset in (0.1, 0.3):
         cage = fit_cage(mesh, np.arange(mesh.n_vertices), 100, offset=offset)
-        gap = distance_to_skin(cage, mesh, slice(None))
+        gap = distance_to_cage(cage, mesh, slice(None))
         assert gap.min() > 0.4 * offset
         assert gap.max() < 2.0 * offset
         assert gap.mean() == pytest.approx(offset, rel=0.35)
@@ -175,10 +175,10 @@ def test_the_last_resort_is_an_ellipsoid_and_logs_one_warning(mesh, monkeypatch,
 
 @pytest.mark.parametrize("n", [4, 5, 8, 50])
 def test_the_ellipsoid_of_a_patch_is_a_cage_around_it(mesh, n):
-    patch = Patch.of(Skin.of(mesh), around(mesh, 2))
+    patch = Patch.of(Surface.of(mesh), around(mesh, 2))
     cage = Cage(*patch.ellipsoid(n))
     assert cage.n_vertices == n
-    assert cage.contains(patch.skin.points[patch.weights > 0]).all()
+    assert cage.contains(patch.surface.points[patch.weights > 0]).all()
 
 
 def test_invalid_arguments_are_errors():
@@ -256,7 +256,7 @@ def test_cages_of_a_real_mesh_are_valid_and_tight(name):
     assert sum(cage.n_vertices for cage in cages) == 200
     for cage, members in zip(cages, regions.membership, strict=True):
         assert_holds(cage, mesh, members)
-        assert distance_to_skin(cage, mesh, members).mean() < 0.03 * mesh.diagonal
+        assert distance_to_cage(cage, mesh, members).mean() < 0.03 * mesh.diagonal
 
 
 def test_simplifying_a_rough_surface_inverts_no_face():

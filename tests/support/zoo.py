@@ -339,7 +339,8 @@ def _tetrahedron() -> Soup:
 CAGES = [
     Creature("snug", ball),
     Creature("4 vertices", _tetrahedron),
-    Creature("2000 vertices", lambda: _sphere(2000)),
+    Creature("1600 vertices", lambda: _sphere(1600)),
+    Creature("2000 vertices", lambda: _sphere(2000), "the limit of the solver is"),
     Creature("ten times as large", lambda: ball(10.0)),
     Creature("almost on the skin, 1e-6", lambda: moved(body(), 1.0 + 1e-6)),
     Creature("a part of it far away", lambda: joined(ball(), ball(0.2, [9.0, 0, 0]))),
@@ -357,7 +358,7 @@ CAGES = [
     Creature("flat", lambda: moved(ball(), [1.0, 1.0, 0.0]), "cross|no area|touch"),
     Creature("the body in its cavity", lambda: joined(ball(3.0), flipped(ball())), "outside"),
     Creature("NaN", lambda: moved(ball(), [1.0, np.nan, 1.0]), "NaN"),
-    Creature("empty", lambda: (np.empty((0, 3)), np.empty((0, 3), int)), "needs 4 faces|no surface"),
+    Creature("empty", lambda: (np.empty((0, 3)), np.empty((0, 3), int)), "needs at least 4 faces|no surface"),
     Creature("faces of another", lambda: (ball()[0], body()[1]), "must index|use vertices"),
     Creature("words", lambda: (ball()[0].astype(str), ball()[1]), "must hold numbers", but={"cage in a pipeline": None}),
     Creature("huge, 1e200", lambda: ball(1e200), "too large to compute"),
@@ -403,8 +404,8 @@ HELD = [  # (fixed, handle)
     Creature("a mask too short", lambda: (LEFT, np.ones(5, bool)), "mask", but={"held in a pipeline": "both fixed and handle"}),
     Creature("NaN", lambda: ([np.nan], RIGHT), "vertex numbers"),
     Creature("words", lambda: (["a"], RIGHT), "vertex numbers"),
-    Creature("a table", lambda: (LEFT, [[200, 201], [202, 203]]), "one row"),
-    Creature("None", lambda: (None, RIGHT), "vertex numbers"),
+    Creature("a table", lambda: (LEFT, [[200, 201], [202, 203]]), "list of vertex numbers"),
+    Creature("None", lambda: (None, RIGHT), "must be an array"),
     Creature("of 2^63", lambda: (LEFT, np.array([2**63 + 5], np.uint64)), "must index"),
 ]  # fmt: skip
 

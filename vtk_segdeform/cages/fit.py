@@ -32,7 +32,7 @@ from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
 from .cage import MOST_CAGE_VERTICES, Cage, cage_faults
 from .contour import contour_surface
-from .region_solid import Patch, Skin, SolidField, solid_field
+from .region_solid import Patch, SolidField, Surface, solid_field
 from .simplify import roundness, simplify
 
 _OFFSET = 0.4  # of sqrt(area of the region / vertices of its cage)
@@ -49,9 +49,8 @@ _PUSHES, _NEAREST = 30, 200  # rounds; nearest vertices whose exact distance is 
 _CLOSEST, _FARTHEST = 1e-12, 1e6  # limits of the offset, in diagonals of the mesh
 _MEASURED = 0.25  # fraction of the progress for measuring regions
 _SIEVE = 16  # every 16th vertex gives an upper bound for the nearest distances
-_SAMPLES = (
-    np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6.0
-)  # barycentric
+# Barycentric coordinates of samples of a face.
+_SAMPLES = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6.0
 
 _log = logging.getLogger(__name__)
 
@@ -99,10 +98,10 @@ def fit_cages(
     patches, n_regions = [], regions.n_regions
     _require_enough(n_vertices, n_regions)
     tell(progress, 0.0, "measuring regions")
-    skin = Skin.of(mesh)
+    surface = Surface.of(mesh)
     for r, members in enumerate(regions.membership):
         tell(progress, _MEASURED * r / n_regions, "measuring regions")
-        patches.append(Patch.of(skin, members))
+        patches.append(Patch.of(surface, members))
     numbers = _distributed(patches, n_vertices)
     cages = []
     for r, (patch, number) in enumerate(zip(patches, numbers, strict=True)):
@@ -131,7 +130,7 @@ def fit_cage(
     mask[as_ids(members, mesh.n_vertices, "members")] = True
     if not mask.any():
         raise RegionError("members is empty; a cage must enclose at least one vertex")
-    patch = Patch.of(Skin.of(mesh), mask)
+    patch = Patch.of(Surface.of(mesh), mask)
     _require_enough(n_vertices, 1)
     return _fit(patch, n_vertices, offset, progress)
 
@@ -204,7 +203,7 @@ def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) 
         if fault:
             continue
         quality = _quality(vertices, faces, field)
-        valid.append((quality, field.grid.to_points(vertices) + patch.skin.centre, faces))
+        valid.append((quality, field.grid.to_points(vertices) + patch.surface.centre, faces))
         if quality >= 1.0 or len(valid) == 2:
             break
     if valid:
@@ -213,7 +212,7 @@ def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) 
         "no valid cage of %d vertices found for a region (%s); using an ellipsoid instead", n, fault
     )
     vertices, faces = patch.ellipsoid(n)
-    return Cage(vertices + patch.skin.centre, faces)
+    return Cage(vertices + patch.surface.centre, faces)
 
 
 def _fault(vertices: FloatArray, faces: IntArray, field: SolidField, n: int) -> str:

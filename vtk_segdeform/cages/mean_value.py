@@ -132,9 +132,8 @@ def mean_value_coordinates(
         else:
             weights[start:stop] = _weights(cage, local.T).T
 
-    rows = max(
-        16, _BLOCK // faces.size
-    )  # with fewer than 16 rows, calls cost more time than the cache saves
+    # With fewer than 16 rows, calls cost more time than the cache saves.
+    rows = max(16, _BLOCK // faces.size)
     in_parallel(work, len(x), rows, progress=progress, message="mean value coordinates")
     return weights
 

@@ -39,7 +39,7 @@ _SPACING = 0.7  # steps between samples of a face: less than 1, to leave no gaps
 
 
 @dataclass(frozen=True, eq=False)
-class Skin:
+class Surface:
     """The mesh relative to its centre; computed once for all regions."""
 
     points: FloatArray
@@ -49,7 +49,7 @@ class Skin:
     centre: FloatArray
 
     @classmethod
-    def of(cls, mesh: Mesh) -> Skin:
+    def of(cls, mesh: Mesh) -> Surface:
         """Return the data of *mesh*."""
         centre = mesh.vertices.mean(axis=0)
         longest = np.empty(mesh.n_faces)
@@ -72,20 +72,22 @@ class Skin:
 class Patch:
     """The surface of a region: its vertices, and the faces that touch any of them."""
 
-    skin: Skin
+    surface: Surface
     members: BoolArray
     weights: FloatArray  # (n,): area of the touching faces at their corners
     axes: FloatArray  # (3, 3): principal axes as rows, longest first
 
     @classmethod
-    def of(cls, skin: Skin, members: BoolArray) -> Patch:
+    def of(cls, surface: Surface, members: BoolArray) -> Patch:
         """Return the patch of the vertices in the mask *members* (n,)."""
-        touching = members[skin.faces].any(axis=1)
-        corners, thirds = skin.faces[touching].ravel(), skin.face_areas[touching] / 3.0
-        weights = np.zeros(len(skin.points))
+        touching = members[surface.faces].any(axis=1)
+        corners, thirds = surface.faces[touching].ravel(), surface.face_areas[touching] / 3.0
+        weights = np.zeros(len(surface.points))
         weights += np.bincount(corners, np.repeat(thirds, 3), minlength=len(weights))
         around = np.flatnonzero(weights)
-        return cls(skin, members, weights, principal_axes(skin.points[around], weights[around]))
+        return cls(
+            surface, members, weights, principal_axes(surface.points[around], weights[around])
+        )
 
     @property
     def area(self) -> float:
@@ -95,14 +97,14 @@ class Patch:
     @property
     def spread(self) -> FloatArray:
         """(3,) float: standard deviation of the area along each axis."""
-        x = self.skin.points @ self.axes.T
+        x = self.surface.points @ self.axes.T
         mean = self.weights @ x / self.area
         return np.asarray(np.sqrt(self.weights @ (x - mean) ** 2 / self.area))
 
     @property
     def box(self) -> tuple[FloatArray, FloatArray]:
         """Lowest and highest coordinates of the touching faces along the axes, (3,) each."""
-        x = self.skin.points[self.weights > 0.0] @ self.axes.T
+        x = self.surface.points[self.weights > 0.0] @ self.axes.T
         return x.min(axis=0), x.max(axis=0)
 
     def ellipsoid(self, n: int) -> tuple[FloatArray, IntArray]:
@@ -173,7 +175,7 @@ def solid_field(patch: Patch, offset: float, step: float, *, most_nodes: float) 
     *step* is increased if the grid would have more than *most_nodes* nodes, and decreased if the
     offset would have too few steps; if both, the offset is increased.
     """
-    skin, members = patch.skin, patch.members
+    surface, members = patch.surface, patch.members
     low, high = patch.box
     step = min(step, offset / _STEPS_PER_OFFSET)
     while np.prod((high - low + 2 * offset) / step + 2 * _MARGIN + 2) > most_nodes:
@@ -183,13 +185,13 @@ def solid_field(patch: Patch, offset: float, step: float, *, most_nodes: float) 
     nx, ny, nz = (int(k) for k in np.ceil((high - low + 2 * pad) / step) + 1)
     grid = Grid((low - pad) @ patch.axes, patch.axes, step, (nx, ny, nz))
 
-    nodes = grid.to_nodes(skin.points)
-    large = skin.faces[skin.longest > 0.99 * _SPACING * step]  # smaller faces need no samples
+    nodes = grid.to_nodes(surface.points)
+    large = surface.faces[surface.longest > 0.99 * _SPACING * step]  # smaller faces need no samples
     samples = np.concatenate([nodes[members], _samples(nodes[large[members[large].all(axis=1)]])])
-    inside = np.argwhere(inside_nodes(nodes, skin.faces, grid.shape))
+    inside = np.argwhere(inside_nodes(nodes, surface.faces, grid.shape))
     inside = inside[((inside >= pad / step) & (inside <= np.array(grid.shape) - pad / step)).all(1)]
     if not members.all():
-        inside = inside[members[skin.tree.query(grid.to_points(inside))[1]]]
+        inside = inside[members[surface.tree.query(grid.to_points(inside))[1]]]
     distance = _distance(samples, inside, grid.shape)
     smooth = ndimage.gaussian_filter(distance, _BLUR * offset / step, mode="nearest")
     smooth, n_shells = _filled(smooth, offset / step, nodes[members])

@@ -34,9 +34,7 @@ from numpy.typing import NDArray
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..progress import Progress, tell
 
-# Least 4 sqrt(3) area / (sum of squared edges) of a changed face: 1 if equilateral, 0 for a needle.
-# Further values would apply in turn, when no other edge can be collapsed.
-_ROUNDNESS = (0.01,)
+_ROUNDNESS = 0.01  # least `roundness` of a changed face
 _LAMBDA = 0.05
 _STIFFNESS = 0.05  # weight that attracts p to the midpoint of the edge, relative to Q's trace
 _CHEAPEST = 0.3  # fraction of the edges considered in one round
@@ -86,25 +84,24 @@ def simplify(
     surface = _accumulated(vertices, faces)
     left = len(vertices)
     reduction = math.log(max(left / max(n_vertices, 1), 2.0))
-    for roundness in _ROUNDNESS:
-        rejected = np.empty(0, dtype=np.int64)
-        collapsed = 0
-        while left > n_vertices:
-            tell(progress, math.log(len(vertices) / left) / reduction, message)
-            edges, cost, place = _costs(surface)
-            key = edges @ [len(vertices), 1]
-            at = np.searchsorted(key, rejected).clip(max=len(key) - 1)
-            cost[at[key[at] == rejected]] = np.inf
-            chosen = _independent(edges, cost, len(vertices))[: left - n_vertices]
-            if len(chosen):
-                done = _collapse(surface, edges[chosen], place[chosen], roundness)
-                collapsed += int(done.sum())
-                left -= int(done.sum())
-                rejected = np.concatenate([rejected, key[chosen[~done]]])
-            elif collapsed:  # rejected edges may be valid now that their neighbourhoods changed
-                rejected, collapsed = rejected[:0], 0
-            else:
-                break
+    rejected = np.empty(0, dtype=np.int64)
+    collapsed = 0
+    while left > n_vertices:
+        tell(progress, math.log(len(vertices) / left) / reduction, message)
+        edges, cost, place = _costs(surface)
+        key = edges @ [len(vertices), 1]
+        at = np.searchsorted(key, rejected).clip(max=len(key) - 1)
+        cost[at[key[at] == rejected]] = np.inf
+        chosen = _independent(edges, cost, len(vertices))[: left - n_vertices]
+        if len(chosen):
+            done = _collapse(surface, edges[chosen], place[chosen])
+            collapsed += int(done.sum())
+            left -= int(done.sum())
+            rejected = np.concatenate([rejected, key[chosen[~done]]])
+        elif collapsed:  # rejected edges may be valid now that their neighbourhoods changed
+            rejected, collapsed = rejected[:0], 0
+        else:
+            break
     used, numbers = np.unique(surface.faces, return_inverse=True)
     return surface.points[used], numbers.reshape(-1, 3)
 
@@ -194,7 +191,7 @@ def _spread(values: NDArray[Any], i: IntArray, j: IntArray, combine: np.ufunc) -
     return result
 
 
-def _collapse(s: _Surface, edges: IntArray, place: FloatArray, roundness: float) -> BoolArray:
+def _collapse(s: _Surface, edges: IntArray, place: FloatArray) -> BoolArray:
     """Collapse the valid ones of *edges*, and return which were, (k,) bool."""
     owner = np.full(len(s.points), -1)
     owner[edges] = np.arange(len(edges))[:, None]
@@ -217,7 +214,7 @@ def _collapse(s: _Surface, edges: IntArray, place: FloatArray, roundness: float)
     before, old_roundness = _normals(s.points[s.faces[kept]])
     after, new_roundness = _normals(moved[s.faces[kept]])
     of_face = of_corner[kept].max(axis=1)
-    worst = np.full(len(edges), roundness)
+    worst = np.full(len(edges), _ROUNDNESS)
     np.minimum.at(worst, of_face, old_roundness)
     fine = np.einsum("fi,fi->f", before, after) > _TURN
     fine &= new_roundness >= worst[of_face]

@@ -147,7 +147,7 @@ def _point_ids(points: ArrayLike) -> tuple[int, ...]:
         array = np.flatnonzero(array)
     if array.size and (array.ndim > 1 or array.dtype.kind not in "iu"):
         raise ArgumentError(
-            "points must be a list of point indices or a mask; "
+            "points must be a list of vertex numbers or a mask; "
             f"got {array.dtype} of shape {array.shape}"
         )
     return tuple(array.astype(np.int64).ravel().tolist())

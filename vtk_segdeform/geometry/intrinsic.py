@@ -180,9 +180,8 @@ def _flip(h: IntArray, twin: IntArray, corners: IntArray, opposite: FloatArray) 
     h2, t2 = next_half_edge(h1), next_half_edge(t1)
     k, new = corners[h], corners[t]  # new is l
     ij, jk, ki, il, lj = (opposite[each] for each in (h, h1, h2, t1, t2))
-    above = (
-        2.0 * areas(np.stack([ij, jk, ki], axis=1)) / ij
-    )  # both faces unfolded, with i j on the axis
+    # Both faces unfolded, with i j on the axis.
+    above = 2.0 * areas(np.stack([ij, jk, ki], axis=1)) / ij
     below = 2.0 * areas(np.stack([ij, il, lj], axis=1)) / ij
     along = ((ki - jk) * (ki + jk) - (il - lj) * (il + lj)) / (2.0 * ij)
     kl = np.hypot(along, above + below)

@@ -21,10 +21,8 @@ from ..mesh import Mesh
 from .implicit import Limb, standing_body
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # the golden angle, radians
-_MOST, _FINEST = (
-    10_000_000,
-    1000,
-)  # larger hulls or grids take minutes and gigabytes
+# Larger hulls or grids take minutes and gigabytes.
+_MOST, _FINEST = 10_000_000, 1000
 
 
 def cactus(n_vertices: int = 5430) -> Mesh:

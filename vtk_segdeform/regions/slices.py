@@ -55,21 +55,21 @@ def fair_slice(part: Surface, rim: FloatArray, fraction: float) -> BoolArray:
     for d in part.distances_from_ends(rim):
         order = np.argsort(d, kind="stable")
         below = np.cumsum(part.areas[order]) / total
-        for wanted in {fraction, 1.0 - fraction}:
-            count = int(np.clip(np.searchsorted(below, wanted), 1, len(d) - 1))
+        for target in {fraction, 1.0 - fraction}:
+            count = int(np.clip(np.searchsorted(below, target), 1, len(d) - 1))
             t = (d[order[count - 1]] + d[order[count]]) / 2.0
             length = part.level_lengths(part.faces, d, np.array([t]))[0]
-            found.append((length, wanted, order[:count]))
+            found.append((length, target, order[:count]))
     found.sort(key=lambda candidate: candidate[0])
 
     best, least = np.zeros(len(rim), dtype=bool), np.inf
-    for _, wanted, ids in found:
+    for _, target, ids in found:
         inside = np.zeros(len(rim), dtype=bool)
         inside[ids] = True
         inside = part.two_pieces(inside)
-        miss = abs(part.areas[inside].sum() / total - wanted) / min(fraction, 1.0 - fraction)
+        miss = abs(part.areas[inside].sum() / total - target) / min(fraction, 1.0 - fraction)
         if miss < least and not inside.all():
-            best, least = inside if wanted == fraction else ~inside, miss
+            best, least = inside if target == fraction else ~inside, miss
         if least <= _TOLERANCE:
             break
     return best

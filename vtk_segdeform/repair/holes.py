@@ -119,7 +119,7 @@ class _Holes:
         self.size = 0.5 * (edge + edge[before])
         triangles = vertices[half_edges.faces[self.border // 3]]
         angles = np.split(least_angle(triangles), self.start[1:])
-        self.wanted = np.minimum(_ROUND, [float(np.median(some)) for some in angles])
+        self.sufficient = np.minimum(_ROUND, [float(np.median(some)) for some in angles])
         up = normals(triangles)
         self.outer = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-300)
 
@@ -144,7 +144,7 @@ class _Holes:
 def _best_lids(holes: _Holes) -> tuple[Lids, _Scores]:
     """Return the best lids found, and their scores."""
     lids = plain = _least_area(holes)
-    narrow = _least(holes, lids) < holes.wanted
+    narrow = _least(holes, lids) < holes.sufficient
     scores = _scores(holes, lids, lids, ~narrow)  # others count as worse than any refined lid
     again = narrow | (scores.crossings > 0)
     for attempt in (_refined, _clipped, _least_bending, _unrefined):

@@ -18,9 +18,8 @@ def put_patches(x, base, p, vertices, columns, left, right, starts, first, last)
     most = 0
     for t in range(first, last):
         most = max(most, starts[t + 1, 0] - starts[t, 0])
-    sums = np.empty(
-        (3, most + 72)
-    )  # 72: rows whose distance is a power of two would conflict in the cache
+    # 72 more, since rows at a distance of a power of two would conflict in the cache.
+    sums = np.empty((3, most + 72))
     here = np.empty((3, p.shape[1]))
     for t in range(first, last):
         first_row = starts[t, 0]
