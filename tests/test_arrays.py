@@ -1,3 +1,5 @@
+"""Array arguments are converted to plain arrays, or errors name them and the value passed."""
+
 from __future__ import annotations
 
 import tracemalloc
@@ -11,7 +13,7 @@ from vtk_segdeform.arrays import as_faces, as_ids, as_points, frozen
 from vtk_segdeform.errors import ArgumentError
 
 
-def test_points_and_faces_come_out_as_plain_arrays():
+def test_points_and_faces_become_plain_arrays():
     points = as_points([[0, 1, 2], [3, 4, 5]], "points")
     assert points.dtype == np.float64
     assert points.flags.c_contiguous
@@ -25,14 +27,17 @@ def test_points_and_faces_come_out_as_plain_arrays():
     [
         ([1.0, 2.0, 3.0], r"handle must have shape \(n, 3\); got \(3,\)"),
         ([[1.0, 2.0]], r"handle must have shape \(n, 3\); got \(1, 2\)"),
-        ([[0, 0, np.nan], [0, np.inf, 0], [0, 0, 0]], "handle holds 2 points with NaN"),
+        (
+            [[0, 0, np.nan], [0, np.inf, 0], [0, 0, 0]],
+            "handle must be finite; 2 of 3 points have NaN",
+        ),
         ([["a", "b", "c"]], "handle must hold numbers"),
         ([[1, 2, 3], [1, 2]], "handle must be an array; its rows differ in length"),
         ([[1j, 0, 0]], "handle must hold real numbers; got complex128"),
-        (np.ma.array([[1.0, 2.0, 3.0]], mask=[[0, 1, 0]]), "handle holds masked entries"),
+        (np.ma.array([[1.0, 2.0, 3.0]], mask=[[0, 1, 0]]), "handle has masked entries"),
     ],
 )
-def test_bad_points_are_named_and_told_what_came(points, message):
+def test_invalid_points_are_errors_that_show_the_value(points, message):
     with pytest.raises(ValueError, match=message):
         as_points(points, "handle")
 
@@ -46,7 +51,7 @@ def test_bad_points_are_named_and_told_what_came(points, message):
         ([[-1, 1, 2]], r"cage must index 0..5; got -1..2"),
     ],
 )
-def test_bad_faces_are_named_and_told_what_came(faces, message):
+def test_invalid_faces_are_errors_that_show_the_value(faces, message):
     with pytest.raises(ValueError, match=message):
         as_faces(faces, 6, "cage")
 
@@ -63,14 +68,14 @@ def test_ids_keep_their_order_and_a_mask_becomes_ids():
     [
         ([0, 5], r"fixed must index 0..4; got 0..5"),
         ([-1], r"fixed must index 0..4; got -1..-1"),
-        ([1, 2, 1], "fixed names a vertex twice"),
-        (np.ma.array([1, 2], mask=[0, 1]), "fixed holds masked entries"),
+        ([1, 2, 1], "fixed contains a vertex twice"),
+        (np.ma.array([1, 2], mask=[0, 1]), "fixed has masked entries"),
         ([0.5], "fixed must hold vertex numbers or be a mask; got float64"),
-        ([[0, 1]], r"fixed must be one row of vertex numbers; got shape \(1, 2\)"),
+        ([[0, 1]], r"fixed must be a list of vertex numbers; got shape \(1, 2\)"),
         ([True, False], r"fixed, a mask, must have shape \(5,\); got \(2,\)"),
     ],
 )
-def test_bad_ids_are_named_and_told_what_came(ids, message):
+def test_invalid_ids_are_errors_that_show_the_value(ids, message):
     with pytest.raises(ValueError, match=message):
         as_ids(ids, 5, "fixed")
 
@@ -78,7 +83,7 @@ def test_bad_ids_are_named_and_told_what_came(ids, message):
 @pytest.mark.parametrize(
     "kind", ["recursive list", "recursive after rows", "endless", "huge range"]
 )
-def test_endless_sequences_are_refused_at_once_and_without_gigabytes(kind):
+def test_endless_sequences_are_errors_at_once_without_using_memory(kind):
     for values in (BAD[kind](), [BAD[kind]()]):
         tracemalloc.start()
         try:
@@ -89,7 +94,7 @@ def test_endless_sequences_are_refused_at_once_and_without_gigabytes(kind):
             tracemalloc.stop()
 
 
-def test_a_frozen_array_cannot_be_written():
+def test_a_frozen_array_is_read_only():
     array = frozen(np.zeros(3))
     with pytest.raises(ValueError, match="read-only"):
         array[0] = 1.0

@@ -1,4 +1,4 @@
-"""Checks at the public door: every argument becomes a plain array, or an error that names it."""
+"""Validation and conversion of array arguments; errors name the argument."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-_DEEPEST = 4  # nesting levels; numpy recurses without end into a list that contains itself
+_DEEPEST = 4  # nesting levels; numpy recurses infinitely into a list that contains itself
 _LONGEST = 10**8  # entries of a sequence that is converted to an array
 _LARGEST = float(np.finfo(np.float64).max)
 
@@ -34,7 +34,7 @@ def as_points(points: ArrayLike, name: str, count: int | None = None) -> FloatAr
     if not finite.all():
         bad = np.count_nonzero(~finite.all(axis=1))
         raise ArgumentError(
-            f"{name} holds {bad} points with NaN or infinite coordinates; all must be finite"
+            f"{name} must be finite; {bad} of {len(array)} points have NaN or infinite coordinates"
         )
     return np.ascontiguousarray(array, dtype=np.float64)
 
@@ -53,9 +53,9 @@ def as_faces(faces: ArrayLike, n_points: int, name: str) -> IntArray:
 
 
 def as_ids(ids: ArrayLike, n_points: int, name: str) -> IntArray:
-    """Return vertex numbers from a list of ids or from a mask of length *n_points*.
+    """Return vertex indices (k,) from a list of indices or a mask of length *n_points*.
 
-    The order given is kept; a number given twice is an error.
+    The order is kept; repeated indices are an error.
     """
     array = plain(ids, name)
     if array.dtype == bool:
@@ -68,28 +68,28 @@ def as_ids(ids: ArrayLike, n_points: int, name: str) -> IntArray:
         raise ArgumentError(f"{name} must hold vertex numbers or be a mask; got {array.dtype}")
     array = np.atleast_1d(array).astype(np.int64)
     if array.ndim != 1:
-        raise ArgumentError(f"{name} must be one row of vertex numbers; got shape {array.shape}")
+        raise ArgumentError(f"{name} must be a list of vertex numbers; got shape {array.shape}")
     if array.min() < 0 or array.max() >= n_points:
         low, high = array.min(), array.max()
         raise ArgumentError(f"{name} must index 0..{n_points - 1}; got {low}..{high}")
     if len(np.unique(array)) != len(array):
-        raise ArgumentError(f"{name} names a vertex twice; name each once")
+        raise ArgumentError(f"{name} contains a vertex twice; list each vertex once")
     return array
 
 
 def is_number(value: object, least: float = -np.inf) -> bool:
-    """Tell whether *value* is one finite real number, *least* or more."""
+    """Return whether *value* is a finite real number of at least *least*."""
     real = isinstance(value, int | float | np.integer | np.floating)
     return real and least <= value <= _LARGEST and not isinstance(value, bool)  # type: ignore[operator]
 
 
 def is_whole(value: object, least: float, most: float = np.inf) -> bool:
-    """Tell whether *value* is one whole number in *least*..*most*, be it written 4 or 4.0."""
+    """Return whether *value* is an integer in *least*..*most*; 4.0 counts as one."""
     return is_number(value, least) and value <= most and value % 1 == 0  # type: ignore[operator]
 
 
 def frozen(array: NDArray[np.generic]) -> NDArray[np.generic]:
-    """Return *array* marked read-only, so that sharing it is safe."""
+    """Mark *array* as read-only, so that it can be shared, and return it."""
     array.flags.writeable = False
     return array
 
@@ -99,7 +99,7 @@ def as_numbers(values: ArrayLike, name: str) -> FloatArray:
     array = plain(values, name)
     if array.dtype.kind == "c":
         raise ArgumentError(f"{name} must hold real numbers; got {array.dtype}")
-    if array.dtype.kind == "O":  # each entry is checked by the conversion
+    if array.dtype.kind == "O":  # the conversion checks each entry
         try:
             return array.astype(np.float64)
         except Exception as fault:
@@ -110,9 +110,9 @@ def as_numbers(values: ArrayLike, name: str) -> FloatArray:
 
 
 def plain(values: ArrayLike, name: str) -> NDArray[Any]:
-    """Return *values* as an array, nothing left out: a mask over some of them would get lost."""
+    """Return *values* as an array; masked entries are an error, since the mask would be lost."""
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
-        raise ArgumentError(f"{name} holds masked entries; fill them in or leave them out")
+        raise ArgumentError(f"{name} has masked entries; fill or remove them")
     _require_bounded(values, name)
     try:
         array = np.asarray(values)
@@ -130,9 +130,9 @@ def plain(values: ArrayLike, name: str) -> NDArray[Any]:
 
 
 def _require_bounded(values: object, name: str) -> None:
-    """Raise an ArgumentError where numpy would recurse without end or run out of memory.
+    """Raise an ArgumentError where numpy would recurse infinitely or run out of memory.
 
-    That is, for lists that contain themselves and for sequences that claim to be very long.
+    This concerns lists that contain themselves and sequences that claim to be very long.
     """
     inner: Any = values
     for _ in range(_DEEPEST):

@@ -1,7 +1,7 @@
-"""Checks of the arguments of public functions; those for arrays are in `arrays`.
+"""Validation of arguments of public functions; for arrays see `arrays`.
 
-Each check returns the valid value or raises an `ArgumentError` that names the argument, says what
-it must be, and shows a short form of the value passed.
+Each function returns the valid value or raises an `ArgumentError` that names the argument, says
+what it must be, and shows the value in short form.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _LARGEST = 10**20  # larger integers are described by their number of bits
 
 
 class _Brief(reprlib.Repr):
-    """Shortens any value; a ``__repr__`` that fails is replaced by the name of its type."""
+    """Short text for any value; if its ``__repr__`` fails, the name of its type."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -45,7 +45,7 @@ _BRIEF = _Brief()
 
 
 def shown(value: object) -> str:
-    """Return *value* in a few words, however large it is and whatever its ``__repr__`` does.
+    """Return a short text for *value*, of any size and with any ``__repr__``.
 
     >>> shown([1] * 1000), len(shown("a" * 1000)), shown(10**5000)
     ('[1, 1, 1, 1, ...]', 60, 'an integer of 16610 bits')
@@ -54,7 +54,7 @@ def shown(value: object) -> str:
 
 
 def require(value: object, kind: type[_T] | tuple[type[_T], ...], name: str) -> _T:
-    """Return *value* if it is of a *kind*, one class or several.
+    """Return *value* if it is an instance of *kind*, one class or several.
 
     >>> require(3, str, "name")
     Traceback (most recent call last):
@@ -69,34 +69,34 @@ def require(value: object, kind: type[_T] | tuple[type[_T], ...], name: str) -> 
 
 
 def require_sequence(values: object, name: str) -> None:
-    """Raise unless *values* is a list, a tuple, an array or another sequence other than text."""
+    """Raise unless *values* is a list, a tuple, an array or another sequence except text."""
     known = isinstance(values, Sequence) or (isinstance(values, np.ndarray) and values.ndim > 0)
     if not known or isinstance(values, str | bytes | bytearray | memoryview):
         raise ArgumentError(f"{name} must be a sequence; got {shown(values)}")
 
 
 def all_of(values: Sequence[_T], kind: type[_T], name: str) -> tuple[_T, ...]:
-    """Return *values*, a sequence of one *kind*, as a tuple."""
+    """Return *values*, a sequence of instances of *kind*, as a tuple."""
     require_sequence(values, name)
     return tuple(require(value, kind, f"{name}[{k}]") for k, value in enumerate(values))
 
 
 def as_flag(value: object, name: str) -> bool:
-    """Return *value* as True or False; numpy's booleans count, numbers do not."""
+    """Return *value* as a bool; numpy's booleans are accepted, numbers are not."""
     if isinstance(value, bool | np.bool_):
         return bool(value)
     raise ArgumentError(f"{name} must be True or False; got {shown(value)}")
 
 
 def as_switch(value: object, name: str) -> bool:
-    """Return *value* as True or False; as in VTK, 1 and 0 count."""
+    """Return *value* as a bool; as in VTK, 1 and 0 are accepted."""
     if isinstance(value, bool | np.bool_ | int | np.integer) and value in (0, 1):
         return bool(value)
     raise ArgumentError(f"{name} must be True or False; got {shown(value)}")
 
 
 def as_text(value: object, name: str) -> str:
-    """Return *value* if it is text that can be encoded and contains no null character."""
+    """Return *value* if it is a str that can be encoded and has no null character."""
     text = require(value, str, name)
     if "\0" in text:
         raise ArgumentError(f"{name} must not contain a null character; got {shown(text)}")
@@ -108,14 +108,14 @@ def as_text(value: object, name: str) -> str:
 
 
 def as_callable(value: _Callable, name: str) -> _Callable:
-    """Return *value* if it can be called."""
+    """Return *value* if it is callable."""
     if callable(value):
         return value
     raise ArgumentError(f"{name} must be callable; got {shown(value)}")
 
 
 def as_path(path: str | os.PathLike[str], name: str = "path") -> Path:
-    """Return *path* as a Path; file descriptors, bytes and invalid file names are refused."""
+    """Return *path* as a Path; file descriptors, bytes and invalid names are rejected."""
     if not isinstance(path, str | os.PathLike):
         raise ArgumentError(f"{name} must be a str or a Path; got {shown(path)}")
     text = os.fspath(path)

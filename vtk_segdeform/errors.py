@@ -1,19 +1,19 @@
-"""What can go wrong, as exceptions a caller can tell apart.
+"""Exceptions of the package.
 
-Each is also a built-in kind of error, so ``except ValueError`` keeps working.
+Each is also a ValueError or a RuntimeError, so that callers can catch the built-in classes.
 """
 
 
 class SegDeformError(Exception):
-    """Everything this package raises on purpose."""
+    """Base class of all exceptions of the package."""
 
 
 class ArgumentError(SegDeformError, ValueError):
-    """An array or a number of the wrong shape, type or range; the text says what it must be."""
+    """An argument of the wrong shape, type or range; the message says what it must be."""
 
 
 class MeshError(SegDeformError, ValueError):
-    """The mesh is not a closed, outward oriented two-manifold; the text names each fault."""
+    """The mesh is not a closed, outward oriented two-manifold; the message names each fault."""
 
 
 class RegionError(SegDeformError, ValueError):
@@ -21,20 +21,20 @@ class RegionError(SegDeformError, ValueError):
 
 
 class CageError(SegDeformError, ValueError):
-    """A cage is open, inside-out, crosses itself, or leaves out part of its region."""
+    """A cage is open, inside-out, intersects itself, or does not enclose its region."""
 
 
 class ConstraintError(SegDeformError, ValueError):
-    """Fixed vertices, handles or targets that make no sense: out of range, overlapping, NaN."""
+    """Invalid fixed vertices, handles or targets: out of range, overlapping, NaN."""
 
 
 class SessionError(SegDeformError, ValueError):
-    """An option, a name or a file that makes no sense to a session; the text says what would."""
+    """An invalid option, name or file of a session; the message says what is valid."""
 
 
 class Cancelled(SegDeformError, RuntimeError):
-    """The caller's progress callback asked to stop; nothing was changed."""
+    """The progress callback cancelled the work; nothing was changed."""
 
 
 class MissingDependencyError(SegDeformError, RuntimeError):
-    """An optional library is absent; the text says which one and how to install it."""
+    """An optional library is missing; the message names it and says how to install it."""

@@ -1,7 +1,6 @@
 """Immutable objects: copies, pickles and read-only arrays.
 
-Only the fields of such an object are copied and pickled.  Cached values are computed again on
-demand.
+Only the fields of such objects are copied and pickled; cached values are computed again on demand.
 """
 
 from __future__ import annotations
@@ -31,9 +30,9 @@ class Frozen:
 
 
 def read_only(value: _T) -> _T:
-    """Return *value* with every array of it read-only, in tuples and mappings as well.
+    """Return *value* with read-only views of its arrays, also in tuples and mappings.
 
-    The arrays are views: the original arrays remain writeable through other references.
+    The original arrays remain writeable through other references.
     """
     same: _T = _read_only(value)
     return same

@@ -1,4 +1,4 @@
-"""How long work tells its caller how far it is, and how the caller stops it."""
+"""Progress callbacks and cancellation."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from collections.abc import Callable
 from .checks import as_callable
 
 Progress = Callable[[float, str], None]
-"""Called with a fraction in 0..1 and what is being done; raise `errors.Cancelled` in it to stop."""
+"""Called with the fraction done, 0..1, and a text; may raise `errors.Cancelled` to stop."""
 
 
 def tell(progress: Progress | None, fraction: float, message: str) -> None:
-    """Call *progress*, if there is one."""
+    """Call *progress* unless it is None."""
     if progress is not None:
         as_callable(progress, "progress")(fraction, message)
 
 
 def part(progress: Progress | None, start: float, end: float) -> Progress | None:
-    """Return a progress for a piece of work that spans *start*..*end* of the whole."""
+    """Return a callback for a part of the work that spans *start*..*end* of *progress*."""
     if progress is None:
         return None
     as_callable(progress, "progress")

@@ -1,4 +1,4 @@
-"""What is a cage and what is not, told by solids with one known fault each."""
+"""`Cage` accepts valid surfaces and names the fault of invalid ones, for known solids."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from solids import CUBE, OCTAHEDRON, SOLIDS, TETRAHEDRON, icosphere, rotation, s
 from solids import two_components as two_spheres
 from vtkmodules.vtkCommonDataModel import vtkTriangle
 
-from vtk_segdeform.cages.cage import Cage, cage_faults, self_intersections, winding_number
+from vtk_segdeform.cages.cage import Cage, cage_faults
 from vtk_segdeform.errors import CageError
-from vtk_segdeform.mesh.inside import distance_to_surface
-from vtk_segdeform.mesh.intersections import _overlapping_boxes
+from vtk_segdeform.mesh.inside import distance_to_surface, winding_number
+from vtk_segdeform.mesh.intersections import _overlapping_boxes, self_intersections
 
 TURN = rotation([1, 2, 3], 0.7)
 VALID = {
@@ -52,7 +52,7 @@ def test_a_good_surface_has_no_faults(solid, scale):
     assert cage_faults(scale * (vertices @ TURN.T + 5.0), faces) == ()
 
 
-def test_a_cage_is_a_read_only_copy_of_what_it_was_given():
+def test_a_cage_is_a_read_only_copy_of_the_given_arrays():
     vertices, faces = icosphere(1)
     cage = Cage(vertices, faces)
     assert (cage.n_vertices, cage.n_faces) == (18, 32)
@@ -70,20 +70,20 @@ def test_the_volume_is_that_of_the_solid():
     assert_allclose(Cage(*joined(CUBE, moved(CUBE, 3.0, 2.0))).volume, 9.0)
 
 
-def test_an_open_surface_is_refused_with_the_number_of_its_open_edges():
+def test_an_open_surface_is_an_error_with_the_number_of_open_edges():
     vertices, faces = OCTAHEDRON
-    with pytest.raises(CageError, match="3 edges border one face only: the cage is open"):
+    with pytest.raises(CageError, match="3 edges border only one face: the cage is open"):
         Cage(vertices, faces[1:])
 
 
-def test_a_face_turned_round_is_found():
+def test_a_flipped_face_is_found():
     vertices, faces = OCTAHEDRON
     (fault,) = cage_faults(vertices, np.vstack([faces[:1, ::-1], faces[1:]]))
     assert "3 edges" in fault
     assert "orientation" in fault
 
 
-def test_a_surface_facing_inward_is_refused():
+def test_an_inside_out_surface_is_an_error():
     (fault,) = cage_faults(*flipped(CUBE))
     assert fault == "it is inside-out, volume -1: reverse its faces"
 
@@ -94,7 +94,7 @@ def test_an_edge_of_four_faces_is_found():
     extra = vertices[[0, 1]].sum(axis=0) - vertices[[2, 3]]
     (fault,) = cage_faults(np.vstack([vertices, extra]), np.vstack([faces, mirrored[faces]]))
     assert "1 edge" in fault
-    assert "three faces or more" in fault
+    assert "three or more faces" in fault
 
 
 def test_two_fans_in_one_vertex_are_found():
@@ -102,7 +102,7 @@ def test_two_fans_in_one_vertex_are_found():
     other = np.array([0, 4, 5, 6])
     mirror = 2 * vertices[0] - vertices[1:]
     (fault,) = cage_faults(np.vstack([vertices, mirror]), np.vstack([faces, other[faces[:, ::-1]]]))
-    assert "1 vertex joins several fans" in fault
+    assert "1 vertex joins several surfaces in a point" in fault
 
 
 def test_a_vertex_in_no_face_is_found():
@@ -119,7 +119,7 @@ def test_a_face_without_area_is_found():
     assert fault == "1 face has no area"
 
 
-def test_a_vertex_pushed_out_through_the_other_side_is_found():
+def test_a_vertex_moved_through_the_opposite_side_is_found():
     vertices, faces = icosphere(2)
     assert cage_faults(vertices, faces) == ()
     through = vertices.copy()
@@ -194,7 +194,7 @@ def test_faces_that_share_nothing_may_not_even_touch():
 
 
 @pytest.mark.parametrize("spread", [0.15, 0.5])
-def test_vtk_finds_the_same_crossings_in_a_heap_of_triangles(spread):
+def test_intersections_of_random_triangles_agree_with_vtk(spread):
     n = 150
     rng = np.random.default_rng(6)
     corners = rng.uniform(-1, 1, (n, 1, 3)) + spread * rng.normal(size=(n, 3, 3))
@@ -210,7 +210,7 @@ def test_vtk_finds_the_same_crossings_in_a_heap_of_triangles(spread):
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_crossings_do_not_depend_on_where_the_sweep_runs_nor_on_batches(axis, monkeypatch):
+def test_intersections_do_not_depend_on_the_sweep_axis_or_on_batches(axis, monkeypatch):
     vertices, faces = joined(icosphere(2), moved(icosphere(2), [0.7, 0.1, 0.2]))
     expected = self_intersections(vertices, faces)
     assert len(expected) > 20
@@ -219,7 +219,7 @@ def test_crossings_do_not_depend_on_where_the_sweep_runs_nor_on_batches(axis, mo
     assert_array_equal(self_intersections(rolled, faces), expected)
 
 
-def test_components_may_lie_apart_or_form_a_cavity_but_not_nest_or_cross():
+def test_components_may_be_disjoint_or_a_cavity_but_not_nested_or_crossing():
     small = moved(icosphere(1), 0.0, 0.5)
     outer = icosphere(2)
     assert cage_faults(*joined(outer, moved(small, 2.0))) == ()
@@ -233,7 +233,7 @@ def test_components_may_lie_apart_or_form_a_cavity_but_not_nest_or_cross():
     assert "intersects itself" in fault
 
 
-def test_inside_is_what_the_formula_of_the_solid_says():
+def test_points_inside_agree_with_the_formula_of_the_solid():
     x = somewhere(2000, size=0.9)
     inside = np.abs(x).sum(axis=1) < 1
     assert_array_equal(Cage(*OCTAHEDRON).contains(x), inside)
@@ -247,7 +247,7 @@ def test_a_cavity_is_outside():
     assert_array_equal(cage.contains([[0, 0, 0], [0.75, 0, 0], [2, 0, 0]]), [False, True, False])
 
 
-def test_the_winding_number_is_whole_and_does_not_depend_on_chunks(monkeypatch):
+def test_the_winding_number_is_an_integer_and_does_not_depend_on_blocks(monkeypatch):
     vertices, faces = torus(24, 12)
     x = somewhere(500, size=1.5)
     number = winding_number(x, vertices, faces)
@@ -257,7 +257,7 @@ def test_the_winding_number_is_whole_and_does_not_depend_on_chunks(monkeypatch):
     assert_allclose(winding_number(x, vertices, faces), number, atol=1e-12)
 
 
-def test_a_point_left_out_is_reported_with_its_distance():
+def test_points_outside_are_reported_with_their_distance():
     cage = Cage(*CUBE)
     cage.require_encloses([[0.5, 0.5, 0.5], [1e-9, 0.5, 0.5]], "points")
     x = [[0.5, 0.5, 0.5], [0.5, 0.5, 1.25], [1.3, 1.4, 0.5]]
@@ -271,12 +271,12 @@ def test_a_point_left_out_is_reported_with_its_distance():
     [([0.3, 0.6, 1.25], "0.25"), ([1.3, 1.4, 0.3], "0.5"), ([2, 2, 2], "1.73")],
     ids=["over a face", "beside an edge", "off a corner"],
 )
-def test_the_distance_is_that_to_the_nearest_place(point, distance):
+def test_the_distance_is_that_to_the_nearest_point_of_the_cage(point, distance):
     with pytest.raises(CageError, match=f"the farthest by {distance};"):
         Cage(*CUBE).require_encloses([point], "points")
 
 
-def test_the_cage_of_the_armadillo_is_a_cage_around_it():
+def test_the_cage_of_the_armadillo_encloses_it():
     pv = pytest.importorskip("pyvista")
     found = pv.read(path_of("armadilloman_cages_triangulated.obj")).clean()
     vertices = np.asarray(found.points, float)
@@ -285,11 +285,11 @@ def test_the_cage_of_the_armadillo_is_a_cage_around_it():
     assert cage.contains(armadillo).mean() > 0.99
 
 
-def test_a_real_mesh_is_a_cage_too():
+def test_a_real_mesh_is_a_valid_cage():
     assert cage_faults(*read_off("hand.off")) == ()
 
 
-def test_the_number_of_pairs_looked_at_grows_like_the_number_of_faces():
+def test_the_number_of_tested_pairs_is_proportional_to_the_number_of_faces():
     def pairs_per_face(solid):
         corners = solid[0][solid[1]]
         boxes = corners.min(axis=1), corners.max(axis=1)
@@ -299,7 +299,7 @@ def test_the_number_of_pairs_looked_at_grows_like_the_number_of_faces():
 
 
 @pytest.mark.parametrize("level", [0, 1, 2])
-def test_points_straight_above_corners_and_edges_of_a_cage_are_told_as_any_others(level):
+def test_columns_through_corners_and_edges_of_a_cage_are_handled(level):
     vertices, faces = icosphere(level)
     middles = 0.5 * (vertices[faces] + vertices[np.roll(faces, 1, axis=1)]).reshape(-1, 3)
     columns = np.concatenate([vertices, middles]) * [1.0, 1.0, 0.0]

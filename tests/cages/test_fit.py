@@ -1,4 +1,4 @@
-"""Cages made automatically: valid and enclosing whatever the region, and moving with the mesh."""
+"""Automatic cages are valid, enclose any region, and move with the mesh."""
 
 from __future__ import annotations
 
@@ -12,11 +12,15 @@ from vtk_segdeform.cages import fit
 from vtk_segdeform.cages.cage import Cage, cage_faults
 from vtk_segdeform.cages.contour import contour_surface
 from vtk_segdeform.cages.fit import fit_cage, fit_cages
-from vtk_segdeform.cages.region_solid import Patch, Skin, _filled, principal_axes
+from vtk_segdeform.cages.region_solid import Patch, Surface, _filled, principal_axes
 from vtk_segdeform.cages.simplify import roundness, simplify
 from vtk_segdeform.errors import CageError, Cancelled, RegionError
-from vtk_segdeform.mesh.columns import inside_nodes, inside_points
-from vtk_segdeform.mesh.inside import distance_to_surface, winding_number
+from vtk_segdeform.mesh.inside import (
+    distance_to_surface,
+    inside_nodes,
+    inside_points,
+    winding_number,
+)
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
 
@@ -51,7 +55,7 @@ def thirds(mesh):
 
 
 def around(mesh, rings):
-    """Return a vertex and so many rings of its neighbours."""
+    """Return a vertex and *rings* rings of its neighbours."""
     members = np.arange(mesh.n_vertices) == mesh.n_vertices // 3
     for _ in range(rings):
         members = members | (mesh.adjacency @ members > 0)
@@ -59,25 +63,25 @@ def around(mesh, rings):
 
 
 def assert_holds(cage, mesh, members):
-    # That it is closed, outward and clear of itself, `Cage` has checked.
+    # `Cage` has checked that it is closed, outward and without self-intersections.
     assert (winding_number(mesh.vertices[members], cage.vertices, cage.faces) > 0.99).all()
-    assert distance_to_skin(cage, mesh, members).min() > 1e-4 * np.ptp(cage.vertices, axis=0).max()
+    assert distance_to_cage(cage, mesh, members).min() > 1e-4 * np.ptp(cage.vertices, axis=0).max()
     assert roundness(cage.vertices, cage.faces).min() > 0.05
 
 
-def distance_to_skin(cage, mesh, members):
+def distance_to_cage(cage, mesh, members):
     return distance_to_surface(mesh.vertices[members], cage.vertices, cage.faces)
 
 
 @pytest.mark.parametrize("name", SOLIDS)
-def test_one_cage_holds_a_mesh_of_a_few_large_faces(name):
+def test_one_cage_encloses_a_mesh_of_a_few_large_faces(name):
     mesh = Mesh(*SOLIDS[name])
     (cage,) = fit_cages(mesh, Regions.single(mesh), 40)
     assert cage.n_vertices == 40
     assert_holds(cage, mesh, slice(None))
 
 
-def test_three_cages_hold_three_regions_with_the_vertices_asked_for(mesh):
+def test_three_cages_enclose_three_regions_with_n_vertices_in_total(mesh):
     regions = thirds(mesh)
     cages = fit_cages(mesh, regions, 100)
     assert sum(cage.n_vertices for cage in cages) == 100
@@ -85,7 +89,7 @@ def test_three_cages_hold_three_regions_with_the_vertices_asked_for(mesh):
         assert_holds(cage, mesh, members)
 
 
-def test_a_cage_holds_a_region_of_any_shape(mesh):
+def test_a_cage_encloses_a_region_of_any_shape(mesh):
     scattered = np.random.default_rng(3).random(mesh.n_vertices) < 0.02
     stripes = np.sin(20.0 * mesh.vertices[:, 0] / mesh.diagonal) > 0.0
     one, ring = around(mesh, 0), around(mesh, 1)
@@ -95,11 +99,11 @@ def test_a_cage_holds_a_region_of_any_shape(mesh):
         assert_holds(cage, mesh, members)
 
 
-def test_a_cage_stays_at_the_offset_asked_for():
+def test_a_cage_has_the_requested_offset():
     mesh = Mesh(*icosphere(3))
     for offset in (0.1, 0.3):
         cage = fit_cage(mesh, np.arange(mesh.n_vertices), 100, offset=offset)
-        gap = distance_to_skin(cage, mesh, slice(None))
+        gap = distance_to_cage(cage, mesh, slice(None))
         assert gap.min() > 0.4 * offset
         assert gap.max() < 2.0 * offset
         assert gap.mean() == pytest.approx(offset, rel=0.35)
@@ -136,7 +140,7 @@ def test_a_cage_moves_with_its_mesh(name, turn, scale, shift):
     assert_allclose(same.vertices, expected, rtol=0, atol=1e-9 * scale * mesh.diagonal)
 
 
-def test_axes_turn_with_points_that_have_no_longest_direction():
+def test_axes_rotate_with_points_that_have_no_longest_direction():
     vertices, _ = CUBE
     axes = principal_axes(vertices, np.ones(8))
     assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
@@ -158,7 +162,7 @@ def test_larger_and_longer_regions_get_more_vertices():
     assert small + long_number + large_number == 90
 
 
-def test_the_last_resort_is_a_cage_and_says_so_once(mesh, monkeypatch, caplog):
+def test_the_last_resort_is_an_ellipsoid_and_logs_one_warning(mesh, monkeypatch, caplog):
     monkeypatch.setattr(fit, "_fault", lambda *_: "it is to fail")
     monkeypatch.setattr(fit, "_ATTEMPTS", 1)
     for members in (around(mesh, 0), around(mesh, 3)):
@@ -171,13 +175,13 @@ def test_the_last_resort_is_a_cage_and_says_so_once(mesh, monkeypatch, caplog):
 
 @pytest.mark.parametrize("n", [4, 5, 8, 50])
 def test_the_ellipsoid_of_a_patch_is_a_cage_around_it(mesh, n):
-    patch = Patch.of(Skin.of(mesh), around(mesh, 2))
+    patch = Patch.of(Surface.of(mesh), around(mesh, 2))
     cage = Cage(*patch.ellipsoid(n))
     assert cage.n_vertices == n
-    assert cage.contains(patch.skin.points[patch.weights > 0]).all()
+    assert cage.contains(patch.surface.points[patch.weights > 0]).all()
 
 
-def test_what_makes_no_cage_is_refused_with_a_reason():
+def test_invalid_arguments_are_errors():
     mesh = Mesh(*icosphere(2))
     with pytest.raises(CageError, match="24 to 1600, at least 8 for each of 3 regions; got 23"):
         fit_cages(mesh, thirds(mesh), 23)
@@ -187,7 +191,7 @@ def test_what_makes_no_cage_is_refused_with_a_reason():
         fit_cage(mesh, np.zeros(mesh.n_vertices, dtype=bool), 12)
 
 
-def test_progress_grows_to_one_and_can_cancel():
+def test_progress_increases_to_one_and_can_cancel():
     mesh = Mesh(*icosphere(2))
     seen = []
     fit_cages(mesh, thirds(mesh), 60, progress=lambda fraction, _: seen.append(fraction))
@@ -203,7 +207,7 @@ def test_progress_grows_to_one_and_can_cancel():
 
 
 @pytest.mark.parametrize(("solid", "genus"), [(icosphere(4), 0), (torus(), 1)])
-def test_simplifying_keeps_the_topology_and_meets_the_number(solid, genus):
+def test_simplifying_preserves_the_topology_and_reaches_n_vertices(solid, genus):
     for n in (300, 77, 20):
         vertices, faces = simplify(*solid, n)
         assert len(vertices) == n
@@ -252,10 +256,10 @@ def test_cages_of_a_real_mesh_are_valid_and_tight(name):
     assert sum(cage.n_vertices for cage in cages) == 200
     for cage, members in zip(cages, regions.membership, strict=True):
         assert_holds(cage, mesh, members)
-        assert distance_to_skin(cage, mesh, members).mean() < 0.03 * mesh.diagonal
+        assert distance_to_cage(cage, mesh, members).mean() < 0.03 * mesh.diagonal
 
 
-def test_simplifying_a_rough_surface_folds_no_face_over():
+def test_simplifying_a_rough_surface_inverts_no_face():
     ball, faces = icosphere(4)
     rough = ball * np.random.default_rng(0).uniform(0.5, 1.5, (len(ball), 1))
     vertices, faces = simplify(rough, faces, 300)
@@ -269,7 +273,7 @@ def test_the_contour_is_exact_beyond_single_precision():
     assert_allclose(points @ [1.0, 0.3, -0.7], 1.2345678901234, atol=1e-13)
 
 
-def test_cavities_are_filled_and_islands_that_hold_nothing_are_sunk():
+def test_cavities_are_filled_and_islands_without_members_removed():
     values = np.full((20, 12, 12), 9.0)
     values[2:9, 2:9, 2:9] = 0.0
     values[4:7, 4:7, 4:7] = 9.0  # a cavity
@@ -282,7 +286,7 @@ def test_cavities_are_filled_and_islands_that_hold_nothing_are_sunk():
     assert _filled(values, 1.5, np.array([[3.0, 3.0, 3.0], [15.0, 4.0, 4.0]]))[1] == 2
 
 
-def test_too_many_cage_vertices_are_refused_before_any_work():
+def test_too_many_cage_vertices_are_an_error_before_any_work():
     mesh = Mesh(*icosphere(4))
     reports = []
 

@@ -1,4 +1,4 @@
-"""Mean value coordinates against exact ones, against VTK's, and against themselves."""
+"""Mean value coordinates agree with exact ones and with VTK, and have their known properties."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vtkmodules.vtkCommonDataModel import vtkMeanValueCoordinatesInterpolator
 from vtk_segdeform.cages.mean_value import mean_value_coordinates
 from vtk_segdeform.errors import CageError, Cancelled
 
-TURN = rotation([1, 2, 3], 0.7)  # tidy coordinates hide faults
+TURN = rotation([1, 2, 3], 0.7)  # axis-aligned coordinates hide faults
 CAGES = {
     **SOLIDS,
     "turned octahedron": (OCTAHEDRON[0] @ TURN.T * 1.3 + [0.1, 0.2, 0.3], OCTAHEDRON[1]),
@@ -33,7 +33,7 @@ every_distance = pytest.mark.parametrize("distance", DISTANCES)
 
 
 def barycentric(x, corners):
-    """Return the four weights that sum to 1 and reproduce *x*: there is only one such row."""
+    """Return the unique four weights that sum to 1 and reproduce *x*."""
     rows = np.vstack([corners.T, np.ones(4)])
     return np.linalg.solve(rows, np.vstack([x.T, np.ones(len(x))])).T
 
@@ -90,7 +90,7 @@ def test_on_a_face_the_weights_are_barycentric(cage):
 
 
 @every_cage
-def test_on_an_edge_only_its_ends_count(cage):
+def test_on_an_edge_only_its_ends_have_weight(cage):
     vertices, faces = cage
     share = np.random.default_rng(2).uniform(0, 1, (len(faces), 1))
     share = np.hstack([share, 1 - share])
@@ -108,7 +108,7 @@ def test_for_a_tetrahedron_they_are_the_barycentric_coordinates_everywhere():
 
 @every_distance
 @pytest.mark.parametrize("place", ["face", "plane", "edge", "line", "vertex"])
-def test_digits_survive_at_any_distance_from_a_tetrahedron(place, distance):
+def test_weights_are_accurate_at_any_distance_from_a_tetrahedron(place, distance):
     vertices, faces = TETRAHEDRON[0] @ TURN.T * 1.3 + 0.1, TETRAHEDRON[1]
     off = np.random.default_rng(3).normal(size=(40, 3))
     off *= distance / np.linalg.norm(off, axis=1, keepdims=True)
@@ -122,7 +122,7 @@ def test_digits_survive_at_any_distance_from_a_tetrahedron(place, distance):
 @pytest.mark.parametrize("place", ["plane", "line"])
 @pytest.mark.parametrize("name", ["turned octahedron", "turned cube", "sphere", "torus"])
 def test_splitting_a_face_changes_nothing(name, place, distance):
-    """The weights integrate a function linear on each face; a vertex in a face adds no bend."""
+    """The weights integrate a function that is linear on each face, also on the parts of a face."""
     cage, share = CAGES[name], np.array([0.2, 0.3, 0.5])
     finer = split(cage, 0, share)
     off = np.random.default_rng(4).normal(size=(40, 3))
@@ -134,7 +134,7 @@ def test_splitting_a_face_changes_nothing(name, place, distance):
 
 
 @pytest.mark.parametrize("height", [1e-3, 1e-5, 1e-7])
-def test_thin_faces_cost_no_more_digits_than_their_height(height):
+def test_thin_faces_lose_no_more_digits_than_their_height(height):
     cage = CAGES["turned octahedron"]
     share = np.array([0.4, 0.6 - height, height])  # a vertex close to an edge: one thin face
     weights = mean_value_coordinates(somewhere(200), *split(cage, 0, share))
@@ -149,7 +149,7 @@ def test_thin_faces_cost_no_more_digits_than_their_height(height):
 
 
 @every_cage
-def test_no_jump_across_a_face_an_edge_or_a_vertex(cage):
+def test_weights_are_continuous_across_faces_edges_and_vertices(cage):
     rng = np.random.default_rng(5)
     for place in ("face", "edge", "vertex"):
         x = places(cage)[place]
@@ -159,7 +159,7 @@ def test_no_jump_across_a_face_an_edge_or_a_vertex(cage):
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
-def test_moving_scaling_turning_and_flipping_the_cage_changes_nothing(scale):
+def test_weights_are_invariant_under_similarities_and_flipped_faces(scale):
     vertices, faces = CAGES["torus"]
     x = somewhere()
     expected = mean_value_coordinates(x, vertices, faces)
@@ -180,7 +180,7 @@ def test_inside_a_convex_cage_all_weights_are_positive():
 @pytest.mark.parametrize(
     "name", ["octahedron", "turned octahedron", "turned cube", "sphere", "torus"]
 )
-def test_vtk_finds_the_same_weights(name):
+def test_weights_agree_with_vtk(name):
     vertices, faces = CAGES[name]
     x = somewhere(100, size=1.5)
     points, triangles = vtkPoints(), vtkIdList()
@@ -208,7 +208,7 @@ def test_a_cactus_in_a_simplified_copy_of_itself_is_reproduced():
     assert np.abs(weights @ cage[0] - vertices).max() < 1e-12 * diagonal
 
 
-def test_memory_stays_bounded_whatever_the_size():
+def test_memory_is_bounded_for_any_size():
     x = somewhere(20_000)
     tracemalloc.start()
     weights = mean_value_coordinates(x, *icosphere(1))
@@ -221,26 +221,26 @@ def test_no_points_give_no_rows():
     assert mean_value_coordinates(np.empty((0, 3)), *OCTAHEDRON).shape == (0, 6)
 
 
-def test_an_open_cage_is_refused():
+def test_an_open_cage_is_an_error():
     vertices, faces = OCTAHEDRON
-    with pytest.raises(CageError, match="3 edges border one face only"):
+    with pytest.raises(CageError, match="3 edges border only one face"):
         mean_value_coordinates([[0, 0, 0]], vertices, faces[1:])
 
 
-def test_a_cage_with_a_face_turned_round_is_refused():
+def test_a_cage_with_a_flipped_face_is_an_error():
     vertices, faces = OCTAHEDRON
     turned = np.vstack([faces[:1, ::-1], faces[1:]])
     with pytest.raises(CageError, match="3 edges have faces of opposite orientation"):
         mean_value_coordinates([[0, 0, 0]], vertices, turned)
 
 
-def test_a_face_without_area_is_refused():
+def test_a_face_without_area_is_an_error():
     cage = split(TETRAHEDRON, 0, np.array([0.5, 0.5, 0.0]))
     with pytest.raises(CageError, match="1 face has no area"):
         mean_value_coordinates([[0, 0, 0]], *cage)
 
 
-def test_progress_arrives_at_one_and_can_cancel():
+def test_progress_increases_to_one_and_can_cancel():
     seen = []
     mean_value_coordinates(somewhere(5000), *icosphere(1), progress=lambda f, _: seen.append(f))
     assert len(seen) > 1

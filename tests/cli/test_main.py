@@ -267,8 +267,8 @@ def test_bench_refuses_a_history_that_it_cannot_append_to_before_it_measures(tmp
         (["check", "no-such-file.ply"], 1, "no-such-file.ply"),
         (["cages", "BAR", "-o", "no/such/folder/x.ply", *QUICK], 1, "no folder"),
         (["regions", "BAR", "-o", "x.xyz", "--regions", "1"], 1, ".xyz"),
-        (["regions", "BAR", "-o", "x.stl", "--regions", "1"], 1, "cannot write arrays"),
-        (["cages", "BAR", "-o", "x.obj", "--regions", "1"], 1, "cannot write arrays"),
+        (["regions", "BAR", "-o", "x.stl", "--regions", "1"], 1, "cannot store arrays"),
+        (["cages", "BAR", "-o", "x.obj", "--regions", "1"], 1, "cannot store arrays"),
     ],
 )  # fmt: skip
 def test_what_goes_wrong_is_one_line_on_stderr_and_an_exit_code(

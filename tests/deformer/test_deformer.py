@@ -194,7 +194,7 @@ def test_a_drag_learns_from_frame_to_frame(monkeypatch):
     [
         ({"fixed": np.array([3]), "handle": np.array([3, 4])}, "1 vertices are both fixed and"),
         ({"handle": np.array([1026])}, r"handle must index 0..1025"),
-        ({"fixed": np.array([5, 5])}, "fixed names a vertex twice"),
+        ({"fixed": np.array([5, 5])}, "fixed contains a vertex twice"),
     ],
 )
 def test_wrong_constraints_are_named(change, says):

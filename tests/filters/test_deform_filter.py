@@ -1,4 +1,4 @@
-"""The filter: the numbers of `deform`, only what changed is done again, faults told as VTK does."""
+"""The filter gives the results of `deform`, recomputes changes only, reports errors like VTK."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SHIFT = np.array([0.25, 0.0, -0.05])
 
 @pytest.fixture
 def surface():
-    """Return the cactus with arrays that mark what stays and what is moved."""
+    """Return the cactus with arrays of fixed vertices and the handle."""
     polydata = to_polydata(MESH)
     polydata.point_data["fixed"] = (HEIGHT < 0.1).astype(np.uint8)
     polydata.point_data["handle"] = (HEIGHT > 0.9).astype(float)
@@ -57,7 +57,7 @@ def expected():
     return sd.deform(MESH, FIXED, HANDLE, MESH.vertices[HANDLE] + SHIFT)
 
 
-def test_its_numbers_are_those_of_deform(surface, expected):
+def test_its_results_are_those_of_deform(surface, expected):
     before = surface.copy()
     made = filter_of(surface, Translation=tuple(SHIFT))
     out = output(made)
@@ -69,15 +69,15 @@ def test_its_numbers_are_those_of_deform(surface, expected):
     assert_allclose(
         out["LocalVolumeChange"], sd.local_volume_change(MESH, expected.vertices), atol=1e-9
     )
-    assert_array_equal(out["number"], surface["number"])  # arrays go through
+    assert_array_equal(out["number"], surface["number"])  # arrays are passed on
     assert_array_equal(out.faces, surface.faces)
-    assert surface == before  # and the input is as it was
+    assert surface == before  # the input is unchanged
     targets = MESH.vertices[HANDLE] + SHIFT
     by_numbers = filter_of(surface, Fixed=FIXED, Handle=HANDLE, Targets=targets)
     assert_allclose(output(by_numbers).points, out.points, rtol=0, atol=1e-12)
 
 
-def test_only_what_changed_is_done_again(surface):
+def test_only_changes_are_computed_again(surface):
     made = filter_of(surface, Translation=tuple(SHIFT))
     first = np.array(output(made).points)
     made.SetTranslation(0.1, 0.0, 0.0)
@@ -88,13 +88,13 @@ def test_only_what_changed_is_done_again(surface):
     assert abs(output(made)["VolumeChange"][0]) > 1e-6
     made.SetHandle(HANDLE[:20])
     output(made)
-    surface.point_data["temperature"] = HEIGHT  # another array is no other surface
+    surface.point_data["temperature"] = HEIGHT  # another array does not change the surface
     surface.Modified()
     assert "temperature" in output(made).point_data
     assert made.rebinds == 1
     made.SetHandleArrayName("handle")
     made.SetPreserveVolume(True)
-    assert_array_equal(output(made).points, other)  # not of what was there before
+    assert_array_equal(output(made).points, other)  # independent of the earlier execution
     made.SetTranslation(*SHIFT)
     made.SetRotationAngle(0.0)
     assert_array_equal(output(made).points, first)
@@ -106,7 +106,7 @@ def test_only_what_changed_is_done_again(surface):
     assert made.rebinds == 3
 
 
-def test_a_setting_that_is_set_already_executes_nothing(surface):
+def test_setting_an_unchanged_value_does_not_execute(surface):
     made = filter_of(surface, Translation=tuple(SHIFT))
     made.Update()
     before = made.GetMTime()
@@ -116,7 +116,7 @@ def test_a_setting_that_is_set_already_executes_nothing(surface):
     assert made.GetMTime() == before
 
 
-def test_regions_and_cages_of_ones_own_are_used(surface):
+def test_given_regions_and_cages_are_used(surface):
     regions = sd.segment(MESH, n_regions=2)
     surface.point_data["label"] = regions.labels
     made = filter_of(surface, RegionArrayName="label", Overlap=3, Translation=tuple(SHIFT))
@@ -137,7 +137,7 @@ def test_regions_and_cages_of_ones_own_are_used(surface):
     assert made.faults == []
 
 
-def test_polygons_stay_polygons_and_normals_are_made_anew():
+def test_polygons_are_kept_and_normals_computed_again():
     cube = pv.Box(level=6).clean()
     cube = cube.compute_normals(cell_normals=False, split_vertices=False)
     top = cube.points[:, 2] > 0.99
@@ -149,7 +149,7 @@ def test_polygons_stay_polygons_and_normals_are_made_anew():
     assert out.points[top, 0].mean() == pytest.approx(0.5, abs=1e-2)
     side = np.abs(cube.points - [1.0, 0.0, 0.0]).max(axis=1) < 0.5
     normals = out.point_data["Normals"][side]
-    assert (normals[:, 2] < -0.1).all()  # they lean as the side does
+    assert (normals[:, 2] < -0.1).all()  # inclined like the side
     assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-6)
 
 
@@ -168,7 +168,7 @@ def test_polygons_stay_polygons_and_normals_are_made_anew():
         (lambda f, s: f.SetInputDataObject(1, pv.MultiBlock([s, s])), "2 cages need regions"),
     ],
 )
-def test_what_is_wrong_is_told_and_the_output_is_empty(surface, spoil, says, capfd):
+def test_errors_are_reported_and_the_output_is_empty(surface, spoil, says, capfd):
     made = filter_of(surface, Translation=tuple(SHIFT))
     spoil(made, surface)
     assert output(made).n_points == 0
@@ -181,10 +181,10 @@ def test_what_is_wrong_is_told_and_the_output_is_empty(surface, spoil, says, cap
         made.SetRegionArrayName("")
         made.SetTargets(None)
         made.SetRotationAxis(0.0, 0.0, 1.0)
-        assert output(made).n_points == MESH.n_vertices  # it goes on
+        assert output(made).n_points == MESH.n_vertices  # and works again
 
 
-def test_with_nobody_listening_the_output_window_has_the_fault(surface):
+def test_without_observers_errors_appear_in_the_output_window(surface):
     window, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
     vtkOutputWindow.SetInstance(window)
     try:
@@ -197,7 +197,7 @@ def test_with_nobody_listening_the_output_window_has_the_fault(surface):
     assert "no point array 'nothing'" in window.GetOutput()
 
 
-def test_it_tells_its_progress_and_can_be_aborted(surface):
+def test_it_reports_progress_and_can_be_aborted(surface):
     made = filter_of(surface, Translation=tuple(SHIFT))
     seen = []
     made.AddObserver("ProgressEvent", lambda *_: seen.append(made.GetProgress()))
@@ -211,7 +211,7 @@ def test_it_tells_its_progress_and_can_be_aborted(surface):
     assert made.faults == []
 
 
-def test_pyvista_draws_what_it_makes(surface):
+def test_pyvista_draws_its_output(surface):
     made = filter_of(surface, Translation=tuple(SHIFT))
     plotter = pv.Plotter(off_screen=True)
     actor = plotter.add_mesh(made)

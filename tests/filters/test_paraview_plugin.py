@@ -1,4 +1,4 @@
-"""The plugin in a real pvpython: its numbers are those of the Python API.  `make test-paraview`."""
+"""The plugin in pvpython gives the results of the Python API.  `make test-paraview`."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def pvpython(script, *arguments, **environment):
 
 
 @needs_paraview
-def test_its_numbers_are_those_of_the_api(tmp_path):
+def test_its_results_are_those_of_the_api(tmp_path):
     from vtk_segdeform.io.convert import to_polydata
 
     mesh = sd.models.cactus(1500)
@@ -95,7 +95,7 @@ def test_its_numbers_are_those_of_the_api(tmp_path):
 
 
 @needs_paraview
-def test_a_scipy_that_is_too_old_is_named(tmp_path):
+def test_a_scipy_that_is_too_old_is_an_error(tmp_path):
     (tmp_path / "scipy.py").write_text("__version__ = '1.10.1'")
     script = tmp_path / "script.py"
     script.write_text(
@@ -108,7 +108,7 @@ def test_a_scipy_that_is_too_old_is_named(tmp_path):
     assert "has scipy 1.10.1, vtk_segdeform needs 1.13" in done.stdout + done.stderr
 
 
-def test_the_plugin_says_where_it_is():
+def test_the_plugin_prints_its_path():
     done = subprocess.run(
         [sys.executable, "-m", "vtk_segdeform.filters.paraview_plugin", "--path"],
         cwd=ROOT, capture_output=True, text=True, check=False,

@@ -30,20 +30,20 @@ def laplacian_of(vertices, faces):
 
 
 @pytest.mark.parametrize("solid", SOLIDS.values(), ids=SOLIDS)
-def test_vertex_areas_add_up_to_the_surface(solid):
+def test_vertex_areas_sum_to_the_surface_area(solid):
     assert_allclose(
         mixed_voronoi_areas(surface(*solid)).sum(), face_areas(*solid).sum(), rtol=1e-13
     )
 
 
 def test_an_obtuse_triangle_gives_half_its_area_to_the_obtuse_corner():
-    # Two copies back to back close the surface; each corner gets its share twice.
+    # Two copies back to back close the surface, so each corner gets its area twice.
     corners = np.array([[0.0, 0, 0], [4, 0, 0], [2, 0.5, 0]])
     areas = mixed_voronoi_areas(surface(corners, [[0, 1, 2], [0, 2, 1]]))
     assert_allclose(areas, [0.5, 0.5, 1.0])
 
 
-def test_the_laplacian_is_symmetric_semidefinite_and_kills_constants():
+def test_the_laplacian_is_symmetric_semidefinite_and_vanishes_for_constants():
     laplacian = laplacian_of(*torus(24, 12)).toarray()
     assert_allclose(laplacian, laplacian.T, atol=1e-14)
     assert_allclose(laplacian.sum(axis=1), 0.0, atol=1e-12)
@@ -52,7 +52,7 @@ def test_the_laplacian_is_symmetric_semidefinite_and_kills_constants():
 
 def test_the_laplacian_of_the_coordinates_vanishes_inside_a_flat_face():
     vertices, faces = CUBE
-    corners = np.array([*vertices, [0.3, 0.6, 0.0]])  # a vertex inside the bottom
+    corners = np.array([*vertices, [0.3, 0.6, 0.0]])  # a vertex inside the bottom face
     bottom = [[0, 2, 8], [2, 3, 8], [3, 1, 8], [1, 0, 8]]
     laplacian = laplacian_of(corners, np.concatenate([faces[2:], bottom]))
     assert_allclose((laplacian @ corners)[8], 0.0, atol=1e-14)
@@ -70,13 +70,13 @@ def test_on_a_sphere_the_mean_curvature_normal_is_the_normal_over_the_radius():
     assert errors[2] < 0.02 * 0.5
 
 
-def test_the_dirichlet_energy_of_the_identity_is_the_area_twice():
+def test_the_dirichlet_energy_of_the_identity_is_twice_the_area():
     vertices, faces = torus()
     twice = np.vdot(vertices, laplacian_of(vertices, faces) @ vertices)
     assert_allclose(twice, 2.0 * face_areas(vertices, faces).sum(), rtol=1e-12)
 
 
-def test_area_gradients_give_back_a_linear_map_in_the_plane_of_each_face():
+def test_area_gradients_reproduce_a_linear_map_in_the_plane_of_each_face():
     vertices, faces = icosphere(2)
     matrix = np.array([[1.0, 0.2, 0.0], [0.1, 0.7, -0.3], [0.0, 0.4, 1.1]])
     moved = (vertices @ matrix.T)[faces]
@@ -89,7 +89,7 @@ def test_area_gradients_give_back_a_linear_map_in_the_plane_of_each_face():
     assert_allclose(transposed / area, in_plane @ matrix.T, atol=1e-12)
 
 
-def test_detail_turns_with_the_mesh_and_shrinks_with_its_scale():
+def test_detail_rotates_with_the_mesh_and_scales_inversely():
     vertices, faces = torus(24, 12)
     turn = rotation([1, 2, 3], 1.0)
     delta = mean_curvature_normals(surface(vertices, faces))
@@ -97,7 +97,7 @@ def test_detail_turns_with_the_mesh_and_shrinks_with_its_scale():
     assert_allclose(moved, 0.1 * delta @ turn.T, atol=1e-12)
 
 
-def test_the_area_of_a_vertex_is_at_least_a_twentieth_of_that_of_its_neighbours():
+def test_vertex_areas_are_at_least_a_twentieth_of_their_neighbours():
     vertices, faces = icosphere(2)
     areas = mixed_voronoi_areas(surface(vertices, faces))
     assert_allclose(with_least_areas(areas, faces), areas)

@@ -1,4 +1,4 @@
-"""The energy is that of well-shaped triangles, however bad those of the mesh are."""
+"""The energy is accurate and its matrix positive semi-definite, even on bad triangles."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from vtk_segdeform.geometry import intrinsic
 from vtk_segdeform.geometry.differential import cotangent_laplacian
 from vtk_segdeform.geometry.distortion import distortion
 from vtk_segdeform.geometry.intrinsic import IntrinsicTriangulation, areas, cotangents
-from vtk_segdeform.mesh.topology import Sides
+from vtk_segdeform.mesh.topology import HalfEdges
 
-HEIGHTS = [1e-2, 1e-4, 1e-6, 1e-8, 0.0]  # of a cap, as a share of its base
+HEIGHTS = [1e-2, 1e-4, 1e-6, 1e-8, 0.0]  # of a cap, relative to its base
 LONG = pytest.mark.campaign
 
 
 def with_caps(vertices, faces, count, height, seed=0):
-    """Return a mesh with *count* of its faces split by a vertex near the middle of a side."""
+    """Return a mesh with *count* of its faces split by a vertex near the middle of an edge."""
     rng = np.random.default_rng(seed)
     split = rng.choice(len(faces), count, replace=False)
     a, b, c = np.take_along_axis(
@@ -43,10 +43,10 @@ def with_caps(vertices, faces, count, height, seed=0):
 
 
 def soup(rng, n=40, m=60):
-    """Return random triangles, with caps, needles, flat ones and sides without length."""
+    """Return random triangles, including caps, needles, flat ones and edges of length zero."""
     vertices = rng.normal(size=(n, 3))
     a, b = vertices[:8], vertices[8:16]
-    vertices[16:24] = a + rng.random((8, 1)) * (b - a)  # on the lines between them
+    vertices[16:24] = a + rng.random((8, 1)) * (b - a)  # on the lines between these pairs
     vertices[16:20] += rng.normal(size=(4, 3)) * 10.0 ** rng.integers(-12, -2, (4, 1))
     vertices[24:28] = vertices[:4] + 10.0 ** rng.integers(-14, -3, (4, 1))
     vertices[28:30] = vertices[:2]
@@ -68,14 +68,14 @@ def test_the_laplacian_of_any_triangles_is_positive_semidefinite(seed):
     require_semidefinite(
         cotangent_laplacian(surface.faces, surface.cotangents, len(surface.vertices)).toarray()
     )
-    counted = surface.cotangents * rng.random((len(surface.faces), 1))
+    scaled = surface.cotangents * rng.random((len(surface.faces), 1))
     require_semidefinite(
-        cotangent_laplacian(surface.faces, counted, len(surface.vertices)).toarray()
+        cotangent_laplacian(surface.faces, scaled, len(surface.vertices)).toarray()
     )
 
 
 @pytest.mark.parametrize("solid", SOLIDS.values(), ids=SOLIDS)
-def test_a_mesh_of_good_triangles_is_its_own_triangulation(solid):
+def test_a_mesh_of_good_triangles_remains_unchanged(solid):
     vertices, faces = solid
     surface = IntrinsicTriangulation.of(vertices, faces)
     assert_array_equal(surface.faces, faces)
@@ -90,18 +90,17 @@ def test_flips_remove_caps_and_keep_the_surface_closed_and_its_area(height):
     whole = icosphere(3)
     vertices, faces = with_caps(*whole, 60, height)
     surface = IntrinsicTriangulation.of(vertices, faces)
-    sides = Sides(surface.faces, len(vertices))
-    assert sides.partner is not None
+    half_edges = HalfEdges(surface.faces, len(vertices))
+    assert half_edges.twin is not None
     assert np.bincount(surface.faces.ravel(), minlength=len(vertices)).min() >= 3
     assert np.abs(surface.cotangents).max() < 100.0
-    assert_allclose(
-        surface.face_areas.sum(), areas_of(*whole).sum(), rtol=2e-4
-    )  # of mollified caps
-    one, other = sides.neighbours[:, 0], np.arange(len(surface.faces))
+    # The areas of the mollified caps differ slightly.
+    assert_allclose(surface.face_areas.sum(), areas_of(*whole).sum(), rtol=2e-4)
+    one, other = half_edges.neighbours[:, 0], np.arange(len(surface.faces))
     assert (one != other).all()
-    # Both faces at an edge agree on how long it is.
-    opposite = np.roll(surface.lengths, -2, axis=1).ravel()  # of side h: of the corner before last
-    assert_allclose(opposite, opposite[sides.partner], rtol=1e-12)
+    # Both faces at an edge have the same length for it.
+    opposite = np.roll(surface.lengths, -2, axis=1).ravel()
+    assert_allclose(opposite, opposite[half_edges.twin], rtol=1e-12)
 
 
 def areas_of(vertices, faces):
@@ -111,7 +110,7 @@ def areas_of(vertices, faces):
 
 def test_flips_preserve_linear_functions_on_a_plane(monkeypatch):
     monkeypatch.setattr(intrinsic, "_BAD", 5.0)
-    # Two fans of needles in a square: whatever the triangles, C x is 0 inside a plane.
+    # Two fans of needles in a square; C x is 0 inside a plane for any triangulation.
     line = np.linspace(0.0, 1.0, 12)
     square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     inside = np.stack(
@@ -199,11 +198,11 @@ def scale(mesh):
     return sd.Deformer(mesh, sd.Regions.single(mesh), clean(1)[2], handle=[0])._energy.scale
 
 
-def test_bad_triangles_hardly_scale_the_weights():
+def test_bad_triangles_hardly_change_the_scale_of_the_energy():
     mesh = clean(1)[0]
     whole = scale(mesh)
-    caps = sd.Mesh(*with_caps(mesh.vertices, mesh.faces, 10, 6e-3))  # too good to be flipped
-    assert scale(caps) < 1.9 * whole  # without a limit for each 2.4 times
+    caps = sd.Mesh(*with_caps(mesh.vertices, mesh.faces, 10, 6e-3))  # not bad enough to be flipped
+    assert scale(caps) < 1.9 * whole  # 2.4 times without the bound on areas
     vertices = mesh.vertices.copy()
     for vertex in np.random.default_rng(0).choice(mesh.n_vertices, 20, replace=False):
         neighbour = mesh.adjacency[[vertex]].indices[0]
@@ -212,8 +211,8 @@ def test_bad_triangles_hardly_scale_the_weights():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_every_triangle_is_one(seed):
+def test_all_lengths_satisfy_the_triangle_inequality(seed):
     vertices, faces = soup(np.random.default_rng(seed))
     lengths = IntrinsicTriangulation.of(vertices, faces).lengths
     slack = lengths.sum(axis=1) - 2.0 * lengths.max(axis=1)
-    assert slack.min() > 1e-7 * lengths.mean()  # a flip may leave less than d
+    assert slack.min() > 1e-7 * lengths.mean()  # after a flip it may be less than d

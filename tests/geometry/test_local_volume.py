@@ -1,3 +1,5 @@
+"""Local volume change is exact for affine maps and local for other poses."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -13,9 +15,9 @@ from vtk_segdeform.mesh.mesh import Mesh
 MESHES = {"sphere": icosphere(3), "torus": torus(), "cube": CUBE}
 
 
-@pytest.fixture(params=[False, True], ids=["whole", "by cells"])
+@pytest.fixture(params=[False, True], ids=["vertices", "cells"])
 def either(request, monkeypatch):
-    """As small meshes are measured, and as large ones are."""
+    """Compute on all vertices, as for small meshes, and on cells, as for large ones."""
     if request.param:
         monkeypatch.setattr(local_volume, "_LARGE", 100)
         monkeypatch.setattr(local_volume, "_CELLS", 400)
@@ -34,7 +36,7 @@ def test_it_is_zero_under_rigid_motion_and_the_determinant_under_affine_maps(sol
 
 
 @pytest.mark.usefixtures("either")
-def test_it_is_negative_where_a_body_is_pinched_and_positive_where_it_swells():
+def test_it_is_negative_where_a_body_shrinks_and_positive_where_it_expands():
     mesh = sausage().mesh
     x = mesh.vertices
     girth = (
@@ -43,32 +45,32 @@ def test_it_is_negative_where_a_body_is_pinched_and_positive_where_it_swells():
         + 0.3 * np.exp(-((x[:, :1] - 1.2) ** 2) / 0.3)
     )
     change = local_volume_change(mesh, x * np.hstack([np.ones_like(girth), girth, girth]))
-    pinched, swollen = np.abs(x[:, 0] + 1.2) < 0.2, np.abs(x[:, 0] - 1.2) < 0.2
-    assert change[pinched].max() < -0.35
-    assert change[swollen].min() > 0.35
+    shrunk, expanded = np.abs(x[:, 0] + 1.2) < 0.2, np.abs(x[:, 0] - 1.2) < 0.2
+    assert change[shrunk].max() < -0.35
+    assert change[expanded].min() > 0.35
     assert np.abs(change[np.abs(x[:, 0]) > 2.7]).max() < 0.1
 
 
 @pytest.mark.usefixtures("either")
-def test_a_sheared_bar_has_lost_nothing():
+def test_it_is_zero_for_a_sheared_bar():
     mesh = sausage().mesh
     x = mesh.vertices.copy()
     x[:, 2] += 0.3 * x[:, 0]
     assert_allclose(local_volume_change(mesh, x), 0.0, atol=1e-12)
 
 
-def test_cells_say_what_the_whole_says_and_without_steps_between_them(monkeypatch):
+def test_cells_agree_with_vertices_and_interpolate_smoothly(monkeypatch):
     ball, faces = icosphere(6)
     mesh = Mesh(ball * [3.0, 0.8, 0.8], faces)
     x = mesh.vertices
     girth = 1.0 - 0.3 * np.exp(-(x[:, :1] ** 2) / 0.5)
-    pinched = x * np.hstack([np.ones_like(girth), girth, girth])
-    whole = local_volume_change(mesh, pinched)
+    pose = x * np.hstack([np.ones_like(girth), girth, girth])
+    whole = local_volume_change(mesh, pose)
     monkeypatch.setattr(local_volume, "_LARGE", 100)
     monkeypatch.setattr(local_volume, "_CELLS", 500)
     local = LocalVolume(mesh)
-    cells = local.change(pinched)
-    assert_allclose(cells, whole, atol=0.12)  # of 0.44: they are smoothed a little otherwise
+    cells = local.change(pose)
+    assert_allclose(cells, whole, atol=0.12)  # of 0.44: the smoothing differs slightly
     assert np.sqrt(np.square(cells - whole).mean()) < 0.03
     i, j = mesh.edges.T
     steps, smooth = np.abs(cells[i] - cells[j]), np.abs(whole[i] - whole[j])
@@ -76,21 +78,21 @@ def test_cells_say_what_the_whole_says_and_without_steps_between_them(monkeypatc
     assert steps.mean() < 1.2 * smooth.mean()
 
 
-def test_across_a_thin_plate_cells_of_one_side_say_nothing_of_the_other(monkeypatch):
+def test_cells_on_one_side_of_a_thin_plate_do_not_affect_the_other(monkeypatch):
     monkeypatch.setattr(local_volume, "_LARGE", 100)
     monkeypatch.setattr(local_volume, "_CELLS", 1500)
     ball, faces = icosphere(5)
     local = LocalVolume(Mesh(ball * [1.0, 1.0, 0.02], faces))
-    (spread,) = local._spread
-    rows = np.repeat(np.arange(len(ball)), np.diff(spread.indptr))
-    height = (local._means @ ball)[spread.indices, 2]
+    (matrix,) = local._interpolation
+    rows = np.repeat(np.arange(len(ball)), np.diff(matrix.indptr))
+    height = (local._means @ ball)[matrix.indices, 2]
     high = np.abs(ball[rows, 2]) > 0.7
     assert np.count_nonzero(high) > 3000
     assert (np.sign(height[high]) == np.sign(ball[rows[high], 2])).all()
 
 
 @pytest.mark.parametrize("with_a_body", [False, True])
-def test_crumbs_are_answered_and_hide_no_body_beside_them(monkeypatch, with_a_body):
+def test_tiny_components_are_handled_and_do_not_affect_a_body_beside_them(monkeypatch, with_a_body):
     corners = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
     triangles = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
     places = 4.0 * np.stack(np.meshgrid(*[np.arange(8.0)] * 3), axis=-1).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Vertex normals: VTK's own, the slope of the volume, and the same in any frame and unit."""
+"""Vertex normals agree with VTK and the volume gradient, in any frame and unit."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MESHES = {"sphere": Mesh(*icosphere(4)), "torus": models.torus(6000), "cactus": 
 
 
 def cone(count: int) -> Mesh:
-    """Return two cones base to base, their tips with *count* faces each."""
+    """Return two cones joined at their bases, with *count* faces at each tip."""
     angle = 2.0 * np.pi * np.arange(count) / count
     rim = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1)
     here, after = 2 + np.arange(count), 2 + (np.arange(count) + 1) % count
@@ -30,7 +30,7 @@ def cone(count: int) -> Mesh:
 
 @pytest.fixture(params=["compiled", "plain"])
 def either(request, monkeypatch):
-    """Compiled loops, and none."""
+    """Run with and without compiled kernels."""
     if request.param == "compiled":
         pytest.importorskip("numba")
     else:
@@ -44,7 +44,7 @@ def posed(mesh: Mesh) -> np.ndarray:
 
 @pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("name", MESHES)
-def test_they_are_those_that_vtk_draws_with(name):
+def test_they_agree_with_vtk(name):
     mesh = MESHES[name]
     x = posed(mesh)
     drawn = vtkTriangleMeshPointNormals()
@@ -56,7 +56,7 @@ def test_they_are_those_that_vtk_draws_with(name):
 
 @pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("name", MESHES)
-def test_they_point_where_the_volume_grows_fastest(name):
+def test_they_have_the_direction_of_the_volume_gradient(name):
     mesh = MESHES[name]
     x = posed(mesh)
     slope = volume_gradient(x, mesh.faces)
@@ -68,7 +68,7 @@ def test_they_point_where_the_volume_grows_fastest(name):
 
 @pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("unit", [1e-60, 1e-6, 1e60])
-def test_they_turn_with_the_mesh_and_do_not_ask_for_its_unit(unit):
+def test_they_rotate_with_the_mesh_and_do_not_depend_on_its_unit(unit):
     mesh, turn = MESHES["torus"], rotation([1.0, 2.0, -0.5], 1.1)
     before = VertexNormals(mesh).of(posed(mesh))
     moved = Mesh(unit * mesh.vertices, mesh.faces)
@@ -84,8 +84,8 @@ def test_a_tip_with_thousands_of_faces_points_along_its_axis():
 
 
 @pytest.mark.usefixtures("either")
-@pytest.mark.parametrize("nowhere", [0.0, np.nan])
-def test_what_has_no_area_has_no_normal_and_is_no_nan(nowhere):
+@pytest.mark.parametrize("coordinate", [0.0, np.nan])
+def test_a_mesh_without_area_has_zero_normals(coordinate):
     mesh = MESHES["sphere"]
-    normals = VertexNormals(mesh).of(np.full(mesh.vertices.shape, nowhere))
+    normals = VertexNormals(mesh).of(np.full(mesh.vertices.shape, coordinate))
     assert_array_equal(normals, np.zeros(mesh.vertices.shape))

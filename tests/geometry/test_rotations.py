@@ -14,14 +14,14 @@ from vtk_segdeform.geometry.rotations import (
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.5, 3.0, np.pi])
-def test_the_turn_of_a_turned_cloud_is_found(angle):
+def test_the_rotation_of_a_rotated_point_cloud_is_found(angle):
     turn, rest = rotation([1, -2, 0.5], angle), somewhere()
     found, shift = rigid_fit(rest, rest @ turn.T + [1, 2, 3])
     assert_allclose(found, turn, atol=1e-12)
     assert_allclose(shift, [1, 2, 3], atol=1e-12)
 
 
-def test_a_mirrored_cloud_still_gets_a_rotation():
+def test_a_reflected_point_cloud_gets_a_rotation():
     rest = somewhere()
     found, _ = rigid_fit(rest, rest * [1, 1, -1])
     assert_allclose(np.linalg.det(found), 1.0)
@@ -38,7 +38,7 @@ def test_closest_rotations_maximise_the_trace():
             assert (np.einsum("kab,kba->k", other, covariances) <= best + 1e-12).all()
 
 
-def test_flat_and_empty_neighbourhoods_give_rotations_too():
+def test_flat_and_empty_neighbourhoods_give_rotations():
     flat = np.diag([2.0, 1.0, 0.0])
     turn = rotation([0, 1, 1], 0.8)
     found = closest_rotations(np.array([flat @ turn.T, np.zeros((3, 3))]))
@@ -46,7 +46,7 @@ def test_flat_and_empty_neighbourhoods_give_rotations_too():
     assert_allclose(np.linalg.det(found), 1.0)
 
 
-def test_one_point_turns_nothing_and_a_line_only_as_far_as_it_must():
+def test_rigid_fit_of_a_point_or_a_line_uses_the_smallest_rotation():
     found, shift = rigid_fit(np.array([[1.0, 2, 3]]), np.array([[4.0, 4, 4]]))
     assert_allclose(found, np.eye(3))
     assert_allclose(shift, [3, 2, 1])

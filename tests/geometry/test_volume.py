@@ -26,41 +26,41 @@ def test_known_solids_have_their_known_volumes():
     assert signed_volume(*SOLIDS["octahedron"]) == pytest.approx(4.0 / 3.0, rel=1e-15)
 
 
-def test_the_icosphere_tends_to_the_ball_with_order_two():
+def test_icospheres_converge_to_the_ball_with_order_two():
     errors = [4 * np.pi / 3 - signed_volume(*icosphere(level)) for level in (2, 3, 4, 5)]
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     assert_allclose(orders, 2.0, atol=0.1)
     assert orders[-1] == pytest.approx(2.0, abs=0.01)
 
 
-def test_the_torus_tends_to_its_volume():
+def test_the_torus_converges_to_its_volume():
     exact = 2 * np.pi**2 * 1.0 * 0.35**2
     assert signed_volume(*torus(400, 200)) == pytest.approx(exact, rel=5e-4)
 
 
-def test_turning_the_mesh_changes_nothing(mesh):
+def test_the_volume_is_invariant_under_rotation(mesh):
     vertices, faces = mesh
     turned = vertices @ rotation([1.0, 2.0, -0.5], 1.1).T
     assert signed_volume(turned, faces) == pytest.approx(signed_volume(vertices, faces), rel=1e-14)
 
 
-def test_turning_the_faces_round_changes_the_sign(mesh):
+def test_reversing_the_faces_changes_the_sign(mesh):
     vertices, faces = mesh
     assert signed_volume(vertices, faces[:, ::-1]) == pytest.approx(
         -signed_volume(*mesh), rel=1e-14
     )
 
 
-def test_far_from_the_origin_only_the_digits_of_the_coordinates_are_lost(mesh):
+def test_far_from_the_origin_only_coordinates_lose_digits(mesh):
     vertices, faces = mesh
     diagonal = np.linalg.norm(np.ptp(vertices, axis=0))
     far = vertices + 1e4 * diagonal * np.array([0.6, -0.64, 0.48])
-    # The coordinates keep 1e4 * 2^-53 = 1e-12 of the diagonal: twelve digits, and so does V.
+    # The coordinates have an error of 1e4 * 2^-53 = 1e-12 of the diagonal, and so has V.
     assert signed_volume(far, faces) == pytest.approx(signed_volume(vertices, faces), rel=1e-11)
     assert_allclose(
         volume_gradient(far, faces), volume_gradient(vertices, faces), atol=1e-11 * diagonal**2
     )
-    # What the cubic says of the far mesh agrees with the far mesh, to the last digits.
+    # The cubic of the far mesh agrees with the volume of the far mesh to the last digits.
     move = somewhere(len(vertices), seed=3, size=0.1 * diagonal)
     at_one = volume_along(far, move, faces).sum()
     assert at_one == pytest.approx(signed_volume(far + move, faces), rel=1e-11)
@@ -88,21 +88,25 @@ def test_the_gradient_leaves_an_error_of_second_order(mesh):
 def test_the_gradient_sums_to_zero_and_times_the_positions_is_three_volumes(mesh):
     vertices, faces = mesh
     gradient = volume_gradient(vertices, faces)
-    assert_allclose(gradient.sum(axis=0), 0.0, atol=1e-13)  # moving all moves no volume
+    assert_allclose(gradient.sum(axis=0), 0.0, atol=1e-13)  # a translation changes no volume
     assert np.sum(gradient * vertices) == pytest.approx(3 * signed_volume(*mesh), rel=1e-13)
 
 
 @pytest.mark.parametrize("t", [-2.0, -0.3, 0.0, 1e-3, 0.7, 1.0, 5.0])
 def test_the_cubic_is_the_volume_along_the_path(mesh, t):
     vertices, faces = mesh
-    d = somewhere(len(vertices), seed=7, size=0.5) + [10.0, 0.0, 0.0]  # a shift changes nothing
+    d = somewhere(len(vertices), seed=7, size=0.5) + [
+        10.0,
+        0.0,
+        0.0,
+    ]  # translated, too
     terms = volume_along(vertices, d, faces) * t ** np.arange(4)
     volume = signed_volume(vertices + t * d, faces)
     assert abs(terms.sum() - volume) <= 1e-14 * max(1.0, abs(volume), np.abs(terms).sum()) * 4
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_a_step_lands_on_the_wanted_volume(mesh, seed):
+def test_the_step_reaches_the_target_volume(mesh, seed):
     vertices, faces = mesh
     d = somewhere(len(vertices), seed=seed, size=0.2) + 0.3 * vertices
     coefficients = volume_along(vertices, d, faces)
@@ -111,37 +115,37 @@ def test_a_step_lands_on_the_wanted_volume(mesh, seed):
     assert signed_volume(vertices + t * d, faces) == pytest.approx(target, rel=1e-14 * 4)
 
 
-def test_of_several_steps_the_smallest_is_taken():
+def test_the_smallest_of_several_steps_is_returned():
     # (t - 1)(t - 2)(t + 5) = t^3 + 2 t^2 - 13 t + 10
     assert step_to_volume(np.array([10.0, -13.0, 2.0, 1.0]), 0.0) == pytest.approx(1.0, rel=1e-15)
     # (t + 0.1)(t - 1)(t - 3) = t^3 - 3.9 t^2 + 2.6 t + 0.3
     assert step_to_volume(np.array([0.3, 2.6, -3.9, 1.0]), 0.0) == pytest.approx(-0.1, rel=1e-14)
 
 
-def test_a_straight_line_and_a_parabola_are_solved_too():
+def test_linear_and_quadratic_cases_are_solved():
     assert step_to_volume(np.array([1.0, 2.0, 0.0, 0.0]), 4.0) == pytest.approx(1.5, rel=1e-15)
     assert step_to_volume(np.array([0.0, 0.0, 2.0, 0.0]), 8.0) in (-2.0, 2.0)
     assert step_to_volume(np.array([0.0, 0.0, 0.0, 1.0]), 8.0) == pytest.approx(2.0, rel=1e-15)
 
 
-def test_a_volume_that_is_met_already_needs_no_step():
+def test_the_step_is_zero_if_the_target_is_met():
     assert step_to_volume(np.array([3.0, 1.0, 1.0, 1.0]), 3.0) == 0.0
     assert step_to_volume(np.array([3.0, 0.0, 0.0, 1.0]), 3.0) == pytest.approx(0.0, abs=1e-15)
 
 
-def test_where_nothing_changes_the_volume_the_step_is_zero():
+def test_the_step_is_zero_if_the_volume_is_constant():
     assert step_to_volume(np.zeros(4), 0.0) == 0.0
     assert step_to_volume(np.array([5.0, 0.0, 0.0, 0.0]), 6.0) == 0.0
 
 
-def test_out_of_reach_the_closest_step_is_taken():
+def test_an_unreachable_target_gives_the_closest_step():
     # 4 + 2 t - t^2 is at most 5, at t = 1.
     assert step_to_volume(np.array([4.0, 2.0, -1.0, 0.0]), 9.0) == pytest.approx(1.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("size", [1e-60, 1e-9, 1e-3, 1e6, 1e60])
 @pytest.mark.parametrize("path", [1e-30, 1.0, 1e30])
-def test_neither_the_size_of_the_mesh_nor_of_the_path_matters(size, path):
+def test_the_step_scales_with_the_mesh_and_the_path(size, path):
     vertices, faces = icosphere(2)
     d = somewhere(len(vertices), seed=1, size=0.2) + 0.5 * vertices
     expected = step_to_volume(
@@ -153,15 +157,15 @@ def test_neither_the_size_of_the_mesh_nor_of_the_path_matters(size, path):
 
 
 @pytest.mark.parametrize("slope", [1e-6, 1e-17, -1e-17, 1e-60])
-def test_a_path_that_barely_begins_to_change_the_volume_still_arrives(slope):
+def test_the_step_is_exact_for_a_path_with_a_small_initial_slope(slope):
     assert step_to_volume(np.array([1.0, slope, 0.0, 1.0]), 9.0) == pytest.approx(2.0, rel=1e-6)
 
 
-def test_however_flat_the_path_begins_it_still_arrives():
+def test_the_step_is_exact_for_a_path_with_a_vanishing_initial_slope():
     t = step_to_volume(np.array([1.0, 1e-200, 0.0, 1.0]), 9.0)
     assert t == pytest.approx(2.0, rel=1e-14)
 
 
-def test_a_target_at_the_crest_of_the_cubic_is_found_there():
-    # (t - 1)^2 (t + 2) = t^3 - 3 t + 2: a double root at 1, which rounding makes complex.
+def test_a_target_at_an_extremum_of_the_cubic_is_found():
+    # (t - 1)^2 (t + 2) = t^3 - 3 t + 2: a double root at 1, complex after rounding.
     assert step_to_volume(np.array([2.0, -3.0, 0.0, 1.0]), 0.0) == pytest.approx(1.0, abs=1e-7)

@@ -1,4 +1,4 @@
-"""Files and pyvista: order, digits, arrays and seams survive; errors name the file."""
+"""Files and pyvista: order, digits, arrays and seams are preserved; errors name the file."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ EXACT = [".obj", ".off", ".ply", ".vtk", ".vtp", ".vtkhdf"]
 
 
 def shuffled(seed: int = 1) -> Mesh:
-    """Return a sphere far from the origin, numbered at random, that needs all its digits."""
+    """Return a sphere far from the origin, in random order, that needs all its digits."""
     rng = np.random.default_rng(seed)
     vertices, faces = icosphere(2, radius=1 / 3)
     number = rng.permutation(len(vertices))
@@ -50,7 +50,7 @@ def quad_cube() -> pv.PolyData:
 
 
 @pytest.mark.parametrize("suffix", EXACT)
-def test_what_is_written_comes_back_to_the_last_digit_in_the_same_order(tmp_path, suffix):
+def test_meshes_are_read_as_written_to_the_last_digit_in_the_same_order(tmp_path, suffix):
     mesh = shuffled()
     write_mesh(tmp_path / f"a{suffix}", mesh)
     again = read_mesh(tmp_path / f"a{suffix}")
@@ -59,7 +59,7 @@ def test_what_is_written_comes_back_to_the_last_digit_in_the_same_order(tmp_path
 
 
 @pytest.mark.parametrize("suffix", EXACT)
-def test_polygons_stay_polygons_and_are_cut_only_for_the_mesh(tmp_path, suffix):
+def test_polygons_are_preserved_and_cut_only_for_the_mesh(tmp_path, suffix):
     cube = quad_cube()
     write_mesh(tmp_path / f"a{suffix}", cube)
     again = read_polydata(tmp_path / f"a{suffix}")
@@ -70,7 +70,7 @@ def test_polygons_stay_polygons_and_are_cut_only_for_the_mesh(tmp_path, suffix):
 
 
 @pytest.mark.parametrize("suffix", [".vtk", ".vtp", ".vtkhdf"])
-def test_every_array_survives_a_deformation_and_a_file_of_vtk(tmp_path, suffix):
+def test_every_array_is_preserved_by_a_deformation_and_by_vtk_files(tmp_path, suffix):
     cube = quad_cube()
     write_mesh(tmp_path / f"a{suffix}", with_vertices(cube, cube.points * 2.0))
     again = read_polydata(tmp_path / f"a{suffix}")
@@ -82,7 +82,7 @@ def test_every_array_survives_a_deformation_and_a_file_of_vtk(tmp_path, suffix):
     assert again.point_data.active_texture_coordinates_name == "uv"
 
 
-def test_a_ply_file_keeps_colours_texture_and_numbers(tmp_path):
+def test_a_ply_file_preserves_colours_texture_and_numbers(tmp_path):
     cube = quad_cube()
     write_mesh(tmp_path / "a.ply", cube)
     again = read_polydata(tmp_path / "a.ply")
@@ -92,7 +92,7 @@ def test_a_ply_file_keeps_colours_texture_and_numbers(tmp_path):
     assert_array_equal(again.cell_data["part"], cube.cell_data["part"])
 
 
-def test_polygons_of_different_lengths_go_through_every_own_format(tmp_path):
+def test_polygons_of_different_lengths_are_preserved_by_every_own_format(tmp_path):
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 1 / 3]])
     pyramid = pv.PolyData()
     pyramid.points = points
@@ -123,10 +123,10 @@ f 2/4 3/3 4/1
 """
 
 
-def test_texture_seams_and_materials_of_an_obj_survive_without_opening_the_mesh(tmp_path):
+def test_texture_seams_and_materials_of_an_obj_do_not_open_the_mesh(tmp_path):
     (tmp_path / "a.obj").write_text(SEAMED)
     surface = read_polydata(tmp_path / "a.obj")
-    assert from_polydata(surface).n_vertices == 4  # VTK's reader makes 12
+    assert from_polydata(surface).n_vertices == 4  # VTK's reader creates 12
     write_mesh(tmp_path / "b.obj", with_vertices(surface, surface.points + 0.1))
     again = read_polydata(tmp_path / "b.obj")
     assert_array_equal(again.points, surface.points + 0.1)
@@ -138,7 +138,7 @@ def test_texture_seams_and_materials_of_an_obj_survive_without_opening_the_mesh(
     assert again.point_data["RGB"].tolist()[3] == [51, 102, 153]
 
 
-def test_one_texture_place_per_vertex_is_what_pyvista_calls_texture_coordinates(tmp_path):
+def test_unique_texture_coordinates_per_vertex_become_the_active_ones(tmp_path):
     cube = quad_cube()
     write_mesh(tmp_path / "a.obj", cube)
     again = read_polydata(tmp_path / "a.obj")
@@ -188,13 +188,13 @@ def test_an_stl_soup_is_merged_into_a_closed_mesh(tmp_path):
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_stale_normals_are_computed_anew_and_the_original_is_left_alone(dtype):
+def test_normals_are_computed_again_and_the_original_is_unchanged(dtype):
     ball = to_polydata(Mesh(*icosphere(2)))
     ball.point_data["Normals"] = np.asarray(ball.points, dtype=dtype)
     ball.point_data.active_normals_name = "Normals"
     ball.cell_data["Normals"] = np.tile([0.0, 0.0, 1.0], (ball.n_cells, 1))
     before = ball.copy(deep=True)
-    turned = with_vertices(ball, ball.points[:, [1, 2, 0]])  # a turn
+    turned = with_vertices(ball, ball.points[:, [1, 2, 0]])  # a rotation
     assert_array_equal(ball.points, before.points)
     assert_array_equal(ball.point_data["Normals"], before.point_data["Normals"])
     facing = np.einsum("ij,ij->i", turned.point_data["Normals"], turned.points)
@@ -218,7 +218,7 @@ def test_strips_and_a_grid_of_triangles_become_the_same_mesh(tmp_path):
 
 
 @pytest.mark.parametrize("name", list(SOLIDS))
-def test_to_polydata_and_back_changes_nothing(name):
+def test_conversion_to_polydata_and_back_changes_nothing(name):
     mesh = Mesh(*SOLIDS[name])
     again = from_polydata(to_polydata(mesh))
     assert_array_equal(again.vertices, mesh.vertices)
@@ -238,7 +238,7 @@ RUBBISH = {
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.parametrize("what", list(RUBBISH))
-def test_rubbish_is_refused_in_words_that_name_the_file(tmp_path, suffix, what, capfd):
+def test_invalid_files_are_errors_that_name_the_file(tmp_path, suffix, what, capfd):
     path = tmp_path / f"rubbish{suffix}"
     path.write_bytes(RUBBISH[what])
     with pytest.raises(MeshError, match=f"rubbish{suffix}"):
@@ -247,7 +247,7 @@ def test_rubbish_is_refused_in_words_that_name_the_file(tmp_path, suffix, what, 
     capfd.readouterr()
 
 
-def test_nan_comes_through_to_be_named_as_the_fault_it_is(tmp_path):
+def test_nan_is_read_and_reported_as_a_fault(tmp_path):
     path = tmp_path / "nan.off"
     path.write_text(
         "OFF\n4 4 0\n0 0 0\n1 0 0\nnan 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
@@ -257,7 +257,7 @@ def test_nan_comes_through_to_be_named_as_the_fault_it_is(tmp_path):
         read_mesh(path)
 
 
-def test_a_truncated_file_is_refused_in_every_format(tmp_path):
+def test_a_truncated_file_is_an_error_in_every_format(tmp_path):
     for suffix in (".obj", ".off", ".ply", ".vtp"):
         path = tmp_path / f"a{suffix}"
         write_mesh(path, Mesh(*icosphere(2)))
@@ -266,11 +266,11 @@ def test_a_truncated_file_is_refused_in_every_format(tmp_path):
             read_mesh(path)
 
 
-def test_what_is_no_closed_surface_is_refused_by_name(tmp_path):
+def test_errors_say_what_is_wrong_with_the_file(tmp_path):
     with pytest.raises(MeshError, match=r"nowhere\.obj: there is no such file"):
         read_mesh(tmp_path / "nowhere.obj")
     (tmp_path / "a.xyz").write_text("1 2 3")
-    with pytest.raises(MeshError, match=r"cannot read \.xyz; can .*\.obj"):
+    with pytest.raises(MeshError, match=r"\.xyz files cannot be read; use one of .*\.obj"):
         read_mesh(tmp_path / "a.xyz")
     pv.ImageData(dimensions=(3, 3, 3)).cast_to_unstructured_grid().save(tmp_path / "a.vtu")
     with pytest.raises(MeshError, match="other than triangles"):
@@ -278,19 +278,19 @@ def test_what_is_no_closed_surface_is_refused_by_name(tmp_path):
     pv.ImageData(dimensions=(3, 3, 3)).save(tmp_path / "image.vtk")
     with pytest.raises(MeshError, match="not a surface"):
         read_mesh(tmp_path / "image.vtk")
-    with pytest.raises(MeshError, match=r"cannot write \.jpg"):
+    with pytest.raises(MeshError, match=r"\.jpg files cannot be written"):
         write_mesh(tmp_path / "a.jpg", shuffled())
     with pytest.raises(MeshError, match="no folder"):
         write_mesh(tmp_path / "no" / "a.obj", shuffled())
 
 
-def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
+def test_a_failed_write_keeps_the_old_file_and_no_other(tmp_path, monkeypatch):
     path = tmp_path / "a.off"
     write_mesh(path, shuffled())
     before = path.read_bytes()
 
     def full(draft, _surface):
-        assert tmp_path in draft.parents  # on the same disk, so that the rename is one step
+        assert tmp_path in draft.parents  # on the same file system, so that the rename is atomic
         draft.write_text("half")
         raise OSError("no space left on device")
 
@@ -301,7 +301,7 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypat
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_real_files_are_read_as_an_independent_reader_does():
+def test_real_files_are_read_as_by_an_independent_reader():
     vertices, faces = read_off("botsch-sorkine/cactus.off")
     mesh = read_mesh(path_of("botsch-sorkine/cactus.off"))
     assert_array_equal(mesh.vertices, vertices)

@@ -1,4 +1,4 @@
-"""glTF and GLB: agreement with VTK's reader, and refusal of inconsistent files."""
+"""glTF and GLB: agreement with VTK's reader, and errors for inconsistent files."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def scene():
 
 
 def theirs(path):
-    """Return the triangles (m, 3, 3) that VTK's own reader returns for a valid file."""
+    """Return the triangles (m, 3, 3) of VTK's reader for a valid file."""
     pieces = list(pv.read(path).recursive_iterator(skip_none=True))
     return np.concatenate([piece.points[triangles_of(piece)] for piece in pieces])
 
@@ -87,7 +87,7 @@ def test_nodes_morphs_and_skins_move_vertices_as_in_vtk(tmp_path, suffix):
     assert len(triangles) == 3 * len(FACES) + 6 + 6
 
     def corners_in_order(soup):
-        soup = np.round(np.sort(soup, axis=1), 4)  # each coordinate by itself: order of corners
+        soup = np.round(np.sort(soup, axis=1), 4)  # for any order of corners
         return soup.reshape(len(soup), -1)
 
     mine, other = corners_in_order(triangles), corners_in_order(theirs(path))
@@ -190,7 +190,7 @@ def deep(levels):
 
 
 HUGE = 10**12
-LIES = {  # path into the JSON, what is put there, and a part of the message
+INCONSISTENT = {  # path into the JSON, the value set there, and a part of the message
     "count beyond": ("accessors 0 count", 7, "ends at byte 84 of 72"),
     "huge count": ("accessors 0 count", HUGE, "ends at byte"),
     "negative count": ("accessors 0 count", -1, "count is -1"),
@@ -254,9 +254,9 @@ def changed(head, where, value):
         head[last] = value
 
 
-@pytest.mark.parametrize("what", list(LIES))
-def test_inconsistent_files_are_refused_with_the_object_named(tmp_path, what):
-    where, value, message = LIES[what]
+@pytest.mark.parametrize("what", list(INCONSISTENT))
+def test_inconsistent_files_are_errors_that_name_the_object(tmp_path, what):
+    where, value, message = INCONSISTENT[what]
     document = octahedron(*OCTAHEDRON)
     changed(document.head, where, value)
     if what == "targets":
@@ -266,7 +266,7 @@ def test_inconsistent_files_are_refused_with_the_object_named(tmp_path, what):
     assert "a.glb" in str(refusal.value)
 
 
-def test_sparse_parts_that_do_not_fit_are_refused(tmp_path):
+def test_sparse_parts_that_do_not_fit_are_errors(tmp_path):
     for change, message in [
         ({"count": 7}, "count is 7"),
         ({"indices": {"bufferView": 2, "componentType": 5122}}, "not unsigned"),
@@ -292,7 +292,7 @@ def test_an_accessor_without_a_buffer_cannot_allocate_more_than_the_file_size_al
         read_polydata(document.save(tmp_path / "a.glb"))
 
 
-def test_a_compressed_primitive_is_not_read_as_zeros(tmp_path):
+def test_a_compressed_primitive_is_an_error(tmp_path):
     document = octahedron(*OCTAHEDRON)
     del document.head["accessors"][0]["bufferView"]
     primitive = document.head["meshes"][0]["primitives"][0]
@@ -301,7 +301,7 @@ def test_a_compressed_primitive_is_not_read_as_zeros(tmp_path):
         read_polydata(document.save(tmp_path / "a.glb"))
 
 
-def test_many_instances_of_many_primitives_are_refused_quickly(tmp_path):
+def test_too_many_instances_of_primitives_are_an_error_at_once(tmp_path):
     document = octahedron(*OCTAHEDRON)
     document.head["meshes"][0]["primitives"] *= 1000
     document.head["nodes"] = [{"mesh": 0} for _ in range(60_000)]
@@ -365,13 +365,13 @@ def test_a_number_that_is_none_says_which_and_what_it_must_be(tmp_path, count):
 
 
 @pytest.mark.parametrize("levels", [10, 5_000])
-def test_a_deep_tree_of_nodes_is_read_as_any_other(tmp_path, levels):
+def test_a_deep_tree_of_nodes_is_read(tmp_path, levels):
     document = octahedron(*OCTAHEDRON)
     document.head["nodes"] = deep(levels)
     assert read_mesh(document.save(tmp_path / "a.glb")).n_faces == 8
 
 
-def test_deeply_nested_or_invalid_json_is_refused(tmp_path):
+def test_deeply_nested_or_invalid_json_is_an_error(tmp_path):
     path = tmp_path / "a.glb"
     for text in (b"[" * 200_000, b"{", b"[]", b"\xff", b"null", b'{"asset":' * 50_000):
         path.write_bytes(glb(text, b""))
@@ -379,7 +379,7 @@ def test_deeply_nested_or_invalid_json_is_refused(tmp_path):
             read_polydata(path)
 
 
-def test_chunks_that_do_not_fit_the_file_are_refused(tmp_path):
+def test_chunks_that_do_not_fit_the_file_are_errors(tmp_path):
     document = octahedron(*OCTAHEDRON)
     data = document.save(tmp_path / "a.glb").read_bytes()
     for harmed, message in [
@@ -396,7 +396,7 @@ def test_chunks_that_do_not_fit_the_file_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize("uri", ["data:,", "data:;base64,AAAA", "data:x", "data:;base64,A"])
-def test_a_data_uri_without_enough_in_it_is_refused(tmp_path, uri):
+def test_a_data_uri_with_too_few_bytes_is_an_error(tmp_path, uri):
     document = octahedron(*OCTAHEDRON)
     document.head["buffers"][0]["uri"] = uri
     with pytest.raises(MeshError, match=r"a\.gltf: "):

@@ -1,4 +1,4 @@
-"""Files of VTK and PyMeshLab are read by a child process: its limits, crashes and absence."""
+"""Files of VTK and PyMeshLab are read in a child process with limits, or without it."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_names_of_components_do_not_make_a_file_unreadable(tmp_path, suffix):
     write_mesh(tmp_path / f"a{suffix}", surface)
     assert surface.GetPointData().GetArray("way").GetComponentName(0) == "<{"
     again = read_polydata(tmp_path / f"a{suffix}").GetPointData().GetArray("way")
-    if suffix != ".vtkhdf":  # which holds none
+    if suffix != ".vtkhdf":  # which stores none
         expected = {".vtp": "_{", ".vtk": "<_"}[suffix]
         assert [again.GetComponentName(k) for k in (0, 1)] == [expected, "Süd 1%"]
 
@@ -82,7 +82,7 @@ def test_reading_that_takes_too_long_is_stopped(tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs limits of memory")
-def test_reading_that_takes_too_much_memory_is_refused(tmp_path, monkeypatch):
+def test_reading_that_needs_too_much_memory_is_an_error(tmp_path, monkeypatch):
     write_mesh(tmp_path / "a.vtp", Mesh(*icosphere(6)))
     monkeypatch.setattr(isolated, "_MEMORY", 1)
     monkeypatch.setattr(isolated, "_PER_BYTE", 0)

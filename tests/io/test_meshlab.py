@@ -1,4 +1,4 @@
-"""PyMeshLab: to it and back changes nothing; without it a sentence says what to install."""
+"""PyMeshLab: conversion both ways changes nothing; without it the error says what to install."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def with_pymeshlab():
 
 
 @pytest.mark.usefixtures("without_pymeshlab")
-def test_without_it_every_call_says_what_to_install(tmp_path):
+def test_without_pymeshlab_every_error_says_what_to_install(tmp_path):
     mesh = Mesh(*icosphere(1))
     (tmp_path / "a.dae").write_text("x")
     assert not meshlab.available()
@@ -49,7 +49,7 @@ def test_without_it_every_call_says_what_to_install(tmp_path):
 
 
 @pytest.mark.usefixtures("with_pymeshlab")
-def test_there_and_back_changes_nothing():
+def test_conversion_both_ways_changes_nothing():
     mesh = Mesh(*torus())
     surface = meshlab.from_meshset(meshlab.to_meshset(mesh))
     assert not surface.point_data
@@ -61,7 +61,7 @@ def test_there_and_back_changes_nothing():
 
 
 def painted() -> pv.PolyData:
-    """Return a torus with all that MeshLab knows of a surface, each its own at random."""
+    """Return a torus with random values of all attributes of MeshLab."""
     rng = np.random.default_rng(5)
     surface = to_polydata(Mesh(*torus()))
     for attributes, n in (
@@ -78,7 +78,7 @@ def painted() -> pv.PolyData:
 
 
 def same(a: pv.PolyData, b: pv.PolyData) -> bool:
-    """Tell whether two surfaces are the same to the last bit, arrays and all."""
+    """Return whether two surfaces and their arrays are identical."""
     assert_array_equal(a.points, b.points)
     assert_array_equal(a.regular_faces, b.regular_faces)
     for mine, other in ((a.point_data, b.point_data), (a.cell_data, b.cell_data)):
@@ -90,7 +90,7 @@ def same(a: pv.PolyData, b: pv.PolyData) -> bool:
 
 
 @pytest.mark.usefixtures("with_pymeshlab")
-def test_selection_quality_colours_and_texture_come_back_to_the_last_bit():
+def test_selection_quality_colours_and_texture_are_preserved_exactly():
     surface = painted()
     meshset = meshlab.to_meshset(surface)
     layer = meshset.current_mesh()
@@ -103,15 +103,15 @@ def test_selection_quality_colours_and_texture_come_back_to_the_last_bit():
 
 
 @pytest.mark.usefixtures("with_pymeshlab")
-def test_other_arrays_go_as_attributes_and_come_back_by_their_names():
+def test_other_arrays_become_custom_attributes_and_are_read_by_name():
     surface = to_polydata(Mesh(*icosphere(1)))
     rng = np.random.default_rng(3)
     surface.point_data["heat of\u00e4"] = rng.random(surface.n_points)
     surface.point_data["flow"] = rng.random((surface.n_points, 3))
     surface.cell_data["flow"] = rng.random(surface.n_cells)
     surface.cell_data["part"] = np.arange(surface.n_cells)
-    surface.point_data["words"] = ["a"] * surface.n_points  # none of numbers
-    surface.point_data["tensor"] = rng.random((surface.n_points, 9))  # MeshLab has none
+    surface.point_data["words"] = ["a"] * surface.n_points  # not numeric
+    surface.point_data["tensor"] = rng.random((surface.n_points, 9))  # MeshLab has no tensors
     meshset = meshlab.to_meshset(surface)
     names = ["heat of\u00e4", "flow", "part"]
     again = meshlab.from_meshset(meshset, names)
@@ -123,7 +123,7 @@ def test_other_arrays_go_as_attributes_and_come_back_by_their_names():
     ):
         for name, values in mine.items():
             assert_array_equal(values, other[name])
-    meshset.meshing_invert_face_orientation()  # what MeshLab does to the layer, they go through
+    meshset.meshing_invert_face_orientation()  # attributes follow changes of the layer
     turned = meshlab.from_meshset(meshset, ["part"])
     assert_array_equal(turned.cell_data["part"], surface.cell_data["part"])
     assert not meshlab.from_meshset(meshset).point_data
@@ -132,7 +132,7 @@ def test_other_arrays_go_as_attributes_and_come_back_by_their_names():
 
 
 @pytest.mark.usefixtures("with_pymeshlab")
-def test_what_is_selected_there_is_held_dragged_or_a_region_here():
+def test_selected_vertices_can_be_fixed_a_handle_or_a_region():
     scene = sausage(2)
     meshset = meshlab.to_meshset(scene.mesh)
     assert len(meshlab.selected_vertices(meshset)) == 0
@@ -151,7 +151,7 @@ def test_what_is_selected_there_is_held_dragged_or_a_region_here():
 
 
 @pytest.mark.usefixtures("with_pymeshlab")
-def test_a_session_is_its_mesh_and_its_cages_in_their_pose():
+def test_a_session_becomes_layers_of_its_mesh_and_cages_in_their_pose():
     scene = sausage(2)
     session = Session(scene.mesh)
     session.set_regions(scene.regions)
@@ -170,7 +170,7 @@ def test_a_session_is_its_mesh_and_its_cages_in_their_pose():
 
 
 @pytest.mark.usefixtures("with_pymeshlab")
-def test_a_moved_layer_is_where_it_is_shown_and_equal_names_get_a_number():
+def test_the_matrix_of_a_layer_is_applied_and_equal_names_get_a_number():
     ball = Mesh(*icosphere(1))
     meshset = meshlab.to_meshset({"a": ball})
     meshset.add_mesh(meshset.current_mesh())
@@ -182,7 +182,7 @@ def test_a_moved_layer_is_where_it_is_shown_and_equal_names_get_a_number():
 
 
 @pytest.mark.usefixtures("with_pymeshlab")
-def test_quadrangles_are_cut_and_what_is_no_surface_is_refused():
+def test_quadrangles_are_cut_and_other_types_are_errors():
     cube = pv.Cube().clean()
     cube.cell_data["quality"] = np.arange(6.0)
     again = meshlab.from_meshset(meshlab.to_meshset(cube))
@@ -198,7 +198,7 @@ def test_quadrangles_are_cut_and_what_is_no_surface_is_refused():
 
 @pytest.mark.usefixtures("with_pymeshlab")
 @pytest.mark.parametrize("suffix", sorted(meshlab.WRITES))
-def test_a_file_only_it_can_write_is_read_back_by_the_same_call_as_any_other(tmp_path, suffix):
+def test_files_in_formats_of_pymeshlab_are_written_and_read(tmp_path, suffix):
     mesh = Mesh(*icosphere(2))
     write_mesh(tmp_path / f"a{suffix}", mesh)
     again = read_mesh(tmp_path / f"a{suffix}")
@@ -211,7 +211,7 @@ def test_a_file_only_it_can_write_is_read_back_by_the_same_call_as_any_other(tmp
 
 @pytest.mark.usefixtures("with_pymeshlab")
 @pytest.mark.parametrize("solid", [icosphere(4), torus()])
-def test_simplifying_keeps_the_genus_and_nearly_the_volume(solid):
+def test_simplifying_preserves_the_genus_and_nearly_the_volume(solid):
     mesh = Mesh(*solid)
     small = meshlab.simplify(mesh, 200)
     assert abs(small.n_vertices - 200) <= 2
@@ -223,7 +223,7 @@ def test_simplifying_keeps_the_genus_and_nearly_the_volume(solid):
 
 
 @pytest.mark.usefixtures("with_pymeshlab")
-def test_what_it_cannot_read_is_an_error_that_names_the_file(tmp_path):
+def test_an_unreadable_file_is_an_error_that_names_it(tmp_path):
     (tmp_path / "a.dae").write_text("rubbish")
     with pytest.raises(MeshError, match=r"a\.dae"):
         read_mesh(tmp_path / "a.dae")

@@ -1,4 +1,4 @@
-"""MeshLab projects: whole again, the same in MeshLab, and harmless whoever wrote them."""
+"""MeshLab projects: complete, readable by MeshLab, and safe to read from any source."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ def project(folder, *layers: str, matrix: str = ""):
 
 
 @pytest.mark.usefixtures("without_pymeshlab")
-def test_layers_come_back_to_the_last_bit_without_pymeshlab(tmp_path):
+def test_layers_are_preserved_exactly_without_pymeshlab(tmp_path):
     layers = {"torus": painted(), '<b> & "c"': to_polydata(BALL)}
     write_project(tmp_path / "work.mlp", layers)
     again = read_project(tmp_path / "work.mlp")
     assert list(again) == list(layers)
     assert all(same(again[name], layers[name]) for name in layers)
-    assert "selection" in layers["torus"].point_data  # the given ones are left as they are
+    assert "selection" in layers["torus"].point_data  # the given surfaces are unchanged
 
 
 @pytest.mark.usefixtures("with_pymeshlab")
-def test_meshlab_opens_the_mesh_and_its_cages_as_they_are(tmp_path):
+def test_meshlab_opens_the_mesh_and_its_cages_unchanged(tmp_path):
     import pymeshlab
 
     scene = sausage(2)
@@ -68,7 +68,7 @@ def test_meshlab_opens_the_mesh_and_its_cages_as_they_are(tmp_path):
 
 @pytest.mark.usefixtures("with_pymeshlab")
 def test_a_project_that_meshlab_saved_is_opened(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)  # PyMeshLab writes a project only where it stands
+    monkeypatch.chdir(tmp_path)  # PyMeshLab writes projects to the working directory only
     meshset = meshlab.to_meshset({"one": painted(), "two": BALL})
     for number in (0, 1):
         meshset.set_current_mesh(number)
@@ -80,7 +80,7 @@ def test_a_project_that_meshlab_saved_is_opened(tmp_path, monkeypatch):
     assert_array_equal(layers["one"]["RGBA"], painted()["RGBA"])
 
 
-def test_a_matrix_places_the_layer(tmp_path):
+def test_the_matrix_of_a_layer_is_applied(tmp_path):
     turn = rotation([1, 2, 3], 0.5)
     matrix = np.vstack([np.column_stack([turn, [1, 2, 3]]), [0, 0, 0, 1]])
     path = project(
@@ -91,7 +91,7 @@ def test_a_matrix_places_the_layer(tmp_path):
     assert_allclose(layers["a 2"].points, BALL.vertices @ turn.T + [1, 2, 3], atol=1e-14)
 
 
-def test_writing_again_replaces_all_layers_and_touches_nothing_else(tmp_path):
+def test_writing_again_replaces_all_layers_and_no_other_files(tmp_path):
     write_project(tmp_path / "work.mlp", {"a": BALL, "b": BALL, "c": BALL})
     for name in ("notes.ply", "7.ply", "../work-0.ply"):
         (tmp_path / "work.layers" / name).write_text("mine")
@@ -104,7 +104,7 @@ def test_writing_again_replaces_all_layers_and_touches_nothing_else(tmp_path):
     assert len(after) == 5
 
 
-def test_cut_off_anywhere_the_old_project_is_still_whole(tmp_path, monkeypatch):
+def test_an_interrupted_write_keeps_the_old_project_complete(tmp_path, monkeypatch):
     write_project(tmp_path / "work.mlp", {"a": BALL, "b": painted()})
     real, left = os.replace, iter(range(100))
     for last in range(4):  # three layers, and the project
@@ -133,7 +133,7 @@ def test_a_layer_outside_the_folder_is_not_read(tmp_path, name):
     (here / "link.ply").symlink_to(tmp_path / "secret.ply")
     before = files(tmp_path)
     path = project(here, name.format(tmp_path))
-    with pytest.raises(MeshError, match="is no file in the project's folder"):
+    with pytest.raises(MeshError, match="is not a file in the project's folder"):
         read_project(path)
     assert set(files(tmp_path)) - set(before) == {"here/ball.ply", "here/work.mlp"}
 
@@ -144,16 +144,16 @@ BOMB = "<!DOCTYPE b [<!ENTITY a 'aaaa'><!ENTITY c '&a;&a;'>]><MeshLabProject>&c;
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("", "is no MeshLab project"),
-        ("rubbish", "is no MeshLab project"),
-        ("<MeshLabProject>", "is no MeshLab project"),
+        ("", "is not a MeshLab project"),
+        ("rubbish", "is not a MeshLab project"),
+        ("<MeshLabProject>", "is not a MeshLab project"),
         ("<html/>", "its root is 'html'"),
         (BOMB, "declares entities"),
-        ("<?xml version='1.0' encoding='no-such'?><MeshLabProject/>", "is no MeshLab project"),
+        ("<?xml version='1.0' encoding='no-such'?><MeshLabProject/>", "is not a MeshLab project"),
         ("<MeshLabProject><MeshGroup/></MeshLabProject>", "has no layers"),
     ],
 )
-def test_what_is_no_project_is_named(tmp_path, text, says):
+def test_an_invalid_project_is_an_error_that_names_it(tmp_path, text, says):
     (tmp_path / "work.mlp").write_text(text)
     with pytest.raises(MeshError, match=rf"work\.mlp: .*{says}"):
         read_project(tmp_path / "work.mlp")
@@ -163,15 +163,15 @@ def test_what_is_no_project_is_named(tmp_path, text, says):
 @pytest.mark.parametrize(
     "matrix", ["1 2 3", "nan " * 16, "1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1", "x " * 16]
 )
-def test_a_matrix_that_is_no_affine_map_is_named(tmp_path, matrix):
-    with pytest.raises(MeshError, match="matrix of layer 'a' is no affine map"):
+def test_a_matrix_that_is_not_affine_is_an_error(tmp_path, matrix):
+    with pytest.raises(MeshError, match="matrix of layer 'a' is not affine"):
         read_project(project(tmp_path, "ball.ply", matrix=matrix))
 
 
-def test_where_it_cannot_be_written_nothing_is(tmp_path):
+def test_nothing_is_written_if_the_project_cannot_be(tmp_path):
     (tmp_path / "taken.layers").write_text("mine")
     for name, says in (
-        ("a.ply", "ends in .mlp"),
+        ("a.ply", "must end in .mlp"),
         ("no/a.mlp", "no folder"),
         ("taken.mlp", "not a folder"),
     ):
@@ -184,7 +184,7 @@ def test_where_it_cannot_be_written_nothing_is(tmp_path):
     assert files(tmp_path) == ["taken.layers"]
 
 
-def test_a_large_file_is_not_even_parsed(tmp_path, monkeypatch):
+def test_a_large_file_is_not_parsed(tmp_path, monkeypatch):
     monkeypatch.setattr(meshlab_project, "_LARGEST", 10)
     with pytest.raises(MeshError, match="too large"):
         read_project(project(tmp_path, "ball.ply"))

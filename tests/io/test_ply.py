@@ -7,7 +7,7 @@ import pytest
 import pyvista as pv
 from numpy.testing import assert_array_equal
 from solids import CUBE, TETRAHEDRON, icosphere
-from test_written_files import Told, prism
+from test_round_trips import Warnings, prism
 
 from vtk_segdeform import Mesh
 from vtk_segdeform.cli.main import main
@@ -39,11 +39,11 @@ def test_arrays_called_x_y_and_z_do_not_become_the_coordinates(tmp_path):
     surface = to_polydata(Mesh(*icosphere(1)))
     for name in "xyz":
         surface.point_data[name] = np.full(surface.n_points, 7.0)
-    told = Told(tmp_path / "a.ply", surface)
+    warnings = Warnings(tmp_path / "a.ply", surface)
     again = read_polydata(tmp_path / "a.ply")
     assert_array_equal(again.points, surface.points)
     assert again.point_data["x_1"].tolist() == [7.0] * again.n_points
-    assert "point array 'x' is written as 'x_1'" in told.texts
+    assert "point array 'x' is written as 'x_1'" in warnings.texts
 
 
 def test_the_command_line_reports_renamed_arrays(tmp_path, capsys):
@@ -58,11 +58,11 @@ def test_the_command_line_reports_renamed_arrays(tmp_path, capsys):
     assert "segdeform regions: PLY cannot store point array 'way': left out" in said
 
 
-def test_a_face_of_300_corners_keeps_them(tmp_path):
+def test_a_face_of_300_corners_is_preserved(tmp_path):
     surface = prism(300)
-    told = Told(tmp_path / "a.ply", surface)
+    warnings = Warnings(tmp_path / "a.ply", surface)
     assert_array_equal(read_polydata(tmp_path / "a.ply").faces, surface.faces)
-    assert told.texts == ["PLY faces of over 255 corners: some programs cannot read them"]
+    assert warnings.texts == ["PLY faces of over 255 corners cannot be read by some programs"]
 
 
 def test_64_bit_integers_are_exact_or_left_out(tmp_path):
@@ -71,12 +71,12 @@ def test_64_bit_integers_are_exact_or_left_out(tmp_path):
     surface.point_data["u"] = np.array([0, 1, 5, 2**32 - 1])
     surface.point_data["d"] = np.array([0, 1, 5, 2**53 - 1])
     surface.point_data["huge"] = np.array([0, 1, 5, 2**53 + 1])
-    told = Told(tmp_path / "a.ply", surface)
+    warnings = Warnings(tmp_path / "a.ply", surface)
     again = read_polydata(tmp_path / "a.ply").point_data
     assert_array_equal(again["i"], surface.point_data["i"])
     assert_array_equal(again["u_1"], surface.point_data["u"])
     assert_array_equal(again["d"], surface.point_data["d"])
-    assert told.left_out("point", "huge")
+    assert warnings.left_out("point", "huge")
     assert "huge" not in again
 
 
@@ -128,7 +128,7 @@ def test_triangle_strips_are_read_with_consistent_orientation(tmp_path, kind, li
         data += vertices.astype(f"{order}f4").tobytes()
         data += b"".join(np.array([len(s), *s], f"{order}i4").tobytes() for s in strips)
         (tmp_path / "a.ply").write_bytes(data)
-    mesh = read_mesh(tmp_path / "a.ply")  # closed, and outward: every triangle is oriented
+    mesh = read_mesh(tmp_path / "a.ply")  # closed and outward, so every triangle is oriented
     assert mesh.n_faces == len(faces)
     assert signed_volume(mesh.vertices, mesh.faces) == pytest.approx(
         signed_volume(vertices, faces), rel=1e-6
@@ -139,7 +139,7 @@ def test_triangle_strips_are_read_with_consistent_orientation(tmp_path, kind, li
 def test_degenerate_triangles_that_join_strips_are_left_out(tmp_path):
     vertices, _ = TETRAHEDRON
     rest = "element tristrips 1\nproperty list int int vertex_indices\n"
-    rows = ["8 0 1 2 2 3 3 1 0"]  # 012, (122, 223, 233), 331, 310 by turns
+    rows = ["8 0 1 2 2 3 3 1 0"]  # 012, (122, 223, 233), 331, 310 in turn
     (tmp_path / "a.ply").write_text(text(vertices, rows, rest))
     assert read_polydata(tmp_path / "a.ply").regular_faces.tolist() == [[0, 1, 2], [1, 3, 0]]
 
@@ -159,13 +159,17 @@ def test_keywords_of_the_header_are_valid_names(tmp_path):
 @pytest.mark.parametrize(
     ("rest", "rows", "message"),
     [
-        ("element face 1000000000000\nproperty list uchar int vertex_indices\n", [], "cannot hold"),
+        (
+            "element face 1000000000000\nproperty list uchar int vertex_indices\n",
+            [],
+            "more than the rest",
+        ),
         ("element nothing 1000000000000\n" + FACES.format(m=1), ["3 0 1 2"], None),
         (FACES.format(m=-1), [], "line: 'element face -1'"),
         (FACES.format(m=1), ["-3 0 1 2"], "length -3"),
-        (FACES.format(m=1), ["3 0 1 9"], "names vertex 0 to 9"),
-        (FACES.format(m=1), ["3 0 1 1.5"], "not a whole number"),
-        (FACES.format(m=1), ["3 0 1 nan"], "not a whole number"),
+        (FACES.format(m=1), ["3 0 1 9"], "use vertices 0 to 9"),
+        (FACES.format(m=1), ["3 0 1 1.5"], "not an integer"),
+        (FACES.format(m=1), ["3 0 1 nan"], "not an integer"),
         (FACES.format(m=1).replace("int v", "thing v"), ["3 0 1 2"], "unknown type"),
         (FACES.format(m=1).replace("vertex_indices", "x"), ["3 0 1 2"], "no faces"),
         (FACES.format(m=1).replace("list uchar ", ""), ["3"], "no faces"),
@@ -175,7 +179,7 @@ def test_keywords_of_the_header_are_valid_names(tmp_path):
         (FACES.format(m=1) + "property int\n", ["3 0 1 2 4"], "line: 'property int'"),
     ],
 )
-def test_an_impossible_header_is_refused(tmp_path, rest, rows, message):
+def test_an_inconsistent_header_is_an_error(tmp_path, rest, rows, message):
     (tmp_path / "a.ply").write_text(text(TETRAHEDRON[0], rows, rest))
     if message is None:
         assert read_polydata(tmp_path / "a.ply").n_cells == 1
@@ -184,7 +188,7 @@ def test_an_impossible_header_is_refused(tmp_path, rest, rows, message):
         read_polydata(tmp_path / "a.ply")
 
 
-def test_colours_of_other_types_are_not_cut_to_bytes(tmp_path):
+def test_colours_of_other_types_are_not_converted_to_bytes(tmp_path):
     rest = FACES.format(m=1)
     colours = "property {0} red\nproperty {0} green\nproperty {0} blue\n"
     for kind, row, name, value in [

@@ -1,4 +1,4 @@
-"""Polygons and arrays that a repaired surface keeps, and the report of the others."""
+"""Polygons and arrays that a repaired surface keeps, and the report of losses."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ N = 4
 
 
 def box(drop=(), turn=()):
-    """Return a cube of N by N quads per side, with some dropped and others flipped."""
+    """Return a cube of N by N quads per side, with some removed and others flipped."""
     grid = pv.ImageData(dimensions=(N + 1,) * 3).extract_surface(algorithm=None)
     grid = grid.clean()
     quads = polygons_of(grid)[1].reshape(-1, 4)
@@ -81,7 +81,7 @@ def test_polygons_and_arrays_of_kept_faces_are_kept():
     assert_array_equal(done.vertex_map[corners[: 4 * kept]], polygons_of(surface)[1])
     there = np.flatnonzero(done.vertex_map >= 0)
     was = done.vertex_map[there]
-    assert len(there) == surface.n_points - 1  # the corner of four quads that were not there
+    assert len(there) == surface.n_points - 1  # the corner of four missing quads
     for name in ("number", "RGB", "TextureCoordinates"):
         assert_array_equal(closed.point_data[name][there], surface.point_data[name][was])
         assert closed.point_data[name].dtype == surface.point_data[name].dtype
@@ -127,7 +127,7 @@ def test_a_flipped_polygon_stays_a_polygon_with_flipped_corners():
     surface.cell_data.active_normals_name = "Normals"
     fixed, done = repair_surface(surface)
     assert done.report.ok
-    assert done.steps == ("turn 4 faces round to agree with the neighbours",)
+    assert done.steps == ("flip 4 faces to agree with the neighbours",)
     assert np.flatnonzero(done.face_turned).size == 4
     assert (polygons_of(fixed)[0] == 4).all()
     assert same_corners(surface, fixed) == 0
@@ -143,13 +143,13 @@ def test_a_polygon_that_loses_a_part_becomes_triangles_and_is_reported():
     surface = box()
     points, (counts, corners) = np.asarray(surface.points), polygons_of(surface)
     triangles, quad = cut_into_triangles(points, counts, corners)
-    extra = triangles[quad == 7][0]  # comes first, so that the triangle of the quad is dropped
+    extra = triangles[quad == 7][0]  # first, so that the triangle of the quad is the duplicate
     double = polydata_of(points, np.append(3, counts), np.append(extra, corners))
     double.cell_data["material"] = np.arange(double.n_cells)
     closed, done = repair_surface(double)
     assert done.report.ok
     assert done.steps == (
-        "drop 1 duplicate face", "cut 1 polygon into triangles where the repair changed a part",
+        "remove 1 duplicate face", "cut 1 polygon into triangles where the repair changed a part",
     )  # fmt: skip
     counts = polygons_of(closed)[0]
     assert sorted(counts)[:3] == [3, 3, 4]
@@ -177,8 +177,8 @@ def test_strips_and_loose_cells_are_reported():
     closed, done = repair_surface(strip)
     assert done.report.ok
     assert_array_equal(closed.cell_data["tag"], [8, 8, 0, 0])
-    for told in ("drop 1 vertex cell", "drop 1 line", "cut 1 strip into triangles"):
-        assert told in done.steps
+    for step in ("remove 1 vertex cell", "remove 1 line", "cut 1 strip into triangles"):
+        assert step in done.steps
 
 
 def test_the_accessor_repairs_a_copy_and_logs_each_step(caplog):

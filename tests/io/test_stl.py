@@ -1,4 +1,4 @@
-"""STL: the same mesh as from VTK's reader; wrong counts, and truncated text."""
+"""STL: the same mesh as by VTK's reader, and errors for wrong counts and truncated text."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ def octahedron(tmp_path, *, binary=True):
 
 
 @pytest.mark.parametrize("count", [0, 7, 9, 2**31, 2**32 - 1])
-def test_a_wrong_count_of_triangles_is_refused(tmp_path, count):
+def test_a_wrong_count_of_triangles_is_an_error(tmp_path, count):
     path, data = octahedron(tmp_path)
     path.write_bytes(data[:80] + count.to_bytes(4, "little") + data[84:])
     with pytest.raises(
-        MeshError, match=rf"a\.stl: declares {count} triangles, but its 484 bytes hold 8"
+        MeshError, match=rf"a\.stl: declares {count} triangles, but its 484 bytes contain 8"
     ):
         read_polydata(path)
 
@@ -53,7 +53,7 @@ def test_text_in_any_case_with_any_ends_of_lines_is_read(tmp_path):
         assert read_polydata(path).n_cells == 8
 
 
-def test_truncated_text_is_refused(tmp_path):
+def test_truncated_text_is_an_error(tmp_path):
     path, data = octahedron(tmp_path, binary=False)
     for text in (data[: len(data) // 2], data.replace(b"vertex", b"corner", 1), data[:-12]):
         path.write_bytes(text)

@@ -1,4 +1,4 @@
-"""OBJ: names in any encoding; objects, groups and smoothing are kept; other arrays are reported."""
+"""OBJ: names in any encoding, objects, groups and smoothing are preserved; losses are reported."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 import pyvista as pv
 from numpy.testing import assert_array_equal
 from solids import TETRAHEDRON, icosphere
-from test_written_files import Told, prism
+from test_round_trips import Warnings, prism
 
 from vtk_segdeform import Mesh
 from vtk_segdeform.errors import MeshError
@@ -41,7 +41,7 @@ f 2 4 3
 
 
 def names_of(surface, key):
-    """Return the name that each face has."""
+    """Return the name of each face."""
     names = get_names(surface, f"{key}Names")
     return [names[k] for k in surface.cell_data[key]]
 
@@ -60,8 +60,8 @@ def test_names_that_are_not_ascii_are_read_and_written(tmp_path, encoding, newli
         assert surface.cell_data["Smoothing"].tolist() == [0, 1, 1, 1]
         assert get_names(surface, "MaterialLibrary") == ["Körper.mtl"]
         assert read_mesh(tmp_path / path).n_faces == 4
-        told = Told(tmp_path / "b.obj", with_vertices(surface, surface.points))
-        assert not told.texts
+        warnings = Warnings(tmp_path / "b.obj", with_vertices(surface, surface.points))
+        assert not warnings.texts
 
 
 def test_only_line_feeds_and_carriage_returns_end_a_line(tmp_path):
@@ -96,12 +96,12 @@ def test_a_newline_in_a_name_does_not_start_a_line(tmp_path):
     names = ["a\nv 9 9 9\nf 1 2 3", "b\\", "b_", "  "]
     set_names(surface, "GroupNames", names)
     set_names(surface, "MaterialLibrary", ["x.mtl\nf 3 2 1"])
-    told = Told(tmp_path / "a.obj", surface)
+    warnings = Warnings(tmp_path / "a.obj", surface)
     again = read_polydata(tmp_path / "a.obj")
     assert_array_equal(again.points, surface.points)
     assert_array_equal(again.faces, surface.faces)
     assert names_of(again, "Group") == ["a_v 9 9 9_f 1 2 3", "b__1", "b_", "unnamed"]
-    assert "group 'b\\\\' is written as 'b__1'" in told.texts
+    assert "group 'b\\\\' is written as 'b__1'" in warnings.texts
     assert get_names(again, "MaterialLibrary") == ["x.mtl_f 3 2 1"]
 
 
@@ -128,15 +128,15 @@ def test_an_array_of_the_wrong_type_is_left_out_with_a_warning(tmp_path, what):
     getattr(surface, f"{sort}_data")[name] = values
     for key in ("Object", "Material"):
         set_names(surface, f"{key}Names", ["a"])
-    told = Told(tmp_path / "a.obj", surface)
-    assert told.left_out(sort, name)
+    warnings = Warnings(tmp_path / "a.obj", surface)
+    assert warnings.left_out(sort, name)
     again = read_polydata(tmp_path / "a.obj")
     assert_array_equal(again.points, surface.points)
     assert not list(again.point_data) + list(again.cell_data)
 
 
 @pytest.mark.parametrize("corner", ["0", "-5", "1/0", "1/-9"])
-def test_numbers_before_the_first_are_refused(tmp_path, corner):
+def test_indices_before_the_first_are_errors(tmp_path, corner):
     (tmp_path / "a.obj").write_text(f"vt 0 0\n{BLENDER}f {corner} 2 3\n", encoding="utf-8")
     with pytest.raises(MeshError, match=r"a\.obj: a face refers to (0|-5|-9)"):
         read_polydata(tmp_path / "a.obj")

@@ -1,4 +1,4 @@
-"""The compiled kernels do what their twins in numpy do."""
+"""The compiled kernels agree with their equivalents in numpy."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MOVE = RNG.normal(size=MESH.vertices.shape)
 
 @pytest.fixture
 def twin(monkeypatch):
-    """Return a caller that calls once compiled and once plain, and returns both results."""
+    """Return a function that calls with and without compiled kernels and returns both results."""
     pytest.importorskip("numba")
     assert dispatch.compiled_kernels(10**6) is not None
 
@@ -70,12 +70,12 @@ SHAPES = {
 
 
 @pytest.mark.parametrize("kind", SHAPES)
-def test_rotations_are_rotations_and_as_close(twin, kind):
+def test_rotations_are_rotations_and_equally_close(twin, kind):
     s = SHAPES[kind]
     quick, plain = twin(lambda: closest_rotations(s))
     assert_allclose(quick @ np.swapaxes(quick, 1, 2), np.tile(np.eye(3), (300, 1, 1)), atol=1e-13)
     assert_allclose(np.linalg.det(quick), 1.0, atol=1e-13)
-    # Where several rotations are equally close, either may be found: what counts is how close.
+    # Several rotations may be equally close, so compare how close they are.
     reached, best = (np.einsum("gij,gji->g", r, s) for r in (quick, plain))
     assert_allclose(reached, best, rtol=0.0, atol=1e-13 * np.abs(s).max())
     if kind in ("any", "almost at rest", "flat"):
@@ -84,7 +84,7 @@ def test_rotations_are_rotations_and_as_close(twin, kind):
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 @pytest.mark.parametrize("columns", [3, 6, 9])
-def test_products_agree_and_are_taken_in_double_precision(twin, dtype, columns):
+def test_products_agree_and_accumulate_in_double_precision(twin, dtype, columns):
     rows = np.sort(RNG.permutation(6000)[:4000])
     block, p = RNG.normal(size=(4000, 37)).astype(dtype), RNG.normal(size=(37, columns))
     y = RNG.normal(size=(6000, 3))
@@ -106,7 +106,7 @@ def test_products_agree_and_are_taken_in_double_precision(twin, dtype, columns):
 
 @pytest.mark.parametrize(("coupled", "n"), [(True, 3 * 60), (False, 180)])
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_triangles_are_solved_alike(twin, coupled, n, count):
+def test_triangular_solves_agree(twin, coupled, n, count):
     spread = RNG.normal(size=(n, n))
     hessian = spread @ spread.T + np.eye(n)
     factor = Factor(np.linalg.cholesky(hessian), coupled)
@@ -119,13 +119,13 @@ def test_triangles_are_solved_alike(twin, coupled, n, count):
         assert_allclose(quick, solved, atol=1e-9 * np.abs(solved).max())
 
 
-def test_results_do_not_depend_on_how_many_threads_there_are(monkeypatch):
+def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
     volume = volume_along(MESH.vertices, MOVE, MESH.faces)
     monkeypatch.setattr(threads, "n_threads", lambda: 1)
     assert_array_equal(volume_along(MESH.vertices, MOVE, MESH.faces), volume)
 
 
-def test_every_row_is_worked_on_once_and_by_others_than_the_caller(monkeypatch):
+def test_every_row_is_processed_once_and_in_other_threads_than_the_callers(monkeypatch):
     monkeypatch.setattr(threads, "n_threads", lambda: 2)
     done, workers = np.zeros(1000, dtype=int), set()
 
@@ -138,7 +138,7 @@ def test_every_row_is_worked_on_once_and_by_others_than_the_caller(monkeypatch):
     assert threading.current_thread() not in workers
 
 
-def test_after_it_was_cancelled_nothing_works_on(monkeypatch):
+def test_nothing_runs_after_cancellation(monkeypatch):
     monkeypatch.setattr(threads, "n_threads", lambda: 2)
     done = []
 
@@ -159,7 +159,7 @@ def test_after_it_was_cancelled_nothing_works_on(monkeypatch):
     assert len(done) == finished
 
 
-def test_a_fault_in_the_work_reaches_the_caller(monkeypatch):
+def test_an_exception_in_a_task_reaches_the_caller(monkeypatch):
     monkeypatch.setattr(threads, "n_threads", lambda: 2)
 
     def work(start, stop):
@@ -170,7 +170,7 @@ def test_a_fault_in_the_work_reaches_the_caller(monkeypatch):
         threads.in_parallel(work, 100, 10)
 
 
-def test_mean_value_coordinates_agree_wherever_the_point_is(twin):
+def test_mean_value_coordinates_agree_at_any_point(twin):
     cage = models.sphere(162)
     p, corners = cage.vertices, cage.vertices[cage.faces]
     share = RNG.dirichlet(np.ones(3), len(corners))[:, :, None]
@@ -189,7 +189,7 @@ def test_a_small_subspace_multiplied_in_one_call_is_the_sum_over_its_regions(twi
     blocks = [RNG.normal(size=(len(own), m)) for own, m in zip(rows, (50, 33, 20, 12), strict=True)]
     subspace = Subspace(4001, tuple(rows), tuple(blocks))
     reached = subspace.reached_alike()
-    assert 5 <= len(reached) <= 8  # by none, by one, by two, by three
+    assert 5 <= len(reached) <= 8  # in no region, in one, in two, in three
     assert_array_equal(np.sort(np.concatenate(reached)), np.arange(4001))
     p, start, y = (RNG.normal(size=(k, c)) for k, c in ((115, columns), (4001, 3), (4001, 3)))
     for call in (
@@ -207,7 +207,7 @@ def test_a_small_subspace_multiplied_in_one_call_is_the_sum_over_its_regions(twi
 
 
 @pytest.mark.parametrize("regions", [1, 5, 70])
-def test_the_cages_that_reach_a_vertex_are_found_for_any_number_of_regions(regions):
+def test_the_cages_of_each_vertex_are_found_for_any_number_of_regions(regions):
     n = 400
     rows = [np.sort(RNG.permutation(n)[: RNG.integers(0, 30)]) for _ in range(regions)]
     rows[0] = np.arange(n)
@@ -228,7 +228,7 @@ def test_the_cages_that_reach_a_vertex_are_found_for_any_number_of_regions(regio
     assert_array_equal(w, dense[np.ix_(some, columns)])
 
 
-def test_without_a_cache_folder_kernels_are_compiled_nevertheless(monkeypatch):
+def test_kernels_are_compiled_without_a_cache_folder(monkeypatch):
     caching = pytest.importorskip("numba.core.caching")
     kernels = importlib.import_module("vtk_segdeform.kernels.compiled.kernels")
     monkeypatch.setattr(caching.CompileResultCacheImpl, "_locator_classes", [])
@@ -237,7 +237,7 @@ def test_without_a_cache_folder_kernels_are_compiled_nevertheless(monkeypatch):
     assert twice.signatures
 
 
-def test_set_up_runs_a_trial_step_so_the_first_frame_waits_for_no_kernel(monkeypatch):
+def test_set_up_runs_a_trial_step_so_that_the_first_frame_compiles_nothing(monkeypatch):
     pytest.importorskip("numba")
     mesh = models.torus(3000)
     regions = Regions.single(mesh)

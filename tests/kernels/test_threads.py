@@ -11,8 +11,8 @@ import pytest
 
 from vtk_segdeform.kernels import threads
 
-# Set-up and a drag, alone and then in three threads at a time.  In a process of its own, since
-# the tests' own BLAS has one thread.
+# Set-up and a drag, alone and then in three threads at a time; in a separate process, since BLAS
+# has one thread in the tests.
 CONCURRENT = """
 import sys, threading
 import numpy as np
@@ -61,7 +61,7 @@ def test_concurrent_deformers_agree_with_sequential_ones_and_blas_threads_are_re
 
 
 class Library:
-    """A stand-in for threadpoolctl and BLAS: each limit remembers the number to restore."""
+    """A fake of threadpoolctl and BLAS: each limit stores the number to restore."""
 
     def __init__(self):
         self.threads = 8

@@ -1,3 +1,5 @@
+"""Every fault of a mesh is found, counted once and named; sound meshes have none."""
+
 from __future__ import annotations
 
 import time
@@ -10,20 +12,21 @@ from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
 from vtk_segdeform.mesh import faults as search
 from vtk_segdeform.mesh import shells, topology
 from vtk_segdeform.mesh.faults import find_faults
+from vtk_segdeform.mesh.grouping import first_equal_row
 from vtk_segdeform.mesh.report import Kind
-from vtk_segdeform.mesh.topology import Sides, first_equal_row
+from vtk_segdeform.mesh.topology import HalfEdges
 
 SPHERE = icosphere(2)
 N = len(SPHERE[0])
 
 
 def kinds(vertices, faces):
-    """Return what is fatal, as {kind: count}."""
+    """Return the faults of a mesh as {kind: count}."""
     return {fault.kind: fault.count for fault in find_faults(vertices, faces).faults}
 
 
 def together(*solids):
-    """Return solids as one mesh, vertices at the same place made one."""
+    """Return solids as one mesh, with coincident vertices merged."""
     vertices = np.concatenate([v for v, _ in solids])
     starts = np.cumsum([0] + [len(v) for v, _ in solids])
     faces = np.concatenate([f + start for (_, f), start in zip(solids, starts, strict=False)])
@@ -32,14 +35,14 @@ def together(*solids):
 
 
 @pytest.mark.parametrize("name", SOLIDS)
-def test_a_sound_mesh_has_no_faults(name):
+def test_a_closed_oriented_manifold_has_no_faults(name):
     report = find_faults(*SOLIDS[name])
     assert report.ok
     assert report.faults == report.notes == ()
     assert report.n_components == 1
 
 
-def test_a_torus_and_two_bodies_are_sound():
+def test_a_torus_and_two_bodies_have_no_faults():
     assert find_faults(*torus()).ok
     report = find_faults(*two_components())
     assert report.ok
@@ -54,7 +57,7 @@ def test_a_missing_face_leaves_three_open_edges_around_one_hole():
     assert sorted(report.faults[0].examples) == [(a, b), (a, c), (b, c)]
 
 
-def test_holes_are_counted_apart():
+def test_separate_holes_are_counted_separately():
     vertices, faces = SPHERE
     around = [np.flatnonzero((faces == v).any(axis=1)) for v in (0, 1)]
     left = np.delete(faces, np.concatenate(around), axis=0)
@@ -69,7 +72,7 @@ def test_a_third_face_at_an_edge_is_found():
     assert found == {Kind.NON_MANIFOLD_EDGE: 1, Kind.OPEN_EDGE: 2, Kind.HOLE: 1}
 
 
-def test_two_cubes_that_share_a_corner_or_an_edge_are_told_apart():
+def test_cubes_that_share_a_corner_or_an_edge_have_different_faults():
     vertices, faces = CUBE
     corner = together(CUBE, (vertices + 1.0, faces))
     assert kinds(*corner) == {Kind.NON_MANIFOLD_VERTEX: 1}
@@ -77,37 +80,37 @@ def test_two_cubes_that_share_a_corner_or_an_edge_are_told_apart():
     assert kinds(*edge) == {Kind.NON_MANIFOLD_EDGE: 1}
 
 
-def test_one_face_turned_round_disagrees_along_three_edges():
+def test_a_flipped_face_is_inconsistent_along_three_edges():
     vertices, faces = SPHERE
     turned = faces.copy()
     turned[3] = turned[3, ::-1]
     assert kinds(vertices, turned) == {Kind.TURNED_EDGE: 3}
 
 
-def test_a_mesh_turned_inside_out_is_found_wherever_it_lies():
+def test_an_inside_out_mesh_is_found_at_any_position_and_scale():
     vertices, faces = SPHERE
     for moved in (vertices, vertices + 1e8, 1e-6 * vertices, vertices @ rotation([1, 2, 3], 2.0).T):
         assert find_faults(moved, faces).ok
         assert kinds(moved, faces[:, ::-1]) == {Kind.INWARD: 1}
-    assert kinds(vertices * [1.0, 1.0, -1.0], faces) == {Kind.INWARD: 1}  # a mirror does it too
+    assert kinds(vertices * [1.0, 1.0, -1.0], faces) == {Kind.INWARD: 1}  # a reflection
 
 
-def test_a_flat_closed_mesh_encloses_nothing():
+def test_a_flat_closed_mesh_encloses_no_volume():
     vertices, faces = CUBE
     turned = vertices * [1.0, 1.0, 0.0] @ rotation([1.0, 2.0, 3.0], 0.7).T
     assert kinds(turned, faces) == {Kind.NO_VOLUME: 1}
 
 
 @pytest.mark.parametrize(("scale", "kind"), [(1e150, Kind.TOO_LARGE), (1e-150, Kind.TOO_SMALL)])
-def test_a_size_that_no_volume_can_be_computed_for_is_named(scale, kind):
+def test_a_mesh_too_large_or_too_small_to_compute_volumes_is_a_fault(scale, kind):
     vertices, faces = CUBE
     assert set(kinds(vertices * scale, faces)) == {kind}
-    for still in (scale**0.46, 1.0 / scale**0.46):
-        assert find_faults(vertices * still, faces).ok
+    for allowed in (scale**0.46, 1.0 / scale**0.46):
+        assert find_faults(vertices * allowed, faces).ok
 
 
 @pytest.mark.parametrize("depth", [1, 2, 3])
-def test_nested_shells_are_bodies_and_cavities_in_turn(depth):
+def test_nested_shells_alternate_between_bodies_and_cavities(depth):
     vertices, faces = SPHERE
     shells = [(vertices * 0.5**k, faces[:, :: (-1) ** k]) for k in range(depth + 1)]
     assert find_faults(*together(*shells)).ok
@@ -115,20 +118,20 @@ def test_nested_shells_are_bodies_and_cavities_in_turn(depth):
     assert kinds(*together(*wrong)) == {Kind.INWARD: 1}
 
 
-def test_bodies_that_overlap_are_no_cavities():
+def test_overlapping_bodies_are_not_cavities():
     vertices, faces = icosphere(3)
     bump = vertices * 0.2 + 0.55  # within the box of the ball, half of it outside the ball
     assert (bump.max(axis=0) < vertices.max(axis=0)).all()
     assert find_faults(*together((vertices, faces), (bump, faces))).ok
 
 
-def test_degenerate_and_duplicate_faces_are_named_and_nothing_else_is():
+def test_degenerate_and_duplicate_faces_are_the_only_faults_reported():
     vertices, faces = SPHERE
     more = np.concatenate([faces, [[0, 0, 1], [5, 7, 5]], faces[:3], faces[:1, ::-1]])
     assert kinds(vertices, more) == {Kind.DEGENERATE: 2, Kind.DUPLICATE_FACE: 4}
 
 
-def test_a_face_without_area_and_a_vertex_on_another_are_notes():
+def test_a_face_without_area_and_a_coincident_vertex_are_notes():
     vertices, faces = SPHERE
     flat = vertices.copy()
     flat[faces[0, 0]] = flat[faces[0, 1]]
@@ -138,7 +141,7 @@ def test_a_face_without_area_and_a_vertex_on_another_are_notes():
     assert report.count(Kind.ZERO_AREA) == 2  # the two faces at that edge
 
 
-def test_numbers_that_are_none_are_found():
+def test_nan_and_infinite_coordinates_are_found():
     vertices, faces = SPHERE
     broken = vertices.copy()
     broken[4, 1], broken[9] = np.nan, np.inf
@@ -186,21 +189,21 @@ def test_the_smallest_meshes_do_not_break_the_search(vertices, faces, expected):
         (np.array([["a", "b", "c"]]), [[0, 0, 0]], "vertices must hold numbers"),
     ],
 )
-def test_what_is_no_mesh_at_all_is_an_error(vertices, faces, message):
+def test_arrays_of_the_wrong_shape_or_type_are_an_error(vertices, faces, message):
     with pytest.raises(ValueError, match=message):
         find_faults(vertices, faces)
 
 
-def test_the_report_reads_well():
+def test_the_text_of_a_report_has_the_size_the_faults_and_advice():
     vertices, faces = SPHERE
     text = str(find_faults(np.append(vertices, [[9, 9, 9]], axis=0), faces[1:]))
-    assert text.splitlines()[0] == "67 vertices, 127 faces, 1 component: not usable as it is"
-    assert "fault: 1 unreferenced vertex (vertex 66); `repair` would drop" in text
+    assert text.splitlines()[0] == "67 vertices, 127 faces, 1 component: has faults"
+    assert "fault: 1 unreferenced vertex (vertex 66); `repair` removes" in text
     assert "fault: 3 open edges (" in text
     assert str(find_faults(*CUBE)).endswith(": a closed, outward oriented two-manifold")
 
 
-def test_random_triangles_agree_with_counting_by_hand():
+def test_faults_of_random_triangles_agree_with_plain_counting():
     rng = np.random.default_rng(11)
     for _ in range(50):
         faces = rng.integers(0, 8, (rng.integers(1, 14), 3))
@@ -218,7 +221,7 @@ def test_random_triangles_agree_with_counting_by_hand():
 
 
 def damaged(vertices, faces, rng):
-    """Return a closed mesh with up to three things done to it; many leave it closed."""
+    """Return a closed mesh with up to three random changes; many of them keep it closed."""
     vertices, faces = vertices.copy(), faces.copy()
     for _ in range(rng.integers(0, 4)):
         one, other = rng.choice(len(vertices), 2, replace=False)
@@ -235,7 +238,7 @@ def damaged(vertices, faces, rng):
             case 4:
                 vertices[one] = vertices[other]
             case 5:
-                more = faces[face] + [[0], [0]]  # a pillow of two faces, at vertices of its own
+                more = faces[face] + [[0], [0]]  # a separate pillow of two faces
                 vertices, faces = (
                     np.append(vertices, vertices[more[0]] + 9.0, axis=0),
                     np.append(faces, len(vertices) + np.array([[0, 1, 2], [0, 2, 1]]), axis=0),
@@ -245,21 +248,21 @@ def damaged(vertices, faces, rng):
     return vertices, faces
 
 
-def groups(things, links):
-    """Return how many groups *things* fall into by *links*; a plain union-find."""
-    parent = {thing: thing for thing in things}
+def groups(items, links):
+    """Return the number of connected components of *items* under *links*, by union-find."""
+    parent = {item: item for item in items}
 
-    def root(thing):
-        while parent[thing] != thing:
-            thing = parent[thing]
-        return thing
+    def root(item):
+        while parent[item] != item:
+            item = parent[item]
+        return item
 
     for one, other in links:
         parent[root(one)] = root(other)
-    return sum(parent[thing] == thing for thing in things)
+    return sum(parent[item] == item for item in items)
 
 
-def test_closed_surfaces_that_were_damaged_agree_with_counting_by_hand():
+def test_faults_of_damaged_surfaces_agree_with_plain_counting():
     rng = np.random.default_rng(5)
     bodies = [*SOLIDS.values(), together(CUBE, (CUBE[0] + 1.0, CUBE[1])), two_components()]
     bodies = [body for body in bodies if len(body[1]) < 100]
@@ -280,34 +283,34 @@ def test_closed_surfaces_that_were_damaged_agree_with_counting_by_hand():
                 at.setdefault(f - {v}, []).append(f)
         touching = [(fs[0], f) for fs in at.values() for f in fs[1:]]
         assert report.n_components == groups(once, touching)
-        crowded = set().union(*(edge for edge, fs in at.items() if len(fs) > 2))
+        non_manifold = set().union(*(edge for edge, fs in at.items() if len(fs) > 2))
         pairs = [(edge, fs) for edge, fs in at.items() if len(fs) == 2]
         pinched = sum(
             groups([f for f in once if v in f], [fs for edge, fs in pairs if v in edge]) > 1
             for v in range(len(vertices))
-            if v not in crowded
+            if v not in non_manifold
         )
         assert report.count(Kind.NON_MANIFOLD_VERTEX) == pinched
         pinches += pinched > 0 and not report.count(Kind.OPEN_EDGE)
-    assert pinches > 20  # of closed surfaces, too
+    assert pinches > 20  # enough pinched closed surfaces among them
 
 
-def test_what_is_found_does_not_depend_on_pieces_or_on_how_many_faces_meet(monkeypatch):
+def test_faults_do_not_depend_on_the_size_of_tasks_or_the_number_of_rounds(monkeypatch):
     pinched = together(CUBE, (CUBE[0] + 1.0, CUBE[1]))
     flat = SPHERE[0].copy()
     flat[SPHERE[1][0, 0]] = flat[SPHERE[1][0, 1]]
     cavity = together(SPHERE, (0.5 * SPHERE[0], SPHERE[1][:, ::-1]))
     far = [(CUBE[0] + at, CUBE[1]) for at in (1e15, -1e15)]
-    apart = together(SPHERE, *far)  # they have volumes only about corners of their own
+    apart = together(SPHERE, *far)  # their volumes need an origin near each
     meshes = [SPHERE, pinched, (flat, SPHERE[1]), cavity, apart, (SPHERE[0], SPHERE[1][:, ::-1])]
     before = [find_faults(*mesh) for mesh in meshes]
     for module in (search, shells):
         monkeypatch.setattr(module, "_PIECE", 7)
-    monkeypatch.setattr(topology, "_ROUNDS", 4)  # at most corners more faces meet
+    monkeypatch.setattr(topology, "_ROUNDS", 4)  # more faces meet at most vertices
     assert [find_faults(*mesh) for mesh in meshes] == before
 
 
-def test_equal_rows_are_equal_numbers_whatever_their_bits():
+def test_rows_are_equal_by_value_not_by_bits():
     rows = np.array([[0.0, 1.0], [-0.0, 1.0], [np.nan, 1.0], [np.nan, 1.0], [1.0, 0.0], [0.0, 1.0]])
     assert first_equal_row(rows).tolist() == [0, 0, 2, 3, 4, 0]
     assert first_equal_row(rows.astype(np.float32)).tolist() == [0, 0, 2, 3, 4, 0]
@@ -323,9 +326,9 @@ def test_equal_rows_are_equal_numbers_whatever_their_bits():
 
 def test_on_a_manifold_edges_fans_and_genus_agree():
     for (vertices, faces), euler in ((SPHERE, 2), (torus(), 0), (two_components(), 4)):
-        sides = Sides(faces, len(vertices))
-        assert len(vertices) - len(sides.first) + len(faces) == euler
-        assert sides.fans(sides.pairs).max() + 1 == len(vertices)
+        half_edges = HalfEdges(faces, len(vertices))
+        assert len(vertices) - len(half_edges.first) + len(faces) == euler
+        assert half_edges.fans(half_edges.pairs).max() + 1 == len(vertices)
 
 
 def test_the_search_grows_no_faster_than_sorting():
@@ -337,21 +340,21 @@ def test_the_search_grows_no_faster_than_sorting():
             times.append(time.perf_counter() - start)
         return min(times)
 
-    # Four times the vertices: a search that compares each with each would take sixteen times.
+    # Four times the vertices: comparing all pairs would take sixteen times as long.
     assert best(torus(200, 100)) < 10 * best(torus(100, 50))
 
 
 @pytest.mark.parametrize(
     "name", ["botsch-sorkine/cactus.off", "botsch-sorkine/cylinder.off", "hand.off"]
 )
-def test_benchmark_meshes_are_sound(name):
+def test_benchmark_meshes_have_no_faults(name):
     assert find_faults(*read_off(name)).ok
 
 
 @pytest.mark.parametrize(
     "name", ["koala.obj", "armadilloman.obj", "armadilloman_cages_triangulated.obj"]
 )
-def test_benchmark_meshes_in_obj_files_are_sound(name):
+def test_benchmark_meshes_in_obj_files_have_no_faults(name):
     lines = [line.split() for line in path_of(name).read_text().splitlines()]
     vertices = np.array([w[1:4] for w in lines if w and w[0] == "v"], dtype=float)
     faces = [[int(i.partition("/")[0]) - 1 for i in w[1:4]] for w in lines if w and w[0] == "f"]

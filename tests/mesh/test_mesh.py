@@ -1,3 +1,5 @@
+"""`Mesh` accepts closed, oriented two-manifolds only, and is immutable."""
+
 from __future__ import annotations
 
 import copy
@@ -20,7 +22,7 @@ def solid(request):
     return SOLIDS[request.param]
 
 
-def test_a_mesh_holds_what_it_was_given(solid):
+def test_a_mesh_has_the_given_arrays(solid):
     mesh = Mesh(*solid)
     assert_array_equal(mesh.vertices, solid[0])
     assert_array_equal(mesh.faces, solid[1])
@@ -28,13 +30,13 @@ def test_a_mesh_holds_what_it_was_given(solid):
     assert (mesh.n_vertices, mesh.n_faces) == (len(solid[0]), len(solid[1]))
 
 
-def test_lists_and_other_number_types_will_do():
+def test_lists_and_other_number_types_are_converted():
     vertices, faces = CUBE
     mesh = Mesh(vertices.astype(np.float32), faces.astype(np.uint8).tolist())
     assert_array_equal(mesh.vertices, vertices)
 
 
-def test_every_fault_is_named_with_its_number():
+def test_the_error_counts_every_fault():
     vertices, faces = icosphere(2)
     broken = np.concatenate([faces[1:], faces[5:7], [[0, 0, 1]]])
     with pytest.raises(MeshError) as caught:
@@ -46,7 +48,7 @@ def test_every_fault_is_named_with_its_number():
 
 
 @pytest.mark.parametrize(
-    "break_it",
+    "damage",
     [
         lambda v, f: (v, f[1:]),
         lambda v, f: (v, f[:, ::-1]),
@@ -58,18 +60,18 @@ def test_every_fault_is_named_with_its_number():
         lambda v, f: (v * [1.0, 1.0, 0.0], f),
     ],
 )
-def test_whatever_the_fault_it_is_a_mesh_error(break_it):
+def test_every_fault_raises_a_mesh_error(damage):
     with pytest.raises(MeshError):
-        Mesh(*break_it(*CUBE))
+        Mesh(*damage(*CUBE))
 
 
-def test_a_wrong_shape_is_told_from_a_fault():
+def test_a_wrong_shape_is_not_a_mesh_error():
     with pytest.raises(ValueError, match="faces must have shape") as caught:
         Mesh(CUBE[0], CUBE[1][:, :2])
     assert not isinstance(caught.value, MeshError)
 
 
-def test_a_mesh_cannot_be_changed_not_even_through_the_arrays_it_was_made_from():
+def test_a_mesh_is_immutable_and_independent_of_the_arrays_it_was_made_from():
     vertices, faces = CUBE[0].copy(), CUBE[1].copy()
     mesh = Mesh(vertices, faces)
     vertices[:], faces[:] = 7.0, 0
@@ -85,7 +87,7 @@ def test_a_mesh_cannot_be_changed_not_even_through_the_arrays_it_was_made_from()
 @pytest.mark.parametrize(
     "again", [lambda m: pickle.loads(pickle.dumps(m)), copy.deepcopy, copy.copy]
 )
-def test_a_copy_is_as_frozen_as_the_mesh(again):
+def test_a_copy_is_read_only_too(again):
     mesh = Mesh(*CUBE)
     twin = again(mesh)
     assert_array_equal(twin.vertices, mesh.vertices)
@@ -94,7 +96,7 @@ def test_a_copy_is_as_frozen_as_the_mesh(again):
     assert not twin.faces.flags.writeable
 
 
-def test_edges_are_counted_once_in_order_and_satisfy_euler():
+def test_edges_are_sorted_unique_and_satisfy_eulers_formula():
     for (vertices, faces), euler in ((icosphere(2), 2), (torus(), 0), (two_components(), 4)):
         edges = Mesh(vertices, faces).edges
         assert len(vertices) - len(edges) + len(faces) == euler
@@ -106,7 +108,7 @@ def test_edges_are_counted_once_in_order_and_satisfy_euler():
         assert [tuple(e) for e in edges.tolist()] == sorted(pairs)
 
 
-def test_adjacency_is_the_edge_lengths_both_ways():
+def test_adjacency_is_the_symmetric_matrix_of_edge_lengths():
     mesh = Mesh(*CUBE)
     dense = mesh.adjacency.toarray()
     assert_array_equal(dense, dense.T)
@@ -125,7 +127,7 @@ def test_components_area_and_size_of_known_solids():
     assert_array_equal(Mesh(*two_components()).components, vertices[:, 0] > 1.5)
 
 
-def test_a_pose_keeps_the_triangles_and_what_is_known_of_them():
+def test_a_pose_shares_the_triangles_and_their_cached_values():
     mesh = Mesh(*torus())
     edges = mesh.edges
     posed = mesh.with_vertices(2.0 * mesh.vertices)
@@ -141,9 +143,9 @@ def test_a_pose_may_be_inside_out():
     assert not find_faults(mesh.with_vertices(-mesh.vertices).vertices, mesh.faces).ok
 
 
-def test_a_pose_must_be_finite_and_have_as_many_vertices():
+def test_a_pose_must_be_finite_and_have_the_same_number_of_vertices():
     mesh = Mesh(*CUBE)
-    with pytest.raises(ValueError, match="vertices holds 1 points with NaN"):
+    with pytest.raises(ValueError, match="vertices must be finite; 1 of 8 points have NaN"):
         mesh.with_vertices(np.where(np.arange(8)[:, None] == 2, np.nan, mesh.vertices))
     with pytest.raises(ValueError, match=r"vertices must have shape \(8, 3\); got \(7, 3\)"):
         mesh.with_vertices(mesh.vertices[:7])
@@ -165,7 +167,7 @@ def test_a_pose_costs_a_fraction_of_the_check():
 
 
 @pytest.mark.parametrize(
-    "ask",
+    "call",
     [
         lambda it: sd.segment(it, 2),
         lambda it: sd.Regions.single(it),
@@ -174,6 +176,6 @@ def test_a_pose_costs_a_fraction_of_the_check():
         lambda it: sd.Session(it),
     ],
 )
-def test_what_is_no_mesh_is_told_how_to_become_one(ask):
-    with pytest.raises(sd.errors.MeshError, match=r"mesh must be a Mesh; got .*Make one by"):
-        ask(np.zeros((4, 3)))
+def test_the_error_for_another_type_says_how_to_make_a_mesh(call):
+    with pytest.raises(sd.errors.MeshError, match=r"mesh must be a Mesh; got .*Make one with"):
+        call(np.zeros((4, 3)))

@@ -1,4 +1,4 @@
-"""Models: the number of vertices asked for, closed, well shaped, always the same."""
+"""Models have the requested number of vertices, are closed and well shaped, and deterministic."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def euler(mesh: Mesh) -> int:
 
 
 def least_angles(mesh: Mesh) -> np.ndarray:
-    """Return each triangle's least angle in degrees."""
+    """Return the least angle of each triangle in degrees."""
     angles = []
     for k in range(3):
         a, b, c = (mesh.vertices[mesh.faces[:, (k + step) % 3]] for step in range(3))
@@ -39,7 +39,7 @@ def least_angles(mesh: Mesh) -> np.ndarray:
     return np.min(angles, axis=0)
 
 
-def test_a_body_has_exactly_the_vertices_asked_for_in_one_piece_without_a_hole(body):
+def test_a_body_has_n_vertices_one_component_and_genus_zero(body):
     mesh, n = body
     assert mesh.n_vertices == n
     assert euler(mesh) == 2
@@ -48,7 +48,7 @@ def test_a_body_has_exactly_the_vertices_asked_for_in_one_piece_without_a_hole(b
     assert signed_volume(mesh.vertices, mesh.faces) > 0.02
 
 
-def test_a_body_stands_on_the_ground_and_is_one_high(body):
+def test_a_body_stands_on_the_ground_with_height_one(body):
     mesh, _ = body
     assert mesh.vertices[:, 2].min() == 0.0
     assert mesh.vertices[:, 2].max() == 1.0
@@ -68,14 +68,14 @@ def test_the_default_cactus_is_as_large_as_the_papers():
     assert models.cactus().n_vertices == 5430
 
 
-def test_the_same_call_gives_the_same_mesh():
+def test_models_are_deterministic():
     one, two = models.cactus(700), models.cactus(700)
     assert one is not two
     assert_array_equal(one.vertices, two.vertices)
     assert_array_equal(one.faces, two.faces)
 
 
-def test_more_vertices_are_the_same_body():
+def test_more_vertices_give_the_same_body():
     volumes = [
         signed_volume(mesh.vertices, mesh.faces)
         for mesh in (models.cactus(4000), models.cactus(20_003))
@@ -100,7 +100,7 @@ def test_a_sphere_of_any_number_of_vertices_is_closed_and_round(n):
     np.testing.assert_allclose(np.linalg.norm(mesh.vertices, axis=1), 3.0, rtol=1e-12)
 
 
-def test_the_volumes_of_sphere_and_torus_tend_to_the_formulas_with_order_1_in_n():
+def test_the_volumes_of_sphere_and_torus_converge_with_order_1_in_n():
     for make, exact in (
         (models.sphere, 4 / 3 * np.pi),
         (models.torus, 2 * np.pi**2 * 0.35**2),
@@ -137,7 +137,7 @@ def test_vertices_of_an_implicit_surface_lie_on_it():
     np.testing.assert_allclose(np.linalg.norm(mesh.vertices, axis=1), 1.0, atol=1e-12)
 
 
-def test_of_several_parts_the_largest_is_taken():
+def test_the_largest_of_several_components_is_used():
     def ball_and_crumb(x):
         ball = np.linalg.norm(x, axis=1) - 1.0
         return np.minimum(ball, np.linalg.norm(x - [1.6, 0.0, 0.0], axis=1) - 0.3)
@@ -153,7 +153,7 @@ def test_a_straight_limb_is_a_capsule():
     np.testing.assert_allclose(limb(x), [0.05, -0.05, 0.02, 0.03, 0.1], atol=1e-12)
 
 
-def test_what_makes_no_model_is_refused_with_advice():
+def test_invalid_arguments_are_errors_with_advice():
     for call in (
         lambda: models.cactus(20),
         lambda: models.cactus("many"),

@@ -1,4 +1,4 @@
-"""Pictures: what is said to be red is red, where it should be; nothing is stored to compare."""
+"""Pictures show the expected colours in the expected places; no reference images."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def renderer():
 
 
 def pixels(path) -> np.ndarray:
-    """Return a picture as (h, w, 3) float, 0 to 255, first row on top."""
+    """Return a picture as (h, w, 3) float, 0 to 255, top row first."""
     image = pv.read(path)
     width, height, _ = image.dimensions
     values = image.point_data.active_scalars.reshape(height, width, -1)[::-1, :, :3]
@@ -50,12 +50,12 @@ def blue(image: np.ndarray) -> np.ndarray:
 
 
 def middle(mask: np.ndarray) -> tuple[float, float]:
-    """Return the mean (row, column) of a mask, as shares of its sides."""
+    """Return the mean (row, column) of a mask, relative to its size."""
     rows, columns = np.nonzero(mask)
     return rows.mean() / mask.shape[0], columns.mean() / mask.shape[1]
 
 
-def test_the_handle_is_red_on_top_at_rest_and_to_the_right_where_it_was_taken(tmp_path):
+def test_the_handle_is_red_at_the_top_at_rest_and_at_the_right_when_deformed(tmp_path):
     bent = BAR.vertices.copy()
     bent[:, 0] += 0.8 * HEIGHT**2
     handle, fixed = HEIGHT > 0.85, HEIGHT < 0.1
@@ -71,7 +71,7 @@ def test_the_handle_is_red_on_top_at_rest_and_to_the_right_where_it_was_taken(tm
     assert middle(dark[image.shape[0] // 2 :, :half])[0] > 0.5  # the fixed foot is grey, below
 
 
-def test_the_background_is_white_and_the_model_stays_inside_the_picture(tmp_path):
+def test_the_background_is_white_and_the_model_is_inside_the_picture(tmp_path):
     picture_before_after(tmp_path / "a.png", BAR, BAR.vertices, fixed=[], handle=[])
     image = pixels(tmp_path / "a.png")
     frame = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
@@ -79,7 +79,7 @@ def test_the_background_is_white_and_the_model_stays_inside_the_picture(tmp_path
     assert 0.05 < (image.min(axis=-1) < 250).mean() < 0.7
 
 
-def test_growth_is_red_and_shrinking_blue_on_the_side_where_it_happens(tmp_path):
+def test_expansion_is_red_and_compression_blue_at_their_places(tmp_path):
     change = np.where(BAR.vertices[:, 2] > 0.5, 0.1, -0.1)
     picture_volume_change(tmp_path / "a.png", BAR, BAR.vertices, change)
     image = pixels(tmp_path / "a.png")
@@ -121,7 +121,7 @@ def _box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("least", [0, 1, 2])
-def test_the_camera_looks_along_the_least_extent_and_its_axes_are_a_turn(least):
+def test_the_camera_looks_along_the_axis_of_least_extent_with_orthonormal_axes(least):
     points = np.array(icosphere(2)[0])
     points[:, least] *= 0.2
     view = canvas.view_of(points, points)
@@ -129,7 +129,7 @@ def test_the_camera_looks_along_the_least_extent_and_its_axes_are_a_turn(least):
     assert np.linalg.det(view) == pytest.approx(1.0)
     assert abs(view[2, least]) > 0.9
     if least < 2:
-        assert view[1, 2] > 0.9  # z stays up
+        assert view[1, 2] > 0.9  # z is up
     else:
         assert view[2, 2] > 0.9  # from above
 
@@ -140,13 +140,13 @@ def test_a_folded_mesh_can_be_shown(tmp_path):
     assert (tmp_path / "a.png").stat().st_size > 1000
 
 
-def test_a_path_that_cannot_be_written_is_refused_before_anything_is_drawn(tmp_path):
+def test_a_path_that_cannot_be_written_is_an_error_before_drawing(tmp_path):
     for path in (tmp_path / "a.jpg", tmp_path / "no" / "a.png"):
         with pytest.raises(MeshError, match="png"):
             picture_before_after(path, BAR, BAR.vertices, fixed=[], handle=[])
 
 
-def test_without_a_gl_library_a_sentence_names_the_packages(monkeypatch):
+def test_without_a_gl_library_the_error_names_the_packages(monkeypatch):
     canvas.require_offscreen.cache_clear()
     monkeypatch.setattr(canvas, "_PROBE", "import os; os.abort()")
     monkeypatch.setattr(canvas.sys, "executable", sys.executable)

@@ -6,7 +6,7 @@ from solids import CUBE, SOLIDS, icosphere, somewhere, torus, two_components
 
 from vtk_segdeform.errors import RegionError
 from vtk_segdeform.mesh.mesh import Mesh
-from vtk_segdeform.regions.blending import borders, distance_to_triangles, shares
+from vtk_segdeform.regions.blending import blend_weights, borders, distance_to_triangles
 from vtk_segdeform.regions.regions import Regions, cage_distance_weights
 
 SPHERE = Mesh(*icosphere(4))
@@ -31,7 +31,7 @@ def biggest_jump(mesh, weights):
 
 @pytest.mark.parametrize("overlap", [0, 1, 2, 4, 9])
 @pytest.mark.parametrize("smoothness", [0.5, 1.0, 2.0, 40.0])
-def test_weights_are_shares_of_one_and_zero_outside(overlap, smoothness):
+def test_weights_sum_to_one_and_are_zero_outside(overlap, smoothness):
     grown = Regions.from_labels(SPHERE, thirds(SPHERE), overlap)
     regions = Regions(SPHERE, grown.membership, smoothness)
     assert_allclose(regions.weights.sum(axis=0), 1.0, rtol=1e-14)
@@ -40,11 +40,11 @@ def test_weights_are_shares_of_one_and_zero_outside(overlap, smoothness):
 
 
 @pytest.mark.parametrize("overlap", [1, 4])
-def test_a_region_has_nothing_to_say_on_its_own_border(overlap):
+def test_the_weight_of_a_region_is_zero_on_its_border(overlap):
     regions = Regions.from_labels(SPHERE, thirds(SPHERE), overlap)
     edge = borders(SPHERE, regions.membership)
     others = regions.membership.sum(axis=0) > 1
-    elsewhere = (regions.membership & ~edge).any(axis=0)  # another region can take the vertex
+    elsewhere = (regions.membership & ~edge).any(axis=0)  # the vertex is inside another region
     assert (edge & others & elsewhere).sum() > 20
     assert not regions.weights[edge & others & elsewhere].any()
 
@@ -56,15 +56,17 @@ def test_the_border_is_where_a_member_has_a_neighbour_outside():
     np.testing.assert_array_equal(borders(SPHERE, regions.membership), expected)
 
 
-def test_where_every_distance_is_zero_the_regions_share_equally():
+def test_regions_have_equal_weights_where_every_distance_is_zero():
     everywhere = np.ones((3, 1), dtype=bool)
-    assert_allclose(shares(everywhere, np.zeros((3, 1))), 1 / 3)
-    assert_allclose(shares(everywhere, np.array([[0.0], [1.0], [3.0]])).ravel(), [0, 0.25, 0.75])
+    assert_allclose(blend_weights(everywhere, np.zeros((3, 1))), 1 / 3)
+    assert_allclose(
+        blend_weights(everywhere, np.array([[0.0], [1.0], [3.0]])).ravel(), [0, 0.25, 0.75]
+    )
 
 
-def test_a_region_without_border_outweighs_every_other_and_shares_with_its_like():
+def test_only_regions_at_infinite_distance_have_weight_and_equally():
     d = np.array([[np.inf], [np.inf], [5.0]])
-    assert_allclose(shares(np.ones((3, 1), dtype=bool), d).ravel(), [0.5, 0.5, 0.0])
+    assert_allclose(blend_weights(np.ones((3, 1), dtype=bool), d).ravel(), [0.5, 0.5, 0.0])
 
 
 def test_a_region_that_covers_a_component_has_no_border_there():
@@ -77,7 +79,7 @@ def test_a_region_that_covers_a_component_has_no_border_there():
     assert_allclose(regions.weights[0, first], 1.0)
 
 
-def test_distance_grows_by_no_more_than_an_edge_along_it():
+def test_the_distance_changes_by_at_most_the_length_of_an_edge_along_it():
     regions = Regions.from_labels(SPHERE, thirds(SPHERE), 4)
     i, j = SPHERE.edges.T
     length = np.linalg.norm(SPHERE.vertices[i] - SPHERE.vertices[j], axis=1)
@@ -108,7 +110,7 @@ def test_refining_the_mesh_makes_the_weights_continuous_and_the_printed_formula_
     assert min(printed) >= 0.49
 
 
-def test_a_higher_power_leaves_zero_with_a_horizontal_tangent():
+def test_a_higher_power_gives_zero_slope_at_the_border():
     kinks = {}
     for power in (1.0, 2.0):
         kinks[power] = []
@@ -124,7 +126,7 @@ def test_a_higher_power_leaves_zero_with_a_horizontal_tangent():
     assert kinks[2.0][1] < 0.65 * kinks[2.0][0]
 
 
-def test_growing_adds_the_vertices_within_so_many_edges():
+def test_growing_adds_the_vertices_within_that_many_edges():
     labels = (np.arange(SPHERE.n_vertices) == 17).astype(int)
     regions = Regions.from_labels(SPHERE, labels, 3)
     steps = csgraph.dijkstra(SPHERE.adjacency, indices=17, unweighted=True)
@@ -134,7 +136,7 @@ def test_growing_adds_the_vertices_within_so_many_edges():
     )
 
 
-def test_labels_come_back_in_sorted_order():
+def test_regions_are_in_the_order_of_their_labels():
     labels = np.array([40, -3, 7])[thirds(SPHERE)]
     regions = Regions.from_labels(SPHERE, labels, overlap=0)
     np.testing.assert_array_equal(regions.labels, np.array([2, 0, 1])[thirds(SPHERE)])
@@ -143,13 +145,13 @@ def test_labels_come_back_in_sorted_order():
 
 
 @pytest.mark.parametrize("solid", SOLIDS.values(), ids=list(SOLIDS))
-def test_a_single_region_is_everything(solid):
+def test_a_single_region_has_all_vertices(solid):
     regions = Regions.single(Mesh(*solid))
     assert regions.n_regions == 1
     assert_allclose(regions.weights, 1.0)
 
 
-def test_turning_does_nothing_and_scaling_scales_the_distance():
+def test_weights_are_invariant_under_rotation_and_scaling():
     regions = Regions.from_labels(SPHERE, thirds(SPHERE), 3)
     scaled = Regions.from_labels(SPHERE.with_vertices(1e3 * SPHERE.vertices), thirds(SPHERE), 3)
     assert_allclose(scaled.border_distance, 1e3 * regions.border_distance, rtol=1e-9)
@@ -176,16 +178,16 @@ def test_distance_to_triangles_does_not_depend_on_chunks(monkeypatch):
     [
         (np.ones((2, 7), dtype=bool), "shape"),
         (np.ones((2, 8), dtype=float), "bool"),
-        (np.array([[True] * 8, [False] * 8]), "1 regions hold no vertex: 1;"),
-        (np.array([[True] * 6 + [False] * 2]), "2 vertices lie in no region: 6, 7;"),
+        (np.array([[True] * 8, [False] * 8]), "1 region has no vertices: 1;"),
+        (np.array([[True] * 6 + [False] * 2]), "2 vertices are in no region: 6, 7;"),
     ],
 )
-def test_regions_that_do_not_fit_are_refused_by_number(masks, message):
+def test_the_error_lists_empty_regions_and_uncovered_vertices(masks, message):
     with pytest.raises(RegionError, match=message):
         Regions.from_masks(Mesh(*CUBE), masks)
 
 
-def test_other_nonsense_is_refused():
+def test_other_invalid_arguments_are_errors():
     mesh = Mesh(*CUBE)
     with pytest.raises(RegionError, match="one integer for each of the 8"):
         Regions.from_labels(mesh, np.zeros(8))
@@ -197,7 +199,7 @@ def test_other_nonsense_is_refused():
         cage_distance_weights(Regions.single(mesh), [])
 
 
-def test_what_is_handed_out_cannot_be_changed():
+def test_the_arrays_are_read_only():
     regions = Regions.single(Mesh(*CUBE))
     for array in (regions.membership, regions.weights, regions.border_distance):
         assert not array.flags.writeable

@@ -7,7 +7,7 @@ from scipy.sparse import csgraph
 from solids import OCTAHEDRON, icosphere, rotation, torus, two_components
 
 from vtk_segdeform.errors import Cancelled, RegionError
-from vtk_segdeform.geometry import thinning
+from vtk_segdeform.geometry import sampling
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions import borders
 from vtk_segdeform.regions.coarse import coarsen
@@ -36,7 +36,7 @@ def tube(around, along, outline):
 
 
 def limbed(around=48, along=160):
-    """Return a fat middle (3 < z < 7) with a thin limb at either end."""
+    """Return a thick middle (3 < z < 7) with a thin limb at each end."""
     fat = 1.2
     return tube(around, along, lambda s: np.where(abs(s - 0.5) < 0.2, fat, 0.4))
 
@@ -54,13 +54,13 @@ def pieces(mesh, mask):
 
 
 def agreement(one, two):
-    """Return the share of vertices in the same part, parts matched by their largest overlap."""
+    """Return the fraction of vertices in the same part, with parts matched by largest overlap."""
     table = np.zeros((one.max() + 1, two.max() + 1))
     np.add.at(table, (one, two), 1)
     return table.max(axis=1).sum() / len(one)
 
 
-def test_two_limbs_come_off_the_trunk_at_their_joints():
+def test_two_limbs_are_cut_off_at_their_joints():
     mesh = limbed()
     regions = cores(mesh)
     assert regions.n_regions == 3
@@ -70,12 +70,12 @@ def test_two_limbs_come_off_the_trunk_at_their_joints():
 
 
 @pytest.mark.parametrize("mesh", [Mesh(*icosphere(4)), BAR], ids=["sphere", "bar"])
-def test_what_has_no_limb_stays_whole(mesh):
+def test_a_shape_without_limbs_is_one_region(mesh):
     assert segment(mesh).n_regions == 1
 
 
 @pytest.mark.parametrize("n_regions", [2, 3, 5])
-def test_a_bar_comes_apart_in_equal_slices_across_it(n_regions):
+def test_a_bar_is_cut_into_equal_slices_across_it(n_regions):
     labels = cores(BAR, n_regions).labels
     z = BAR.vertices[:, 2]
     order = np.argsort([z[labels == part].mean() for part in range(n_regions)])
@@ -90,7 +90,7 @@ def test_a_bar_comes_apart_in_equal_slices_across_it(n_regions):
     [Mesh(*icosphere(4)), Mesh(*torus()), limbed(24, 90)],
     ids=["sphere", "torus", "limbed"],
 )
-def test_there_are_as_many_regions_as_asked_each_connected(mesh, n_regions):
+def test_there_are_n_regions_each_connected(mesh, n_regions):
     regions = cores(mesh, n_regions)
     assert regions.n_regions == n_regions
     assert all(pieces(mesh, members) == 1 for members in regions.membership)
@@ -121,16 +121,16 @@ def test_fewer_regions_than_components_join_the_nearest():
     assert second == third != regions.labels[mesh.components == 0][0]
 
 
-def test_moving_turning_and_scaling_the_shape_changes_nothing():
+def test_the_result_is_invariant_under_translation_rotation_and_scaling():
     mesh = limbed()
-    rough = np.random.default_rng(0).normal(0.0, 0.01, mesh.vertices.shape)  # no two ends alike
+    rough = np.random.default_rng(0).normal(0.0, 0.01, mesh.vertices.shape)  # no symmetries
     mesh = mesh.with_vertices(mesh.vertices + rough)
     turned = 37.0 * mesh.vertices @ rotation([1, 2, 3], 1.1).T + [5, -3, 100]
     one, two = cores(mesh, 5).labels, cores(mesh.with_vertices(turned), 5).labels
     assert np.mean(one == two) > 0.999
 
 
-def test_the_same_call_gives_the_same_answer():
+def test_the_result_is_deterministic():
     one, two = segment(limbed(), 4, seed=3), segment(limbed(), 4, seed=3)
     np.testing.assert_array_equal(one.membership, two.membership)
 
@@ -142,8 +142,8 @@ def test_a_finer_mesh_gives_the_same_parts():
         labels, z = cores(mesh, 3).labels, mesh.vertices[:, 2]
         middle = labels == labels[np.argmin(abs(z - 5.0))]
         joints.append([z[middle].min(), z[middle].max()])
-    # To within the radius of a limb: the shoulder between 0.4 and 1.2 is a step, and where along
-    # the thin side of it the border ends depends on the seed (2.55 to 2.98 over five seeds).
+    # Within the radius of a limb: the radius steps from 0.4 to 1.2 at the shoulder, and where the
+    # border is on the thin side depends on the seed (2.55 to 2.98 over five seeds).
     np.testing.assert_allclose(joints[0], joints[1], atol=0.4)
 
 
@@ -163,21 +163,21 @@ def test_the_coarse_copy_keeps_the_area_and_connected_cells():
     assert all(pieces(mesh, cell == k) == 1 for k in range(0, len(surface.areas), 7))
 
 
-def test_thinning_chooses_what_a_walk_in_random_order_would():
+def test_the_independent_set_is_that_of_a_greedy_pass_in_random_order():
     mesh = Mesh(*icosphere(3))
     chosen: set[int] = set()
     for i in np.random.default_rng(4).permutation(mesh.n_vertices):
         if not chosen.intersection(mesh.adjacency[[i]].indices):
             chosen.add(i)
-    found = thinning._independent(mesh.edges, mesh.n_vertices, np.random.default_rng(4))
+    found = sampling._independent(mesh.edges, mesh.n_vertices, np.random.default_rng(4))
     np.testing.assert_array_equal(found, sorted(chosen))
 
 
-def test_what_goes_joins_its_nearest_neighbour_that_stays():
+def test_a_removed_vertex_joins_its_nearest_chosen_neighbour():
     mesh = limbed()
-    stay = thinning._independent(mesh.edges, mesh.n_vertices, np.random.default_rng(0))
+    stay = sampling._independent(mesh.edges, mesh.n_vertices, np.random.default_rng(0))
     length = np.linalg.norm(np.subtract(*mesh.vertices[mesh.edges.T]), axis=1)
-    joined = stay[thinning._nearest_neighbour(mesh.edges, length, stay, mesh.n_vertices)]
+    joined = stay[sampling._nearest_neighbour(mesh.edges, length, stay, mesh.n_vertices)]
     assert set(joined) == set(stay)
     for i in range(0, mesh.n_vertices, 17):
         row = mesh.adjacency[[i]]
@@ -186,10 +186,10 @@ def test_what_goes_joins_its_nearest_neighbour_that_stays():
         assert np.linalg.norm(mesh.vertices[i] - mesh.vertices[joined[i]]) == pytest.approx(wanted)
 
 
-def test_borders_are_smoothed_alike_whether_or_not_the_rest_is_looked_at(monkeypatch):
+def test_smoothing_near_the_borders_equals_smoothing_everywhere(monkeypatch):
     mesh = limbed(64, 200)
     x, y, z = mesh.vertices.T
-    x = z + 2.0 * np.sin(3.0 * np.arctan2(y, x))  # a wave that the smoothing levels
+    x = z + 2.0 * np.sin(3.0 * np.arctan2(y, x))  # a wavy border
     labels = (x > np.quantile(x, 0.7)).astype(int)
     near = borders.smooth_borders(mesh, labels)
     everything = np.arange(mesh.n_vertices)
@@ -221,20 +221,20 @@ def test_level_sets_have_their_length():
     np.testing.assert_allclose(lengths, 2 * np.pi * np.sin(levels), rtol=0.01)
 
 
-def test_quotas_follow_area_and_add_up():
+def test_quotas_are_proportional_to_area_and_sum_to_the_count():
     many = np.array([99, 99, 99])
     np.testing.assert_array_equal(quotas(np.array([6.0, 3.0, 1.0]), many, 10), [6, 3, 1])
     np.testing.assert_array_equal(quotas(np.array([1.0, 1e-6]), many[:2], 3), [2, 1])
     np.testing.assert_array_equal(quotas(np.array([1.0, 1e-6]), np.array([2, 9]), 5), [2, 3])
 
 
-def test_nonsense_is_refused():
+def test_invalid_arguments_are_errors():
     for wrong in (0, -1, 2.5, 7):
         with pytest.raises(RegionError, match=r"whole number in 1\.\.6"):
             segment(Mesh(*OCTAHEDRON), wrong)
 
 
-def test_progress_rises_to_one_and_may_cancel():
+def test_progress_increases_to_one_and_can_cancel():
     seen = []
     segment(limbed(), 5, progress=lambda fraction, _: seen.append(fraction))
     assert seen == sorted(seen)

@@ -1,4 +1,4 @@
-"""Lids over holes: closed, without flat triangles and intersections, for any border."""
+"""Lids close holes with any border, without flat triangles or intersections."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from solids import icosphere
 
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.intersections import intersections_of, self_intersections
-from vtk_segdeform.mesh.quality import least_angle
-from vtk_segdeform.mesh.topology import Sides
-from vtk_segdeform.repair.ears import clip_ears
+from vtk_segdeform.mesh.topology import HalfEdges
+from vtk_segdeform.mesh.triangles import least_angle
 from vtk_segdeform.repair.hole_borders import border_loops
+from vtk_segdeform.repair.lids import clip_ears
 from vtk_segdeform.repair.repair import repair
 
 
@@ -28,7 +28,7 @@ def tube(loop, height=1.0, rows=6):
 
 
 def straight(corners, divisions):
-    """Return a polygon (n, 2) as a loop in the plane z = 0, each side cut into as many edges."""
+    """Return a polygon (n, 2) as a loop in the plane z = 0, each side divided into *divisions*."""
     start = np.asarray(corners, dtype=float)
     along = np.roll(start, -1, axis=0) - start
     share = np.arange(divisions) / divisions
@@ -98,7 +98,7 @@ def test_a_saddle_gets_a_smooth_lid(depth):
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.8])
-def test_a_window_in_a_cylinder_is_closed_from_side_to_side(share):
+def test_a_window_in_a_cylinder_gets_a_curved_lid(share):
     n, rows = 48, 16
     vertices, faces = tube(polar(1.0, 2.0 * np.pi * np.arange(n) / n), 2.0, rows)
     column, row = np.arange(n), np.repeat(np.arange(rows), 2 * n)
@@ -125,7 +125,7 @@ def test_a_random_border_is_closed_without_a_crossing(seed):
     closed(*tube(loop, 6.0), least=0.2)
 
 
-def test_a_tilted_winding_loop_is_closed_in_the_projection_along_its_axis():
+def test_a_tilted_spiral_is_closed_in_the_projection_along_its_axis():
     t = np.linspace(0.0, 1.0, 40)
     rise = np.array([0.0, 0.0, 1.0]) * np.concatenate([t, t[::-1]])[:, None]
     inner, outer = (polar(r + t, 4.0 * np.pi * t) for r in (0.3, 0.55))
@@ -139,7 +139,7 @@ def test_the_number_of_lid_triangles_is_proportional_to_the_border():
         loop = polar(1.0 + 0.2 * np.cos(9 * (angle := 2.0 * np.pi * np.arange(n) / n)), angle)
         result = closed(*tube(loop, 1.0, 3), least=1.0)
         sizes[n] = np.count_nonzero(result.face_map < 0)
-    assert sizes[320] < 6.0 * sizes[80]  # with uniform density it would be sixteen times
+    assert sizes[320] < 6.0 * sizes[80]  # a uniform density would give sixteen times as many
 
 
 def test_ears_are_clipped_in_any_projection_in_which_the_loop_is_simple():
@@ -164,7 +164,7 @@ def test_every_new_vertex_has_weights_of_border_vertices():
     new = weights[np.flatnonzero(result.vertex_map < 0)]
     assert new.data.min() >= 0.0
     around = np.unique(new.indices)
-    assert np.isin(vertices[around, 2], [0.0, -1.0]).all()  # of the borders alone
+    assert np.isin(vertices[around, 2], [0.0, -1.0]).all()  # border vertices only
     top = result.vertices[result.vertex_map < 0][:, 2] == 0.0
     assert_allclose((new @ vertices[:, 2])[top], 0.0, atol=1e-15)
 
@@ -185,7 +185,9 @@ def test_an_unavoidable_intersection_is_reported():
                      -np.sin(3 * TURN)]).T  # fmt: skip
     result = repair(*tube(knot, 0.3))
     assert result.report.ok
-    assert "2 lids cross the surface or another lid; no alternative was found" in result.steps
+    assert (
+        "2 lids cross the surface or another lid; no better triangulation was found" in result.steps
+    )
 
 
 def test_touching_holes_are_separated():
@@ -193,9 +195,9 @@ def test_touching_holes_are_separated():
     at = np.flatnonzero((faces == 2).any(axis=1))
     other = [f for f in at if len(np.intersect1d(faces[f], faces[at[0]])) == 1]
     left = np.delete(faces, [at[0], other[0]], axis=0)
-    sides = Sides(left, len(vertices))
-    loops = border_loops(vertices, sides, 100)
-    found = sorted(sorted(sides.head[loop].tolist()) for loop in loops)
+    half_edges = HalfEdges(left, len(vertices))
+    loops = border_loops(vertices, half_edges, 100)
+    found = sorted(sorted(half_edges.head[loop].tolist()) for loop in loops)
     assert found == sorted(sorted(faces[f].tolist()) for f in (at[0], other[0]))
 
 

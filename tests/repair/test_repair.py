@@ -1,3 +1,5 @@
+"""`repair` fixes each fault with as few changes as possible and reports every step."""
+
 from __future__ import annotations
 
 from itertools import pairwise
@@ -20,12 +22,12 @@ N, M = len(SPHERE[0]), len(SPHERE[1])
 
 
 def soup(vertices, faces):
-    """Return the mesh with every triangle on vertices of its own."""
+    """Return the mesh with three separate vertices for every triangle."""
     return vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
 
 
 def together(*solids):
-    """Return solids as one mesh, vertices at the same place made one."""
+    """Return solids as one mesh, with coincident vertices merged."""
     vertices = np.concatenate([v for v, _ in solids])
     starts = np.cumsum([0] + [len(v) for v, _ in solids])
     faces = np.concatenate([f + start for (_, f), start in zip(solids, starts, strict=False)])
@@ -33,8 +35,8 @@ def together(*solids):
     return vertices, number.reshape(-1)[faces]
 
 
-def mended(vertices, faces, **options):
-    """Repair; check what holds of every success, and return the result."""
+def repaired(vertices, faces, **options):
+    """Repair, check the properties of every successful repair, and return the result."""
     result = repair(vertices, faces, **options)
     assert result.report.ok, str(result.report)
     assert Mesh(result.vertices, result.faces).n_faces == len(result.face_map)
@@ -50,9 +52,9 @@ def mended(vertices, faces, **options):
 
 
 @pytest.mark.parametrize("name", [*SOLIDS, "torus"])
-def test_a_sound_mesh_comes_back_unchanged(name):
+def test_a_mesh_without_faults_remains_unchanged(name):
     vertices, faces = torus() if name == "torus" else SOLIDS[name]
-    result = mended(vertices, faces)
+    result = repaired(vertices, faces)
     assert result.steps == ()
     assert_array_equal(result.vertices, vertices)
     assert_array_equal(result.faces, faces)
@@ -61,9 +63,9 @@ def test_a_sound_mesh_comes_back_unchanged(name):
 
 
 @pytest.mark.parametrize("mesh", [SPHERE, torus(), CUBE], ids=["sphere", "torus", "cube"])
-def test_a_soup_of_triangles_is_welded_back(mesh):
+def test_a_triangle_soup_is_welded(mesh):
     vertices, faces = mesh
-    result = mended(*soup(vertices, faces))
+    result = repaired(*soup(vertices, faces))
     n = len(vertices)
     welded, edges = 3 * len(faces) - n, 3 * len(faces)
     assert result.steps == (f"weld {welded} duplicate vertices, which closes {edges} open edges",)
@@ -71,10 +73,10 @@ def test_a_soup_of_triangles_is_welded_back(mesh):
     assert_array_equal(result.vertices[result.faces], vertices[faces])
 
 
-def test_a_soup_with_holes_is_the_closed_mesh_again():
+def test_a_triangle_soup_with_holes_becomes_the_closed_mesh():
     vertices, faces = icosphere(3)
     keep = np.random.default_rng(5).random(len(faces)) > 0.1
-    result = mended(*soup(vertices, faces[keep]))
+    result = repaired(*soup(vertices, faces[keep]))
     assert any(step.endswith("where holes touch") for step in result.steps)
     assert len(result.vertices) == len(vertices)
     assert len(result.faces) == len(faces)
@@ -84,74 +86,74 @@ def test_vertices_that_nearly_coincide_are_welded_when_a_distance_is_given():
     vertices, faces = soup(*SPHERE)
     shaken = vertices + np.random.default_rng(2).uniform(-1e-7, 1e-7, vertices.shape)
     assert not repair(shaken, faces, largest_hole=0).report.ok
-    result = mended(shaken, faces, weld_distance=1e-6)
+    result = repaired(shaken, faces, weld_distance=1e-6)
     assert len(result.vertices) == N
 
 
 def test_coincident_vertices_of_a_closed_surface_are_left_alone():
     vertices, faces = SPHERE
-    double = np.concatenate([faces, faces[:, ::-1] + N])  # a cavity right under the surface
+    double = np.concatenate([faces, faces[:, ::-1] + N])  # a cavity that coincides with the surface
     result = repair(np.concatenate([vertices, vertices]), double[1:])
     assert not any("weld" in step for step in result.steps)
 
 
-def test_degenerate_and_duplicate_faces_and_loose_vertices_go():
+def test_degenerate_and_duplicate_faces_and_unreferenced_vertices_are_removed():
     vertices, faces = SPHERE
-    result = mended(
+    result = repaired(
         np.append(vertices, [[9.0, 9.0, 9.0]], axis=0),
         np.concatenate([[[0, 0, 1]], faces, faces[:3]]),
     )
     assert result.steps == (
-        "drop 1 degenerate face", "drop 3 duplicate faces", "drop 1 unreferenced vertex",
+        "remove 1 degenerate face", "remove 3 duplicate faces", "remove 1 unreferenced vertex",
     )  # fmt: skip
     assert_array_equal(result.faces, faces)
     assert_array_equal(result.face_map, np.arange(1, M + 1))
 
 
-def test_a_duplicate_face_goes_even_if_it_faces_the_other_side():
+def test_a_duplicate_face_of_opposite_orientation_is_removed():
     vertices, faces = SPHERE
-    result = mended(vertices, np.append(faces, faces[7:8, ::-1], axis=0))
+    result = repaired(vertices, np.append(faces, faces[7:8, ::-1], axis=0))
     assert_array_equal(result.faces, faces)
 
 
-def test_the_wall_between_two_bodies_goes_from_both():
+def test_both_faces_of_a_wall_between_two_bodies_are_removed():
     vertices, faces = CUBE
-    result = mended(*together(CUBE, (vertices + [1.0, 0.0, 0.0], faces)))
-    assert result.steps == ("drop 4 duplicate faces, 4 of them inner walls",)
+    result = repaired(*together(CUBE, (vertices + [1.0, 0.0, 0.0], faces)))
+    assert result.steps == ("remove 4 duplicate faces, 4 of them inner walls",)
     assert signed_volume(result.vertices, result.faces) == pytest.approx(2.0)
     assert result.report.n_components == 1
 
 
-def test_a_vertex_without_a_place_goes_and_the_hole_is_closed():
+def test_a_vertex_with_nan_coordinates_is_removed_and_the_hole_filled():
     vertices, faces = SPHERE
     broken = vertices.copy()
     broken[5] = np.nan
     around = int(np.sum(faces == 5))
-    result = mended(broken, faces)
+    result = repaired(broken, faces)
     assert result.steps == (
-        f"drop 1 vertex with NaN or infinite coordinates and {around} faces there",
+        f"remove 1 vertex with NaN or infinite coordinates and {around} faces there",
         f"fill 1 hole of {around} edges with {around - 2} triangles",
     )
     assert 5 not in result.vertex_map
 
 
-def test_turned_faces_are_turned_back_and_the_majority_wins():
+def test_the_minority_of_inconsistently_oriented_faces_is_flipped():
     vertices, faces = SPHERE
     some = np.random.default_rng(1).random(M) < 0.3
-    some[0] = True  # the first face has no say of its own
+    some[0] = True  # the orientation of the first face does not decide
     broken = np.where(some[:, None], faces[:, [0, 2, 1]], faces)
-    result = mended(vertices, broken)
-    assert result.steps == (f"turn {some.sum()} faces round to agree with the neighbours",)
+    result = repaired(vertices, broken)
+    assert result.steps == (f"flip {some.sum()} faces to agree with the neighbours",)
     assert_array_equal(result.faces, faces)
-    most = mended(vertices, np.where(some[:, None], faces, faces[:, [0, 2, 1]]))
+    most = repaired(vertices, np.where(some[:, None], faces, faces[:, [0, 2, 1]]))
     assert_array_equal(most.faces, faces)
-    assert most.steps[1] == f"turn 1 inside-out component round ({M} faces)"
+    assert most.steps[1] == f"flip 1 inside-out component ({M} faces)"
 
 
 def test_an_outward_shell_within_a_body_becomes_a_cavity():
     vertices, faces = SPHERE
-    result = mended(*together(SPHERE, (0.5 * vertices, faces)))
-    assert result.steps == (f"turn 1 inside-out component round ({M} faces)",)
+    result = repaired(*together(SPHERE, (0.5 * vertices, faces)))
+    assert result.steps == (f"flip 1 inside-out component ({M} faces)",)
     assert signed_volume(result.vertices, result.faces) == pytest.approx(
         signed_volume(*SPHERE) * (1.0 - 0.5**3)
     )
@@ -166,9 +168,9 @@ def test_an_outward_shell_within_a_body_becomes_a_cavity():
         ([0.0, -1.0, 1.0], "split 2 vertices and 1 edge where surfaces touch, adding 2 copies"),
     ],
 )
-def test_bodies_that_touch_are_parted_without_moving(shift, step):
+def test_touching_bodies_are_separated_without_moving_vertices(shift, step):
     vertices, faces = CUBE
-    result = mended(*together(CUBE, (vertices + shift, faces)))
+    result = repaired(*together(CUBE, (vertices + shift, faces)))
     assert result.steps == (step,)
     assert (len(result.vertices), len(result.faces)) == (16, 24)
     for body in (result.faces[:12], result.faces[12:]):  # whole cubes, not halves of each
@@ -178,18 +180,18 @@ def test_bodies_that_touch_are_parted_without_moving(shift, step):
         assert signed_volume(result.vertices, body) == pytest.approx(1.0)
 
 
-def test_holes_that_touch_are_filled_without_a_copy():
+def test_touching_holes_are_filled_without_copying_vertices():
     vertices, faces = SPHERE
     at = np.flatnonzero((faces == 2).any(axis=1))
     pair = [f for f in at if len(np.intersect1d(faces[f], faces[at[0]])) == 1]
     assert len(pair) > 0
-    result = mended(vertices, np.delete(faces, [at[0], pair[0]], axis=0))
+    result = repaired(vertices, np.delete(faces, [at[0], pair[0]], axis=0))
     assert result.steps == ("fill 2 holes of 3 edges with 2 triangles",)
     assert len(result.vertices) == N
     assert signed_volume(result.vertices, result.faces) == pytest.approx(signed_volume(*SPHERE))
 
 
-def test_a_large_hole_stays_open_until_it_is_allowed():
+def test_a_hole_larger_than_largest_hole_remains_open():
     vertices, faces = icosphere(4)
     lower = faces[(vertices[faces][:, :, 2] <= 1e-12).all(axis=1)]
     used = np.unique(lower)
@@ -198,7 +200,7 @@ def test_a_large_hole_stays_open_until_it_is_allowed():
     assert left.steps == ()
     assert left.report.count(Kind.HOLE) == 1
     border = left.report.count(Kind.OPEN_EDGE)
-    result = mended(*bowl)
+    result = repaired(*bowl)
     new = len(result.vertices) - len(used)
     triangles = border - 2 + 2 * new
     assert result.steps == (
@@ -208,13 +210,13 @@ def test_a_large_hole_stays_open_until_it_is_allowed():
     assert signed_volume(result.vertices, result.faces) == pytest.approx(whole / 2, rel=1e-12)
 
 
-def test_a_hole_whose_every_diagonal_is_taken_gets_one_new_vertex():
-    # The torus of seven vertices joins each with each; without one, no lid over the six is left.
+def test_a_hole_whose_diagonals_all_exist_gets_one_new_vertex():
+    # The torus of seven vertices has all edges: without one vertex, no lid over the others exists.
     i = np.arange(7)[:, None]
     faces = np.concatenate([(i + [0, 1, 3]) % 7, (i + [0, 3, 2]) % 7])
     vertices = np.random.default_rng(4).normal(size=(7, 3))
     left = faces[(faces != 6).all(axis=1)]
-    result = mended(vertices[:6], left)
+    result = repaired(vertices[:6], left)
     assert result.steps[0] == "fill 1 hole of 6 edges with 6 triangles and 1 new vertex"
     assert (len(result.vertices), len(result.faces)) == (7, 14)
     assert result.vertex_map[-1] == -1
@@ -225,8 +227,8 @@ def test_the_lid_of_a_loop_has_the_least_area():
     lid = triangulate_loop(corners, np.zeros((5, 5), bool))
     a, b, c = corners[lid].transpose(1, 0, 2)
     normals = np.cross(b - a, c - a)
-    assert np.linalg.norm(normals, axis=1).sum() / 2 == pytest.approx(2.5)  # nothing twice
-    assert (normals[:, 2] > 0).all()  # all in the direction of the loop
+    assert np.linalg.norm(normals, axis=1).sum() / 2 == pytest.approx(2.5)  # without overlap
+    assert (normals[:, 2] > 0).all()  # all oriented like the loop
 
 
 def test_no_other_lid_of_a_bent_loop_has_less_area():
@@ -259,7 +261,7 @@ def test_a_crack_is_closed_by_splitting_the_face_with_vertices_on_its_edge(n_on_
     along = [b, *range(3 + n_on_side, 3, -1), a]
     fan = [[c, one, other] for one, other in pairwise(along)]
     faces = np.array([*fan, [a, b, d], [b, c, d], [c, a, d]])
-    result = mended(vertices, faces)
+    result = repaired(vertices, faces)
     assert len(result.vertices) == len(vertices)
     assert result.report.count(Kind.ZERO_AREA) == 0
     assert result.steps[1] == "split 1 face at vertices on an edge, to close cracks"
@@ -268,12 +270,12 @@ def test_a_crack_is_closed_by_splitting_the_face_with_vertices_on_its_edge(n_on_
 
 def test_two_lids_over_the_same_corners_do_not_share_a_diagonal():
     vertices, faces = SOLIDS["octahedron"]
-    flat = vertices * [0.2, 1.0, 1.0]  # so that both lids would like the short diagonal
-    result = mended(flat, faces[[2, 3, 4, 5]])
+    flat = vertices * [0.2, 1.0, 1.0]  # so that the short diagonal is best for both lids
+    result = repaired(flat, faces[[2, 3, 4, 5]])
     assert result.steps == ("fill 2 holes of 4 edges with 4 triangles",)
 
 
-def test_what_would_need_guessing_stays_in_the_report():
+def test_faults_that_need_guessing_remain_in_the_report():
     vertices, faces = SPHERE
     fin = np.append(faces, [[faces[0, 0], faces[0, 1], N]], axis=0)
     result = repair(np.append(vertices, [[3.0, 3.0, 3.0]], axis=0), fin)
@@ -283,7 +285,7 @@ def test_what_would_need_guessing_stays_in_the_report():
         Mesh(result.vertices, result.faces)
 
 
-def test_a_moebius_strip_has_no_outside_to_turn_to():
+def test_a_moebius_strip_cannot_be_oriented():
     k = np.arange(12)
     a, t = 2 * np.pi * k / 12, np.pi * k / 12
     r = np.stack([1 - 0.3 * np.cos(t), 1 + 0.3 * np.cos(t)], axis=1)
@@ -301,18 +303,18 @@ def test_a_moebius_strip_has_no_outside_to_turn_to():
     ("vertices", "faces", "message"),
     [
         ([], [], "1 empty mesh"),
-        (CUBE[0], CUBE[1] + 1, "naming a vertex that does not exist"),
-        (CUBE[0], [[0, 0, 1]], "nothing is left of the mesh after: drop 1 degenerate face"),
-        (np.full((3, 3), np.nan), [[0, 1, 2]], "nothing is left"),
+        (CUBE[0], CUBE[1] + 1, "with a vertex index out of range"),
+        (CUBE[0], [[0, 0, 1]], "no faces are left after these repairs: remove 1 degenerate face"),
+        (np.full((3, 3), np.nan), [[0, 1, 2]], "no faces are left"),
     ],
 )
-def test_where_there_is_nothing_to_repair_it_says_so(vertices, faces, message):
+def test_a_mesh_that_cannot_be_repaired_is_an_error(vertices, faces, message):
     with pytest.raises(MeshError, match=message):
         repair(vertices, faces)
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_no_damage_makes_it_crash_and_none_makes_it_worse(seed):
+def test_random_damage_never_raises_and_never_gets_worse(seed):
     rng = np.random.default_rng(seed)
     vertices, faces = SPHERE if seed % 2 else torus(12, 8)
     vertices, faces = vertices.copy(), faces[rng.random(len(faces)) > rng.choice([0.0, 0.02, 0.2])]

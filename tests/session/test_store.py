@@ -330,7 +330,7 @@ WRONG = [
     ({"mesh_vertices": np.array([[None] * 3] * 6)}, "must be float64 of shape"),
     ({"mesh_faces": OCTAHEDRON[1] + 1}, "does not exist"),
     ({"mesh_faces": OCTAHEDRON[1][:, ::-1]}, "outward"),
-    ({"membership": np.zeros((1, 6), bool)}, "hold no vertex"),
+    ({"membership": np.zeros((1, 6), bool)}, "no vertices"),
     ({"membership": np.full((1, 6), 7, np.uint8).view(bool)}, "neither true nor false"),
     ({"cage_vertices": 0.1 * TETRAHEDRON[0]}, "outside the cage"),
     ({"fixed": np.array([99])}, "fixed must index"),

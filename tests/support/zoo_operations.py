@@ -166,7 +166,7 @@ def filtered(polydata, *, cages=None, **told):
     """Run the filter over *polydata*; what it says by an event is raised."""
     bend, said = SegmentedCageDeformFilter(), []
     bend.AddObserver("ErrorEvent", lambda *_: said.append("something that VTK says"))
-    bend._tell = said.append  # its one way to say what is wrong
+    bend._report_error = said.append  # the only function that reports errors
     bend.SetInputDataObject(0, polydata)
     if cages is not None:
         bend.SetInputDataObject(1, cages)

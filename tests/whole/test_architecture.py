@@ -46,7 +46,7 @@ GRANTED = {
     "io.convert": VTK,
     "io.meshlab": {"pymeshlab"},
     "io.polygons": VTK,
-    "io.vtk_writers": VTK,
+    "io.vtk_formats": VTK,
     "pictures": VTK | {"pyvista"},
     "filters": VTK,
     "filters.paraview_plugin": {"paraview"},
@@ -325,7 +325,7 @@ def test_public_functions_take_at_most_four_positional_arguments():
 
 # Given a draft to write to; the log of a recording, which grows event by event; and /proc.
 WRITE_TO_WHAT_THEY_ARE_GIVEN = {
-    "io.off", "io.ply", "io.wavefront", "io.vtk_writers", "io.reading_child",
+    "io.off", "io.ply", "io.wavefront", "io.vtk_formats", "io.reading_child",
     "widgets.recording.film_files", "widgets.recording.recording",
     "benchmarks.measuring",
 }  # fmt: skip

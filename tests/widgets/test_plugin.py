@@ -268,7 +268,7 @@ def test_without_a_screen_the_command_says_so_in_one_line(tmp_path, bar):
     )  # fmt: skip
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1
-    assert "there is no screen to open a window on; set DISPLAY" in done.stderr
+    assert "no window can be opened: there is no screen; set DISPLAY" in done.stderr
     assert list(tmp_path.iterdir()) == [path]
 
 

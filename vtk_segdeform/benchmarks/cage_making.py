@@ -17,11 +17,11 @@ from vtkmodules.vtkCommonDataModel import vtkMeanValueCoordinatesInterpolator
 from vtkmodules.vtkFiltersGeneral import vtkDeformPointSet
 
 from ..arrays import FloatArray, IntArray
-from ..cages import Cage, cage_faults, fit_cages, mean_value_coordinates, winding_number
+from ..cages import Cage, cage_faults, fit_cages, mean_value_coordinates
 from ..errors import MissingDependencyError, SegDeformError
 from ..geometry import signed_volume
 from ..io import polydata_of
-from ..mesh import Mesh
+from ..mesh import Mesh, winding_number
 from ..models import cactus
 from ..progress import Progress
 from ..regions import Regions

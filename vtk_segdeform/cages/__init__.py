@@ -1,16 +1,16 @@
-"""A coarse cage around every region, and coordinates of the mesh with respect to it.
+"""Cages around the regions, and coordinates of the mesh with respect to them.
 
 The files, in reading order:
 
-    cage            `Cage`: a closed surface, checked
+    cage            `Cage`: a closed surface, checked and immutable
     fit             `fit_cages`: automatic cages
-    region_solid    a region as a solid, by its distance field
+    region_solid    the distance field of a region as a solid
     contour         level set of a field on a grid
-    simplify        edge collapses
+    simplify        simplification by edge collapses
     mean_value      mean value coordinates, eqs. (15) to (19)
 """
 
-from .cage import MOST_CAGE_VERTICES, Cage, cage_faults, winding_number
+from .cage import MOST_CAGE_VERTICES, Cage, cage_faults
 from .fit import fit_cages
 from .mean_value import mean_value_coordinates
 
@@ -20,5 +20,4 @@ __all__ = [
     "cage_faults",
     "fit_cages",
     "mean_value_coordinates",
-    "winding_number",
 ]

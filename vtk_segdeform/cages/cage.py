@@ -1,8 +1,8 @@
-"""What a valid cage is: a closed surface seen from outside, around all it is to move.
+"""`Cage`: a closed, outward oriented surface without self-intersections.
 
-A cage bounds a solid.  Each directed edge occurs once and its reverse once, the faces around a
-vertex form one fan, no two faces cross, and the enclosed volume is positive.  It may have several
-components that stay clear of each other; one inside another is a cavity and faces inward.
+A cage bounds a solid: every half-edge has one twin, the faces around a vertex form one fan, no two
+faces cross, and the enclosed volume is positive.  It may have several components that do not
+intersect; a component inside another is a cavity and faces inward.
 """
 
 from __future__ import annotations
@@ -28,22 +28,20 @@ from ..mesh import (
 )
 
 MOST_CAGE_VERTICES = 1600
-"""Limit of all cages together: the solver factors matrices with three rows per cage vertex."""
+"""Most vertices of all cages together: the solver factors matrices of three rows per vertex."""
 
 _LONGEST_NAME = 100  # characters of a cage's name in a message
-_LARGEST = 1e70  # as of a mesh, see `faults`
-
-__all__ = ["Cage", "cage_faults", "self_intersections", "winding_number"]
+_LARGEST = 1e70  # coordinate, as for a mesh
 
 
 @dataclass(frozen=True, init=False, eq=False)
 class Cage(Frozen):
-    """A closed, outward oriented triangle mesh that does not cross itself; frozen.
+    """A closed, outward oriented triangle mesh without self-intersections; immutable.
 
     Parameters
     ----------
     vertices : (m, 3) float
-        In the length unit of the mesh it is to move.
+        In the length unit of the mesh.
     faces : (k, 3) int
         Counter-clockwise seen from outside.
 
@@ -52,7 +50,7 @@ class Cage(Frozen):
     ValueError
         If an array has the wrong shape or type.
     CageError
-        If `cage_faults` finds any; the text lists them.
+        If `cage_faults` finds any; the message lists them.
 
     Examples
     --------
@@ -70,9 +68,7 @@ class Cage(Frozen):
         triangles = as_faces(faces, len(points), "faces").copy()
         faults = cage_faults(points, triangles)
         if faults:
-            raise CageError(
-                f"not a valid cage: {'; '.join(faults)}; mend it, or let fit_cages make one"
-            )
+            raise CageError(f"not a valid cage: {'; '.join(faults)}; repair it, or use fit_cages")
         points.flags.writeable = triangles.flags.writeable = False
         object.__setattr__(self, "vertices", points)
         object.__setattr__(self, "faces", triangles)
@@ -89,11 +85,11 @@ class Cage(Frozen):
 
     @property
     def volume(self) -> float:
-        """The enclosed volume; positive."""
+        """Enclosed volume; positive."""
         return float(_six_volumes(self.vertices, self.faces).sum() / 6.0)
 
     def contains(self, points: ArrayLike) -> BoolArray:
-        """Tell which of (n, 3) *points* are inside; on the cage itself either answer may come."""
+        """Return which *points* (n, 3) are inside, (n,) bool; on the cage it may be either."""
         x = as_points(points, "points")
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
         inside = ((x >= low) & (x <= high)).all(axis=1)
@@ -101,11 +97,13 @@ class Cage(Frozen):
         return np.asarray(inside)
 
     def require_encloses(self, points: ArrayLike, name: str) -> None:
-        """Raise a CageError that counts the (n, 3) *points* outside, unless there are none."""
+        """Raise a CageError if any of *points* (n, 3) are outside; *name* describes them."""
         name = require(name, str, "name")[:_LONGEST_NAME]
         x = as_points(points, name)
         if np.abs(x).max(initial=0.0) > _LARGEST:
-            raise CageError(f"{name} are too large to compute with, above {_LARGEST:.0e}")
+            raise CageError(
+                f"{name} are too large to compute with: above {_LARGEST:.0e}; scale down"
+            )
         outside = x[~self.contains(x)]
         if len(outside):
             farthest = distance_to_surface(outside, self.vertices, self.faces).max()
@@ -116,9 +114,9 @@ class Cage(Frozen):
 
 
 def cage_faults(vertices: ArrayLike, faces: ArrayLike) -> tuple[str, ...]:
-    """Return what keeps a surface from being a cage, one sentence each; empty if nothing does.
+    """Return the reasons why a surface is not a valid cage, one sentence each; empty if it is.
 
-    Geometry is only looked at once the connectivity is sound.
+    Geometry is only checked if the connectivity has no faults.
 
     Examples
     --------
@@ -144,19 +142,21 @@ def _solid_faults(points: FloatArray, faces: IntArray) -> list[str]:
     if crossings:
         pairs = counted(crossings, "pair of faces crosses", "pairs of faces cross")
         return [f"{pairs} or touch: the cage intersects itself"]
-    part_of_face = components(len(points), faces)[faces[:, 0]]
-    volumes = np.bincount(part_of_face, _six_volumes(points, faces)) / 6.0
+    component = components(len(points), faces)[faces[:, 0]]
+    volumes = np.bincount(component, _six_volumes(points, faces)) / 6.0
     if len(volumes) == 1:
         inward = volumes[0] <= 0
         return [f"it is inside-out, volume {volumes[0]:.3g}: reverse its faces"] if inward else []
     faults = []
-    for part, volume in enumerate(volumes):
-        own = part_of_face == part
+    for number, volume in enumerate(volumes):
+        own = component == number
         seed = points[faces[own][0, :1]]
         depth = round(float(winding_number(seed, points, faces[~own])[0]))
         if (depth, volume > 0) not in ((0, True), (1, False)):
             where = "inside another and faces outward" if depth else "faces inward"
-            faults.append(f"component {part + 1} of {len(volumes)} {'is ' if depth else ''}{where}")
+            faults.append(
+                f"component {number + 1} of {len(volumes)} {'is ' if depth else ''}{where}"
+            )
     return faults
 
 

@@ -1,4 +1,4 @@
-"""The surface on which a field on a grid has a level: VTK's flying edges, with all digits."""
+"""Level set of a field on a grid: VTK's flying edges, in double precision."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..arrays import FloatArray, IntArray
 
 
 def contour_surface(values: FloatArray, level: float) -> tuple[FloatArray, IntArray]:
-    """Return the outward surface values = level on the unit grid."""
+    """Return the outward oriented surface values = level on the unit grid."""
     image = vtkImageData()
     image.SetDimensions(*values.shape)
     image.GetPointData().SetScalars(numpy_to_vtk(values.ravel(order="F")))
@@ -25,7 +25,7 @@ def contour_surface(values: FloatArray, level: float) -> tuple[FloatArray, IntAr
     points = vtk_to_numpy(surface.GetPoints().GetData()).astype(np.float64)
     faces = vtk_to_numpy(surface.GetPolys().GetConnectivityArray()).reshape(-1, 3)
 
-    # VTK rounds to float32.  Each point is on an edge of the grid: cut that again in float64.
+    # VTK rounds to float32.  Each point is on an edge of the grid; interpolate again in float64.
     rows, axis = np.arange(len(points)), np.abs(points - np.rint(points)).argmax(axis=1)
     low = np.rint(points).astype(np.int64)
     low[rows, axis] = np.floor(points[rows, axis]).astype(np.int64)

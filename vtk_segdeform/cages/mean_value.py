@@ -1,19 +1,20 @@
 """Mean value coordinates of points with respect to a closed triangular cage, eqs. (15)-(19).
 
-Seen from x, a face covers a triangle on the unit sphere around x.  The integral m of the unit
-vectors over it is half the sum of its sides theta_i, each times the normal of its plane; resolved
-along the face's corners it gives the weights, and since the sphere closes, they reproduce x:
+Seen from x, a face covers a spherical triangle on the unit sphere around x.  The integral m of the
+unit vectors over it is half the sum of its sides theta_i, each times the normal of its plane; the
+components along the corners of the face are the weights.  They reproduce x because the integral
+over the whole sphere vanishes:
 
     m = sum_j w_j (p_j - x)        sum over all faces of m = 0                           (17)
     x = sum_j w_j p_j / sum_j w_j                                                        (18)
 
 Written in the frame of the face, with i an edge and the corner opposite to it,
 
-    h         distance of x from the plane, positive on the inner side; its foot is x's projection
+    h         distance of x from the plane, positive on the inner side; its foot is the projection
     a_i       distance of the foot from edge i, in the plane, positive towards corner i
     H_i       distance of corner i from edge i: a_i / H_i are the foot's barycentric coordinates
     A_i       sqrt(a_i^2 + h^2), distance of x from the line of edge i
-    theta_i   angle under which x sees edge i;  b_i = theta_i / A_i
+    theta_i   angle of edge i as seen from x;  b_i = theta_i / A_i
     gamma_i   angle of the face at corner i
 
 the weight of corner j is
@@ -21,19 +22,19 @@ the weight of corner j is
     w_j = (a_j S + h (b_j - b_{j+1} cos gamma_{j-1} - b_{j-1} cos gamma_{j+1})) / (2 H_j)
     S   = (a_1 b_1 + a_2 b_2 + a_3 b_3) / h
 
-This is w_j of [JSW05] Fig. 4 with the determinant divided out by hand.  Nothing is divided by
-the sine of an angle, so there is no special case for a point in the plane of a face or on the
-line of an edge, and on a face S, which grows as 2 pi / h, leaves the barycentric coordinates.
-Only S needs care: near the plane, with the foot outside the face, its terms cancel to O(h^2).
-There each is compared with alpha_i, the angle under which the *foot* sees the edge; these add
-up to zero, and what is left, psi_i = alpha_i - a_i b_i, is small term by term.  With t the
-place along the edge, counted from the foot, and for a >= 0 (psi is odd in a):
+This is w_j of [JSW05] Fig. 4 with the determinant cancelled analytically.  There is no division by
+the sine of an angle, so points in the plane of a face or on the line of an edge are no special
+case, and on a face S, which grows as 2 pi / h, gives the barycentric coordinates.  Only S needs
+care: near the plane, with the foot outside the face, its terms cancel to O(h^2).  There alpha_i,
+the angle of the edge as seen from the *foot*, is subtracted from each term: the alpha_i sum to
+zero, and the differences psi_i = alpha_i - a_i b_i are small.  With t the coordinate along the edge
+relative to the foot, and for a >= 0 (psi is odd in a):
 
     psi_i = [atan(t (A - a) / (a A + t^2))]_{t_1}^{t_2} + (1 - a/A) theta_i,   A - a = h^2 / (A + a)
 
-Measured against 60 digits on octahedron, cube, sphere and torus: weights inside, on the cage and
-at any distance (1e-16 to 1e-3) from it 1e-13; in the plane of a face or on the line of an
-edge, up to 3 face sizes outside, 3e-12.  A face of height k times its length: 1e-15 / k.
+Errors of the weights, measured against 60 digits on octahedron, cube, sphere and torus: 1e-13
+inside, on the cage and at distances of 1e-16 to 1e-3 from it; 3e-12 in the plane of a face or on
+the line of an edge, up to 3 face sizes outside; 1e-15 / k for a face of height k times its length.
 
 Source
 ------
@@ -57,12 +58,12 @@ from ..kernels import compiled_kernels, in_parallel, inputs
 from ..mesh import connectivity_faults, counted, face_edges, flat_faces
 from ..progress import Progress
 
-# Lengths are shares of the cage's diagonal.
-_ON = 1e-14  # as near as this, a point is on the vertex or edge
-_OFF = 1e-30  # added to h: no point is in a plane to the last digit
-_NEAR = 1e-3  # of max |a|, for |h|: where S is summed as psi
-_FARTHEST = 1e60  # diagonals; beyond it, fourth powers of distances overflow
-_BLOCK = 1 << 15  # numbers per temporary: a quarter of a megabyte, so that they stay in the cache
+# Lengths are relative to the diagonal of the cage.
+_ON = 1e-14  # points at this distance are on the vertex or edge
+_OFF = 1e-30  # added to h, so that it is never exactly 0
+_NEAR = 1e-3  # of max |a|: for smaller |h|, S is the sum of psi_i
+_FARTHEST = 1e60  # diagonals; fourth powers of larger distances overflow
+_BLOCK = 1 << 15  # numbers per temporary array: a quarter of a megabyte, which fits into the cache
 
 
 def mean_value_coordinates(
@@ -72,35 +73,35 @@ def mean_value_coordinates(
     *,
     progress: Progress | None = None,
 ) -> FloatArray:
-    """Return the weights W of x = W p (15), which express *points* by the vertices of a cage.
+    """Return the mean value coordinates W of *points*: x = W p (15) with p the cage vertices.
 
     Parameters
     ----------
     points : (n, 3) float
-        Where to evaluate: inside, outside or on the cage.
+        Points inside, outside or on the cage.
     cage_vertices : (m, 3) float
-        In the length unit of *points*; the weights themselves have no unit.
+        In the length unit of *points*; the weights are dimensionless.
     cage_faces : (k, 3) int
-        Closed and consistently oriented; inward or outward makes no difference.
+        Closed and consistently oriented, inward or outward.
     progress : callable, optional
         Called with a fraction in 0..1 and a text; raise `Cancelled` in it to stop.
 
     Returns
     -------
     weights : (n, m) float
-        Rows sum to 1 (16) and ``weights @ cage_vertices`` gives back *points*.  Weights are
+        Rows sum to 1 (16) and ``weights @ cage_vertices`` reproduces *points*.  Weights are
         positive inside a convex cage and may be negative elsewhere.
 
     Raises
     ------
     ValueError
-        If an array has the wrong shape, or holds non-finite numbers or bad indices.
+        If an array has the wrong shape, non-finite numbers or indices out of range.
     CageError
         If the cage is not a closed, oriented two-manifold, or has faces without area.
 
     Examples
     --------
-    The centre of a regular tetrahedron is the plain mean of its corners.
+    The centre of a regular tetrahedron is the mean of its corners.
 
     >>> corners = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
     >>> faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
@@ -116,40 +117,43 @@ def mean_value_coordinates(
     low, high = p.min(axis=0), p.max(axis=0)
     centre, size = (low + high) / 2.0, np.linalg.norm(high - low)
     if max(x.max(initial=0.0), -x.min(initial=0.0)) > _FARTHEST * size:
-        raise ArgumentError(f"points are more than {_FARTHEST:.0e} sizes of the cage away")
+        raise ArgumentError(
+            f"points must be within {_FARTHEST:.0e} diagonals of the cage; some are farther away"
+        )
     cage = _prepare((p - centre) / size, faces)
     weights = np.empty((len(x), len(p)))
     kernels = compiled_kernels(len(x))
     arguments = inputs(*_as_arrays(cage, faces)) if kernels else ()
 
     def work(start: int, stop: int) -> None:
-        there = (x[start:stop] - centre) / size
+        local = (x[start:stop] - centre) / size
         if kernels:
-            kernels.weights(*inputs(there), *arguments, weights[start:stop])
+            kernels.weights(*inputs(local), *arguments, weights[start:stop])
         else:
-            weights[start:stop] = _weights(cage, there.T).T
+            weights[start:stop] = _weights(cage, local.T).T
 
-    rows = max(16, _BLOCK // faces.size)  # fewer than 16 cost more calls than they save memory
+    # With fewer than 16 rows, calls cost more time than the cache saves.
+    rows = max(16, _BLOCK // faces.size)
     in_parallel(work, len(x), rows, progress=progress, message="mean value coordinates")
     return weights
 
 
 class _Cage(NamedTuple):
-    """What does not depend on x.  Edge and corner i of face f are row i k + f of 3 k."""
+    """Quantities that do not depend on x.  Edge and corner i of face f are row i k + f of 3 k."""
 
     p: FloatArray  # (m, 3)
     edges: IntArray  # (e, 2)
     edge_length: FloatArray  # (e, 1)
     edge_of: IntArray  # (3, k)
-    first: IntArray  # (e,) one row of 3 k that is this edge
-    planes: FloatArray  # (4 k, 4): times (x, 1) gives a_1, a_2, a_3, h of each face
-    start: FloatArray  # (3, k, 3) where edge i begins
-    along: FloatArray  # (3, k, 3) its unit vector
+    first: IntArray  # (e,) a row of 3 k for each edge
+    planes: FloatArray  # (4 k, 4): maps (x, 1) to a_1, a_2, a_3, h of each face
+    start: FloatArray  # (3, k, 3) start of edge i
+    along: FloatArray  # (3, k, 3) unit vector of edge i
     length: FloatArray  # (3, k)
     cosine: FloatArray  # (3, k, 1) of gamma_i
     halved: FloatArray  # (3, k, 1): 1 / (2 H_i)
-    by_vertex: IntArray  # (3 k,) rows in the order of their vertices
-    begins: IntArray  # (m,) where each vertex begins in it
+    by_vertex: IntArray  # (3 k,) rows sorted by vertex
+    begins: IntArray  # (m,) first position of each vertex in by_vertex
 
 
 def _prepare(p: FloatArray, faces: IntArray) -> _Cage:
@@ -164,15 +168,15 @@ def _prepare(p: FloatArray, faces: IntArray) -> _Cage:
     planes[:3, :, :3], planes[3, :, :3] = inward, -normal
     planes[:3, :, 3] = -np.einsum("ikx,ikx->ik", inward, start)
     planes[3, :, 3] = np.einsum("kx,kx->k", normal, start.mean(axis=0))
-    edges, sides = face_edges(faces)
+    edges, edge_of = face_edges(faces)
     corner = faces.T.ravel()
     by_vertex = np.argsort(corner, kind="stable")
     return _Cage(
         p=p,
         edges=edges,
         edge_length=np.linalg.norm(p[edges[:, 1]] - p[edges[:, 0]], axis=1)[:, None],
-        edge_of=sides.T,
-        first=np.unique(sides.T, return_index=True)[1],
+        edge_of=edge_of.T,
+        first=np.unique(edge_of.T, return_index=True)[1],
         planes=planes.reshape(-1, 4),
         start=start,
         along=along,
@@ -185,7 +189,7 @@ def _prepare(p: FloatArray, faces: IntArray) -> _Cage:
 
 
 def _as_arrays(cage: _Cage, faces: IntArray) -> tuple[FloatArray | IntArray, ...]:
-    """Return the cage as the compiled kernel takes it."""
+    """Return the arguments of the compiled kernel."""
     planes, starts = cage.planes.reshape(4, len(faces), 4), np.stack([cage.start, cage.along])
     numbers = np.stack([cage.length, cage.cosine[..., 0], cage.halved[..., 0]])
     limits = np.array([_ON, _OFF, _NEAR])
@@ -193,7 +197,7 @@ def _as_arrays(cage: _Cage, faces: IntArray) -> tuple[FloatArray | IntArray, ...
 
 
 def _weights(cage: _Cage, x: FloatArray) -> FloatArray:
-    """Return (m, n) weights of the points *x* (3, n), given as columns."""
+    """Return the weights (m, n) of the points *x* (3, n), given as columns."""
     n = x.shape[1]
     distances = (cage.planes @ np.vstack([x, np.ones(n)])).reshape(4, -1, n)
     distances[3] += _OFF
@@ -219,7 +223,7 @@ def _weights(cage: _Cage, x: FloatArray) -> FloatArray:
     w *= cage.halved
     weights = np.add.reduceat(w.reshape(-1, n)[cage.by_vertex], cage.begins)
 
-    # On an edge or a vertex the faces around it disagree about rounding errors: say it outright.
+    # On edges and vertices the faces give different rounding errors; set the weights directly.
     edge, k = np.nonzero((from_edge <= _ON) & (dot < 0.0))
     i, j = i[edge], j[edge]
     weights[:, k] = 0.0
@@ -233,7 +237,7 @@ def _weights(cage: _Cage, x: FloatArray) -> FloatArray:
 def _sum_near_plane(
     cage: _Cage, face: IntArray, x: FloatArray, distances: FloatArray
 ) -> FloatArray:
-    """Return (n,) a_1 b_1 + a_2 b_2 + a_3 b_3 by psi_i, for pairs of *face* (n,) and *x* (3, n)."""
+    """Return a_1 b_1 + a_2 b_2 + a_3 b_3 by psi_i for pairs of *face* (n,) and *x* (3, n), (n,)."""
     a, h = distances[:3], distances[3]
     size, length = np.abs(a), cage.length[:, face]
     A = np.sqrt(a * a + h * h)
@@ -250,4 +254,4 @@ def _require_closed(p: FloatArray, faces: IntArray) -> None:
     if not faults and len(flat := flat_faces(p, faces)):
         faults = [f"{counted(len(flat), 'face has', 'faces have')} no area"]
     if faults:
-        raise CageError("cage_faces do not close a cage: " + "; ".join(faults))
+        raise CageError("cage_faces is not a closed cage: " + "; ".join(faults))

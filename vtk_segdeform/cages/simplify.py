@@ -1,18 +1,18 @@
-"""A closed surface with fewer vertices, of the same topology, by collapsing edges.
+"""Simplification of a closed surface by edge collapses that preserve its topology.
 
 Collapsing edge (i, j) to a point p costs
 
     C(i, j) = Q(p) + LAMBDA (a_i + a_j) |x_i - x_j|^2        p near the minimum of Q
 
-    Q(p)    sum of a_f (distance of p from the plane of f)^2 over the faces f that have been
-            gathered in i and j: the quadric of [GH97]
-    a       area gathered; the second term keeps the edges of equal length, which a cage that
-            bends needs more than a sharp outline
+    Q(p)    sum of a_f (distance of p from the plane of f)^2 over the faces f accumulated in i
+            and j: the quadric of [GH97]
+    a       accumulated area; the second term favours edges of equal length, which matter more
+            for a cage that bends than a sharp outline
 
-An edge may go if that leaves the topology as it is (the link condition of [DEGN99]: i and j share
-two neighbours and no third), turns no face over and makes no needle.  Each round collapses
-many of the cheapest edges together, none within reach of another, so everything here is whole
-arrays and the number of rounds grows with the logarithm of the reduction.
+A collapse is valid if it preserves the topology (the link condition of [DEGN99]: i and j have
+exactly two common neighbours), inverts no face and creates no needle.  Each round collapses many of
+the cheapest edges at once, chosen so that they do not affect each other; all operations are on
+whole arrays, and the number of rounds grows with the logarithm of the reduction.
 
 Source
 ------
@@ -34,14 +34,12 @@ from numpy.typing import NDArray
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..progress import Progress, tell
 
-# Asked of a face that changes: 4 sqrt(3) area / (sum of squared edges), 1 for an equilateral, 0
-# for a needle.  Relaxed only where nothing else can go.
-_ROUNDNESS = (0.01,)
+_ROUNDNESS = 0.01  # least `roundness` of a changed face
 _LAMBDA = 0.05
-_STIFFNESS = 0.05  # share of Q's trace that holds p at the middle of the edge
-_CHEAPEST = 0.3  # share of the edges that may go in one round
-_PASSES = 2  # in search of edges that are apart
-_TURN = 0.3  # cosine of the largest turn of a face
+_STIFFNESS = 0.05  # weight that attracts p to the midpoint of the edge, relative to Q's trace
+_CHEAPEST = 0.3  # fraction of the edges considered in one round
+_PASSES = 2  # of the search for independent edges
+_TURN = 0.3  # cosine of the largest rotation of a face
 
 
 @dataclass
@@ -49,7 +47,7 @@ class _Surface:
     points: FloatArray
     faces: IntArray
     area: FloatArray
-    # Q(p) = p'A p - 2 b'p + c, gathered in each vertex
+    # Q(p) = p'A p - 2 b'p + c, accumulated in each vertex
     A: FloatArray
     b: FloatArray
     c: FloatArray
@@ -63,16 +61,16 @@ def simplify(
     progress: Progress | None = None,
     message: str = "simplifying",
 ) -> tuple[FloatArray, IntArray]:
-    """Return a surface of *n_vertices*, or of more where the topology allows no fewer.
+    """Return a surface of *n_vertices*, or of more if the topology does not allow fewer.
 
     Parameters
     ----------
     vertices : (n, 3) float
         Not changed.
     faces : (m, 3) int
-        Closed and oriented; may have several components, each of which keeps four vertices.
+        Closed and oriented; each component keeps at least four vertices.
     n_vertices : int
-        How many are wanted.
+        Target number of vertices.
     progress : Progress, optional
         Called between rounds; may cancel.
     message : str
@@ -81,30 +79,29 @@ def simplify(
     Returns
     -------
     vertices, faces : (n', 3) float, (m', 3) int
-        Closed, oriented, of the topology given; n' >= *n_vertices*.
+        Closed, oriented, of the same topology; n' >= *n_vertices*.
     """
-    surface = _gather(vertices, faces)
+    surface = _accumulated(vertices, faces)
     left = len(vertices)
     reduction = math.log(max(left / max(n_vertices, 1), 2.0))
-    for roundness in _ROUNDNESS:
-        refused = np.empty(0, dtype=np.int64)
-        gone = 0
-        while left > n_vertices:
-            tell(progress, math.log(len(vertices) / left) / reduction, message)
-            edges, cost, place = _priced(surface)
-            key = edges @ [len(vertices), 1]
-            at = np.searchsorted(key, refused).clip(max=len(key) - 1)
-            cost[at[key[at] == refused]] = np.inf
-            chosen = _apart(edges, cost, len(vertices))[: left - n_vertices]
-            if len(chosen):
-                done = _collapse(surface, edges[chosen], place[chosen], roundness)
-                gone += int(done.sum())
-                left -= int(done.sum())
-                refused = np.concatenate([refused, key[chosen[~done]]])
-            elif gone:  # what was refused may go now that its surroundings have changed
-                refused, gone = refused[:0], 0
-            else:
-                break
+    rejected = np.empty(0, dtype=np.int64)
+    collapsed = 0
+    while left > n_vertices:
+        tell(progress, math.log(len(vertices) / left) / reduction, message)
+        edges, cost, place = _costs(surface)
+        key = edges @ [len(vertices), 1]
+        at = np.searchsorted(key, rejected).clip(max=len(key) - 1)
+        cost[at[key[at] == rejected]] = np.inf
+        chosen = _independent(edges, cost, len(vertices))[: left - n_vertices]
+        if len(chosen):
+            done = _collapse(surface, edges[chosen], place[chosen])
+            collapsed += int(done.sum())
+            left -= int(done.sum())
+            rejected = np.concatenate([rejected, key[chosen[~done]]])
+        elif collapsed:  # rejected edges may be valid now that their neighbourhoods changed
+            rejected, collapsed = rejected[:0], 0
+        else:
+            break
     used, numbers = np.unique(surface.faces, return_inverse=True)
     return surface.points[used], numbers.reshape(-1, 3)
 
@@ -114,8 +111,8 @@ def roundness(vertices: FloatArray, faces: IntArray) -> FloatArray:
     return _normals(vertices[faces])[1]
 
 
-def _gather(vertices: FloatArray, faces: IntArray) -> _Surface:
-    """Return the surface with a third of each face's quadric and area in each corner."""
+def _accumulated(vertices: FloatArray, faces: IntArray) -> _Surface:
+    """Return the surface with a third of the quadric and area of each face at its corners."""
     corners = vertices[faces]
     normal = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     twice_area = np.linalg.norm(normal, axis=1)
@@ -134,8 +131,8 @@ def _gather(vertices: FloatArray, faces: IntArray) -> _Surface:
     return _Surface(vertices.copy(), faces.copy(), area, A, b, c)
 
 
-def _priced(s: _Surface) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return all edges i < j, what collapsing each costs (infinite: it may not), and where to."""
+def _costs(s: _Surface) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return all edges i < j, their costs (infinite if invalid) and the points they collapse to."""
     tail, head, apex = (s.faces[:, k].ravel() for k in ([0, 1, 2], [1, 2, 0], [2, 0, 1]))
     up = tail < head
     n = len(s.points)
@@ -145,7 +142,7 @@ def _priced(s: _Surface) -> tuple[IntArray, FloatArray, FloatArray]:
     middle = 0.5 * (s.points[i] + s.points[j])
     A, b, c = s.A[i] + s.A[j], s.b[i] + s.b[j], s.c[i] + s.c[j]
     stiffness = _STIFFNESS * np.trace(A, axis1=1, axis2=2)
-    # (A + k I)(p - m) = b - A m, by the rule of cross products for a symmetric matrix
+    # (A + k I)(p - m) = b - A m; the inverse of the symmetric matrix by cross products
     pull = b - np.einsum("eij,ej->ei", A, middle)
     x, y, z = (A + stiffness[:, None, None] * np.eye(3)).transpose(1, 0, 2)
     yz = _cross(y, z)
@@ -160,11 +157,11 @@ def _priced(s: _Surface) -> tuple[IntArray, FloatArray, FloatArray]:
     return np.stack([i, j], axis=1), cost, place
 
 
-def _apart(edges: IntArray, cost: FloatArray, n: int) -> IntArray:
-    """Return cheap edges, none within reach of another.
+def _independent(edges: IntArray, cost: FloatArray, n: int) -> IntArray:
+    """Return cheap edges (k,) whose neighbourhoods are disjoint.
 
-    Each edge claims its ends and their neighbours; it is chosen if it is the cheapest to claim
-    any of them.  Then again among the edges that claim nothing taken.
+    An edge is chosen if it is the cheapest one among all edges whose ends or neighbours overlap
+    with its own; a second pass considers the edges that overlap with no chosen one.
     """
     i, j = edges.T
     cheapest = np.argsort(cost, kind="stable")[: int(np.ceil(_CHEAPEST * len(edges)))]
@@ -173,10 +170,10 @@ def _apart(edges: IntArray, cost: FloatArray, n: int) -> IntArray:
     taken = np.zeros(n, dtype=bool)
     for _ in range(_PASSES):
         rank = np.arange(len(cheapest))
-        own = np.full(n, len(edges))
-        np.minimum.at(own, edges[cheapest].ravel(), np.repeat(rank, 2))
-        seen = _spread(_spread(own, i, j, np.minimum), i, j, np.minimum)
-        wins = seen[edges[cheapest]].min(axis=1) == rank
+        least = np.full(n, len(edges))
+        np.minimum.at(least, edges[cheapest].ravel(), np.repeat(rank, 2))
+        least = _spread(_spread(least, i, j, np.minimum), i, j, np.minimum)
+        wins = least[edges[cheapest]].min(axis=1) == rank
         chosen.append(cheapest[wins])
         taken[edges[cheapest[wins]]] = True
         reach = taken
@@ -194,42 +191,42 @@ def _spread(values: NDArray[Any], i: IntArray, j: IntArray, combine: np.ufunc) -
     return result
 
 
-def _collapse(s: _Surface, edges: IntArray, place: FloatArray, roundness: float) -> BoolArray:
-    """Collapse those *edges* that may go, and tell which those were."""
+def _collapse(s: _Surface, edges: IntArray, place: FloatArray) -> BoolArray:
+    """Collapse the valid ones of *edges*, and return which were, (k,) bool."""
     owner = np.full(len(s.points), -1)
     owner[edges] = np.arange(len(edges))[:, None]
     moved = s.points.copy()
     moved[edges] = place[:, None]
 
-    # The link condition: exactly two vertices see both ends.
+    # The link condition: exactly two vertices are neighbours of both ends.
     of_corner = owner[s.faces]
     near = np.flatnonzero((of_corner >= 0).any(axis=1))
     tail, head = s.faces[near].ravel(), s.faces[near][:, [1, 2, 0]].ravel()
-    sees = (owner[tail] < 0) & (owner[head] >= 0)
-    seen = np.bincount(tail[sees], minlength=len(owner))
-    watched = np.full(len(owner), -1)
-    watched[tail[sees]] = owner[head[sees]]
-    common = np.bincount(watched[seen >= 2], minlength=len(edges))
+    adjacent = (owner[tail] < 0) & (owner[head] >= 0)
+    count = np.bincount(tail[adjacent], minlength=len(owner))
+    neighbour_of = np.full(len(owner), -1)
+    neighbour_of[tail[adjacent]] = owner[head[adjacent]]
+    common = np.bincount(neighbour_of[count >= 2], minlength=len(edges))
     good = common == 2
 
-    # The faces that stay keep their side and their shape.
-    stays = near[(of_corner[near] >= 0).sum(axis=1) == 1]
-    before, rounder = _normals(s.points[s.faces[stays]])
-    after, round_now = _normals(moved[s.faces[stays]])
-    of_face = of_corner[stays].max(axis=1)
-    worst = np.full(len(edges), roundness)
-    np.minimum.at(worst, of_face, rounder)
+    # The remaining faces must keep their orientation and their shape.
+    kept = near[(of_corner[near] >= 0).sum(axis=1) == 1]
+    before, old_roundness = _normals(s.points[s.faces[kept]])
+    after, new_roundness = _normals(moved[s.faces[kept]])
+    of_face = of_corner[kept].max(axis=1)
+    worst = np.full(len(edges), _ROUNDNESS)
+    np.minimum.at(worst, of_face, old_roundness)
     fine = np.einsum("fi,fi->f", before, after) > _TURN
-    fine &= round_now >= worst[of_face]
+    fine &= new_roundness >= worst[of_face]
     good[of_face[~fine]] = False
 
     i, j = edges[good].T
     s.points[i] = place[good]
-    for gathered in (s.A, s.b, s.c, s.area):
-        gathered[i] += gathered[j]
-    becomes = np.arange(len(owner))
-    becomes[j] = i
-    faces = becomes[s.faces]
+    for accumulated in (s.A, s.b, s.c, s.area):
+        accumulated[i] += accumulated[j]
+    number = np.arange(len(owner))
+    number[j] = i
+    faces = number[s.faces]
     s.faces = faces[(faces != faces[:, [1, 2, 0]]).all(axis=1)]
     return np.asarray(good)
 
@@ -245,7 +242,7 @@ def _normals(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return `numpy.cross` of (n, 3) vectors; in a third of its time where they are few."""
+    """Return the cross products of (n, 3) vectors; three times as fast as numpy for few of them."""
     out = np.empty_like(a)
     for k in range(3):
         out[:, k] = a[:, k - 2] * b[:, k - 1] - a[:, k - 1] * b[:, k - 2]

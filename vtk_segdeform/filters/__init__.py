@@ -1,17 +1,17 @@
-"""The deformation as a VTK pipeline filter.
+"""The deformation as a filter of a VTK pipeline.
 
 The files, in reading order:
 
     deform_filter      `SegmentedCageDeformFilter`
-    settings           its setters
-    surfaces           vtkPolyData in and out, without pyvista
+    settings           the setters of the filter
+    surfaces           conversion from and to vtkPolyData, without pyvista
     paraview_plugin    the ParaView plugin
 """
 
 from .deform_filter import SegmentedCageDeformFilter
-from .settings import SettingsOfAFilter
+from .settings import FilterSettings
 
 __all__ = [
+    "FilterSettings",
     "SegmentedCageDeformFilter",
-    "SettingsOfAFilter",
 ]

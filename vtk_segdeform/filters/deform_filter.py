@@ -1,22 +1,22 @@
-"""The deformation as a filter of a VTK pipeline, for VTK, pyvista and ParaView alike.
+"""The deformation as a filter of a VTK pipeline, for VTK, pyvista and ParaView.
 
-    port 0   the surface: closed, of triangles, or of polygons, which are cut for solving only
-    port 1   its cages, optional: a composite dataset with a surface for each region, or one
-             surface for a single region; without them cages are fitted
-    output   the surface with all its arrays and its points moved; and as well
+    port 0   the surface: closed, of triangles or polygons, which are only cut for the solver
+    port 1   cages, optional: a composite dataset with a surface for each region, or one surface
+             for a single region; without cages, the filter fits them
+    output   the deformed surface with all its arrays, and also
              "LocalVolumeChange" (points), "VolumeChange", "HandleError", "Steps", "Status" (field)
 
-Regions are told by a point array of labels, or found.  What stays and what is moved is told by
-point arrays, true where not 0, or by numbers of points.  The handle goes to given targets, or is
-turned about its centre and shifted.
+Regions come from a point array of labels or from automatic segmentation.  Fixed vertices and the
+handle are point arrays, where nonzero, or point indices.  The handle moves to given targets, or is
+rotated about its centre and translated.
 
-The output is a function of inputs and settings, not of what was there before; its numbers are
-those of `vtk_segdeform.deform`.  Only what changed is done again: other targets are solved for,
-another handle takes milliseconds more, and for nothing but another surface, other regions, cages
-or energies is anything bound anew (`rebinds` counts).
+The output depends on inputs and settings only, not on earlier executions; it equals that of
+`vtk_segdeform.deform`.  Only the parts that changed are computed again: new targets need a solve, a
+new handle some milliseconds more, and only a new surface, regions, cages or stretch resistance
+needs a new binding (counted by `rebinds`).
 
-Faults are told as VTK does, by an ErrorEvent with a text or in the output window; the output is
-empty then.  Needs numpy, scipy and VTK's own modules.
+Errors are reported as in VTK, by an ErrorEvent with a text or in the output window, and the output
+is empty.  Requires numpy, scipy and VTK's modules, but not pyvista.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ from ..mesh import Mesh
 from ..progress import Progress, part
 from ..regions import Regions, segment
 from . import surfaces
-from .settings import SettingsOfAFilter
+from .settings import FilterSettings
 
 
-class SegmentedCageDeformFilter(SettingsOfAFilter):
-    """Deform a closed surface by its handle, detail and volume kept.
+class SegmentedCageDeformFilter(FilterSettings):
+    """Deform a closed surface by a handle, preserving detail and volume.
 
     Attributes
     ----------
     rebinds : int
-        How often cages were fitted or bound so far.
+        Number of times that cages were fitted or bound so far.
     """
 
     def __init__(self) -> None:
@@ -56,12 +56,12 @@ class SegmentedCageDeformFilter(SettingsOfAFilter):
             nInputPorts=2, inputType="vtkPolyData", nOutputPorts=1, outputType="vtkPolyData"
         )
         self.rebinds = 0
-        self._bound: tuple[bytes, Deformer] | None = None
+        self._cached: tuple[bytes, Deformer] | None = None
 
     # The pipeline.
 
     def FillInputPortInformation(self, port: int, info: Any) -> int:  # noqa: N802
-        """Port 0 is a surface; port 1, cages, may be of several pieces, or missing."""
+        """Declare the inputs: port 0 a surface; port 1 cages, composite or missing."""
         if port == 1:
             info.Set(self.INPUT_REQUIRED_DATA_TYPE(), "vtkDataObject")
             info.Set(self.INPUT_IS_OPTIONAL(), 1)
@@ -70,7 +70,7 @@ class SegmentedCageDeformFilter(SettingsOfAFilter):
         return 1
 
     def RequestData(self, _request: Any, inputs: Any, outputs: Any) -> int:  # noqa: N802
-        """Deform; called by the pipeline."""
+        """Deform the input; called by the pipeline."""
         source = vtkPolyData.GetData(inputs[0], 0)
         output = vtkPolyData.GetData(outputs, 0)
         given = inputs[1].GetNumberOfInformationObjects()
@@ -81,7 +81,7 @@ class SegmentedCageDeformFilter(SettingsOfAFilter):
             output.Initialize()
         except (SegDeformError, ValueError, TypeError) as fault:
             output.Initialize()
-            self._tell(f"{type(self).__name__}: {fault}")
+            self._report_error(f"{type(self).__name__}: {fault}")
         return 1
 
     def _deform(self, source: Any, cages: Any, output: Any) -> None:
@@ -95,17 +95,17 @@ class SegmentedCageDeformFilter(SettingsOfAFilter):
         handle = _marked(source, settings.handle, settings.handle_array)
         if handle is None:
             handle = np.flatnonzero(_required(source, settings.handle_array, "SetHandleArrayName"))
-        held = deformer.hold(
+        constrained = deformer.hold(
             fixed=np.zeros(0, np.int64) if fixed is None else fixed,
             handle=handle,
             preserve_volume=settings.preserve_volume,
         )
         solving = part(self._progress(), 0.95, 1.0)
-        solution = held.solve(self._targets(vertices[held.handle]), progress=solving)
+        solution = constrained.solve(self._targets(vertices[constrained.handle]), progress=solving)
         output.ShallowCopy(source)
         surfaces.move(output, solution.vertices, faces)
         if settings.local_volume:
-            change = local_volume_change(held.mesh, solution.vertices)
+            change = local_volume_change(constrained.mesh, solution.vertices)
             surfaces.add_array(output.GetPointData(), "LocalVolumeChange", change)
         for name, value in (
             ("VolumeChange", [solution.volume_change]),
@@ -117,7 +117,7 @@ class SegmentedCageDeformFilter(SettingsOfAFilter):
         self.UpdateProgress(1.0)
 
     def _binding(self, mesh: Mesh, labels: Any, cages: Sequence[Cage]) -> Deformer:
-        """Return a deformer that holds nothing yet: the one of the last time, if it may be."""
+        """Return a deformer without constraints: that of the last execution, if still valid."""
         settings, key = self._settings, hashlib.blake2b()
         choices = settings.n_regions, settings.n_cage_vertices, settings.overlap, settings.stretch
         key.update(repr((choices, labels is None, len(cages))).encode())
@@ -126,13 +126,13 @@ class SegmentedCageDeformFilter(SettingsOfAFilter):
             arrays += [cage.vertices, cage.faces]
         for array in arrays:
             key.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
-        if self._bound is None or self._bound[0] != key.digest():
-            self._bound = None
+        if self._cached is None or self._cached[0] != key.digest():
+            self._cached = None
             self.rebinds += 1
-            self._bound = key.digest(), self._made(mesh, labels, cages)
-        return self._bound[1]
+            self._cached = key.digest(), self._new_deformer(mesh, labels, cages)
+        return self._cached[1]
 
-    def _made(self, mesh: Mesh, labels: Any, cages: Sequence[Cage]) -> Deformer:
+    def _new_deformer(self, mesh: Mesh, labels: Any, cages: Sequence[Cage]) -> Deformer:
         settings, progress = self._settings, self._progress()
         if labels is not None:
             regions = Regions.from_labels(mesh, labels, settings.overlap)
@@ -140,7 +140,7 @@ class SegmentedCageDeformFilter(SettingsOfAFilter):
             regions = Regions.single(mesh)
         elif cages:
             raise CageError(
-                f"{len(cages)} cages need regions: name an array of labels by SetRegionArrayName"
+                f"{len(cages)} cages need regions; set an array of labels with SetRegionArrayName"
             )
         else:
             regions = segment(mesh, settings.n_regions or None, progress=part(progress, 0.0, 0.2))
@@ -151,17 +151,19 @@ class SegmentedCageDeformFilter(SettingsOfAFilter):
         binding = part(progress, 0.7, 0.95)
         return Deformer(mesh, regions, cages, stretch=settings.stretch, progress=binding)
 
-    def _targets(self, places: FloatArray) -> FloatArray:
+    def _targets(self, points: FloatArray) -> FloatArray:
         settings = self._settings
         if settings.targets is not None:
             return np.array(settings.targets).reshape(-1, 3)
         axis = np.array(settings.axis)
         length = np.linalg.norm(axis)
         if not length > 0.0:
-            raise ConstraintError("the axis to turn about must not be 0 0 0")
-        turn = Rotation.from_rotvec(np.radians(settings.angle) * axis / length)
-        centre = places.mean(axis=0) if len(places) else np.zeros(3)
-        return np.asarray(turn.apply(places - centre) + centre + settings.translation)
+            raise ConstraintError(
+                "the rotation axis must not be 0 0 0; set it with SetRotationAxis"
+            )
+        rotation = Rotation.from_rotvec(np.radians(settings.angle) * axis / length)
+        centre = points.mean(axis=0) if len(points) else np.zeros(3)
+        return np.asarray(rotation.apply(points - centre) + centre + settings.translation)
 
     def _progress(self) -> Progress:
         def report(fraction: float, text: str) -> None:
@@ -172,8 +174,8 @@ class SegmentedCageDeformFilter(SettingsOfAFilter):
 
         return report
 
-    def _tell(self, text: str) -> None:
-        """Tell a fault as VTK's own filters do."""
+    def _report_error(self, text: str) -> None:
+        """Report an error like the filters of VTK."""
         if self.HasObserver("ErrorEvent"):
             self.InvokeEvent("ErrorEvent", text)
         else:
@@ -183,12 +185,12 @@ class SegmentedCageDeformFilter(SettingsOfAFilter):
 def _required(source: Any, name: str, setter: str) -> Any:
     array = surfaces.point_array(source, name)
     if array is None:
-        raise ConstraintError(f"the input has no point array '{name}'; name one by {setter}")
+        raise ConstraintError(f"the input has no point array '{name}'; set its name with {setter}")
     return array
 
 
 def _marked(source: Any, ids: Sequence[int] | None, name: str) -> Any:
-    """Return numbers of points: those given, or those marked by an array; None without either."""
+    """Return the given point indices, or those where an array is nonzero; None without either."""
     if ids is not None:
         return as_ids(np.array(ids, dtype=np.int64), source.GetNumberOfPoints(), "points")
     array = surfaces.point_array(source, name) if name else None

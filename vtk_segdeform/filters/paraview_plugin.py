@@ -1,17 +1,17 @@
-"""The filter in ParaView: load this file by Tools > Manage Plugins > Load New.
+"""ParaView plugin of the filter: load this file with Tools > Manage Plugins > Load New.
 
     python -m vtk_segdeform.filters.paraview_plugin --path
 
-prints where it is; PV_PLUGIN_PATH or LoadPlugin take it as well.  In the menu it is Filters >
-Mesh > Segmented Cage Deform: mark what stays and what is moved by point arrays "fixed" and
-"handle" (a Calculator makes them, coordsZ > 0.9), then shift and turn the handle.
+prints its path, for PV_PLUGIN_PATH or LoadPlugin, too.  The filter is in the menu Filters > Mesh >
+Segmented Cage Deform.  Point arrays "fixed" and "handle" mark the fixed vertices and the handle (a
+Calculator creates them, for example coordsZ > 0.9); the properties translate and rotate the handle.
 
-ParaView's Python needs a numpy and scipy as new as this package does; where its own are older:
+ParaView's Python needs recent versions of numpy and scipy.  If its own are too old:
 
     pip install --target FOLDER numpy scipy         with the same Python version as ParaView's
     PYTHONPATH=FOLDER paraview
 
-Where it has no vtk_segdeform of its own, the one that this file lies in is used.
+If vtk_segdeform is not installed in it, the package that contains this file is used.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
-if __name__ == "__main__":  # asked from a shell, where there is no ParaView
+if __name__ == "__main__":  # run from a shell, without ParaView
     if sys.argv[1:] == ["--path"]:
         print(Path(__file__).resolve())
         sys.exit(0)
@@ -31,12 +31,12 @@ from paraview.util.vtkAlgorithm import smdomain, smhint, smproperty, smproxy
 
 if tuple(map(int, scipy.__version__.split(".")[:2])) < (1, 13):
     raise ImportError(
-        f"ParaView's Python has scipy {scipy.__version__}, vtk_segdeform needs 1.13 or newer: "
+        f"ParaView's Python has scipy {scipy.__version__}; vtk_segdeform needs 1.13 or newer: "
         "pip install --target FOLDER numpy scipy, then start ParaView with PYTHONPATH=FOLDER"
     )
 
 if find_spec("vtk_segdeform") is None:
-    # Last, so that nothing of ParaView's own is replaced by what lies beside it.
+    # Last in the path, so that no module of ParaView is replaced.
     sys.path.append(str(Path(__file__).resolve().parent.parent))
 
 from .deform_filter import SegmentedCageDeformFilter
@@ -51,7 +51,7 @@ paraview_plugin_version = "0.1"
 @smproperty.input(name="Input", port_index=0)
 @smdomain.datatype(dataTypes=["vtkPolyData"], composite_data_supported=False)
 class SegmentedCageDeform(SegmentedCageDeformFilter):
-    """What may be set, for ParaView's panel; see `SegmentedCageDeformFilter`."""
+    """Properties of the filter for ParaView's panel; see `SegmentedCageDeformFilter`."""
 
     @smproperty.stringvector(name="HandleArray", default_values="handle")
     def SetHandleArrayName(self, name: str) -> None:  # noqa: N802
@@ -95,8 +95,8 @@ class SegmentedCageDeform(SegmentedCageDeformFilter):
 
     @smproperty.intvector(name="PreserveVolume", default_values=1)
     @smdomain.xml('<BooleanDomain name="bool"/>')
-    def SetPreserveVolume(self, hold: int) -> None:  # noqa: N802
-        super().SetPreserveVolume(bool(hold))
+    def SetPreserveVolume(self, on: int) -> None:  # noqa: N802
+        super().SetPreserveVolume(bool(on))
 
     @smproperty.doublevector(name="Stretch", default_values=10.0)
     @smdomain.doublerange(min=0.0, max=100.0)

@@ -1,4 +1,4 @@
-"""What a deforming filter is told, by setters in VTK's manner."""
+"""Settings of the filter, with setters in the style of VTK."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..errors import ArgumentError
 
 @dataclass(frozen=True)
 class Settings:
-    """All that may be set, as it is before anything is."""
+    """The settings and their defaults."""
 
     n_regions: int = 3
     n_cage_vertices: int = 155
@@ -35,72 +35,72 @@ class Settings:
     local_volume: bool = True
 
 
-class SettingsOfAFilter(VTKPythonAlgorithmBase):  # type: ignore[misc]
-    """A filter with these settings; setting what is set already changes nothing."""
+class FilterSettings(VTKPythonAlgorithmBase):  # type: ignore[misc]
+    """A filter with setters; setting an unchanged value does not modify the filter."""
 
     def __init__(self, **ports: Any) -> None:
         super().__init__(**ports)
         self._settings = Settings()
 
-    def SetNumberOfRegions(self, count: int) -> None:  # noqa: N802 - VTK's manner
-        """Find so many regions; 0 leaves the choice to `segment`."""
-        self._set(n_regions=_whole(count, "count"))
+    def SetNumberOfRegions(self, count: int) -> None:  # noqa: N802 - VTK's style
+        """Set the number of regions of the automatic segmentation; 0 means automatic."""
+        self._set(n_regions=_integer(count, "count"))
 
     def SetNumberOfCageVertices(self, count: int) -> None:  # noqa: N802
-        """Fit cages of so many vertices, all together."""
-        self._set(n_cage_vertices=_whole(count, "count"))
+        """Set the total number of vertices of fitted cages."""
+        self._set(n_cage_vertices=_integer(count, "count"))
 
     def SetRegionArrayName(self, name: str) -> None:  # noqa: N802
-        """Name the point array of labels that makes regions; "" finds regions instead."""
+        """Set the name of the point array of region labels; "" for automatic segmentation."""
         self._set(region_array=_name(name))
 
     def SetOverlap(self, rings: int) -> None:  # noqa: N802
-        """Let regions of labels grow by rings of edges; see `Regions.from_labels`."""
-        self._set(overlap=_whole(rings, "rings"))
+        """Set the overlap of regions from labels, in edge rings; see `Regions.from_labels`."""
+        self._set(overlap=_integer(rings, "rings"))
 
     def SetFixedArrayName(self, name: str) -> None:  # noqa: N802
-        """Name the point array that is not 0 where points stay; it may be missing."""
+        """Set the name of the point array that is nonzero at fixed vertices; it may be missing."""
         self._set(fixed_array=_name(name), fixed=None)
 
     def SetHandleArrayName(self, name: str) -> None:  # noqa: N802
-        """Name the point array that is not 0 where points are moved."""
+        """Set the name of the point array that is nonzero at the handle."""
         self._set(handle_array=_name(name), handle=None)
 
     def SetFixed(self, points: ArrayLike) -> None:  # noqa: N802
-        """Tell the points that stay by their numbers, instead of by an array."""
-        self._set(fixed=_numbers(points))
+        """Set the fixed vertices as point indices, instead of an array."""
+        self._set(fixed=_point_ids(points))
 
     def SetHandle(self, points: ArrayLike) -> None:  # noqa: N802
-        """Tell the points that are moved by their numbers, instead of by an array."""
-        self._set(handle=_numbers(points))
+        """Set the handle as point indices, instead of an array."""
+        self._set(handle=_point_ids(points))
 
     def SetTargets(self, targets: ArrayLike | None) -> None:  # noqa: N802
-        """Send the handle's points, in their order, to (k, 3) places; None for a motion instead."""
-        rows = None if targets is None else _places(targets)
+        """Set the targets (k, 3) of the handle, in its order; None for a rigid motion instead."""
+        rows = None if targets is None else _positions(targets)
         self._set(targets=None if rows is None else tuple(map(tuple, rows)))
 
     def SetTranslation(self, x: float, y: float, z: float) -> None:  # noqa: N802
-        """Shift the handle."""
+        """Set the translation of the handle."""
         self._set(translation=_vector(x, y, z))
 
     def SetRotationAxis(self, x: float, y: float, z: float) -> None:  # noqa: N802
-        """Turn the handle about an axis through its centre."""
+        """Set the axis for rotating the handle about its centre."""
         self._set(axis=_vector(x, y, z))
 
     def SetRotationAngle(self, degrees: float) -> None:  # noqa: N802
-        """Turn it by so much, the right hand's thumb along the axis."""
+        """Set the angle for rotating the handle, by the right-hand rule."""
         self._set(angle=_real(degrees, "degrees"))
 
-    def SetPreserveVolume(self, hold: bool) -> None:  # noqa: N802
-        """Hold the enclosed volume exactly."""
-        self._set(preserve_volume=as_switch(hold, "hold"))
+    def SetPreserveVolume(self, on: bool) -> None:  # noqa: N802
+        """Set whether the enclosed volume is preserved exactly."""
+        self._set(preserve_volume=as_switch(on, "on"))
 
     def SetStretch(self, strength: float) -> None:  # noqa: N802
-        """See `Deformer`."""
+        """Set the stretch resistance; see `Deformer`."""
         self._set(stretch=_real(strength, "strength"))
 
     def SetComputeLocalVolumeChange(self, on: bool) -> None:  # noqa: N802
-        """Add "LocalVolumeChange"; see `local_volume_change`."""
+        """Set whether to compute "LocalVolumeChange"; see `local_volume_change`."""
         self._set(local_volume=as_switch(on, "on"))
 
     def _set(self, **changes: Any) -> None:
@@ -110,7 +110,7 @@ class SettingsOfAFilter(VTKPythonAlgorithmBase):  # type: ignore[misc]
             self.Modified()
 
 
-def _whole(value: int, name: str) -> int:
+def _integer(value: int, name: str) -> int:
     if not is_whole(value, -np.inf):
         raise ArgumentError(f"{name} must be a whole number; got {shown(value)}")
     return int(value)
@@ -130,24 +130,24 @@ def _name(name: str | None) -> str:
     return "" if name is None else as_text(name, "name")
 
 
-def _places(targets: ArrayLike) -> list[list[float]]:
+def _positions(targets: ArrayLike) -> list[list[float]]:
     array = plain(targets, "targets")
     if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "iuf":
         raise ArgumentError(
             f"targets must be (k, 3) real numbers; got {array.dtype} of shape {array.shape}"
         )
     rows: list[list[float]] = array.astype(np.float64).tolist()
-    return rows  # whether they are finite, the pipeline tells
+    return rows  # checked for finite values when the pipeline executes
 
 
-def _numbers(points: ArrayLike) -> tuple[int, ...]:
-    """Return numbers of points, or those a mask marks; whether they are there, the input tells."""
+def _point_ids(points: ArrayLike) -> tuple[int, ...]:
+    """Return point indices, also of a mask; their range is checked with the input."""
     array = plain(points, "points")
     if array.dtype == bool and array.ndim == 1:
         array = np.flatnonzero(array)
     if array.size and (array.ndim > 1 or array.dtype.kind not in "iu"):
         raise ArgumentError(
-            "points must be one row of vertex numbers, or a mask; "
+            "points must be a list of vertex numbers or a mask; "
             f"got {array.dtype} of shape {array.shape}"
         )
     return tuple(array.astype(np.int64).ravel().tolist())

@@ -1,4 +1,4 @@
-"""Surfaces as VTK's own polydata, in and out, for where there is no pyvista."""
+"""Conversion of surfaces from and to vtkPolyData, without pyvista."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def surface(polydata: Any) -> tuple[FloatArray, IntArray]:
     if not polydata.GetNumberOfPoints() or not (
         polydata.GetNumberOfPolys() or polydata.GetNumberOfStrips()
     ):
-        raise MeshError("the input holds no surface; give it polygons")
+        raise MeshError("the input has no surface; it must have points and polygons")
     cut = vtkTriangleFilter()
     cut.PassVertsOff()
     cut.PassLinesOff()
@@ -44,19 +44,19 @@ def point_array(polydata: Any, name: str) -> Any:
 
 
 def pieces(data: Any) -> Iterator[Any]:
-    """Yield the vtkPolyData that *data* is, or that it is composed of."""
+    """Yield *data*, or the datasets of which it is composed."""
     if not isinstance(data, vtkCompositeDataSet):
         yield data
         return
-    places = data.NewIterator()
-    places.InitTraversal()
-    while not places.IsDoneWithTraversal():
-        yield places.GetCurrentDataObject()
-        places.GoToNextItem()
+    item = data.NewIterator()
+    item.InitTraversal()
+    while not item.IsDoneWithTraversal():
+        yield item.GetCurrentDataObject()
+        item.GoToNextItem()
 
 
 def move(polydata: Any, vertices: FloatArray, faces: IntArray) -> None:
-    """Give a vtkPolyData other points (n, 3) of its own; point normals, if any, are made anew."""
+    """Replace the points (n, 3) of a vtkPolyData, and compute point normals again if it has any."""
     points = vtkPoints()
     points.SetData(numpy_to_vtk(np.ascontiguousarray(vertices), deep=True))
     polydata.SetPoints(points)
@@ -66,16 +66,16 @@ def move(polydata: Any, vertices: FloatArray, faces: IntArray) -> None:
     bare = vtkPolyData()
     bare.SetPoints(points)
     bare.SetPolys(_triangles(faces))
-    anew = vtkTriangleMeshPointNormals()
-    anew.SetInputData(bare)
-    anew.Update()
-    made = anew.GetOutput().GetPointData().GetNormals()
-    made.SetName(normals.GetName())
-    polydata.GetPointData().SetNormals(made)
+    computed = vtkTriangleMeshPointNormals()
+    computed.SetInputData(bare)
+    computed.Update()
+    fresh = computed.GetOutput().GetPointData().GetNormals()
+    fresh.SetName(normals.GetName())
+    polydata.GetPointData().SetNormals(fresh)
 
 
 def add_array(attributes: Any, name: str, values: Any) -> None:
-    """Add an array of numbers, or one of a single text, to point, cell or field data."""
+    """Add an array of numbers, or of a single text, to point, cell or field data."""
     if isinstance(values, str):
         array = vtkStringArray()
         array.InsertNextValue(values)

@@ -1,15 +1,15 @@
-"""Geometry of a triangle surface: the quantities a deformation preserves or reports.
+"""Geometry of a triangle surface: quantities that a deformation preserves or reports.
 
 The files, in reading order:
 
     volume          enclosed volume, eqs. (8) and (9)
     differential    mean-curvature normals, eq. (5)
-    intrinsic       intrinsic triangulation: the same surface without bad triangles
+    intrinsic       intrinsic triangulation: the surface without bad triangles
     rotations       local rotations
-    thinning        subsets of vertices at even distances
+    sampling        even samples of the vertices, and their Voronoi cells
     normals         vertex normals for drawing
-    distortion      stretch and shear, a number per triangle
-    local_volume    volume change below the surface, a number per vertex
+    distortion      stretch and shear of each triangle
+    local_volume    volume change below the surface at each vertex
 """
 
 from .differential import area_gradients, cotangent_laplacian, mixed_voronoi_areas, with_least_areas
@@ -24,7 +24,7 @@ from .rotations import (
     rigid_fit,
     rotation_groups,
 )
-from .thinning import cells, distinct_lengths, faces_between, nearest_of, unique_edges
+from .sampling import distinct_lengths, faces_between, nearest_source, unique_edges, voronoi_cells
 from .volume import signed_volume, step_to_volume, volume_along, volume_along_path, volume_gradient
 
 __all__ = [
@@ -32,7 +32,6 @@ __all__ = [
     "LocalVolume",
     "VertexNormals",
     "area_gradients",
-    "cells",
     "closest_rotations",
     "cotangent_laplacian",
     "distinct_lengths",
@@ -42,7 +41,7 @@ __all__ = [
     "group_by_position",
     "local_volume_change",
     "mixed_voronoi_areas",
-    "nearest_of",
+    "nearest_source",
     "rigid_fit",
     "rotation_groups",
     "signed_volume",
@@ -52,5 +51,6 @@ __all__ = [
     "volume_along",
     "volume_along_path",
     "volume_gradient",
+    "voronoi_cells",
     "with_least_areas",
 ]

@@ -1,14 +1,14 @@
-"""Mean-curvature normals, eq. (5): the detail that a deformation keeps.
+"""Mean-curvature normals, eq. (5): the detail that a deformation preserves.
 
     kappa_i n_i = 1/(4 A_i) sum_j (cot alpha_ij + cot beta_ij) (x_i - x_j) = delta_i      (5)
 
 alpha_ij, beta_ij are the angles opposite edge (i, j) in its two triangles, A_i is the mixed
 Voronoi area of vertex i, kappa_i the mean curvature and n_i the outward normal.  With the
-cotangent Laplacian C, (C x)_i = 1/2 sum_j (cot alpha_ij + cot beta_ij) (x_i - x_j), the left
-side reads (C x)_i / (2 A_i).
+cotangent Laplacian C, (C x)_i = 1/2 sum_j (cot alpha_ij + cot beta_ij) (x_i - x_j), the detail is
+delta_i = (C x)_i / (2 A_i).
 
-Cotangents and areas are those of an intrinsic triangulation (`intrinsic`), which is the mesh
-itself wherever its triangles are well shaped; so C is positive semi-definite for any triangles.
+Cotangents and areas come from an intrinsic triangulation (`intrinsic`), which equals the mesh where
+its triangles are well shaped; C is therefore positive semi-definite for any triangles.
 
 Source
 ------
@@ -25,17 +25,17 @@ from ..arrays import FloatArray, IntArray
 from ..kernels import in_parallel
 from .intrinsic import IntrinsicTriangulation
 
-_PIECE = 50_000  # faces to a thread
+_PIECE = 50_000  # faces per task
 _LEAST_AREA = 0.05  # share of the mean area of a vertex's neighbours
 
 
 def cotangent_laplacian(
     faces: IntArray, cotangents: FloatArray, n_vertices: int
 ) -> sparse.csr_array:
-    """Return the (n, n) symmetric C; x^T C x is twice Dirichlet's energy.
+    """Return C, (n, n) and symmetric; x^T C x is twice the Dirichlet energy.
 
-    Positive semi-definite where the *cotangents* (m, 3) are those of an intrinsic triangulation,
-    or multiples of them, one for each face.
+    C is positive semi-definite if *cotangents* (m, 3) are those of an intrinsic triangulation, or
+    non-negative multiples of them, one factor per face.
     """
     half = 0.5 * cotangents.ravel()
     i, j = faces[:, [1, 2, 0]].ravel(), faces[:, [2, 0, 1]].ravel()
@@ -45,12 +45,12 @@ def cotangent_laplacian(
 
 
 def mixed_voronoi_areas(surface: IntrinsicTriangulation) -> FloatArray:
-    """Return (n,): each vertex's mixed Voronoi area; they sum to the area of the surface."""
+    """Return the mixed Voronoi area of each vertex, (n,); their sum is the surface area."""
     square, cotangents = surface.lengths**2, surface.cotangents
     # Voronoi part of corner a: (|ab|^2 cot c + |ac|^2 cot b) / 8.
     share = square * cotangents / 8.0
     voronoi = share.sum(axis=1, keepdims=True) - share
-    # An obtuse triangle's circumcentre is outside: half to its obtuse corner, a quarter each.
+    # The circumcentre of an obtuse triangle is outside: half its area goes to the obtuse corner.
     obtuse = cotangents < 0.0
     split = np.where(obtuse, 0.5, 0.25) * surface.face_areas[:, None]
     parts = np.where(obtuse.any(axis=1, keepdims=True), split, voronoi)
@@ -59,11 +59,11 @@ def mixed_voronoi_areas(surface: IntrinsicTriangulation) -> FloatArray:
 
 
 def with_least_areas(areas: FloatArray, faces: IntArray) -> FloatArray:
-    """Return vertex *areas* (n,), each at least a twentieth of the mean of its neighbours'.
+    """Return vertex *areas* (n,), each at least a twentieth of its neighbours' mean.
 
     Eq. (5) divides by the area, so a patch of tiny triangles would outweigh all others: 100 of
-    them among the hand's 2390 faces multiplied the trace of the bending term by 27, and by 1.7
-    with this lower bound, which is active at only eight vertices of seven good meshes.
+    them among the 2390 faces of the hand multiplied the trace of the bending term by 27; with this
+    bound, by 1.7.  On seven good meshes the bound is active at only eight vertices.
     """
     n = len(areas)
     around = np.bincount(faces.ravel(), areas[faces[:, [1, 2, 0]]].ravel(), n)
@@ -74,7 +74,7 @@ def with_least_areas(areas: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def mean_curvature_normals(surface: IntrinsicTriangulation) -> FloatArray:
-    """Return delta of eq. (5), (n, 3), in 1/length: outward and of length 1/r on a sphere."""
+    """Return delta of eq. (5), (n, 3), in 1/length; on a sphere, outward and of length 1/r."""
     x = surface.vertices
     areas = with_least_areas(mixed_voronoi_areas(surface), surface.faces)
     laplacian = cotangent_laplacian(surface.faces, surface.cotangents, len(x))
@@ -82,7 +82,7 @@ def mean_curvature_normals(surface: IntrinsicTriangulation) -> FloatArray:
 
 
 def area_gradients(surface: IntrinsicTriangulation) -> FloatArray:
-    """Return (m, 3, 3): for each face and corner k, face area times the gradient of k's hat.
+    """Return the face area times the gradient of the hat function of each corner, (m, 3, 3).
 
     With J the gradient over a face of a map x of the mesh, area J^T = sum_k g_k x_k^T.
     """
@@ -92,11 +92,11 @@ def area_gradients(surface: IntrinsicTriangulation) -> FloatArray:
 
     def work(start: int, stop: int) -> None:
         x, share = vertices[faces[start:stop]], half[start:stop]
-        here = gradients[start:stop]
+        out = gradients[start:stop]
         for corner in range(3):
             after, last = (corner + 1) % 3, (corner + 2) % 3
-            here[:, corner] = share[:, [last]] * (x[:, corner] - x[:, after])
-            here[:, corner] += share[:, [after]] * (x[:, corner] - x[:, last])
+            out[:, corner] = share[:, [last]] * (x[:, corner] - x[:, after])
+            out[:, corner] += share[:, [after]] * (x[:, corner] - x[:, last])
 
     in_parallel(work, len(faces), _PIECE)
     return gradients

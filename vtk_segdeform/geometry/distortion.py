@@ -1,11 +1,11 @@
-"""How much a pose stretches and shears the surface, triangle by triangle.
+"""Stretch and shear of a pose, per triangle and over the surface.
 
 J_T is the linear map from the rest triangle T, in its own plane, to the deformed one; s1 >= s2 are
-its singular values, both 1 where T only moved.  Over the surface,
+its singular values, both 1 if T moved rigidly.  Over the surface,
 
     distortion = sqrt( sum_T A_T ((s1 - 1)^2 + (s2 - 1)^2) / sum_T A_T ),    A_T the rest area
 
-0.1 reads as "a tenth of stretch or shear, root mean square".
+For example, 0.1 means 10 % of stretch or shear, root mean square.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from ..mesh import Mesh, require_mesh
 
 
 def triangle_distortion(mesh: Mesh, vertices: ArrayLike) -> FloatArray:
-    """Return (m,): sqrt((s1 - 1)^2 + (s2 - 1)^2) of each face from *mesh* to *vertices* (n, 3).
+    """Return sqrt((s1 - 1)^2 + (s2 - 1)^2) of each face from *mesh* to *vertices* (n, 3), (m,).
 
-    A face without area at rest gives 0.
+    It is 0 for a face without area at rest.
     """
     require_mesh(mesh)
     vertices = as_points(vertices, "vertices", mesh.n_vertices)

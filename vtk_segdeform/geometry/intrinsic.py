@@ -1,22 +1,22 @@
-"""Intrinsic triangulation on which the energy is measured: the mesh without its bad triangles.
+"""Intrinsic triangulation of the mesh, without bad triangles: the domain of the energy.
 
 The cotangents of caps and needles are unbounded.  Clamping them corner by corner gives values that
-belong to no triangle, and an indefinite matrix.  The energy takes them from an *intrinsic
-triangulation* instead: triangles over the vertices of the mesh, defined by edge lengths alone.
-Lengths that satisfy the triangle inequality are those of a planar triangle, whose Dirichlet energy
-is never negative, so the matrix is positive semi-definite.  The triangulation is the mesh itself
-except for two operations, neither of which changes a mesh of well-shaped triangles:
+belong to no triangle, and an indefinite matrix.  The energy uses an *intrinsic triangulation*
+instead: triangles over the vertices of the mesh, defined by edge lengths alone.  Lengths that
+satisfy the triangle inequality define a planar triangle, whose Dirichlet energy is never negative,
+so the matrix is positive semi-definite.  Two operations lead from the mesh to the triangulation;
+neither changes a mesh of well-shaped triangles:
 
-    mollify     every edge becomes longer by  eps = max(0, d - min (a + b - c)),  the minimum over
-                all corners, so that no triangle has less slack a + b - c than d        [SC20, 4.5]
-    flip        each edge of a bad triangle that is not Delaunay, cot + cot < 0 at the two
-                opposite corners, until there is none left                              [FSSB07]
+    mollify     lengthen every edge by  eps = max(0, d - min (a + b - c)),  the minimum over all
+                corners, so that every triangle has a slack a + b - c of at least d     [SC20, 4.5]
+    flip        every edge of a bad triangle that is not Delaunay, cot + cot < 0 at the two
+                opposite corners, until none is left                                    [FSSB07]
 
-Mollification alone makes the matrix positive semi-definite, but a cap keeps a cotangent of about
-sqrt(mean / 2 d), whose square enters the detail of eq. (5).  For the same cages and 100 flat caps
-among the 7828 faces of a dinosaur bent by 60 degrees, the distortion is off by 6.2 % with
-mollification alone, and by 0.3 % with flips as well.  Flipping all edges, as [SC20] do, changes
-good meshes, too: on 36 poses of three of them the distortion increased by 4 %.
+Mollification alone makes the matrix positive semi-definite, but leaves a cap with a cotangent of
+about sqrt(mean / 2 d), whose square enters the detail of eq. (5).  For the same cages and 100 flat
+caps among the 7828 faces of a dinosaur bent by 60 degrees, the error of the distortion is 6.2 %
+with mollification alone, and 0.3 % with flips as well.  Flipping all edges, as in [SC20], changes
+good meshes too: on 36 poses of three of them the distortion increased by 4 %.
 
 Source
 ------
@@ -37,27 +37,27 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray
 from ..kernels import in_parallel
-from ..mesh import Sides, following
+from ..mesh import HalfEdges, next_half_edge
 
-_SLACK = 1e-6  # d, as a share of the mean edge length
+_SLACK = 1e-6  # d, relative to the mean edge length
 _BAD = 100.0  # cotangent of the smallest angle of a bad triangle: 0.6 degrees
-_DELAUNAY = -1e-9  # cot + cot above which an edge counts as Delaunay, for rounding
+_DELAUNAY = -1e-9  # an edge with a larger cot + cot counts as Delaunay; not 0, because of rounding
 _ROUNDS = 1000  # of flips; more than ten are rare
-_PIECE = 50_000  # faces to a thread
+_PIECE = 50_000  # faces per task
 
 
 @dataclass(frozen=True, eq=False)
 class IntrinsicTriangulation:
-    """Triangles over the vertices of a mesh, with edge lengths of their own.
+    """Triangles over the vertices of a mesh, defined by their edge lengths.
 
     Parameters
     ----------
     vertices : (n, 3) float
-        Those of the mesh.
+        Vertices of the mesh.
     faces : (m, 3) int
-        Oriented as the mesh is.
+        Oriented like the mesh.
     lengths : (m, 3) float
-        Of the edge opposite each corner; they satisfy the triangle inequality.
+        Length of the edge opposite each corner; they satisfy the triangle inequality.
     """
 
     vertices: FloatArray
@@ -66,7 +66,7 @@ class IntrinsicTriangulation:
 
     @classmethod
     def of(cls, vertices: FloatArray, faces: IntArray) -> IntrinsicTriangulation:
-        """Return the triangulation of a mesh; open edges are not flipped."""
+        """Return the triangulation of a mesh; boundary edges are not flipped."""
         lengths = _mollified(_edge_lengths(vertices, faces))
         if (np.abs(cotangents(lengths)).max(axis=1, initial=0.0) > _BAD).any():
             faces, lengths = _flipped(faces, lengths, len(vertices))
@@ -74,17 +74,17 @@ class IntrinsicTriangulation:
 
     @cached_property
     def cotangents(self) -> FloatArray:
-        """(m, 3): the cotangent of the angle at each corner of each face."""
+        """(m, 3) float: cotangents of the angles of the triangles."""
         return cotangents(self.lengths)
 
     @cached_property
     def face_areas(self) -> FloatArray:
-        """(m,): the areas of the triangles."""
+        """(m,) float: areas of the triangles."""
         return areas(self.lengths)
 
 
 def areas(lengths: FloatArray) -> FloatArray:
-    """Return (m,): the areas of triangles by their edge *lengths* (m, 3), exact for needles."""
+    """Return the areas of triangles of edge *lengths* (m, 3), accurate for needles, (m,)."""
     found = np.empty(len(lengths))
 
     def work(start: int, stop: int) -> None:
@@ -97,7 +97,7 @@ def areas(lengths: FloatArray) -> FloatArray:
 
 
 def cotangents(lengths: FloatArray) -> FloatArray:
-    """Return (m, 3): the cotangents of the angles opposite edges of *lengths* (m, 3)."""
+    """Return the cotangents of the angles opposite edges of *lengths* (m, 3), (m, 3)."""
     squares = lengths * lengths
     fourfold = 4.0 * areas(lengths)[:, None]
     cosines = squares.sum(axis=1, keepdims=True) - 2.0 * squares
@@ -124,9 +124,9 @@ def _mollified(lengths: FloatArray) -> FloatArray:
 
 
 def _flipped(faces: IntArray, lengths: FloatArray, n_vertices: int) -> tuple[IntArray, FloatArray]:
-    """Return faces and lengths after flips, in rounds of edges no two of which share a face.
+    """Return faces and lengths after flips, in rounds of edges that share no face.
 
-    A flip never raises the Dirichlet energy of any function [FSSB07], so the rounds terminate.
+    A flip never increases the Dirichlet energy of any function [FSSB07], so the rounds terminate.
     """
     twin = _twins(faces, n_vertices)
     corners, opposite = faces.copy().ravel(), lengths.copy().ravel()
@@ -137,25 +137,26 @@ def _flipped(faces: IntArray, lengths: FloatArray, n_vertices: int) -> tuple[Int
         if not len(h):
             break
         _flip(h, twin, corners, opposite)
-        changed = np.concatenate([h, twin[following(h)]]) // 3
+        changed = np.concatenate([h, twin[next_half_edge(h)]]) // 3
         cot[changed] = cotangents(opposite.reshape(-1, 3)[changed])
     return corners.reshape(-1, 3), opposite.reshape(-1, 3)
 
 
 def _twins(faces: IntArray, n_vertices: int) -> IntArray:
-    """Return (3m,): the corner opposite the same edge in the other face; its own at an open edge.
+    """Return the corner opposite the same edge in the other face, itself at a boundary, (3m,).
 
-    Corner h = 3 f + c stands for the edge opposite it.
+    Here corner h = 3 f + c stands for the edge opposite it.
     """
-    sides = Sides(faces, n_vertices)  # side s runs from corner s to the next one: opposite the last
-    one, other = following(following(sides.pairs)).T
+    # A half-edge runs from its corner to the next one, opposite the last corner.
+    pairs = HalfEdges(faces, n_vertices).pairs
+    one, other = next_half_edge(next_half_edge(pairs)).T
     twin = np.arange(faces.size)
     twin[one], twin[other] = other, one
     return twin
 
 
 def _not_delaunay(bad: IntArray, twin: IntArray, cot: FloatArray) -> IntArray:
-    """Return the edges of the faces *bad* to be flipped, each by one of its corners."""
+    """Return the edges of the faces *bad* that are not Delaunay, each as one of its corners."""
     h = (3 * bad[:, None] + np.arange(3)).ravel()
     h = np.unique(np.minimum(h, twin[h]))
     inner = h // 3 != twin[h] // 3
@@ -163,28 +164,30 @@ def _not_delaunay(bad: IntArray, twin: IntArray, cot: FloatArray) -> IntArray:
 
 
 def _independent(h: IntArray, twin: IntArray, cot: FloatArray) -> IntArray:
-    """Return the edges among *h* that are the worst of both their faces."""
+    """Return the edges among *h* that are the worst ones of both their faces."""
     worst_first = np.argsort(cot[h] + cot[twin[h]], kind="stable")
     h = h[worst_first]
-    rank, sides = np.arange(len(h)), np.stack([h // 3, twin[h] // 3])
+    rank, pair = np.arange(len(h)), np.stack([h // 3, twin[h] // 3])
     first = np.full(len(cot) // 3, len(h))
-    np.minimum.at(first, sides.ravel(), np.tile(rank, 2))
-    return np.asarray(h[(first[sides] == rank).all(axis=0)])
+    np.minimum.at(first, pair.ravel(), np.tile(rank, 2))
+    return np.asarray(h[(first[pair] == rank).all(axis=0)])
 
 
 def _flip(h: IntArray, twin: IntArray, corners: IntArray, opposite: FloatArray) -> None:
     """Flip the edges i j of faces (k, i, j) and (l, j, i) to k l: (k, i, l) and (l, j, k)."""
     t = twin[h]
-    h1, h2, t1, t2 = following(h), following(following(h)), following(t), following(following(t))
-    k, new = corners[h], corners[t]  # l, which reads as a one
+    h1, t1 = next_half_edge(h), next_half_edge(t)
+    h2, t2 = next_half_edge(h1), next_half_edge(t1)
+    k, new = corners[h], corners[t]  # new is l
     ij, jk, ki, il, lj = (opposite[each] for each in (h, h1, h2, t1, t2))
-    above = 2.0 * areas(np.stack([ij, jk, ki], axis=1)) / ij  # both faces unfolded, i j on the axis
+    # Both faces unfolded, with i j on the axis.
+    above = 2.0 * areas(np.stack([ij, jk, ki], axis=1)) / ij
     below = 2.0 * areas(np.stack([ij, il, lj], axis=1)) / ij
     along = ((ki - jk) * (ki + jk) - (il - lj) * (il + lj)) / (2.0 * ij)
     kl = np.hypot(along, above + below)
-    # All slots keep their corner except two: l replaces j, and k replaces i.
+    # Two slots change their corner: l replaces j, and k replaces i.
     moved = np.arange(len(twin))
-    moved[t1], moved[h1] = h, t  # where the edges i l and j k are now
+    moved[t1], moved[h1] = h, t  # the new slots of the edges i l and j k
     outside = [moved[twin[each]] for each in (t1, h2, h1, t2)]
     corners[h2], corners[t2] = new, k
     for slot, length in zip((h, h1, h2, t, t1, t2), (il, kl, ki, jk, kl, lj), strict=True):

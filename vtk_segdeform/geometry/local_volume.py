@@ -1,20 +1,20 @@
-"""Local volume change: where the body under the skin has swollen or been pinched.
+"""Local volume change: expansion and compression of the body below each vertex.
 
-The largest ball inside the body that touches the skin at vertex i touches it at another vertex
-o(i) as well, on the other side.  The tetrahedra from the triangles around i to o(i) are the flesh
-under i, and their volume is
+The largest ball inside the body that touches the surface at vertex i also touches it at another
+vertex o(i), on the opposite side.  The tetrahedra from the triangles around i to o(i) have the
+volume
 
     L_i(x) = sum_{T = (a, b, c) at i} det(x_a - x_o, x_b - x_o, x_c - x_o) / 18
            = sum_{T at i} (x_a - x_o) . N_T / 18,        N_T = (x_b - x_a) x (x_c - x_a)
 
-(a third of each tetrahedron: a triangle has three corners).  The local volume change is
+(a third of each tetrahedron, since a triangle has three corners).  The local volume change is
 
     s_i(x) = sum_j k_ij L_j(x) / sum_j k_ij L_j(rest) - 1
 
-with k a smoothing over the surface about a quarter as wide as the body is thick, which calms
-o(i) at edges and in creases.  It is signed and relative: +0.1 has swollen by a tenth.  Being a
-quotient of determinants it is 0 under any rigid motion, and det(M) - 1 everywhere under any
-affine map M; at a vertex whose flesh turns inside-out it is below -1.
+with k a smoothing over the surface about a quarter as wide as the body is thick, because o(i)
+varies irregularly at edges and in creases.  s is signed and relative: +0.1 is an expansion by 10 %.
+As a quotient of determinants it is 0 under any rigid motion, and det(M) - 1 under any affine map M;
+it is below -1 where the tetrahedra are inverted.
 
 Source
 ------
@@ -31,28 +31,27 @@ from scipy.spatial import cKDTree
 from ..arrays import FloatArray, IntArray, as_points
 from ..kernels import in_parallel
 from ..mesh import Mesh, require_mesh
-from .thinning import cells as cells_of
-from .thinning import faces_between, unique_edges
+from .sampling import faces_between, unique_edges, voronoi_cells
 from .volume import corner_and_edges, volume_gradient
 
 _MOST_SHRINKS = 30
-_NARROWEST = np.cos(np.radians(40.0))  # a ball touching under a smaller angle sees its own skin
-_WIDTH = 0.25  # of the median ball's diameter
+_NARROWEST = np.cos(np.radians(40.0))  # at a smaller angle both points are on one side
+_WIDTH = 0.25  # of smoothing, relative to the median diameter of the balls
 _MOST_ROUNDS = 100
 _LARGE, _CELLS = 20_000, 8_000  # vertices beyond which, and about how many, cells stand for them
 _REACH = 1.6  # distances of neighbouring cells
-_AT_ONCE = 1 << 15  # vertices
-_LEAST = 0.05  # share of the mean flesh under which a quotient is not trusted
+_AT_ONCE = 1 << 15  # vertices per task
+_LEAST = 0.05  # of the mean volume; the quotient of a smaller one is unreliable
 
 
 class LocalVolume:
-    """The local volume of a mesh at rest; `change` compares a pose with it.
+    """Local volume of a mesh at rest; `change` compares a pose with it.
 
     Parameters
     ----------
     mesh : Mesh
-        The rest shape, n vertices.  Of a large one it is the change of some thousand cells of
-        neighbouring vertices, each as one point at their mean, spread over the vertices again.
+        The rest shape, n vertices.  For a large mesh the change is computed at the means of some
+        thousand cells of neighbouring vertices and interpolated to the vertices.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -60,41 +59,43 @@ class LocalVolume:
         self._shape = mesh.vertices.shape
         points, faces = mesh.vertices, mesh.faces
         self._means: sparse.csr_array | None = None
-        self._spread: list[sparse.csr_array] = []
+        self._interpolation: list[sparse.csr_array] = []
         if mesh.n_vertices > _LARGE:
-            _, cells = cells_of(mesh, _CELLS, np.random.default_rng(0))
+            _, cells = voronoi_cells(mesh, _CELLS, np.random.default_rng(0))
             between = faces_between(cells, faces)
-            if len(between):  # none is left of a heap of crumbs, which have no cells to spare
+            if len(between):  # none is left if every component is smaller than a cell
                 self._means, faces = _means(cells), between
                 points = self._means @ points
-                self._spread = _spread(mesh.vertices, cells, points, _edges(faces, len(points)))
-        self._flesh = _Flesh(points, faces)
-        self._rest = self._flesh.smoothed(points)
+                self._interpolation = _interpolation(
+                    mesh.vertices, cells, points, _edges(faces, len(points))
+                )
+        self._volumes = _Volumes(points, faces)
+        self._rest = self._volumes.smoothed(points)
         floor = _LEAST * np.abs(self._rest).mean()
-        self._trusted = self._rest > floor
+        self._reliable = self._rest > floor
 
     def change(self, vertices: FloatArray) -> FloatArray:
-        """Return s, (n,), of the pose *vertices* (n, 3): 0.1 where the body has swollen by 10 %.
+        """Return s, (n,), of the pose *vertices* (n, 3): 0.1 where the body expanded by 10 %.
 
-        Vertices over (almost) no flesh at rest, on the rim of a thin plate say, get 0.
+        It is 0 at vertices with almost no volume at rest, such as on the rim of a thin plate.
         """
         x = as_points(vertices, "vertices", self._shape[0])
-        now = self._flesh.smoothed(x if self._means is None else self._means @ x)
-        s = np.divide(now - self._rest, self._rest, where=self._trusted, out=np.zeros(len(now)))
+        now = self._volumes.smoothed(x if self._means is None else self._means @ x)
+        s = np.divide(now - self._rest, self._rest, where=self._reliable, out=np.zeros(len(now)))
         if self._means is None:
             return s
         out = np.empty(len(x))
 
         def work(first: int, last: int) -> None:
-            for k, weights in enumerate(self._spread[first:last], first):
+            for k, weights in enumerate(self._interpolation[first:last], first):
                 out[k * _AT_ONCE : (k + 1) * _AT_ONCE] = weights @ s
 
-        in_parallel(work, len(self._spread), 1)
+        in_parallel(work, len(self._interpolation), 1)
         return out
 
 
-class _Flesh:
-    """L over a closed surface (k, 3), (m, 3), and what smoothes it."""
+class _Volumes:
+    """The smoothed volumes L over a closed surface, *points* (k, 3) and *faces* (m, 3)."""
 
     def __init__(self, points: FloatArray, faces: IntArray) -> None:
         self._faces = faces
@@ -116,16 +117,18 @@ class _Flesh:
         a, e, f = corner_and_edges(x, self._faces)
         normals = np.cross(e, f)
         heights = np.einsum("ij,ij->i", a, normals)
-        flesh = self._around @ np.column_stack([normals, heights])  # summed at each vertex
+        sums = self._around @ np.column_stack([normals, heights])  # over the faces at each vertex
         apex = x[self._opposite]
-        flesh = np.asarray(flesh[:, 3] - np.einsum("ij,ij->i", apex, flesh[:, :3])) / 18.0
+        volumes = np.asarray(sums[:, 3] - np.einsum("ij,ij->i", apex, sums[:, :3])) / 18.0
         for _ in range(self._rounds):
-            flesh = self._average @ flesh
-        return np.asarray(flesh)
+            volumes = np.asarray(self._average @ volumes)
+        return np.asarray(volumes)
 
 
 def local_volume_change(mesh: Mesh, vertices: FloatArray) -> FloatArray:
-    """Return the local volume change (n,) of the pose *vertices* (n, 3) of *mesh*; see above.
+    """Return the local volume change of the pose *vertices* (n, 3) of *mesh*, (n,).
+
+    +0.1 is an expansion by 10 %, -0.1 a compression; see `LocalVolume` for many poses.
 
     Examples
     --------
@@ -139,19 +142,19 @@ def local_volume_change(mesh: Mesh, vertices: FloatArray) -> FloatArray:
 
 
 def _means(cells: IntArray) -> sparse.csr_array:
-    """Return (k, n), from vertices to the means of their *cells* (n,)."""
+    """Return the matrix from vertices to the means of their *cells* (n,), (k, n)."""
     share = (1.0 / np.bincount(cells))[cells]
     return sparse.coo_array((share, (cells, np.arange(len(cells))))).tocsr()
 
 
-def _spread(
+def _interpolation(
     x: FloatArray, cells: IntArray, points: FloatArray, edges: IntArray
 ) -> list[sparse.csr_array]:
-    """Return (n, k), from cells at *points* (k, 3) to vertices *x*, some rows at a time.
+    """Return the matrix from cells at *points* (k, 3) to vertices *x*, (n, k), in blocks of rows.
 
-    Weights sum to one.  Each vertex takes part of the cells within reach that lie at most two
-    away from its own along the surface, the nearer the more: so it is smooth, and stays on its
-    side of a thin body.
+    Rows sum to 1.  A vertex interpolates the cells within reach that are at most two cells away
+    along the surface, with weights that decrease with distance: the result is smooth, and not
+    mixed between the two sides of a thin body.
     """
     i, j = edges.T
     reach = _REACH * float(np.median(np.linalg.norm(points[i] - points[j], axis=1)))
@@ -164,8 +167,8 @@ def _spread(
         candidates = twice[own]
         near = candidates.indices
         vertex = np.repeat(np.arange(len(own)), np.diff(candidates.indptr))
-        away = np.square(x[start + vertex] - points[near]).sum(axis=1) / reach**2
-        weight = (1.0 - away.clip(max=1.0)) ** 2 + 1e-9 * (near == own[vertex])
+        distance2 = np.square(x[start + vertex] - points[near]).sum(axis=1) / reach**2
+        weight = (1.0 - distance2.clip(max=1.0)) ** 2 + 1e-9 * (near == own[vertex])
         weight /= np.bincount(vertex, weight)[vertex]
         some = sparse.csr_array((weight, near, candidates.indptr), candidates.shape)
         some.eliminate_zeros()
@@ -192,9 +195,9 @@ def _opposite_vertices(x: FloatArray, faces: IntArray) -> tuple[IntArray, FloatA
         chord = x[touched] - x[active]
         square = np.einsum("ij,ij->i", chord, chord)
         height = np.einsum("ij,ij->i", chord, inward[active])
-        # The ball through x, tangent there, that reaches the touched vertex.
+        # The ball that is tangent at x and passes through the touched vertex.
         smaller = np.divide(square, 2 * height, where=height > 0, out=np.full(len(active), np.inf))
-        # Between the two touching points as seen from the new centre.
+        # Cosine between the two touching points as seen from the new centre.
         spread = 1.0 - 0.5 * square / smaller**2
         keep = (distance < radius[active] * (1 - 1e-9)) & (smaller < radius[active])
         keep &= (touched != active) & (spread < _NARROWEST)

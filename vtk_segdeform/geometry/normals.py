@@ -1,13 +1,13 @@
-"""Unit normals at the vertices of a mesh as it moves, for drawing it.
+"""Unit vertex normals of a moving mesh, for drawing.
 
-Each is the sum of the cross products of the faces around its vertex, so that a face counts by its
-area: the direction in which the vertex adds most volume.  With the neighbours x_1 ... x_d of a
-vertex x in the order in which they go around it, that is
+The normal is the area-weighted mean of the face normals around a vertex: the direction in which
+moving the vertex adds most volume.  With the neighbours x_1 ... x_d of a vertex x in cyclic order,
+it is the direction of
 
     sum_k (x_k - x) x (x_{k+1} - x)
 
-over one pass through rings that are found once; every vertex is read from its own ring alone, so
-that all cores can do their share.
+The rings of neighbours are computed once.  Each vertex depends on its own ring only, so the loop
+over vertices runs in parallel.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from ..arrays import FloatArray, IntArray
 from ..kernels import compiled_kernels, in_parallel, inputs
 from ..mesh import Mesh
 
-_PIECES = 16  # of the vertices at most
-_PIECE = 1 << 12  # vertices to a thread at least
+_PIECES = 16  # most tasks
+_PIECE = 1 << 12  # fewest vertices per task
 
 
 class VertexNormals:
-    """The unit normals of *mesh* in any pose.
+    """Unit vertex normals of *mesh* in any pose.
 
     Parameters
     ----------
     mesh : Mesh
-        n vertices; its size is the unit that poses are taken in.
+        n vertices; poses are scaled by its diagonal.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -40,9 +40,9 @@ class VertexNormals:
         self._scale = 1.0 / mesh.diagonal
 
     def of(self, x: FloatArray, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
-        """Return the normals (n, 3) of the pose *x* (n, 3), in *out* if it is given.
+        """Return the normals (n, 3) of the pose *x* (n, 3), in *out* if given.
 
-        Zero where there is no area around a vertex, as in a fan that has shrunk to a point.
+        A normal is zero where the faces around the vertex have no area.
         """
         out = np.empty((self._n, 3), dtype=np.float32) if out is None else out
         if kernels := compiled_kernels(len(self._faces)):
@@ -62,7 +62,7 @@ class VertexNormals:
 
     @cached_property
     def _rings(self) -> tuple[NDArray[np.int32], IntArray]:
-        """(3m,) and (n + 1,): the neighbours of all vertices, and where each one's begin."""
+        """(3m,) and (n + 1,): the neighbours of all vertices, and where each ring begins."""
         starts = np.concatenate([[0], np.cumsum(np.bincount(self._faces.ravel()))])
         ring = np.empty(self._faces.size, dtype=np.int32)
         compiled_kernels().rings(ring, *inputs(self._faces, starts))
@@ -70,6 +70,6 @@ class VertexNormals:
 
     @cached_property
     def _around(self) -> sparse.csr_array:
-        """(n, m): 1 where a vertex is a corner of a face."""
+        """(n, m) sparse: 1 where a vertex is a corner of a face."""
         corners = self._faces.ravel(), np.repeat(np.arange(len(self._faces)), 3)
         return sparse.coo_array((np.ones(3 * len(self._faces)), corners)).tocsr()

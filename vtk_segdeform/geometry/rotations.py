@@ -1,11 +1,11 @@
-"""Local rotations: how each bit of surface has turned, per vertex or per group of vertices.
+"""Local rotations of the surface, per vertex or per group of vertices.
 
-The detail delta of eq. (5) turns with the surface (b depends on x in eq. (10)).  The turn of a
-bit of surface is the rotation R that brings its rest vectors v_k closest to the present ones y_k:
+The detail delta of eq. (5) rotates with the surface (b depends on x in eq. (10)).  The rotation R
+of a part of the surface brings its rest vectors v_k closest to the deformed ones y_k:
 
     R = argmax tr(R S),   S = sum_k w_k v_k y_k^T,   S = U Sigma V^T   =>   R = V D U^T
 
-with D = diag(1, 1, det(V U^T)), so that R never mirrors.
+with D = diag(1, 1, det(V U^T)), so that R is never a reflection.
 
 Groups of vertices may share one rotation; they are clusters of positions (k-means), seeded at
 the points farthest from each other.
@@ -32,7 +32,7 @@ _TIE_BREAK = 1e-6  # relative: of equal distances one is preferred, the same in 
 
 
 def closest_rotations(covariances: FloatArray) -> FloatArray:
-    """Return the (k, 3, 3) rotations R that maximise tr(R S) for each of the (k, 3, 3) S."""
+    """Return R, (k, 3, 3), that maximises tr(R S) for each S of *covariances* (k, 3, 3)."""
     if kernels := compiled_kernels(_TIMES * len(covariances)):
         kernels.rotations(*inputs(covariances), found := np.empty(covariances.shape))
         return found
@@ -47,7 +47,7 @@ def rigid_fit(
 ) -> tuple[FloatArray, FloatArray]:
     """Return (R, t) of the rigid motion that brings *rest* (k, 3) closest to *moved* (k, 3).
 
-    Points on a line or a single point leave R undetermined; the smallest such turn is returned.
+    For collinear or coincident points, which do not determine R, the smallest rotation is returned.
     """
     weights = np.ones(len(rest)) if weights is None else weights
     from_, to = weights @ rest / weights.sum(), weights @ moved / weights.sum()
@@ -57,7 +57,7 @@ def rigid_fit(
     if s[0] <= 1e-12 * (np.abs(weights) @ (a * a).sum(axis=1)):
         rotation = np.eye(3)
     elif s[1] <= 1e-9 * s[0]:
-        rotation = _turn_onto(u[:, 0], vt[0])
+        rotation = _smallest_rotation(u[:, 0], vt[0])
     else:
         rotation = closest_rotations(covariance[None])[0]
     return rotation, to - rotation @ from_
@@ -154,12 +154,12 @@ def _nearest(positions: FloatArray, centres: FloatArray, favour: FloatArray) -> 
     return np.asarray(np.take_along_axis(which, best[:, None], axis=1)[:, 0], dtype=np.int64)
 
 
-def _turn_onto(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the smallest rotation that turns unit vector *a* onto unit vector *b*."""
+def _smallest_rotation(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the smallest rotation from unit vector *a* to unit vector *b*."""
     axis, cosine = np.cross(a, b), float(a @ b)
-    if cosine < -1.0 + 1e-12:  # opposite: half a turn about any axis across
-        across = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
-        across /= np.linalg.norm(across)
-        return np.asarray(2.0 * np.outer(across, across) - np.eye(3))
+    if cosine < -1.0 + 1e-12:  # opposite: by 180 degrees about any perpendicular axis
+        axis = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
+        axis /= np.linalg.norm(axis)
+        return np.asarray(2.0 * np.outer(axis, axis) - np.eye(3))
     k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
     return np.asarray(np.eye(3) + k + k @ k / (1.0 + cosine))

@@ -7,16 +7,16 @@ V is a cubic polynomial of the positions, so along any direction d it is a cubic
 
     V(x + t d) = c0 + c1 t + c2 t^2 + c3 t^3
 
-with all four coefficients from one pass over the triangles.  A step that lands *exactly* on a
-wanted volume is then a root of a scalar cubic; the linearised multiplier of (14) leaves 1e-4.
+with all four coefficients from one pass over the triangles.  The step to an *exact* target volume
+is therefore a root of a scalar cubic; the linearised multiplier of (14) leaves an error of 1e-4.
 
-Every sum is taken about a vertex of the mesh: for a closed mesh the volume does not depend on the
-origin, and a mesh far from it keeps its digits.  And every determinant is taken as
+All sums use a vertex of the mesh as origin: the volume of a closed mesh does not depend on the
+origin, and a mesh far from zero keeps its digits.  Determinants are computed as
 
     det(a, b, c) = a . ((b - a) x (c - a))
 
-whose products are as small as the triangle: on a wire 400 times as long as thick, products of
-its corners would cost three digits.
+whose products are of the size of the triangle: on a wire 400 times as long as thick, products of
+its corners would lose three digits.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ import numpy as np
 from ..arrays import FloatArray, IntArray
 from ..kernels import compiled_kernels, in_parallel, inputs
 
-_BLOCK = 4096  # faces to a sum: always the same, so that sums do not depend on threads
-_PIECE = 16  # blocks to a thread
+_BLOCK = 4096  # faces per partial sum; fixed, so that results do not depend on threads
+_PIECE = 16  # blocks per task
 
 
 def signed_volume(vertices: FloatArray, faces: IntArray) -> float:
-    """Return the enclosed volume (8) of (n, 3) *vertices*, (m, 3) *faces*; outward is positive."""
+    """Return the enclosed volume (8) of *vertices* (n, 3), *faces* (m, 3); positive if outward."""
     if kernels := compiled_kernels(len(faces)):
         sums = _by_blocks(kernels.volume_sums, inputs(vertices, faces), np.empty(_blocks(faces)))
         return float(sums.sum() / 6.0)
@@ -43,15 +43,12 @@ def signed_volume(vertices: FloatArray, faces: IntArray) -> float:
 
 
 def volume_gradient(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return dV/dx, (n, 3): a sixth of the cross products of each vertex's opposite edges.
-
-    The rows of J_g in eq. (12), one per vertex.
-    """
+    """Return dV/dx, (n, 3): the entries of J_g in eq. (12), one row per vertex."""
     if kernels := compiled_kernels(len(faces)):
         kernels.volume_gradient(*inputs(vertices, faces), summed := np.zeros(vertices.shape))
         return summed
     _, e, f = corner_and_edges(vertices, faces)
-    normals = np.cross(e, f) / 6.0  # on a closed mesh the same sum as b x c, c x a, a x b
+    normals = np.cross(e, f) / 6.0  # on a closed mesh, equal in sum to b x c, c x a, a x b
     gradient = np.empty_like(vertices)
     for axis in range(3):
         column = np.repeat(normals[:, axis], 3)
@@ -65,7 +62,7 @@ def volume_along(vertices: FloatArray, direction: FloatArray, faces: IntArray) -
 
 
 def volume_along_path(path: FloatArray, faces: IntArray) -> FloatArray:
-    """Return the same for *path* (n, 6), vertices and direction side by side."""
+    """Return `volume_along` of *path* (n, 6), vertices and direction side by side."""
     if kernels := compiled_kernels(len(faces)):
         sums = _by_blocks(
             kernels.volume_along_sums, inputs(path, faces), np.empty((_blocks(faces), 4))
@@ -84,10 +81,10 @@ def volume_along_path(path: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def step_to_volume(coefficients: FloatArray, target: float) -> float:
-    """Return the smallest step t (in size) at which the cubic of `volume_along` equals *target*.
+    """Return the step t of least magnitude at which the cubic of `volume_along` equals *target*.
 
-    The root is polished by Newton's method to the last digit.  Where the cubic never reaches
-    *target* (its leading coefficients vanish), the step that comes closest is returned.
+    Newton's method refines the root to the last digit.  If the cubic never reaches *target*
+    because its leading coefficients vanish, the step that comes closest is returned.
     """
     missing = target - coefficients[0]
     if missing == 0.0 or not coefficients[1:].any():
@@ -95,11 +92,11 @@ def step_to_volume(coefficients: FloatArray, target: float) -> float:
     if near := _near_root(missing, *(float(c) for c in coefficients[1:])):
         return near
     powers = np.arange(1, 4)
-    # The smallest step at which one term alone would do sets the unit: nothing over- or underflows.
+    # Unit of t: the smallest step at which one term alone reaches the target; prevents overflow.
     with np.errstate(divide="ignore", over="ignore"):
         alone = np.abs(missing / coefficients[1:]) ** (1.0 / powers)
     unit = float(alone.min())
-    terms = coefficients[1:] / missing * unit**powers  # the cubic over what is missing, ends at 1
+    terms = coefficients[1:] / missing * unit**powers  # relative to *missing*: the target is 1
     polynomial = np.array([*terms[::-1], -1.0])
     roots = np.roots(np.trim_zeros(polynomial, "f"))
     real = roots[np.abs(roots.imag) <= 1e-9 * np.abs(roots).max(initial=0.0)].real
@@ -117,10 +114,10 @@ def step_to_volume(coefficients: FloatArray, target: float) -> float:
 
 
 def _near_root(missing: float, c1: float, c2: float, c3: float) -> float | None:
-    """Return the smallest t with c1 t + c2 t^2 + c3 t^3 = missing if that is plain to see.
+    """Return the smallest t with c1 t + c2 t^2 + c3 t^3 = missing if the first term dominates.
 
-    So it is where the first term alone says nearly all: both others, at twice its root, less than
-    a fifth of it.  Within that reach the cubic then rises throughout, from 0 to past *missing*.
+    It dominates if at twice its root both other terms are less than a fifth of it; the cubic then
+    is monotonic up to there and passes *missing*, so Newton's method finds the root.  Else None.
     """
     with np.errstate(all="ignore"):
         t = missing / c1 if c1 else math.inf
@@ -144,6 +141,6 @@ def _blocks(faces: IntArray) -> int:
 
 
 def _by_blocks(kernel: Any, arguments: tuple[FloatArray | IntArray, ...], out: FloatArray) -> Any:
-    """Return *out* with a sum for each block of faces; numpy then adds these pairwise."""
+    """Return *out* with one partial sum per block of faces; numpy adds them pairwise."""
     in_parallel(lambda first, last: kernel(*arguments, out, _BLOCK, first, last), len(out), _PIECE)
     return out

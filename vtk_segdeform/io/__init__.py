@@ -3,21 +3,21 @@
 The files, in reading order:
 
     convert            `read_mesh`, `write_mesh`, `from_polydata`, `to_polydata`
-    off ply wavefront stl gltf
-                       file formats with our own readers, every digit kept
-    ply_tables gltf_buffers
-                       the tables and buffers of two of them
-    vtk_readers vtk_writers
-                       other formats, by VTK
+    polygons           polygons as two flat arrays
+    off                OFF
+    ply ply_tables     PLY, and the tables of its elements
+    wavefront          OBJ
+    stl                STL
+    gltf gltf_buffers  glTF, and the numbers in its buffers
+    vtk_formats        other formats, by VTK
     isolated reading_child
                        native readers in a child process
-    meshlab            PyMeshLab: conversion, simplification, its formats
+    array_names        names and arrays that a format cannot store
+    referenced_files   files that another file refers to
+    repaired           repair of PolyData with its polygons and arrays
+    meshlab            PyMeshLab: conversion, simplification, file formats
     meshlab_layers     MeshLab's layers as PolyData
-    meshlab_project    projects: a mesh and its cages
-    repaired           repair of PolyData, arrays kept
-    polygons           polygons in two flat arrays
-    array_names        array names a format cannot hold
-    neighbours         files named by other files
+    meshlab_project    MeshLab projects: a mesh and its cages
 """
 
 from .convert import (

@@ -1,8 +1,8 @@
-"""Arrays and names that a file format cannot hold: what is written instead, and the warning.
+"""Arrays and names that a file format cannot store: replacements and warnings.
 
 An array that a format cannot store is left out; a name that is invalid or reserved in its syntax is
 replaced by another one.  Both are logged as warnings, which the command line prints.  The file
-itself is valid either way.
+is valid in any case.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from vtkmodules.vtkCommonCore import vtkStringArray
 from ..errors import MeshError
 
 _log = logging.getLogger(__name__)
-_LONGEST = 200  # readers written in C keep a name in a buffer of fixed size
+_LONGEST = 200  # characters; some readers store names in buffers of fixed size
 
 
 def decoded(data: bytes) -> str:
-    """Return the text decoded as UTF-8 or, if that fails, as Latin-1, which never fails."""
+    """Return *data* decoded as UTF-8 or, if that fails, as Latin-1, which never fails."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -49,17 +49,17 @@ def plain_names(
     names : iterable of str
         Any text.
     reserved : container of str
-        Names that have a meaning of their own in the format.
+        Names with a special meaning in the format.
     refused : str
-        Characters that a name must not contain, besides those that are not printable.
+        Characters that a name must not contain, besides unprintable ones.
     measure : callable
         Returns the length of a name in the file; names longer than 200 are truncated.
     """
-    wanted = dict.fromkeys(names)
-    plain = {name: _plain(name, refused, measure) for name in wanted}
-    result = {name: name for name in wanted if plain[name] == name and name not in reserved}
+    given = dict.fromkeys(names)
+    plain = {name: _plain(name, refused, measure) for name in given}
+    result = {name: name for name in given if plain[name] == name and name not in reserved}
     taken = set(result)
-    for name in wanted:
+    for name in given:
         if name in result:
             continue
         free, number = plain[name], 0
@@ -68,7 +68,7 @@ def plain_names(
             free = f"{plain[name]}_{number}"
         taken.add(free)
         result[name] = free
-    return {name: result[name] for name in wanted}
+    return {name: result[name] for name in given}
 
 
 def _plain(name: str, refused: str, measure: Callable[[str], int]) -> str:
@@ -76,27 +76,27 @@ def _plain(name: str, refused: str, measure: Callable[[str], int]) -> str:
     text = "".join(letters).strip()
     while measure(text) > _LONGEST:
         text = text[:-1]
-    if text.endswith("\\"):  # in OBJ it would continue on the next line
+    if text.endswith("\\"):  # in OBJ it would continue the line
         text = text[:-1] + "_"
     return text or "unnamed"
 
 
 def warn_renamed(what: str, names: dict[str, str]) -> None:
-    """Log a warning for each name that is replaced; *what* is the kind of thing it names."""
+    """Log a warning for each name that is replaced; *what* says what the name stands for."""
     for name, written in names.items():
         if name != written:
             _log.warning("%s %r is written as %r", what, name, written)
 
 
 def warn_left_out(format_: str, surface: pv.PolyData, kept: Mapping[str, Sequence[str]]) -> None:
-    """Log one warning that lists everything of *surface* that the format cannot store.
+    """Log a warning that lists the arrays and cells of *surface* that the format cannot store.
 
     Parameters
     ----------
     format_ : str
         Name of the format.
     surface : pyvista.PolyData
-        The surface to write.
+        The surface that is written.
     kept : mapping
         Names of the arrays that are written, for "point", "cell" and "field".
     """
@@ -114,7 +114,7 @@ def warn_left_out(format_: str, surface: pv.PolyData, kept: Mapping[str, Sequenc
 
 
 def set_names(surface: pv.PolyData, key: str, names: Iterable[str]) -> None:
-    """Store *names* as field array *key*; pyvista itself refuses text that is not ASCII."""
+    """Store *names* as field array *key*; pyvista accepts ASCII text only."""
     array = vtkStringArray()
     array.SetName(key)
     for name in names:
@@ -123,6 +123,6 @@ def set_names(surface: pv.PolyData, key: str, names: Iterable[str]) -> None:
 
 
 def get_names(surface: pv.PolyData, key: str) -> list[str]:
-    """Return the texts of field array *key*; none if it does not exist or is not text."""
+    """Return the texts of field array *key*; empty if it does not exist or is not text."""
     values = np.asarray(surface.field_data[key]) if key in surface.field_data else np.empty(0)
     return [str(name) for name in values.ravel()] if values.dtype.kind == "U" else []

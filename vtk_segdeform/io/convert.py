@@ -1,13 +1,13 @@
-"""Meshes from and to files and pyvista, so that nothing is lost that a deformation leaves valid.
+"""Conversion of meshes from and to files and pyvista, with their polygons and arrays.
 
     file  --read_polydata-->  PolyData  --from_polydata-->  Mesh
     file  <---write_mesh----  PolyData  <--with_vertices--  new positions (n, 3)
 
-Vertices and faces keep their order and number all the way, coordinates their digits: OBJ, OFF
+The order and number of vertices and faces and all digits of coordinates are preserved.  OBJ, OFF
 and PLY are read and written by this package, because VTK's readers round to seven digits (PLY),
-split vertices at texture seams (OBJ) or do not exist (OFF); glTF because VTK's reader does not
-validate the file.  STL is the exception: a triangle soup in single precision, whose equal corners
-are merged on reading.
+split vertices at texture seams (OBJ) or do not exist (OFF); glTF is read by this package, because
+VTK's reader does not validate the file.  STL is the exception: it is a triangle soup in single
+precision, and equal corners are merged.
 
 Arrays that a format cannot store are left out, names that it cannot store are changed, and a
 warning is logged (`array_names`).
@@ -35,8 +35,7 @@ from .off import read_off, write_off
 from .ply import read_ply, write_ply
 from .polygons import polydata_of, triangles_of
 from .stl import read_stl
-from .vtk_readers import read_with_vtk
-from .vtk_writers import write_with_vtk
+from .vtk_formats import read_with_vtk, write_with_vtk
 from .wavefront import read_obj, write_obj
 
 _log = logging.getLogger(__name__)
@@ -50,16 +49,16 @@ _WRITERS: dict[str, Callable[[Path, pv.PolyData], None]] = {
 }  # fmt: skip
 _VTK_READS = frozenset({".vtk", ".vtp", ".vtu", ".vtkhdf"})
 _VTK_WRITES = frozenset({".stl", ".vtk", ".vtp", ".vtkhdf"})
-_HOLD_ARRAYS = frozenset({".ply", ".vtk", ".vtp", ".vtkhdf"})
+_STORE_ARRAYS = frozenset({".ply", ".vtk", ".vtp", ".vtkhdf"})
 
 
 def is_mesh_file(path: str | Path) -> bool:
-    """Tell whether *path* has a suffix of a format that `read_mesh` knows."""
+    """Return whether *path* has the suffix of a format that `read_mesh` supports."""
     return as_path(path).suffix.lower() in {*_READERS, *_VTK_READS, *meshlab.READS}
 
 
 def read_mesh(path: str | Path) -> Mesh:
-    """Return the closed mesh in a file.
+    """Read a closed mesh from a file.
 
     Parameters
     ----------
@@ -70,14 +69,14 @@ def read_mesh(path: str | Path) -> Mesh:
     Returns
     -------
     mesh : Mesh
-        Vertices and faces in the file's order; polygons cut into triangles.
+        Vertices and faces in the order of the file; polygons are cut into triangles.
 
     Raises
     ------
     MeshError
-        If there is no such file, it cannot be read, or holds no closed outward two-manifold.
+        If the file does not exist, cannot be read, or has no closed, outward oriented two-manifold.
     MissingDependencyError
-        If only PyMeshLab reads such files, and it is not installed.
+        If only PyMeshLab reads this format and it is not installed.
     """
     surface = read_polydata(path)
     try:
@@ -87,17 +86,17 @@ def read_mesh(path: str | Path) -> Mesh:
 
 
 def read_polydata(path: str | Path) -> pv.PolyData:
-    """Return the surface in a file with all that comes with it; open or faulty ones too.
+    """Read a surface with its polygons and arrays from a file; it may be open or faulty.
 
-    Quadrangles and polygons stay what they are (`from_polydata` cuts them), so that `write_mesh`
-    can write them back.  Point, cell and field arrays and texture coordinates are kept.
+    Polygons are not cut into triangles, so that `write_mesh` can write them again.  Point, cell and
+    field arrays and texture coordinates are kept.
 
     Raises
     ------
     MeshError
-        If there is no such file, its suffix is not known, or it holds no readable surface.
+        If the file does not exist, its format is not supported, or it has no readable surface.
     MissingDependencyError
-        If only PyMeshLab reads such files, and it is not installed.
+        If only PyMeshLab reads this format and it is not installed.
     """
     path = as_path(path)
     try:
@@ -111,7 +110,7 @@ def read_polydata(path: str | Path) -> pv.PolyData:
     suffix = path.suffix.lower()
     if not is_mesh_file(path):
         known = {*_READERS, *_VTK_READS, *meshlab.READS}
-        raise MeshError(f"{path}: cannot read {suffix or 'no suffix'}; can {_listed(known)}")
+        raise MeshError(f"{path}: {_files(suffix)} cannot be read; use one of {_listed(known)}")
     try:
         if suffix in _READERS:
             surface = _READERS[suffix](path)
@@ -123,7 +122,7 @@ def read_polydata(path: str | Path) -> pv.PolyData:
     except MeshError as error:
         raise MeshError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
     except (ValueError, IndexError, KeyError, OverflowError, OSError) as error:
-        raise MeshError(f"{path}: is no readable {suffix} file ({error})") from None
+        raise MeshError(f"{path}: is not a readable {suffix} file ({error})") from None
     except MemoryError:
         size = f"{status.st_size / 1e9:.2g} GB"
         raise MeshError(f"{path}: too large for the memory of this machine ({size})") from None
@@ -136,24 +135,24 @@ def read_polydata(path: str | Path) -> pv.PolyData:
 
 
 def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
-    """Write a mesh atomically: if anything fails, an existing file stays unchanged.
+    """Write a mesh to a file, atomically: after an error an existing file is unchanged.
 
-    The new file keeps the mode of the old one; a symbolic link is followed.
+    The new file has the mode of the old one; symbolic links are followed.
 
     Parameters
     ----------
     path : str or Path
         .obj, .off, .ply, .stl, .vtk, .vtp, .vtkhdf; with PyMeshLab .3ds, .dae, .x3d, .wrl, .ctm.
-        All formats except .stl and PyMeshLab's keep every digit; .vtk, .vtp and .vtkhdf keep every
-        array.  A warning is logged for each array that is left out or renamed.
+        All formats except .stl and those of PyMeshLab store every digit; .vtk, .vtp and .vtkhdf
+        store every array.  A warning is logged for each array that is left out or renamed.
     mesh : Mesh or pyvista.PolyData
-        What to write.
+        The mesh to write.
 
     Raises
     ------
     MeshError
-        If the suffix is not known, the folder does not exist, *path* is not a regular file, or the
-        disk is full.
+        If the format is not supported, the folder does not exist, *path* is not a regular file, or
+        the disk is full.
     """
     path = as_path(path)
     require(mesh, (Mesh, pv.PolyData), "mesh")
@@ -171,33 +170,33 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
     except OSError as fault:
         reason = fault.strerror or str(fault)
         raise MeshError(
-            f"{path}: cannot be written ({reason}); make room, or choose another place"
+            f"{path}: cannot be written ({reason}); free disk space or choose another folder"
         ) from fault
 
 
 def _write_with_meshlab(draft: Path, mesh: Mesh) -> None:
-    """Write through PyMeshLab; OSError unless all of it is there, which it does not say itself."""
+    """Write by PyMeshLab; OSError if the file is incomplete, which PyMeshLab does not report."""
     try:
         meshlab.write(draft, mesh)
-        whole = len(meshlab.read_faces(draft)[1]) == mesh.n_faces
+        complete = len(meshlab.read_faces(draft)[1]) == mesh.n_faces
     except MeshError as fault:
         raise OSError(str(fault).removeprefix(f"{draft}: ")) from None
-    if not whole:
-        raise OSError("what was written is not all of it")
+    if not complete:
+        raise OSError("the written file is incomplete")
 
 
 def require_writable(path: str | Path, *, arrays: bool = False) -> None:
-    """Raise the MeshError that `write_mesh` would, before the work that is to be written.
+    """Raise the MeshError that `write_mesh` would raise, so that it is known before the work.
 
-    With *arrays* the file has to hold point arrays and colours, which some formats cannot.
+    With *arrays* the format must store point arrays and colours.
     """
     path = as_path(path)
     suffix = path.suffix.lower()
     as_flag(arrays, "arrays")
-    known = {*_HOLD_ARRAYS} if arrays else {*_WRITERS, *_VTK_WRITES, *meshlab.WRITES}
+    known = {*_STORE_ARRAYS} if arrays else {*_WRITERS, *_VTK_WRITES, *meshlab.WRITES}
     if suffix not in known:
-        what = "arrays and colours to " if arrays else ""
-        raise MeshError(f"{path}: cannot write {what}{suffix or 'no suffix'}; can {_listed(known)}")
+        verb = "cannot store arrays and colours" if arrays else "cannot be written"
+        raise MeshError(f"{path}: {_files(suffix)} {verb}; use one of {_listed(known)}")
     try:
         require_place(path)
     except OSError as fault:
@@ -205,15 +204,15 @@ def require_writable(path: str | Path, *, arrays: bool = False) -> None:
 
 
 def to_polydata(mesh: Mesh | Cage) -> pv.PolyData:
-    """Return *mesh*, or a cage, as PolyData: float64 points, same vertices, same triangles."""
+    """Return a mesh or a cage as PolyData with float64 points and the same triangles."""
     require(mesh, (Mesh, Cage), "mesh")
     return polydata_of(mesh.vertices.copy(), np.full(mesh.n_faces, 3), mesh.faces.ravel())
 
 
 def from_polydata(polydata: pv.PolyData) -> Mesh:
-    """Return the closed mesh of a PolyData; quads, polygons and strips are cut into triangles.
+    """Return the closed mesh of a PolyData; polygons and strips are cut into triangles.
 
-    No vertex is added, dropped or renumbered, so `with_vertices` fits new positions back.
+    Vertices keep their number and order, so `with_vertices` accepts positions of the mesh.
 
     Raises
     ------
@@ -228,15 +227,15 @@ def from_polydata(polydata: pv.PolyData) -> Mesh:
 
 
 def with_vertices(polydata: pv.PolyData, vertices: ArrayLike) -> pv.PolyData:
-    """Return a copy of *polydata* with other positions and everything else as it was.
+    """Return a copy of *polydata* with other positions.
 
-    Cells, point, cell and field arrays and texture coordinates stay; points become float64.
-    Arrays of normals are computed anew, since the old ones would shade the old shape.
+    Cells, point, cell and field arrays and texture coordinates are kept; points become float64.
+    Arrays of normals are computed again.
 
     Parameters
     ----------
     polydata : pyvista.PolyData
-        Left as it is.
+        Not changed.
     vertices : (n, 3) float
         One position per point, in the order of ``polydata.points``.
     """
@@ -248,7 +247,7 @@ def with_vertices(polydata: pv.PolyData, vertices: ArrayLike) -> pv.PolyData:
         stale = {"Normals", attributes.active_normals_name} & set(attributes.keys())
         if not stale:
             continue
-        # VTK hands back normals that are already there, so it gets the bare shape.
+        # VTK would return existing normals, so it gets a copy without arrays.
         bare = pv.PolyData()
         bare.copy_structure(moved)
         bare = bare.compute_normals(
@@ -261,6 +260,10 @@ def with_vertices(polydata: pv.PolyData, vertices: ArrayLike) -> pv.PolyData:
         for name in stale:
             attributes[name] = np.asarray(fresh, dtype=attributes[name].dtype)
     return moved
+
+
+def _files(suffix: str) -> str:
+    return f"{suffix} files" if suffix else "files without a suffix"
 
 
 def _listed(suffixes: set[str]) -> str:

@@ -1,14 +1,14 @@
-"""Read glTF and GLB: the meshes of a scene in world coordinates, as one surface.
+"""glTF and GLB: reader for the meshes of a scene in world coordinates, as one surface.
 
-    nodes        a forest; world matrix of a node = that of its parent @ its own
-    mesh         primitives: triangles, strips or fans; lines and points are left out
-    morphs       targets are added with the weights of the node or the mesh
-    skins        a skinned vertex follows its joints and ignores the transform of its node
+    nodes        a forest; the world matrix of a node is that of its parent @ its own
+    mesh         primitives: triangles, strips or fans; lines and points are ignored
+    morphs       targets are added with the weights of the node or mesh
+    skins        a skinned vertex follows its joints and not the transform of its node
     attributes   NORMAL and TEXCOORD_0 (active), COLOR_0 as "RGB" or "RGBA", further TEXCOORD_k
                  and _NAMES become point arrays if all primitives have them
 
-Animations, materials and images are not read.  The only other files that are read are buffers in
-the model's folder.
+Animations, materials and images are not read.  Only buffers in the folder of the model are read
+from other files.
 
 Source
 ------
@@ -29,12 +29,12 @@ from ..errors import MeshError
 from .gltf_buffers import Document, numbers, object_, objects, whole
 from .polygons import polydata_of, unstripped
 
-# Extensions that do not change the surface, and the one that is supported.
-_HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_xmp")
-_READ = "KHR_mesh_quantization"
+# Extensions that do not affect the surface, and a supported one.
+_IGNORED = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_xmp")
+_SUPPORTED = "KHR_mesh_quantization"
 _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-_PRIMITIVE = 1000  # cost of a primitive, in elements
+_PRIMITIVE = 1000  # cost of a primitive, as a number of elements
 
 
 class _Part(NamedTuple):
@@ -43,18 +43,18 @@ class _Part(NamedTuple):
     arrays: dict[str, Any]  # (n, ...)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # the check of the mesh reports overflows
+@np.errstate(over="ignore", invalid="ignore")  # overflows are reported when the mesh is checked
 def read_gltf(path: Path) -> pv.PolyData:
-    """Return the triangles of the scene in a .gltf or .glb file.
+    """Read the triangles of the scene in a .gltf or .glb file.
 
     Raises
     ------
     MeshError
         If a number is out of range, the nodes do not form a forest, a required extension is not
-        supported, or a buffer is outside the model's folder.
+        supported, or a buffer is outside the folder of the model.
     """
     document = Document(path)
-    _require_known_extensions(document.json)
+    _require_supported_extensions(document.json)
     parts = list(_parts(document))
     if not parts:
         raise MeshError("contains no triangles")
@@ -73,12 +73,12 @@ def read_gltf(path: Path) -> pv.PolyData:
     return surface
 
 
-def _require_known_extensions(head: dict[str, Any]) -> None:
+def _require_supported_extensions(head: dict[str, Any]) -> None:
     needed = head.get("extensionsRequired", [])
     if not isinstance(needed, list):
         raise MeshError("extensionsRequired must be a list")
     for name in map(str, needed):
-        if name != _READ and not name.startswith(_HARMLESS):
+        if name != _SUPPORTED and not name.startswith(_IGNORED):
             raise MeshError(f"needs the glTF extension {name[:80]}, which is not supported")
 
 
@@ -105,23 +105,23 @@ def _indices(where: dict[str, Any], key: str, name: str, end: int) -> list[int]:
 
 
 def _worlds(nodes: list[dict[str, Any]], children: list[list[int]]) -> list[FloatArray]:
-    """Return the (4, 4) world matrix of every node."""
+    """Return the world matrix of every node, (4, 4) each."""
     named = [child for each in children for child in each]
     if len(set(named)) < len(named):
         raise MeshError("a node of the scene has two parents")
     worlds: dict[int, FloatArray] = {}
-    waiting = [(k, np.eye(4)) for k in set(range(len(nodes))) - set(named)]
-    while waiting:
-        k, above = waiting.pop()
+    pending = [(k, np.eye(4)) for k in set(range(len(nodes))) - set(named)]
+    while pending:
+        k, above = pending.pop()
         worlds[k] = above @ _local(nodes[k], f"node {k}")
-        waiting += [(child, worlds[k]) for child in children[k]]
+        pending += [(child, worlds[k]) for child in children[k]]
     if len(worlds) < len(nodes):
         raise MeshError("a node of the scene is its own descendant")
     return [worlds[k] for k in range(len(nodes))]
 
 
 def _local(node: dict[str, Any], name: str) -> FloatArray:
-    """Return the (4, 4) matrix of a node: stored by columns, or as rotation, scale, translation."""
+    """Return the matrix (4, 4) of a node, from its columns or from rotation, scale, translation."""
     if "matrix" in node:
         columns: FloatArray = numbers(node, "matrix", name, [0.0] * 16).reshape(4, 4)
         return columns.T
@@ -141,23 +141,23 @@ def _local(node: dict[str, Any], name: str) -> FloatArray:
 
 
 def _in_scene(document: Document, children: list[list[int]]) -> Iterable[int]:
-    """Return the nodes of the default scene, or all nodes if there is none, in their order."""
+    """Return the nodes of the default scene, sorted; all nodes if there are no scenes."""
     scenes = document.items("scenes")
     if not scenes:
         return range(len(children))
     index = whole(document.json, "scene", "the file", default=0, most=len(scenes) - 1)
-    waiting = _indices(scenes[index], "nodes", f"scene {index}", len(children))
+    pending = _indices(scenes[index], "nodes", f"scene {index}", len(children))
     seen = set()
-    while waiting:
-        k = waiting.pop()
+    while pending:
+        k = pending.pop()
         if k not in seen:
             seen.add(k)
-            waiting += children[k]
+            pending += children[k]
     return sorted(seen)
 
 
 def _joints(document: Document, index: object, worlds: list[FloatArray]) -> list[FloatArray]:
-    """Return for each joint of a skin the (4, 4) matrix from the bind pose to the world."""
+    """Return the matrix (4, 4) of each joint of a skin, from the bind pose to the world."""
     skin = document.item("skins", index)
     joints = _indices(skin, "joints", f"skin {index}", len(worlds))
     if "inverseBindMatrices" not in skin:
@@ -165,7 +165,7 @@ def _joints(document: Document, index: object, worlds: list[FloatArray]) -> list
     columns = document.array(skin["inverseBindMatrices"], "MAT4").astype(float).reshape(-1, 4, 4)
     if len(columns) < len(joints):
         raise MeshError(f"skin {index} has {len(columns)} matrices for {len(joints)} joints")
-    return [worlds[k] @ bound.T for k, bound in zip(joints, columns, strict=False)]
+    return [worlds[k] @ inverse.T for k, inverse in zip(joints, columns, strict=False)]
 
 
 def _primitives(
@@ -190,7 +190,7 @@ def _primitives(
             weights = numbers(owner, "weights", name, [0.0] * len(targets))
             for weight, target in zip(weights, targets, strict=True):
                 if weight and "POSITION" in target:
-                    points = points + weight * _fitting(document, target, "POSITION", points)
+                    points = points + weight * _attribute(document, target, "POSITION", points)
         arrays = _arrays(document, attributes, points, world)
         if joints:
             points = _skinned(document, attributes, points, joints)
@@ -222,8 +222,8 @@ def _faces(
     return corners.reshape(-1, 3)
 
 
-def _fitting(document: Document, attributes: dict[str, Any], key: str, points: FloatArray) -> Any:
-    """Return an attribute's numbers, as many as there are *points*."""
+def _attribute(document: Document, attributes: dict[str, Any], key: str, points: FloatArray) -> Any:
+    """Return the array of an attribute, one row per point."""
     array = document.array(attributes[key], "SCALAR", "VEC2", "VEC3", "VEC4")
     if len(array) != len(points):
         raise MeshError(f"{key} has {len(array)} elements for {len(points)} vertices")
@@ -239,15 +239,15 @@ def _arrays(
     for key in attributes:
         if not key.startswith(("NORMAL", "TEXCOORD_", "COLOR_", "_")):
             continue
-        values = _fitting(document, attributes, key, points)
+        values = _attribute(document, attributes, key, points)
         if key == "COLOR_0" and values.shape[1] in (3, 4):
             colour = np.nan_to_num(values.astype(float)).clip(0.0, 1.0)
             arrays["RGB" if values.shape[1] == 3 else "RGBA"] = np.rint(255 * colour).astype("u1")
         elif key == "NORMAL" and values.shape[1] == 3:
             if abs(np.linalg.det(world[:3, :3])) > 0:
-                turned = values @ np.linalg.inv(world[:3, :3])
-                length = np.linalg.norm(turned, axis=1, keepdims=True)
-                arrays[key] = turned / np.where(length > 0, length, 1.0)
+                rotated = values @ np.linalg.inv(world[:3, :3])
+                length = np.linalg.norm(rotated, axis=1, keepdims=True)
+                arrays[key] = rotated / np.where(length > 0, length, 1.0)
         elif not key.startswith("NORMAL"):
             arrays[key] = np.ascontiguousarray(values[:, 0] if values.shape[1] == 1 else values)
     return arrays
@@ -256,13 +256,13 @@ def _arrays(
 def _skinned(
     document: Document, attributes: dict[str, Any], points: FloatArray, joints: list[FloatArray]
 ) -> FloatArray:
-    """Return *points* moved by the weighted joints."""
+    """Return *points* transformed by the weighted joints."""
     matrices, result, total = np.array(joints), np.zeros_like(points), np.zeros(len(points))
     for k in range(len(attributes)):
         keys = f"JOINTS_{k}", f"WEIGHTS_{k}"
         if not set(keys) <= set(attributes):
             break
-        which, weights = (_fitting(document, attributes, key, points) for key in keys)
+        which, weights = (_attribute(document, attributes, key, points) for key in keys)
         if which.dtype.kind != "u" or which.shape != weights.shape or which.max() >= len(joints):
             raise MeshError("a skinned mesh refers to joints that do not exist")
         for joint, weight in zip(which.T, weights.astype(float).T, strict=True):

@@ -1,11 +1,11 @@
-"""The JSON of a glTF file, and the numbers in its buffers, all checked before they are used.
+"""JSON and buffers of a glTF file, validated before they are used.
 
     buffer      bytes: the second chunk of a .glb, a data: URI, or a file in the model's folder
     bufferView  a range of a buffer
     accessor    numbers in a bufferView: type, count and stride; some may be replaced (sparse)
 
-A number in the JSON that does not fit the buffers raises a MeshError that names it, so that no byte
-outside a buffer is ever read, and memory is limited by the size of the file.
+A number in the JSON that does not fit the buffers raises a MeshError that names it.  No byte
+outside a buffer is read, and memory is limited by the size of the file.
 
 Source
 ------
@@ -25,11 +25,11 @@ from urllib.parse import unquote, unquote_to_bytes
 import numpy as np
 
 from ..errors import MeshError
-from .neighbours import file_inside
+from .referenced_files import file_inside
 
 _TYPES = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-_PER_BYTE, _ALWAYS = 64, 50_000_000  # elements allowed: per byte of the file, and in any case
+_PER_BYTE, _LEAST = 64, 50_000_000  # limit of elements: per byte of the file, but at least this
 _MAGIC, _JSON, _BINARY = b"glTF", b"JSON", b"BIN\0"
 
 
@@ -65,16 +65,16 @@ class Document:
         self._spent = 0
 
     def spend(self, elements: int) -> None:
-        """Count the elements generated; MeshError if they far exceed the size of the file.
+        """Count generated elements; MeshError if they far exceed the size of the file.
 
-        The same few bytes may be instanced any number of times.
+        A few bytes may be instanced any number of times.
         """
         self._spent += elements
-        if self._spent > max(_ALWAYS, _PER_BYTE * self.size):
-            raise MeshError(f"its instances have more than {_ALWAYS} vertices and corners")
+        if self._spent > max(_LEAST, _PER_BYTE * self.size):
+            raise MeshError(f"its instances have more than {_LEAST} vertices and corners")
 
     def items(self, key: str) -> list[dict[str, Any]]:
-        """Return a top-level list of objects of the JSON; empty if there is none."""
+        """Return the top-level list *key* of objects; empty if there is none."""
         if key not in self._lists:
             self._lists[key] = objects(self.json, key, key)
         return self._lists[key]
@@ -91,12 +91,12 @@ class Document:
         return whole({"index": index}, "index", key, most=count - 1)
 
     def array(self, index: object, *types: str) -> Any:
-        """Return the numbers of an accessor, (n, width), in their own type or, normalised, float64.
+        """Return the numbers of an accessor, (n, width), in the stored type; float64 if normalised.
 
         Parameters
         ----------
         index : int
-            Of the accessor.
+            Index of the accessor.
         *types : str
             Allowed types: "SCALAR", "VEC3" ...
         """
@@ -199,7 +199,7 @@ def _chunks(data: bytes) -> tuple[bytes, bytes | None]:
         raise MeshError("is truncated")
     _, version, length = struct.unpack_from("<4sII", data)
     if version != 2:
-        raise MeshError(f"is glTF {version}; only 2 can be read")
+        raise MeshError(f"is glTF {version}; only version 2 is supported")
     if length > len(data):
         raise MeshError(f"declares {length} bytes, but has {len(data)}")
     chunks, at = dict[bytes, bytes](), 12
@@ -218,7 +218,7 @@ def whole(
     where: dict[str, Any], key: str, name: str, *, default: int | None = None,
     least: int = 0, most: float = math.inf,
 ) -> int:  # fmt: skip
-    """Return the whole number *key* of an object that messages call *name*."""
+    """Return the integer *key* of an object; messages call the object *name*."""
     value = where.get(key, default)
     if isinstance(value, float) and value.is_integer():
         value = int(value)
@@ -230,7 +230,7 @@ def whole(
 
 
 def numbers(where: dict[str, Any], key: str, name: str, default: list[float]) -> Any:
-    """Return a list of as many finite numbers as *default* has, as an array."""
+    """Return a list of finite numbers, as many as *default* has, as an array."""
     value = where.get(key, default)
     sound = isinstance(value, list) and len(value) == len(default)
     if not sound or not all(_is_number(each) for each in value):

@@ -1,10 +1,10 @@
-"""Read files with native libraries in a child process, with limits on memory and time.
+"""Reading of files by native libraries in a child process, with limits on memory and time.
 
 The readers of VTK and PyMeshLab do not validate files: a wrong count, deep nesting or an
-exponential entity can end the process that reads them.  So a child process, `reading_child`, reads
-the file and returns the result in files written by VTK.  It starts in 0.2 s.
+exponential entity can crash the process.  So a child process, `reading_child`, reads the file and
+returns the result in files written by VTK.  It starts in 0.2 s.
 
-A frozen or embedded application has no Python interpreter to start: it reads in its own process,
+A frozen or embedded application has no Python interpreter to start, so it reads in its own process
 and logs a warning.
 """
 
@@ -26,17 +26,17 @@ from . import reading_child
 
 _log = logging.getLogger(__name__)
 _SECONDS, _PER_MEGABYTE = 30.0, 2.0
-_MEMORY, _PER_BYTE = 2 << 30, 64  # bytes, and for each byte of the file
+_MEMORY, _PER_BYTE = 2 << 30, 64  # bytes, in addition to a multiple of the file size
 _START = """import runpy, sys
 sys.path[:] = {path!r}
 if {tool!r} == "vtk":
-    sys.modules["numpy"] = None  # VTK does not need it, and starts in half the time
+    sys.modules["numpy"] = None  # VTK works without it and starts in half the time
 runpy.run_path({child!r}, run_name="__main__")
 """
 
 
 @contextmanager
-def read_apart(tool: str, path: Path) -> Iterator[Path]:
+def read_isolated(tool: str, path: Path) -> Iterator[Path]:
     """Read *path* in a child process; yield the folder with the results of `reading_child`.
 
     Parameters
@@ -44,7 +44,7 @@ def read_apart(tool: str, path: Path) -> Iterator[Path]:
     tool : str
         "vtk" or "meshlab".
     path : Path
-        The file.
+        The file to read.
 
     Raises
     ------
@@ -57,33 +57,29 @@ def read_apart(tool: str, path: Path) -> Iterator[Path]:
         folder = Path(name)
         python = _python()
         if python is None:
-            _log.warning(
-                "%s is read without protection: there is no Python interpreter to start", path
-            )
+            _log.warning("%s is read without protection: no Python interpreter was found", path)
             reading_child.main(tool, str(path.absolute()), name, "0")
             code = 0
         else:
             start = _START.format(path=sys.path, tool=tool, child=reading_child.__file__)
             try:
-                words = [tool, str(path.absolute()), name, str(_MEMORY + _PER_BYTE * size)]
-                code = _ended([python, "-S", "-c", start, *words], name, seconds)
+                arguments = [tool, str(path.absolute()), name, str(_MEMORY + _PER_BYTE * size)]
+                code = _exit_code([python, "-S", "-c", start, *arguments], name, seconds)
             except subprocess.TimeoutExpired:
                 raise MeshError(f"reading was stopped after {seconds:.0f} s") from None
-        said = folder / "said.txt"
-        if said.exists():
-            raise MeshError(said.read_text(encoding="utf-8"))
+        error = folder / "error.txt"
+        if error.exists():
+            raise MeshError(error.read_text(encoding="utf-8"))
         if code:
             how = signal.Signals(-code).name if code < 0 else f"code {code}"
-            raise MeshError(
-                f"the reader ended in a crash ({how}); the file is damaged or too large"
-            )
+            raise MeshError(f"the reader crashed ({how}); the file is damaged or too large")
         yield folder
 
 
-def _ended(words: list[str], folder: str, seconds: float) -> int:
-    one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+def _exit_code(arguments: list[str], folder: str, seconds: float) -> int:
+    one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
     done = subprocess.run(
-        words, cwd=folder, env={**os.environ, **one}, timeout=seconds, check=False,
+        arguments, cwd=folder, env={**os.environ, **one_thread}, timeout=seconds, check=False,
         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
     )  # fmt: skip

@@ -1,21 +1,21 @@
-"""PyMeshLab, if it is installed: meshes to and from it, its simplification, its file formats.
+"""PyMeshLab, if it is installed: conversion, simplification and its file formats.
 
-    Mesh, PolyData, Session  --to_meshset-->    MeshSet
-    PolyData                 <--from_meshset--  MeshSet       its current layer
-    fixed, handle, region    <--selected_vertices--           what is selected there
+    Mesh, PolyData, Session  --to_meshset-->        MeshSet
+    PolyData                 <--from_meshset------  MeshSet       the current layer
+    fixed, handle, region    <--selected_vertices-  MeshSet       its selected vertices
 
-Selection, quality, colours and texture coordinates go both ways, as arrays of the PolyData that
-`meshlab_layers` lists; so do other arrays of numbers, as custom attributes, of which
-`from_meshset` has to be told the names.  `convert.from_polydata` makes the `Mesh` of a PolyData.
+Selection, quality, colours and texture coordinates are converted both ways, as arrays of the
+PolyData (`meshlab_layers`); so are other arrays of numbers, as custom attributes, whose names must
+be passed to `from_meshset`.  `convert.from_polydata` converts a PolyData to a `Mesh`.
 
-The image of a texture stays behind: PyMeshLab (2025.7) takes one from a file only, by its filter
-``set_texture_per_mesh``, and hands one out only to a file, ``layer.textures()[name].save(path)``.
+Texture images are not converted: PyMeshLab (2025.7) reads them from files only, by its filter
+``set_texture_per_mesh``, and writes them to files only, ``layer.textures()[name].save(path)``.
 
-PyMeshLab is under the GPL (version 3), this package is not: it is imported inside the calls
-below, nowhere else, and everything but these calls works without it.
+PyMeshLab has the GPL (version 3), unlike this package: it is only imported inside the functions
+below, and everything else works without it.
 
-PyMeshLab gives arrays column by column and with 32-bit faces; `Mesh` puts both right.  Lengths
-that are meant as such, not as per cent, have to be wrapped in its ``PureValue``.
+PyMeshLab returns arrays in column-major order and faces of 32 bits; `Mesh` converts both.  Lengths
+that are not percentages must be wrapped in its ``PureValue``.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from ..checks import all_of, as_path, require, shown
 from ..errors import ArgumentError, MeshError, MissingDependencyError
 from ..mesh import Mesh, require_mesh
 from ..session import Session
-from .isolated import read_apart
-from .meshlab_layers import Surface, add_attributes, as_layers, free_name, ingredients, surface_of
+from .isolated import read_isolated
+from .meshlab_layers import Surface, add_attributes, as_layers, free_name, layer_data, surface_of
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -46,7 +46,7 @@ _MARK = "selected_here"
 
 
 def available() -> bool:
-    """Return whether PyMeshLab can be imported; it may be there and lack a GL library."""
+    """Return whether PyMeshLab can be imported; it may be installed but lack a GL library."""
     try:
         _pymeshlab()
     except MissingDependencyError:
@@ -55,35 +55,35 @@ def available() -> bool:
 
 
 def to_meshset(what: Surface | Session | Mapping[str, Surface]) -> Any:
-    """Return a ``pymeshlab.MeshSet``, vertices and faces in order, its first layer the current one.
+    """Convert surfaces to a ``pymeshlab.MeshSet``; its first layer is the current one.
 
     Parameters
     ----------
     what : Mesh, pyvista.PolyData, Session, or dict of str to Mesh or PolyData
-        One layer; the mesh and the cages of a session, in its pose; or layers by name.  Polygons
-        are cut into triangles.
+        A surface, for one layer; a session, for layers of its mesh and cages in their pose; or
+        layers by name.  Polygons are cut into triangles; vertices and faces keep their order.
 
     Raises
     ------
     MissingDependencyError
         If PyMeshLab is not installed.
     MeshError
-        If *what* is none of these.
+        If *what* is of another type.
 
     Notes
     -----
-    PyMeshLab has no call to select given vertices.  They are marked by an attribute of the
-    layer's own, "selected_here", which stays there.
+    PyMeshLab has no function to select given vertices.  They are marked by a custom attribute of
+    the layer, "selected_here", which remains there.
     """
     pymeshlab = _pymeshlab()
     meshset = pymeshlab.MeshSet(verbose=False)
     for name, surface in as_layers(what).items():
-        arrays, vertices, faces, of_vertices, of_faces = ingredients(surface)
+        arrays, vertices, faces, of_vertices, of_faces = layer_data(surface)
         meshset.add_mesh(pymeshlab.Mesh(**arrays), name)
         layer, condition = meshset.current_mesh(), f"({_MARK} > 0)"
         add_attributes(layer, "vertex", of_vertices)
         add_attributes(layer, "face", of_faces)
-        # The attribute goes to the layer: from the mesh it is copied from, PyMeshLab crashes.
+        # Added to the layer, because PyMeshLab crashes if the mesh already has the attribute.
         if vertices is not None:
             layer.add_vertex_custom_scalar_attribute(vertices, _MARK)
             meshset.compute_selection_by_condition_per_vertex(condselect=condition)
@@ -96,19 +96,19 @@ def to_meshset(what: Surface | Session | Mapping[str, Surface]) -> Any:
 
 
 def from_meshset(meshset: Any, arrays: Sequence[str] = ()) -> pv.PolyData:
-    """Return the current layer of a ``pymeshlab.MeshSet``, with all that MeshLab knows of it.
+    """Convert the current layer of a ``pymeshlab.MeshSet``, with all its arrays.
 
     Parameters
     ----------
     meshset : pymeshlab.MeshSet
-        Left as it is.
+        Not changed.
     arrays : sequence of str
-        Names of custom attributes, of vertices or faces, to bring along as float64 arrays.
+        Names of custom attributes, of vertices or faces, to convert to float64 arrays.
 
     Raises
     ------
     MeshError
-        If there is no layer, or no attribute of a name.
+        If there is no layer, or an attribute does not exist.
     """
     arrays = all_of(arrays, str, "arrays")
     return surface_of(_current(meshset), arrays, _pymeshlab().PyMeshLabException)
@@ -124,11 +124,10 @@ def layers_from_meshset(meshset: Any) -> dict[str, pv.PolyData]:
 
 
 def selected_vertices(meshset: Any) -> IntArray:
-    """Return (k,) int, the vertices selected in the current layer and the corners of its faces'.
+    """Return the selected vertices of the current layer and those of selected faces, (k,) int.
 
-    To hold still, to drag, or as a region: ``session.set_fixed(selected_vertices(meshset))``,
-    ``session.add_handle(...)``, ``session.paint_region(0, ...)``, as the layer's vertices are
-    those of the mesh.
+    For use as fixed vertices, ``session.set_fixed(selected_vertices(meshset))``, as a handle,
+    ``session.add_handle(...)``, or as a region, ``session.paint_region(0, ...)``.
 
     Raises
     ------
@@ -143,18 +142,18 @@ def selected_vertices(meshset: Any) -> IntArray:
 
 
 def read_faces(path: str | Path) -> tuple[FloatArray, IntArray]:
-    """Return (vertices, faces) of a file in any format PyMeshLab reads; nothing is checked."""
+    """Read (vertices, faces) of a file in any format of PyMeshLab, unchecked."""
     path = as_path(path)
     _pymeshlab()
     try:
-        with read_apart("meshlab", path) as folder, np.load(folder / "mesh.npz") as arrays:
+        with read_isolated("meshlab", path) as folder, np.load(folder / "mesh.npz") as arrays:
             return _plain(arrays["vertices"], arrays["faces"])
     except (MeshError, OSError) as error:
         raise MeshError(f"{path}: PyMeshLab cannot read it: {error}") from None
 
 
 def read(path: str | Path) -> Mesh:
-    """Return the mesh of a file in any format PyMeshLab reads."""
+    """Read a mesh from a file in any format of PyMeshLab."""
     vertices, faces = read_faces(path)
     try:
         return Mesh(vertices, faces)
@@ -163,26 +162,26 @@ def read(path: str | Path) -> Mesh:
 
 
 def write(path: str | Path, mesh: Mesh) -> None:
-    """Write *mesh* in the format PyMeshLab knows by the suffix of *path*."""
+    """Write *mesh* in the PyMeshLab format of the suffix of *path*."""
     path = as_path(path)
     require_mesh(mesh)
     pymeshlab, meshset = _pymeshlab(), to_meshset(mesh)
     try:
-        with _standing_still():
+        with _same_folder():
             meshset.save_current_mesh(str(path.absolute()))
     except pymeshlab.PyMeshLabException as error:
         raise MeshError(f"{path}: PyMeshLab cannot write it: {error}") from None
 
 
 def simplify(mesh: Mesh, n_vertices: int) -> Mesh:
-    """Return *mesh* with about *n_vertices*, by quadric edge collapse with topology kept.
+    """Simplify *mesh* to about *n_vertices* by quadric edge collapses that preserve topology.
 
     Parameters
     ----------
     mesh : Mesh
-        Left as it is.
+        Not changed.
     n_vertices : int
-        At least 4.  Fewer cannot be reached than the topology allows.
+        At least 4; the topology may require more.
 
     Raises
     ------
@@ -194,7 +193,7 @@ def simplify(mesh: Mesh, n_vertices: int) -> Mesh:
         raise ArgumentError(f"n_vertices must be 4 or more; got {shown(n_vertices)}")
     n_vertices = min(int(n_vertices), mesh.n_vertices)
     meshset = to_meshset(mesh)
-    euler = mesh.n_vertices - len(mesh.edges) + mesh.n_faces  # stays; V - E + F with E = 3/2 F
+    euler = mesh.n_vertices - len(mesh.edges) + mesh.n_faces  # preserved: V - E + F with E = 3/2 F
     meshset.meshing_decimation_quadric_edge_collapse(
         targetfacenum=max(2 * (n_vertices - euler), 4),
         preservenormal=True,
@@ -212,7 +211,7 @@ def _require_meshset(meshset: object) -> None:
 def _current(meshset: Any) -> Any:
     _require_meshset(meshset)
     if not meshset.mesh_number():
-        raise MeshError("this MeshSet has no layer; add a mesh to it first")
+        raise MeshError("the MeshSet has no layer; add a mesh to it first")
     return meshset.current_mesh()
 
 
@@ -227,8 +226,8 @@ def _plain(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:
 
 
 @contextlib.contextmanager
-def _standing_still() -> Iterator[None]:
-    """Stay in the current folder, which PyMeshLab leaves when it fails."""
+def _same_folder() -> Iterator[None]:
+    """Restore the working directory, which PyMeshLab changes if it fails."""
     folder = os.getcwd()
     try:
         yield

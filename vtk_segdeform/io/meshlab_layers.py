@@ -1,23 +1,22 @@
-"""Layers of MeshLab as pyvista's PolyData: everything MeshLab knows of a surface, by name.
+"""Layers of MeshLab as pyvista's PolyData, with all their attributes as arrays.
 
-A `Mesh` is positions and triangles only, so what else a layer has travels in the arrays of a
-PolyData, which files, views and the deformation (`convert.with_vertices`) hand on already:
+A `Mesh` has only positions and triangles, so the other attributes of a layer become arrays of a
+PolyData, which files, views and the deformation (`convert.with_vertices`) preserve:
 
-    selection            point and cell array "selection", uint8, 1 is selected
+    selection            point and cell array "selection", uint8, 1 if selected
     quality              point and cell array "quality", float64
     colour               point and cell array "RGBA", uint8 (n, 4)
-    texture coordinates  of vertices: active ones, "TextureCoordinates" (n, 2);
+    texture coordinates  of vertices: the active ones, "TextureCoordinates" (n, 2);
                          of corners: cell array "TextureCorners" (m, 6)
+    custom attributes    numbers or vectors of vertices or faces: all other numeric point and cell
+                         arrays (n,) and (n, 3), by name
 
-    attributes           of MeshLab's users, numbers or vectors of vertices or faces: all other
-                         point and cell arrays (n,) and (n, 3) of numbers, under their names
+`ply` uses the same names.  MeshLab stores texture coordinates in single precision, all else in
+double.  Every vertex has a colour and a quality in MeshLab; the defaults, white and 0, do not
+become arrays.  The matrix of a layer is applied to its positions.  MeshLab cannot list custom
+attributes, so their names must be given.
 
-These are the names that PLY files have for them here.  MeshLab holds texture coordinates in single
-precision, the rest in double.  It gives each vertex a colour and a quality: white and 0, if it was
-told none, are no arrays.  A layer's matrix is applied to its positions.  It does not tell what
-attributes there are, so who reads a layer names them.
-
-No import of PyMeshLab: functions below only ask a mesh that a caller of PyMeshLab got.
+This module does not import PyMeshLab.
 """
 
 from __future__ import annotations
@@ -38,20 +37,20 @@ Surface: TypeAlias = Mesh | pv.PolyData
 _CORNERS, _TEXTURE = "TextureCorners", "TextureCoordinates"
 
 
-class Ingredients(NamedTuple):
-    """A surface in the terms of ``pymeshlab.Mesh(**arrays)``, and what that cannot be told."""
+class LayerData(NamedTuple):
+    """Arguments of ``pymeshlab.Mesh(**arrays)``, and the data that it does not accept."""
 
     arrays: dict[str, Any]
-    selected_vertices: Any  # (n,) float, 1 is selected; None if none is
+    selected_vertices: Any  # (n,) float, 1 if selected; None if none is
     selected_faces: Any  # (m,)
-    of_vertices: dict[str, Any]  # attributes by name, (n,) or (n, 3) float
+    of_vertices: dict[str, Any]  # custom attributes by name, (n,) or (n, 3) float
     of_faces: dict[str, Any]
 
 
 def layers_of(session: Session) -> dict[str, pv.PolyData]:
-    """Return a session as layers: "mesh" and "cage 1", "cage 2" ..., all in the present pose.
+    """Return the layers of a session, "mesh" and "cage 1", "cage 2" ..., in the current pose.
 
-    Vertices of handles are selected; the quality of a vertex is the number of its region.
+    Vertices of handles are selected; the quality of a vertex is the index of its region.
     """
     mesh = as_surface(session.mesh.with_vertices(session.vertices))
     if session.handles:
@@ -76,7 +75,7 @@ def as_layers(what: Surface | Session | Mapping[str, Surface]) -> dict[str, pv.P
 
 
 def as_surface(surface: Surface) -> pv.PolyData:
-    """Return triangles with float64 points; polygons are cut, arrays stay."""
+    """Return a surface as triangles; polygons are cut, arrays are kept."""
     if isinstance(surface, Mesh):
         return polydata_of(surface.vertices, np.full(surface.n_faces, 3), surface.faces.ravel())
     if not isinstance(surface, pv.PolyData):
@@ -90,13 +89,13 @@ def as_surface(surface: Surface) -> pv.PolyData:
 
 
 def free_name(name: str, taken: Container[str]) -> str:
-    """Return *name*, or "name 2", "name 3" ... where that is taken."""
+    """Return *name*, or "name 2", "name 3" ... if it is taken."""
     names = itertools.chain([name], (f"{name} {k}" for k in itertools.count(2)))
     return next(each for each in names if each not in taken)
 
 
-def ingredients(surface: pv.PolyData) -> Ingredients:
-    """Return what a ``pymeshlab.Mesh`` is made from."""
+def layer_data(surface: pv.PolyData) -> LayerData:
+    """Return the data for a ``pymeshlab.Mesh``."""
     points, cells = surface.point_data, surface.cell_data
     arrays: dict[str, Any] = {
         "vertex_matrix": np.asarray(surface.points, dtype=np.float64),
@@ -115,27 +114,27 @@ def ingredients(surface: pv.PolyData) -> Ingredients:
         corners = np.asarray(cells[_CORNERS], dtype=np.float64)
         arrays["w_tex_coords_matrix"] = corners.reshape(-1, 2)
     others = (_others(points, surface.n_points), _others(cells, surface.n_cells))
-    return Ingredients(arrays, _selection(points), _selection(cells), *others)
+    return LayerData(arrays, _selection(points), _selection(cells), *others)
 
 
 def add_attributes(layer: Any, sort: str, attributes: Mapping[str, Any]) -> None:
-    """Give *attributes* to the vertices or faces, the *sort*, of a ``pymeshlab.Mesh``."""
+    """Add custom *attributes* to the elements of a ``pymeshlab.Mesh``, "vertex" or "face"."""
     for name, values in attributes.items():
         kind = "scalar" if values.ndim == 1 else "point"
         getattr(layer, f"add_{sort}_custom_{kind}_attribute")(values, name)
 
 
 def surface_of(layer: Any, names: Iterable[str] = (), absent: Any = ()) -> pv.PolyData:
-    """Return a ``pymeshlab.Mesh`` with all it has.
+    """Convert a ``pymeshlab.Mesh`` to PolyData with all its attributes.
 
     Parameters
     ----------
     layer : pymeshlab.Mesh
-        Left as it is.
+        Not changed.
     names : iterable of str
-        Of the attributes to bring along; a MeshError if there is none of a name.
+        Names of the custom attributes to convert; a MeshError if one does not exist.
     absent : type or tuple of types
-        What PyMeshLab raises where there is no attribute of a name.
+        Exceptions of PyMeshLab for an attribute that does not exist.
     """
     faces = np.asarray(layer.face_matrix(), dtype=np.int64).reshape(-1, 3)
     points = np.asarray(layer.transformed_vertex_matrix(), dtype=np.float64)
@@ -160,11 +159,11 @@ def surface_of(layer: Any, names: Iterable[str] = (), absent: Any = ()) -> pv.Po
         corners = np.ascontiguousarray(layer.wedge_tex_coord_matrix())
         surface.cell_data[_CORNERS] = corners.reshape(len(faces), 6)
     for name in names:
-        _bring(layer, name, surface, absent)
+        _add_attribute(layer, name, surface, absent)
     return surface
 
 
-def _bring(layer: Any, name: str, surface: pv.PolyData, absent: Any) -> None:
+def _add_attribute(layer: Any, name: str, surface: pv.PolyData, absent: Any) -> None:
     found = False
     for sort, attributes in (("vertex", surface.point_data), ("face", surface.cell_data)):
         for kind in ("scalar_attribute_array", "point_attribute_matrix"):
@@ -174,11 +173,11 @@ def _bring(layer: Any, name: str, surface: pv.PolyData, absent: Any) -> None:
                 continue
             attributes[name], found = np.ascontiguousarray(values), True
     if not found:
-        raise MeshError(f"the layer has no attribute {name!r}, of vertices or of faces")
+        raise MeshError(f"the layer has no attribute {name!r} of vertices or faces")
 
 
 def _others(attributes: Any, count: int) -> dict[str, Any]:
-    """Return the arrays that MeshLab has no place for, as float64."""
+    """Return the numeric arrays that become custom attributes, as float64."""
     known = {"selection", "quality", "RGB", "RGBA", "Normals", "selected_here", _CORNERS, _TEXTURE}
     known |= {attributes.active_normals_name, attributes.active_texture_coordinates_name}
     arrays = {name: np.asarray(v) for name, v in attributes.items() if name not in known}
@@ -190,7 +189,7 @@ def _others(attributes: Any, count: int) -> dict[str, Any]:
 
 
 def _colour(attributes: Any) -> Any:
-    """Return (n, 4) of the colours, or None."""
+    """Return the colours, (n, 4), or None."""
     name = next((name for name in ("RGBA", "RGB") if name in attributes), None)
     if name is None:
         return None

@@ -1,15 +1,15 @@
 """MeshLab projects, .mlp: a mesh and its cages as layers that MeshLab opens together.
 
-    work.mlp              which layers there are, and where each is placed; XML
+    work.mlp              list of the layers and their matrices, in XML
     work.layers/*.ply     the layers, with selection, quality, colours and texture coordinates
 
-PyMeshLab is not needed.  MeshLab keeps a selection in a PLY file as bit 32 of the property
-``flags``; here it is the array "selection", as `meshlab_layers` has it.
+PyMeshLab is not required.  MeshLab stores a selection in a PLY file as bit 32 of the property
+``flags``; here it is the array "selection", as in `meshlab_layers`.
 
 A project may come from an untrusted source, so only files in its own folder and below are read, at
-most a thousand layers of four gigabytes together, and entities are not expanded.  New layers are
-written next to the old ones and the .mlp last, so that it always refers to layers that belong
-together.  Only *path* and the folder of its layers are touched, and in that folder only files with
+most a thousand layers of four gigabytes in total, and entities are not expanded.  New layers are
+written beside the old ones and the .mlp last, so that it always refers to a consistent set of
+layers.  Only *path* and the folder of its layers are changed, and in that folder only files with
 generated names.
 """
 
@@ -32,39 +32,39 @@ from ..files import open_regular, replacing, require_place
 from ..session import Session
 from .convert import read_polydata, with_vertices, write_mesh
 from .meshlab_layers import Surface, as_layers, free_name
-from .neighbours import file_inside
+from .referenced_files import file_inside
 
 _SELECTED = 0x20  # of MeshLab's flags
-_OURS = re.compile(r"\d+-[0-9a-f]{12}\.ply")
+_GENERATED = re.compile(r"\d+-[0-9a-f]{12}\.ply")
 _HEAD = "<!DOCTYPE MeshLabDocument>\n"
-_LARGEST = 10_000_000  # bytes; projects are lists
-_DEEPEST = 32  # elements within elements; MeshLab's projects have four
-_MOST_LAYERS, _MOST_BYTES = 1000, 4 << 30  # of all of them, however often a file is named
+_LARGEST = 10_000_000  # bytes of the .mlp
+_DEEPEST = 32  # nesting levels; MeshLab's projects have four
+_MOST_LAYERS, _MOST_BYTES = 1000, 4 << 30  # in total, also if a file is listed several times
 _IDENTITY = "\n1 0 0 0 \n0 1 0 0 \n0 0 1 0 \n0 0 0 1 \n"
 
 
 def read_project(path: str | Path) -> dict[str, pv.PolyData]:
-    """Return the layers of a MeshLab project, by name, each where its matrix places it.
+    """Read the layers of a MeshLab project, by name, transformed by their matrices.
 
     Parameters
     ----------
     path : str or Path
-        An .mlp file; equal names of layers get a number.
+        An .mlp file; layers of equal names get a number.
 
     Raises
     ------
     MeshError
         If it is not a MeshLab project, refers to a layer outside its folder or one that cannot be
-        read, or to more than 1000 layers or 4 GiB of them.
+        read, or has more than 1000 layers or 4 GiB.
     MissingDependencyError
-        If only PyMeshLab reads a layer's format, and it is not installed.
+        If only PyMeshLab reads the format of a layer and it is not installed.
     """
     path = as_path(path)
     layers: dict[str, pv.PolyData] = {}
     elements = _parsed(path).findall("MeshGroup/MLMesh")
     if len(elements) > _MOST_LAYERS:
         raise MeshError(f"{path}: has {len(elements)} layers; the limit is {_MOST_LAYERS}")
-    files = [_inside(path, element.get("filename", "")) for element in elements]
+    files = [_layer_file(path, element.get("filename", "")) for element in elements]
     total = sum(file.stat().st_size for file in files)
     if total > _MOST_BYTES:
         raise MeshError(
@@ -93,18 +93,18 @@ def write_project(path: str | Path, what: Surface | Session | Mapping[str, Surfa
     Parameters
     ----------
     path : str or Path
-        ``work.mlp``; the layers go to a folder ``work.layers`` beside it.
+        For example ``work.mlp``; the layers are written to a folder ``work.layers`` beside it.
     what : Mesh, pyvista.PolyData, Session, or dict of str to Mesh or PolyData
-        As `meshlab.to_meshset` takes it.
+        As in `meshlab.to_meshset`.
 
     Raises
     ------
     MeshError
-        If the suffix is not .mlp, the folder is not there, or *what* is none of these.
+        If the suffix is not .mlp, the folder does not exist, or *what* is of another type.
     """
     path = as_path(path)
     if path.suffix.lower() != ".mlp":
-        raise MeshError(f"{path}: the name of a MeshLab project ends in .mlp")
+        raise MeshError(f"{path}: the name of a MeshLab project must end in .mlp")
     folder = path.with_suffix(".layers")
     try:
         require_place(path)
@@ -122,9 +122,9 @@ def write_project(path: str | Path, what: Surface | Session | Mapping[str, Surfa
             name = f"{number}-{_digest(surface)}.ply"
             write_mesh(folder / name, _with_flags(surface))
             names.add(name)
-            place = {"label": _printable(label), "visible": "1"}
-            place["filename"] = f"{folder.name}/{name}"
-            mesh = ElementTree.SubElement(group, "MLMesh", place)
+            entry = {"label": _printable(label), "visible": "1"}
+            entry["filename"] = f"{folder.name}/{name}"
+            mesh = ElementTree.SubElement(group, "MLMesh", entry)
             ElementTree.SubElement(mesh, "MLMatrix44").text = _IDENTITY
         ElementTree.SubElement(project, "RasterGroup")
         ElementTree.indent(project, " ")
@@ -132,27 +132,27 @@ def write_project(path: str | Path, what: Surface | Session | Mapping[str, Surfa
         with replacing(path) as draft:
             draft.write_text(text, encoding="utf-8")
         for file in folder.iterdir():
-            if _OURS.fullmatch(file.name) and file.name not in names and not file.is_symlink():
+            if _GENERATED.fullmatch(file.name) and file.name not in names and not file.is_symlink():
                 file.unlink()
     except OSError as fault:
         reason = fault.strerror or str(fault)
         raise MeshError(
-            f"{path}: cannot be written ({reason}); make room, or choose another place"
+            f"{path}: cannot be written ({reason}); free disk space or choose another folder"
         ) from fault
 
 
 def _digest(surface: pv.PolyData) -> str:
-    """Return a digest of a surface, of twelve digits."""
+    """Return a digest of a surface, twelve hexadecimal digits."""
     texture = surface.GetPointData().GetTCoords()
-    seen = hashlib.sha256(repr(texture and texture.GetName()).encode())
+    digest = hashlib.sha256(repr(texture and texture.GetName()).encode())
     arrays = {"points": surface.points, "corners": surface.faces, "strips": surface.strips}
     for kind, attributes in (("p", surface.point_data), ("c", surface.cell_data)):
         arrays |= {f"{kind} {name}": values for name, values in attributes.items()}
     for name, values in arrays.items():
         array = np.ascontiguousarray(values)
-        seen.update(repr((name, array.shape, array.dtype.str)).encode())
-        seen.update(array.tobytes())
-    return seen.hexdigest()[:12]
+        digest.update(repr((name, array.shape, array.dtype.str)).encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()[:12]
 
 
 def _with_flags(surface: pv.PolyData) -> pv.PolyData:
@@ -165,12 +165,12 @@ def _with_flags(surface: pv.PolyData) -> pv.PolyData:
 
 
 def _printable(text: str) -> str:
-    """Return *text* without the control characters that XML cannot hold."""
+    """Return *text* without control characters, which XML cannot store."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 class _Builder(ElementTree.TreeBuilder):
-    """Refuses deep trees, which are slow to build and to delete."""
+    """Tree builder that rejects deep nesting, which is slow to build and to delete."""
 
     _depth = 0
 
@@ -196,25 +196,25 @@ def _parsed(path: Path) -> ElementTree.Element:
     if len(data) > _LARGEST:
         raise MeshError(f"{path}: too large for a MeshLab project")
     if b"<!ENTITY" in data.upper() or b"\0" in data:
-        raise MeshError(f"{path}: is no MeshLab project, it declares entities or is not text")
+        raise MeshError(f"{path}: is not a MeshLab project: it declares entities or is not text")
     try:
         parser = ElementTree.XMLParser(target=_Builder())
         parser.feed(data)
         root = parser.close()
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise MeshError(f"{path}: is no MeshLab project ({error})") from None
+        raise MeshError(f"{path}: is not a MeshLab project ({error})") from None
     if root.tag != "MeshLabProject":
-        raise MeshError(f"{path}: is no MeshLab project; its root is {root.tag[:40]!r}")
+        raise MeshError(f"{path}: is not a MeshLab project; its root is {root.tag[:40]!r}")
     return root
 
 
-def _inside(path: Path, name: str) -> Path:
-    """Return the file of a layer, which must be in the project's own folder or below."""
+def _layer_file(path: Path, name: str) -> Path:
+    """Return the file of a layer, which must be in the folder of the project or below."""
     file = file_inside(path.parent, name)
     if file is None:
         raise MeshError(
-            f"{path}: the layer {name[:200]!r} is no file in the project's folder; "
-            "copy it there, and save the project again"
+            f"{path}: the layer {name[:200]!r} is not a file in the project's folder; "
+            "copy it there and save the project again"
         )
     return file
 
@@ -227,5 +227,5 @@ def _matrix(path: Path, element: ElementTree.Element) -> FloatArray:
         matrix = np.full((4, 4), np.nan)
     if not np.isfinite(matrix).all() or not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
         label = element.get("label", "")[:80]
-        raise MeshError(f"{path}: the matrix of layer {label!r} is no affine map")
+        raise MeshError(f"{path}: the matrix of layer {label!r} is not affine")
     return matrix

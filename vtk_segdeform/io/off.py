@@ -1,9 +1,9 @@
-"""OFF, the Object File Format of Geomview: read and write, every digit kept.
+"""OFF, the Object File Format of Geomview: reader and writer in full precision.
 
-OFF             or COFF, NOFF, STOFF, ...: what follows each position
-n m e           vertices, faces, edges (the last is not used)
+OFF             or COFF, NOFF, STOFF, ...: the values after each position
+n m e           numbers of vertices, faces and edges (the last is not used)
 x y z [...]     n lines
-k i j l [...]   m lines: a polygon with k corners, counted from 0, perhaps a colour
+k i j l [...]   m lines: a polygon with k corners, numbered from 0, possibly a colour
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _WIDTHS = {"N": 3, "C": 4, "ST": 2}
 
 
 def read_off(path: Path) -> pv.PolyData:
-    """Return the surface in an OFF file; colours of vertices as "RGBA", normals are dropped."""
+    """Read a surface from an OFF file; colours of vertices become "RGBA", normals are ignored."""
     text = re.sub(r"#[^\r\n]*", "", text_of(path.read_bytes()))
     lines = [line for line in re.split(r"[\r\n]+", text) if line.strip()]
     kind = _KIND.match(lines[0].strip()) if lines else None
@@ -56,7 +56,7 @@ def read_off(path: Path) -> pv.PolyData:
 
 
 def write_off(path: Path, surface: pv.PolyData) -> None:
-    """Write positions with every digit, polygons as they are; OFF holds no other arrays."""
+    """Write positions in full precision, and polygons; OFF stores no other arrays."""
     polygons = rows(*polygons_of(surface))
     warn_left_out("OFF", surface, {})
     with path.open("w", newline="\n") as file:

@@ -1,14 +1,14 @@
-"""PLY, Stanford's polygon format, text or binary: read and write, every digit kept.
+"""PLY, Stanford's polygon format, text or binary: reader and writer in full precision.
 
-VTK's own reader and writer keep 7 digits.  A surface consists of these elements and properties:
+VTK's reader and writer keep 7 digits.  A surface consists of these elements and properties:
 
     vertex     x y z; red green blue (alpha); s t, u v or texture_u texture_v
-    face       vertex_indices or vertex_index, a list; texcoord, a list of (u, v) of each corner
-    tristrips  vertex_indices, a list: any three in a row form a triangle, -1 starts a strip
+    face       vertex_indices or vertex_index, a list; texcoord, a list of (u, v) per corner
+    tristrips  vertex_indices, a list: any three in sequence are a triangle, -1 ends a strip
 
-Colours become the arrays "RGB" or "RGBA", texture coordinates "TextureCoordinates" of vertices and
+Colours become arrays "RGB" or "RGBA", texture coordinates "TextureCoordinates" of vertices and
 "TextureCorners" of corners, all other numbers arrays of the same name.  Arrays are written as
-properties of the same name, unless that name is listed here or contains white space.
+properties of the same name, unless the name is listed here or contains white space.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ _WIDTHS = {"RGB": 3, "RGBA": 4}
 _NORMAL = ("nx", "ny", "nz")
 _CORNERS = ("vertex_indices", "vertex_index")
 _POINT_TEXTURE, _CORNER_TEXTURE = "TextureCoordinates", "TextureCorners"
-_COMMON = 255  # corners of a face; VTK and MeshLab keep the number in a byte
+_COMMON = 255  # corners of a face; VTK and MeshLab store the number in a byte
 _NO_NUMBERS = np.empty(0, dtype=np.int64)
 _OF_POINTS = frozenset({*"xyz", *_NORMAL, *_COLOUR, *(name for pair in _TEXTURE for name in pair)})
 _OF_FACES = frozenset({*_CORNERS, "texcoord", *_COLOUR})
 
 
 def read_ply(path: Path) -> pv.PolyData:
-    """Return the surface in a PLY file: colours as "RGB"(A), other properties under their names."""
+    """Read a surface from a PLY file, with colours as "RGB"(A) and other properties by name."""
     tables = tables_of(path.read_bytes())
     vertex, face = tables.get("vertex", {}), tables.get("face", {})
     if not _has_numbers(vertex, "xyz"):
@@ -88,7 +88,7 @@ def _corners(table: Table) -> Lists | None:
         return None
     lengths, values = found[0]
     if not (np.abs(values.astype(float)) < 2**53).all() or (values != np.rint(values)).any():
-        raise MeshError("a face of the PLY file has a corner that is not a whole number")
+        raise MeshError("a face of the PLY file has a corner that is not an integer")
     return Lists(lengths, values.astype(np.int64))
 
 
@@ -120,7 +120,7 @@ def write_ply(path: Path, surface: pv.PolyData) -> None:
     points, columns = surface.points, dict[str, Any]()
     texture, texture_name = surface.active_texture_coordinates, ""
     if texture is not None and texture.ndim == 2 and texture.shape[1] >= 2:
-        # the names that MeshLab reads in double precision
+        # MeshLab reads these names in double precision
         columns |= dict(zip(_TEXTURE[-1], np.asarray(texture, dtype="f8").T, strict=False))
         texture_name = surface.point_data.active_texture_coordinates_name
     arrays = {name: v for name, v in surface.point_data.items() if name != texture_name}
@@ -136,7 +136,7 @@ def write_ply(path: Path, surface: pv.PolyData) -> None:
     kept["cell"] += [_CORNER_TEXTURE] if seams is not None else []
     warn_left_out("PLY", surface, kept)
     if counts.max(initial=0) > _COMMON:
-        _log.warning("PLY faces of over %d corners: some programs cannot read them", _COMMON)
+        _log.warning("PLY faces of over %d corners cannot be read by some programs", _COMMON)
     lists = [("vertex_indices", counts, corners.astype("<i4"))]
     if seams is not None:  # MeshLab reads single precision only
         lists.append(("texcoord", 2 * counts, seams.astype("<f4").ravel()))
@@ -194,16 +194,16 @@ def _length_type(lengths: IntArray) -> str:
 
 
 def _packed(count: int, columns: list[Any]) -> Any:
-    """Return (count, size) bytes: the numbers of each row, one column after another."""
+    """Return the bytes of rows of numbers, (count, size), from their columns."""
     parts = [np.ascontiguousarray(c, dtype=c.dtype.newbyteorder("<")) for c in columns]
     sized = [part.view("u1").reshape(count, -1 if count else 0) for part in parts]
     return np.hstack(sized) if sized else np.empty((count, 0), dtype="u1")
 
 
 def _face_rows(lists: list[tuple[IntArray, Any]], columns: list[Any]) -> bytes:
-    """Return the rows of faces: *lists*, of (lengths, values), and then the *columns*.
+    """Return the bytes of the rows of faces: *lists* of (lengths, values), then *columns*.
 
-    Faces with the same number of corners are packed together.
+    Faces with equal numbers of corners are packed together.
     """
     counts = lists[0][0]
     tail = _packed(len(counts), columns)
@@ -218,8 +218,8 @@ def _face_rows(lists: list[tuple[IntArray, Any]], columns: list[Any]) -> bytes:
         for lengths, values in lists:
             starts = (np.cumsum(lengths) - lengths)[rows]
             length = int(lengths[rows[0]])
-            here = values[starts[:, None] + np.arange(length)]
-            parts += [lengths[rows].astype(_length_type(lengths)), *here.T]
+            items = values[starts[:, None] + np.arange(length)]
+            parts += [lengths[rows].astype(_length_type(lengths)), *items.T]
         packed = np.hstack([_packed(len(rows), parts), tail[rows]])
         if len(rows) == len(counts):
             return bytes(packed.tobytes())

@@ -1,12 +1,12 @@
-"""The elements of a PLY file as tables, by name: the header, and text or binary rows after it.
+"""Elements of a PLY file as tables: its header, and text or binary rows.
 
     element face 12
     property list uchar int vertex_indices
     property uchar red
 
 A property is a number, or a list preceded by its length in every row.  A text file is converted to
-a binary one of doubles, so that there is one reader.  A name is any text between white space.
-Counts in the header are checked against the number of bytes after it.
+binary doubles, so that one reader suffices.  A name is any text without white space.  Counts in the
+header are checked against the number of bytes after it.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ Table: TypeAlias = dict[str, Any]  # by property: (n,) array of numbers, or List
 @dataclass
 class _Property:
     name: str
-    kind: str  # numpy's type without a byte order
+    kind: str  # numpy's type without byte order
     length: str = ""  # type of the length, if this is a list
 
 
@@ -151,7 +151,7 @@ def _restore_integers(table: Table, element: _Element) -> None:
 
 
 def _table(data: bytes, start: int, element: _Element, order: str) -> tuple[Table, int]:
-    """Return an element's columns, and where it ends."""
+    """Return the columns of an element, and the position after it."""
     if not element.count or not element.properties:
         nothing = np.empty(0)
         lists = Lists(np.empty(0, dtype=np.int64), nothing)
@@ -162,14 +162,14 @@ def _table(data: bytes, start: int, element: _Element, order: str) -> tuple[Tabl
             "hold; it is truncated or damaged, copy or export it again"
         )
     first, _ = _row(data, start, element, order)
-    parts: list[Any] = []  # of a row, if all are as long as the first
+    parts: list[Any] = []  # the layout of a row, if all rows are as long as the first
     for k, each in enumerate(element.properties):
         if each.length:
             parts.append((f"length {k}", order + each.length))
         parts.append((f"value {k}", order + each.kind, (len(first[k]),)))
-    even = np.dtype(parts)
-    if start + element.count * even.itemsize <= len(data):
-        table = np.frombuffer(data, even, element.count, start)
+    layout = np.dtype(parts)
+    if start + element.count * layout.itemsize <= len(data):
+        table = np.frombuffer(data, layout, element.count, start)
         listed = [k for k, each in enumerate(element.properties) if each.length]
         if all((table[f"length {k}"] == len(first[k])).all() for k in listed):
             columns: Table = {}
@@ -177,7 +177,7 @@ def _table(data: bytes, start: int, element: _Element, order: str) -> tuple[Tabl
                 values = table[f"value {k}"].ravel()
                 lengths = np.full(element.count, len(first[k]))
                 columns[each.name] = Lists(lengths, values) if each.length else values
-            return columns, start + element.count * even.itemsize
+            return columns, start + element.count * layout.itemsize
     rows = []
     for _ in range(element.count):
         row, start = _row(data, start, element, order)
@@ -191,7 +191,7 @@ def _table(data: bytes, start: int, element: _Element, order: str) -> tuple[Tabl
 
 
 def _row(data: bytes, start: int, element: _Element, order: str) -> tuple[list[Any], int]:
-    """Return the values of one row, each as an array, and where the row ends."""
+    """Return the values of one row, each as an array, and the position after it."""
     row = []
     for each in element.properties:
         n = 1

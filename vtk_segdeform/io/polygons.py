@@ -1,7 +1,7 @@
-"""Polygons of any length in two flat arrays, and pyvista's PolyData made from them and read back.
+"""Polygons as two flat arrays, and their conversion from and to pyvista's PolyData.
 
-counts[k] is the number of corners of polygon k; corners lists their vertex numbers one polygon
-after another.  Triangles are (m, 3) faces with all counts 3.
+counts[k] is the number of corners of polygon k; corners has the vertex indices of one polygon after
+another.  Triangles are polygons with counts of 3.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from ..errors import MeshError
 
 
 def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.PolyData:
-    """Return a surface with float64 *points* (n, 3) and these polygons, both in the order given.
+    """Return a surface with float64 *points* (n, 3) and the given polygons, in their order.
 
-    NaN goes through: it is for `find_faults` to name, not for a reader to trip over.
+    NaN is allowed here; `find_faults` reports it.
 
     Raises
     ------
     MeshError
-        If a polygon has fewer than three corners or names a vertex that is not there.
+        If a polygon has fewer than three corners or a vertex index out of range.
     """
     points = np.ascontiguousarray(points, dtype=np.float64)
     _require_polygons(len(points), counts, corners)
@@ -35,22 +35,22 @@ def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.P
 def _require_polygons(n_points: int, counts: IntArray, corners: IntArray) -> None:
     if len(corners) and (corners.min() < 0 or corners.max() >= n_points):
         raise MeshError(
-            f"a face names vertex {corners.min()} to {corners.max()}; "
-            f"there are {n_points}: count from 0, and give all of them"
+            f"faces use vertices {corners.min()} to {corners.max()}, but there are {n_points}; "
+            "number vertices from 0, and pass all of them"
         )
     if len(counts) and counts.min() < 3:
         raise MeshError(
-            f"{np.count_nonzero(counts < 3)} faces have fewer than three corners; leave them out"
+            f"{np.count_nonzero(counts < 3)} faces have fewer than three corners; remove them"
         )
 
 
 def polygons_of(polydata: pv.PolyData) -> tuple[IntArray, IntArray]:
-    """Return (counts, corners) of the polygons, in order, and then of the strips' triangles.
+    """Return (counts, corners) of the polygons, in order, then of the triangles of strips.
 
     Raises
     ------
     MeshError
-        If a polygon has fewer than three corners or names a vertex that is not there.
+        If a polygon has fewer than three corners or a vertex index out of range.
     """
     cells = polydata.GetPolys()
     starts = pv.convert_array(cells.GetOffsetsArray()).astype(np.int64)
@@ -59,7 +59,7 @@ def polygons_of(polydata: pv.PolyData) -> tuple[IntArray, IntArray]:
     while len(strips):
         strip, strips = strips[1 : strips[0] + 1], strips[strips[0] + 1 :]
         triangles = np.stack([strip[:-2], strip[1:-1], strip[2:]], axis=-1)
-        triangles[1::2] = triangles[1::2, [1, 0, 2]]  # every other one is turned round
+        triangles[1::2] = triangles[1::2, [1, 0, 2]]  # every other triangle is reversed
         counts.append(np.full(len(triangles), 3))
         corners.append(triangles.ravel())
     result = np.concatenate(counts).astype(np.int64), np.concatenate(corners).astype(np.int64)
@@ -68,9 +68,9 @@ def polygons_of(polydata: pv.PolyData) -> tuple[IntArray, IntArray]:
 
 
 def unstripped(lengths: IntArray, values: IntArray) -> IntArray:
-    """Return the (m, 3) triangles of strips, all oriented as the first of each.
+    """Return the triangles of strips, (m, 3), oriented like the first of each strip.
 
-    Triangles with a repeated vertex, which only connect parts of a strip, are left out.
+    Degenerate triangles, which only connect parts of a strip, are omitted.
     """
     values = np.insert(values, np.cumsum(lengths), -1)  # after each strip
     number = np.arange(len(values))
@@ -84,7 +84,7 @@ def unstripped(lengths: IntArray, values: IntArray) -> IntArray:
 
 
 def cells_of(polydata: pv.PolyData) -> IntArray:
-    """Return the cell number of each polygon of `polygons_of`: its row in the cell data."""
+    """Return the cell index of each polygon of `polygons_of`, its row in the cell data."""
     lengths = []
     strips = polydata.strips
     while len(strips):
@@ -97,7 +97,7 @@ def cells_of(polydata: pv.PolyData) -> IntArray:
 
 
 def padded_corners(counts: IntArray, pairs: FloatArray) -> FloatArray:
-    """Return (m, 2 * most corners) values of corners in rows, NaN after the last; pairs (k, 2)."""
+    """Return *pairs* (k, 2) per corner as rows (m, 2 * most corners), padded with NaN."""
     most = int(counts.max(initial=0))
     wide = np.full((len(counts), most, 2), np.nan)
     wide[np.arange(most) < counts[:, None]] = pairs
@@ -105,7 +105,7 @@ def padded_corners(counts: IntArray, pairs: FloatArray) -> FloatArray:
 
 
 def corner_values(wide: FloatArray | None, counts: IntArray) -> FloatArray | None:
-    """Return the (k, 2) values of corners from such rows; None if they do not fit *counts*."""
+    """Return the inverse of `padded_corners`, (k, 2); None if *wide* does not fit *counts*."""
     if wide is None or wide.ndim != 2 or wide.dtype.kind != "f" or wide.shape[1] % 2:
         return None
     most = wide.shape[1] // 2
@@ -116,14 +116,14 @@ def corner_values(wide: FloatArray | None, counts: IntArray) -> FloatArray | Non
 
 
 def triangles_of(polydata: pv.PolyData) -> IntArray:
-    """Return (m, 3) faces over the same points; polygons are cut by ear clipping, in order."""
+    """Return triangles (m, 3) over the same points; polygons are cut by ear clipping, in order."""
     return cut_into_triangles(np.asarray(polydata.points, float), *polygons_of(polydata))[0]
 
 
 def cut_into_triangles(
     points: FloatArray, counts: IntArray, corners: IntArray
 ) -> tuple[IntArray, IntArray]:
-    """Return (m, 3) faces, by ear clipping, and which polygon each was cut from, (m,) int."""
+    """Return triangles (m, 3), by ear clipping, and the polygon of each, (m,) int."""
     number = np.arange(len(counts))
     if (counts == 3).all():
         return corners.reshape(-1, 3), number
@@ -135,7 +135,7 @@ def cut_into_triangles(
 
 
 def rows(counts: IntArray, corners: IntArray) -> list[list[int]]:
-    """Return the polygons one by one, for a writer."""
+    """Return the polygons as lists, for a writer."""
     if len(counts) and (counts == counts[0]).all():
         equal: list[list[int]] = corners.reshape(len(counts), -1).tolist()
         return equal

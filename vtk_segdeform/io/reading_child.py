@@ -2,11 +2,11 @@
 
     python reading_child.py vtk|meshlab FILE FOLDER BYTES
 
-It allocates no more than about BYTES of memory, if that is not 0.  It writes its results to FOLDER:
+It allocates at most about BYTES of memory, unless that is 0.  It writes its results to FOLDER:
 0.vtp, 1.vtu ... for surfaces and grids, or mesh.npz for vertices and faces.  Characters of names
-that XML cannot store are escaped as %XX.  If the file cannot be read, said.txt has the reason.
-Either library may crash, which is why this is a process of its own.  It imports nothing of this
-package, so that it starts in a fraction of a second.
+that XML cannot store are escaped as %XX.  If the file cannot be read, error.txt has the reason.
+Both libraries may crash, hence the separate process.  This module imports nothing of the package,
+so that it starts in a fraction of a second.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-# The readers of `convert`'s VTK formats: module and class.
+# Readers of the VTK formats: module and class.
 _READERS = {
     ".vtk": ("vtkIOLegacy", "vtkDataSetReader"),
     ".vtp": ("vtkIOXML", "vtkXMLPolyDataReader"),
@@ -37,12 +37,12 @@ _LEGACY = (
 
 
 def main(tool: str, path: str, folder: str, limit: str) -> None:
-    """Read one file."""
+    """Read one file, and write the results or the reason of the failure."""
     try:
         {"vtk": _with_vtk, "meshlab": _with_meshlab}[tool](Path(path), Path(folder), int(limit))
     except (RuntimeError, ValueError, MemoryError, OSError, ImportError) as error:
-        said = str(error) or type(error).__name__
-        (Path(folder) / "said.txt").write_text(said, encoding="utf-8", errors="replace")
+        reason = str(error) or type(error).__name__
+        (Path(folder) / "error.txt").write_text(reason, encoding="utf-8", errors="replace")
 
 
 def _with_vtk(path: Path, folder: Path, limit: int) -> None:
@@ -58,7 +58,7 @@ def _with_vtk(path: Path, folder: Path, limit: int) -> None:
         if "ERROR:" in window.GetOutput():
             raise ValueError(window.GetOutput())
         for number, piece in enumerate(_pieces(reader.GetOutputDataObject(0))):
-            _hand_on(piece, folder / str(number), writers)
+            _write_piece(piece, folder / str(number), writers)
             if "ERROR:" in window.GetOutput():
                 raise ValueError(window.GetOutput())
     finally:
@@ -73,17 +73,17 @@ def _update(reader: Any, path: Path) -> None:
     reader.Update()
 
 
-def _hand_on(piece: Any, path: Path, writers: Any) -> None:
-    """Write a data set as VTK's own XML, numbers as they are, to *path* and its suffix."""
+def _write_piece(piece: Any, path: Path, writers: Any) -> None:
+    """Write a data set in VTK's XML format, uncompressed, to *path* with its suffix."""
     sort = piece.GetClassName()
     if sort not in _WRITERS:
-        raise ValueError(f"it holds a {sort}, not a surface")
+        raise ValueError(f"it contains a {sort}, not a surface")
     for attributes in (piece.GetPointData(), piece.GetCellData(), piece.GetFieldData()):
         for k in range(attributes.GetNumberOfArrays()):
             array = attributes.GetAbstractArray(k)
-            array.SetName(_written(array.GetName() or ""))
+            array.SetName(_escaped(array.GetName() or ""))
             for j in range(array.GetNumberOfComponents() * array.HasAComponentName()):
-                array.SetComponentName(j, _written(array.GetComponentName(j) or ""))
+                array.SetComponentName(j, _escaped(array.GetComponentName(j) or ""))
     suffix, name = _WRITERS[sort]
     writer = getattr(writers, name)()
     writer.SetFileName(f"{path}{suffix}")
@@ -93,26 +93,26 @@ def _hand_on(piece: Any, path: Path, writers: Any) -> None:
     writer.SetCompressorTypeToNone()
     writer.SetHeaderTypeToUInt64()
     if not writer.Write():
-        raise ValueError("the data that was read cannot be passed on")
+        raise ValueError("the data cannot be returned by the child process")
 
 
-def _written(name: str) -> str:
+def _escaped(name: str) -> str:
     return _REFUSED.sub(lambda found: quote(found[0]), name)
 
 
 def _pieces(data: Any) -> Iterator[Any]:
-    """Yield *data*, or the data sets that it is composed of, if they have cells."""
+    """Yield *data*, or the data sets with cells of which it is composed."""
     if data is None:
         return
     if not data.IsA("vtkCompositeDataSet"):
         yield data
         return
-    places = data.NewIterator()
-    places.InitTraversal()
-    while not places.IsDoneWithTraversal():
-        if places.GetCurrentDataObject().GetNumberOfCells():
-            yield places.GetCurrentDataObject()
-        places.GoToNextItem()
+    item = data.NewIterator()
+    item.InitTraversal()
+    while not item.IsDoneWithTraversal():
+        if item.GetCurrentDataObject().GetNumberOfCells():
+            yield item.GetCurrentDataObject()
+        item.GoToNextItem()
 
 
 def _with_meshlab(path: Path, folder: Path, limit: int) -> None:
@@ -131,7 +131,7 @@ def _with_meshlab(path: Path, folder: Path, limit: int) -> None:
 
 
 def _limit_memory(most: int) -> None:
-    """Limit this process to *most* more bytes than it has now, where the system allows it."""
+    """Limit the memory of this process to *most* more bytes, where the system supports that."""
     if not most:
         return
     try:
@@ -142,7 +142,7 @@ def _limit_memory(most: int) -> None:
         if hard != resource.RLIM_INFINITY:
             most = min(most, hard)
         resource.setrlimit(resource.RLIMIT_AS, (most, hard))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a crash leaves no file behind
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # no core dumps
     except (ImportError, OSError, ValueError):
         return
 

@@ -1,13 +1,13 @@
-"""Repair of a surface with polygons and arrays, which are kept wherever there is no fault.
+"""Repair of a surface with polygons and arrays, which are kept where there is no fault.
 
-`repair` works on triangles; its maps lead back from each new triangle to an old one, from there to
-the polygon it was cut from, and from each corner to a corner of that:
+`repair` works on triangles; its maps lead from each new triangle to an old one, on to the polygon
+it was cut from, and from each corner to a corner of that polygon:
 
     polygon     restored if all its triangles are kept and agree; otherwise left as triangles
-    point data  kept; at new vertices interpolated from the border: floats and colours by distance,
-                others from the nearest vertex
+    point data  kept; at new vertices interpolated from the border: floats and colours by
+                distance, others from the nearest vertex
     cell data   kept; 0 or "" on new faces
-    corners     "TextureCorners", two columns to a corner, follow the corners; NaN on new faces
+    corners     "TextureCorners", two columns per corner, follow the corners; NaN on new faces
     normals     flipped where faces are flipped; computed for new faces
 
 Each loss is reported in a sentence after the steps of the repair.
@@ -25,9 +25,9 @@ import pyvista as pv
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..checks import require
-from ..mesh import normals
+from ..mesh import counted, normals
 from ..repair import Repair, repair
-from .polygons import cut_into_triangles, polydata_of, polygons_of
+from .polygons import cells_of, cut_into_triangles, polydata_of, polygons_of
 
 _CORNERS = "TextureCorners"
 _ATTRIBUTES = ("Scalars", "Vectors", "Normals", "TCoords", "Tensors")
@@ -36,27 +36,27 @@ _ATTRIBUTES = ("Scalars", "Vectors", "Normals", "TCoords", "Tensors")
 def repair_surface(
     surface: pv.PolyData, *, weld_distance: float = 0.0, largest_hole: int = 100
 ) -> tuple[pv.PolyData, Repair]:
-    """Return *surface* repaired with its polygons and arrays, and what was done.
+    """Repair *surface* with its polygons and arrays.
 
     Parameters
     ----------
     surface : pyvista.PolyData
-        With any faults; not modified.
+        With any faults; not changed.
     weld_distance, largest_hole
-        As of `repair`.
+        As in `repair`.
 
     Returns
     -------
     repaired : pyvista.PolyData
-        The original points and polygons in their order, then the new ones.  Closed and free of
-        faults only if ``done.report.ok``.
+        The original points and polygons in their order, then the new ones.  Without faults only if
+        ``done.report.ok``.
     done : Repair
         The repair of the triangulated surface; its last steps list the losses.
 
     Raises
     ------
     MeshError
-        As of `repair`.
+        As in `repair`.
     """
     counts, corners = polygons_of(require(surface, pv.PolyData, "surface"))
     points = np.asarray(surface.points, dtype=np.float64)
@@ -66,12 +66,12 @@ def repair_surface(
         return surface.copy(deep=True), done
     trace = _traced(_Polygons(counts, corners, triangles, polygon), done)
     whole = polydata_of(done.vertices, trace.counts, trace.corners)
-    cells = np.append(_cells(surface), -1)[trace.polygon]  # the last one is for lids
-    said = [
+    cells = np.append(cells_of(surface), -1)[trace.polygon]  # -1 for lids
+    losses = [
         *_lost(surface, trace),
         *_carry_points(surface, whole, done),
         *_carry_cells(surface, whole, trace, cells),
-        *_mixed_up(surface, trace, done),
+        *_merged_values(surface, trace, done),
     ]
     for name, values in surface.field_data.items():
         whole.field_data[name] = values
@@ -83,12 +83,12 @@ def repair_surface(
             active = getattr(source, f"Get{attribute}")()
             if active is not None and active.GetName():
                 getattr(target, f"SetActive{attribute}")(active.GetName())
-    return whole, replace(done, steps=(*done.steps, *said))
+    return whole, replace(done, steps=(*done.steps, *losses))
 
 
 @dataclass(frozen=True)
 class _Polygons:
-    """Polygons, as `polygons_of` returns them, and the triangles that they were cut into."""
+    """Polygons, as of `polygons_of`, and the triangles they were cut into."""
 
     counts: IntArray
     corners: IntArray
@@ -97,12 +97,12 @@ class _Polygons:
 
     @cached_property
     def start(self) -> IntArray:
-        """Where in `corners` each polygon begins."""
+        """(c,) int: the position in `corners` at which each polygon begins."""
         return np.cumsum(self.counts) - self.counts
 
     @cached_property
     def places(self) -> IntArray:
-        """(m, 3) int: which corner of its polygon each corner of a triangle is; -1 if unknown."""
+        """(m, 3) int: the corner of the polygon at each corner of a triangle; -1 if unknown."""
         place = np.full(self.triangles.shape, -1)
         for c in range(int(self.counts.max(initial=0))):
             long = self.counts[self.polygon] > c
@@ -114,7 +114,7 @@ class _Polygons:
 
 @dataclass(frozen=True)
 class _Trace:
-    """Where the new polygons (c) and their corners (s) come from.
+    """Origin of the new polygons (c) and their corners (s).
 
     Attributes
     ----------
@@ -124,11 +124,11 @@ class _Trace:
         The new vertex at each corner, polygon by polygon, and the index of the corner in its old
         polygon, -1 for new ones.
     polygon : (c,) int
-        The old polygon of each, -1 for new ones.
-    turned : (c,) bool
-        Whether its orientation was flipped.
+        The old polygon of each new one, -1 if there is none.
+    flipped : (c,) bool
+        Whether the orientation was flipped.
     n_cut : int
-        Number of old polygons of four or more corners that are triangles now.
+        Number of old polygons with four or more corners that are triangles now.
     old, new : (q,) int
         Old and new vertex of each kept corner, with repetitions.
     """
@@ -137,7 +137,7 @@ class _Trace:
     corners: IntArray
     places: IntArray
     polygon: IntArray
-    turned: BoolArray
+    flipped: BoolArray
     n_cut: int
     old: IntArray
     new: IntArray
@@ -147,33 +147,33 @@ def _traced(given: _Polygons, done: Repair) -> _Trace:
     """Trace faces and corners back to their original polygons."""
     lids = done.faces[done.face_map < 0]
     kept = np.flatnonzero(done.face_map >= 0)
-    was, turned, new = done.face_map[kept], done.face_turned[kept], done.faces[kept]
-    places = np.where(turned[:, None], given.places[was][:, [0, 2, 1]], given.places[was])
-    old = np.where(turned[:, None], given.triangles[was][:, [0, 2, 1]], given.triangles[was])
+    was, flipped, new = done.face_map[kept], done.face_turned[kept], done.faces[kept]
+    places = np.where(flipped[:, None], given.places[was][:, [0, 2, 1]], given.places[was])
+    old = np.where(flipped[:, None], given.triangles[was][:, [0, 2, 1]], given.triangles[was])
     polygon = given.polygon[was]
-    # The new vertex at each corner of an old polygon; -1 where triangles disagree or are gone.
+    # The new vertex at each corner of an old polygon; -1 if triangles differ or are missing.
     slots = given.start[polygon][:, None] + places
     at_corner = np.full(len(given.corners), -1)
     at_corner[slots] = new
     at_corner[slots[at_corner[slots] != new]] = -1
-    there = np.minimum.reduceat(at_corner, given.start) >= 0
+    complete = np.minimum.reduceat(at_corner, given.start) >= 0
     n = len(given.counts)
     n_before = np.bincount(given.polygon, minlength=n)
     n_left = np.bincount(polygon, minlength=n)
-    n_turned = np.bincount(polygon, turned, minlength=n)
-    whole = there & (given.counts > 3) & (n_before == given.counts - 2) & (n_left == n_before)
-    whole &= ((n_turned == 0) | (n_turned == n_before)) & (given.places >= 0).all()
+    n_flipped = np.bincount(polygon, flipped, minlength=n)
+    whole = complete & (given.counts > 3) & (n_before == given.counts - 2) & (n_left == n_before)
+    whole &= ((n_flipped == 0) | (n_flipped == n_before)) & (given.places >= 0).all()
     first = np.zeros(len(kept), dtype=bool)
     first[np.unique(polygon, return_index=True)[1]] = True
-    chosen = np.flatnonzero(first | ~whole[polygon])  # for a polygon, or for itself
+    chosen = np.flatnonzero(first | ~whole[polygon])  # one triangle per polygon kept, else all
     as_polygon = whole[polygon[chosen]]
     counts = np.where(as_polygon, given.counts[polygon[chosen]], 3)
     owner = np.repeat(np.arange(len(chosen)), counts)
     k = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
     face, in_face = chosen[owner], np.minimum(k, 2)
-    back = np.where(turned[face], -k % counts[owner], k)
-    place = np.where(as_polygon[owner], back, places[face, in_face])
-    slot = np.where(as_polygon[owner], given.start[polygon[face]] + back, 0)
+    forth = np.where(flipped[face], -k % counts[owner], k)
+    place = np.where(as_polygon[owner], forth, places[face, in_face])
+    slot = np.where(as_polygon[owner], given.start[polygon[face]] + forth, 0)
     corner = np.where(as_polygon[owner], at_corner[slot], new[face, in_face])
     some_left = n_left > 0
     return _Trace(
@@ -181,55 +181,42 @@ def _traced(given: _Polygons, done: Repair) -> _Trace:
         np.append(corner, lids.ravel()),
         np.append(place, np.full(lids.size, -1)),
         np.append(polygon[chosen], np.full(len(lids), -1)),
-        np.append(turned[chosen], np.zeros(len(lids), dtype=bool)),
+        np.append(flipped[chosen], np.zeros(len(lids), dtype=bool)),
         int(np.count_nonzero((given.counts > 3) & some_left & ~whole)),
         old.ravel(),
         new.ravel(),
     )
 
 
-def _cells(surface: pv.PolyData) -> IntArray:
-    """Return the cell that each polygon of `polygons_of` is, or is a part of."""
-    n_polygons = surface.GetPolys().GetNumberOfCells()
-    before = int(surface.n_verts + surface.n_lines)
-    lengths, strips = [], surface.strips
-    while len(strips):
-        lengths.append(int(strips[0]) - 2)
-        strips = strips[strips[0] + 1 :]
-    of_strips = np.repeat(np.arange(len(lengths)), lengths)
-    cells = np.append(np.arange(n_polygons), n_polygons + of_strips)
-    return np.asarray(before + cells, dtype=np.int64)
-
-
 def _lost(surface: pv.PolyData, trace: _Trace) -> Iterator[str]:
-    """Yield sentences on cells that were converted or dropped."""
+    """Yield sentences about cells that were converted or removed."""
     if trace.n_cut:
-        polygons = _counted(trace.n_cut, "polygon", "polygons")
+        polygons = counted(trace.n_cut, "polygon", "polygons")
         yield f"cut {polygons} into triangles where the repair changed a part"
     if surface.n_verts:
-        yield f"drop {_counted(surface.n_verts, 'vertex cell', 'vertex cells')}"
+        yield f"remove {counted(surface.n_verts, 'vertex cell', 'vertex cells')}"
     if surface.n_lines:
-        yield f"drop {_counted(surface.n_lines, 'line', 'lines')}"
+        yield f"remove {counted(surface.n_lines, 'line', 'lines')}"
     if surface.n_strips:
-        yield f"cut {_counted(surface.n_strips, 'strip', 'strips')} into triangles"
+        yield f"cut {counted(surface.n_strips, 'strip', 'strips')} into triangles"
 
 
 def _carry_points(surface: pv.PolyData, whole: pv.PolyData, done: Repair) -> Iterator[str]:
     """Add the point arrays to *whole*, interpolated at new vertices."""
     new = np.flatnonzero(done.vertex_map < 0)
-    mix = done.vertex_weights[new]
+    weights = done.vertex_weights[new]
     nearest = np.zeros(len(new), dtype=np.int64)
     for row in range(len(new)):
-        some = slice(mix.indptr[row], mix.indptr[row + 1])
-        nearest[row] = mix.indices[some][mix.data[some].argmax()]
-    flipped = _turned_vertices(done)
+        some = slice(weights.indptr[row], weights.indptr[row + 1])
+        nearest[row] = weights.indices[some][weights.data[some].argmax()]
+    flipped = _flipped_vertices(done)
     for name, values in surface.point_data.items():
         array = np.asarray(values)
         carried = array[done.vertex_map]
         carried[new] = array[nearest]
         if len(new) and (array.dtype.kind == "f" or array.dtype == np.uint8):
-            used = np.unique(mix.indices)
-            blend = mix[:, used] @ array[used].reshape(len(used), -1).astype(np.float64)
+            used = np.unique(weights.indices)
+            blend = weights[:, used] @ array[used].reshape(len(used), -1).astype(np.float64)
             blend = blend.reshape(len(new), *array.shape[1:])
             carried[new] = blend if array.dtype.kind == "f" else np.rint(blend)
         if name in _normal_arrays(surface.point_data):
@@ -239,16 +226,16 @@ def _carry_points(surface: pv.PolyData, whole: pv.PolyData, done: Repair) -> Ite
         whole.point_data[name] = carried
     if len(new) and len(surface.point_data.keys()):
         names = ", ".join(surface.point_data.keys())
-        vertices = _counted(len(new), "new vertex", "new vertices")
+        vertices = counted(len(new), "new vertex", "new vertices")
         yield f"interpolate point data ({names}) at {vertices}"
 
 
-def _turned_vertices(done: Repair) -> BoolArray:
-    """Return which vertices (n,) have only flipped faces, apart from new ones."""
+def _flipped_vertices(done: Repair) -> BoolArray:
+    """Return which vertices have only flipped faces, apart from new ones, (n,) bool."""
     kept = done.face_map >= 0
     count = np.bincount(done.faces[kept].ravel(), minlength=len(done.vertices))
-    turned = np.bincount(done.faces[kept & done.face_turned].ravel(), minlength=len(done.vertices))
-    return np.asarray((turned == count) & (count > 0))
+    flipped = np.bincount(done.faces[kept & done.face_turned].ravel(), minlength=len(done.vertices))
+    return np.asarray((flipped == count) & (count > 0))
 
 
 def _carry_cells(
@@ -262,7 +249,7 @@ def _carry_cells(
         if name == _CORNERS and array.ndim == 2:
             carried = _corner_array(array, trace, cells)
         elif name in _normal_arrays(surface.cell_data):
-            carried[trace.turned] *= -1
+            carried[trace.flipped] *= -1
             carried[new] = _lid_normals(whole, trace, new)
         else:
             carried[new] = "" if array.dtype.kind in "US" else 0
@@ -273,12 +260,12 @@ def _carry_cells(
         if name not in _normal_arrays(surface.cell_data)
     ]
     if new.any() and names:
-        faces = _counted(int(new.sum()), "new face", "new faces")
+        faces = counted(int(new.sum()), "new face", "new faces")
         yield f"leave cell data ({', '.join(names)}) empty on {faces}"
 
 
 def _corner_array(array: Any, trace: _Trace, cells: IntArray) -> Any:
-    """Return per-corner values, two columns to a corner, in the order of the new corners."""
+    """Return per-corner values, two columns each, in the order of the new corners."""
     wide = array.reshape(len(array), -1, 2)
     carried = np.full((len(cells), *wide.shape[1:]), np.nan, dtype=array.dtype)
     owner = np.repeat(np.arange(len(cells)), trace.counts)
@@ -289,7 +276,7 @@ def _corner_array(array: Any, trace: _Trace, cells: IntArray) -> Any:
 
 
 def _lid_normals(whole: pv.PolyData, trace: _Trace, new: BoolArray) -> FloatArray:
-    """Return the unit normals of the new faces, which are triangles and come last."""
+    """Return the unit normals of the new faces; these are triangles and come last."""
     count = int(np.count_nonzero(new))
     faces = trace.corners[len(trace.corners) - 3 * count :].reshape(-1, 3)
     up = normals(np.asarray(whole.points)[faces])
@@ -298,24 +285,20 @@ def _lid_normals(whole: pv.PolyData, trace: _Trace, new: BoolArray) -> FloatArra
 
 
 def _normal_arrays(attributes: Any) -> set[str]:
-    """Return the names of the arrays that hold normals."""
+    """Return the names of the arrays of normals."""
     return {"Normals", attributes.active_normals_name} & set(attributes.keys())
 
 
-def _mixed_up(surface: pv.PolyData, trace: _Trace, done: Repair) -> Iterator[str]:
-    """Yield sentences on welded vertices with different values, of which one is kept."""
+def _merged_values(surface: pv.PolyData, trace: _Trace, done: Repair) -> Iterator[str]:
+    """Yield sentences about welded vertices with different values, of which one is kept."""
     for name, values in surface.point_data.items():
         array = np.asarray(values)
         array = array.reshape(len(array), -1)
-        mine, kept = array[trace.old], array[done.vertex_map[trace.new]]
-        same = mine == kept
+        old, kept = array[trace.old], array[done.vertex_map[trace.new]]
+        same = old == kept
         if array.dtype.kind == "f":
-            same |= np.isnan(mine) & np.isnan(kept)
-        places = len(np.unique(trace.new[~same.all(axis=1)]))
-        if places:
-            vertices = _counted(places, "welded vertex", "welded vertices")
+            same |= np.isnan(old) & np.isnan(kept)
+        count = len(np.unique(trace.new[~same.all(axis=1)]))
+        if count:
+            vertices = counted(count, "welded vertex", "welded vertices")
             yield f"keep one of several values of {name} at {vertices}"
-
-
-def _counted(number: int, one: str, many: str) -> str:
-    return f"{number} {one if number == 1 else many}"

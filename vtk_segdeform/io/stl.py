@@ -1,10 +1,10 @@
-"""Read STL, a triangle soup in single precision, text or binary; equal corners are merged.
+"""STL, a triangle soup in single precision, text or binary: reader that merges equal corners.
 
-    binary   80 bytes, the number of triangles, and 50 bytes of each: normal, corners, 2 more
+    binary   80 bytes, the number of triangles, and 50 bytes each: normal, corners, 2 more
     text     solid ... facet normal ... outer loop, vertex x y z three times, endloop ... endsolid
 
-Vertices are numbered in the order of their first corner.  Normals are dropped, and so are triangles
-with a repeated vertex.
+Vertices are numbered in the order of their first corner.  Normals, and triangles with a repeated
+vertex, are ignored.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ import pyvista as pv
 from ..errors import MeshError
 from .polygons import polydata_of
 
-_START, _SIZE = 84, 50  # bytes before the triangles, and of each
+_START, _SIZE = 84, 50  # bytes before the triangles, and per triangle
 _VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE | re.I)
 _FACET = re.compile(rb"^[ \t]*facet\b", re.MULTILINE | re.I)
 _END = re.compile(rb"^[ \t]*endsolid\b", re.MULTILINE | re.I)
 
 
 def read_stl(path: Path) -> pv.PolyData:
-    """Return the triangles of an STL file, equal corners merged."""
+    """Read the triangles of an STL file, with equal corners merged."""
     data = path.read_bytes()
     count = int.from_bytes(data[80:84], "little")
     text = data.lstrip()[:5].lower() == b"solid" and len(data) != _START + _SIZE * count
     corners = _of_text(data) if text else _of_bytes(data, count)
-    with np.errstate(invalid="ignore"):  # the check of the mesh reports NaN
-        corners = corners + np.float32(0.0)  # so that -0 is 0
+    with np.errstate(invalid="ignore"):  # NaN is reported when the mesh is checked
+        corners = corners + np.float32(0.0)  # -0 becomes 0
     points, numbers = _merged(corners)
     faces = numbers.reshape(-1, 3)
     a, b, c = faces.T
@@ -41,10 +41,10 @@ def read_stl(path: Path) -> pv.PolyData:
 
 
 def _of_bytes(data: bytes, count: int) -> Any:
-    held = (len(data) - _START) // _SIZE
-    if len(data) < _START or held != count:
+    stored = (len(data) - _START) // _SIZE
+    if len(data) < _START or stored != count:
         raise MeshError(
-            f"declares {count} triangles, but its {len(data)} bytes hold {max(held, 0)}"
+            f"declares {count} triangles, but its {len(data)} bytes contain {max(stored, 0)}"
         )
     row = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
     return np.frombuffer(data, row, count, _START)["corners"].reshape(-1, 3)
@@ -71,6 +71,6 @@ def _merged(corners: Any) -> tuple[Any, Any]:
     group[order] = np.cumsum(new) - 1
     first = order[new]  # lexsort is stable: the first corner of each
     rank = np.empty(len(first), dtype=np.int64)
-    by_place = np.argsort(first)
-    rank[by_place] = np.arange(len(first))
-    return corners[first[by_place]].astype(np.float64), rank[group]
+    by_first = np.argsort(first)
+    rank[by_first] = np.arange(len(first))
+    return corners[first[by_first]].astype(np.float64), rank[group]

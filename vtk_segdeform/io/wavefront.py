@@ -1,19 +1,19 @@
-"""OBJ, Wavefront's text format: read and write, every digit, number and texture seam kept.
+"""OBJ, Wavefront's text format: reader and writer that preserve vertices and texture seams.
 
-VTK's own reader makes one point per corner where texture coordinates have seams, which opens a
-closed mesh and renumbers it.  Here a vertex stays one vertex, in the order of the file:
+VTK's reader creates one point per corner at texture seams, which opens a closed mesh and renumbers
+its vertices.  Here vertices remain as in the file:
 
     v  x y z [r g b]    positions; colours become the point array "RGB"
     vt u v              one per vertex: point array "TextureCoordinates".  Else, with seams, cell
-                        array "TextureCorners": (u, v) of each corner in turn, NaN where it has none
-    f  a/t/n ...        polygons; negative numbers count back from the last vertex
-    o g usemtl          cell arrays "Object", "Group" and "Material": numbers into the field arrays
+                        array "TextureCorners": (u, v) per corner in sequence, NaN if it has none
+    f  a/t/n ...        polygons; negative indices count back from the last vertex
+    o g usemtl          cell arrays "Object", "Group" and "Material": indices into the field arrays
                         "ObjectNames", "GroupNames" and "MaterialNames"
-    s                   cell array "Smoothing": the number of a smoothing group, 0 is off
+    s                   cell array "Smoothing": smoothing group, 0 is off
     mtllib              field array "MaterialLibrary"
 
-A name is the rest of its line, in UTF-8 or Latin-1; it is written in UTF-8.  Normals (vn), lines
-and points are dropped.
+A name is the rest of its line, in UTF-8 or Latin-1; names are written in UTF-8.  Normals (vn),
+lines and points are ignored.
 """
 
 from __future__ import annotations
@@ -34,13 +34,12 @@ _POINT_TEXTURE, _CORNER_TEXTURE = "TextureCoordinates", "TextureCorners"
 _NAMED = {"o": "Object", "g": "Group", "usemtl": "Material"}
 _SMOOTHING, _LIBRARY = "Smoothing", "MaterialLibrary"
 _MOST = 2**62  # an index
-_Runs: TypeAlias = dict[
-    str, list[tuple[int, str]]
-]  # by statement: the first face it applies to, and its value
+# By statement: the first face it applies to, and its value.
+_Runs: TypeAlias = dict[str, list[tuple[int, str]]]
 
 
 def read_obj(path: Path) -> pv.PolyData:
-    """Return the polygons of an OBJ file."""
+    """Read the polygons of an OBJ file."""
     points: list[list[str]] = []
     textures: list[list[str]] = []
     counts: list[int] = []
@@ -93,7 +92,7 @@ def _words(rest: str) -> list[str]:
 
 
 def _number(word: str, count: int) -> int:
-    """Return the index from 0 for one that counts from 1, or backwards from the last of *count*."""
+    """Return the index from 0 of an index from 1, or from -1 backwards from the last of *count*."""
     try:
         number = int(word)
     except ValueError:
@@ -126,18 +125,20 @@ def _are_numbers(words: list[str], least: int) -> bool:
 
 
 def _keep_texture(surface: pv.PolyData, texture: FloatArray, texture_of: IntArray) -> None:
-    """Store texture coordinates with the points if each has one place, else with the corners."""
+    """Store texture coordinates per point if every point has a unique one, else per corner."""
     if not len(texture) or (texture_of < 0).all():
         return
     if texture_of.max() >= len(texture):
-        raise MeshError(f"a face names texture coordinate {texture_of.max() + 1} of {len(texture)}")
+        raise MeshError(
+            f"a face refers to texture coordinate {texture_of.max() + 1} of {len(texture)}"
+        )
     counts, corners = polygons_of(surface)
-    place = np.full(surface.n_points, -1)
-    if len(texture) == len(place) and (texture_of == corners).all():
-        place = np.arange(len(place))
-    place[corners] = texture_of
-    if (place[corners] == texture_of).all() and (place >= 0).all():
-        surface.point_data[_POINT_TEXTURE] = texture[place]
+    of_point = np.full(surface.n_points, -1)
+    if len(texture) == len(of_point) and (texture_of == corners).all():
+        of_point = np.arange(len(of_point))
+    of_point[corners] = texture_of
+    if (of_point[corners] == texture_of).all() and (of_point >= 0).all():
+        surface.point_data[_POINT_TEXTURE] = texture[of_point]
         surface.point_data.active_texture_coordinates_name = _POINT_TEXTURE
         return
     pairs = np.where(texture_of[:, None] >= 0, texture[texture_of], np.nan)
@@ -145,13 +146,13 @@ def _keep_texture(surface: pv.PolyData, texture: FloatArray, texture_of: IntArra
 
 
 def _keep_runs(surface: pv.PolyData, runs: _Runs) -> None:
-    """Store the values that statements set for the faces after them, as cell and name arrays."""
-    for word, said in runs.items():
-        if not said:
+    """Store the values of statements, which apply to the faces after them, as cell arrays."""
+    for word, statements in runs.items():
+        if not statements:
             continue
-        starts = [0, *(at for at, _ in said), surface.n_cells]
+        starts = [0, *(at for at, _ in statements), surface.n_cells]
         lengths = np.diff(starts)
-        texts = ["", *(text for _, text in said)]
+        texts = ["", *(text for _, text in statements)]
         if word == "s":
             groups = [_smoothing_group(text) for text in texts]
             surface.cell_data[_SMOOTHING] = np.repeat(groups, lengths)
@@ -171,7 +172,7 @@ def _smoothing_group(text: str) -> int:
 
 
 def write_obj(path: Path, surface: pv.PolyData) -> None:
-    """Write an OBJ file that `read_obj` reads back unchanged.
+    """Write an OBJ file that `read_obj` reads unchanged.
 
     Warnings are logged for arrays that are left out and names that are changed.
     """
@@ -206,7 +207,7 @@ def write_obj(path: Path, surface: pv.PolyData) -> None:
 def _texture(
     surface: pv.PolyData, counts: IntArray, corners: IntArray, kept: dict[str, list[str]]
 ) -> tuple[FloatArray, list[int]]:
-    """Return the vt lines and, for each corner, which it uses, counted from 1; 0 for none."""
+    """Return texture coordinates (k, 2) and the index of each corner's one from 1; 0 for none."""
     wide = surface.cell_data.get(_CORNER_TEXTURE)
     each = None if wide is None else corner_values(np.asarray(wide)[cells_of(surface)], counts)
     if each is not None:
@@ -224,11 +225,11 @@ def _texture(
 
 
 def _tags(surface: pv.PolyData, cells: IntArray, kept: dict[str, list[str]]) -> dict[int, str]:
-    """Return the lines to write before each face at which a statement changes, by face number.
+    """Return the statements to write before faces at which they change, by face index.
 
-    All statements are repeated after a new object, where some readers reset them.
+    All statements are repeated for a new object, since some readers reset them.
     """
-    lines: list[list[str]] = []  # by statement, of each face
+    lines: list[list[str]] = []  # per statement and face
     for word, key in _NAMED.items():
         names = get_names(surface, f"{key}Names")
         numbers = _whole_numbers(surface.cell_data.get(key), len(names))
@@ -243,19 +244,19 @@ def _tags(surface: pv.PolyData, cells: IntArray, kept: dict[str, list[str]]) -> 
     if groups is not None:
         lines.append([f"s {k or 'off'}\n" for k in groups[cells].tolist()])
         kept["cell"].append(_SMOOTHING)
-    said = list(zip(*lines, strict=True))  # of each face
-    tags = {0: "".join(said[0])} if said else {}
+    by_face = list(zip(*lines, strict=True))
+    tags = {0: "".join(by_face[0])} if by_face else {}
     objects = "Object" in kept["cell"]
-    for k, (before, now) in enumerate(pairwise(said), start=1):
+    for k, (before, now) in enumerate(pairwise(by_face), start=1):
         if now != before:
-            anew = objects and now[0] != before[0]
+            repeat = objects and now[0] != before[0]
             pairs = zip(now, before, strict=True)
-            tags[k] = "".join(line for line, old in pairs if anew or line != old)
+            tags[k] = "".join(line for line, old in pairs if repeat or line != old)
     return tags
 
 
 def _whole_numbers(values: Any, end: int) -> Any:
-    """Return (m,) whole numbers from 0 to *end* - 1; None if *values* are anything else."""
+    """Return *values* as integers in 0..*end* - 1, (m,); None if they are anything else."""
     array = np.asarray(values)
     if array.ndim != 1 or array.dtype.kind not in "biuf" or not len(array):
         return None

@@ -1,10 +1,10 @@
-"""Fast loops: threads, and compiled kernels that each have a twin in numpy.
+"""Fast loops: threads, and compiled kernels, each with an equivalent in numpy.
 
 The files, in reading order:
 
-    dispatch    compiled kernels where numba is available and the array is large enough
-    threads     long loops over rows on all cores
-    compiled    the kernels themselves, compiled by numba
+    dispatch    compiled kernels if numba is available and the arrays are large enough
+    threads     parallel loops over rows
+    compiled    the kernels, compiled by numba
 """
 
 from .dispatch import WORTHWHILE, advice, compiled_kernels, inputs, writable

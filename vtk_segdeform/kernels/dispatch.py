@@ -1,10 +1,10 @@
-"""Whether the compiled kernels are at hand; every one has a twin in numpy that does as well.
+"""Choice between compiled kernels and their equivalents in numpy.
 
     kernels = compiled_kernels()        the module `compiled`, or None
 
-numba is installed with the package wherever it has wheels.  Importing it takes half a second, so it
-is imported with the first array that is large enough to make up for that.  Without it everything
-works, more slowly, and `advice` says so; ``SEGDEFORM_NUMBA=0`` disables it.
+numba is installed with the package on platforms that have wheels of it.  Importing it takes half a
+second, so it is imported for the first array that is large enough.  Without it everything works,
+but more slowly, and `advice` says so; ``SEGDEFORM_NUMBA=0`` disables it.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_LIBRARIES = "numba", "threadpoolctl"  # required for speed only
+_LIBRARIES = "numba", "threadpoolctl"  # for speed only
 WORTHWHILE = 2000  # faces, points: fewer are as quick in numpy
 
 
 def compiled_kernels(size: int = WORTHWHILE) -> Any:
-    """Return the compiled kernels if *size* is worth them and numba is there; else None."""
+    """Return the compiled kernels if *size* is large enough and numba is installed; else None."""
     return _kernels() if size >= WORTHWHILE else None
 
 
 def advice() -> str:
-    """Return a sentence on what to install for fast frames; "" if nothing is missing."""
+    """Return a sentence about missing libraries that make frames faster; "" if none is missing."""
     missing = [name for name in _LIBRARIES if importlib.util.find_spec(name) is None]
     if not missing:
         return ""
@@ -41,7 +41,7 @@ def advice() -> str:
 
 
 def inputs(*arrays: NDArray[Any]) -> tuple[NDArray[Any], ...]:
-    """Return *arrays* in the one form that kernels are compiled for: contiguous and read-only."""
+    """Return *arrays* contiguous and read-only, the only layout that kernels are compiled for."""
     plain = [np.ascontiguousarray(array).view() for array in arrays]
     for array in plain:
         array.setflags(write=False)
@@ -49,10 +49,9 @@ def inputs(*arrays: NDArray[Any]) -> tuple[NDArray[Any], ...]:
 
 
 def writable(array: NDArray[Any]) -> NDArray[Any]:
-    """Return *array*, contiguous and writable: as new ones are, which are handed over as they are.
+    """Return *array* contiguous and writable; new arrays are returned as they are.
 
-    For kernels of some microseconds: after each has gone over what does not fit in a cache, Python
-    starts cold, and `inputs` takes as long as they do.
+    For microsecond kernels, where the overhead of `inputs` would equal the kernel itself.
     """
     return array if array.flags.carray else np.array(array, order="C")
 
@@ -63,5 +62,5 @@ def _kernels() -> Any:
         return None
     try:
         return importlib.import_module(".compiled", __package__)
-    except ImportError:  # no numba, or one that does not fit this numpy
+    except ImportError:  # numba is missing, or incompatible with this numpy
         return None

@@ -1,11 +1,11 @@
-"""Long loops over rows, a piece at a time, on all the cores that this process may use.
+"""Parallel loops over rows, on all cores that this process may use.
 
-    in_parallel(work, n, size)        calls work(start, stop) for pieces of about *size* rows
+    in_parallel(work, n, size)        calls work(start, stop) for tasks of about *size* rows
 
-numpy and the compiled kernels let go of the interpreter while they count, so plain threads do.
-There is one pool for the whole process, however many meshes are open in it, and a host
-application that wants its cores for itself says so by ``SEGDEFORM_THREADS=1``.  Every row is
-computed alike on whatever thread, so results do not depend on how many there are.
+numpy and the compiled kernels release the GIL, so ordinary threads suffice.  There is one thread
+pool per process, for any number of open meshes; a host application can limit it with
+``SEGDEFORM_THREADS=1``.  Every row is computed in the same way on any thread, so results do not
+depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -29,39 +29,39 @@ def in_parallel(
     progress: Progress | None = None,
     message: str = "",
 ) -> None:
-    """Call *work* with (start, stop) for all of 0..n, *size* rows at a time, in any order.
+    """Call *work* with (start, stop) for all rows of 0..n, *size* at a time and in any order.
 
     Parameters
     ----------
     work : callable
-        Must not call `in_parallel` itself, and write to its own rows only.
+        Must write to its own rows only, and must not call `in_parallel`.
     n, size : int
-        How many rows there are, and how many make a piece.
+        Number of rows in total and per task.
     progress : Progress, optional
-        Called in the caller's thread with the share done; when it raises, what has not begun is
-        left undone.
+        Called in the caller's thread with the fraction done; if it raises, the remaining tasks
+        are cancelled.
     message : str
-        What *progress* is told.
+        Text passed to *progress*.
     """
-    pieces = [(start, min(start + size, n)) for start in range(0, n, size)]
-    if len(pieces) <= 1 or n_threads() == 1:
-        for start, stop in pieces:
+    tasks = [(start, min(start + size, n)) for start in range(0, n, size)]
+    if len(tasks) <= 1 or n_threads() == 1:
+        for start, stop in tasks:
             work(start, stop)
             if progress is not None:
                 progress(stop / n, message)
         return
     with one_blas_thread():
-        waiting = [_pool().submit(work, *piece) for piece in pieces]
+        futures = [_pool().submit(work, *task) for task in tasks]
         try:
-            if progress is None:  # to wake for each piece would take a core from the others
-                wait(waiting, return_when=FIRST_EXCEPTION)
-            for piece, future in zip(pieces, waiting, strict=True):
+            if progress is None:  # waking for each task would take time from the other threads
+                wait(futures, return_when=FIRST_EXCEPTION)
+            for task, future in zip(tasks, futures, strict=True):
                 future.result()
                 if progress is not None:
-                    progress(piece[1] / n, message)
+                    progress(task[1] / n, message)
         finally:
-            unfinished = [future for future in waiting if not future.cancel()]
-            for future in unfinished:  # nothing writes on after this has returned
+            unfinished = [future for future in futures if not future.cancel()]
+            for future in unfinished:  # nothing may write after this function returns
                 future.exception()
 
 
@@ -69,9 +69,9 @@ def in_parallel(
 def one_blas_thread() -> Iterator[None]:
     """Limit BLAS to one thread, in a ``with`` block or, as a decorator, in a function.
 
-    Threads of its own fight with ours where we have several.  And a solver's step is many products
-    too small to share out: waking another thread for each takes longer than the product, and
-    while it waits for more it holds the core that we are to use.
+    BLAS threads compete with the threads of `in_parallel`.  Besides, a step of the solver has many
+    small products: waking another thread takes longer than such a product, and while the thread
+    waits for more work it occupies a core.
 
     Most builds of BLAS have one number of threads for the whole process, and the order of summation
     depends on it.  So the first Python thread to enter sets the limit and the last to leave
@@ -129,7 +129,7 @@ def _blas_limit() -> _BlasLimit | None:
 
 @functools.cache
 def n_threads() -> int:
-    """Return how many threads work: ``SEGDEFORM_THREADS``, or the cores of this process."""
+    """Return the number of threads: ``SEGDEFORM_THREADS``, or the cores of this process."""
     wanted = os.environ.get("SEGDEFORM_THREADS", "")
     if wanted.isdigit() and int(wanted) > 0:
         return int(wanted)
@@ -141,5 +141,5 @@ def n_threads() -> int:
 @functools.cache
 def _pool() -> ThreadPoolExecutor:
     if hasattr(os, "register_at_fork"):
-        os.register_at_fork(after_in_child=_pool.cache_clear)  # its threads stay with the parent
+        os.register_at_fork(after_in_child=_pool.cache_clear)  # threads stay in the parent
     return ThreadPoolExecutor(n_threads(), thread_name_prefix="segdeform")

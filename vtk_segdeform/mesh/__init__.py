@@ -1,50 +1,38 @@
-"""The mesh: closed, oriented triangle surfaces, and what can be wrong with them.
+"""The mesh: closed, oriented triangle surfaces, and the search for their faults.
 
 The files, in reading order:
 
     mesh             `Mesh`, checked and immutable
-    faults           search for everything that keeps triangles from being a closed surface
-    report           the faults found, counted and in words
-    topology         edges, fans, shells and borders
-    manifold         faults of connectivity
-    intersections    pairs of triangles that cross or touch
+    faults           search for the faults of a mesh
+    report           kinds of faults, counted and described
+    topology         half-edges, edges, fans, shells and boundaries
     shells           orientation of closed shells
-    inside           winding number and distance to a surface
-    columns          inside or outside for many points at once
-    quality          angles of triangles
-    counting         sorting and grouping in linear time
+    inside           winding numbers, points inside a surface, distance to it
+    intersections    pairs of triangles that cross or touch
+    triangles        angles and normals of triangles
+    grouping         connected components, equal rows and ragged ranges in linear time
 """
 
-from .columns import count_up, inside_nodes, inside_points
-from .faults import HOPELESS, as_soup, find_faults
-from .inside import distance_to_surface, winding_number
+from .faults import UNREPAIRABLE, as_soup, connectivity_faults, find_faults
+from .grouping import connected, first_equal_row, first_of_group, ragged_arange
+from .inside import distance_to_surface, inside_nodes, inside_points, winding_number
 from .intersections import flat_faces, intersections_of, self_intersections
-from .manifold import components, connectivity_faults, counted, face_edges
 from .mesh import Mesh, require_mesh
-from .quality import corner_angles, least_angle, normals
-from .report import MeshReport
-from .shells import wrong_way_round
-from .topology import (
-    Sides,
-    connected,
-    edge_keys,
-    first_equal_row,
-    first_of_group,
-    following,
-    repeats_vertex,
-)
+from .report import MeshReport, counted
+from .shells import misoriented_shells
+from .topology import HalfEdges, components, edge_keys, face_edges, next_half_edge, repeats_vertex
+from .triangles import corner_angles, least_angle, normals
 
 __all__ = [
-    "HOPELESS",
+    "UNREPAIRABLE",
+    "HalfEdges",
     "Mesh",
     "MeshReport",
-    "Sides",
     "as_soup",
     "components",
     "connected",
     "connectivity_faults",
     "corner_angles",
-    "count_up",
     "counted",
     "distance_to_surface",
     "edge_keys",
@@ -53,15 +41,16 @@ __all__ = [
     "first_equal_row",
     "first_of_group",
     "flat_faces",
-    "following",
     "inside_nodes",
     "inside_points",
     "intersections_of",
     "least_angle",
+    "misoriented_shells",
+    "next_half_edge",
     "normals",
+    "ragged_arange",
     "repeats_vertex",
     "require_mesh",
     "self_intersections",
     "winding_number",
-    "wrong_way_round",
 ]

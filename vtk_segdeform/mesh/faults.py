@@ -1,8 +1,8 @@
-"""What keeps triangles from being a closed, outward oriented two-manifold: the search.
+"""Search for the faults that prevent triangles from being a closed, oriented two-manifold.
 
-The checks go from the outside in: numbers, indices, single faces, edges, vertices, and at last
-the side each shell faces.  Each looks only at what the ones before found sound, so that a fault is
-named once and under its own name.
+The checks run in this order: coordinates, indices, single faces, edges, vertices, and last the
+orientation of shells.  Each check skips everything that earlier ones rejected, so that a fault is
+reported once and under its own name.
 """
 
 from __future__ import annotations
@@ -15,29 +15,32 @@ from numpy.typing import ArrayLike
 from ..arrays import BoolArray, FloatArray, IntArray, plain
 from ..errors import ArgumentError
 from ..kernels import in_parallel
-from .report import Fault, Id, Kind, MeshReport
-from .shells import corner_columns, cross, judged, norm
-from .topology import Sides, connected, first_equal_row, repeats_face, repeats_vertex
+from .grouping import connected, first_equal_row
+from .report import Fault, Id, Kind, MeshReport, counted
+from .shells import shell_faults
+from .topology import HalfEdges, repeats_face, repeats_vertex
+from .triangles import corner_columns, cross, norm
 
-HOPELESS = (Kind.EMPTY, Kind.BAD_INDEX, Kind.TOO_LARGE, Kind.TOO_SMALL)  # nothing else is asked
+UNREPAIRABLE = (Kind.EMPTY, Kind.BAD_INDEX, Kind.TOO_LARGE, Kind.TOO_SMALL)  # no further checks
 _EXAMPLES = 4
-_PIECE = 10_000  # faces to a thread; what they need stays in the cache
-_LARGEST, _SMALLEST = 1e70, 1e-70  # fourth powers of lengths must be numbers
-_FLAT = 1e-12  # a face of less height than this share of its longest edge has no area
+_PIECE = 10_000  # faces per task; their data fit into the cache
+_LARGEST, _SMALLEST = 1e70, 1e-70  # fourth powers of lengths must neither overflow nor vanish
+_FLAT = 1e-12  # height over longest edge; a flatter face counts as one without area
 
 
 def find_faults(vertices: ArrayLike, faces: ArrayLike) -> MeshReport:
     """Return every fault of the triangles *faces* over *vertices*, with counts and examples.
 
-    Degenerate and duplicate faces are reported, and then left out of what follows, so that each
-    fault is named once.  Whether shells face outward is asked of closed, consistent ones only.
+    Degenerate and duplicate faces are reported and then ignored by the later checks, so that each
+    fault is reported once.  Only closed, consistently oriented shells are checked for facing
+    outward.
 
     Parameters
     ----------
     vertices : (n, 3) float
-        NaN and infinite coordinates are a fault, not an error.
+        NaN and infinite coordinates are reported as a fault.
     faces : (m, 3) int
-        Bad indices are a fault, not an error.
+        Indices out of range are reported as a fault.
 
     Raises
     ------
@@ -46,7 +49,7 @@ def find_faults(vertices: ArrayLike, faces: ArrayLike) -> MeshReport:
 
     Examples
     --------
-    A tetrahedron that lacks a face:
+    A tetrahedron without one of its faces:
 
     >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
     >>> report = find_faults(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]])
@@ -58,15 +61,15 @@ def find_faults(vertices: ArrayLike, faces: ArrayLike) -> MeshReport:
     points, triangles = as_soup(vertices, faces)
     n_components = 0
     found = list(_number_faults(points, triangles))
-    if not any(fault.kind in HOPELESS for fault in found):
-        degenerate, duplicate, sides = _unlike_faces(triangles, len(points))
-        n_components = int(sides.shells.max(initial=-1)) + 1
+    if not any(fault.kind in UNREPAIRABLE for fault in found):
+        degenerate, duplicate, half_edges = _distinct_faces(triangles, len(points))
+        n_components = int(half_edges.shells.max(initial=-1)) + 1
         found += _some(Kind.DEGENERATE, np.flatnonzero(degenerate))
         found += _some(Kind.DUPLICATE_FACE, np.flatnonzero(duplicate & ~degenerate))
         flat = _flat_faces(points, triangles)
         found += _some(Kind.ZERO_AREA, flat[~degenerate[flat]])
-        found += _edge_faults(sides)
-        found += _inward_shells(points, sides)
+        found += _edge_faults(half_edges)
+        found += _inward_shells(points, half_edges)
         coincident = first_equal_row(points) != np.arange(len(points))
         found += _some(Kind.COINCIDENT, np.flatnonzero(coincident))
         if n_components > 1:
@@ -81,7 +84,7 @@ def find_faults(vertices: ArrayLike, faces: ArrayLike) -> MeshReport:
 
 
 def as_soup(vertices: ArrayLike, faces: ArrayLike) -> tuple[FloatArray, IntArray]:
-    """Return arrays (n, 3) float and (m, 3) int whatever they hold; only shape and type matter."""
+    """Return (n, 3) float and (m, 3) int arrays; only shapes and types are checked."""
     points, triangles = plain(vertices, "vertices"), plain(faces, "faces")
     if points.size == 0:
         points = np.empty((0, 3))
@@ -101,11 +104,46 @@ def as_soup(vertices: ArrayLike, faces: ArrayLike) -> tuple[FloatArray, IntArray
     )
 
 
+def connectivity_faults(n_points: int, faces: IntArray) -> list[str]:
+    """Return one sentence per fault of the connectivity of a cage, *faces* (m, 3); [] if none.
+
+    Shorter than `find_faults`, since a faulty cage is rejected and not repaired.
+    """
+    if len(faces) < 4:
+        return [f"a closed surface needs at least 4 faces; got {len(faces)}"]
+    a, b, c = faces.T
+    repeated = np.count_nonzero((a == b) | (b == c) | (c == a))
+    if repeated:
+        return [f"{counted(int(repeated), 'face repeats', 'faces repeat')} a vertex"]
+    half_edges = HalfEdges(faces, n_points)
+    faults = []
+    if len(half_edges.boundary):
+        border = counted(len(half_edges.boundary), "edge borders", "edges border")
+        faults.append(f"{border} only one face: the cage is open")
+    if len(half_edges.non_manifold):
+        edges = counted(len(half_edges.non_manifold), "edge borders", "edges border")
+        faults.append(f"{edges} three or more faces")
+    inconsistent = int(np.count_nonzero(half_edges.inconsistent))
+    if inconsistent:
+        edges = counted(inconsistent, "edge has", "edges have")
+        faults.append(f"{edges} faces of opposite orientation")
+    unused = n_points - len(np.unique(faces))
+    if unused:
+        faults.append(f"{counted(unused, 'vertex is', 'vertices are')} in no face")
+    if not faults:
+        fans = half_edges.fans(half_edges.pairs)
+        pinched = len(np.unique(fans)) - n_points
+        if pinched:
+            vertices = counted(pinched, "vertex joins", "vertices join")
+            faults.append(f"{vertices} several surfaces in a point")
+    return faults
+
+
 def _number_faults(points: FloatArray, faces: IntArray) -> Iterator[Fault]:
     if not len(faces):
         yield Fault(Kind.EMPTY, 1)
     finite, far = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
-    if not (np.abs(points) <= _LARGEST).all():  # one cheap question, before several
+    if not (np.abs(points) <= _LARGEST).all():  # one cheap test before several
         finite = _finite(points)
         far[:] = (np.isfinite(points) & (np.abs(points) > _LARGEST)).any(axis=1)
     yield from _some(Kind.NON_FINITE, np.flatnonzero(~finite))
@@ -127,21 +165,21 @@ def _finite(points: FloatArray) -> BoolArray:
     return np.asarray(np.isfinite(points).all(axis=1))
 
 
-def _unlike_faces(faces: IntArray, n_vertices: int) -> tuple[BoolArray, BoolArray, Sides]:
-    """Return which faces repeat a vertex, which an earlier face, and the sides of the others.
+def _distinct_faces(faces: IntArray, n_vertices: int) -> tuple[BoolArray, BoolArray, HalfEdges]:
+    """Return which faces are degenerate, which repeat an earlier face, and the others' half-edges.
 
-    Two faces on the same three vertices share three edges.  Where every edge has its two faces,
-    each face is therefore asked only for its neighbours: whether two of them are the same.
+    Two faces on the same three vertices share three edges.  If every edge has two faces, a face
+    can therefore only be a duplicate if two of its neighbours are the same face.
     """
     degenerate = repeats_vertex(faces)
     if not degenerate.any():
-        sides = Sides(faces, n_vertices)
-        if sides.neighbours is not None:
-            one, other, _ = sides.neighbours.T
+        half_edges = HalfEdges(faces, n_vertices)
+        if half_edges.neighbours is not None:
+            one, other, _ = half_edges.neighbours.T
             if not (one == other).any():
-                return degenerate, degenerate, sides
+                return degenerate, degenerate, half_edges
     duplicate = repeats_face(faces)
-    return degenerate, duplicate, Sides(faces[~degenerate & ~duplicate], n_vertices)
+    return degenerate, duplicate, HalfEdges(faces[~degenerate & ~duplicate], n_vertices)
 
 
 def _flat_faces(points: FloatArray, faces: IntArray) -> IntArray:
@@ -159,41 +197,46 @@ def _flat_faces(points: FloatArray, faces: IntArray) -> IntArray:
     return np.flatnonzero(flat)
 
 
-def _edge_faults(sides: Sides) -> Iterator[Fault]:
+def _edge_faults(half_edges: HalfEdges) -> Iterator[Fault]:
     def edges(some: IntArray) -> tuple[Id, ...]:
-        ends = np.stack([sides.tail[some], sides.head[some]], axis=1)
+        ends = np.stack([half_edges.tail[some], half_edges.head[some]], axis=1)
         return tuple((a, b) for a, b in np.sort(ends, axis=1).tolist())
 
-    if sides.partner is not None:  # nothing else can be wrong
-        yield from _some(Kind.NON_MANIFOLD_VERTEX, sides.pinched)
+    if half_edges.twin is not None:  # nothing else can be wrong
+        yield from _some(Kind.NON_MANIFOLD_VERTEX, half_edges.pinched)
         return
-    yield from _some(Kind.OPEN_EDGE, sides.open, edges)
-    ends = np.stack([sides.tail[sides.open], sides.head[sides.open]], axis=1)
+    yield from _some(Kind.OPEN_EDGE, half_edges.boundary, edges)
+    ends = np.stack(
+        [half_edges.tail[half_edges.boundary], half_edges.head[half_edges.boundary]], axis=1
+    )
     corners, ends = np.unique(ends, return_inverse=True)
     _, hole = np.unique(connected(len(corners), *ends.reshape(-1, 2).T), return_index=True)
     yield from _some(Kind.HOLE, corners[hole])
-    crowded = sides.order[sides.first[sides.n_sides > 2]]
-    yield from _some(Kind.NON_MANIFOLD_EDGE, crowded, edges)
-    yield from _some(Kind.NON_MANIFOLD_VERTEX, sides.pinched)
-    yield from _some(Kind.TURNED_EDGE, sides.pairs[sides.turned, 0], edges)
+    non_manifold = half_edges.order[half_edges.first[half_edges.counts > 2]]
+    yield from _some(Kind.NON_MANIFOLD_EDGE, non_manifold, edges)
+    yield from _some(Kind.NON_MANIFOLD_VERTEX, half_edges.pinched)
+    yield from _some(Kind.TURNED_EDGE, half_edges.pairs[half_edges.inconsistent, 0], edges)
 
 
-def _inward_shells(points: FloatArray, sides: Sides) -> Iterator[Fault]:
-    """Ask the shells whose every edge joins two faces that face the same side."""
-    asked = np.ones(len(sides.faces), dtype=bool)
-    if sides.partner is None:
-        good = np.ones(int(sides.shells.max(initial=-1)) + 1, dtype=bool)
-        good[sides.shells[sides.open // 3]] = False
-        good[sides.shells[sides.order[sides.first[sides.n_sides > 2]] // 3]] = False
-        good[sides.shells[sides.pairs[sides.turned, 0] // 3]] = False
-        asked = good[sides.shells]
+def _inward_shells(points: FloatArray, half_edges: HalfEdges) -> Iterator[Fault]:
+    """Yield the faults of orientation of the shells that are closed and consistently oriented."""
+    checked = np.ones(len(half_edges.faces), dtype=bool)
+    if half_edges.twin is None:
+        good = np.ones(int(half_edges.shells.max(initial=-1)) + 1, dtype=bool)
+        good[half_edges.shells[half_edges.boundary // 3]] = False
+        good[half_edges.shells[half_edges.order[half_edges.first[half_edges.counts > 2]] // 3]] = (
+            False
+        )
+        good[half_edges.shells[half_edges.pairs[half_edges.inconsistent, 0] // 3]] = False
+        checked = good[half_edges.shells]
     if not (finite := _finite(points)).all():
-        asked &= finite[sides.faces].all(axis=1)
-    faces, shells = sides.faces, sides.shells
-    if not asked.all():
-        faces, (_, shells) = faces[asked], np.unique(shells[asked], return_inverse=True)
+        checked &= finite[half_edges.faces].all(axis=1)
+    faces, shells = half_edges.faces, half_edges.shells
+    if not checked.all():
+        faces = faces[checked]
+        _, shells = np.unique(shells[checked], return_inverse=True)
     if len(faces):
-        wrong, flat, first = judged(points, faces, shells)
+        wrong, flat, first = shell_faults(points, faces, shells)
         yield from _some(Kind.INWARD, faces[first[wrong & ~flat], 0])
         yield from _some(Kind.NO_VOLUME, faces[first[flat], 0])
 
@@ -201,7 +244,7 @@ def _inward_shells(points: FloatArray, sides: Sides) -> Iterator[Fault]:
 def _some(
     kind: Kind, where: IntArray, ids: Callable[[IntArray], tuple[Id, ...]] | None = None
 ) -> Iterator[Fault]:
-    """Yield the fault if it occurs at all; *ids* turns the first few places into what is shown."""
+    """Yield the fault if it occurs; *ids* converts its first few occurrences to examples."""
     if len(where):
         few = where[:_EXAMPLES]
         yield Fault(kind, len(where), ids(few) if ids else tuple(few.tolist()))

@@ -1,21 +1,21 @@
-"""Pairs of triangles of a mesh that cross or touch where they should not.
+"""Self-intersections: pairs of triangles of a mesh that cross or touch.
 
-Two faces of an embedded surface meet in nothing, in a shared corner or in a shared edge.  A pair
-that meets in more is found in two stages:
+Two faces of an embedded surface are disjoint or share exactly a corner or an edge.  All other
+pairs are found in two stages:
 
-    boxes       a sweep along the axis that parts the bounding boxes best leaves few pairs
+    boxes       a sweep along the axis that separates the bounding boxes best leaves few pairs
     triangles   a and b meet if an edge of one pierces the other, d_p d_q <= 0 with the piercing
-                point inside; in a common plane, if no edge of either has them on its two sides
+                point inside; in a common plane, if no edge of either separates them
 
 d are the distances of one triangle's corners from the other's plane.  A shared corner lies in
-both planes and only the edges opposite to it can pierce; faces on a shared edge can only fold
+both planes, so only the edges opposite to it can pierce; faces that share an edge can only fold
 over one another.
 
 Source
 ------
 [Moe97] T. Moeller, "A fast triangle-triangle intersection test", J. Graphics Tools 2(2), 25-30,
-        1997.  The interval test there is replaced by the piercing points, which stay correct
-        for triangles that are almost in one plane.
+        1997.  Piercing points replace its interval test, since they remain correct for
+        nearly coplanar triangles.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
 
-_TOUCH = 1e-12  # of a pair's extent: closer than this, triangles touch and planes are one
+_TOUCH = 1e-12  # of a pair's extent: at smaller distances triangles touch and planes coincide
 _FOLD = 1e-9  # radians between two faces folded over their common edge
-_NEEDLE = 1e-10  # height of a face over its longest edge: below it has no plane
-_BATCH = 200_000  # pairs of boxes looked at together
-_FACES = 10_000  # faces whose neighbourhood is searched together
+_NEEDLE = 1e-10  # height over longest edge; the plane of a flatter face is undefined
+_BATCH = 200_000  # pairs of boxes tested at once
+_FACES = 10_000  # faces whose neighbourhoods are searched at once
 
 _EDGES = ((0, 1), (1, 2), (2, 0))
-_OPPOSITE = ((1, 2),)  # the edge opposite to a shared corner that was rolled to the front
+_OPPOSITE = ((1, 2),)  # the edge opposite to a shared corner, which is rolled to the front
 
 
 def self_intersections(vertices: ArrayLike, faces: ArrayLike) -> IntArray:
@@ -79,7 +79,7 @@ def intersections_of(vertices: FloatArray, faces: IntArray, some: IntArray) -> I
     Returns
     -------
     pairs : (k, 2) int
-        One of *some* first; a pair of two of them stands there once either way.
+        One of *some* comes first; a pair of two of them is listed in both orders.
     """
     corners = vertices[faces]
     low, high = corners.min(axis=1), corners.max(axis=1)
@@ -90,10 +90,10 @@ def intersections_of(vertices: FloatArray, faces: IntArray, some: IntArray) -> I
 
 
 def _boxes_near(low: FloatArray, high: FloatArray, some: IntArray) -> Iterator[IntArray]:
-    """Yield the pairs of *some* boxes and any others that overlap or touch, sizes sorted apart.
+    """Yield the pairs of *some* boxes and any others that overlap or touch.
 
-    Boxes of similar size are searched by their centres, so that one large box does not slow down
-    the search of the small ones.
+    The centres are searched separately for each power of two of the size, so that one large box
+    does not slow down the search among small ones.
     """
     centre, radius = 0.5 * (low + high), 0.5 * np.linalg.norm(high - low, axis=1)
     size = np.frexp(radius)[1]
@@ -116,7 +116,7 @@ def _boxes_near(low: FloatArray, high: FloatArray, some: IntArray) -> Iterator[I
 
 
 def flat_faces(vertices: FloatArray, faces: IntArray) -> IntArray:
-    """Return the numbers of the faces that have no area to speak of, and so no plane."""
+    """Return the indices of faces with nearly zero area, whose plane is undefined."""
     a, b, c = vertices[faces.T]
     twice_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     longest = np.max([((b - a) ** 2).sum(1), ((c - b) ** 2).sum(1), ((a - c) ** 2).sum(1)], axis=0)
@@ -148,7 +148,7 @@ def _overlapping_boxes(low: FloatArray, high: FloatArray) -> Iterator[IntArray]:
 
 
 def _meet(points: FloatArray, a: IntArray, b: IntArray) -> BoolArray:
-    """Tell which triangles *a* and *b*, (k, 3) int each, meet outside their common corners."""
+    """Return which triangles *a* and *b*, (k, 3) int each, meet outside their common corners."""
     same = a[:, :, None] == b[:, None, :]
     shared = same.sum(axis=(1, 2))
     result = np.asarray(shared == 3)
@@ -167,12 +167,12 @@ def _meet(points: FloatArray, a: IntArray, b: IntArray) -> BoolArray:
 
 def _folded(a: FloatArray, b: FloatArray) -> BoolArray:
     n, m = _unit_normals(a), _unit_normals(b)
-    turned = np.einsum("ij,ij->i", n, m) < 0
-    return np.asarray(turned & (np.linalg.norm(np.cross(n, m), axis=1) <= _FOLD))
+    opposite = np.einsum("ij,ij->i", n, m) < 0
+    return np.asarray(opposite & (np.linalg.norm(np.cross(n, m), axis=1) <= _FOLD))
 
 
 def _pierce_or_overlap(a: FloatArray, b: FloatArray, *, corner_shared: bool) -> BoolArray:
-    """Decide for triangles (k, 3, 3); a shared corner is the first of both."""
+    """Return which triangles (k, 3, 3) intersect; a shared corner is the first of both."""
     origin = a[:, :1]
     a, b = a - origin, b - origin
     touch = _TOUCH * np.maximum(np.abs(a).max(axis=(1, 2)), np.abs(b).max(axis=(1, 2)))
@@ -208,12 +208,12 @@ def _pierce_or_overlap(a: FloatArray, b: FloatArray, *, corner_shared: bool) -> 
 def _overlap(
     a: FloatArray, b: FloatArray, inward_a: FloatArray, inward_b: FloatArray, depth: FloatArray
 ) -> BoolArray:
-    """Tell whether triangles in one plane reach at least *depth* into one another."""
-    parted = np.zeros(len(a), dtype=bool)
+    """Return which coplanar triangles overlap by more than *depth* (k,)."""
+    separated = np.zeros(len(a), dtype=bool)
     for triangle, inward, other in (a, inward_a, b), (b, inward_b, a):
         beyond = np.einsum("kijx,kix->kij", other[:, None] - triangle[:, :, None], inward)
-        parted |= (beyond.max(axis=2) <= depth[:, None]).any(axis=1)
-    return ~parted
+        separated |= (beyond.max(axis=2) <= depth[:, None]).any(axis=1)
+    return ~separated
 
 
 def _unit_normals(triangle: FloatArray) -> FloatArray:
@@ -225,14 +225,14 @@ def _unit_normals(triangle: FloatArray) -> FloatArray:
 def _distances(
     corners: FloatArray, triangle: FloatArray, normal: FloatArray, touch: FloatArray
 ) -> FloatArray:
-    """Return (k, 3) signed distances of *corners* from the planes; 0 where they touch."""
+    """Return the signed distances of *corners* from the planes, (k, 3); 0 where they touch."""
     d = np.einsum("kij,kj->ki", corners - triangle[:, :1], normal)
     d[np.abs(d) <= touch[:, None]] = 0.0
     return np.asarray(d)
 
 
 def _inward(triangle: FloatArray, normal: FloatArray) -> FloatArray:
-    """Return (k, 3, 3): for each edge i, i + 1 the unit vector in the plane that points inward."""
+    """Return the in-plane unit vectors that point inward from each edge i, i + 1, (k, 3, 3)."""
     along = triangle[:, [1, 2, 0]] - triangle
     inward = np.cross(normal[:, None], along)
     length = np.linalg.norm(inward, axis=2, keepdims=True)

@@ -1,7 +1,8 @@
-"""The mesh that is deformed: triangles that close, on a two-manifold, seen from outside.
+"""`Mesh`: a closed, outward oriented triangle mesh.
 
-Volume, and with it the whole method, only means something on such a mesh (section 3.2 of the
-paper), so a `Mesh` cannot be made from anything else: `find_faults` looks, `repair` mends.
+Volume, and with it the whole method, is only defined for a closed, oriented two-manifold
+(section 3.2 of the paper), so `Mesh` rejects everything else; `find_faults` lists the faults and
+`repair` fixes what it can.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ from ..freezing import Frozen, read_only
 from ..kernels import in_parallel
 from .faults import as_soup, find_faults
 
-_PIECE = 20_000  # faces to a thread; what they need stays in the cache
+_PIECE = 20_000  # faces per task; their data fit into the cache
 
 
 @dataclass(frozen=True, init=False, eq=False)
 class Mesh(Frozen):
-    """A closed, outward oriented triangle mesh; frozen.
+    """A closed, outward oriented triangle mesh; immutable.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ class Mesh(Frozen):
     ValueError
         If an array has the wrong shape or type.
     MeshError
-        If the mesh is not a closed oriented two-manifold; names and counts every fault.
+        If the mesh is not a closed, oriented two-manifold; the message counts every fault.
 
     Examples
     --------
@@ -79,20 +80,20 @@ class Mesh(Frozen):
 
     @cached_property
     def diagonal(self) -> float:
-        """Length of the bounding box's diagonal: the size that tolerances are relative to."""
+        """Length of the bounding box diagonal, the reference length of tolerances."""
         return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
 
     @cached_property
     def edges(self) -> IntArray:
-        """(e, 2) int: each edge once, smaller vertex first, in lexicographic order."""
+        """(e, 2) int: the edges, smaller vertex first, in lexicographic order."""
         tails, heads = self.faces.ravel(), self.faces[:, [1, 2, 0]].ravel()
-        once = tails < heads  # every edge is met once from either end
+        once = tails < heads  # an edge occurs once in each direction
         keys = np.sort(tails[once] * self.n_vertices + heads[once])
         return read_only(np.stack(np.divmod(keys, self.n_vertices), axis=1))
 
     @cached_property
     def adjacency(self) -> sparse.csr_array:
-        """(n, n) symmetric sparse: the edge length between neighbouring vertices."""
+        """(n, n) symmetric sparse: edge lengths between neighbouring vertices."""
         i, j = self.edges.T
         length = np.linalg.norm(self.vertices[i] - self.vertices[j], axis=1)
         length = np.maximum(length, np.finfo(float).tiny)  # csgraph reads a zero as "no edge"
@@ -104,7 +105,7 @@ class Mesh(Frozen):
 
     @cached_property
     def _edge_numbers(self) -> sparse.csr_array:
-        """(n, n) symmetric sparse: 1 + the number of the edge between neighbouring vertices."""
+        """(n, n) symmetric sparse: 1 + the edge index between neighbouring vertices."""
         numbers = np.arange(1, len(self.edges) + 1, dtype=np.int32)
         half = sparse.coo_array((numbers, tuple(self.edges.T)), shape=(self.n_vertices,) * 2)
         return (half + half.T).tocsr()
@@ -117,7 +118,7 @@ class Mesh(Frozen):
 
     @cached_property
     def face_areas(self) -> FloatArray:
-        """(m,) float: the triangles' areas."""
+        """(m,) float: areas of the triangles."""
         areas = np.empty(self.n_faces)
 
         def work(start: int, stop: int) -> None:
@@ -129,14 +130,14 @@ class Mesh(Frozen):
         return areas
 
     def with_vertices(self, vertices: ArrayLike) -> Mesh:
-        """Return the same triangles over other positions (n, 3), finite but otherwise unchecked.
+        """Return a mesh with the same triangles and other positions (n, 3).
 
-        The triangles were checked already; a pose that crosses or inverts itself is still a pose.
+        The positions must be finite; a pose may intersect or invert itself.
         """
         points = as_points(vertices, "vertices", self.n_vertices)
         posed = object.__new__(Mesh)
         posed.__setstate__({"vertices": points.copy(), "faces": self.faces})
-        # the same at every pose: hand on what is known
+        # The same for every pose: pass on the cached values.
         for name in ("edges", "components", "_edge_numbers"):
             if name in self.__dict__:
                 posed.__dict__[name] = self.__dict__[name]
@@ -144,9 +145,9 @@ class Mesh(Frozen):
 
 
 def require_mesh(mesh: object) -> None:
-    """Raise a MeshError unless *mesh* is a `Mesh`, and say how to make one."""
+    """Raise a MeshError that says how to make a `Mesh` unless *mesh* is one."""
     if not isinstance(mesh, Mesh):
         raise MeshError(
-            f"mesh must be a Mesh; got {type(mesh).__name__}. Make one by Mesh(vertices, faces), "
+            f"mesh must be a Mesh; got {type(mesh).__name__}. Make one with Mesh(vertices, faces), "
             "read_mesh(path) or convert.from_polydata(polydata)"
         )

@@ -1,6 +1,6 @@
-"""What is wrong with a mesh, in words: kinds of faults, and the report that counts them.
+"""Kinds of mesh faults, and the report that counts them.
 
-A fault keeps triangles from being a `Mesh`; a note does not.  `find_faults` looks for both.
+A fault prevents triangles from being a `Mesh`; a note does not.  `find_faults` finds both.
 """
 
 from __future__ import annotations
@@ -12,89 +12,89 @@ Id = int | tuple[int, ...]  # a vertex or face by its number, an edge by its two
 
 
 class Kind(enum.Enum):
-    """A way to fail or, the last three, a thing worth knowing: in words, where, what to do."""
+    """A kind of fault, or of note (the last three): its name, its location and what to do."""
 
     EMPTY = "empty mesh", "empty meshes", "", "give at least four triangles"
     NON_FINITE = (
         "vertex with NaN or infinite coordinates",
         "vertices with NaN or infinite coordinates",
         "vertex ",
-        "`repair` would drop them and their faces",
+        "`repair` removes such vertices and their faces",
     )
     BAD_INDEX = (
-        "face naming a vertex that does not exist",
-        "faces naming a vertex that does not exist",
+        "face with a vertex index out of range",
+        "faces with a vertex index out of range",
         "face ",
-        "count vertices from 0, and pass all of them",
+        "number vertices from 0, and pass all of them",
     )
     TOO_LARGE = (
-        "vertex too far out to compute volumes with",
-        "vertices too far out to compute volumes with",
+        "vertex too far from the origin to compute volumes",
+        "vertices too far from the origin to compute volumes",
         "vertex ",
-        "scale the mesh down: coordinates may be 1e70 at most",
+        "scale the mesh down; coordinates must not exceed 1e70",
     )
     TOO_SMALL = (
-        "mesh too small to compute volumes with",
-        "meshes too small to compute volumes with",
+        "mesh too small to compute volumes",
+        "meshes too small to compute volumes",
         "",
-        "scale it up: it must be 1e-70 long at least",
+        "scale the mesh up; its extent must be at least 1e-70",
     )
     UNREFERENCED = (
         "unreferenced vertex",
         "unreferenced vertices",
         "vertex ",
-        "`repair` would drop what is in no face",
+        "`repair` removes vertices that are in no face",
     )
     DEGENERATE = (
         "degenerate face",
         "degenerate faces",
         "face ",
-        "`repair` would drop what names a vertex twice",
+        "`repair` removes faces that contain a vertex twice",
     )
-    DUPLICATE_FACE = "duplicate face", "duplicate faces", "face ", "`repair` would keep one of each"
+    DUPLICATE_FACE = "duplicate face", "duplicate faces", "face ", "`repair` keeps one of each"
     OPEN_EDGE = (
         "open edge",
         "open edges",
         "",
-        "`repair` would weld vertices that coincide along them, then fill holes",
+        "`repair` welds coincident vertices along them, then fills holes",
     )
-    HOLE = "hole", "holes", "at vertex ", "`repair` would fill those of up to `largest_hole` edges"
+    HOLE = "hole", "holes", "at vertex ", "`repair` fills holes of up to `largest_hole` edges"
     NON_MANIFOLD_EDGE = (
         "non-manifold edge",
         "non-manifold edges",
         "",
-        "three or more faces meet there; `repair` would split where closed bodies touch",
+        "three or more faces meet there; `repair` separates closed bodies that touch",
     )
     NON_MANIFOLD_VERTEX = (
         "non-manifold vertex",
         "non-manifold vertices",
         "vertex ",
-        "surfaces touch there in a point; `repair` would split them",
+        "surfaces touch there in a point; `repair` separates them",
     )
     TURNED_EDGE = (
         "inconsistently oriented edge",
         "inconsistently oriented edges",
         "",
-        "their two faces face opposite sides; `repair` would turn the fewer faces round",
+        "the two faces there have opposite orientation; `repair` flips the minority",
     )
     INWARD = (
         "inside-out component",
         "inside-out components",
         "at vertex ",
-        "`repair` would turn them round",
+        "`repair` flips such components",
     )
     NO_VOLUME = (
         "component that encloses no volume",
         "components that enclose no volume",
         "at vertex ",
-        "give it thickness, leave it out or, where digits are lost, move it near to the origin",
+        "thicken it or remove it; if it is far from the origin, move it there",
     )
     ZERO_AREA = "face without area", "faces without area", "face ", "allowed", False
     COINCIDENT = (
-        "vertex on the same place as another",
-        "vertices on the same place as another",
+        "vertex at the same position as another",
+        "vertices at the same position as another",
         "vertex ",
-        "allowed where the surface closes without welding them",
+        "allowed if the surface is closed without welding them",
         False,
     )
     COMPONENTS = "component", "components", "", "allowed", False
@@ -105,7 +105,7 @@ class Kind(enum.Enum):
 
 @dataclass(frozen=True)
 class Fault:
-    """One kind of fault: how often it occurs, and at which vertices, edges or faces."""
+    """One kind of fault: its count, and examples of vertices, edges or faces."""
 
     kind: Kind
     count: int
@@ -122,7 +122,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class MeshReport:
-    """All that `find_faults` found; ``str(report)`` is meant for people."""
+    """The result of `find_faults`; ``str(report)`` is readable text."""
 
     n_vertices: int
     n_faces: int
@@ -132,18 +132,23 @@ class MeshReport:
 
     @property
     def ok(self) -> bool:
-        """Whether a `Mesh` can be made; notes do not stand in the way."""
+        """Whether the triangles can be a `Mesh`; notes do not matter."""
         return not self.faults
 
     def count(self, kind: Kind) -> int:
-        """Return how often *kind* occurs, 0 if it does not."""
+        """Return the number of occurrences of *kind*."""
         return sum(f.count for f in self.faults + self.notes if f.kind is kind)
 
     def __str__(self) -> str:
         parts = "component" if self.n_components == 1 else "components"
         size = f"{self.n_vertices} vertices, {self.n_faces} faces, {self.n_components} {parts}"
-        verdict = "a closed, outward oriented two-manifold" if self.ok else "not usable as it is"
+        verdict = "a closed, outward oriented two-manifold" if self.ok else "has faults"
         lines = [f"{size}: {verdict}"]
         lines += [f"  fault: {fault}; {fault.kind.advice}" for fault in self.faults]
         lines += [f"  note: {note}; {note.kind.advice}" for note in self.notes]
         return "\n".join(lines)
+
+
+def counted(number: int, one: str, many: str) -> str:
+    """Return "1 edge is" or "2 edges are": *number* with its singular or plural."""
+    return f"{number} {one if number == 1 else many}"

@@ -1,8 +1,8 @@
-"""Which way each closed shell of a mesh ought to face, and whether it does.
+"""Orientation of closed shells: outward around bodies, inward around cavities.
 
-A shell inside an even number of others bounds a body and must enclose a positive volume; inside an
-odd number it is the wall of a cavity, and its own volume must be negative.  Inside is where the
-generalized winding number of the other shell is 1 in absolute value, whichever way that faces.
+A shell inside an even number of other shells bounds a body, so its volume must be positive; inside
+an odd number it bounds a cavity, so its volume must be negative.  A point is inside a shell if the
+shell's generalized winding number there is 1 or -1.
 
 Source
 ------
@@ -16,38 +16,39 @@ import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..kernels import in_parallel
-from .counting import first_members
+from .grouping import first_members
 from .inside import winding_number
+from .triangles import corner_columns, cross, norm
 
-_PIECE = 10_000  # faces to a thread; what they need stays in the cache
-_NO_VOLUME = 1e-14  # share of area times size; rounding leaves about this much of a flat shell
-
-
-def wrong_way_round(vertices: FloatArray, faces: IntArray, shells: IntArray) -> BoolArray:
-    """Return which shells face the wrong side or enclose no volume, (k,) bool; see `judged`."""
-    return judged(vertices, faces, shells)[0]
+_PIECE = 10_000  # faces per task; their data fit into the cache
+_NO_VOLUME = 1e-14  # relative to area times size: about the rounding error for a flat shell
 
 
-def judged(
+def misoriented_shells(vertices: FloatArray, faces: IntArray, shells: IntArray) -> BoolArray:
+    """Return which shells are inside-out or enclose no volume, (k,) bool; see `shell_faults`."""
+    return shell_faults(vertices, faces, shells)[0]
+
+
+def shell_faults(
     vertices: FloatArray, faces: IntArray, shells: IntArray
 ) -> tuple[BoolArray, BoolArray, IntArray]:
-    """Tell of each shell what is wrong with the volume it encloses.
+    """Return which shells are inside-out or enclose no volume.
 
     Parameters
     ----------
     vertices : (n, 3) float
         Finite.
     faces : (m, 3) int
-        Every shell closed and oriented consistently.
+        Every shell closed and consistently oriented.
     shells : (m,) int
         The shell of each face, 0..k-1.
 
     Returns
     -------
     wrong : (k,) bool
-        Faces the wrong side, or encloses no volume.
+        Whether the shell is inside-out or encloses no volume.
     flat : (k,) bool
-        Encloses no volume but what rounding leaves.
+        Whether it encloses no volume, up to rounding.
     first : (k,) int
         Its first face.
     """
@@ -56,14 +57,14 @@ def judged(
     depth = _depths(vertices, faces, shells)
     wrong = np.where(depth % 2 == 0, volume, -volume) <= _NO_VOLUME * scale
     if len(volume) and not wrong.any() and volume.sum() <= 0.0:
-        wrong[:] = True  # only shells that overlap get here
+        wrong[:] = True  # only overlapping shells get here
     return wrong, np.asarray(np.abs(volume) <= _NO_VOLUME * scale), first
 
 
 def _volumes(
     vertices: FloatArray, faces: IntArray, shells: IntArray, origins: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return each shell's volume, about a point of its own (k, 3), and its area times its size."""
+    """Return the volume of each shell, relative to its *origin* (k, 3), and its area times size."""
     volumes, areas, radii = np.empty((3, len(faces)))
 
     def work(start: int, stop: int) -> None:
@@ -79,32 +80,11 @@ def _volumes(
     return np.bincount(shells, volumes) / 6.0, np.bincount(shells, areas) / 2.0 * size
 
 
-def corner_columns(vertices: FloatArray, faces: IntArray) -> list[FloatArray]:
-    """Return the places of the three corners of *faces* (k, 3), each (3, k) float: x, y and z.
-
-    Long rows: `cross` and `norm` take half the time that numpy's own take of short ones.
-    """
-    return [np.take(vertices, corner, axis=0).T.copy() for corner in faces.T]
-
-
-def cross(u: FloatArray, v: FloatArray) -> FloatArray:
-    """Return the cross products of the columns of *u* and *v*, (3, k) float."""
-    product = np.empty_like(u)
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        product[i] = u[j] * v[k] - u[k] * v[j]
-    return product
-
-
-def norm(u: FloatArray) -> FloatArray:
-    """Return the lengths of the columns of *u*, (k,) float."""
-    return np.asarray(np.sqrt((u * u).sum(axis=0)))
-
-
 def _depths(vertices: FloatArray, faces: IntArray, shells: IntArray) -> IntArray:
     """Return the number of other shells around each shell, (k,) int.
 
-    A shell is asked at its outermost vertices in each direction, so that one which merely
-    reaches into another, a limb pushed into a body, is not taken for a cavity.
+    All extreme vertices of a shell must be inside the other one, so that a shell which only
+    reaches into another, such as a limb pushed into a body, does not count as a cavity.
     """
     n_shells = int(shells.max(initial=-1)) + 1
     depth = np.zeros(n_shells, dtype=np.int64)

@@ -1,17 +1,19 @@
-"""Which triangles touch where: edges, fans, shells and borders, without any positions.
+"""Connectivity of a triangle mesh: half-edges, edges, fans, shells and boundaries.
 
-A triangle (v_0, v_1, v_2) has three *sides*, directed from each corner to the next.  Side
-``h = 3 f + c`` belongs to face f and runs from its corner c to its corner c + 1, so h also names
-that corner.  Everything here follows from sorting the 3m sides by the edge they lie on, and
-where each lies against just one other, as on any sound mesh, from these partners alone:
+A triangle (v_0, v_1, v_2) has three *half-edges*, directed from each corner to the next.
+Half-edge ``h = 3 f + c`` belongs to face f and runs from its corner c to its corner c + 1, so h
+also identifies that corner.  Sorting the 3m half-edges by edge gives everything else; on a closed,
+consistently oriented surface, where every half-edge has a twin, the twins alone suffice:
 
-    edge     the sides between the same two vertices, in either direction
-    partner  the one other side on an edge, which runs the other way
-    open     an edge with one side; the surface ends there
-    pair     an edge with two; on a two-manifold every edge is one
-    shell    the faces that can be reached from each other across edges
-    fan      the corners at one vertex that can be reached from each other across pairs; at each
-             vertex of a two-manifold there is exactly one
+    edge      the half-edges between the same two vertices, in either direction
+    twin      the other half-edge of an edge that has two of opposite direction
+    boundary  an edge with one half-edge
+    pair      an edge with two half-edges; on a two-manifold every edge is a pair
+    shell     the faces that are connected across edges
+    fan       the corners at one vertex that are connected across pairs; each vertex of a
+              two-manifold has exactly one
+
+Positions are not used.
 """
 
 from __future__ import annotations
@@ -20,49 +22,48 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, IntArray
-from .counting import counting_order, first_members, perhaps_equal
+from .grouping import connected, counting_order, first_equal_row
 
-_ROUNDS = 10_000  # steps around a vertex; where more faces meet, `fans` are counted instead
+_ROUNDS = 10_000  # steps around a vertex; with more faces at a vertex, `fans` are counted
 
 
 @dataclass(frozen=True, eq=False)
-class Sides:
-    """The directed sides of triangles, sorted by edge; faces (m, 3) must not repeat a vertex."""
+class HalfEdges:
+    """Half-edges of triangles (m, 3), sorted by edge; no face may repeat a vertex."""
 
     faces: IntArray
     n_vertices: int
 
     @cached_property
     def tail(self) -> IntArray:
-        """(3m,) int: the vertex where each side starts."""
+        """(3m,) int: the vertex at which each half-edge starts."""
         return self.faces.ravel()
 
     @cached_property
     def head(self) -> IntArray:
-        """(3m,) int: the vertex where each side ends."""
+        """(3m,) int: the vertex at which each half-edge ends."""
         return np.roll(self.faces, -1, axis=1).ravel()
 
     @cached_property
     def keys(self) -> IntArray:
-        """(3m,) int: one number per pair of vertices, whatever the direction; see `edge_keys`."""
+        """(3m,) int: the edge of each half-edge as one number; see `edge_keys`."""
         return edge_keys(self.tail, self.head, self.n_vertices)
 
     @cached_property
     def order(self) -> IntArray:
-        """(3m,) int: the sides, those of one edge next to each other, smaller number first."""
+        """(3m,) int: the half-edges sorted by edge, and by number within an edge."""
         by_larger = counting_order(np.maximum(self.tail, self.head), self.n_vertices)
         smaller = np.minimum(self.tail, self.head)[by_larger]
         order: IntArray = by_larger[counting_order(smaller, self.n_vertices)]
         return order
 
     @cached_property
-    def partner(self) -> IntArray | None:
-        """(3m,) int: the partner of each side; None unless every edge is a pair, and not turned."""
+    def twin(self) -> IntArray | None:
+        """(3m,) int: the twin of each half-edge; None unless every half-edge has one."""
         one, other = self.order[: len(self.order) // 2 * 2].reshape(-1, 2).T
         tail, head = self.tail[one], self.head[one]
         if not (
@@ -72,57 +73,57 @@ class Sides:
             and np.diff(edge_keys(tail, head, self.n_vertices)).all()
         ):
             return None
-        partner = np.empty_like(self.order)
-        partner[one], partner[other] = other, one
-        return partner
+        twin = np.empty_like(self.order)
+        twin[one], twin[other] = other, one
+        return twin
 
     @cached_property
     def neighbours(self) -> IntArray | None:
-        """(m, 3) int: the face across each side; None where `partner` is."""
-        return None if self.partner is None else (self.partner // 3).reshape(-1, 3)
+        """(m, 3) int: the face across each half-edge; None where `twin` is None."""
+        return None if self.twin is None else (self.twin // 3).reshape(-1, 3)
 
     @cached_property
     def first(self) -> IntArray:
-        """(e,) int: where in `order` each edge begins."""
+        """(e,) int: the position in `order` at which each edge begins."""
         return np.flatnonzero(np.diff(self.keys[self.order], prepend=-1))
 
     @cached_property
-    def n_sides(self) -> IntArray:
-        """(e,) int: the number of sides on each edge."""
-        n_sides: IntArray = np.diff(self.first, append=len(self.order))
-        return n_sides
+    def counts(self) -> IntArray:
+        """(e,) int: the number of half-edges on each edge."""
+        counts: IntArray = np.diff(self.first, append=len(self.order))
+        return counts
 
     @cached_property
-    def open(self) -> IntArray:
-        """(b,) int: the sides without a partner."""
-        alone: IntArray = self.order[self.first[self.n_sides == 1]]
-        return alone
+    def boundary(self) -> IntArray:
+        """(b,) int: the half-edges that are alone on their edge."""
+        boundary: IntArray = self.order[self.first[self.counts == 1]]
+        return boundary
 
     @cached_property
     def pairs(self) -> IntArray:
-        """(p, 2) int: the two sides of every edge that has exactly two."""
-        start = self.first[self.n_sides == 2]
+        """(p, 2) int: the two half-edges of every edge that has exactly two."""
+        start = self.first[self.counts == 2]
         pairs: IntArray = self.order[start[:, None] + [0, 1]]
         return pairs
 
     @cached_property
-    def crowded(self) -> list[IntArray]:
-        """The sides of every edge that has three or more, one array per edge."""
-        where = np.flatnonzero(self.n_sides > 2)
-        return [self.order[self.first[e] : self.first[e] + self.n_sides[e]] for e in where]
+    def non_manifold(self) -> list[IntArray]:
+        """The half-edges of every edge that has three or more, one array per edge."""
+        where = np.flatnonzero(self.counts > 2)
+        return [self.order[self.first[e] : self.first[e] + self.counts[e]] for e in where]
 
     @cached_property
-    def turned(self) -> BoolArray:
-        """(p,) bool: pairs that run the same way, so that their faces face opposite sides."""
+    def inconsistent(self) -> BoolArray:
+        """(p,) bool: pairs of the same direction, whose two faces have opposite orientation."""
         one, other = self.pairs.T
-        turned: BoolArray = self.tail[one] == self.tail[other]
-        return turned
+        inconsistent: BoolArray = self.tail[one] == self.tail[other]
+        return inconsistent
 
     @cached_property
     def shells(self) -> IntArray:
-        """(m,) int: the shell of each face, numbered from 0 in the order of first faces."""
+        """(m,) int: the shell of each face, numbered from 0 in the order of their first faces."""
         m = len(self.faces)
-        # One shell, as nearly always?  To walk over it takes a fifth of the time to find all.
+        # Most meshes are one shell; testing for that takes a fifth of the time of the general case.
         if self.neighbours is not None and m:
             starts, across = np.arange(0, 3 * m + 1, 3), self.neighbours.ravel()
             links = sparse.csr_array((np.ones(3 * m, bool), across, starts), shape=(m, m))
@@ -133,117 +134,83 @@ class Sides:
         return connected(m, one, other)
 
     def fans(self, pairs: IntArray) -> IntArray:
-        """Return the fan of each corner, (3m,) int, where only *pairs* (p, 2) hold together."""
+        """Return the fan of each corner, (3m,) int, connected across *pairs* (p, 2) only."""
         one, other = pairs.T
-        start, end = one, following(one)  # the corners at both ends of the first side
-        turned = self.tail[one] == self.tail[other]
-        partner_of_start = np.where(turned, other, following(other))
-        partner_of_end = np.where(turned, following(other), other)
+        start, end = one, next_half_edge(one)  # the corners at both ends of the first half-edge
+        parallel = self.tail[one] == self.tail[other]
+        across_start = np.where(parallel, other, next_half_edge(other))
+        across_end = np.where(parallel, next_half_edge(other), other)
         return connected(
             3 * len(self.faces),
             np.concatenate([start, end]),
-            np.concatenate([partner_of_start, partner_of_end]),
+            np.concatenate([across_start, across_end]),
         )
 
     @cached_property
     def pinched(self) -> IntArray:
-        """Vertices with several fans, for no other reason than that; crowded edges apart."""
+        """Vertices with several fans, except the ends of non-manifold edges."""
         if self._has_one_fan_each():
             return np.empty(0, dtype=np.int64)
         _, corner = np.unique(self.fans(self.pairs), return_index=True)
         several = np.bincount(self.tail[corner], minlength=self.n_vertices) > 1
-        crowded = self.order[self.first[self.n_sides > 2]]
-        several[self.tail[crowded]] = several[self.head[crowded]] = False
+        excluded = self.order[self.first[self.counts > 2]]
+        several[self.tail[excluded]] = several[self.head[excluded]] = False
         return np.flatnonzero(several)
 
     def _has_one_fan_each(self) -> bool:
-        """Tell whether partners show it for each vertex at once; False may be too careful.
+        """Return whether every vertex has one fan, as far as the twins can tell; may be too strict.
 
-        A step across the side that ends at a corner leads to the next corner of its fan.  All
-        vertices are gone round together, each from one of its corners back to it; with one fan
-        to each, this passes all corners.
+        Crossing the half-edge that ends at a corner leads to the next corner of its fan.  The
+        walk goes around all vertices at once, each from one of its corners until it returns;
+        if every vertex has one fan, it visits every corner.
         """
-        if self.partner is None:
+        if self.twin is None:
             return False
-        step = np.roll(self.partner.reshape(-1, 3), 1, axis=1).ravel()
+        step = np.roll(self.twin.reshape(-1, 3), 1, axis=1).ravel()
         start = np.full(self.n_vertices, -1)
         start[self.tail] = np.arange(len(step))
         start = at = start[start >= 0]
-        passed = 0
+        visited = 0
         for _ in range(_ROUNDS):
             if not len(at):
                 break
-            passed += len(at)
+            visited += len(at)
             at = step[at]
-            on = at != start
-            start, at = start[on], at[on]
-        return passed == len(step)
+            going = at != start
+            start, at = start[going], at[going]
+        return visited == len(step)
 
 
 def edge_keys(one: IntArray, other: IntArray, n_vertices: int) -> IntArray:
-    """Return a number for each pair of vertices that is the same for (a, b) and (b, a)."""
+    """Return one number for each pair of vertices, the same for (a, b) and (b, a)."""
     return np.minimum(one, other) * n_vertices + np.maximum(one, other)
 
 
-def following(sides: IntArray) -> IntArray:
-    """Return the next side of the same face, or the next corner."""
-    return np.where(sides % 3 == 2, sides - 2, sides + 1)
-
-
-def connected(n: int, one: IntArray, other: IntArray) -> IntArray:
-    """Return the group of each of *n* things, (n,) int, when one[i] and other[i] belong together.
-
-    Groups are numbered from 0 in the order of their first members.
-
-    >>> connected(5, np.array([3]), np.array([1]))
-    array([0, 1, 2, 1, 3])
-    """
-    if n == 0:
-        return np.empty(0, dtype=np.int64)
-    links = sparse.coo_array((np.ones(len(one), bool), (one, other)), shape=(n, n))
-    count, found = csgraph.connected_components(links, directed=False)
-    rank = np.empty(count, np.int64)
-    rank[np.argsort(first_members(found))] = np.arange(count)
-    return rank[found]
-
-
-def first_of_group(group: IntArray) -> IntArray:
-    """Return for each thing the number of the first in the same group, (n,) int.
-
-    >>> first_of_group(np.array([7, 4, 7, 4]))
-    array([0, 1, 0, 1])
-    """
-    _, first, which = np.unique(group, return_index=True, return_inverse=True)
-    return first[which]
-
-
-def first_equal_row(rows: NDArray[np.generic]) -> IntArray:
-    """Return for each row the number of the first row equal to it, (n,) int; NaN equals nothing.
-
-    >>> first_equal_row(np.array([[0, 1], [2, 3], [0, 1]]))
-    array([0, 1, 0])
-    """
-    suspects = perhaps_equal(rows)  # mostly none, and there is nothing to sort
-    some = rows[suspects]
-    order = (
-        np.lexsort(some.T) if len(some) else np.empty(0, np.int64)
-    )  # stable: equal rows stay in their order
-    ordered = some[order]
-    new = np.ones(len(some), dtype=bool)
-    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    first = np.arange(len(rows))
-    first[suspects[order]] = suspects[order[np.flatnonzero(new)][np.cumsum(new) - 1]]
-    return first
+def next_half_edge(half_edges: IntArray) -> IntArray:
+    """Return the next half-edge, or corner, of the same face."""
+    return np.where(half_edges % 3 == 2, half_edges - 2, half_edges + 1)
 
 
 def repeats_vertex(faces: IntArray) -> BoolArray:
-    """Return which faces name a vertex twice, (m,) bool."""
+    """Return which faces contain a vertex twice, (m,) bool."""
     a, b, c = faces.T
     repeats: BoolArray = (a == b) | (b == c) | (c == a)
     return repeats
 
 
 def repeats_face(faces: IntArray) -> BoolArray:
-    """Return which faces stand on the same three vertices as an earlier one, (m,) bool."""
+    """Return which faces have the same three vertices as an earlier face, (m,) bool."""
     repeats: BoolArray = first_equal_row(np.sort(faces, axis=1)) != np.arange(len(faces))
     return repeats
+
+
+def components(n_points: int, faces: IntArray) -> IntArray:
+    """Return the component of each vertex, (n,) int, numbered from 0."""
+    return connected(n_points, faces.ravel(), faces[:, [1, 2, 0]].ravel())
+
+
+def face_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the edges (e, 2), and for each face (m, 3) the edges opposite its three corners."""
+    opposite = np.sort(faces[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2), axis=1)
+    edges, which = np.unique(opposite, axis=0, return_inverse=True)
+    return edges, which.reshape(-1, 3)

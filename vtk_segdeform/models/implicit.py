@@ -1,18 +1,18 @@
-"""A closed mesh with exactly n vertices on the surface f(x) = 0, and f for bodies with limbs.
+"""Closed mesh with exactly n vertices of a surface f(x) = 0, and f for bodies with limbs.
 
-f is a signed distance, or nearly: negative inside, with a slope near 1.  The mesh is made thus:
+f is approximately a signed distance: negative inside, with a slope near 1.  The steps:
 
-    contour     f on a grid, cut at 0; the spacing is chosen so that just under n vertices come out
-    split       the longest edges, until there are n
-    relax       flip edges, even out the vertices, put them back on the surface; repeat
-    refine      for large n: make a mesh of n / 4, cut each triangle in four, put back
+    contour     level set 0 of f on a grid, whose spacing gives slightly fewer than n vertices
+    split       split the longest edges until there are n vertices
+    relax       flip edges, relax the vertices, project them to the surface; repeat
+    refine      for large n: compute a mesh of n / 4, divide each triangle into four, project
 
 A `Limb` is a tube about a curve c(s), with radius r(s) and k ribs of relative height a,
 
     f(x) = |x - c(s)| - r(s) (1 - a + a (1 + cos k phi))
 
-where c(s) is the point of the curve nearest to x and phi the angle about the curve.  Several
-become one body by the smooth minimum, which is rounded off where two distances are nearly equal.
+where c(s) is the point of the curve nearest to x and phi the angle about the curve.  The smooth
+minimum joins several limbs to one body, rounded where two distances are nearly equal.
 """
 
 from __future__ import annotations
@@ -35,25 +35,25 @@ from ..errors import ArgumentError
 from ..mesh import Mesh
 from .remeshing import Field, flip, refine, relax, split_to, vertex_normals
 
-_FAR = 0.1  # a limb's distances beyond are all the same, which saves looking them up
-_LARGEST_CONTOUR = 20_000  # vertices; above, refining is faster and as good
-_ROUNDS = 12  # of relaxing; the least angle stops improving there
+_FAR = 0.1  # upper limit of a limb's distance, which saves computing larger ones
+_LARGEST_CONTOUR = 20_000  # vertices; for more, refining is faster and equally good
+_ROUNDS = 12  # of relaxation; later ones do not improve the least angle
 
 
 @dataclass(frozen=True)
 class Limb:
-    """A round, ribbed, tapering tube along a smooth curve; calling it gives the distance.
+    """A round, ribbed, tapering tube along a smooth curve; a function that returns the distance.
 
     Parameters
     ----------
     points : sequence of (x, y, z)
-        Where the curve goes through.  Ribs are counted from the y axis about it.
+        Points on the curve.  Ribs start at the y axis around the curve.
     radii : sequence of float
-        The tube's radius at each point.
+        Radius of the tube at each point.
     ribs : int
-        How many; none if 0.
+        Number of ribs.
     height : float
-        Of the ribs, as a share of the radius.
+        Height of the ribs, relative to the radius.
     """
 
     points: Sequence[tuple[float, float, float]]
@@ -62,7 +62,7 @@ class Limb:
     height: float = 0.0
 
     def __call__(self, x: FloatArray) -> FloatArray:
-        """Return the signed distance, about, of the (n, 3) points *x*; at most 0.1."""
+        """Return the approximate signed distance of the points *x* (n, 3), limited to 0.1, (n,)."""
         centre, tangent, radius, tree = self._curve
         reach = _FAR + 1.3 * max(self.radii)
         low, high = centre.min(axis=0) - reach, centre.max(axis=0) + reach
@@ -71,7 +71,7 @@ class Limb:
         near, k = near[np.isfinite(distance)], np.asarray(k)[np.isfinite(distance)]
         t, offset = tangent[k], x[near] - centre[k]
         along = np.einsum("ij,ij->i", offset, t)
-        between = (k > 0) & (k < len(centre) - 1)  # else beyond an end: a round cap
+        between = (k > 0) & (k < len(centre) - 1)  # otherwise in the round cap of an end
         offset -= np.where(between, along, 0.0)[:, None] * t
         d = np.linalg.norm(offset, axis=1)
         r = radius[k]
@@ -86,7 +86,7 @@ class Limb:
 
     @cached_property
     def _curve(self) -> tuple[FloatArray, FloatArray, FloatArray, cKDTree]:
-        """400 points of the curve, the unit tangents and radii there, and a search tree."""
+        """400 points of the curve with unit tangents, radii, and a search tree."""
         points = np.asarray(self.points, dtype=float)
         knots = np.insert(np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)), 0, 0.0)
         s = np.linspace(0.0, knots[-1], 400)
@@ -98,9 +98,9 @@ class Limb:
 
 
 def standing_body(limbs: Sequence[Limb], n_vertices: int, *, blend: float) -> Mesh:
-    """Return the *limbs* as one body, cut flat at z = 0 and scaled to height 1.
+    """Return the union of *limbs* as one body, cut at z = 0 and scaled to height 1.
 
-    *blend* is the width, in the limbs' unit, over which two of them run into each other.
+    *blend* is the width of the transition between two limbs, in their unit.
     """
 
     def field(x: FloatArray) -> FloatArray:
@@ -124,11 +124,12 @@ def implicit_surface(field: Field, box: FloatArray, n_vertices: int) -> Mesh:
     Parameters
     ----------
     field : function of (n, 3) float points, returning (n,) float
-        Nearly a signed distance, negative inside.  Of several parts the largest is taken.
+        Approximately a signed distance, negative inside.  If the surface has several components,
+        the largest is used.
     box : (2, 3) float
         Lower and upper corner of a box around the surface.
     n_vertices : int
-        How many vertices; enough of them that the thinnest part is a few edges around.
+        Number of vertices; enough for a few edges around the thinnest part.
 
     Returns
     -------
@@ -137,21 +138,21 @@ def implicit_surface(field: Field, box: FloatArray, n_vertices: int) -> Mesh:
     Raises
     ------
     ValueError
-        If so few vertices cannot hold the shape.
+        If *n_vertices* is too small for the shape.
     """
     if n_vertices > _LARGEST_CONTOUR:
         coarse = implicit_surface(field, box, n_vertices // 4)
         vertices, faces = split_to(*refine(coarse.vertices, coarse.faces), n_vertices)
-        return Mesh(_put_back(vertices, faces, field), faces)
+        return Mesh(_projected(vertices, faces, field), faces)
     vertices, faces = split_to(*_contour_below(field, box, n_vertices), n_vertices)
     for _ in range(_ROUNDS):
         faces = flip(vertices, faces)
-        vertices = _put_back(relax(vertices, faces), faces, field)
+        vertices = _projected(relax(vertices, faces), faces, field)
     return Mesh(vertices, flip(vertices, faces, field))
 
 
 def _contour_below(field: Field, box: FloatArray, n: int) -> tuple[FloatArray, IntArray]:
-    """Contour with at most *n* vertices, and nearly so many; they grow as 1 / spacing^2."""
+    """Return a contour with at most, and nearly, *n* vertices; n grows with 1 / spacing^2."""
     spacing = float(np.ptp(box, axis=0).max()) / 24
     best: tuple[FloatArray, IntArray] | None = None
     for _ in range(12):
@@ -162,7 +163,7 @@ def _contour_below(field: Field, box: FloatArray, n: int) -> tuple[FloatArray, I
             break
         spacing *= float(np.sqrt(max(len(vertices), 8) / (0.985 * n)))
     if best is None or not len(best[0]):
-        raise ArgumentError(f"n_vertices = {n} is too few for this shape; ask for more")
+        raise ArgumentError(f"n_vertices = {n} is too small for this shape; use more")
     return best
 
 
@@ -171,13 +172,13 @@ def _contour(field: Field, box: FloatArray, spacing: float) -> tuple[FloatArray,
     x, y, z = (np.arange(low[k], high[k] + spacing, spacing) for k in range(3))
     grid = np.stack(np.meshgrid(z, y, x, indexing="ij")[::-1], axis=-1)
     values = field(grid.reshape(-1, 3))
-    # A surface that grazes a grid point makes needles there; keep it a little away.
+    # A surface close to a grid point gives needles there; keep it at some distance.
     values = np.copysign(np.maximum(np.abs(values), 0.15 * spacing), values)
     image = vtkImageData()
     image.SetDimensions(len(x), len(y), len(z))
     image.SetOrigin(*low)
     image.SetSpacing(spacing, spacing, spacing)
-    # VTK turns its triangles towards lower values, so outward needs the sign changed.
+    # VTK orients triangles towards lower values, so the sign is reversed.
     image.GetPointData().SetScalars(numpy_to_vtk(-values, deep=True))
     contour = vtkFlyingEdges3D()
     contour.SetInputData(image)
@@ -190,11 +191,11 @@ def _contour(field: Field, box: FloatArray, spacing: float) -> tuple[FloatArray,
         return np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
     faces = vtk_to_numpy(output.GetPolys().GetConnectivityArray()).reshape(-1, 3)
     vertices = vtk_to_numpy(output.GetPoints().GetData()).astype(float)
-    return _largest_part(vertices, faces.astype(np.int64))
+    return _largest_component(vertices, faces.astype(np.int64))
 
 
-def _largest_part(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
-    """Drop the crumbs that a grid too coarse for a thin part leaves beside it."""
+def _largest_component(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    """Remove small components, which a coarse grid leaves beside thin parts."""
     links = np.ones(faces.size), (faces.ravel(), np.roll(faces, 1, axis=1).ravel())
     graph = sparse.coo_array(links, shape=(len(vertices),) * 2)
     part = csgraph.connected_components(graph, directed=False)[1]
@@ -203,10 +204,11 @@ def _largest_part(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, In
     return vertices[kept], number[faces[kept[faces[:, 0]]]]
 
 
-def _put_back(vertices: FloatArray, faces: IntArray, field: Field) -> FloatArray:
-    """Move each vertex along its normal onto the surface: two secant steps.
+def _projected(vertices: FloatArray, faces: IntArray, field: Field) -> FloatArray:
+    """Project each vertex along its normal to the surface, by two secant steps.
 
-    None is longer than the edges: where the field is flat, in a sharp crease, it would run away.
+    Steps are limited to the length of an edge, since they diverge where the field is flat, as in
+    a sharp crease.
     """
     normals = vertex_normals(vertices, faces)
     edge = float(np.linalg.norm(vertices[faces] - vertices[faces[:, [1, 2, 0]]], axis=2).mean())
@@ -223,7 +225,7 @@ def _put_back(vertices: FloatArray, faces: IntArray, field: Field) -> FloatArray
 
 
 def _smooth_minimum(a: FloatArray, b: FloatArray, width: float) -> FloatArray:
-    """Return the lesser of a and b, rounded off where they differ by less than *width*."""
+    """Return the minimum of a and b, rounded where they differ by less than *width*."""
     gap = np.maximum(1.0 - np.abs(a - b) / width, 0.0)
     lesser: FloatArray = np.minimum(a, b) - 0.25 * width * gap**2
     return lesser

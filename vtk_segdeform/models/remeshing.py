@@ -1,17 +1,17 @@
-"""Better triangles on the same surface: split, flip, relax, refine.
+"""Remeshing operations: split, flip, relax, refine.
 
-    split       an edge at its middle: one vertex and two triangles more
+    split       an edge at its midpoint: adds one vertex and two triangles
     flip        an edge to the other diagonal of its two triangles
-    relax       each vertex towards the middle of its neighbours, within its tangent plane
-    refine      each triangle into four at the middles of its edges: V' = V + E
+    relax       each vertex towards the mean of its neighbours, in its tangent plane
+    refine      each triangle into four at the midpoints of its edges: V' = V + E
 
-Every move takes (n, 3) float vertices and (m, 3) int faces of a closed mesh, returns new ones,
-and keeps the mesh closed, oriented and manifold.
+Every operation accepts vertices (n, 3) and faces (m, 3) of a closed mesh and returns new ones; the
+mesh remains closed, oriented and manifold.
 
 Source
 ------
 M. Botsch, L. Kobbelt, "A remeshing approach to multiresolution modeling", Proc. SGP, 185-192,
-2004, section 4; without its collapses.
+2004, section 4; without edge collapses.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from ..arrays import FloatArray, IntArray
 
 Field = Callable[[FloatArray], FloatArray]  # (n, 3) -> (n,), negative inside
 
-_WIDEST = np.radians(110.0)  # angle allowed in a triangle for the sake of following the shape
+_WIDEST = np.radians(110.0)  # largest angle that flips for a better fit may create
 
 
 def split_to(vertices: FloatArray, faces: IntArray, n: int) -> tuple[FloatArray, IntArray]:
-    """Split the longest edges, no two in one triangle at a time, until there are *n* vertices."""
+    """Split the longest edges, at most one per triangle at a time, until there are *n* vertices."""
     while len(vertices) < n:
         edges, corners = _edges(faces)
         a, b = vertices[edges[:, 0]], vertices[edges[:, 1]]
         longest = np.argsort(-np.linalg.norm(a - b, axis=1), kind="stable")
-        chosen = _apart(longest, corners // 3, n - len(vertices))
+        chosen = _independent(longest, corners // 3, n - len(vertices))
         middle = len(vertices) + np.arange(len(chosen))
         vertices = np.concatenate([vertices, 0.5 * (a[chosen] + b[chosen])])
         parts = []
@@ -48,29 +48,29 @@ def split_to(vertices: FloatArray, faces: IntArray, n: int) -> tuple[FloatArray,
 
 
 def flip(vertices: FloatArray, faces: IntArray, field: Field | None = None) -> IntArray:
-    """Turn edges to the other diagonal of their two triangles.
+    """Flip edges to the other diagonal of their two triangles.
 
-    Without *field*, those whose two opposite angles exceed pi together (Delaunay's test).  With
-    it, those whose middle lies twice as far from the surface field = 0 as the other diagonal's
-    does, so that edges come to run along ribs and not across.
+    Without *field*, flip edges whose opposite angles sum to more than pi (not Delaunay).  With
+    *field*, flip edges whose midpoint is more than twice as far from the surface field = 0 as that
+    of the other diagonal, so that edges align with ribs.
     """
     n = len(vertices)
     for _ in range(4):
         edges, corners = _edges(faces)
         tips = faces.ravel()[corners]
-        turned = np.sort(tips, axis=1)
+        flipped = np.sort(tips, axis=1)
         if field is None:
             gain = _angle(vertices, tips[:, 0], edges) + _angle(vertices, tips[:, 1], edges) - np.pi
         else:
-            now, then = (np.abs(field(vertices[ends].mean(axis=1))) for ends in (edges, turned))
-            widest = np.maximum(*(_angle(vertices, end, turned) for end in edges.T))
+            now, then = (np.abs(field(vertices[ends].mean(axis=1))) for ends in (edges, flipped))
+            widest = np.maximum(*(_angle(vertices, end, flipped) for end in edges.T))
             gain = np.where(widest < _WIDEST, now - 2.0 * then, 0.0)
-        is_new = ~np.isin(turned @ [n, 1], edges @ [n, 1])
+        is_new = ~np.isin(flipped @ [n, 1], edges @ [n, 1])
         best = np.argsort(-gain, kind="stable")
         best = best[(gain > 1e-6)[best] & is_new[best]]
-        _, first = np.unique(turned[best] @ [n, 1], return_index=True)
+        _, first = np.unique(flipped[best] @ [n, 1], return_index=True)
         best = best[np.sort(first)]
-        chosen = _apart(best, corners // 3, len(best))
+        chosen = _independent(best, corners // 3, len(best))
         if not len(chosen):
             break
         one, two = corners[chosen].T
@@ -82,7 +82,7 @@ def flip(vertices: FloatArray, faces: IntArray, field: Field | None = None) -> I
 
 
 def relax(vertices: FloatArray, faces: IntArray, *, step: float = 0.7) -> FloatArray:
-    """Move each vertex by *step* of its way to the middle of its neighbours, along the surface."""
+    """Move each vertex by *step* times the way to the mean of its neighbours, tangentially."""
     edges, _ = _edges(faces)
     i, j = np.concatenate([edges, edges[:, ::-1]]).T
     neighbours = sparse.csr_array((np.ones(len(i)), (i, j)), shape=(len(vertices),) * 2)
@@ -94,7 +94,7 @@ def relax(vertices: FloatArray, faces: IntArray, *, step: float = 0.7) -> FloatA
 
 
 def refine(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
-    """Cut every triangle in four at the middles of its edges; old vertices keep their numbers."""
+    """Divide every triangle into four at the midpoints of its edges; vertices keep their index."""
     edges, corners = _edges(faces)
     middle = np.empty(faces.size, dtype=np.int64)
     middle[corners] = len(vertices) + np.arange(len(edges))[:, None]
@@ -107,7 +107,7 @@ def refine(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]
 
 
 def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return the (n, 3) unit normals: the means of the triangles' around, by area."""
+    """Return area-weighted unit vertex normals, (n, 3)."""
     a, b, c = vertices[faces.T]
     area = np.repeat(np.cross(b - a, c - a), 3, axis=0)
     columns = [np.bincount(faces.ravel(), area[:, k], len(vertices)) for k in range(3)]
@@ -118,14 +118,14 @@ def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def _edges(faces: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the edges (e, 2) and the corners (e, 2), as places in faces.ravel(), opposite them."""
+    """Return the edges (e, 2) and their opposite corners (e, 2) as indices into faces.ravel()."""
     pairs = np.sort(faces[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2), axis=1)
     order = np.argsort(pairs @ [faces.max() + 1, 1], kind="stable")
-    return pairs[order[::2]], order.reshape(-1, 2)  # closed: each edge comes twice, in a row
+    return pairs[order[::2]], order.reshape(-1, 2)  # closed: each edge occurs twice in sequence
 
 
 def _around(faces: IntArray, corners: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Return each corner's vertex and the next two of its triangle."""
+    """Return the vertex of each corner and the next two of its triangle."""
     face, k = corners // 3, corners % 3
     return faces[face, k], faces[face, (k + 1) % 3], faces[face, (k + 2) % 3]
 
@@ -133,18 +133,18 @@ def _around(faces: IntArray, corners: IntArray) -> tuple[IntArray, IntArray, Int
 def _rewritten(
     faces: IntArray, parts: list[tuple[IntArray, IntArray, IntArray, IntArray]]
 ) -> IntArray:
-    """Return a copy of *faces* in which the triangles named first have the corners after."""
+    """Return a copy of *faces* with *parts*, each indices of triangles and their three corners."""
     faces = faces.copy()
     for which, a, b, c in parts:
         faces[which] = np.stack([a, b, c], axis=-1)
     return faces
 
 
-def _apart(order: IntArray, sides: IntArray, most: int) -> IntArray:
-    """Return the first *most* edges in *order* of which no two share a triangle."""
+def _independent(order: IntArray, triangles: IntArray, most: int) -> IntArray:
+    """Return the first *most* edges in *order* that share no triangle."""
     taken: set[int] = set()
     chosen: list[int] = []
-    for edge, (left, right) in zip(order.tolist(), sides[order].tolist(), strict=True):
+    for edge, (left, right) in zip(order.tolist(), triangles[order].tolist(), strict=True):
         if len(chosen) == most:
             break
         if left not in taken and right not in taken:
@@ -154,7 +154,7 @@ def _apart(order: IntArray, sides: IntArray, most: int) -> IntArray:
 
 
 def _angle(vertices: FloatArray, tip: IntArray, ends: IntArray) -> FloatArray:
-    """Return the angles under which the vertices *tip* see the pairs *ends*."""
+    """Return the angles at the vertices *tip* between the pairs *ends*."""
     u, v = vertices[ends[:, 0]] - vertices[tip], vertices[ends[:, 1]] - vertices[tip]
     angle: FloatArray = np.arctan2(
         np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v)

@@ -1,10 +1,10 @@
-"""Closed meshes made from code: something to try things on, at any resolution.
+"""Sample meshes at any resolution.
 
-The cactus and the dinosaur are the paper's two models (its section 5) remade as bodies with
-limbs; the cactus has ribs, the fine detail that a deformation has to keep.  Both stand on z = 0,
-z up, height 1, as `bar` does by default; `sphere` and `torus` are centred on the origin.
+The cactus and the dinosaur imitate the two models of the paper (section 5) as bodies with limbs;
+the cactus has ribs, the fine detail that a deformation must preserve.  Both stand on z = 0, with z
+up and height 1, like the default `bar`; `sphere` and `torus` are centred at the origin.
 
-Nothing here is random: the same call gives the same mesh.
+All functions are deterministic.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from ..mesh import Mesh
 from .implicit import Limb, standing_body
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # the golden angle, radians
-_MOST, _FINEST = 10_000_000, 1000  # a larger hull or grid takes minutes and gigabytes
+# Larger hulls or grids take minutes and gigabytes.
+_MOST, _FINEST = 10_000_000, 1000
 
 
 def cactus(n_vertices: int = 5430) -> Mesh:
@@ -30,7 +31,7 @@ def cactus(n_vertices: int = 5430) -> Mesh:
     Parameters
     ----------
     n_vertices : int
-        Exactly so many vertices, 500 or more.  The paper's cactus has 5430.
+        Exact number of vertices, 500 or more.  The cactus of the paper has 5430.
 
     Examples
     --------
@@ -60,12 +61,12 @@ def cactus(n_vertices: int = 5430) -> Mesh:
 
 
 def dinosaur(n_vertices: int = 8000) -> Mesh:
-    """Return a long-necked dinosaur on four legs, plates along its back; it looks along +x.
+    """Return a long-necked dinosaur on four legs with plates along its back; it faces +x.
 
     Parameters
     ----------
     n_vertices : int
-        Exactly so many vertices, 1000 or more.
+        Exact number of vertices, 1000 or more.
 
     Examples
     --------
@@ -102,14 +103,14 @@ def bar(
     size: tuple[float, float, float] = (0.2, 0.2, 1.0),
     divisions: tuple[int, int, int] = (8, 8, 40),
 ) -> Mesh:
-    """Return a rectangular bar, standing in the middle of z = 0; (8, 8, 40) gives 1410 vertices.
+    """Return a rectangular bar on z = 0, centred; (8, 8, 40) gives 1410 vertices.
 
     Parameters
     ----------
     size : (width, depth, height)
-        Its edge lengths.
+        Edge lengths.
     divisions : (a, b, c) int
-        How often each edge is divided: 2 (ab + bc + ca) + 2 vertices.
+        Number of divisions per edge: the bar has 2 (ab + bc + ca) + 2 vertices.
     """
     if not (_are_three(size) and all(is_number(each) and each > 0 for each in size)):
         raise ArgumentError(f"size must be three positive numbers; got {shown(size)}")
@@ -135,12 +136,12 @@ def bar(
 
 
 def torus(n_vertices: int = 3000, *, major: float = 1.0, minor: float = 0.35) -> Mesh:
-    """Return a torus about z: its vertices wind around the tube, one after another.
+    """Return a torus about z; consecutive vertices wind around its tube.
 
     Parameters
     ----------
     n_vertices : int
-        Exactly so many vertices, 30 or more.
+        Exact number of vertices, 30 or more.
     major, minor : float
         Radius of the ring and of the tube.
     """
@@ -164,7 +165,7 @@ def torus(n_vertices: int = 3000, *, major: float = 1.0, minor: float = 0.35) ->
 
 
 def sphere(n_vertices: int = 2562, *, radius: float = 1.0) -> Mesh:
-    """Return a sphere about the origin: points along a spiral of golden angles, their hull."""
+    """Return a sphere about the origin: the convex hull of points on a golden-angle spiral."""
     _require(n_vertices, 4)
     if not (is_number(radius) and radius > 0):
         raise ArgumentError(f"radius must be a positive number; got {shown(radius)}")
@@ -192,7 +193,7 @@ def _are_three(values: object) -> bool:
 
 
 def _chequered(p: int, q: int) -> IntArray:
-    """Return the (2 p q, 3) triangles of a p by q grid of squares; the diagonals take turns."""
+    """Return the triangles (2 p q, 3) of a p by q grid of squares with alternating diagonals."""
     i, j = np.indices((p, q)).reshape(2, -1)
     a = i * (q + 1) + j
     b, c, d = a + q + 1, a + q + 2, a + 1  # counter-clockwise from a

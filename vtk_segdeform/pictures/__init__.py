@@ -1,10 +1,10 @@
-"""Pictures without a window.
+"""Pictures of meshes and deformations, rendered off-screen.
 
 The files, in reading order:
 
-    pictures    before and after, as a PNG file
-    canvas      panels side by side, off-screen
-    palette     the colours of pictures and widgets
+    pictures    regions and cages, before and after, volume change, distortion
+    canvas      camera, and panels side by side in a PNG file
+    palette     colours of pictures and widgets
 """
 
 from .canvas import (

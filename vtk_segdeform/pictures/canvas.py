@@ -1,9 +1,9 @@
-"""Panels side by side, one camera for all, rendered without a window and written as a PNG file.
+"""Panels side by side with a common camera, rendered off-screen and written as a PNG file.
 
-The camera looks along the direction in which the model extends and moves least, so that a bend is
-seen from its side; then a little from aside and above, for depth.  It projects in parallel, so
-all panels have one scale.  Everything is drawn at twice the size and averaged down, which smooths
-edges on any renderer.
+The camera looks along the axis of least extent of the model in both poses, so that a bend is seen
+from the side, tilted slightly sideways and up to show depth.  The projection is parallel, so all
+panels have the same scale.  Pictures are rendered at twice the size and averaged, which smooths
+edges with any renderer.
 """
 
 from __future__ import annotations
@@ -31,39 +31,38 @@ from .palette import INK, PAPER
 Draw = Callable[[pv.Plotter], None]
 
 _HEIGHT = 800  # pixels of a picture
-_TITLE, _MARGIN = 0.1, 0.04  # shares of the height: for the words on top, and around
-_ASIDE, _ABOVE = np.radians(14.0), np.radians(10.0)
-_UNSEEN = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")  # what VTK opens without a screen
+_TITLE, _MARGIN = 0.1, 0.04  # of the height: title, and margins
+_SIDEWAYS, _UP = np.radians(14.0), np.radians(10.0)
+_OFFSCREEN = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")  # VTK's windows without a screen
 _PROBE = "import pyvista; pyvista.Plotter(off_screen=True).show()"
 
 
 @functools.lru_cache(maxsize=1)
 def require_offscreen() -> None:
-    """Make sure that pictures can be rendered here; tried once, in a process of its own.
+    """Check once, in a separate process, that pictures can be rendered.
 
-    Without a GL library VTK ends the whole process on its first picture, which no ``try`` can
-    catch.
+    Without a GL library VTK ends the process at the first rendering, which no ``try`` can catch.
 
     Raises
     ------
     MissingDependencyError
-        If rendering fails; names the Debian packages that make it work.
+        If rendering fails; the message names the Debian packages that it needs.
     """
-    tried = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, check=False)
-    if tried.returncode != 0:
+    probe = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, check=False)
+    if probe.returncode != 0:
         raise MissingDependencyError(
-            "cannot render pictures here: VTK finds no OpenGL to draw with. On Debian or Ubuntu: "
+            "pictures cannot be rendered: VTK finds no OpenGL library. On Debian or Ubuntu: "
             "apt-get install --no-install-recommends libegl1 libgl1"
         )
 
 
 def require_picture(path: str | Path) -> None:
-    """Check that a picture can be rendered and written, before the computation that it shows.
+    """Check that a picture can be rendered and written, before its data are computed.
 
     Raises
     ------
     MissingDependencyError
-        If nothing can be rendered here.
+        If rendering is not possible.
     MeshError
         If the file is not a .png or cannot be written.
     """
@@ -78,42 +77,42 @@ def require_picture(path: str | Path) -> None:
 
 
 def require_screen() -> None:
-    """Make sure that a window can be opened where somebody sees it.
+    """Check that a window can be opened on a screen.
 
     Raises
     ------
     MissingDependencyError
-        If not; the text says why.
+        If not; the message says why.
     """
     if pv.OFF_SCREEN:
         raise MissingDependencyError(
-            "there is no window to edit in: pyvista draws off-screen; unset PYVISTA_OFF_SCREEN"
+            "no window can be opened: pyvista renders off-screen; unset PYVISTA_OFF_SCREEN"
         )
     probe = pv.Plotter(notebook=False)
     kind = probe.render_window.GetClassName()
     probe.close()
-    if kind in _UNSEEN:
+    if kind in _OFFSCREEN:
         raise MissingDependencyError(
-            "there is no screen to open a window on; set DISPLAY, or log in with 'ssh -X'"
+            "no window can be opened: there is no screen; set DISPLAY, or log in with 'ssh -X'"
         )
 
 
 def view_of(rest: FloatArray, deformed: FloatArray) -> FloatArray:
-    """Return the camera's (3, 3) axes: rows to the right, up, and towards the viewer.
+    """Return the axes of the camera (3, 3): rows to the right, up, and towards the viewer.
 
     Parameters
     ----------
     rest, deformed : (n, 3) float
-        What is to be seen.  z stays up, unless that is where it extends least.
+        The poses to show.  z is up unless it is the axis of least extent.
     """
     extent = np.ptp(np.concatenate([rest, deformed]), axis=0)
     towards = -np.eye(3)[int(np.argmin(extent))]
     up = np.eye(3)[2] if towards[2] == 0.0 else np.eye(3)[1]
     towards = abs(towards) if towards[2] else towards
     right = np.cross(up, towards)
-    towards = np.cos(_ASIDE) * towards + np.sin(_ASIDE) * right
+    towards = np.cos(_SIDEWAYS) * towards + np.sin(_SIDEWAYS) * right
     right = np.cross(up, towards)
-    towards = np.cos(_ABOVE) * towards + np.sin(_ABOVE) * up
+    towards = np.cos(_UP) * towards + np.sin(_UP) * up
     return np.stack([right, np.cross(towards, right), towards])
 
 
@@ -125,36 +124,36 @@ def write_panels(
     *,
     foot: float = 0.0,
 ) -> None:
-    """Render *panels* and write them side by side.
+    """Render *panels* side by side and write them to a file.
 
     Parameters
     ----------
     path : str or Path
-        A PNG file, which appears whole or not at all.
+        A PNG file, replaced atomically.
     panels : sequence of (title, draw)
-        Each ``draw(plotter)`` adds what is to be seen; the camera stands already.
+        Each ``draw(plotter)`` adds the actors of a panel; the camera is set before.
     points : (k, 3) float
-        What every panel has room for.
+        Points that are visible in every panel.
     view : (3, 3) float
         From `view_of`.
     foot : float
-        Share of the height kept free at the bottom.
+        Fraction of the height that is free at the bottom.
 
     Raises
     ------
     MissingDependencyError
-        If nothing can be rendered here.
+        If rendering is not possible.
     MeshError
-        If the file is no .png or cannot be written.
+        If the file is not a .png or cannot be written.
     """
     require_picture(path)
     seen = points @ view.T
     low, high = seen.min(axis=0), seen.max(axis=0)
     width, height, _ = np.maximum(high - low, 1e-9 * np.ptp(seen))
     head = _TITLE if any(title for title, _ in panels) else _MARGIN
-    room = 1.0 - head - max(foot, _MARGIN)  # of the panel's height, for the model
+    room = 1.0 - head - max(foot, _MARGIN)  # fraction of the height for the model
     aspect = float(np.clip(room * width / height + 2 * _MARGIN, 0.6, 2.0))
-    visible = max(height / room, width / (aspect - 2 * _MARGIN))  # height of a panel, model units
+    visible = max(height / room, width / (aspect - 2 * _MARGIN))  # height of a panel in model units
     middle = 0.5 * (low + high)
     middle[1] += 0.5 * visible * (head - max(foot, _MARGIN))
     size = (int(2 * _HEIGHT * aspect) // 2 * 2 * len(panels), 2 * _HEIGHT)
@@ -175,12 +174,12 @@ def write_panels(
             draw(plotter)
             plotter.reset_camera_clipping_range()
             if title:
-                place = (0.5, 1.0 - 0.5 * _TITLE)
-                words = plotter.add_text(
-                    title, position=place, viewport=True, color=INK, font_size=20
+                position = (0.5, 1.0 - 0.5 * _TITLE)
+                text = plotter.add_text(
+                    title, position=position, viewport=True, color=INK, font_size=20
                 )
-                words.prop.justification_horizontal = "center"
-                words.prop.justification_vertical = "center"
+                text.prop.justification_horizontal = "center"
+                text.prop.justification_vertical = "center"
         image = np.asarray(plotter.screenshot(return_img=True))
     finally:
         plotter.close()
@@ -192,16 +191,16 @@ def write_panels(
 
 
 def add_surface(plotter: pv.Plotter, surface: pv.PolyData, **colouring: Any) -> Any:
-    """Add a surface, softly shaded, with its outline; returns its actor.
+    """Add a smoothly shaded surface with its silhouette; returns its actor.
 
     Parameters
     ----------
     plotter : pyvista.Plotter
-        Its camera stands already; the outline depends on it.
+        Its camera must be set, since the silhouette depends on it.
     surface : pyvista.PolyData
         Triangles.
     **colouring
-        Of pyvista's ``add_mesh``: color, scalars, cmap, ...
+        Options of pyvista's ``add_mesh``: color, scalars, cmap, ...
     """
     actor = plotter.add_mesh(
         surface,
@@ -219,13 +218,13 @@ def add_surface(plotter: pv.Plotter, surface: pv.PolyData, **colouring: Any) -> 
 
 
 def png_of(pixels: NDArray[np.uint8]) -> bytes:
-    """Return a picture, (h, w, 3), upper row first, as the content of a PNG file."""
+    """Return pixels (h, w, 3), top row first, as the bytes of a PNG file."""
     height, width, _ = pixels.shape
     image = vtkImageData()
     image.SetDimensions(width, height, 1)
     rows = np.ascontiguousarray(pixels[::-1]).reshape(-1, 3)
     image.GetPointData().SetScalars(numpy_to_vtk(rows))
-    writer = vtkPNGWriter()  # into memory: it does not report a full disk
+    writer = vtkPNGWriter()  # to memory, since it does not report a full disk
     writer.WriteToMemoryOn()
     writer.SetInputData(image)
     writer.Write()
@@ -233,7 +232,7 @@ def png_of(pixels: NDArray[np.uint8]) -> bytes:
 
 
 def _averaged(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return *image* (h, w, 3) at half its size, a mean of 2 by 2 pixels each."""
+    """Return *image* (h, w, 3) at half the size, averaged over 2 by 2 pixels."""
     h, w = (side // 2 for side in image.shape[:2])
     small = image[: 2 * h, : 2 * w].reshape(h, 2, w, 2, 3).mean(axis=(1, 3))
     return np.asarray(np.round(small), dtype=np.uint8)

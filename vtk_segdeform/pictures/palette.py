@@ -1,7 +1,7 @@
-"""The colours of pictures and windows, the same in both.
+"""Colours of pictures and widgets.
 
-Regions take those of Okabe and Ito, which colour-blind people tell apart; what is fixed is grey
-and what is dragged is red, as in the figures of the paper.
+Regions have the colours of Okabe and Ito, which are distinct for colour-blind people; fixed
+vertices are grey and handles red, as in the figures of the paper.
 
 Source
 ------
@@ -19,7 +19,7 @@ INK, PAPER = "#333333", "#FFFFFF"
 
 
 def rgb(colour: str) -> NDArray[np.uint8]:
-    """Return the (3,) red, green and blue, 0 to 255, of a "#RRGGBB".
+    """Return red, green and blue, (3,), 0 to 255, of a "#RRGGBB" text.
 
     >>> rgb("#E69F00")
     array([230, 159,   0], dtype=uint8)
@@ -28,5 +28,5 @@ def rgb(colour: str) -> NDArray[np.uint8]:
 
 
 def of_region(region: int) -> NDArray[np.uint8]:
-    """Return the (3,) red, green and blue of a region; after the last colour comes the first."""
+    """Return red, green and blue, (3,), of a region; colours repeat after the last."""
     return rgb(COLOURS[region % len(COLOURS)])

@@ -1,9 +1,9 @@
-"""Pictures of a deformation, rendered without a window and written as PNG files.
+"""Pictures of a deformation, rendered off-screen and written as PNG files.
 
-    regions and cages   each region in its own colour, and its cage as wires of that colour
-    before and after    the mesh at rest and deformed, from the same camera; fixed and handle marked
-    volume change       the deformed mesh coloured by a signed share, in per cent, white at zero
-    distortion          the deformed mesh coloured by a size, dark at zero
+    regions and cages   each region in its colour, and its cage as wires of that colour
+    before and after    the mesh at rest and deformed; fixed vertices grey, handle red
+    volume change       the deformed mesh coloured by a signed percentage, white at zero
+    distortion          the deformed mesh coloured by a magnitude, dark at zero
 
 The colours are those of `palette`.  `canvas` chooses the camera and writes the files.
 """
@@ -24,15 +24,10 @@ from ..errors import ArgumentError
 from ..io import polydata_of
 from ..mesh import Mesh, require_mesh
 from ..regions import CageSurface, Regions
-from .canvas import add_surface, require_offscreen, view_of, write_panels
+from .canvas import add_surface, view_of, write_panels
 from .palette import BODY, FIXED, HANDLE, INK, of_region
 
-__all__ = [
-    "draw_mesh", "picture_before_after", "picture_distortion", "picture_regions_and_cages",
-    "picture_volume_change", "require_offscreen",
-]  # fmt: skip
-
-_BAR = 0.17  # share of the height that a colour bar takes
+_BAR = 0.17  # fraction of the height for the colour bar
 
 
 def picture_regions_and_cages(
@@ -41,7 +36,7 @@ def picture_regions_and_cages(
     membership: ArrayLike,
     cages: Sequence[CageSurface] = (),
 ) -> None:
-    """Draw the regions in colours, mixed where they overlap; beside them their cages as wires.
+    """Draw the regions in colours, mixed in overlaps, and beside them their cages as wires.
 
     Parameters
     ----------
@@ -50,23 +45,25 @@ def picture_regions_and_cages(
     mesh : Mesh
         n vertices.
     membership : (r, n) bool
-        Which vertices each region has.
+        The vertices of each region.
     cages : sequence with .vertices (m, 3) and .faces (k, 3)
-        One per region, in the same order; without any, only the regions are drawn.
+        One per region, in the same order; if empty, only the regions are drawn.
     """
     path = as_path(path)
-    belongs = Regions(mesh, as_numbers(membership, "membership").astype(bool)).membership
+    member_of = Regions(mesh, as_numbers(membership, "membership").astype(bool)).membership
     require_sequence(cages, "cages")
-    if len(cages) not in (0, len(belongs)):
-        raise ArgumentError(f"cages must be {len(belongs)}, one for each region; got {len(cages)}")
+    if len(cages) not in (0, len(member_of)):
+        raise ArgumentError(
+            f"cages must be one for each of the {len(member_of)} regions; got {len(cages)}"
+        )
     for cage in cages:
         if not (hasattr(cage, "vertices") and hasattr(cage, "faces")):
             raise ArgumentError(f"cages must have vertices and faces; got {shown(cage)}")
         points = as_points(cage.vertices, "vertices of cages")
         as_faces(cage.faces, len(points), "faces of cages")
-    palette = np.array([of_region(r) for r in range(len(belongs))])
-    shares = belongs / belongs.sum(axis=0)
-    colours = (shares.T @ palette)[mesh.faces].mean(axis=1)
+    palette = np.array([of_region(r) for r in range(len(member_of))])
+    mixing = member_of / member_of.sum(axis=0)
+    colours = (mixing.T @ palette)[mesh.faces].mean(axis=1)
     everything = np.concatenate([mesh.vertices, *(cage.vertices for cage in cages)])
 
     def draw_regions(plotter: pv.Plotter) -> None:
@@ -78,7 +75,7 @@ def picture_regions_and_cages(
             wires = _surface(cage.faces, cage.vertices).extract_all_edges()
             plotter.add_mesh(wires, color=tuple(0.8 * colour / 255), line_width=4.0, lighting=False)
 
-    panels = [("regions" if len(belongs) > 1 else "one region", draw_regions)]
+    panels = [("regions" if len(member_of) > 1 else "one region", draw_regions)]
     if len(cages):
         number = sum(len(cage.vertices) for cage in cages)
         panels.append((f"cages, {number} vertices", draw_cages))
@@ -129,18 +126,18 @@ def picture_before_after(
 def picture_volume_change(
     path: str | Path, mesh: Mesh, vertices: ArrayLike, change: ArrayLike
 ) -> None:
-    """Draw the deformed mesh coloured by *change*: red has grown, blue has shrunk.
+    """Draw the deformed mesh coloured by *change*: red for expansion, blue for compression.
 
     Parameters
     ----------
     path : str or Path
         A PNG file to write.
     mesh : Mesh
-        At rest, n vertices; seen from where `picture_before_after` sees it.
+        At rest, n vertices; the camera is that of `picture_before_after`.
     vertices : (n, 3) float
         Deformed.
     change : (n,) or (m,) float
-        Per vertex or per face, relative: 0.1 is shown as 10 per cent.
+        Per vertex or per face, relative: 0.1 is shown as 10 %.
     """
     percent = 100.0 * _values(mesh, change, "change")
     most = _largest(np.abs(percent))
@@ -168,16 +165,16 @@ def draw_mesh(
     vertices: FloatArray | None = None,
     colours: FloatArray | None = None,
 ) -> Any:
-    """Add *mesh* to a plotter, softly shaded, with its outline; returns the mesh's actor.
+    """Add *mesh* to a plotter, smoothly shaded, with its silhouette; returns its actor.
 
     Parameters
     ----------
     plotter : pyvista.Plotter
-        Whose camera is already where it will be: the outline depends on it.
+        Its camera must be set, since the silhouette depends on it.
     mesh : Mesh
         m faces.
     vertices : (n, 3) float, optional
-        Drawn instead of the mesh's own.
+        Drawn instead of the vertices of the mesh.
     colours : (m, 3) float, optional
         Red, green and blue of each face, 0 to 255.
     """
@@ -221,7 +218,7 @@ def _picture_values(
 
 
 def _values(mesh: Mesh, values: ArrayLike, name: str) -> FloatArray:
-    """Return *values* (n,) or (m,), one for each vertex or face of *mesh*."""
+    """Return *values* (n,) or (m,), one per vertex or face of *mesh*."""
     require_mesh(mesh)
     array = as_numbers(values, name)
     if array.shape not in ((mesh.n_vertices,), (mesh.n_faces,)) or not np.isfinite(array).all():
@@ -233,12 +230,12 @@ def _values(mesh: Mesh, values: ArrayLike, name: str) -> FloatArray:
 
 
 def _surface(faces: IntArray, vertices: FloatArray) -> pv.PolyData:
-    """Return the triangles as they are: a picture may well show that they are folded."""
+    """Return the triangles unchecked, since a picture may show a folded pose."""
     return polydata_of(vertices, np.full(len(faces), 3), faces.ravel())
 
 
 def _largest(values: FloatArray) -> float:
-    """Return the size that all but a hundredth of *values* stay below, rounded up; never 0."""
+    """Return the 99th percentile of *values*, rounded up; never 0."""
     size = float(np.percentile(values, 99.0)) if len(values) else 0.0
     if size <= 0.0:
         return 1.0

@@ -5,10 +5,10 @@ The files, in reading order:
     regions         `Regions`: membership and blend weights
     blending        blend weights in the overlaps, eqs. (3) and (4)
     segmentation    `segment`: automatic regions
-    coarse          a coarse copy of the mesh, on which limbs are searched
-    necks           where to cut a limb off
+    necks           cuts between limbs and the rest
     slices          parts of equal area where there are no limbs
-    borders         the borders of parts on the mesh itself
+    coarse          the coarse surface on which cuts are searched
+    borders         smoothing of the borders between parts on the mesh
 """
 
 from .regions import CageSurface, Regions, cage_distance_weights, require_region, require_regions

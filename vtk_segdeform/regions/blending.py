@@ -1,22 +1,22 @@
-"""How much each of several overlapping regions has to say at a vertex, eqs. (3) and (4).
+"""Blend weights of overlapping regions at a vertex, eqs. (3) and (4).
 
 The paper blends two cages by
 
     x = alpha x_A + (1 - alpha) x_B        alpha = d_A / (d_A + d_B)                      (4)
 
-and prints d_A as the distance to the edge of cage A.  Where both cages stand equally far from the
-skin, which is everywhere by construction, that alpha is near 1/2 right up to the last vertex of a
-region, and jumps to 0 one vertex further.  Here d is measured along the surface instead, to the
-*region's own border*, where it is zero, and the sum runs over any number of regions:
+where d_A is printed as the distance to the edge of cage A.  Both cages have about the same distance
+from the surface by construction, so that this alpha is near 1/2 up to the last vertex of a region
+and jumps to 0 at the next.  Here d is the distance along the surface to the *border of the region*,
+where it is zero, and the sum runs over any number of regions:
 
     w_r = d_r^p / sum_s d_s^p
 
-    d_r     length of the shortest path over mesh edges to the border of region r: its members that
-            have a neighbour outside.  0 outside the region; infinite where it has no border.
-    p       1 is (4); with a larger p the weight leaves zero with a horizontal tangent.
+    d_r     length of the shortest path along edges to the border of region r, that is, to its
+            members with a neighbour outside; 0 outside the region, infinite without a border
+    p       1 gives (4); a larger p gives weights with zero slope at the border
 
-d_r changes by at most the edge's length along an edge, so w changes by at most about p / D times
-that length, D being the width of the overlap: it is continuous, and (4) as printed is not.
+Along an edge d_r changes by at most the length of the edge, so w changes by at most about p / D
+times that length, with D the width of the overlap: w is continuous, unlike (4) as printed.
 
 Source
 ------
@@ -32,11 +32,11 @@ from scipy.sparse import csgraph
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..mesh import Mesh
 
-_PAIRS_AT_ONCE = 400_000  # point-triangle pairs held in memory together, about 100 MB
+_PAIRS_AT_ONCE = 400_000  # point-triangle pairs processed at once, about 100 MB
 
 
 def borders(mesh: Mesh, membership: BoolArray) -> BoolArray:
-    """Return (r, n) bool: the members of each region that have a neighbour outside of it."""
+    """Return the members of each region that have a neighbour outside, (r, n) bool."""
     i, j = mesh.edges.T
     border = np.zeros_like(membership)
     for members, edge in zip(membership, border, strict=True):
@@ -46,25 +46,25 @@ def borders(mesh: Mesh, membership: BoolArray) -> BoolArray:
 
 
 def border_distance(mesh: Mesh, membership: BoolArray) -> FloatArray:
-    """Return the distance of every vertex to the border of each region, inside that region.
+    """Return the distance of each vertex to the border of each region that contains it.
 
     Parameters
     ----------
     mesh : Mesh
         n vertices.
     membership : (r, n) bool
-        Which vertices each region holds.
+        The vertices of each region.
 
     Returns
     -------
     d : (r, n) float
-        Along mesh edges, in the mesh's own unit.  0 on the border and outside the region, infinite
-        on the connected parts of a region that have no border.
+        Along mesh edges, in the unit of the mesh.  0 on the border and outside the region, infinite
+        on connected parts of a region without a border.
 
     Notes
     -----
-    A path that leaves a region crosses its border again to come back, so the shortest path stays
-    inside, and each region is searched by itself.
+    A path that leaves a region crosses its border, so shortest paths stay inside, and each region
+    is processed on its own.
     """
     distance = np.zeros(membership.shape)
     for d, members, edge in zip(distance, membership, borders(mesh, membership), strict=True):
@@ -78,13 +78,13 @@ def border_distance(mesh: Mesh, membership: BoolArray) -> FloatArray:
     return distance
 
 
-def shares(membership: BoolArray, distance: FloatArray, power: float = 1.0) -> FloatArray:
-    """Return w_r = d_r^p / sum_s d_s^p over the regions that hold a vertex.
+def blend_weights(membership: BoolArray, distance: FloatArray, power: float = 1.0) -> FloatArray:
+    """Return w_r = d_r^p / sum_s d_s^p over the regions that contain a vertex.
 
     Parameters
     ----------
     membership : (r, n) bool
-        Every column holds at least one True.
+        Every column has at least one True.
     distance : (r, n) float
         d >= 0; may be infinite.
     power : float
@@ -93,21 +93,21 @@ def shares(membership: BoolArray, distance: FloatArray, power: float = 1.0) -> F
     Returns
     -------
     weights : (r, n) float
-        At least 0, 0 outside each region, columns sum to 1.  Regions at infinite d share alone and
-        equally; where every d is zero, all regions that hold the vertex share equally.
+        Non-negative, 0 outside each region; columns sum to 1.  Regions with infinite d have equal
+        weights, all others 0; where every d is zero, all regions of the vertex have equal weights.
     """
     d = np.where(membership, distance, 0.0)
     largest = d.max(axis=0)
     d = np.where(np.isinf(largest), np.isinf(d), d)
     d = np.where(largest == 0.0, membership, d)
-    d = (d / d.max(axis=0)) ** power  # the largest is 1, so that no power over- or underflows
+    d = (d / d.max(axis=0)) ** power  # the largest is 1, which prevents overflow of the power
     return np.asarray(d / d.sum(axis=0))
 
 
 def distance_to_triangles(
     points: FloatArray, vertices: FloatArray, triangles: IntArray
 ) -> FloatArray:
-    """Return (n,) float: the distance of each point to the nearest point of (k, 3) *triangles*."""
+    """Return the distance of each point to the nearest point of *triangles* (k, 3), (n,)."""
     corners = vertices[triangles]  # (k, 3, 3)
     step = max(1, _PAIRS_AT_ONCE // max(1, len(triangles)))
     parts = [_nearest(points[i : i + step], corners) for i in range(0, len(points), step)]
@@ -115,13 +115,13 @@ def distance_to_triangles(
 
 
 def _nearest(points: FloatArray, corners: FloatArray) -> FloatArray:
-    """Return the least distance: to the plane above a triangle's inside, to an edge elsewhere."""
+    """Return the distance to the nearest triangle: to its plane above its face, else to an edge."""
     x = points[:, None, :]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1)
     normal /= np.where(length > 0.0, length, 1.0)[:, None]
-    above_all = np.broadcast_to(length > 0.0, (len(points), len(corners))).copy()
-    squared = np.full(above_all.shape, np.inf)
+    over_face = np.broadcast_to(length > 0.0, (len(points), len(corners))).copy()
+    squared = np.full(over_face.shape, np.inf)
     for corner in range(3):
         a = corners[:, corner]
         edge = corners[:, (corner + 1) % 3] - a
@@ -131,7 +131,7 @@ def _nearest(points: FloatArray, corners: FloatArray) -> FloatArray:
         t = np.clip(along / np.where(size > 0.0, size, 1.0), 0.0, 1.0)
         gap = from_a - t[:, :, None] * edge
         squared = np.minimum(squared, np.einsum("nkc,nkc->nk", gap, gap))
-        above_all &= np.einsum("nkc,kc->nk", from_a, np.cross(normal, edge)) >= 0.0
+        over_face &= np.einsum("nkc,kc->nk", from_a, np.cross(normal, edge)) >= 0.0
     height = np.einsum("nkc,kc->nk", x - corners[:, 0], normal)
-    squared = np.where(above_all, height**2, squared)
+    squared = np.where(over_face, height**2, squared)
     return np.asarray(np.sqrt(squared.min(axis=1)))

@@ -1,8 +1,8 @@
-"""The borders of parts on the mesh itself: short, in the creases, and each part connected.
+"""Smoothing of the borders between parts on the mesh: short, in creases, around connected parts.
 
-Borders are shortened as those of soap films are, by spreading each part's indicator and giving
-every vertex to the part with the most [MBO].  It spreads slowly across concave edges, so that a
-border near a crease stays in the crease.
+Borders move by mean curvature: the indicator of each part diffuses, and every vertex is assigned to
+the part of largest value [MBO].  Diffusion is slow across concave edges, so that a border near a
+crease moves into the crease.
 
 Source
 ------
@@ -16,21 +16,21 @@ import numpy as np
 from scipy import sparse
 
 from ..arrays import IntArray
-from ..geometry import distinct_lengths, nearest_of
+from ..geometry import distinct_lengths, nearest_source
 from ..mesh import Mesh, connected
 from .coarse import symmetric
 
-_CREASE = 0.06  # of the square root of the area: a concave edge as sharp as this radius halves
-_SCALE = 3000  # borders are smoothed at the scale of so many vertices to the whole
-_ROUNDS = 3  # of spreading
-_MOST_STEPS = 60  # in a round
+_CREASE = 0.06  # relative to sqrt(area): a concave edge of this radius halves the diffusion
+_SCALE = 3000  # diffusion acts at the scale of an edge in a mesh of this many vertices
+_ROUNDS = 3  # of diffusion
+_MOST_STEPS = 60  # per round
 
 
 def smooth_borders(mesh: Mesh, labels: IntArray) -> IntArray:
-    """Return labels with short borders that keep to creases; none shrinks by half in a round.
+    """Return labels with short borders along creases; no part shrinks by half in a round.
 
-    In a round a border moves by so many rings at most, and what is more than as many steps away
-    does not count: vertices that far from all borders keep their labels and are left out.
+    A border moves by a limited number of rings per round, and diffusion reaches one ring per step;
+    so vertices farther than that from all borders keep their labels and are not processed.
     """
     area = mesh.face_areas.sum()
     edge = np.median(mesh.adjacency.data)
@@ -38,17 +38,17 @@ def smooth_borders(mesh: Mesh, labels: IntArray) -> IntArray:
     rings = int(np.ceil(np.sqrt(steps))) + 1
     borders = np.unique(mesh.edges[np.diff(labels[mesh.edges], axis=1)[:, 0] != 0])
     zone = _within(mesh.adjacency, borders, _ROUNDS * rings + steps + 1)
-    spread = _spreading(mesh, zone, edge)
+    diffusion = _diffusion(mesh, zone, edge)
     far = np.bincount(np.delete(labels, zone), minlength=labels.max() + 1)
     label = labels[zone]
     for _ in range(_ROUNDS):
         most, smooth = np.zeros(len(zone)), label.copy()
         for part in np.unique(label):
-            near = _within(spread, np.flatnonzero(label == part), rings)
-            here = spread[near][:, near]
+            near = _within(diffusion, np.flatnonzero(label == part), rings)
+            step = diffusion[near][:, near]
             amount = (label[near] == part).astype(float)
             for _ in range(steps):
-                amount = here @ amount
+                amount = step @ amount
             more = amount > most[near]
             most[near[more]] = amount[more]
             smooth[near[more]] = part
@@ -60,7 +60,7 @@ def smooth_borders(mesh: Mesh, labels: IntArray) -> IntArray:
 
 
 def _within(graph: sparse.csr_array, ids: IntArray, rings: int) -> IntArray:
-    """Return the vertices up to *rings* edges away from *ids*, in order."""
+    """Return the vertices up to *rings* edges away from *ids*, sorted."""
     reached = np.zeros(graph.shape[0], dtype=bool)
     reached[ids] = True
     for _ in range(rings):
@@ -70,12 +70,13 @@ def _within(graph: sparse.csr_array, ids: IntArray, rings: int) -> IntArray:
     return np.flatnonzero(reached)
 
 
-def _spreading(mesh: Mesh, zone: IntArray, usual: float) -> sparse.csr_array:
-    """Return the matrix of one step among the k vertices *zone*, (k, k); the last ring is rough.
+def _diffusion(mesh: Mesh, zone: IntArray, usual: float) -> sparse.csr_array:
+    """Return the matrix of a diffusion step among the vertices *zone* (k,), (k, k).
 
-    Half stays, half goes to neighbours, less over creases, and less over edges longer than *usual*,
-    so that it spreads evenly in space.  An edge's bend is its normal curvature,
-    (n_j - n_i).(x_j - x_i) / |x_j - x_i|^2, negative where the surface is concave.
+    A vertex keeps at least half; neighbours get the rest, less of it across creases, and less along
+    edges longer than *usual*, so that diffusion is uniform in space.  The normal curvature of an
+    edge is (n_j - n_i).(x_j - x_i) / |x_j - x_i|^2, negative where the surface is concave.  The
+    outermost ring is inaccurate.
     """
     k, number = len(zone), np.full(mesh.n_vertices, -1)
     number[zone] = np.arange(k)
@@ -90,16 +91,16 @@ def _spreading(mesh: Mesh, zone: IntArray, usual: float) -> sparse.csr_array:
     i, j = edges.T
     along = mesh.vertices[zone[j]] - mesh.vertices[zone[i]]
     size = np.maximum(np.einsum("ij,ij->i", along, along), np.finfo(float).tiny)
-    bend = np.einsum("ij,ij->i", normal[j] - normal[i], along) / size
-    hollow = _CREASE * np.sqrt(mesh.face_areas.sum()) * np.maximum(-bend, 0.0)
-    share = symmetric(edges, np.minimum(1.0, usual**2 / size) / (1.0 + hollow**2), k)
+    curvature = np.einsum("ij,ij->i", normal[j] - normal[i], along) / size
+    concavity = _CREASE * np.sqrt(mesh.face_areas.sum()) * np.maximum(-curvature, 0.0)
+    share = symmetric(edges, np.minimum(1.0, usual**2 / size) / (1.0 + concavity**2), k)
     degree = np.maximum(np.diff(share.indptr), 1)
     moves = sparse.diags_array(0.5 / degree) @ share
     return sparse.csr_array(moves + sparse.diags_array(1.0 - moves.sum(axis=1)))
 
 
 def connected_parts(mesh: Mesh, labels: IntArray) -> IntArray:
-    """Return labels of which each is connected: stray pieces go to the nearest other vertex."""
+    """Return labels of connected parts: smaller pieces join the part of the nearest vertex."""
     i, j = mesh.edges[labels[mesh.edges[:, 0]] == labels[mesh.edges[:, 1]]].T
     piece = connected(len(labels), i, j)
     label = np.empty(piece.max() + 1, dtype=np.int64)
@@ -111,5 +112,5 @@ def connected_parts(mesh: Mesh, labels: IntArray) -> IntArray:
     near = _within(mesh.adjacency, np.flatnonzero(stray[piece]), 1)
     settled = np.flatnonzero(~stray[piece[near]])
     labels = labels.copy()
-    labels[near] = labels[near[nearest_of(distinct_lengths(mesh)[near][:, near], settled)]]
+    labels[near] = labels[near[nearest_source(distinct_lengths(mesh)[near][:, near], settled)]]
     return labels

@@ -1,12 +1,13 @@
-"""A shape told by about a thousand points: a coarse copy of a mesh, for questions about its parts.
+"""A coarse surface of some thousand points, on which the segmentation is computed.
 
-Its points are the vertices that remain when neighbours are thinned out; every vertex belongs to
-the cell of the nearest (`thinning`).  The copy's triangles are those of the mesh whose corners lie
-in three different cells; its areas are the cells' own areas, so nothing is lost in the sum.
+Its points are samples of the vertices, and every vertex belongs to the Voronoi cell of a sample
+(`geometry.voronoi_cells`).  Its triangles are the faces with corners in three different cells; the
+area of a point is the area of its cell, so that the total is exact.
 
-    d           distance along the surface, over edges and over the straight line between the far
-                corners of two triangles unfolded into a plane (edges alone are 15 % too long)
-    {d = t}     level set; each triangle carries a piece of it, longest at its middle corner
+    d           distance along the surface, along edges and along the straight line between the
+                opposite corners of two triangles unfolded into a plane (edges alone overestimate
+                distances by 15 %)
+    {d = t}     level set; a triangle contains a segment of it, longest at its middle corner
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..geometry import cells, unique_edges
-from ..mesh import Mesh, count_up
+from ..geometry import unique_edges, voronoi_cells
+from ..mesh import Mesh, ragged_arange
 from ..progress import Progress
 
-_LOOPS, _ENDS = 4, 12  # ends that distances are taken from
+_LOOPS, _ENDS = 4, 12  # earlier cuts, and points, that distances are computed from
 _STRAIGHT = np.pi / 4  # mean of length over steps, for a straight line walked in steps
 
 
@@ -34,9 +35,9 @@ class Surface:
     ----------
     vertices : (k, 3) float
     faces : (m, 3) int
-        For lengths of level sets only; need not be a two-manifold.
+        Used for lengths of level sets only; may be non-manifold.
     areas : (k,) float
-        The area each point stands for.
+        The area of the cell of each point.
     graph : (k, k) sparse
         Distances between neighbours, symmetric.
     contact : (k, k) sparse
@@ -50,7 +51,7 @@ class Surface:
     contact: sparse.csr_array
 
     def part(self, ids: IntArray) -> Surface:
-        """Return the surface over the points *ids* alone, renumbered in their order."""
+        """Return the surface over the points *ids*, renumbered in their order."""
         number = np.full(len(self.areas), -1)
         number[ids] = np.arange(len(ids))
         faces = number[self.faces]
@@ -59,20 +60,20 @@ class Surface:
         return Surface(self.vertices[ids], faces, self.areas[ids], graph, contact)
 
     def distance(self, start: IntArray, limit: float = np.inf) -> FloatArray:
-        """Return (k,) float: distance to the nearest of *start*; infinite beyond *limit*."""
+        """Return the distance to the nearest of *start*, (k,); infinite beyond *limit*."""
         return np.asarray(csgraph.dijkstra(self.graph, indices=start, min_only=True, limit=limit))
 
     def pieces(self, members: BoolArray) -> list[IntArray]:
-        """Return the connected pieces of the points in *members*, the largest area first."""
+        """Return the connected pieces of the points in *members*, by decreasing area."""
         ids = np.flatnonzero(members)
         count, piece = csgraph.connected_components(self.graph[ids][:, ids], directed=False)
         area = np.bincount(piece, self.areas[ids], minlength=count)
         return [ids[piece == k] for k in np.argsort(-area, kind="stable")]
 
     def two_pieces(self, inside: BoolArray) -> BoolArray:
-        """Return *inside* with its holes filled and its lesser pieces left out.
+        """Return the largest piece of *inside* with its holes filled.
 
-        Then both sides are connected, if the surface is.
+        Both sides are then connected if the surface is.
         """
         outside = np.zeros_like(inside)
         outside[self.pieces(~inside)[0]] = True
@@ -81,10 +82,10 @@ class Surface:
         return largest
 
     def distances_from_ends(self, rim: FloatArray) -> list[FloatArray]:
-        """Return distance fields (k,): their level sets run across limbs and along tubes.
+        """Return distances (k,) from the ends of the surface; their level sets run across limbs.
 
-        The largest connected pieces of {rim > 0} come first, for (k,) *rim*, the length of cuts
-        made at each point; then single points, each the farthest from all before.
+        The first ends are the largest connected pieces of {rim > 0}, with *rim* (k,) the length of
+        earlier cuts at each point; then single points, each the farthest from all ends before.
         """
         fields = []
         nearest = self.distance(np.array([0]))
@@ -95,12 +96,12 @@ class Surface:
             nearest = np.min(fields, axis=0)
         for number in range(min(_ENDS, len(rim))):
             fields.append(self.distance(np.array([np.argmax(nearest)])))
-            fresh = number == 0 and not rim.any()  # forget the arbitrary start
-            nearest = fields[-1] if fresh else np.minimum(nearest, fields[-1])
+            first = number == 0 and not rim.any()  # discard the arbitrary start
+            nearest = fields[-1] if first else np.minimum(nearest, fields[-1])
         return [d for d in fields if d.max() > 0.0]
 
     def level_lengths(self, faces: IntArray, d: FloatArray, levels: FloatArray) -> FloatArray:
-        """Return the length of each level set {d = level} within *faces*, for rising *levels*."""
+        """Return the length of each level set {d = level} within *faces*; *levels* increase."""
         order = np.argsort(d[faces], axis=1)
         corners = np.take_along_axis(faces, order, axis=1)
         low, middle, high = d[corners].T
@@ -109,7 +110,7 @@ class Surface:
         opposite = a + ((middle - low) / np.maximum(high - low, least))[:, None] * (c - a)
         longest = np.linalg.norm(b - opposite, axis=1)
         first, end = np.searchsorted(levels, low, "right"), np.searchsorted(levels, high)
-        f, k = count_up(end - np.minimum(first, end))
+        f, k = ragged_arange(end - np.minimum(first, end))
         k += first[f]
         rise = (levels[k] - low[f]) / np.maximum(middle - low, least)[f]
         fall = (high[f] - levels[k]) / np.maximum(high - middle, least)[f]
@@ -120,17 +121,17 @@ class Surface:
 def coarsen(
     mesh: Mesh, n_points: int, rng: np.random.Generator, progress: Progress | None = None
 ) -> tuple[IntArray, Surface]:
-    """Return (n,) int, the cell of each vertex, and the coarse copy with one point per cell.
+    """Return the cell of each vertex, (n,) int, and the coarse surface with one point per cell.
 
-    The copy has roughly *n_points*, or all vertices where there are fewer.  Every cell is
-    connected, and every component of the mesh keeps at least one.
+    There are about *n_points* cells, or as many as vertices if these are fewer.  Every cell is
+    connected, and every component of the mesh has at least one.
     """
-    kept, cell = cells(mesh, n_points, rng, progress)
+    kept, cell = voronoi_cells(mesh, n_points, rng, progress)
     return cell, _surface(mesh, cell, kept, unique_edges(cell[mesh.edges], len(kept)))
 
 
 def symmetric(edges: IntArray, values: FloatArray, n: int) -> sparse.csr_array:
-    """Return the (n, n) matrix with *values* at both ends of *edges*; repeated ones add up."""
+    """Return the symmetric (n, n) matrix with *values* at *edges*; repeated edges are summed."""
     i, j = edges.T
     half = sparse.coo_array((values, (i, j)), shape=(n, n)).tocsr()
     return sparse.csr_array(half + half.T)
@@ -140,10 +141,10 @@ def _surface(mesh: Mesh, cell: IntArray, kept: IntArray, edges: IntArray) -> Sur
     x, k = mesh.vertices[kept], len(kept)
     corners = cell[mesh.faces]
     areas = np.bincount(corners.ravel(), np.repeat(mesh.face_areas / 3.0, 3), k).astype(float)
-    # The border between two cells crosses each edge between them, from one triangle's centre
-    # over the edge's middle to the other's.
-    face, side = np.nonzero(corners != corners[:, [1, 2, 0]])
-    ends = np.stack([mesh.faces[face, side], mesh.faces[face, (side + 1) % 3]], axis=1)
+    # The border between two cells runs from the centre of a triangle over the midpoint of an edge
+    # between the cells to the centre of the next triangle.
+    face, corner = np.nonzero(corners != corners[:, [1, 2, 0]])
+    ends = np.stack([mesh.faces[face, corner], mesh.faces[face, (corner + 1) % 3]], axis=1)
     centres = mesh.vertices[mesh.faces[face]].mean(axis=1)
     width = np.linalg.norm(mesh.vertices[ends].mean(axis=1) - centres, axis=1)
     contact = symmetric(cell[ends], _STRAIGHT * width, k)
@@ -151,17 +152,17 @@ def _surface(mesh: Mesh, cell: IntArray, kept: IntArray, edges: IntArray) -> Sur
     length = np.linalg.norm(np.subtract(*x[edges.T]), axis=1)
     shortcuts, straight = _shortcuts(x, faces)
     lines, lengths = np.concatenate([edges, shortcuts]), np.concatenate([length, straight])
-    order = np.lexsort((lengths, lines[:, 1], lines[:, 0]))  # of two lines, the shorter
+    order = np.lexsort((lengths, lines[:, 1], lines[:, 0]))  # the shorter of two equal lines
     lines, first = np.unique(lines[order], axis=0, return_index=True)
     lengths = np.maximum(lengths[order][first], np.finfo(float).tiny)
     return Surface(x, faces, areas, symmetric(lines, lengths, k), contact)
 
 
 def _shortcuts(x: FloatArray, faces: IntArray) -> tuple[IntArray, FloatArray]:
-    """Return lines between the far corners of neighbouring triangles, and their lengths.
+    """Return lines between opposite corners of neighbouring triangles, and their lengths.
 
-    Both triangles are unfolded into a plane about their common edge; where the straight line
-    misses that edge there is none.
+    The two triangles are unfolded into a plane about their common edge; lines that do not cross
+    this edge are omitted.
     """
     a, b, c = (np.roll(faces, -turn, axis=1).ravel() for turn in range(3))
     key = np.minimum(a, b) * len(x) + np.maximum(a, b)

@@ -1,29 +1,29 @@
-"""Where a surface has a limb: the best neck to cut it at.
+"""Necks: the best closed curves for cutting limbs off a surface.
 
-A limb is a part of the surface with much area behind a short closed curve.  A curve of length L
-that leaves area a on its smaller side is judged by the number without unit
+A limb is a part of the surface with a large area behind a short closed curve.  The score of a curve
+of length L with area a on its smaller side is dimensionless:
 
     s = (c^3 L + R / 2)^2 / (2 pi a)                              smaller is better
 
-    R       length of older cuts on the smaller side; half of each belongs to either neighbour
+    R       length of earlier cuts on the smaller side; half of each counts for either neighbour
     c       L over the mean length of the two curves parallel to it at distances up to L / 2 pi,
-            at most 1.  It is 1 on a tube and on a disc, 2/3 where a tube stands on a plane: by
-            Gauss and Bonnet it tells how much negative curvature, a crease round the limb, the
-            curve lies on.  The parallel on the smaller side counts as at most L, since a limb does
-            not widen.
+            at most 1.  It is 1 on a tube and on a disc, 2/3 where a tube stands on a plane: by the
+            Gauss-Bonnet theorem it measures the negative curvature along the curve, as in a crease
+            around the limb.  The parallel on the smaller side counts as at most L, since a limb
+            does not widen.
 
 s is 1 for half a sphere and r / (l + r) for the closed end of a tube (radius r, length l), a tenth
-of that where the tube stands on a plane.  What stays below `NECK` is a neck: a tube on a plane that
-is longer than its radius, or a plain tube ten times as long as its radius.
+of that where the tube stands on a plane.  A curve with s below `NECK` is a neck: on a tube on a
+plane that is longer than its radius, or a plain tube ten times as long as its radius.
 
-Candidates are level sets of the distance from the ends of the surface, because those run across
-limbs.  All of them are judged roughly, with parallel level sets in place of parallel curves, and
-the best are measured.
+Candidates are level sets of the distance from the ends of the surface, because these run across
+limbs.  All are scored approximately, with parallel level sets in place of parallel curves, and the
+best ones exactly.
 
 Source
 ------
-[HR]  D. Hoffman, W. Richards, "Parts of recognition", Cognition 18, 65-96, 1984: people cut shapes
-      at negative minima of curvature.
+[HR]  D. Hoffman, W. Richards, "Parts of recognition", Cognition 18, 65-96, 1984: vision divides
+      shapes at negative minima of curvature.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ from .coarse import Surface
 
 NECK = 0.1  # s below which a cut is a neck
 _SHARPNESS = 3  # power of c
-_LEVELS = 100  # level sets of each distance, all judged roughly;
-_PER_END, _MEASURED = 5, 24  # so many of each, and of all, are measured
-_LEAST = 0.2  # the smallest limb, in fair shares
+_LEVELS = 100  # level sets of each distance, scored approximately
+_PER_END, _MEASURED = 5, 24  # candidates per distance, and in total, scored exactly
+_LEAST = 0.2  # area of the smallest limb, relative to that of a region
 _PARALLELS = np.array([0.5, 0.75, 1.0])  # distances of the parallel curves, in L / 2 pi
 
 
 @dataclass(frozen=True, eq=False)
 class Neck:
-    """One side of the best cut of a surface; among surfaces, cut the one of lowest *rank* first."""
+    """One side of the best cut of a surface; the surface of lowest *rank* is cut first."""
 
     rank: float
     inside: BoolArray
@@ -53,7 +53,7 @@ class Neck:
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    """The points with d < t, bounded by a curve of length *length*."""
+    """The points with d < t, bounded by a curve of the given length."""
 
     d: FloatArray
     t: float
@@ -62,16 +62,16 @@ class _Candidate:
 
 
 def best_neck(part: Surface, rim: FloatArray, share: float) -> Neck | None:
-    """Return the best neck of a connected surface, or None where it has no limb.
+    """Return the best neck of a connected surface, or None if it has no limb.
 
     Parameters
     ----------
     part : Surface
         k points.
     rim : (k,) float
-        Length of older cuts at each point.
+        Length of earlier cuts at each point.
     share : float
-        The area a region should have; no limb is much smaller.
+        The typical area of a region; limbs are not much smaller.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def best_neck(part: Surface, rim: FloatArray, share: float) -> Neck | None:
         return _measured_rank(part, rim, share, inside, length, curve)
 
     for candidate in candidates[:_MEASURED]:
-        if candidate.rank > 4.0 * bound:  # measured, it seldom falls to less than a quarter
+        if candidate.rank > 4.0 * bound:  # the exact score is seldom less than a quarter
             break
         inside = candidate.d < candidate.t
         rank = measured(inside, candidate.length)
@@ -105,7 +105,7 @@ def best_neck(part: Surface, rim: FloatArray, share: float) -> Neck | None:
 
 
 def _candidates(part: Surface, rim: FloatArray, share: float, d: FloatArray) -> list[_Candidate]:
-    """Return the level sets of *d* that look like necks: the best, and others some way apart."""
+    """Return the level sets of *d* with the best approximate scores, at some distance apart."""
     t = d.max() * np.arange(1, _LEVELS + 1) / (_LEVELS + 1)
     exact = part.level_lengths(part.faces, d, t)
     length = np.convolve(np.pad(exact, 1, mode="edge"), [0.25, 0.5, 0.25], mode="valid")
@@ -116,11 +116,11 @@ def _candidates(part: Surface, rim: FloatArray, share: float, d: FloatArray) -> 
     order = np.argsort(d, kind="stable")
     below = np.searchsorted(d[order], t)
     area = np.append(0.0, np.cumsum(part.areas[order]))[below]
-    older = np.append(0.0, np.cumsum(rim[order]))[below]
+    earlier = np.append(0.0, np.cumsum(rim[order]))[below]
     total = part.areas.sum()
-    older = np.where(area <= total - area, older, rim.sum() - older)
+    earlier = np.where(area <= total - area, earlier, rim.sum() - earlier)
     area = np.minimum(area, total - area)
-    rank = _rank(sharp * length + older / 2.0, area, total, share)
+    rank = _rank(sharp * length + earlier / 2.0, area, total, share)
     rank[(area < _LEAST * share) | (length <= 0.0)] = np.inf
 
     found: list[_Candidate] = []
@@ -134,7 +134,7 @@ def _candidates(part: Surface, rim: FloatArray, share: float, d: FloatArray) -> 
 def _measured_rank(
     part: Surface, rim: FloatArray, share: float, inside: BoolArray, length: float, curve: IntArray
 ) -> float:
-    """Return the rank of the cut along the points *curve*; infinite where it is no neck."""
+    """Return the rank of the cut along the points *curve*; infinite if it is not a neck."""
     total, area = part.areas.sum(), part.areas[inside].sum()
     if area > total - area:
         inside, area = ~inside, total - area
@@ -154,7 +154,7 @@ def _measured_rank(
 
 
 def _rank(cost: FloatArray, area: FloatArray, total: float, share: float) -> FloatArray:
-    """Return s, but area beyond the share is worth little, and larger surfaces are cut first."""
+    """Return s, modified: area beyond the share counts less, and larger surfaces come first."""
     area = np.maximum(area, np.finfo(float).tiny)
-    worth = np.minimum(area, share * (share / area) ** 0.25)
-    return np.asarray(cost**2 / (2.0 * np.pi * worth) * share / total)
+    effective = np.minimum(area, share * (share / area) ** 0.25)
+    return np.asarray(cost**2 / (2.0 * np.pi * effective) * share / total)

@@ -1,7 +1,7 @@
-"""Overlapping regions of a mesh, each of which will be moved by a cage of its own (section 2.2).
+"""Overlapping regions of a mesh, each deformed by its own cage (section 2.2).
 
-A vertex may lie in several regions.  Where it does, the positions that their cages give it are
-blended by weights that sum to 1 and fade to zero at each region's own border (`blending`):
+In an overlap, the positions that the cages give a vertex are blended by weights that sum to 1 and
+fade to zero at the border of each region (`blending`):
 
     x_i = sum_r w_ri x_ri        w_ri >= 0,  sum_r w_ri = 1,  w_ri = 0 outside region r       (3)
 
@@ -22,14 +22,14 @@ from ..arrays import BoolArray, FloatArray, IntArray, is_number, is_whole, plain
 from ..checks import shown
 from ..errors import RegionError
 from ..freezing import Frozen
-from ..mesh import Mesh, require_mesh
-from .blending import border_distance, distance_to_triangles, shares
+from ..mesh import Mesh, counted, require_mesh
+from .blending import blend_weights, border_distance, distance_to_triangles
 
 _EQUAL = 1e-9  # weights that differ by rounding only
 
 
 class CageSurface(Protocol):
-    """Anything with the surface of a cage."""
+    """An object with the vertices and faces of a cage."""
 
     @property
     def vertices(self) -> FloatArray:
@@ -42,22 +42,23 @@ class CageSurface(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Regions(Frozen):
-    """Which vertices belong to which regions; every vertex to at least one.
+    """Overlapping regions of the vertices of a mesh; every vertex is in at least one.
 
     Parameters
     ----------
     mesh : Mesh
-        The mesh the regions lie on, n vertices.
+        The mesh, n vertices.
     membership : (r, n) bool
         One row per region.
     smoothness : float
-        The power p of `blending.shares`: 1 fades linearly across an overlap, 2 leaves zero with a
-        horizontal tangent.
+        The power p of `blending.blend_weights`: 1 fades linearly across an overlap, larger values
+        with zero slope at its border.
 
     Raises
     ------
     RegionError
-        If the shape is wrong, a region is empty, or a vertex lies in no region; says which.
+        If the shape is wrong, a region is empty, or a vertex is in no region; the message
+        lists them.
     """
 
     mesh: Mesh
@@ -76,12 +77,14 @@ class Regions(Frozen):
         empty = np.flatnonzero(~membership.any(axis=1))
         if len(empty):
             raise RegionError(
-                f"{len(empty)} regions hold no vertex: {_some(empty)}; leave them out"
+                f"{counted(len(empty), 'region has', 'regions have')} no vertices: {_some(empty)}; "
+                "leave out empty regions"
             )
-        bare = np.flatnonzero(~membership.any(axis=0))
-        if len(bare):
+        uncovered = np.flatnonzero(~membership.any(axis=0))
+        if len(uncovered):
             raise RegionError(
-                f"{len(bare)} vertices lie in no region: {_some(bare)}; add them to a region"
+                f"{counted(len(uncovered), 'vertex is', 'vertices are')} in no region: "
+                f"{_some(uncovered)}; add every vertex to a region"
             )
         if not (is_number(self.smoothness) and self.smoothness > 0.0):
             raise RegionError(f"smoothness must be a number above 0; got {shown(self.smoothness)}")
@@ -90,28 +93,28 @@ class Regions(Frozen):
 
     @classmethod
     def single(cls, mesh: Mesh) -> Regions:
-        """Return one region that holds everything: the classical method with a single cage."""
+        """Return one region of all vertices, for the classical method with a single cage."""
         require_mesh(mesh)
         return cls(mesh, np.ones((1, mesh.n_vertices), dtype=bool))
 
     @classmethod
     def from_masks(cls, mesh: Mesh, masks: ArrayLike) -> Regions:
-        """Return the regions that (r, n) bool *masks* describe, as they are."""
+        """Return the regions of *masks* (r, n) bool."""
         return cls(mesh, np.atleast_2d(plain(masks, "masks")))
 
     @classmethod
     def from_labels(cls, mesh: Mesh, labels: ArrayLike, overlap: int = 4) -> Regions:
-        """Return one region for each label, grown over its neighbours so that they overlap.
+        """Return one region per label, grown so that neighbouring regions overlap.
 
         Parameters
         ----------
         mesh : Mesh
             n vertices.
         labels : (n,) int
-            Any integers; region r is the r-th smallest of those that occur.
+            Any integers; region r has the r-th smallest label.
         overlap : int
-            By how many rings of edges each region grows beyond its label, so that two neighbours
-            share about twice as many.  With 0, none overlap and the surface may tear at a border.
+            Number of edge rings by which each region grows beyond its label; an overlap is about
+            twice as wide.  With 0 there are no overlaps, and the surface may tear at borders.
 
         Raises
         ------
@@ -146,33 +149,34 @@ class Regions(Frozen):
 
     @cached_property
     def border_distance(self) -> FloatArray:
-        """(r, n) float: distance along the surface to the region's border; 0 outside of it.
+        """(r, n) float: distance along the surface to the border of each region, 0 outside it.
 
-        In the mesh's unit; infinite where a region has no border.
+        In the unit of the mesh; infinite where a region has no border.
         """
         return _read_only(border_distance(self.mesh, self.membership))
 
     @cached_property
     def weights(self) -> FloatArray:
-        """(r, n) float: the share of each region at each vertex; columns sum to 1.
+        """(r, n) float: the blend weight of each region at each vertex; columns sum to 1.
 
-        Zero outside a region and on its border, except at vertices that no other region can take.
+        Zero outside a region and on its border, except at vertices that are on the border of all
+        their regions.
         """
-        return _read_only(shares(self.membership, self.border_distance, self.smoothness))
+        return _read_only(blend_weights(self.membership, self.border_distance, self.smoothness))
 
     @property
     def labels(self) -> IntArray:
-        """(n,) int: the region that weighs most at each vertex; the first of (almost) equals."""
+        """(n,) int: the region of largest weight at each vertex; the first of equal ones."""
         ahead = self.weights >= self.weights.max(axis=0) - _EQUAL
         return np.asarray(np.argmax(ahead, axis=0), dtype=np.int64)
 
     def members(self, region: int) -> IntArray:
-        """Return the numbers of the vertices in *region*, in order."""
+        """Return the vertices of *region*, sorted."""
         require_region(region, self.n_regions)
         return np.flatnonzero(self.membership[int(region)])
 
     def grow(self, rings: int) -> Regions:
-        """Return the same regions, each with *rings* more rings of neighbours."""
+        """Return the regions grown by *rings* rings of neighbours."""
         if not is_whole(rings, 0):
             raise RegionError(f"rings must be a whole number, 0 or more; got {shown(rings)}")
         membership = self.membership.copy()
@@ -190,7 +194,7 @@ class Regions(Frozen):
 
 
 def require_regions(regions: object, mesh: Mesh) -> None:
-    """Raise a RegionError unless *regions* are `Regions` over as many vertices as *mesh* has."""
+    """Raise a RegionError unless *regions* are `Regions` with as many vertices as *mesh*."""
     if not isinstance(regions, Regions):
         raise RegionError(
             f"regions must be Regions; got {shown(regions)}. Create them with segment(mesh) or "
@@ -198,8 +202,8 @@ def require_regions(regions: object, mesh: Mesh) -> None:
         )
     if regions.mesh.n_vertices != mesh.n_vertices:
         raise RegionError(
-            f"these regions belong to a mesh of {regions.mesh.n_vertices} vertices, "
-            f"this one has {mesh.n_vertices}; create new ones"
+            f"the regions belong to a mesh of {regions.mesh.n_vertices} vertices, but this mesh "
+            f"has {mesh.n_vertices}; create regions of this mesh"
         )
 
 
@@ -210,7 +214,7 @@ def require_region(region: int, count: int) -> None:
 
 
 def cage_distance_weights(regions: Regions, cages: Sequence[CageSurface]) -> FloatArray:
-    """Return the weights (4) as printed: d is the distance in space to each region's cage.
+    """Return the weights (4) as printed, with d the distance in space to the cage of each region.
 
     For comparison only: these weights jump at the border of a region (see `blending`).
 
@@ -228,15 +232,14 @@ def cage_distance_weights(regions: Regions, cages: Sequence[CageSurface]) -> Flo
     """
     if len(cages) != regions.n_regions:
         raise RegionError(
-            f"cages must hold one cage for each of the {regions.n_regions} regions; "
-            f"got {len(cages)}"
+            f"cages must be one cage for each of the {regions.n_regions} regions; got {len(cages)}"
         )
     distance = np.zeros(regions.membership.shape)
     for r, cage in enumerate(cages):
         inside = regions.members(r)
         points = regions.mesh.vertices[inside]
         distance[r, inside] = distance_to_triangles(points, cage.vertices, cage.faces)
-    return shares(regions.membership, distance)
+    return blend_weights(regions.membership, distance)
 
 
 def _read_only(array: FloatArray) -> FloatArray:
@@ -245,6 +248,6 @@ def _read_only(array: FloatArray) -> FloatArray:
 
 
 def _some(numbers: IntArray) -> str:
-    """Name the first few of *numbers*."""
+    """Return the first few of *numbers* as text."""
     shown = ", ".join(str(number) for number in numbers[:8])
     return shown + (", ..." if len(numbers) > 8 else "")

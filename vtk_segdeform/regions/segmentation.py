@@ -1,12 +1,12 @@
-"""Automatic regions: limbs apart from the trunk, and the trunk in fair shares.
+"""Automatic segmentation: limbs are separated from the trunk, and large parts sliced evenly.
 
-The shape is cut in two at its best neck (`necks`), then whichever part has the best neck left, and
-so on, until there are as many parts as asked or no neck is left.  If more parts are asked than
-there are limbs, the largest are cut into slices of about equal area (`slices`).
-All this happens on a coarse copy (`coarse`), so that it costs about the same for every mesh, and
-the parts hardly depend on how finely the shape is meshed.
+The shape is cut in two at its best neck (`necks`), then the part with the best remaining neck, and
+so on, until the requested number of parts is reached or no neck is left.  If more parts are
+requested than there are limbs, the largest are cut into slices of about equal area (`slices`).
+All this is computed on a coarse surface (`coarse`), so that it costs about the same for every mesh
+and hardly depends on the resolution of the mesh.
 
-On the mesh itself the parts' borders are then shortened, and drawn into creases (`borders`).
+Finally the borders between parts are shortened and moved into creases on the mesh (`borders`).
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from .slices import fair_slice, quotas
 
 _POINTS = 3000  # of the coarse copy, about
 _POINTS_PER_REGION = 16  # at least
-_TYPICAL = 6  # where the number is open, a region's share is the whole over this
-_OVERLAP = 0.1  # of a region's width, counted in edges
-_TIE_BREAK = 1e-3  # of an edge
+_TYPICAL = 6  # without a requested number, a region's typical area is the whole over this
+_OVERLAP = 0.1  # rings, relative to the width of a region in edges
+_TIE_BREAK = 1e-3  # relative to an edge
 
 
 @one_blas_thread()
@@ -41,39 +41,39 @@ def segment(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Regions:
-    """Return overlapping regions of sensible shape.
+    """Segment a mesh into overlapping regions.
 
     Parameters
     ----------
     mesh : Mesh
         n vertices, one or several components.
     n_regions : int, optional
-        How many, 1 to n.  None cuts off every limb (`necks.NECK`) and nothing else: 1 for a sphere,
-        3 for a cactus with two arms.
+        Number of regions, 1 to n.  None separates every limb (`necks.NECK`) and nothing else: one
+        region for a sphere, three for a cactus with two arms.
     overlap : int, optional
-        Rings of edges by which each region grows over its neighbours.  None takes a tenth of a
-        region's width in edges, sqrt(n / regions) / 10, at least 2: the same width in space on a
-        coarse and on a fine mesh.
+        Number of edge rings by which each region grows over its neighbours.  None means a tenth of
+        the width of a region in edges, sqrt(n / regions) / 10, at least 2: the same width in space
+        on coarse and fine meshes.
     seed : int
-        Of the order in which vertices are thinned out for the coarse copy.
+        Seed for sampling the vertices of the coarse surface.
     progress : Progress, optional
-        Told how far it is; may raise `errors.Cancelled`.
+        Called with the fraction done; may raise `errors.Cancelled`.
 
     Returns
     -------
     regions : Regions
-        Each is connected before it is grown, and no region spans two components of the mesh, unless
-        *n_regions* is less than the number of components: then each of the largest components is a
-        region, and every other one belongs to the region nearest to it.
+        Each is connected before it is grown, and no region spans two components of the mesh.  If
+        *n_regions* is less than the number of components, each of the largest components is a
+        region, and the others are added to the nearest one.
 
     Raises
     ------
     RegionError
-        If *n_regions* is not a whole number in 1..n.
+        If *n_regions* is not an integer in 1..n.
 
     Notes
     -----
-    The same for the same arguments, and for a mesh moved, turned or scaled, up to rounding.
+    Deterministic, and invariant under translation, rotation and scaling up to rounding.
     """
     require_mesh(mesh)
     n = mesh.n_vertices
@@ -83,15 +83,15 @@ def segment(
         raise RegionError(f"overlap must be a whole number, 0 or more; got {shown(overlap)}")
     if not is_whole(seed, 0):
         raise ArgumentError(f"seed must be a whole number, 0 or more; got {shown(seed)}")
-    tell(progress, 0.0, "thinning out vertices")
+    tell(progress, 0.0, "sampling vertices")
     shape = _without_ties(mesh)
     if n_regions is not None and n_regions <= mesh.components.max() + 1:
         labels = _merged_components(shape, int(n_regions))
     else:
         n_regions = None if n_regions is None else int(n_regions)
         points = max(_POINTS, _POINTS_PER_REGION * (n_regions or 1))
-        thinning = part(progress, 0.02, 0.1)
-        cell, surface = coarsen(shape, points, np.random.default_rng(int(seed)), thinning)
+        sampling = part(progress, 0.02, 0.1)
+        cell, surface = coarsen(shape, points, np.random.default_rng(int(seed)), sampling)
         labels = _parts(surface, n_regions, progress)[cell]
         tell(progress, 0.8, "smoothing borders")
         labels = smooth_borders(shape, labels)
@@ -106,10 +106,10 @@ def segment(
 
 
 def _without_ties(mesh: Mesh) -> Mesh:
-    """Return the mesh with each vertex moved a little towards its first neighbour.
+    """Return the mesh with each vertex moved slightly towards its first neighbour.
 
-    On a symmetric shape many distances are equal, and rounding, which is another in every frame,
-    would choose between them.  The moves belong to the numbers of the vertices and turn along.
+    Symmetric shapes have many equal distances, and rounding must not decide between them, since it
+    differs between frames of reference.  The moves depend on the vertex indices only.
     """
     first = mesh.adjacency.indices[mesh.adjacency.indptr[:-1]]
     share = _TIE_BREAK * np.random.default_rng(0).random((mesh.n_vertices, 1))
@@ -117,13 +117,13 @@ def _without_ties(mesh: Mesh) -> Mesh:
 
 
 def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -> IntArray:
-    """Return (k,) int: the part of each point; limbs first, then slices of what is large."""
+    """Return the part of each point, (k,) int: limbs first, then slices of large parts."""
     everything = np.ones(len(surface.areas), dtype=bool)
     labels = np.empty(len(everything), dtype=np.int64)
     share = surface.areas.sum() / (n_regions or _TYPICAL)
     wanted = n_regions or np.inf
 
-    def alone(label: int) -> tuple[IntArray, Surface, FloatArray]:
+    def extracted(label: int) -> tuple[IntArray, Surface, FloatArray]:
         ids = np.flatnonzero(labels == label)
         part = surface.part(ids)
         rim = surface.contact[ids].sum(axis=1) - part.contact.sum(axis=1)
@@ -135,8 +135,8 @@ def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -
     necks: list[Neck | None]
     necks = []
     for label in range(len(components)):
-        necks.append(best_neck(*alone(label)[1:], share))
-        tell(progress, 0.1 + 0.2 * len(necks) / len(components), "looking for limbs")
+        necks.append(best_neck(*extracted(label)[1:], share))
+        tell(progress, 0.1 + 0.2 * len(necks) / len(components), "detecting limbs")
     while len(necks) < wanted:
         ranks = [np.inf if neck is None else neck.rank for neck in necks]
         label = int(np.argmin(ranks))
@@ -144,29 +144,29 @@ def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -
         if neck is None:
             break
         labels[np.flatnonzero(labels == label)[neck.inside]] = len(necks)
-        necks[label] = best_neck(*alone(label)[1:], share)
-        necks.append(best_neck(*alone(len(necks))[1:], share))
-        tell(progress, 0.3 + 0.2 * min(1.0, len(necks) / min(wanted, 20)), "cutting off limbs")
+        necks[label] = best_neck(*extracted(label)[1:], share)
+        necks.append(best_neck(*extracted(len(necks))[1:], share))
+        tell(progress, 0.3 + 0.2 * min(1.0, len(necks) / min(wanted, 20)), "separating limbs")
 
     count = len(necks)
     areas = np.bincount(labels, surface.areas).astype(float)
-    waiting = list(enumerate(quotas(areas, np.bincount(labels), n_regions or count)))
-    while waiting:
-        label, quota = waiting.pop()
-        ids, part, rim = alone(label)
+    to_slice = list(enumerate(quotas(areas, np.bincount(labels), n_regions or count)))
+    while to_slice:
+        label, quota = to_slice.pop()
+        ids, part, rim = extracted(label)
         if quota > 1:
             inside = fair_slice(part, rim, (quota // 2) / quota)
             labels[ids[inside]] = count
-            size = int(inside.sum())  # no side gets more parts than it has points
-            there = int(np.clip(quota // 2, quota - (len(ids) - size), size))
-            waiting += [(label, quota - there), (count, there)]
+            size = int(inside.sum())  # neither side gets more parts than it has points
+            inner = int(np.clip(quota // 2, quota - (len(ids) - size), size))
+            to_slice += [(label, quota - inner), (count, inner)]
             count += 1
-            tell(progress, 0.5 + 0.3 * count / (n_regions or count), "slicing the rest")
+            tell(progress, 0.5 + 0.3 * count / (n_regions or count), "slicing large parts")
     return labels
 
 
 def _merged_components(mesh: Mesh, n_regions: int) -> IntArray:
-    """Return one label per large component; the others join the nearest, centre to centre."""
+    """Return one label per large component; the others join the one with the nearest centre."""
     component, size = mesh.components, np.bincount(mesh.components)
     sums = [np.bincount(component, mesh.vertices[:, axis]) for axis in range(3)]
     centres = np.stack(sums, axis=1) / size[:, None]

@@ -1,8 +1,8 @@
-"""A surface in parts of equal area with short borders, where it has no limbs to tell them apart.
+"""Slicing of a surface without limbs into parts of equal area with short borders.
 
-A surface for q parts is cut into two, for q // 2 parts and the rest, along the shortest level set
-that leaves the right area on each side, and each side likewise.  Level sets of the distance from
-the ends of a surface run across it, so a tube comes apart in rings.
+A surface for q parts is cut into two sides, for q // 2 parts and the rest, along the shortest level
+set with the right area on each side, and each side recursively.  Level sets of the distance from
+the ends of a surface run across it, so a tube is cut into rings.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ import numpy as np
 from ..arrays import BoolArray, FloatArray, IntArray
 from .coarse import Surface
 
-_TOLERANCE = 0.15  # by which a side may miss its area
+_TOLERANCE = 0.15  # relative error of the area of a side
 
 
 def quotas(areas: FloatArray, points: IntArray, count: int) -> IntArray:
-    """Return how many of *count* parts each surface is cut into: in proportion, at least one each.
+    """Return the number of parts of each surface, *count* in total: by area, at least one each.
 
-    The next part goes to the surface whose parts are largest so far, if it has *points* enough.
+    Each further part goes to the surface whose parts are largest so far, if it has enough *points*.
     """
     quota = np.ones(len(areas), dtype=np.int64)
     heap = [(-area, k) for k, area in enumerate(areas) if points[k] > 1]
@@ -34,14 +34,14 @@ def quotas(areas: FloatArray, points: IntArray, count: int) -> IntArray:
 
 
 def fair_slice(part: Surface, rim: FloatArray, fraction: float) -> BoolArray:
-    """Return (k,) bool: a side of the surface with about *fraction* of its area.
+    """Return a side of the surface with about *fraction* of its area, (k,) bool.
 
     Parameters
     ----------
     part : Surface
-        Connected, two points or more.
+        Connected, at least two points.
     rim : (k,) float
-        Length of older cuts at each point.
+        Length of earlier cuts at each point.
     fraction : float
         Between 0 and 1.
 
@@ -55,21 +55,21 @@ def fair_slice(part: Surface, rim: FloatArray, fraction: float) -> BoolArray:
     for d in part.distances_from_ends(rim):
         order = np.argsort(d, kind="stable")
         below = np.cumsum(part.areas[order]) / total
-        for wanted in {fraction, 1.0 - fraction}:
-            count = int(np.clip(np.searchsorted(below, wanted), 1, len(d) - 1))
+        for target in {fraction, 1.0 - fraction}:
+            count = int(np.clip(np.searchsorted(below, target), 1, len(d) - 1))
             t = (d[order[count - 1]] + d[order[count]]) / 2.0
             length = part.level_lengths(part.faces, d, np.array([t]))[0]
-            found.append((length, wanted, order[:count]))
+            found.append((length, target, order[:count]))
     found.sort(key=lambda candidate: candidate[0])
 
     best, least = np.zeros(len(rim), dtype=bool), np.inf
-    for _, wanted, ids in found:
+    for _, target, ids in found:
         inside = np.zeros(len(rim), dtype=bool)
         inside[ids] = True
         inside = part.two_pieces(inside)
-        miss = abs(part.areas[inside].sum() / total - wanted) / min(fraction, 1.0 - fraction)
+        miss = abs(part.areas[inside].sum() / total - target) / min(fraction, 1.0 - fraction)
         if miss < least and not inside.all():
-            best, least = inside if wanted == fraction else ~inside, miss
+            best, least = inside if target == fraction else ~inside, miss
         if least <= _TOLERANCE:
             break
     return best

@@ -2,15 +2,14 @@
 
 The files, in reading order:
 
-    repair          `repair`: triangles in, a `Mesh` and a list of what was done out
+    repair          `repair`: triangles in, a closed mesh and a list of the steps taken out
     repair_steps    the steps
-    holes           closing holes
-    hole_borders    border loops
-    lids            triangulation of a loop by dynamic programming
-    ears            triangulation of a loop by ear clipping
-    lid_refining    interior vertices for lids
-    cracks          flat lids replaced by splitting the adjacent face
-    splitting       surfaces that touch in a vertex or an edge, separated
+    splitting       separating surfaces that touch in a vertex or along an edge
+    holes           closing holes with lids
+    hole_borders    border loops of holes
+    lids            triangulation of a loop, by dynamic programming or ear clipping
+    lid_refining    interior vertices of lids
+    cracks          replacing flat lids by splitting the adjacent face
 """
 
 from .repair import Repair, repair

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..mesh import Sides, edge_keys, least_angle, normals
+from ..mesh import HalfEdges, edge_keys, least_angle, normals
 
 _FLAT = 1e-9  # radians
 
@@ -18,9 +18,9 @@ _FLAT = 1e-9  # radians
 def close_cracks(
     vertices: FloatArray, faces: IntArray, lids: BoolArray
 ) -> tuple[IntArray, BoolArray]:
-    """Return *faces* (m, 3) with flat *lids* (m,) replaced, and which faces were changed.
+    """Return *faces* (m, 3) with flat *lids* (m,) replaced, and which faces changed.
 
-    A flat lid is kept where a half would be flat too, fold over, or need an existing edge.
+    A flat lid is kept if a half would be flat too, fold over, or repeat an existing edge.
     """
     changed = np.zeros(len(faces), dtype=bool)
     while True:
@@ -36,27 +36,27 @@ def close_cracks(
 def _halves(
     vertices: FloatArray, faces: IntArray, flat: IntArray
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Return flat faces (k,), the faces beyond their longest sides (k,), and halves (k, 2, 3)."""
-    sides = Sides(faces, len(vertices))
-    partner = np.full(3 * len(faces), -1)
-    one, other = sides.pairs[~sides.turned].T
-    partner[one], partner[other] = other, one
+    """Return flat faces (k,), the faces across their longest edges (k,), and halves (k, 2, 3)."""
+    half_edges = HalfEdges(faces, len(vertices))
+    twin = np.full(3 * len(faces), -1)
+    one, other = half_edges.pairs[~half_edges.inconsistent].T
+    twin[one], twin[other] = other, one
     corners = vertices[faces[flat]]
     length = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-    side = 3 * flat + length.argmax(axis=1)
-    known = partner[side] >= 0
-    flat, side = flat[known], side[known]
-    across = partner[side]
+    longest = 3 * flat + length.argmax(axis=1)
+    paired = twin[longest] >= 0
+    flat, longest = flat[paired], longest[paired]
+    across = twin[longest]
     beyond = across // 3
-    a, b = sides.tail[side], sides.head[side]
-    c = faces[flat, (side % 3 + 2) % 3]
+    a, b = half_edges.tail[longest], half_edges.head[longest]
+    c = faces[flat, (longest % 3 + 2) % 3]
     d = faces[beyond, (across % 3 + 2) % 3]
     halves = np.stack([np.stack([a, d, c], axis=1), np.stack([d, b, c], axis=1)], axis=1)
     good = (least_angle(vertices[halves]) > _FLAT).all(axis=1) & (c != d)
     up = normals(vertices[faces[beyond]])
     good &= ((normals(vertices[halves]) * up[:, None]).sum(axis=2) > 0.0).all(axis=1)
     keys = edge_keys(c, d, len(vertices))
-    good &= ~np.isin(keys, sides.keys)
+    good &= ~np.isin(keys, half_edges.keys)
     # At most one split per face and edge at a time.
     some = np.flatnonzero(good)
     some = some[np.unique(beyond[some], return_index=True)[1]]

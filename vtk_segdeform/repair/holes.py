@@ -1,13 +1,13 @@
 """Close holes with lids that have no flat triangle and, where possible, no intersections.
 
-A lid over the corners of its loop alone is enough where its triangles are about as well shaped as
-the faces along the border.  Others get interior vertices.  A lid that intersects itself or the
-surrounding surface is built again from other triangulations of its loop, and the best one is kept:
+A lid over the corners of its loop needs no interior vertices if its triangles are about as well
+shaped as the faces along the border; otherwise it is refined.  A lid that intersects itself or the
+surrounding surface is built again from other triangulations of its loop, and the best is kept:
 
     least area       by dynamic programming; cuts off bays and follows a curved border
-    clipped ears     of the projected loop; for planar borders, however they wind, and others with
-                     a simple projection
-    least bending    the smallest largest angle to the neighbours first; leaves the surface
+    clipped ears     of the projected loop; for planar borders of any shape, and others with a
+                     simple projection
+    least bending    minimises the largest angle between neighbours first; continues the surface
                      smoothly
 
 All holes are processed together, so that a mesh with thousands of them takes seconds.
@@ -21,15 +21,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..mesh import Sides, edge_keys, intersections_of, least_angle, normals
-from .ears import clip_ears
+from ..mesh import HalfEdges, edge_keys, intersections_of, least_angle, normals
 from .hole_borders import border_loops
 from .lid_refining import Lids, harmonic, joined_twice, refine, split_edges
-from .lids import triangulate_long_loop, triangulate_loops
+from .lids import clip_ears, triangulate_long_loop, triangulate_loops
 
-_CUBIC = 64  # corners of a loop that dynamic programming takes at once
-_ROUND = np.deg2rad(20.0)  # least angle that is good enough for any lid
-_WORTH = 1.1  # factor by which interior vertices must increase the least angle
+_CUBIC = 64  # most corners of a loop for dynamic programming
+_ROUND = np.deg2rad(20.0)  # least angle that is sufficient for any lid
+_GAIN = 1.1  # factor by which another lid must increase the least angle
 _FLAT = 1e-9  # radians
 _NEAREST = 8  # border vertices that a new one interpolates
 
@@ -47,9 +46,9 @@ class Closing:
     faces : (k, 3) int
         The lids, hole by hole.
     sources, weights : (c, 8) int, (c, 8) float
-        Border vertices near each new one, and their weights; rows sum to 1.
+        Border vertices near each new vertex, and their weights; rows sum to 1.
     n_crossing : int
-        Number of lids that still intersect themselves or the surface, degenerate ones excluded.
+        Number of lids that intersect themselves or the surface, except degenerate ones.
     """
 
     sizes: list[int]
@@ -62,71 +61,74 @@ class Closing:
 
 @dataclass(frozen=True)
 class _Scores:
-    """Quality of the lids over some loops, (h,) each; the first difference decides."""
+    """Quality of lids, (h,) each; fewer crossings matter most, then flat faces, then angles."""
 
     crossings: IntArray
     flat: IntArray
     angle: FloatArray
 
     def worse_than(self, other: _Scores) -> BoolArray:
-        """Return for which loops the *other* lid is sufficiently better."""
-        clearer = other.crossings < self.crossings
-        even = other.crossings == self.crossings
-        fuller = even & (other.flat < self.flat)
-        even &= other.flat == self.flat
-        return np.asarray(clearer | fuller | (even & (other.angle > _WORTH * self.angle)))
+        """Return for which loops the *other* lid is better, (h,)."""
+        fewer_crossings = other.crossings < self.crossings
+        equal = other.crossings == self.crossings
+        fewer_flat = equal & (other.flat < self.flat)
+        equal &= other.flat == self.flat
+        rounder = equal & (other.angle > _GAIN * self.angle)
+        return np.asarray(fewer_crossings | fewer_flat | rounder)
 
 
-def close_holes(vertices: FloatArray, sides: Sides, largest: int) -> Closing:
+def close_holes(vertices: FloatArray, half_edges: HalfEdges, largest: int) -> Closing:
     """Return lids for the holes of up to *largest* edges.
 
     Parameters
     ----------
     vertices : (n, 3) float
         Finite.
-    sides : Sides
-        Consistently oriented, no edge with three sides or more.
+    half_edges : HalfEdges
+        Consistently oriented, at most two on each edge.
     largest : int
-        Number of edges.
+        Largest number of edges of a hole that is closed.
     """
-    borders = border_loops(vertices, sides, largest)
+    borders = border_loops(vertices, half_edges, largest)
     if not borders:
         none = np.empty((0, 3))
         return Closing([], none, none.astype(int), np.empty((0, _NEAREST), int), none, 0)
-    holes = _Holes(vertices, sides, borders)
+    holes = _Holes(vertices, half_edges, borders)
     return _closing(holes, *_best_lids(holes))
 
 
 class _Holes:
     """The h loops to close, and the surrounding surface.
 
-    The corners of all loops, one after another, are the first vertices of all `Lids` here.
+    All `Lids` in this file begin with the corners of all loops, in their order.
     """
 
-    def __init__(self, vertices: FloatArray, sides: Sides, borders: list[IntArray]) -> None:
-        self.vertices, self.faces = vertices, sides.faces
-        self.border = np.concatenate(borders)  # sides
-        self.corners = sides.head[self.border]
+    def __init__(
+        self, vertices: FloatArray, half_edges: HalfEdges, borders: list[IntArray]
+    ) -> None:
+        self.vertices, self.faces = vertices, half_edges.faces
+        self.border = np.concatenate(borders)  # half-edges
+        self.corners = half_edges.head[self.border]
         self.length = np.array([len(loop) for loop in borders])
         self.start = np.cumsum(self.length) - self.length
-        self.known = np.sort(sides.keys)
+        self.known = np.sort(half_edges.keys)
         self.points = vertices[self.corners]
-        edge = np.linalg.norm(vertices[sides.tail[self.border]] - self.points, axis=1)
+        edge = np.linalg.norm(vertices[half_edges.tail[self.border]] - self.points, axis=1)
         before = np.arange(len(edge)) - 1
         before[self.start] = self.start + self.length - 1
         self.size = 0.5 * (edge + edge[before])
-        triangles = vertices[sides.faces[self.border // 3]]
+        triangles = vertices[half_edges.faces[self.border // 3]]
         angles = np.split(least_angle(triangles), self.start[1:])
-        self.wanted = np.minimum(_ROUND, [float(np.median(some)) for some in angles])
+        self.sufficient = np.minimum(_ROUND, [float(np.median(some)) for some in angles])
         up = normals(triangles)
         self.outer = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-300)
 
     def of(self, loop: int) -> slice:
-        """Return where the corners of a loop are."""
+        """Return the slice of the corners of a loop."""
         return slice(self.start[loop], self.start[loop] + self.length[loop])
 
     def lids(self, faces: IntArray, centred: IntArray) -> Lids:
-        """Return lids of *faces* over corners and one new vertex in each loop of *centred*."""
+        """Return lids of *faces* over the corners and a new vertex in each loop of *centred*."""
         owner = np.repeat(np.arange(len(self.length)), self.length)
         middle = [self.points[self.of(loop)].mean(axis=0) for loop in centred]
         size = [self.size[self.of(loop)].mean() for loop in centred]
@@ -140,19 +142,19 @@ class _Holes:
 
 
 def _best_lids(holes: _Holes) -> tuple[Lids, _Scores]:
-    """Return the best lid found for every loop."""
-    lids = plain = _plain(holes)
-    narrow = _least(holes, lids) < holes.wanted
+    """Return the best lids found, and their scores."""
+    lids = plain = _least_area(holes)
+    narrow = _least(holes, lids) < holes.sufficient
     scores = _scores(holes, lids, lids, ~narrow)  # others count as worse than any refined lid
     again = narrow | (scores.crossings > 0)
-    for attempt in (_refined, _as_seen, _least_bending, _plain_again):
-        asked = again & (holes.length > 3)
-        if not asked.any():
+    for attempt in (_refined, _clipped, _least_bending, _unrefined):
+        retried = again & (holes.length > 3)
+        if not retried.any():
             break
-        tried = attempt(holes, plain, np.flatnonzero(asked))
-        asked &= _mask(holes, tried.owner[tried.faces[:, 0]])
-        found = _scores(holes, lids, tried, asked)
-        better = asked & scores.worse_than(found)
+        tried = attempt(holes, plain, np.flatnonzero(retried))
+        retried &= _mask(holes, tried.owner[tried.faces[:, 0]])
+        found = _scores(holes, lids, tried, retried)
+        better = retried & scores.worse_than(found)
         lids = _together(holes, _only(holes, lids, ~better), _only(holes, tried, better))
         scores = _Scores(
             np.where(better, found.crossings, scores.crossings),
@@ -165,17 +167,17 @@ def _best_lids(holes: _Holes) -> tuple[Lids, _Scores]:
     return lids, scores
 
 
-def _plain(holes: _Holes) -> Lids:
-    """Return lids of least area over corners alone; fans where existing edges prevent them.
+def _least_area(holes: _Holes) -> Lids:
+    """Return lids of least area over the corners; fans around a new vertex where none is allowed.
 
-    Loops that would share a new edge with an earlier one are closed again without it.
+    Loops that would share a new edge with an earlier one are triangulated again without it.
     """
     faces: list[IntArray] = [np.empty((0, 3), int)] * len(holes.length)
-    known, ask = holes.known, np.arange(len(holes.length))
+    known, todo = holes.known, np.arange(len(holes.length))
     centred: list[int] = []
-    while len(ask):
-        for n in np.unique(holes.length[ask]):
-            some = ask[holes.length[ask] == n]
+    while len(todo):
+        for n in np.unique(holes.length[todo]):
+            some = todo[holes.length[todo] == n]
             triangles, allowed = _over_corners(holes, some, known)
             for loop, lid, good in zip(some.tolist(), triangles, allowed.tolist(), strict=True):
                 faces[loop] = lid + holes.start[loop]
@@ -186,12 +188,12 @@ def _plain(holes: _Holes) -> Lids:
                     faces[loop] = np.insert(rim, 2, middle, axis=1)
                     centred.append(loop)
         lids = holes.lids(np.concatenate(faces), np.array(centred, dtype=np.int64))
-        ask, known = _in_conflict(holes, lids)
+        todo, known = _in_conflict(holes, lids)
     return lids
 
 
 def _over_corners(holes: _Holes, some: IntArray, known: IntArray) -> tuple[IntArray, BoolArray]:
-    """Return triangles (l, n - 2, 3) for loops of one length, and which of them are allowed."""
+    """Return triangles (l, n - 2, 3) for loops of one length, and whether they are allowed."""
     n = int(holes.length[some[0]])
     at = holes.start[some][:, None] + np.arange(n)
     if n == 3:
@@ -209,7 +211,7 @@ def _over_corners(holes: _Holes, some: IntArray, known: IntArray) -> tuple[IntAr
 
 
 def _in_conflict(holes: _Holes, lids: Lids) -> tuple[IntArray, IntArray]:
-    """Return the loops whose lids share an edge with an earlier one, and all existing edges."""
+    """Return the loops whose lids share an edge with an earlier lid, and all existing edges."""
     one, other = lids.faces.ravel(), lids.faces[:, [1, 2, 0]].ravel()
     old = (lids.origin[one] >= 0) & (lids.origin[other] >= 0)
     keys = edge_keys(lids.origin[one[old]], lids.origin[other[old]], len(holes.vertices))
@@ -222,29 +224,29 @@ def _in_conflict(holes: _Holes, lids: Lids) -> tuple[IntArray, IntArray]:
 
 
 def _refined(holes: _Holes, lids: Lids, some: IntArray) -> Lids:
-    return refine(_plain_again(holes, lids, some), holes.known, len(holes.vertices))
+    return refine(_unrefined(holes, lids, some), holes.known, len(holes.vertices))
 
 
-def _plain_again(holes: _Holes, lids: Lids, some: IntArray) -> Lids:
+def _unrefined(holes: _Holes, lids: Lids, some: IntArray) -> Lids:
     return _only(holes, lids, _mask(holes, some))
 
 
-def _as_seen(holes: _Holes, lids: Lids, some: IntArray) -> Lids:
-    """Refine in the projection and lift the result: it is the graph of a function over a plane."""
+def _clipped(holes: _Holes, lids: Lids, some: IntArray) -> Lids:
+    """Clip ears and refine in the projection, then lift the lid by harmonic heights."""
     del lids
     faces, views = [], np.tile(np.eye(3), (len(holes.length), 1, 1))
     for loop in some:
         if (clipped := clip_ears(holes.points[holes.of(loop)])) is not None:
             faces.append(clipped[0] + holes.start[loop])
             views[loop] = clipped[1]
-    seen = _of_corners(holes, faces)
-    turned = np.einsum("kxy,ky->kx", views[seen.owner], seen.points)
-    flat = replace(seen, points=turned * [1.0, 1.0, 0.0])
+    lid = _of_corners(holes, faces)
+    local = np.einsum("kxy,ky->kx", views[lid.owner], lid.points)
+    flat = replace(lid, points=local * [1.0, 1.0, 0.0])
     flat = refine(flat, holes.known, len(holes.vertices))
-    points, k = flat.points.copy(), len(turned)
-    points[:k, 2] = turned[:, 2]
+    points, k = flat.points.copy(), len(local)
+    points[:k, 2] = local[:, 2]
     points[:, 2:] = harmonic(flat, points[:, 2:])
-    points[:k] = seen.points
+    points[:k] = lid.points
     points[k:] = np.einsum("kyx,ky->kx", views[flat.owner[k:]], points[k:])
     return replace(flat, points=points)
 
@@ -290,7 +292,7 @@ def _only(holes: _Holes, lids: Lids, mask: BoolArray) -> Lids:
 
 
 def _together(holes: _Holes, one: Lids, other: Lids) -> Lids:
-    """Return two sets of lids over different loops as one."""
+    """Return the union of two sets of lids over different loops."""
     k, more = len(holes.corners), len(one.points) - len(holes.corners)
     return Lids(
         np.concatenate([one.points, other.points[k:]]),
@@ -302,7 +304,7 @@ def _together(holes: _Holes, one: Lids, other: Lids) -> Lids:
 
 
 def _over_surface(holes: _Holes, lids: Lids) -> IntArray:
-    """Return the lids' faces over the vertices of the surface, new ones after them."""
+    """Return the faces of the lids, over the vertices of the surface followed by new ones."""
     k = len(holes.corners)
     new = len(holes.vertices) + np.arange(len(lids.points) - k)
     return np.append(lids.origin[:k], new)[lids.faces]
@@ -315,31 +317,31 @@ def _least(holes: _Holes, lids: Lids) -> FloatArray:
     return least
 
 
-def _scores(holes: _Holes, rest: Lids, lids: Lids, asked: BoolArray) -> _Scores:
-    """Judge the *lids* over the loops *asked* (h,), where the *rest* close the others.
+def _scores(holes: _Holes, rest: Lids, lids: Lids, scored: BoolArray) -> _Scores:
+    """Return scores of *lids* over the loops *scored* (h,), while *rest* closes the others.
 
     A lid of one triangle has no alternative, so it is not tested for intersections.
     """
     h, k = len(holes.length), len(holes.corners)
-    both = _together(holes, _only(holes, rest, ~asked), _only(holes, lids, asked))
+    both = _together(holes, _only(holes, rest, ~scored), _only(holes, lids, scored))
     points = np.concatenate([holes.vertices, both.points[k:]])
     faces = _over_surface(holes, both)
     owner = both.owner[both.faces[:, 0]]
-    some = np.flatnonzero((asked & (holes.length > 3))[owner])
+    some = np.flatnonzero((scored & (holes.length > 3))[owner])
     hits, _ = intersections_of(
         points, np.concatenate([holes.faces, faces]), len(holes.faces) + some
     ).T
     crossings = np.bincount(owner[hits - len(holes.faces)], minlength=h)
     flat = np.bincount(owner, least_angle(points[faces]) <= _FLAT, minlength=h)
     return _Scores(
-        np.where(asked | (holes.length == 3), crossings, np.iinfo(np.int64).max),
+        np.where(scored | (holes.length == 3), crossings, np.iinfo(np.int64).max),
         flat.astype(np.int64),
         _least(holes, both),
     )
 
 
 def _closing(holes: _Holes, lids: Lids, scores: _Scores) -> Closing:
-    """Return the lids over the vertices of the surface."""
+    """Return the `Closing` of the final *lids*."""
     k = len(holes.corners)
     owner, points = lids.owner[k:], lids.points[k:]
     sources = np.zeros((len(points), _NEAREST), dtype=np.int64)

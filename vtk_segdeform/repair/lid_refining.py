@@ -1,19 +1,19 @@
-"""Refine lids: interior vertices as dense as the border, well-shaped triangles, least area.
+"""Refinement of lids: interior vertices as dense as the border, good triangles, least area.
 
-Many disjoint lids are refined as one surface.  Three operations alternate:
+Any number of disjoint lids are refined as one surface.  Three operations alternate:
 
     split    interior edges much longer than the target size get a vertex in the middle
     flip     an interior edge is replaced by the other diagonal where that increases the least
              angle
-    relax    interior vertices move to the mean of their neighbours, unless that would invert a
-             triangle or reduce the least angle around
+    relax    interior vertices move to the mean of their neighbours, unless that inverts a
+             triangle or reduces the least angle around them
 
-Finally the interior moves onto the surface of least area, on which the cotangent Laplacian of the
+Finally the interior moves to the surface of least area, where the cotangent Laplacian of the
 positions vanishes.  A planar border gives a planar lid.  The target size is that of the border
-edges, and grows by `_GROWTH` with every unit of distance from them: the number of new vertices is
-then proportional to that of border edges, not to its square.
+edges and grows by `_GROWTH` per unit of distance from them, so that the number of new vertices is
+proportional to the number of border edges, not to its square.
 
-Only one edge of a triangle is changed at a time.
+Splits and flips change at most one edge of a triangle at a time.
 
 Source
 ------
@@ -31,14 +31,14 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..mesh import Sides, corner_angles, edge_keys, least_angle, normals
+from ..mesh import HalfEdges, corner_angles, edge_keys, least_angle, normals
 
 _GROWTH = 0.3  # of the target size, per unit of distance from the border
 _LONG = 1.4  # times the target size: longer edges are split
-_ROUND = np.deg2rad(25.0)  # least angles beyond this need not increase
+_ROUND = np.deg2rad(25.0)  # larger least angles need not increase
 _GAIN = 1.01  # factor by which a flip must increase the least angle
 _FLAT = 1e-9  # radians
-_LEAST_WEIGHT = 1e-3  # cotangents may be negative, weights of a mean may not
+_LEAST_WEIGHT = 1e-3  # replaces negative cotangents, since the weights of a mean must be positive
 _ROUNDS = 50
 _FLIPS = 5
 _SETTLE = 4
@@ -51,13 +51,13 @@ class Lids:
     Attributes
     ----------
     points : (k, 3) float
-        The first are the corners of the loops, which do not move.
+        The corners of the loops come first; they do not move.
     size : (k,) float
         The target edge length.
     origin : (k,) int
-        The vertex of the surface that each is; -1 for a new one.
+        The corresponding vertex of the surface; -1 for a new vertex.
     owner : (k,) int
-        Its lid.
+        The lid of each vertex.
     faces : (m, 3) int
     """
 
@@ -74,17 +74,16 @@ class Lids:
 
 
 def refine(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
-    """Return *lids* refined; corners keep their numbers, new vertices come after.
+    """Return *lids* refined; new vertices come after the corners.
 
     Parameters
     ----------
     lids : Lids
-        Triangles over corners of loops only.
+        Triangles over the corners of loops only.
     taken : (t,) int
-        Sorted `edge_keys` of the surrounding surface.  A lid edge that is among them gets a
-        vertex in its middle.
+        Sorted `edge_keys` of the surrounding surface.  A lid edge with one of these keys is split.
     n_vertices : int
-        Of the surrounding surface, as used for the keys.
+        Number of vertices of the surrounding surface, as used for the keys.
     """
     for _ in range(_ROUNDS):
         split = _split(lids, taken, n_vertices)
@@ -99,26 +98,26 @@ def refine(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
 
 
 def _interior(lids: Lids) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray, IntArray]:
-    """Return of each interior edge its ends a and b, the corners c and d beyond, and its faces.
+    """Return the ends a, b of each interior edge, the opposite corners c, d, and the two faces.
 
     The first face is (a, b, c), the second (b, a, d), each up to rotation.
     """
-    sides = Sides(lids.faces, len(lids.points))
-    one, other = sides.pairs.T
+    half_edges = HalfEdges(lids.faces, len(lids.points))
+    one, other = half_edges.pairs.T
     c = lids.faces[one // 3, (one % 3 + 2) % 3]
     d = lids.faces[other // 3, (other % 3 + 2) % 3]
-    return sides.tail[one], sides.head[one], c, d, one // 3, other // 3
+    return half_edges.tail[one], half_edges.head[one], c, d, one // 3, other // 3
 
 
-def _some_apart(urgency: FloatArray, one: IntArray, other: IntArray, n_faces: int) -> IntArray:
-    """Return edges to change at once, (k,) int: urgent ones, no two of them on one face.
+def _independent(urgency: FloatArray, one: IntArray, other: IntArray, n_faces: int) -> IntArray:
+    """Return edges of positive *urgency* to change at once, (k,) int: at most one of each face.
 
     On each face the most urgent edge is chosen; ties are broken at random.
     """
     some = np.flatnonzero(urgency > 0)
-    lots = np.random.default_rng(len(some)).permutation(len(some))
+    ties = np.random.default_rng(len(some)).permutation(len(some))
     rank = np.empty(len(some), dtype=np.int64)
-    rank[np.lexsort([lots, urgency[some]])] = np.arange(1, len(some) + 1)
+    rank[np.lexsort([ties, urgency[some]])] = np.arange(1, len(some) + 1)
     highest = np.zeros(n_faces, dtype=np.int64)
     np.maximum.at(highest, one[some], rank)
     np.maximum.at(highest, other[some], rank)
@@ -155,12 +154,12 @@ def joined_twice(lids: Lids, known: IntArray, n_vertices: int) -> BoolArray:
 
 
 def split_edges(lids: Lids, urgency: FloatArray) -> Lids:
-    """Return *lids* with a vertex in the middle of interior edges (e,) of positive *urgency*.
+    """Return *lids* with interior edges (e,) of positive *urgency* split in the middle.
 
-    Only one edge of a triangle is split; *lids* itself is returned if there is none.
+    At most one edge of a triangle is split; *lids* itself is returned if none is.
     """
     a, b, c, d, f, g = _interior(lids)
-    some = _some_apart(urgency, f, g, len(lids.faces))
+    some = _independent(urgency, f, g, len(lids.faces))
     if not len(some):
         return lids
     a, b, c, d, f, g = (x[some] for x in (a, b, c, d, f, g))
@@ -179,7 +178,7 @@ def split_edges(lids: Lids, urgency: FloatArray) -> Lids:
 
 
 def _split(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
-    """Split edges that are long or duplicate an edge of the surface; *lids* itself without any."""
+    """Split long edges and edges that duplicate one of the surface; *lids* itself if none are."""
     a, b, *_ = _interior(lids)
     length = np.linalg.norm(lids.points[a] - lids.points[b], axis=1)
     ratio = length / (_LONG * 0.5 * (lids.size[a] + lids.size[b]))
@@ -188,7 +187,7 @@ def _split(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
 
 
 def _flip(lids: Lids, taken: IntArray, n_vertices: int, times: int) -> Lids:
-    """Flip edges where that increases the least angle of both triangles and folds nothing."""
+    """Flip edges where that increases the least angle of both triangles and inverts none."""
     k = len(lids.points)
     for _ in range(times):
         edges = np.stack(_interior(lids))
@@ -207,10 +206,10 @@ def _flip(lids: Lids, taken: IntArray, n_vertices: int, times: int) -> Lids:
         up = normals(before).sum(axis=1)
         gain[((normals(after) * up[:, None]).sum(axis=2) <= 0.0).any(axis=1)] = 0.0
         keys = edge_keys(c, d, k)
-        there = np.sort(edge_keys(lids.faces, lids.faces[:, [1, 2, 0]], k).ravel())
-        bad = (c == d) | _among(keys, there) | _joins_neighbours(lids, c, d, taken, n_vertices)
+        existing = np.sort(edge_keys(lids.faces, lids.faces[:, [1, 2, 0]], k).ravel())
+        bad = (c == d) | _among(keys, existing) | _joins_neighbours(lids, c, d, taken, n_vertices)
         gain[bad] = 0.0
-        some = _some_apart((gain > 0.0).astype(float), f, g, len(lids.faces))
+        some = _independent((gain > 0.0).astype(float), f, g, len(lids.faces))
         some = some[np.unique(keys[some], return_index=True)[1]]
         if not len(some):
             break
@@ -239,7 +238,7 @@ def _relax(lids: Lids) -> Lids:
 def harmonic(lids: Lids, values: FloatArray) -> FloatArray:
     """Return *values* (k, d) with harmonic values at interior vertices.
 
-    Each is the cotangent-weighted mean of its neighbours, and so between those of the border.
+    These are cotangent-weighted means of their neighbours, and within the range of the border.
     """
     free, fixed = np.flatnonzero(lids.free), np.flatnonzero(~lids.free)
     if not len(free):
@@ -257,28 +256,28 @@ def harmonic(lids: Lids, values: FloatArray) -> FloatArray:
 
 
 def _settle(lids: Lids) -> Lids:
-    """Move the interior onto the surface of least area where no triangle gets worse."""
+    """Move the interior to the surface of least area, except where triangles would get worse."""
     return _moved(lids, harmonic(lids, lids.points), 0.5 * _ROUND)
 
 
-def _moved(lids: Lids, there: FloatArray, enough: float) -> Lids:
-    """Return the lids with interior vertices moved to *there* (k, 3), except where that does harm.
+def _moved(lids: Lids, targets: FloatArray, sufficient: float) -> Lids:
+    """Return the lids with interior vertices moved to *targets* (k, 3), except for harmful moves.
 
-    A move does harm if it inverts a triangle, or reduces an angle to less than *enough* and less
-    than the previous least angle around the vertex.
+    A move is harmful if it inverts a triangle, or reduces an angle below *sufficient* and below
+    the previous least angle around the vertex.
     """
     before = lids.points[lids.faces]
     old, up = least_angle(before), normals(before)
-    limit = np.full(len(lids.points), enough)
+    limit = np.full(len(lids.points), sufficient)
     np.minimum.at(limit, lids.faces.ravel(), np.repeat(old - 1e-12, 3))
     moving = lids.free.copy()
     while True:
-        points = np.where(moving[:, None], there, lids.points)
+        points = np.where(moving[:, None], targets, lids.points)
         after = points[lids.faces]
         angle = least_angle(after)
-        over = ((normals(after) * up).sum(axis=1) <= 0.0) & (old > _FLAT)
+        inverted = ((normals(after) * up).sum(axis=1) <= 0.0) & (old > _FLAT)
         narrow = (angle < old)[:, None] & (angle[:, None] < limit[lids.faces])
-        harm = (over[:, None] | narrow) & moving[lids.faces]
-        if not harm.any():
+        harmful = (inverted[:, None] | narrow) & moving[lids.faces]
+        if not harmful.any():
             return replace(lids, points=points)
-        moving[lids.faces[harm]] = False
+        moving[lids.faces[harmful]] = False

@@ -1,7 +1,7 @@
-"""Lids over border loops from the corners of the loop alone, by dynamic programming.
+"""Triangulation of a border loop without new vertices: a lid.
 
-A triangulation of the loop v_0 ... v_{n-1} splits at its last side into two smaller ones and the
-triangle between them, so the cost of the best one over v_i ... v_j is
+*Dynamic programming.*  The triangle at the last edge of the loop v_0 ... v_{n-1} divides a
+triangulation into two smaller ones, so the least cost over v_i ... v_j is
 
     C(i, i+1) = 0        C(i, j) = min over i < k < j of  C(i, k) + C(k, j) + c(i, k, j)
 
@@ -9,9 +9,12 @@ from short spans to long ones: n^3 / 6 triangles, n^2 memory.  The cost c of a t
 plus a thousandth of its squared sides, so that better-shaped triangles win among equal areas, plus
 a penalty for a degenerate triangle.  With *outer* normals, the largest angle between neighbouring
 triangles, including the faces outside the loop, decides first [Lie03], in steps of five degrees so
-that rounding does not.
+that rounding does not decide.  Loops of equal length are processed together.
 
-Loops of equal length are closed together.
+*Ear clipping* of the loop projected to a plane, the best shaped ears first, where the projection is
+a simple polygon.  An ear that contains another corner, even on its boundary, is not clipped, so
+that no triangle is degenerate.  Triangles that do not overlap in the projection do not cross in
+space, for any shape of the loop.
 
 Source
 ------
@@ -23,14 +26,18 @@ Source
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
 
 _ROUNDNESS = 1e-3
 _FLAT, _FLAT_CHARGE = 1e-4, 0.05  # twice the area, and the penalty, over the longest side^2
 _STEP = np.deg2rad(5.0)
-_BRANCHES = 48  # corners that represent a longer loop
-_AT_ONCE = 2_000_000  # triangles compared together
+_BRANCHES = 48  # corners that approximate a longer loop
+_AT_ONCE = 2_000_000  # triangles compared at once
+_STRAIGHT = 1e-9  # sine of an angle
+_VIEWS = 60  # projection directions that are tried
+_AREA = 1e-3  # least projected area per corner, over the squared extent
 
 
 def triangulate_loop(points: FloatArray, taken: BoolArray) -> IntArray | None:
@@ -42,12 +49,12 @@ def triangulate_loop(points: FloatArray, taken: BoolArray) -> IntArray | None:
         The corners, in the order of the loop.
     taken : (n, n) bool
         Symmetric: pairs of corners that must not be joined, because the surface outside the loop
-        has that edge already.  Sides of the loop itself are never looked up.
+        has that edge already.  Entries for edges of the loop are ignored.
 
     Returns
     -------
     triangles : (n - 2, 3) int
-        Numbers of corners; each triangle runs round in the direction of the loop.
+        Corners of each triangle, in the direction of the loop.
 
     Examples
     --------
@@ -62,16 +69,16 @@ def triangulate_loop(points: FloatArray, taken: BoolArray) -> IntArray | None:
 def triangulate_loops(
     points: FloatArray, taken: BoolArray, outer: FloatArray | None = None
 ) -> tuple[IntArray, BoolArray]:
-    """Return the triangles (l, n - 2, 3) of l loops, and for which loops there are any, (l,) bool.
+    """Return triangulations (l, n - 2, 3) of l loops, and for which loops one exists, (l,) bool.
 
     Parameters
     ----------
     points : (l, n, 3) float
         The corners of each loop.
     taken : (l, n, n) bool
-        As of `triangulate_loop`.
+        As in `triangulate_loop`.
     outer : (l, n, 3) float, optional
-        Unit normals of the faces outside side i of each loop, from corner i to i + 1.
+        Unit normals of the faces outside the loop at its edges, from corner i to i + 1.
     """
     n_loops, n, _ = points.shape
     together = max(1, _AT_ONCE // n**2)
@@ -125,16 +132,16 @@ def triangulate_loops(
 def triangulate_long_loop(points: FloatArray) -> IntArray:
     """Return n - 2 triangles over a loop (n, 3) of any length, in time proportional to n.
 
-    A few of its corners are closed first, then the part between each of their chords and the
-    border, and so on.
+    A few corners are triangulated first, then the part between each of their chords and the
+    border, recursively.
     """
     n = len(points)
     if n <= _BRANCHES:
         lid, _ = triangulate_loops(points[None], np.zeros((1, n, n), dtype=bool))
         return np.asarray(lid[0])
-    stems = np.unique(np.linspace(0, n, _BRANCHES, endpoint=False).astype(np.int64))
-    parts = [stems[triangulate_long_loop(points[stems])]]
-    for first, last in zip(stems, [*stems[1:], n], strict=True):
+    chosen = np.unique(np.linspace(0, n, _BRANCHES, endpoint=False).astype(np.int64))
+    parts = [chosen[triangulate_long_loop(points[chosen])]]
+    for first, last in zip(chosen, [*chosen[1:], n], strict=True):
         part = np.arange(first, last + 1) % n
         if len(part) > 2:
             parts.append(part[triangulate_long_loop(points[part])])
@@ -157,7 +164,7 @@ def _angle(one: FloatArray, other: FloatArray) -> FloatArray:
 
 
 def _cut(middle: IntArray) -> IntArray:
-    """Return the triangles (l, n - 2, 3) where spans are cut at *middle* (l, n, n)."""
+    """Return the triangles (l, n - 2, 3) of the splits at *middle* (l, n, n)."""
     n_loops, n, _ = middle.shape
     loop, first, last = np.arange(n_loops), np.zeros(n_loops, int), np.full(n_loops, n - 1)
     owners, triangles = [], []
@@ -171,3 +178,118 @@ def _cut(middle: IntArray) -> IntArray:
         loop, first, last = loop[wide], first[wide], last[wide]
     order = np.argsort(np.concatenate(owners), kind="stable")
     return np.concatenate(triangles)[order].reshape(n_loops, n - 2, 3)
+
+
+def clip_ears(points: FloatArray) -> tuple[IntArray, FloatArray] | None:
+    """Return n - 2 triangles over the loop *points* (n, 3), and the view of the projection.
+
+    The *view* (3, 3) is a rotation: ``points @ view.T`` are coordinates to the right, upwards and
+    towards the viewer.  The mean normal of the loop is tried first, then directions in order of
+    their angle to it.  None if the loop crosses itself in all of these projections.
+
+    Examples
+    --------
+    >>> clip_ears(np.array([[0.0, 0, 0], [2, 0, 1], [2, 2, 0], [1, 0.5, 1]]))[0].tolist()
+    [[1, 2, 3], [3, 0, 1]]
+    """
+    for up in _directions(points):
+        view = _view(up)
+        flat = (points - points[0]) @ view[:2].T
+        if _is_simple(flat) and (triangles := _clipped(flat)) is not None:
+            return triangles, view
+    return None
+
+
+def _clipped(flat: FloatArray) -> IntArray | None:
+    """Return the ears of a simple polygon (n, 2); None if rounding leaves no valid ear."""
+    n = len(flat)
+    before, after = np.roll(np.arange(n), 1), np.roll(np.arange(n), -1)
+    sharp = _roundness(flat[before], flat, flat[after])
+    candidate = sharp.copy()  # 0 once an ear has failed, until a neighbour is clipped
+    left = np.ones(n, dtype=bool)
+    triangles = []
+    for _ in range(n - 2):
+        tried_again = False
+        while True:
+            at = int(candidate.argmax())
+            if candidate[at] <= 0.0:
+                if tried_again:
+                    return None
+                candidate, tried_again = np.where(left, sharp, 0.0), True
+                continue
+            ear = np.array([before[at], at, after[at]])
+            reflex = left & (sharp <= 0.0)
+            reflex[ear] = False
+            if not _any_inside(flat[ear], flat[reflex]):
+                break
+            candidate[at] = 0.0
+        triangles.append(ear)
+        left[at], candidate[at] = False, 0.0
+        a, c = ear[[0, 2]]
+        after[a], before[c] = c, a
+        both = np.array([a, c])
+        sharp[both] = _roundness(flat[before[both]], flat[both], flat[after[both]])
+        candidate[both] = sharp[both]
+    return np.array(triangles, dtype=np.int64)
+
+
+def _directions(points: FloatArray) -> FloatArray:
+    """Return unit vectors (v, 3): the mean normal of the loop, then others of its hemisphere."""
+    x = points - points.mean(axis=0)
+    area = np.cross(x, np.roll(x, -1, axis=0)).sum(axis=0)
+    k = np.arange(_VIEWS) + 0.5  # spread evenly over the sphere
+    z, turn = 1.0 - 2.0 * k / _VIEWS, np.pi * (1.0 + np.sqrt(5.0)) * k
+    r = np.sqrt(1.0 - z * z)
+    around = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
+    along = around @ area
+    around = around[np.argsort(-along, kind="stable")][: np.count_nonzero(along > 0.0)]
+    size = np.linalg.norm(area)
+    return np.concatenate([[area / size], around]) if size > 0.0 else around
+
+
+def _view(up: FloatArray) -> FloatArray:
+    """Return a rotation (3, 3) whose last row is *up*."""
+    right = np.cross(np.eye(3)[np.abs(up).argmin()], up)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(up, right), up])
+
+
+def _roundness(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    """Return twice the signed area of triangles over their longest edge squared, (k,)."""
+    u, v, w = b - a, c - b, a - c
+    twice_area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    longest = np.max([(e * e).sum(axis=1) for e in (u, v, w)], axis=0)
+    round_ = twice_area / np.maximum(longest, np.finfo(float).tiny)
+    return np.where(np.abs(round_) <= _STRAIGHT, 0.0, round_)
+
+
+def _any_inside(ear: FloatArray, others: FloatArray) -> bool:
+    """Return whether any of *others* (k, 2) is in counter-clockwise *ear* or on its boundary."""
+    inside = np.ones(len(others), dtype=bool)
+    slack = _STRAIGHT * float(np.ptp(ear, axis=0).max()) ** 2
+    for start, end in ((0, 1), (1, 2), (2, 0)):
+        along, to = ear[end] - ear[start], others - ear[start]
+        inside &= along[0] * to[:, 1] - along[1] * to[:, 0] >= -slack
+    return bool(inside.any())
+
+
+def _is_simple(flat: FloatArray) -> bool:
+    """Return whether the polygon *flat* (n, 2) is counter-clockwise and no two edges cross."""
+    n, after = len(flat), np.roll(flat, -1, axis=0)
+    area = (flat[:, 0] * after[:, 1] - flat[:, 1] * after[:, 0]).sum()
+    if area <= _AREA * float(np.ptp(flat, axis=0).max()) ** 2 / n:
+        return False
+    longest = float(np.linalg.norm(after - flat, axis=1).max())
+    near = cKDTree(0.5 * (flat + after)).query_pairs(longest, output_type="ndarray")
+    one, other = near.T
+    apart = ~np.isin(other - one, (1, n - 1))
+    a, b, c, d = flat[one], after[one], flat[other], after[other]
+    slack = _STRAIGHT * float(np.ptp(flat, axis=0).max()) ** 2
+
+    def separates(start: FloatArray, end: FloatArray, p: FloatArray, q: FloatArray) -> BoolArray:
+        """Return for which pairs the points p and q lie on different sides of the line."""
+        u, v, w = end - start, p - start, q - start
+        left, right = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]
+        return (np.minimum(left, right) < -slack) & (np.maximum(left, right) > slack)
+
+    return not (apart & separates(a, b, c, d) & separates(c, d, a, b)).any()

@@ -1,9 +1,9 @@
-"""Mend triangles into a closed, outward oriented two-manifold, step by step and said aloud.
+"""Repair triangles to a closed, outward oriented two-manifold, one step at a time, each reported.
 
-Each step does only what is needed, in an order where the next can stand on the one before: first
-what is no triangle goes, then borders that coincide are welded, then every vertex gets one fan,
-every shell one orientation, every small hole a lid, and at last every closed shell faces outward.
-Turning comes after filling, because an open shell has no inside.
+Each step changes only what is faulty, and the next one relies on it: invalid faces are removed,
+coincident borders welded, vertices split until each has one fan, faces oriented consistently,
+small holes filled, and closed shells oriented outward.  Orientation outward comes after filling,
+because an open shell has no inside.
 """
 
 from __future__ import annotations
@@ -17,27 +17,27 @@ from ..arrays import BoolArray, FloatArray, IntArray, is_number, is_whole
 from ..checks import shown
 from ..errors import ArgumentError, MeshError
 from ..freezing import Frozen
-from ..mesh import HOPELESS, MeshReport, as_soup, find_faults
+from ..mesh import UNREPAIRABLE, MeshReport, as_soup, find_faults
 from . import repair_steps as steps
 
 
 @dataclass(frozen=True)
 class Repair(Frozen):
-    """A mended mesh and how it came about; *report* says what could not be mended.
+    """A repaired mesh and the steps that led to it; *report* lists the remaining faults.
 
-    What is kept keeps its order; what is created comes after.
+    Vertices and faces that are kept keep their order; new ones come after them.
 
     Attributes
     ----------
     vertices, faces : (n, 3) float, (m, 3) int
-        The result.  A `Mesh` takes it if ``report.ok``.
+        The result.  It can be a `Mesh` if ``report.ok``.
     steps : tuple of str
-        What was done, one sentence each; empty if nothing was wrong.
+        The steps taken, one sentence each; empty if there were no faults.
     vertex_map, face_map : (n,) int, (m,) int
         The original index of each vertex and face; -1 if it fills a hole or is part of a face
         that was split to close a crack.
     report : MeshReport
-        What `find_faults` says of the result.
+        The result of `find_faults` for the repaired mesh.
     vertex_weights : (n, o) sparse
         Weights of the o original vertices at each vertex; rows sum to 1.  A kept vertex has one
         weight, a new one interpolates the border around it: ``vertex_weights @ array`` transfers an
@@ -71,7 +71,7 @@ class Repair(Frozen):
         )
         edges = str(few) if few == many else f"{few} to {many}"
         return (
-            f"{holes} open, of {edges} edges; to fill up to that size, repair with "
+            f"{holes} open, of {edges} edges; to fill holes up to that size, repair with "
             f"largest_hole={many} (--largest-hole {many} on the command line)"
         )
 
@@ -83,35 +83,35 @@ def repair(
     weld_distance: float = 0.0,
     largest_hole: int = 100,
 ) -> Repair:
-    """Return the triangles mended as far as that needs no guessing.
+    """Repair triangles as far as possible without guessing.
 
     Parameters
     ----------
     vertices : (n, 3) float
-        NaN and infinite coordinates are dropped with their faces.
+        Vertices with NaN or infinite coordinates are removed with their faces.
     faces : (m, 3) int
-        Triangles in any state, but with valid indices.
+        Any triangles with valid indices.
     weld_distance : float
-        How far apart two vertices may lie and still count as one, in the unit of *vertices*.
-        Only vertices whose welding closes open edges are welded at all.
+        Largest distance of two vertices that are welded, in the unit of *vertices*.  Vertices
+        are only welded where that closes open edges.
     largest_hole : int
         Holes with more edges than this are not filled; ``open_holes`` has their sizes.
 
     Raises
     ------
     MeshError
-        If there are no faces, none worth keeping, faces with bad indices, or coordinates beyond all
-        computing.
+        If there are no faces, none are left after a step, indices are out of range, or coordinates
+        are too large or too small to compute with.
     ValueError
         If an array has the wrong shape or type.
 
     Examples
     --------
     >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    >>> mended = repair(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]])
-    >>> mended.steps
+    >>> fixed = repair(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]])
+    >>> fixed.steps
     ('fill 1 hole of 3 edges with 1 triangle',)
-    >>> mended.face_map, mended.report.ok
+    >>> fixed.face_map, fixed.report.ok
     (array([ 0,  1,  2, -1]), True)
     """
     if not is_number(weld_distance, 0.0):
@@ -120,44 +120,44 @@ def repair(
         )
     if not is_whole(largest_hole, 0):
         raise ArgumentError(
-            f"largest_hole must be a whole number of edges; got {shown(largest_hole)}"
+            f"largest_hole must be a number of edges, 0 or more; got {shown(largest_hole)}"
         )
     points, triangles = as_soup(vertices, faces)
     report = find_faults(points, triangles)
-    hopeless = [
-        f"{fault}; {fault.kind.advice}" for fault in report.faults if fault.kind in HOPELESS
+    unrepairable = [
+        f"{fault}; {fault.kind.advice}" for fault in report.faults if fault.kind in UNREPAIRABLE
     ]
-    if hopeless:
-        raise MeshError(f"nothing to repair: {'; '.join(hopeless)}")
+    if unrepairable:
+        raise MeshError(f"the mesh cannot be repaired: {'; '.join(unrepairable)}")
     draft = steps.Draft.of(points, triangles)
     done: list[str] = []
     if not report.ok:
         for step in (
-            steps.drop_non_finite,
-            steps.drop_degenerate,
+            steps.remove_non_finite,
+            steps.remove_degenerate,
             lambda draft: steps.weld(draft, weld_distance),
             lambda draft: steps.weld_corners(draft, weld_distance),
-            steps.drop_duplicates,
-            steps.drop_unreferenced,
+            steps.remove_duplicates,
+            steps.remove_unreferenced,
             steps.split,
             steps.orient,
             lambda draft: steps.fill(draft, largest_hole),
             steps.close_flat,
             steps.split,
-            steps.turn_outward,
+            steps.orient_outward,
         ):
             draft, sentence = step(draft)
             done += sentence.splitlines()
             if not len(draft.faces):
                 raise MeshError(
-                    f"nothing is left of the mesh after: {'; '.join(done)}; "
-                    "look at where it comes from"
+                    f"no faces are left after these repairs: {'; '.join(done)}; "
+                    "check how the mesh was made"
                 )
         report = find_faults(draft.vertices, draft.faces)
-    left = steps.holes_beyond(draft, largest_hole) if not report.ok else ()
+    left = steps.remaining_holes(draft, largest_hole) if not report.ok else ()
     found = Repair(
         draft.vertices, draft.faces, tuple(done), draft.vertex_map, draft.face_map, report,
-        draft.mix, draft.turned, left,
+        draft.weights, draft.flipped, left,
     )  # fmt: skip
-    found.__setstate__(found.__getstate__())  # makes its arrays read-only
+    found.__setstate__(found.__getstate__())  # makes the arrays read-only
     return found

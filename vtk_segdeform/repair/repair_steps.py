@@ -1,8 +1,8 @@
-"""The steps of a repair: each takes a draft of the mesh, and returns a better one and a sentence.
+"""The steps of a repair: each takes a draft of the mesh and returns a repaired one and a report.
 
-A step that finds nothing to do returns its draft and ""; several sentences are on separate lines.
-The steps from `split` on require edges without faults; where a faulty edge remains, they leave the
-mesh unchanged, and the report says why.
+The report has one sentence per line; it is "" if there was nothing to repair.  `orient`, `fill` and
+`orient_outward` leave a mesh with non-manifold edges unchanged, the last two also one with
+inconsistently oriented edges; the final `MeshReport` lists these edges.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..mesh import (
-    Sides,
+    HalfEdges,
     connected,
     edge_keys,
     first_equal_row,
     first_of_group,
+    misoriented_shells,
     repeats_vertex,
-    wrong_way_round,
 )
 from .cracks import close_cracks
 from .hole_borders import border_loops
@@ -35,7 +35,7 @@ from .splitting import split_fans
 class Draft:
     """A mesh under repair; the maps give the original of each vertex and face, -1 for a new one.
 
-    *mix* (n, o) has the weights of the o original vertices at each vertex, *turned* (m,) says
+    *weights* (n, o) are the weights of the o original vertices at each vertex; *flipped* (m,) says
     which faces were flipped.
     """
 
@@ -43,75 +43,75 @@ class Draft:
     faces: IntArray
     vertex_map: IntArray
     face_map: IntArray
-    mix: sparse.csr_array
-    turned: BoolArray
+    weights: sparse.csr_array
+    flipped: BoolArray
 
     @classmethod
     def of(cls, vertices: FloatArray, faces: IntArray) -> Draft:
         """Return the draft of a mesh before any repair."""
         n = len(vertices)
-        mix = sparse.eye_array(n, format="csr")
-        turned = np.zeros(len(faces), dtype=bool)
-        return cls(vertices, faces, np.arange(n), np.arange(len(faces)), mix, turned)
+        weights = sparse.eye_array(n, format="csr")
+        flipped = np.zeros(len(faces), dtype=bool)
+        return cls(vertices, faces, np.arange(n), np.arange(len(faces)), weights, flipped)
 
     @cached_property
-    def sides(self) -> Sides:
-        """The sides of the faces, by edge."""
-        return Sides(self.faces, len(self.vertices))
+    def half_edges(self) -> HalfEdges:
+        """The half-edges of the faces."""
+        return HalfEdges(self.faces, len(self.vertices))
 
     def keep_faces(self, keep: BoolArray) -> Draft:
-        """Return the draft with only these faces (m,), in their order."""
+        """Return the draft with only the faces *keep* (m,), in their order."""
         return replace(
             self,
             faces=self.faces[keep],
             face_map=self.face_map[keep],
-            turned=self.turned[keep],
+            flipped=self.flipped[keep],
         )
 
     def keep_vertices(self, keep: BoolArray) -> Draft:
-        """Return the draft with only these vertices (n,), which no face may need otherwise."""
+        """Return the draft with only the vertices *keep* (n,); no face may use the others."""
         number = np.cumsum(keep) - 1
         return replace(
             self,
             vertices=self.vertices[keep],
             faces=number[self.faces],
             vertex_map=self.vertex_map[keep],
-            mix=self.mix[np.flatnonzero(keep)],
+            weights=self.weights[np.flatnonzero(keep)],
         )
 
-    def turn(self, which: BoolArray) -> Draft:
-        """Return the draft with these faces (m,) turned round; their first vertex stays first."""
+    def flip(self, which: BoolArray) -> Draft:
+        """Return the draft with the faces *which* (m,) flipped; their first vertex stays first."""
         faces = np.where(which[:, None], self.faces[:, [0, 2, 1]], self.faces)
-        return replace(self, faces=faces, turned=self.turned ^ which)
+        return replace(self, faces=faces, flipped=self.flipped ^ which)
 
 
-def drop_non_finite(draft: Draft) -> tuple[Draft, str]:
-    """Drop vertices without a place, and the faces on them."""
+def remove_non_finite(draft: Draft) -> tuple[Draft, str]:
+    """Remove vertices with NaN or infinite coordinates, and their faces."""
     finite: BoolArray = np.logical_and.reduce(np.isfinite(draft.vertices), axis=1)
     keep: BoolArray = np.logical_and.reduce(finite[draft.faces], axis=1)
     if finite.all():
         return draft, ""
     vertices, faces = _n(~finite, "vertex", "vertices"), _n(~keep, "face")
-    sentence = f"drop {vertices} with NaN or infinite coordinates and {faces} there"
+    sentence = f"remove {vertices} with NaN or infinite coordinates and {faces} there"
     return draft.keep_faces(keep).keep_vertices(finite), sentence
 
 
-def drop_degenerate(draft: Draft) -> tuple[Draft, str]:
-    """Drop faces that name a vertex twice."""
+def remove_degenerate(draft: Draft) -> tuple[Draft, str]:
+    """Remove faces that contain a vertex twice."""
     bad = repeats_vertex(draft.faces)
-    return draft.keep_faces(~bad), f"drop {_n(bad, 'degenerate face')}" if bad.any() else ""
+    return draft.keep_faces(~bad), f"remove {_n(bad, 'degenerate face')}" if bad.any() else ""
 
 
 def weld(draft: Draft, distance: float) -> tuple[Draft, str]:
-    """Make vertices one that lie within *distance*, where that closes open edges."""
-    sides, n = draft.sides, len(draft.vertices)
-    tail, head = sides.tail[sides.open], sides.head[sides.open]
-    place = _places(draft.vertices, np.union1d(tail, head), distance)
-    keys = edge_keys(place[tail], place[head], n)
+    """Weld vertices within *distance* of each other where that closes open edges."""
+    half_edges, n = draft.half_edges, len(draft.vertices)
+    tail, head = half_edges.tail[half_edges.boundary], half_edges.head[half_edges.boundary]
+    target = _weld_targets(draft.vertices, np.union1d(tail, head), distance)
+    keys = edge_keys(target[tail], target[head], n)
     _, edge, count = np.unique(keys, return_inverse=True, return_counts=True)
-    closes = np.flatnonzero((count[edge] % 2 == 0) & (place[tail] != place[head]))
+    closes = np.flatnonzero((count[edge] % 2 == 0) & (target[tail] != target[head]))
     closes = closes[np.argsort(edge[closes], kind="stable")]
-    forward = place[tail[closes]] < place[head[closes]]
+    forward = target[tail[closes]] < target[head[closes]]
     low = np.where(forward, tail[closes], head[closes])
     high = np.where(forward, head[closes], tail[closes])
     together = np.diff(edge[closes]) == 0
@@ -127,23 +127,23 @@ def weld(draft: Draft, distance: float) -> tuple[Draft, str]:
     welded = replace(draft, faces=number[draft.faces])
     collapsed = repeats_vertex(welded.faces)
     welded = welded.keep_faces(~collapsed).keep_vertices(~gone)
-    closed = len(sides.open) - len(welded.sides.open)
+    closed = len(half_edges.boundary) - len(welded.half_edges.boundary)
     sentence = f"weld {_n(gone, 'duplicate vertex', 'duplicate vertices')}"
     sentence += f", which closes {_n(range(closed), 'open edge')}"
-    return welded, sentence + (f" and drops {_n(collapsed, 'face')}" if collapsed.any() else "")
+    return welded, sentence + (f" and removes {_n(collapsed, 'face')}" if collapsed.any() else "")
 
 
 def weld_corners(draft: Draft, distance: float) -> tuple[Draft, str]:
     """Weld border vertices within *distance* of each other where holes touch at a corner only.
 
-    Otherwise two holes would count as one whose border passes the corner twice.  Where edges would
-    be merged, too, nothing is welded: that is left to `weld`.
+    Otherwise two holes would count as one whose border passes the corner twice.  Vertices whose
+    welding would also merge edges are left to `weld`.
     """
-    sides, n = draft.sides, len(draft.vertices)
-    border = np.union1d(sides.tail[sides.open], sides.head[sides.open])
-    number = _places(draft.vertices, border, distance)
-    edge = sides.order[sides.first]
-    tail, head = sides.tail[edge], sides.head[edge]
+    half_edges, n = draft.half_edges, len(draft.vertices)
+    border = np.union1d(half_edges.tail[half_edges.boundary], half_edges.head[half_edges.boundary])
+    number = _weld_targets(draft.vertices, border, distance)
+    edge = half_edges.order[half_edges.first]
+    tail, head = half_edges.tail[edge], half_edges.head[edge]
     while (gone := number != np.arange(n)).any():
         moved = np.isin(np.arange(n), number[gone])[number]
         near = moved[tail] | moved[head]
@@ -151,95 +151,98 @@ def weld_corners(draft: Draft, distance: float) -> tuple[Draft, str]:
         _, which, count = np.unique(
             edge_keys(one, other, n), return_inverse=True, return_counts=True
         )
-        clash = (count[which] > 1) | (one == other)
-        if not clash.any():
+        merged = (count[which] > 1) | (one == other)
+        if not merged.any():
             break
-        held = np.isin(number, np.append(one[clash], other[clash]))
-        number = np.where(held, np.arange(n), number)
+        kept = np.isin(number, np.append(one[merged], other[merged]))
+        number = np.where(kept, np.arange(n), number)
     if not gone.any():
         return draft, ""
     welded = replace(draft, faces=number[draft.faces]).keep_vertices(~gone)
     return welded, f"weld {_n(gone, 'vertex', 'vertices')} where holes touch"
 
 
-def drop_duplicates(draft: Draft) -> tuple[Draft, str]:
-    """Keep one face of those on the same vertices; none of two that wall off body from body."""
+def remove_duplicates(draft: Draft) -> tuple[Draft, str]:
+    """Keep one of the faces on the same vertices, and neither face of a wall between two bodies."""
     a, b, c = draft.faces.T
     first = first_equal_row(np.sort(draft.faces, axis=1))
-    drop = first != np.arange(len(first))
-    if not drop.any():
+    repeated = first != np.arange(len(first))
+    if not repeated.any():
         return draft, ""
-    turn = np.where((a < b).astype(int) + (b < c) + (c < a) == 2, 1, -1)
-    opposite = np.bincount(first, turn, minlength=len(first)) == 0
-    distinct = np.flatnonzero(~drop)
-    sides = draft.keep_faces(~drop).sides
+    orientation = np.where((a < b).astype(int) + (b < c) + (c < a) == 2, 1, -1)
+    opposite = np.bincount(first, orientation, minlength=len(first)) == 0
+    distinct = np.flatnonzero(~repeated)
+    half_edges = draft.keep_faces(~repeated).half_edges
     among_others = np.zeros(len(first), dtype=bool)
-    among_others[distinct[sides.order[np.repeat(sides.n_sides > 2, sides.n_sides)] // 3]] = True
+    crowded = np.repeat(half_edges.counts > 2, half_edges.counts)  # with a third face on their edge
+    among_others[distinct[half_edges.order[crowded] // 3]] = True
     wall = (opposite & among_others)[first]
-    sentence = f"drop {_n(drop | wall, 'duplicate face')}"
+    sentence = f"remove {_n(repeated | wall, 'duplicate face')}"
     sentence += f", {np.count_nonzero(wall)} of them inner walls" if wall.any() else ""
-    return draft.keep_faces(~(drop | wall)), sentence
+    return draft.keep_faces(~(repeated | wall)), sentence
 
 
-def drop_unreferenced(draft: Draft) -> tuple[Draft, str]:
-    """Drop vertices in no face."""
+def remove_unreferenced(draft: Draft) -> tuple[Draft, str]:
+    """Remove vertices that are in no face."""
     used = np.zeros(len(draft.vertices), dtype=bool)
     used[draft.faces] = True
     if used.all():
         return draft, ""
-    sentence = f"drop {_n(~used, 'unreferenced vertex', 'unreferenced vertices')}"
+    sentence = f"remove {_n(~used, 'unreferenced vertex', 'unreferenced vertices')}"
     return draft.keep_vertices(used), sentence
 
 
 def split(draft: Draft) -> tuple[Draft, str]:
-    """Give each fan a vertex of its own; the first fan keeps the old one."""
-    faces, copied = split_fans(draft.vertices, draft.sides)
+    """Split vertices so that each has one fan; the first fan keeps the original vertex."""
+    faces, copied = split_fans(draft.vertices, draft.half_edges)
     if not len(copied):
         return draft, ""
-    places, edges = _n(np.unique(copied), "vertex", "vertices"), len(draft.sides.crowded)
-    also = f" and {_n(draft.sides.crowded, 'edge')}" if edges else ""
-    sentence = f"split {places}{also} where surfaces touch, adding {_n(copied, 'copy', 'copies')}"
+    edges = draft.half_edges.non_manifold
+    sentence = f"split {_n(np.unique(copied), 'vertex', 'vertices')}"
+    sentence += f" and {_n(edges, 'edge')}" if edges else ""
+    sentence += f" where surfaces touch, adding {_n(copied, 'copy', 'copies')}"
     return (
         replace(
             draft,
             vertices=np.concatenate([draft.vertices, draft.vertices[copied]]),
             faces=faces,
             vertex_map=np.concatenate([draft.vertex_map, draft.vertex_map[copied]]),
-            mix=sparse.vstack([draft.mix, draft.mix[copied]], format="csr"),
+            weights=sparse.vstack([draft.weights, draft.weights[copied]], format="csr"),
         ),
         sentence,
     )
 
 
 def orient(draft: Draft) -> tuple[Draft, str]:
-    """Turn the fewer faces of each shell, so that all its neighbours agree.
+    """Flip the minority of faces in each shell so that all neighbours agree.
 
-    Each face stands twice in a graph, as it is and turned; what agrees is connected.  A shell
-    whose two halves are connected has one side only, and stays as it is.
+    A graph has two nodes for each face, unchanged and flipped, and links between nodes of
+    neighbours that agree.  If both nodes of a face are connected, the shell is one-sided and
+    remains unchanged.
     """
-    sides, m = draft.sides, len(draft.faces)
-    one, other = sides.pairs.T // 3
-    other_way = np.where(sides.turned, other + m, other)
+    half_edges, m = draft.half_edges, len(draft.faces)
+    one, other = half_edges.pairs.T // 3
+    across = np.where(half_edges.inconsistent, other + m, other)
     group = connected(
         2 * m,
         np.concatenate([one, one + m]),
-        np.concatenate([other_way, (other_way + m) % (2 * m)]),
+        np.concatenate([across, (across + m) % (2 * m)]),
     )
-    as_is, turned = group[:m], group[m:]
-    shell = np.minimum(as_is, turned)
-    n_turned = np.bincount(shell, turned == shell, minlength=2 * m)
-    n_as_is = np.bincount(shell, as_is == shell, minlength=2 * m)
-    turn = ((turned == shell) != (n_turned > n_as_is)[shell]) & (as_is != turned)
-    if not turn.any() or len(sides.crowded):
+    unchanged, flipped = group[:m], group[m:]
+    shell = np.minimum(unchanged, flipped)
+    n_flipped = np.bincount(shell, flipped == shell, minlength=2 * m)
+    n_unchanged = np.bincount(shell, unchanged == shell, minlength=2 * m)
+    flip = ((flipped == shell) != (n_flipped > n_unchanged)[shell]) & (unchanged != flipped)
+    if not flip.any() or len(half_edges.non_manifold):
         return draft, ""
-    return draft.turn(turn), f"turn {_n(turn, 'face')} round to agree with the neighbours"
+    return draft.flip(flip), f"flip {_n(flip, 'face')} to agree with the neighbours"
 
 
 def fill(draft: Draft, largest: int) -> tuple[Draft, str]:
-    """Close holes of up to *largest* edges, at most with one new vertex each."""
-    if len(draft.sides.crowded) or draft.sides.turned.any():
+    """Fill holes of up to *largest* edges."""
+    if len(draft.half_edges.non_manifold) or draft.half_edges.inconsistent.any():
         return draft, ""
-    closing = close_holes(draft.vertices, draft.sides, largest)
+    closing = close_holes(draft.vertices, draft.half_edges, largest)
     sizes, new = closing.sizes, len(closing.vertices)
     if not sizes:
         return draft, ""
@@ -249,9 +252,9 @@ def fill(draft: Draft, largest: int) -> tuple[Draft, str]:
     sentence += f" and {_n(closing.vertices, 'new vertex', 'new vertices')}" if new else ""
     if closing.n_crossing:
         lids = "1 lid crosses" if closing.n_crossing == 1 else f"{closing.n_crossing} lids cross"
-        sentence += f"\n{lids} the surface or another lid; no alternative was found"
+        sentence += f"\n{lids} the surface or another lid; no better triangulation was found"
     rows = np.repeat(np.arange(new), closing.sources.shape[1])
-    mix = sparse.coo_array(
+    weights = sparse.coo_array(
         (closing.weights.ravel(), (rows, closing.sources.ravel())),
         shape=(new, len(draft.vertices)),
     )
@@ -262,8 +265,8 @@ def fill(draft: Draft, largest: int) -> tuple[Draft, str]:
             faces=np.concatenate([draft.faces, closing.faces]),
             vertex_map=np.append(draft.vertex_map, np.full(new, -1)),
             face_map=np.append(draft.face_map, np.full(len(closing.faces), -1)),
-            turned=np.append(draft.turned, np.zeros(len(closing.faces), dtype=bool)),
-            mix=sparse.vstack([draft.mix, mix.tocsr() @ draft.mix], format="csr"),
+            flipped=np.append(draft.flipped, np.zeros(len(closing.faces), dtype=bool)),
+            weights=sparse.vstack([draft.weights, weights.tocsr() @ draft.weights], format="csr"),
         ),
         sentence,
     )
@@ -280,53 +283,53 @@ def close_flat(draft: Draft) -> tuple[Draft, str]:
         draft,
         faces=faces[order],
         face_map=np.where(changed, -1, draft.face_map)[order],
-        turned=(draft.turned & ~changed)[order],
+        flipped=(draft.flipped & ~changed)[order],
     )
     return cut, f"split {_n(changed & ~lids, 'face')} at vertices on an edge, to close cracks"
 
 
-def holes_beyond(draft: Draft, largest: int) -> tuple[int, ...]:
+def remaining_holes(draft: Draft, largest: int) -> tuple[int, ...]:
     """Return the number of edges of each hole that `fill` leaves open only because of its size."""
-    if len(draft.sides.crowded) or draft.sides.turned.any():
+    if len(draft.half_edges.non_manifold) or draft.half_edges.inconsistent.any():
         return ()
-    loops = border_loops(draft.vertices, draft.sides, len(draft.sides.open))
+    loops = border_loops(draft.vertices, draft.half_edges, len(draft.half_edges.boundary))
     return tuple(sorted(len(loop) for loop in loops if len(loop) > largest))
 
 
-def turn_outward(draft: Draft) -> tuple[Draft, str]:
-    """Turn closed shells that face the wrong side; those without volume stay as they are."""
-    sides = draft.sides
-    if len(sides.crowded) or sides.turned.any():
+def orient_outward(draft: Draft) -> tuple[Draft, str]:
+    """Flip inside-out closed shells; shells without volume remain unchanged."""
+    half_edges = draft.half_edges
+    if len(half_edges.non_manifold) or half_edges.inconsistent.any():
         return draft, ""
     closed = np.ones(len(draft.faces), dtype=bool)
-    closed[np.isin(sides.shells, sides.shells[sides.open // 3])] = False
-    _, shells = np.unique(sides.shells[closed], return_inverse=True)
-    wrong = wrong_way_round(draft.vertices, draft.faces[closed], shells)
-    turn = np.zeros(len(draft.faces), dtype=bool)
-    turn[closed] = wrong[shells]
-    turned = draft.turn(turn)
-    wrong &= ~wrong_way_round(turned.vertices, turned.faces[closed], shells)
+    closed[np.isin(half_edges.shells, half_edges.shells[half_edges.boundary // 3])] = False
+    _, shells = np.unique(half_edges.shells[closed], return_inverse=True)
+    wrong = misoriented_shells(draft.vertices, draft.faces[closed], shells)
+    flip = np.zeros(len(draft.faces), dtype=bool)
+    flip[closed] = wrong[shells]
+    flipped = draft.flip(flip)
+    wrong &= ~misoriented_shells(flipped.vertices, flipped.faces[closed], shells)
     if not wrong.any():
         return draft, ""
-    turn[closed] = wrong[shells]
-    return draft.turn(turn), f"turn {_n(wrong, 'inside-out component')} round ({_n(turn, 'face')})"
+    flip[closed] = wrong[shells]
+    return draft.flip(flip), f"flip {_n(wrong, 'inside-out component')} ({_n(flip, 'face')})"
 
 
-def _places(vertices: FloatArray, border: IntArray, distance: float) -> IntArray:
-    """Return for each vertex (n,) the first of *border* within *distance*; others for itself."""
-    place = np.arange(len(vertices))
+def _weld_targets(vertices: FloatArray, border: IntArray, distance: float) -> IntArray:
+    """Return for each vertex the first of *border* within *distance*, else itself, (n,) int."""
+    nearest = np.arange(len(vertices))
     if distance > 0.0:
         pairs = cKDTree(vertices[border]).query_pairs(distance, output_type="ndarray")
         first = first_of_group(connected(len(border), *pairs.T))
     else:
         first = first_equal_row(vertices[border])
-    place[border] = border[first]
-    return place
+    nearest[border] = border[first]
+    return nearest
 
 
-def _n(things: Sized, one: str, many: str = "") -> str:
-    """Return "1 face", "2 faces": how many things, or how many true ones of a mask."""
-    if isinstance(things, np.ndarray) and things.dtype == bool:
-        things = np.flatnonzero(things)
-    count = len(things)
+def _n(items: Sized, one: str, many: str = "") -> str:
+    """Return "1 face" or "2 faces": the number of items, or of true entries of a mask."""
+    if isinstance(items, np.ndarray) and items.dtype == bool:
+        items = np.flatnonzero(items)
+    count = len(items)
     return f"{count} {one if count == 1 else many or one + 's'}"

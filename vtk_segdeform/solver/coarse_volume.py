@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..arrays import FloatArray, IntArray
-from ..geometry import cells as cells_of
-from ..geometry import faces_between, group_by_position
+from ..geometry import faces_between, group_by_position, voronoi_cells
 from ..mesh import Mesh
 from ..progress import Progress
 from ..subspace import Subspace
@@ -71,7 +70,7 @@ class StandIn:
         n = mesh.n_vertices
         if n <= _LARGE or whole:
             return cls(subspace)
-        _, cells = cells_of(mesh, _POINTS, np.random.default_rng(0), progress)
+        _, cells = voronoi_cells(mesh, _POINTS, np.random.default_rng(0), progress)
         areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), n)
         shares = areas / np.bincount(cells, areas)[cells]
         return cls(subspace.averaged(_matrix(cells, shares)), cells, shares)

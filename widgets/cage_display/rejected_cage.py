@@ -22,7 +22,7 @@ from vtkmodules.vtkRenderingCore import vtkTextActor
 from vtk_segdeform.arrays import FloatArray, IntArray, as_faces, as_points
 from vtk_segdeform.cages import Cage, cage_faults
 from vtk_segdeform.errors import CageError
-from vtk_segdeform.mesh import Sides, face_edges, flat_faces, repeats_vertex, self_intersections
+from vtk_segdeform.mesh import HalfEdges, face_edges, flat_faces, repeats_vertex, self_intersections
 from vtk_segdeform.pictures import PAPER, rgb
 
 from ..scene import View, Wires
@@ -128,8 +128,8 @@ class RejectedCage:
 def _failing(points: FloatArray, faces: IntArray) -> tuple[IntArray, IntArray]:
     """Return the edges (e, 2) and the vertices (v,) at which a surface fails to be a cage."""
     broken = repeats_vertex(faces)
-    sides = Sides(faces[~broken], len(points))
-    bad = np.concatenate([sides.open, *sides.crowded, sides.pairs[sides.turned, 0]])
+    sides = HalfEdges(faces[~broken], len(points))
+    bad = np.concatenate([sides.boundary, *sides.non_manifold, sides.pairs[sides.inconsistent, 0]])
     edges = np.stack([sides.tail[bad], sides.head[bad]], axis=1)
     unused = np.setdiff1d(np.arange(len(points)), faces)
     corners = np.concatenate([unused, sides.pinched, faces[broken].ravel()])

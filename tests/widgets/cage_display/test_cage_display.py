@@ -341,7 +341,7 @@ def test_an_open_cage_is_marked_along_its_hole(cages):
     faces = np.delete(cage.faces, hole, axis=0)
     assert count(cages, WARNING) == 0
     assert cages.show_faults(cage.vertices, faces, 1) == (
-        "3 edges border one face only: the cage is open"
+        "3 edges border only one face: the cage is open"
     )
     assert count(cages, of_region(1)) < 20  # it stands in the place of that region's own
     for a, b in ((0, 1), (1, 2), (2, 0)):

@@ -1,4 +1,4 @@
-"""The inner loops in compiled form, by numba; each does what a twin in numpy does, to rounding.
+"""Inner loops compiled by numba; each agrees with its equivalent in numpy up to rounding.
 
     volumes         `volume.signed_volume`, `volume.volume_along_path`, `volume.volume_gradient`
     products        `products.add_product`, `products.adjoint_product`, `products.Groups`
@@ -8,8 +8,8 @@
     rotations       `rotations.closest_rotations`
     factor          `hessian.Factor`
 
-They let go of the interpreter and call no threads of their own; `threads.in_parallel` runs several
-at a time.  Their arguments are positional, as numba wants it, and outputs come in as arrays.
+They release the GIL and start no threads; `threads.in_parallel` runs several at a time.  Arguments
+are positional, as numba requires, and outputs are arrays passed as arguments.
 """
 
 from .factor import solve_factored

@@ -1,6 +1,6 @@
-"""Solving with a triangle for a few right-hand sides, for `hessian`.
+"""Triangular solves for a few right-hand sides, for `hessian`.
 
-LAPACK is made for many, and for two it takes twice as long.
+LAPACK is optimised for many right-hand sides; for two it takes twice as long.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ _compile = kernel(fastmath={"reassoc", "contract"})
 
 @_compile
 def solve_factored(columns, y):
-    """Put (L L^T)^-1 y in place of each row of *y* (k, n); *columns* (n, n) are those of L.
+    """Replace each row of *y* (k, n) by (L L^T)^-1 y; *columns* (n, n) are the columns of L.
 
-    Rows of *y* go by twos, so that L is read half as often.
+    Two rows of *y* are processed at a time, so that L is read half as often.
     """
     n = len(columns)
     for k in range(0, len(y), 2):

@@ -1,4 +1,4 @@
-"""The product of `low_rank.Patches`, W~ in two narrow factors; single precision is widened."""
+"""Product with W~ as two narrow factors, for `low_rank`; accumulated in double precision."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ _compile = kernel(fastmath={"reassoc", "contract"})
 
 @_compile
 def put_patches(x, base, p, vertices, columns, left, right, starts, first, last):
-    """Put W~ @ p.T into *x* for some patches of `low_rank.Patches`; *p* is (k, m), k by threes.
+    """Put W~ @ p.T into *x* for patches first..last; *p* is (k, m) with k a multiple of 3.
 
-    To the first three columns *base* (n, 3), patch by patch, is added; or (0, 3), which is nothing.
+    *base* (n, 3), in the order of the patches, is added to the first three columns unless empty.
     """
     most = 0
     for t in range(first, last):
         most = max(most, starts[t + 1, 0] - starts[t, 0])
-    sums = np.empty((3, most + 72))  # 72: rows a power of two apart would share cache lines
+    # 72 more, since rows at a distance of a power of two would conflict in the cache.
+    sums = np.empty((3, most + 72))
     here = np.empty((3, p.shape[1]))
     for t in range(first, last):
         first_row = starts[t, 0]
@@ -27,7 +28,7 @@ def put_patches(x, base, p, vertices, columns, left, right, starts, first, last)
         n, c = len(ids), len(own)
         rank = (starts[t + 1, 3] - starts[t, 3]) // c
         u, v = left[starts[t, 2] : starts[t + 1, 2]], right[starts[t, 3] : starts[t + 1, 3]]
-        turned = np.zeros((3, (rank + 3) // 4 * 4))
+        projected = np.zeros((3, (rank + 3) // 4 * 4))
         for a in range(0, len(p), 3):
             for d in range(3):
                 for j in range(c):
@@ -40,8 +41,8 @@ def put_patches(x, base, p, vertices, columns, left, right, starts, first, last)
                     q0 += w * here[0, j]
                     q1 += w * here[1, j]
                     q2 += w * here[2, j]
-                turned[0, k], turned[1, k], turned[2, k] = q0, q1, q2
-            _add_rows(sums, u, turned, n, rank)
+                projected[0, k], projected[1, k], projected[2, k] = q0, q1, q2
+            _add_rows(sums, u, projected, n, rank)
             for i in range(n):
                 r = ids[i]
                 if a == 0 and len(base) > 0:
@@ -54,7 +55,7 @@ def put_patches(x, base, p, vertices, columns, left, right, starts, first, last)
 
 @_compile
 def _add_rows(sums, u, q, n, rank):
-    """Put q @ u into *sums* (3, n), for the *rank* rows u of *n* numbers and *q* (3, rank)."""
+    """Put q @ u into *sums* (3, n), with *u* the *rank* rows of length *n* and *q* (3, rank)."""
     x, y, z = sums[0], sums[1], sums[2]
     x[:n], y[:n], z[:n] = 0.0, 0.0, 0.0
     four = rank // 4 * 4

@@ -1,4 +1,4 @@
-"""Rings of neighbours, and cross products summed around them, for `normals`."""
+"""Rings of neighbours and vertex normals, for `normals`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _compile = kernel()
 
 @_compile
 def rings(ring, faces, starts):
-    """Put the neighbours of each vertex into *ring* (3m,), in the order that goes around it."""
+    """Put the neighbours of each vertex into *ring* (3m,), in cyclic order."""
     n = len(starts) - 1
     fill, pairs, after = (
         starts[:-1].copy(),
@@ -35,7 +35,7 @@ def rings(ring, faces, starts):
 
 @_compile
 def ring_normals(out, x, ring, starts, scale, first, last):
-    """Put the unit normals of vertices first..last of *x* times *scale* into *out* (n, 3)."""
+    """Put the unit normals of vertices first..last into *out* (n, 3); *x* is scaled by *scale*."""
     for i in range(first, last):
         end = starts[i + 1] - 1
         ox, oy, oz = x[i, 0], x[i, 1], x[i, 2]

@@ -1,6 +1,6 @@
-"""Products of W~ with a few columns, for `blocks`; single precision is widened.
+"""Products of W~ with a few columns, for `products`; accumulated in double precision.
 
-Several rows at a time: what is read of the columns then serves all of them.
+Several rows are processed at a time, so that the columns are read less often.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ import numpy as np
 from .kernels import kernel
 
 _compile = kernel(fastmath={"reassoc", "contract"})
-_IN_A_ROW = 1 << 14  # numbers that are read forwards, so that they are fetched ahead
+_IN_A_ROW = 1 << 14  # numbers that are read in forward order, for prefetching
 
 
 @_compile
 def add_product(x, onto, rows, block, p, start, stop):
-    """Put onto + block @ p.T into the *rows* start..stop of *x*, for *p* (k, m), k by threes.
+    """Put onto + block @ p.T into *rows* start..stop of *x*, for *p* (k, m), k a multiple of 3.
 
-    *onto* is (n, k), *x* itself for example; None is 0, and this is known when it is compiled.
+    *onto* is (n, k), for example *x*; None means 0, which is resolved at compile time.
     """
     if len(p) == 6:
         _add_six(x, onto, rows, block, p, start, stop)
@@ -58,7 +58,7 @@ def add_product(x, onto, rows, block, p, start, stop):
 
 @_compile
 def _add_six(x, onto, rows, block, p, start, stop):
-    """Do `add_product` for six columns, and read a block once: all sums are in registers still."""
+    """Do `add_product` for six columns, reading the block once: all sums fit into registers."""
     p0, p1, p2, p3, p4, p5 = p[0], p[1], p[2], p[3], p[4], p[5]
     two = start + (stop - start) // 2 * 2
     for i in range(start, two, 2):
@@ -134,7 +134,7 @@ def add_adjoint(p, rows, block, y):
 
 @_compile
 def _add_adjoints(p, rows, block, y, z):
-    """Do `add_adjoint` for two, *y* and *z*, to *p* (6, m), and read the block once."""
+    """Do `add_adjoint` for both *y* and *z*, to *p* (6, m), reading the block once."""
     m = block.shape[1]
     p0, p1, p2, p3, p4, p5 = p[0], p[1], p[2], p[3], p[4], p[5]
     two = len(rows) // 2 * 2
@@ -157,9 +157,9 @@ def _add_adjoints(p, rows, block, y, z):
 
 @_compile
 def put_groups(x, base, p, rows, columns, weights, starts):
-    """Put W~ @ p into *x* for all groups of `products.Groups`; *p* is (m, k), k by threes.
+    """Put W~ @ p into *x* for all groups of `products.Groups`; *p* is (m, k), k a multiple of 3.
 
-    To the first three columns *base* (n, 3) is added; or (0, 3), which is nothing.
+    *base* (n, 3) is added to the first three columns unless empty.
     """
     here, k = np.empty(p.size), p.shape[1]
     for g in range(len(starts) - 1):
@@ -181,10 +181,10 @@ def put_groups(x, base, p, rows, columns, weights, starts):
 
 @_compile
 def add_groups_adjoint(p, y, z, rows, columns, weights, starts):
-    """Add (W~.T @ y).T to *p* (3, m), for *y* (n, 3); or of *y* and *z*, one below the other.
+    """Add (W~.T @ y).T to *p* (3, m), for *y* (n, 3); with *z*, both to *p* (6, m).
 
-    From the last group to the first, and in each from its last rows on: these are what
-    `put_groups` has left in the cache, as this leaves it the first.
+    Groups and their rows are processed in reverse order, since `put_groups` leaves the last ones
+    in the cache, and this function leaves the first ones there.
     """
     here = np.empty(p.size)
     for g in range(len(starts) - 2, -1, -1):

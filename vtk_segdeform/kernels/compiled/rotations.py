@@ -17,13 +17,13 @@ from .kernels import kernel
 
 _compile = kernel()
 
-_SWEEPS, _ROUNDS = 12, 40  # of Jacobi's method, of Newton's
-_CLEAR = 1e-3  # of the largest eigenvalue's cube: how small cofactors may be
+_SWEEPS, _ROUNDS = 12, 40  # most iterations of Jacobi's and Newton's methods
+_CLEAR = 1e-3  # least cofactor, relative to the cube of the largest eigenvalue
 
 
 @_compile
 def _minor(n, i, j):
-    """Return the determinant of *n* (4, 4) without row i and column j, with its sign."""
+    """Return the cofactor (i, j) of *n* (4, 4)."""
     r, s, t = (i + 1) % 4, (i + 2) % 4, (i + 3) % 4
     u, v, w = (j + 1) % 4, (j + 2) % 4, (j + 3) % 4
     sign = -1.0 if (i + j) % 2 else 1.0
@@ -36,10 +36,10 @@ def _minor(n, i, j):
 
 @_compile
 def _largest(n, q):
-    """Put the eigenvector of the largest eigenvalue of *n* (4, 4), trace 0, into *q*; or False.
+    """Put the eigenvector of the largest eigenvalue of *n* (4, 4), trace 0, into *q*.
 
-    Newton's method on the characteristic polynomial, from above; then a row of cofactors.  False
-    where two eigenvalues are too close for that.
+    Newton's method on the characteristic polynomial, from above, then a row of cofactors.  Returns
+    False if two eigenvalues are too close for that.
     """
     square = 0.0
     for i in range(4):
@@ -80,7 +80,7 @@ def _largest(n, q):
 
 @_compile
 def _jacobi(n, v):
-    """Put the same into the first row of *v*, by Jacobi's method: to the last digit."""
+    """Put the eigenvector into the first row of *v*, by Jacobi's method, to the last digit."""
     scale = 0.0
     for i in range(4):
         for j in range(4):
@@ -123,7 +123,7 @@ def _jacobi(n, v):
 def rotations(s, out):
     """Put the rotations R that maximise tr(R S) into *out* (k, 3, 3), for *s* (k, 3, 3).
 
-    R as a unit quaternion q makes tr(R S) = q^T N q (Horn 1987), with a 4 x 4 matrix N.
+    With R as a unit quaternion q, tr(R S) = q^T N q for a 4 x 4 matrix N (Horn 1987).
     """
     n = np.empty((4, 4))
     v = np.empty((4, 4))

@@ -5,13 +5,13 @@ from __future__ import annotations
 from .kernels import kernel
 
 _compile = kernel()
-# Sums in several registers at a time, which takes half as long; no other freedom is given.
+# Reassociation allows several partial sums, which halves the time; no other relaxation.
 _compile_sums = kernel(fastmath={"reassoc"})
 
 
 @_compile_sums
 def volume_sums(x, faces, out, size, first, last):
-    """Put six times the volume under each block of *size* faces into *out*, blocks first..last."""
+    """Put six times the volume of each block of *size* faces into *out*, blocks first..last."""
     ox, oy, oz = x[0, 0], x[0, 1], x[0, 2]
     for block in range(first, last):
         total = 0.0

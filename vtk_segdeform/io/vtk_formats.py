@@ -1,0 +1,261 @@
+"""Surfaces through VTK's own readers and writers, for .vtk, .vtp, .vtu, .vtkhdf and .stl.
+
+Reading: the readers of VTK do not validate a file, so they run in a child process (`isolated`);
+afterwards the cells and arrays are checked, and VTK's error messages become a MeshError.
+
+Writing: names that a format cannot store are changed first.  VTK's XML writer does not escape
+names, so that ``<`` makes the file unreadable.  Its HDF writer changes some names, possibly two to
+the same one.  Its legacy writer uses names as format strings, so that ``{`` aborts the process, and
+the legacy reader fails on long names and on active scalars of more than four components.
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, unquote
+
+import numpy as np
+import pyvista as pv
+from vtkmodules.vtkCommonDataModel import vtkPolyData
+from vtkmodules.vtkIOGeometry import vtkSTLWriter
+from vtkmodules.vtkIOHDF import vtkHDFWriter
+from vtkmodules.vtkIOLegacy import vtkPolyDataWriter
+from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+from ..errors import MeshError
+from .array_names import plain_names, warn_left_out, warn_renamed
+from .isolated import read_isolated
+from .polygons import polydata_of
+
+_PREFIX = re.compile(r"^\w+ \(\w+\): ")
+_XML = frozenset({".vtp", ".vtu"})
+_DENSEST = 1100  # most bytes out of one compressed byte
+_COUNTS = re.compile(rb'(NumberOf\w+)="(\d+)"')
+_BINARY = re.compile(rb'format="binary"[^>]*>\s*([A-Za-z0-9+/=]{32})')
+_BEGINS = {
+    ".vtk": re.compile(rb"# vtk DataFile"),
+    ".vtp": re.compile(rb"[^<]*<[\s\S]*<?VTKFile\b"),
+    ".vtu": re.compile(rb"[^<]*<[\s\S]*<?VTKFile\b"),
+    ".vtkhdf": re.compile(rb"\x89HDF\r\n\x1a\n"),
+}
+_SURFACE_CELLS = frozenset({5, 7, 9})  # VTK's numbers of triangle, polygon, quadrangle
+_WRITERS = {".stl": vtkSTLWriter, ".vtk": vtkPolyDataWriter, ".vtkhdf": vtkHDFWriter}
+_REFUSED = {".vtk": "{}", ".vtp": '<>&"', ".vtkhdf": "/."}
+_SCALARS, _MOST = 0, 4  # VTK's attribute index; most components in a legacy file
+
+
+def read_with_vtk(path: Path) -> pv.PolyData:
+    """Read a surface by one of VTK's readers, in a child process."""
+    suffix = path.suffix.lower()
+    with path.open("rb") as file:
+        if not _BEGINS[suffix].match(file.read(1000)):
+            raise MeshError(
+                f"does not begin as a {suffix} file does; it is damaged, or of another format: "
+                "give it the suffix of its format"
+            )
+    if suffix in _XML:
+        _require_plausible_counts(path)
+    try:
+        with read_isolated("vtk", path) as folder:
+            pieces = sorted(folder.iterdir(), key=lambda piece: int(piece.stem))
+            parts = [_validated(pv.get_reader(piece).read()) for piece in pieces]
+    except (MeshError, RuntimeError) as error:
+        raise MeshError(f"is not a readable {suffix} file ({_first_message(error)})") from None
+    surfaces = [_surface(part) for part in parts]
+    return surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
+
+
+def _validated(data: pv.DataSet) -> pv.DataSet:
+    """Return *data* with its original names; MeshError if cells or arrays do not fit the points.
+
+    VTK's readers do not check this, and its filters would read outside the arrays.
+    """
+    arrays = [data.GetCells()] if isinstance(data, pv.UnstructuredGrid) else _cell_arrays(data)
+    for cells in arrays:
+        starts = pv.convert_array(cells.GetOffsetsArray())
+        corners = pv.convert_array(cells.GetConnectivityArray())
+        ends = (int(starts[0]), int(starts[-1])) if len(starts) else (0, len(corners))
+        if ends != (0, len(corners)) or (np.diff(starts) < 0).any():
+            raise MeshError("its cells overlap or exceed their list of corners")
+        if len(corners) and not 0 <= corners.min() <= corners.max() < data.n_points:
+            raise MeshError(
+                f"cells use vertices {corners.min()} to {corners.max()}, "
+                f"but there are {data.n_points}"
+            )
+    if isinstance(data, pv.UnstructuredGrid) and len(data.celltypes) != data.n_cells:
+        raise MeshError("the numbers of cells and cell types differ")
+    for sort, attributes, count in (
+        ("point", data.GetPointData(), data.n_points),
+        ("cell", data.GetCellData(), data.n_cells),
+        ("field", data.GetFieldData(), 0),
+    ):
+        for k in range(attributes.GetNumberOfArrays()):
+            array = attributes.GetAbstractArray(k)
+            array.SetName(unquote(array.GetName()))
+            for j in range(array.GetNumberOfComponents() * array.HasAComponentName()):
+                array.SetComponentName(j, unquote(array.GetComponentName(j) or ""))
+            if array.GetNumberOfTuples() != count and sort != "field":
+                raise MeshError(
+                    f"its {sort} array {array.GetName()!r} has {array.GetNumberOfTuples()} rows; "
+                    f"must be {count}"
+                )
+    return data
+
+
+def _cell_arrays(data: pv.PolyData) -> list[Any]:
+    return [data.GetVerts(), data.GetLines(), data.GetPolys(), data.GetStrips()]
+
+
+def _require_plausible_counts(path: Path) -> None:
+    """Raise a MeshError if a file declares more than its bytes can contain.
+
+    VTK's XML readers would allocate that much memory and crash.  Each block of an array, compressed
+    or not, also begins with counts: a few integers in base64.
+    """
+    data = path.read_bytes()
+    most = _DENSEST * len(data)
+    for match in _COUNTS.finditer(data):
+        if int(match[2]) > most:
+            raise MeshError(f"declares {match[0].decode()}, too many for {len(data)} bytes")
+    wide = b'header_type="UInt64"' in data[:1000]
+    coded = b"compressor=" in data[:1000]
+    for match in _BINARY.finditer(data):
+        words = np.frombuffer(_decoded(match[1]), "<u8" if wide else "<u4")
+        counts = words[: 3 if coded else 1].astype(float)
+        if (counts > most).any() or (coded and len(counts) > 1 and counts[0] * counts[1] > most):
+            raise MeshError(f"declares an array that is too large for {len(data)} bytes")
+
+
+def _decoded(word: bytes) -> bytes:
+    """Return the first 24 bytes of base64 text; empty if it is invalid."""
+    try:
+        return base64.b64decode(word)[:24]
+    except ValueError:
+        return b""
+
+
+def _surface(data: pv.DataSet) -> pv.PolyData:
+    if isinstance(data, pv.PolyData):
+        return data
+    if not isinstance(data, pv.UnstructuredGrid):
+        raise MeshError(f"contains a {type(data).__name__}, not a surface")
+    if not set(data.celltypes.tolist()) <= _SURFACE_CELLS:
+        raise MeshError(
+            "contains cells other than triangles and polygons; extract its surface first"
+        )
+    counts = np.diff(pv.convert_array(data.GetCells().GetOffsetsArray()))
+    surface = polydata_of(np.asarray(data.points, dtype=float), counts, data.cell_connectivity)
+    for mine, theirs in (
+        (surface.point_data, data.point_data),
+        (surface.cell_data, data.cell_data),
+        (surface.field_data, data.field_data),
+    ):
+        for name, values in theirs.items():
+            mine[name] = values
+    return surface
+
+
+def _first_message(error: Exception) -> str:
+    """Return the first error message of VTK; the others follow from it."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    messages = [line for line in lines if not line.startswith("ERROR: In")]
+    return _PREFIX.sub("", messages[0]) if messages else type(error).__name__
+
+
+def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
+    """Write a surface by one of VTK's writers; OSError if the file is incomplete.
+
+    On a full disk VTK's XML writer aborts the process, and its HDF writer leaves an incomplete file
+    without an error.  So the former writes to memory, and the output of the latter is read back.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".stl":
+        warn_left_out("STL", surface, {})
+    plain = surface if suffix == ".stl" else _with_plain_names(surface, suffix)
+    if suffix == ".vtp":
+        writer = vtkXMLPolyDataWriter()
+        writer.SetInputData(plain)
+        writer.SetDataModeToBinary()
+        writer.WriteToOutputStringOn()
+        writer.Write()
+        path.write_text(writer.GetOutputString(), encoding="utf-8")
+        return
+    try:
+        with pv.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
+            writer = _WRITERS[suffix]()
+            writer.SetInputData(plain)
+            again = surface
+            if suffix != ".vtkhdf":
+                writer.SetFileName(str(path))
+                writer.SetFileTypeToBinary()
+                writer.Write()
+            else:  # HDF5 locks its file, but *path* is locked already
+                with tempfile.TemporaryDirectory() as folder:
+                    whole = Path(folder) / path.name
+                    writer.SetFileName(str(whole))
+                    writer.Write()
+                    again = pv.read(whole)
+                    shutil.copyfile(whole, path)
+    except (RuntimeError, ValueError) as error:
+        raise OSError(" ".join(str(error).split())) from None
+    if not np.array_equal(again.points, surface.points, equal_nan=True):
+        raise OSError("the file is incomplete")
+
+
+def _with_plain_names(surface: pv.PolyData, suffix: str) -> Any:
+    """Return a vtkPolyData whose arrays have names that the format can store."""
+    copy = vtkPolyData()
+    copy.ShallowCopy(surface)
+    for sort in ("Point", "Cell", "Field"):
+        attributes = getattr(copy, f"Get{sort}Data")()
+        arrays = [attributes.GetAbstractArray(k) for k in range(attributes.GetNumberOfArrays())]
+        refused, measure = _REFUSED.get(suffix, ""), _quoted if suffix == ".vtk" else len
+        names = plain_names((a.GetName() for a in arrays), refused=refused, measure=measure)
+        parts = {name for array in arrays for name in _components(array) if name}
+        components = plain_names(parts, refused=refused, measure=measure)
+        warn_renamed(f"{sort.lower()} array", names)
+        warn_renamed("component", components)
+        if any(name != plain for name, plain in (names | components).items()):
+            _rename(attributes, arrays, list(names.values()), components)
+        if suffix == ".vtk" and sort != "Field":
+            scalars = attributes.GetScalars()
+            if scalars is not None and scalars.GetNumberOfComponents() > _MOST:
+                attributes.SetActiveAttribute(-1, _SCALARS)
+    return copy
+
+
+def _components(array: Any) -> list[str]:
+    """Return the names of the components of an array; "" for unnamed ones."""
+    if not array.HasAComponentName():
+        return []
+    return [array.GetComponentName(k) or "" for k in range(array.GetNumberOfComponents())]
+
+
+def _rename(
+    attributes: Any, arrays: list[Any], names: list[str], components: dict[str, str]
+) -> None:
+    """Replace *arrays* by renamed copies that remain the active normals, scalars ..."""
+    parts = [
+        attributes.IsArrayAnAttribute(k) if hasattr(attributes, "IsArrayAnAttribute") else -1
+        for k in range(len(arrays))
+    ]
+    attributes.Initialize()
+    for array, name, part in zip(arrays, names, parts, strict=True):
+        renamed = array.NewInstance()
+        renamed.DeepCopy(array)
+        renamed.SetName(name)
+        for k, component in enumerate(_components(array)):
+            renamed.SetComponentName(k, components[component] if component else "")
+        place = attributes.AddArray(renamed)
+        if part >= 0:
+            attributes.SetActiveAttribute(place, part)
+
+
+def _quoted(name: str) -> int:
+    """Return the length of a name in a legacy file, where a space is %20."""
+    return len(quote(name, safe=""))

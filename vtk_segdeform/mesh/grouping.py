@@ -1,0 +1,111 @@
+"""Grouping, sorting and ragged ranges of integers in linear time.
+
+Vertices and faces are numbered from 0 without gaps, so tables replace comparisons.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from ..arrays import IntArray
+
+_MIX = np.uint64(0x9E3779B97F4A7C15)  # odd, with irregular bits: a multiplicative hash
+
+
+def connected(n: int, one: IntArray, other: IntArray) -> IntArray:
+    """Return the connected component of each of *n* items, (n,) int, over links one[i]-other[i].
+
+    Components are numbered from 0 in the order of their first members.
+
+    >>> connected(5, np.array([3]), np.array([1]))
+    array([0, 1, 2, 1, 3])
+    """
+    if n == 0:
+        return np.empty(0, dtype=np.int64)
+    links = sparse.coo_array((np.ones(len(one), bool), (one, other)), shape=(n, n))
+    count, found = csgraph.connected_components(links, directed=False)
+    rank = np.empty(count, np.int64)
+    rank[np.argsort(first_members(found))] = np.arange(count)
+    return rank[found]
+
+
+def first_of_group(group: IntArray) -> IntArray:
+    """Return for each item the index of the first item of the same group, (n,) int.
+
+    >>> first_of_group(np.array([7, 4, 7, 4]))
+    array([0, 1, 0, 1])
+    """
+    _, first, which = np.unique(group, return_index=True, return_inverse=True)
+    return first[which]
+
+
+def first_equal_row(rows: NDArray[np.generic]) -> IntArray:
+    """Return for each row the index of the first row equal to it, (n,) int; NaN equals nothing.
+
+    >>> first_equal_row(np.array([[0, 1], [2, 3], [0, 1]]))
+    array([0, 1, 0])
+    """
+    suspects = _equal_hashes(rows)  # usually none: nothing to sort
+    some = rows[suspects]
+    # lexsort is stable: equal rows keep their order.
+    order = np.lexsort(some.T) if len(some) else np.empty(0, np.int64)
+    ordered = some[order]
+    new = np.ones(len(some), dtype=bool)
+    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    first = np.arange(len(rows))
+    first[suspects[order]] = suspects[order[np.flatnonzero(new)][np.cumsum(new) - 1]]
+    return first
+
+
+def counting_order(keys: IntArray, n: int) -> IntArray:
+    """Return the stable order that sorts *keys* of 0..n-1, in linear time.
+
+    The keys are the column indices of a sparse matrix with one entry per row; its conversion from
+    rows to columns is a counting sort.
+
+    >>> counting_order(np.array([2, 0, 2, 1]), 3)
+    array([1, 3, 0, 2])
+    """
+    short = np.int32 if max(len(keys), n) < np.iinfo(np.int32).max else np.int64
+    entries = np.ones(len(keys), dtype=bool)
+    rows = np.arange(len(keys) + 1, dtype=short)
+    matrix = sparse.csr_array((entries, keys.astype(short), rows), shape=(len(keys), n))
+    return matrix.tocsc().indices.astype(np.int64)
+
+
+def first_members(labels: NDArray[np.integer]) -> IntArray:
+    """Return the first item with each label, (k,) int; *labels* (n,) are 0..k-1 without gaps.
+
+    >>> first_members(np.array([1, 0, 0, 1]))
+    array([1, 0])
+    """
+    first = np.empty(int(labels.max(initial=-1)) + 1, np.int64)
+    first[labels[::-1]] = np.arange(len(labels))[::-1]  # the last write wins
+    return first
+
+
+def ragged_arange(counts: IntArray) -> tuple[IntArray, IntArray]:
+    """Return i and k: each i repeated counts[i] times, with k = 0, 1, ... counts[i] - 1.
+
+    >>> ragged_arange(np.array([2, 0, 3]))
+    (array([0, 0, 2, 2, 2]), array([0, 1, 0, 1, 2]))
+    """
+    i = np.repeat(np.arange(len(counts)), counts)
+    return i, np.arange(len(i)) - np.repeat(counts.cumsum() - counts, counts)
+
+
+def _equal_hashes(rows: NDArray[np.generic]) -> IntArray:
+    """Return the rows (k,) that share their hash with another row, as equal rows do."""
+    if rows.dtype not in (np.float64, np.int64):
+        return np.arange(len(rows))
+    mixed = np.zeros(len(rows), dtype=np.uint64)
+    for column in rows.T:
+        mixed ^= (column + 0).view(np.uint64)  # 0 and -0 are equal
+        mixed *= _MIX
+        mixed ^= mixed >> np.uint64(29)
+    ordered = np.sort(mixed)
+    twice = ordered[1:][ordered[1:] == ordered[:-1]]
+    return np.flatnonzero(np.isin(mixed, twice)) if len(twice) else np.empty(0, np.int64)
