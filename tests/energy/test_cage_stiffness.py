@@ -9,14 +9,14 @@ from solids import rotation
 
 from vtk_segdeform.energy.cage_stiffness import with_cage_stiffness
 from vtk_segdeform.energy.energy import shape_energy
-from vtk_segdeform.geometry.rotations import group_by_position
+from vtk_segdeform.geometry.kmeans import cluster_positions
 from vtk_segdeform.subspace.subspace import bind
 
 SCENE = sausage(2)  # in cages 1.75 times as large as their regions
 SUBSPACE = bind(SCENE.regions, SCENE.cages)
 REST = np.concatenate([cage.vertices for cage in SCENE.cages])
 FACES = [cage.faces for cage in SCENE.cages]
-GROUPS = group_by_position(SCENE.mesh.vertices, 40)
+GROUPS = cluster_positions(SCENE.mesh.vertices, 40)
 WITHOUT = shape_energy(SCENE.mesh, SUBSPACE, 10.0, GROUPS)
 ENERGY = with_cage_stiffness(WITHOUT, REST, FACES, GROUPS)
 

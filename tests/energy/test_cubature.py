@@ -14,13 +14,13 @@ from vtk_segdeform.energy import cubature
 from vtk_segdeform.energy.cubature import Sample
 from vtk_segdeform.energy.energy import shape_energy
 from vtk_segdeform.geometry.intrinsic import IntrinsicTriangulation
-from vtk_segdeform.geometry.rotations import group_by_position
+from vtk_segdeform.geometry.kmeans import cluster_positions
 from vtk_segdeform.subspace.subspace import Subspace, bind
 
 SCENE = sausage(3)
 SUBSPACE = bind(SCENE.regions, SCENE.cages)
 REST = np.concatenate([cage.vertices for cage in SCENE.cages])
-GROUPS = group_by_position(SCENE.mesh.vertices, 20)
+GROUPS = cluster_positions(SCENE.mesh.vertices, 20)
 
 
 @pytest.fixture
@@ -157,7 +157,7 @@ def test_the_more_are_asked_the_nearer_it_is(asked, monkeypatch):
 
 def test_the_same_are_asked_in_every_frame_however_regular_the_mesh(asked):
     mesh = models.bar(divisions=(8, 8, 30))
-    groups = group_by_position(mesh.vertices, 10)
+    groups = cluster_positions(mesh.vertices, 10)
     asked(200)
     here = Sample.of(surface_of(mesh), groups)
     for seed in range(3):

@@ -10,7 +10,7 @@ from solids import rotation
 
 from vtk_segdeform.energy.energy import shape_energy
 from vtk_segdeform.energy.hessian import _rotations_part, curved_factor, factored
-from vtk_segdeform.geometry.rotations import group_by_position
+from vtk_segdeform.geometry.kmeans import cluster_positions
 from vtk_segdeform.subspace.subspace import bind
 
 SCENE = sausage()
@@ -20,7 +20,7 @@ RNG = np.random.default_rng(5)
 
 def energy_of(n_groups):
     subspace = bind(SCENE.regions, SCENE.cages)
-    groups = n_groups and group_by_position(SCENE.mesh.vertices, n_groups)
+    groups = n_groups and cluster_positions(SCENE.mesh.vertices, n_groups)
     return shape_energy(SCENE.mesh, subspace, 10.0, groups)
 
 
@@ -58,7 +58,7 @@ def test_it_is_the_derivative_of_the_gradient_to_second_order(n_groups):
 @pytest.mark.parametrize("stretch", [10.0, 0.0])
 def test_energy_and_gradient_are_those_of_the_dense_operators(stretch):
     subspace, p = bind(SCENE.regions, SCENE.cages), bent(REST)
-    groups = group_by_position(SCENE.mesh.vertices, 250)
+    groups = cluster_positions(SCENE.mesh.vertices, 250)
     energy = shape_energy(SCENE.mesh, subspace, stretch, groups)
     assert energy.fit.size > 60_000  # as many as are multiplied without their zeros
     u, _, vt = np.linalg.svd((energy.fit @ p).reshape(-1, 3, 3))

@@ -11,7 +11,7 @@ from solids import icosphere, rotation
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.energy import rotation_clusters
 from vtk_segdeform.energy.energy import Energy
-from vtk_segdeform.geometry.rotations import rotation_groups
+from vtk_segdeform.geometry.kmeans import cluster_within_parts
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
 
@@ -35,7 +35,7 @@ def joined(scene: Scene, n_groups: int = 100) -> tuple[Energy, np.ndarray]:
 def plain(scene: Scene, n_groups: int = 100) -> Energy:
     """Return the energy with clusters of position for groups, and nothing taken off."""
     energy, _, (positions, parts, _) = fine(scene)
-    groups = rotation_groups(positions, parts, n_groups)
+    groups = cluster_within_parts(positions, parts, n_groups)
     rows = np.asarray(energy.fit).reshape(len(groups), 3, -1)
     return rotation_clusters._with_rotations(energy, rotation_clusters._added(rows, groups))
 
@@ -90,7 +90,7 @@ def test_the_excess_is_the_spread_of_turning_within_the_groups():
     energy, rest, (positions, parts, _) = fine(SCENE)
     move = np.random.default_rng(0).normal(size=rest.shape)
     rows = np.asarray(energy.fit).reshape(len(parts), 3, -1)
-    groups = rotation_groups(positions, parts, 100)
+    groups = cluster_within_parts(positions, parts, 100)
     one, whole = (
         rotation_clusters._response(k, rest, move[:, None])
         for k in (rows, rotation_clusters._added(rows, groups))
@@ -148,7 +148,7 @@ def test_groups_lie_across_what_bends():
 
     x, parts, _ = fine(blade())[2]
     thin = np.abs(x[:, 0]) < 0.2 * x[:, 0].max()
-    assert width(joined(blade(), 60)[1]) > 1.5 * width(rotation_groups(x, parts, 60))
+    assert width(joined(blade(), 60)[1]) > 1.5 * width(cluster_within_parts(x, parts, 60))
 
 
 def test_what_nothing_holds_together_is_grouped_by_position():

@@ -22,7 +22,7 @@ import numpy as np
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage
 from ..energy import Energy, join_rotations, shape_energy, with_cage_stiffness
-from ..geometry import rotation_groups
+from ..geometry import cluster_within_parts
 from ..mesh import Mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions
@@ -108,7 +108,7 @@ class Binder:
         count = max(_BITS, _EACH * count) if many else count
         if count >= n:
             return np.arange(n)
-        return rotation_groups(self.rest.vertices, self._parts, count, quick=many)
+        return cluster_within_parts(self.rest.vertices, self._parts, count, quick=many)
 
     @property
     def _parts(self) -> IntArray:

@@ -42,7 +42,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
-from ..geometry import farthest_points, rotation_groups
+from ..geometry import cluster_within_parts, farthest_points
 from ..progress import Progress, tell
 from .energy import Energy
 from .hessian import curved_factor
@@ -93,7 +93,7 @@ def join_rotations(
     """
     positions, parts, counts = bits
     rows = np.asarray(energy.fit).reshape(len(parts), 3, -1)
-    groups = rotation_groups(positions, parts, n_groups)
+    groups = cluster_within_parts(positions, parts, n_groups)
     tell(progress, 0.0, _DOING)
     pulls = _pulls(energy, rest, progress)
     tell(progress, 0.4, _DOING)

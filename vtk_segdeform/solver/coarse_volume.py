@@ -25,7 +25,7 @@ from scipy import sparse
 
 from ..arrays import FloatArray, IntArray
 from ..geometry import cells as cells_of
-from ..geometry import faces_between, group_by_position
+from ..geometry import cluster_positions, faces_between
 from ..mesh import Mesh
 from ..progress import Progress
 from ..subspace import Subspace
@@ -120,7 +120,7 @@ class _Curve:
             outward = np.sum([each.gradient(self.points) for each in self.constraints], axis=0)
             areas = np.linalg.norm(outward, axis=1) + np.finfo(float).tiny
             places = np.hstack([self.points, _SIDES * outward / areas[:, None]])
-            cells = group_by_position(places, _FEW, rounds=3, seeded=False)
+            cells = cluster_positions(places, _FEW, rounds=3, seeded=False)
             shares = areas / np.bincount(cells, areas)[cells]
         weights = self.surface.left(_matrix(cells, shares)).astype(np.float32)
         return weights, tuple(_coarse(each, cells) for each in self.constraints)

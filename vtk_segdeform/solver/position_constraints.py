@@ -24,7 +24,7 @@ from scipy.sparse import csgraph
 
 from ..arrays import FloatArray, IntArray, as_ids, as_points
 from ..errors import ConstraintError
-from ..geometry import group_by_position
+from ..geometry import cluster_positions
 from ..mesh import Mesh
 from ..subspace import Subspace
 
@@ -174,7 +174,7 @@ def _places(points: FloatArray) -> IntArray:
     """Return (k,) the place of each point of a set: its own, or one shared by those near by."""
     if len(points) <= _MANY:
         return np.arange(len(points))
-    return group_by_position(points, _PLACES)
+    return cluster_positions(points, _PLACES)
 
 
 def errors_at(
