@@ -51,8 +51,9 @@ def convergence() -> None:
     parts = cactus(1500)
     targets = turned(parts["mesh"], parts["handle"], 30)
     ours = bound(parts).solve(targets)
-    printed = bound(parts, window=0).solve(targets)
-    linear = bound(parts, window=0, exact_volume=False)
+    paper = {"acceleration": 0, "exact_hessian": False}
+    printed = bound(parts, **paper).solve(targets)
+    linear = bound(parts, exact_volume=False, **paper)
     missed = [abs(linear.solve(targets, max_steps=1).volume_change) for _ in range(60)]
     exact = bound(parts)
     kept = [abs(exact.solve(targets, max_steps=1).volume_change) for _ in range(ours.steps)]

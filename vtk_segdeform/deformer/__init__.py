@@ -3,9 +3,11 @@
 The files, in reading order:
 
     deformer         `Deformer`: targets in, `Solution` out
-    deform           `deform`: the whole method in one call
-    binding          what is computed once for a mesh, its regions and its cages
+    frame            the coordinates in which a mesh is deformed
+    arguments        checks of its arguments
+    binding          all that is computed once for a mesh, its regions and its cages
     binding_cache    bindings kept on disk
+    deform           `deform`: the whole method in one call
 """
 
 from .binding_cache import cache_folder

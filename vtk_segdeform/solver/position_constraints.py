@@ -167,7 +167,7 @@ def position_term(
     share = 1.0 / np.bincount(row)[row]
     mean = sparse.coo_array((share, (row, np.arange(len(ids))))).tocsr()
     on_mesh = sparse.coo_array((share, (row, ids)), (len(set_of), len(vertices))).tocsr()
-    return PositionTerm(subspace.left(on_mesh), set_of, base, strength, mean)
+    return PositionTerm(subspace.premultiplied(on_mesh), set_of, base, strength, mean)
 
 
 def _places(points: FloatArray) -> IntArray:

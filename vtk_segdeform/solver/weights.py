@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import FloatArray
-from .gauss_newton import GaussNewton
-from .iteration import Iteration, SolverOptions
+from .gauss_newton import GaussNewton, SolverOptions, SolverResult
 from .solution import Status
 
 # A higher weight must reduce the errors to this share and raise the energy by no more than this
@@ -27,7 +26,7 @@ class _Rung:
     solver: GaussNewton
     p: FloatArray  # (m, 3), where it is
 
-    def move(self, places: FloatArray, options: SolverOptions) -> Iteration:
+    def move(self, places: FloatArray, options: SolverOptions) -> SolverResult:
         result = self.solver.minimise(self.p, places, options)
         self.p = result.p
         return result
@@ -91,16 +90,16 @@ class Ladder:
         self._top.p = p
         self._has_hurried = self.is_climbed
         self._above = [self._top] if self.is_climbed else []
-        volumes = self._top.solver.volumes.held_at(p)
+        volumes = self._top.solver.volumes.preserved_at(p)
         for rung in (self._lowest, *self._above):
             rung.solver.volumes = volumes
 
-    def hurry(self, places: FloatArray, options: SolverOptions) -> Iteration:
+    def hurry(self, places: FloatArray, options: SolverOptions) -> SolverResult:
         """Return a pose for *places* (k, 3) at the weights of the last; it is not final."""
         self._has_hurried = self.is_climbed
         return replace(self._top.move(places, options), status=Status.STEP_LIMIT)
 
-    def move(self, places: FloatArray, options: SolverOptions) -> Iteration:
+    def move(self, places: FloatArray, options: SolverOptions) -> SolverResult:
         """Return the pose for *places* (k, 3); its steps are those of all rungs."""
         if self._has_hurried:
             self._lowest.p, self._above, self._has_hurried = self._top.p, [self._top], False
