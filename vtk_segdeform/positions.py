@@ -34,7 +34,8 @@ FARTHEST_APART = 20.0
 So far apart, volumes are rounded to a few 1e-13 of themselves; it grows with the cube of that."""
 
 _MANY, _PLACES = 1000, 500  # vertices of a set beyond which it has so many places
-_ALONE = 2.0  # a vertex that shares its place may be off by so much more than the place
+_MOST_CHECKED = 5000  # vertices of a border
+_ALONE = 1.5  # a vertex that shares its place may be off by so much more than the place
 _Set: TypeAlias = tuple[slice, FloatArray | None, FloatArray]
 
 
@@ -55,14 +56,15 @@ class Pull:
 
 
 @dataclass(frozen=True, eq=False)
-class Borders:
-    """Border vertices of the sets whose vertices share places: the rest of the mesh pulls there.
+class Checks:
+    """Vertices without a weight at which sets that share places are checked.
 
-    They have no weight of their own, but are farthest from where they should be.
+    A set is off by most at its border, through which the rest of the mesh pulls, or else far from
+    the middle of a place.
     """
 
-    rows: FloatArray  # W~ at them, (b, m)
-    set_of: IntArray  # (b,)
+    rows: FloatArray  # W~ at them, (c, m)
+    set_of: IntArray  # (c,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,15 +74,15 @@ class PositionTerm:
     A set of many vertices reaches few cage vertices: its rows Q R count as R, with targets Q^T u.
     What of the targets is beyond Q no pose can meet, and it says nothing of where to go.
 
-    Where vertices share places, targets are those of the k places and of the b border vertices.
+    Where vertices share places, targets are those of the k places and of the c vertices checked.
     """
 
     rows: FloatArray  # W~ at the k places, (k, m)
     set_of: IntArray  # (k,), in order
     base: FloatArray  # omega before strength, (k,), the same within a set
     strength: FloatArray
-    mean: sparse.csr_array | None = None  # (k + b, v), from the vertices held to the targets
-    borders: Borders | None = None
+    mean: sparse.csr_array | None = None  # (k + c, v), from the vertices held to the targets
+    checks: Checks | None = None
     known: list[_Set] | None = None  # what `_sets` is, if it is known
 
     @property
@@ -138,16 +140,16 @@ class PositionTerm:
         return self.toward(u).value_and_slope(p)
 
     def errors(self, p: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return how far the places of each set are missed at *p* (m, 3), (s,), and its border.
+        """Return by how much each set is off at *p* (m, 3): at its places, and where it is checked.
 
-        A border's error counts as that of a place: a half of it.  0 where no places are shared.
+        Both (s,).  The latter counts for two thirds, and is 0 for a set that shares no places.
         """
         count = len(self.rows)
         places = self._worst(self.rows @ p - u[:count], self.set_of)
-        if self.borders is None:
+        if self.checks is None:
             return places, np.zeros_like(places)
-        border = self._worst(self.borders.rows @ p - u[count:], self.borders.set_of)
-        return places, border / _ALONE
+        checks = self._worst(self.checks.rows @ p - u[count:], self.checks.set_of)
+        return places, checks / _ALONE
 
     def _worst(self, away: FloatArray, set_of: IntArray) -> FloatArray:
         worst = np.zeros(len(self.strength))
@@ -189,15 +191,16 @@ def position_term(
     mean = sparse.coo_array((share, (row, np.arange(len(ids))))).tocsr()
     on_mesh = sparse.coo_array((share, (row, ids)), (len(set_of), mesh.n_vertices)).tocsr()
     count = np.array([len(own) for own in held])
-    shares = np.flatnonzero(size < count)
     begins = np.cumsum(count) - count
-    border = [begins[k] + _border(mesh, held[k]) for k in shares]
-    at = np.concatenate(border)
-    borders = Borders(subspace.at(ids[at]), np.repeat(shares, [len(own) for own in border]))
-    alone = sparse.eye_array(len(ids)).tocsr()[at]
-    gathered = sparse.vstack([mean, alone]).tocsr()
+    at, shares = [], np.flatnonzero(size < count)
+    for k in shares:
+        farthest = _farthest(mesh.vertices[held[k]], places[k])
+        at.append(begins[k] + np.union1d(_border(mesh, held[k]), farthest))
+    checked = np.concatenate(at)
+    checks = Checks(subspace.at(ids[checked]), np.repeat(shares, [len(own) for own in at]))
+    to_targets = sparse.vstack([mean, sparse.eye_array(len(ids)).tocsr()[checked]]).tocsr()
     return PositionTerm(
-        subspace.left(on_mesh), set_of, base, strength, mean=gathered, borders=borders
+        subspace.left(on_mesh), set_of, base, strength, mean=to_targets, checks=checks
     )
 
 
@@ -206,7 +209,15 @@ def _border(mesh: Mesh, ids: IntArray) -> IntArray:
     outside = np.ones(mesh.n_vertices)
     outside[ids] = 0.0
     border = np.flatnonzero(mesh.adjacency[ids] @ outside)
-    return border[:: 1 + len(border) // _PLACES]
+    return border[:: 1 + len(border) // _MOST_CHECKED]
+
+
+def _farthest(points: FloatArray, place: IntArray) -> IntArray:
+    """Return which of *points* (k, 3) is farthest from the middle of each *place* (k,)."""
+    share = 1.0 / np.bincount(place)
+    middle = np.stack([np.bincount(place, x) * share for x in points.T], axis=1)
+    order = np.lexsort((np.linalg.norm(points - middle[place], axis=1), place))
+    return order[np.cumsum(np.bincount(place)) - 1]
 
 
 def _places(points: FloatArray) -> IntArray:
