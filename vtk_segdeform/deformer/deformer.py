@@ -431,7 +431,9 @@ class Deformer:
         order = [*handles, *(len(self.handle) + patch for patch in patches)]
         in_order = sparse.eye_array(len(ids)).tocsr()[np.concatenate([_NONE, *order])]
         weight = _POSITION_WEIGHT * binding.energy.scale
-        positions = position_term(self.subspace, rest, [ids[places] for places in order], weight)
+        positions = position_term(
+            self.subspace, self._rest, [ids[places] for places in order], weight
+        )
         gathered = in_order if positions.mean is None else positions.mean @ in_order
         volumes = binding.coarse_volume.volumes(self._preserved_volumes, rest)
         fixed_at = rest[self.fixed] if len(self.fixed) else np.zeros((1, 3))
