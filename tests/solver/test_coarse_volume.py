@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 
 from vtk_segdeform import models, sizes
 from vtk_segdeform.regions.coarse import coarsen
-from vtk_segdeform.solver import position_constraints
 from vtk_segdeform.solver.coarse_volume import CoarseVolume
 from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.solver.volume_constraints import region_volumes, total_volume
@@ -147,10 +146,10 @@ def test_single_precision_is_the_papers_product_with_rounded_weights(monkeypatch
 def test_neighbours_in_a_large_patch_share_a_place_and_are_held_no_worse(monkeypatch):
     targets = SCENE.turned(40)
     each = SCENE.deformer().solve(targets)
-    monkeypatch.setattr(position_constraints, "_MANY", 20)
-    monkeypatch.setattr(position_constraints, "_PLACES", 30)
+    monkeypatch.setattr(sizes, "SHARED_PLACES", 20)
+    monkeypatch.setattr(sizes, "PLACES", 30)
     deformer = SCENE.deformer()
-    assert len(deformer._ladder.solver.positions.rows) == 60
+    assert len(deformer._continuation.solver.positions.rows) == 60
     shared = deformer.solve(targets)
     assert shared.handle_error < 1.5 * each.handle_error + 1e-4
     assert shared.fixed_error < 1.5 * each.fixed_error + 1e-4
@@ -159,18 +158,18 @@ def test_neighbours_in_a_large_patch_share_a_place_and_are_held_no_worse(monkeyp
 
 
 def test_a_patch_whose_vertices_share_places_is_checked_where_it_is_off_by_most(monkeypatch):
-    monkeypatch.setattr(position_constraints, "_MANY", 20)
-    monkeypatch.setattr(position_constraints, "_PLACES", 30)
+    monkeypatch.setattr(sizes, "SHARED_PLACES", 20)
+    monkeypatch.setattr(sizes, "PLACES", 30)
     deformer, targets = SCENE.deformer(), SCENE.turned(40)
     solution, goal = deformer.solve(targets), SCENE.mesh.vertices.copy()
     goal[SCENE.handle] = targets
     away = np.linalg.norm(solution.vertices - goal, axis=1) / deformer._frame.size
     largest = [away[ids].max() for ids in (SCENE.handle, SCENE.fixed)]
     term, places = (
-        deformer._ladder.solver.positions,
+        deformer._continuation.solver.positions,
         deformer._constraints.places(deformer._targets),
     )
-    shared, checked = term.errors(deformer._ladder.p, places)
+    shared, checked = term.errors(deformer._continuation.p, places)
     assert_allclose(1.5 * checked, largest, rtol=1e-6)
     assert (shared < 0.7 * np.array(largest)).all()  # which the places do not tell
 

@@ -60,7 +60,7 @@ def test_a_large_mesh_is_landed_by_its_size_and_its_cages_with_it():
     assert solution.status is Status.CONVERGED
     assert abs(solution.volume_change) < 1e-14
     assert_allclose(deformer.surface(solution.cage_vertices), solution.vertices, atol=1e-13)
-    assert deformer._ladder.solver.volumes.constraints[0].target != pytest.approx(
+    assert deformer._continuation.solver.volumes.constraints[0].target != pytest.approx(
         deformer._constraints.volumes.constraints[0].target, rel=1e-9
     )  # held is what the stand-in has where the mesh has its own
 

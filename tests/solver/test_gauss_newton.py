@@ -189,10 +189,10 @@ def test_at_the_end_the_slope_is_a_multiple_of_the_volume_gradient():
     # Karush-Kuhn-Tucker: what is left of the slope can only push against the volume.
     deformer = SCENE.deformer(tolerance=1e-10, max_steps=2000, rotation_groups=50)
     deformer.solve(SCENE.turned(40))
-    solver, targets = deformer._ladder.solver, deformer._constraints.places(deformer._targets)
-    x = solver.energy.subspace.map(deformer._ladder.p)
-    _, slope = solver.energy.local_step(deformer._ladder.p, x)
-    slope = slope + solver.positions.value_and_slope(deformer._ladder.p, targets)[1]
+    solver, targets = deformer._continuation.solver, deformer._constraints.places(deformer._targets)
+    x = solver.energy.subspace.map(deformer._continuation.p)
+    _, slope = solver.energy.local_step(deformer._continuation.p, x)
+    slope = slope + solver.positions.value_and_slope(deformer._continuation.p, targets)[1]
     gradient = solver.energy.subspace.adjoint(solver.volumes.constraints[0].gradient(x))
     factor = np.vdot(slope, gradient) / np.vdot(gradient, gradient)
     assert np.linalg.norm(slope - factor * gradient) < 1e-5 * np.linalg.norm(slope)

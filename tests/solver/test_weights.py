@@ -29,7 +29,7 @@ def rested(deformer, targets, max_steps):
 
 
 def strength(deformer):
-    return deformer._ladder.solver.positions.strength.max()
+    return deformer._continuation.solver.positions.strength.max()
 
 
 def away(a, b):
@@ -50,10 +50,10 @@ def test_what_is_missed_gets_more_weight_and_is_met():
 def off(deformer):
     """Return the largest error of each set, as a share of the tolerance."""
     positions, places = (
-        deformer._ladder.solver.positions,
+        deformer._continuation.solver.positions,
         deformer._constraints.places(deformer._targets),
     )
-    errors, _ = positions.errors(deformer._ladder.p, places)
+    errors, _ = positions.errors(deformer._continuation.p, places)
     return errors / deformer._hold_tolerance
 
 
@@ -61,7 +61,7 @@ def off(deformer):
 def test_no_set_has_more_weight_than_it_needs(degrees):
     deformer = SCENE.held()
     deformer.solve(bent(degrees))
-    assert (deformer._ladder.solver.positions.strength > 1.0).all()
+    assert (deformer._continuation.solver.positions.strength > 1.0).all()
     assert (off(deformer) <= 1.0).all()
     assert (off(deformer) > 0.8).all()  # at weights of 10 and 100: 0.4 to 0.66
 

@@ -1,4 +1,4 @@
-"""Checks of the arguments of a `Deformer`: each raises an error that names the argument."""
+"""Checks of the arguments of a `Deformer`; each raises an error that names the argument."""
 
 from __future__ import annotations
 
@@ -7,12 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, as_points, is_number, is_whole
+from ..arrays import FloatArray, IntArray, as_ids, as_points, is_number, is_whole
 from ..cages import Cage
 from ..checks import require_sequence, shown
 from ..errors import ArgumentError, CageError, ConstraintError
+from ..mesh import Mesh
 
 _FARTHEST = 1e3  # sizes of the mesh
+FARTHEST_APART = 20.0
+"""Diagonals of the mesh between two targets or fixed vertices, at most.
+
+At this distance volumes are rounded to a few 1e-13 of themselves; the error grows with its cube."""
 
 
 def check_options(hold_tolerance: float, stretch: float, rotation_groups: int | None) -> None:
@@ -44,3 +49,53 @@ def stacked_cages(cages: Sequence[Cage], cage_vertices: Sequence[ArrayLike]) -> 
     if got != expected:
         raise CageError(f"cage_vertices must hold {expected} points, cage by cage; got {got}")
     return np.concatenate(poses)
+
+
+def checked_constraints(
+    mesh: Mesh, fixed: ArrayLike, handle: ArrayLike
+) -> tuple[IntArray, IntArray]:
+    """Return the vertex numbers of *fixed* and *handle*, or raise a ConstraintError."""
+    try:
+        fixed = as_ids(fixed, mesh.n_vertices, "fixed")
+        handle = as_ids(handle, mesh.n_vertices, "handle")
+    except ValueError as fault:
+        raise ConstraintError(str(fault)) from None
+    both = np.intersect1d(fixed, handle)
+    if len(both):
+        raise ConstraintError(
+            f"{len(both)} vertices are both fixed and handle (the first is {both[0]}); "
+            "remove them from one of the two"
+        )
+    return fixed, handle
+
+
+def checked_targets(targets: ArrayLike, n_handle: int) -> FloatArray:
+    """Return *targets* as (n_handle, 3), or raise a ConstraintError.
+
+    Without handles, any empty sequence is accepted.
+    """
+    try:
+        array = as_points(targets, "targets") if n_handle or np.size(targets) else np.empty((0, 3))
+    except ValueError as fault:
+        raise ConstraintError(str(fault)) from None
+    if len(array) != n_handle:
+        raise ConstraintError(
+            f"targets must give one point for each of the {n_handle} handle vertices; "
+            f"got shape {array.shape}"
+        )
+    return array
+
+
+def require_together(mesh: Mesh, *places: FloatArray) -> None:
+    """Raise a ConstraintError if *places* (k, 3), targets and fixed vertices, are too far apart."""
+    given = [points for points in places if len(points)]
+    if not given:
+        return
+    low = np.min([points.min(axis=0) for points in given], axis=0)
+    high = np.max([points.max(axis=0) for points in given], axis=0)
+    apart = float((high - low).max()) / mesh.diagonal
+    if not apart <= FARTHEST_APART:
+        raise ConstraintError(
+            f"targets and fixed vertices are {apart:.3g} diagonals of the mesh apart; at most "
+            f"{FARTHEST_APART:.0f} are allowed: are both in the same unit?"
+        )

@@ -48,7 +48,6 @@ from ..progress import Progress, tell
 from ..regions import Regions, require_regions
 from ..solver import (
     GaussNewton,
-    Ladder,
     ScaledSurface,
     Solution,
     SolverOptions,
@@ -56,20 +55,25 @@ from ..solver import (
     Status,
     VolumeConstraint,
     Volumes,
-    checked_constraints,
-    checked_targets,
+    WeightContinuation,
     connected_sets,
     errors_at,
     moved_along,
     position_term,
     region_volumes,
-    require_together,
     steps_to_volume,
     total_volume,
     waypoints,
 )
 from ..subspace import Passengers, Subspace, bind_passengers
-from .arguments import check_distance, check_options, stacked_cages
+from .arguments import (
+    check_distance,
+    check_options,
+    checked_constraints,
+    checked_targets,
+    require_together,
+    stacked_cages,
+)
 from .binding import BindingInputs
 from .binding_cache import cached_binding
 from .frame import Frame
@@ -158,7 +162,7 @@ class Deformer:
     """
 
     _constraints: _Constraints
-    _ladder: Ladder
+    _continuation: WeightContinuation
     _p: FloatArray  # (m, 3), the cages of the last pose, in solver coordinates
     _targets: FloatArray  # (k, 3), the targets of the last pose
 
@@ -252,7 +256,7 @@ class Deformer:
         """Return a deformer in the same pose that continues independently."""
         other = self._shared()
         other._constraints = replace(self._constraints, solver=self._constraints.solver.copy())
-        other._ladder = self._ladder.copy()
+        other._continuation = self._continuation.copy()
         return other
 
     __copy__ = copy
@@ -351,15 +355,17 @@ class Deformer:
         places = self._constraints.places(goal)
         steps = self._follow_waypoints(goal, options)
         is_drag = max_steps is not None and not np.array_equal(goal, self._targets)
-        move = self._ladder.hurry if is_drag and self._ladder.is_climbed else self._ladder.move
-        result = move(places, options)
+        if is_drag and self._continuation.has_raised_weights:
+            result = self._continuation.solve_at_current_weights(places, options)
+        else:
+            result = self._continuation.solve(places, options)
         self._targets = goal
         steps += result.steps
         x, scaled_by = self._with_exact_volume(result)
         for _ in range(_SOLVES_PER_SCALING):
             if scaled_by <= _SCALED or result.status is Status.STEP_LIMIT:
                 break
-            result = self._ladder.move(places, options)
+            result = self._continuation.solve(places, options)
             steps += result.steps
             x, scaled_by = self._with_exact_volume(result)
         return self._solution(result, x, steps)
@@ -368,8 +374,11 @@ class Deformer:
         """Move through the waypoints before *goal*; return the number of steps."""
         options = replace(options, tolerance=_WAYPOINT_TOLERANCE, max_steps=_WAYPOINT_STEPS)
         *on_the_way, _ = waypoints(self._targets, goal, self._constraints.handles)
-        places = map(self._constraints.places, on_the_way)
-        return sum(self._ladder.hurry(each, options).steps for each in places)
+        steps = 0
+        for targets in on_the_way:
+            places = self._constraints.places(targets)
+            steps += self._continuation.solve_at_current_weights(places, options).steps
+        return steps
 
     def _with_exact_volume(self, result: SolverResult) -> tuple[FloatArray, float]:
         """Restore the exact volumes; return the mesh and by how much it was scaled.
@@ -396,7 +405,7 @@ class Deformer:
         self._p = inside + scale * (self._p - inside)
         scaled_by = abs(scale - 1.0)
         if scaled_by > _ROUNDING:
-            self._ladder.go_on_from(self._p)
+            self._continuation.continue_from(self._p)
         return x, scaled_by
 
     def _map(self, offsets: FloatArray, directions: Sequence[FloatArray] = ()) -> FloatArray:
@@ -457,10 +466,10 @@ class Deformer:
         """Begin at cages *p* (m, 3), which are a pose for *targets* (k, 3)."""
         solver = self._constraints.solver
         solver.volumes = self._constraints.volumes
-        self._ladder = Ladder(solver, p, self._hold_tolerance)
+        self._continuation = WeightContinuation(solver, p, self._hold_tolerance)
         self._p, self._targets = p, targets
         if self._constraints.is_scaled and p is not self._rest_cages:
-            self._ladder.go_on_from(p)
+            self._continuation.continue_from(p)
 
     def _take_trial_step(self) -> None:
         """Compile the kernels, or load them, before the first frame needs them."""

@@ -16,25 +16,15 @@ The files, in reading order:
 from .coarse_volume import CoarseVolume
 from .exact_volume import ScaledSurface, moved_along, steps_to_volume
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
-from .position_constraints import (
-    FARTHEST_APART,
-    checked_constraints,
-    checked_targets,
-    connected_sets,
-    errors_at,
-    position_term,
-    require_together,
-)
+from .position_constraints import connected_sets, errors_at, position_term
 from .solution import Solution, Status
 from .volume_constraints import VolumeConstraint, Volumes, region_volumes, total_volume
 from .waypoints import waypoints
-from .weights import Ladder
+from .weights import WeightContinuation
 
 __all__ = [
-    "FARTHEST_APART",
     "CoarseVolume",
     "GaussNewton",
-    "Ladder",
     "ScaledSurface",
     "Solution",
     "SolverOptions",
@@ -42,14 +32,12 @@ __all__ = [
     "Status",
     "VolumeConstraint",
     "Volumes",
-    "checked_constraints",
-    "checked_targets",
+    "WeightContinuation",
     "connected_sets",
     "errors_at",
     "moved_along",
     "position_term",
     "region_volumes",
-    "require_together",
     "steps_to_volume",
     "total_volume",
     "waypoints",

@@ -50,7 +50,7 @@ from ..errors import ArgumentError, CageError
 from ..progress import Progress, tell
 from .anderson import Anderson
 from .exact_volume import moved_along, steps_to_volume
-from .position_constraints import PositionTerm, Pull
+from .position_constraints import PositionTerm, TargetTerm
 from .solution import Status
 from .volume_constraints import Volumes
 
@@ -115,9 +115,9 @@ class _Iterate:
     merit: float  # E and the position term
     slope: FloatArray  # d
 
-    def toward(self, pull: Pull) -> _Iterate:
+    def toward(self, term: TargetTerm) -> _Iterate:
         """Return the same pose for other targets."""
-        value, slope = pull.value_and_slope(self.p)
+        value, slope = term.value_and_slope(self.p)
         return replace(self, merit=self.shape + value, slope=self.shape_slope + slope)
 
 
@@ -219,8 +219,8 @@ class GaussNewton:
         Called again with the last p and targets, it continues as if it had never returned.
         """
         state = self._begin(p, targets, options)
-        pull = self.positions.toward(targets)
-        here = self._iterate_at(p, pull)
+        term = self.positions.toward(targets)
+        here = self._iterate_at(p, term)
         merits = [here.merit]
         multipliers = np.zeros(len(self.volumes.constraints))
         directions: list[FloatArray] = []
@@ -243,13 +243,13 @@ class GaussNewton:
             if options.acceleration:
                 residual = self._factor.triangle.T @ step
                 guess = state.acceleration.extrapolate(here.p, step, residual)
-                ahead = self._retract(guess, directions, pull, options)
+                ahead = self._retract(guess, directions, term, options)
                 if not self._improves(ahead, here):
                     state.acceleration.forget()
                     ahead = None
             is_renewable = newton and state.age > 1  # H is of an earlier pose
             if ahead is None and not (is_renewable and options.acceleration):
-                ahead = self._shortened(here, step, directions, pull, options)
+                ahead = self._shortened(here, step, directions, term, options)
             if ahead is None and is_renewable:
                 state.drop_factor()
                 continue
@@ -289,18 +289,18 @@ class GaussNewton:
         self,
         p: FloatArray,
         directions: Sequence[FloatArray],
-        pull: Pull,
+        term: TargetTerm,
         options: SolverOptions,
     ) -> _Iterate:
         """Return *p* moved along *directions* onto the constraints, and the objective there."""
         if not np.isfinite(p).all():
             return _Iterate(p, p, math.inf, p, (), math.inf, p)
         if not directions or not options.exact_volume:
-            return self._evaluate(p, self._surface(p), pull)
+            return self._evaluate(p, self._surface(p), term)
         paths = self.volumes.surface.map(np.hstack([p, *directions]))
         t = steps_to_volume(self.volumes.constraints, paths)
         p = p + sum(tk * z for tk, z in zip(t, directions, strict=True))
-        return self._evaluate(p, moved_along(paths, t), pull)
+        return self._evaluate(p, moved_along(paths, t), term)
 
     def _full_factor(self, here: _Iterate, state: _State) -> Factor | None:
         """Return the factor of the exact Hessian; None if it is not convex."""
@@ -323,7 +323,7 @@ class GaussNewton:
         needed = self.volumes.constraints or self.energy.has_vertex_rotations
         return self.volumes.surface.map(p) if needed else _NO_SURFACE
 
-    def _evaluate(self, p: FloatArray, x: FloatArray, pull: Pull) -> _Iterate:
+    def _evaluate(self, p: FloatArray, x: FloatArray, term: TargetTerm) -> _Iterate:
         load = self.energy.rotation_load(p, x)
         gradients = [constraint.gradient(x) for constraint in self.volumes.constraints]
         if self.energy.has_vertex_rotations:  # the load is on the surface, too: one pass over W~
@@ -331,27 +331,27 @@ class GaussNewton:
         else:
             rows = self.volumes.surface.adjoints(gradients)
         value, slope = self.energy.value_and_slope(p, load)
-        return _Iterate(p, x, value, slope, tuple(rows), value, slope).toward(pull)
+        return _Iterate(p, x, value, slope, tuple(rows), value, slope).toward(term)
 
-    def _iterate_at(self, p: FloatArray, pull: Pull) -> _Iterate:
+    def _iterate_at(self, p: FloatArray, term: TargetTerm) -> _Iterate:
         """Return the iterate at *p*; where the last call ended only the targets have changed."""
         last = self._last
         if last is None or last.p is not p:
-            return self._evaluate(p, self._surface(p), pull)
-        return last.toward(pull)
+            return self._evaluate(p, self._surface(p), term)
+        return last.toward(term)
 
     def _shortened(
         self,
         here: _Iterate,
         step: FloatArray,
         directions: Sequence[FloatArray],
-        pull: Pull,
+        term: TargetTerm,
         options: SolverOptions,
     ) -> _Iterate | None:
         """Return the first of the steps h, h/2, h/4 ... that lowers the objective, or None."""
         epsilon = 1.0
         while epsilon >= _SHORTEST:
-            ahead = self._retract(here.p + epsilon * step, directions, pull, options)
+            ahead = self._retract(here.p + epsilon * step, directions, term, options)
             is_merit = self.energy.has_exact_gradient and options.exact_volume
             if self._improves(ahead, here) or (not is_merit and np.isfinite(ahead.merit)):
                 return ahead
