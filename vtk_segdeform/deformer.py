@@ -371,7 +371,7 @@ class Deformer:
         in_order = sparse.eye_array(len(ids)).tocsr()[np.concatenate([_NONE, *order])]
         weight = _POSITION_WEIGHT * self._energy.scale
         positions = position_term(
-            self.subspace, self._rest.vertices, [ids[places] for places in order], weight
+            self.subspace, self._rest, [ids[places] for places in order], weight
         )
         gathered = in_order if positions.mean is None else positions.mean @ in_order
         self._rest_of_fixed = mesh.vertices[self.fixed]

@@ -5,15 +5,15 @@
 Vertices joined by mesh edges form a *set*: a fixed patch, or a handle that moves on its own.
 Every set weighs the same, shared out evenly over its vertices, so that a handle of one vertex
 holds as well as a patch of a thousand; in a patch of many thousands, neighbours share a place,
-their mean.  A coarse cage cannot put every vertex of a set in place; `PositionTerm.stiffened`
-raises the weight of the sets that are off by too much.
+their mean.  A coarse cage cannot put every vertex of a set in place; `stiffening` finds how much
+more weight the sets need that are off by too much.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeAlias
 
@@ -34,8 +34,8 @@ FARTHEST_APART = 20.0
 So far apart, volumes are rounded to a few 1e-13 of themselves; it grows with the cube of that."""
 
 _MANY, _PLACES = 1000, 500  # vertices of a set beyond which it has so many places
-_STIFFER = 10.0
-_STIFFEST = 1e4  # times the weight it started with
+_MOST_CHECKED = 5000  # vertices of a border
+_ALONE = 1.5  # a vertex that shares its place may be off by so much more than the place
 _Set: TypeAlias = tuple[slice, FloatArray | None, FloatArray]
 
 
@@ -56,18 +56,33 @@ class Pull:
 
 
 @dataclass(frozen=True, eq=False)
+class Checks:
+    """Vertices without a weight at which sets that share places are checked.
+
+    A set is off by most at its border, through which the rest of the mesh pulls, or else far from
+    the middle of a place.
+    """
+
+    rows: FloatArray  # W~ at them, (c, m)
+    set_of: IntArray  # (c,)
+
+
+@dataclass(frozen=True, eq=False)
 class PositionTerm:
     """The term for k vertices in sets; `strength` (s,) multiplies the weight of each set.
 
     A set of many vertices reaches few cage vertices: its rows Q R count as R, with targets Q^T u.
     What of the targets is beyond Q no pose can meet, and it says nothing of where to go.
+
+    Where vertices share places, targets are those of the k places and of the c vertices checked.
     """
 
     rows: FloatArray  # W~ at the k places, (k, m)
     set_of: IntArray  # (k,), in order
     base: FloatArray  # omega before strength, (k,), the same within a set
     strength: FloatArray
-    mean: sparse.csr_array | None = None  # (k, v), from the vertices held to the places
+    mean: sparse.csr_array | None = None  # (k + c, v), from the vertices held to the targets
+    checks: Checks | None = None
     known: list[_Set] | None = None  # what `_sets` is, if it is known
 
     @property
@@ -124,22 +139,30 @@ class PositionTerm:
         """Return the term at *p* and half its gradient (m, 3), for targets *u* (k, 3)."""
         return self.toward(u).value_and_slope(p)
 
-    def stiffened(self, errors: FloatArray, tolerance: float) -> PositionTerm | None:
-        """Return the term with more weight where *errors* (k,) pass *tolerance*, or None.
+    def errors(self, p: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return by how much each set is off at *p* (m, 3): at its places, and where it is checked.
 
-        None means that nothing is off, or that what is off already has all the weight allowed.
+        Both (s,).  The latter counts for two thirds, and is 0 for a set that shares no places.
         """
+        count = len(self.rows)
+        places = self._worst(self.rows @ p - u[:count], self.set_of)
+        if self.checks is None:
+            return places, np.zeros_like(places)
+        checks = self._worst(self.checks.rows @ p - u[count:], self.checks.set_of)
+        return places, checks / _ALONE
+
+    def _worst(self, away: FloatArray, set_of: IntArray) -> FloatArray:
         worst = np.zeros(len(self.strength))
-        np.maximum.at(worst, self.set_of, errors)
-        raised = (worst > tolerance) & (self.strength < _STIFFEST)
-        if not raised.any():
-            return None
-        strength = np.where(raised, self.strength * _STIFFER, self.strength)
-        return PositionTerm(self.rows, self.set_of, self.base, strength, self.mean, self._sets)
+        np.maximum.at(worst, set_of, np.sqrt(np.einsum("ij,ij->i", away, away)))
+        return worst
+
+    def with_strength(self, strength: FloatArray) -> PositionTerm:
+        """Return the same with other weights."""
+        return replace(self, strength=strength, known=self._sets)
 
 
 def position_term(
-    subspace: Subspace, vertices: FloatArray, held: list[IntArray], weight: float
+    subspace: Subspace, mesh: Mesh, held: list[IntArray], weight: float
 ) -> PositionTerm:
     """Return the term for sets of vertices *held*, each of total *weight*.
 
@@ -147,14 +170,14 @@ def position_term(
     ----------
     subspace : Subspace
         W~.
-    vertices : (n, 3) float
-        The mesh at rest.
+    mesh : Mesh
+        At rest.
     held : list of (k_s,) int
         The vertices of each set, as they follow each other in the targets.
     weight : float
         Of each set.
     """
-    places = [_places(vertices[ids]) for ids in held]
+    places = [_places(mesh.vertices[ids]) for ids in held]
     size = np.array([int(place.max()) + 1 for place in places], dtype=np.int64)
     set_of = np.repeat(np.arange(len(held)), size)
     base = weight / size[set_of]
@@ -166,8 +189,35 @@ def position_term(
     row = np.concatenate([begin + place for begin, place in zip(begins, places, strict=False)])
     share = 1.0 / np.bincount(row)[row]
     mean = sparse.coo_array((share, (row, np.arange(len(ids))))).tocsr()
-    on_mesh = sparse.coo_array((share, (row, ids)), (len(set_of), len(vertices))).tocsr()
-    return PositionTerm(subspace.left(on_mesh), set_of, base, strength, mean)
+    on_mesh = sparse.coo_array((share, (row, ids)), (len(set_of), mesh.n_vertices)).tocsr()
+    count = np.array([len(own) for own in held])
+    begins = np.cumsum(count) - count
+    at, shares = [], np.flatnonzero(size < count)
+    for k in shares:
+        farthest = _farthest(mesh.vertices[held[k]], places[k])
+        at.append(begins[k] + np.union1d(_border(mesh, held[k]), farthest))
+    checked = np.concatenate(at)
+    checks = Checks(subspace.at(ids[checked]), np.repeat(shares, [len(own) for own in at]))
+    to_targets = sparse.vstack([mean, sparse.eye_array(len(ids)).tocsr()[checked]]).tocsr()
+    return PositionTerm(
+        subspace.left(on_mesh), set_of, base, strength, mean=to_targets, checks=checks
+    )
+
+
+def _border(mesh: Mesh, ids: IntArray) -> IntArray:
+    """Return places in *ids* (k,) of vertices with neighbours elsewhere; of many, every so many."""
+    outside = np.ones(mesh.n_vertices)
+    outside[ids] = 0.0
+    border = np.flatnonzero(mesh.adjacency[ids] @ outside)
+    return border[:: 1 + len(border) // _MOST_CHECKED]
+
+
+def _farthest(points: FloatArray, place: IntArray) -> IntArray:
+    """Return which of *points* (k, 3) is farthest from the middle of each *place* (k,)."""
+    share = 1.0 / np.bincount(place)
+    middle = np.stack([np.bincount(place, x) * share for x in points.T], axis=1)
+    order = np.lexsort((np.linalg.norm(points - middle[place], axis=1), place))
+    return order[np.cumsum(np.bincount(place)) - 1]
 
 
 def _places(points: FloatArray) -> IntArray:
