@@ -2,7 +2,8 @@
 With and without the volume constraint
 ======================================
 
-Figure 7 of the paper: a bar bent by 120 degrees loses a fifth of its volume without the constraint.
+Figure 7 of the paper: without the constraint, a bar that is bent by 120 degrees loses a quarter of
+its volume.
 
     python examples/with_and_without_volume.py FOLDER
 
