@@ -35,7 +35,7 @@ extensions = [
     "sphinx_gallery.gen_gallery",
     "making.equations",
     "making.keys",
-    "making.changelog",
+    "myst_parser",  # for CHANGELOG.md
     "making.headers",
     "making.made",
 ]

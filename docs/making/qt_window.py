@@ -1,9 +1,9 @@
-r"""The picture of the Qt example's window, which the site cannot make by itself: it takes a screen.
+r"""The picture of the Qt example's window. It needs a screen, so it is kept in the repository.
 
     xvfb-run -s "-screen 0 1600x1200x24" \
         env PYTHONPATH=.:docs .venv/bin/python -m making.qt_window
 
-writes docs/pictures/qt-application.png.  `examples/qt_application.py` runs as it is; then its
+writes docs/pictures/qt-application.png.  `examples/qt_application.py` runs unchanged, and its
 cactus is bent.
 """
 
@@ -23,11 +23,11 @@ from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.editor import actions
 
 PICTURE = DOCS / "pictures" / "qt-application.png"
-PAUSE = 1500  # milliseconds for the window to lay itself out and draw
+PAUSE = 1500  # milliseconds, for layout and drawing
 
 
 def story(window: Any) -> Iterator[None]:
-    """Bend the cactus by its tip, colour what has swollen and keep what is seen."""
+    """Bend the cactus by its tip, show the local volume change and save a picture."""
     editor, session = window.editor.editor, window.editor.session
     height, angle = session.mesh.vertices[:, 2], np.radians(45.0)
     session.segment(3)
@@ -49,17 +49,17 @@ def story(window: Any) -> Iterator[None]:
 
 
 def main() -> None:
-    """Run the example, and go on with the story whenever it has nothing to do."""
+    """Run the example, and continue the story whenever it is idle."""
     application = QtWidgets.QApplication(["qt_application"])
-    told: list[Iterator[None]] = []
+    started: list[Iterator[None]] = []
 
-    def go_on() -> None:
+    def continue_story() -> None:
         window = next(w for w in application.topLevelWidgets() if hasattr(w, "show_volume"))
-        told[:] = told or [story(window)]
-        if window.editor.editor.is_busy or next(told[0], "ended") is None:
-            QtCore.QTimer.singleShot(PAUSE, go_on)
+        started[:] = started or [story(window)]
+        if window.editor.editor.is_busy or next(started[0], "ended") is None:
+            QtCore.QTimer.singleShot(PAUSE, continue_story)
 
-    QtCore.QTimer.singleShot(PAUSE, go_on)
+    QtCore.QTimer.singleShot(PAUSE, continue_story)
     sys.argv = ["qt_application"]
     runpy.run_path(str(EXAMPLES / "qt_application.py"))
 
