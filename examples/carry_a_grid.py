@@ -52,5 +52,6 @@ if len(sys.argv) > 1:
         plotter.add_mesh(shown, color="lightsteelblue", show_edges=True)
     plotter.link_views()
     plotter.camera_position = [(0.9, -2.9, 1.1), (0.15, 0.0, 0.45), (0.0, 0.0, 1.0)]
+    plotter.camera.zoom(1.5)
     plotter.screenshot(folder / "grids.png")
     plotter.close()

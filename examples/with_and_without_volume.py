@@ -23,7 +23,7 @@ foot, tip = np.flatnonzero(height < 0.05), np.flatnonzero(height > 0.95)
 regions = sd.segment(mesh, n_regions=3)
 cages = sd.fit_cages(mesh, regions, n_vertices=155)
 
-angle, pivot = np.radians(120), [0.0, 0.0, 0.5]
+angle, pivot = np.radians(120), [0.0, 0.0, 0.4]
 turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
 targets = (mesh.vertices[tip] - pivot) @ turn.T + pivot
 

@@ -39,10 +39,10 @@ def volume_along_a_step() -> None:
     axes.plot(t, cubic(t), color=OURS)
     axes.plot([guess, guess], [100.0, cubic(guess)], color=THEIRS, marker="o")
     axes.plot([root], [100.0], color=OURS, marker="o")
-    words = f"root of the tangent: {cubic(guess):.1f} %"
+    words = f"tangent: {cubic(guess):.1f} %"
     axes.annotate(words, (guess, cubic(guess)), (-8, 6), ha="right", **BESIDE)
-    axes.annotate("root of the cubic: 100 %", (root, 100.0), (14, -34), **BESIDE)
-    axes.annotate("at rest", (0.0, 100.0), (0, 5), **BESIDE)
+    axes.annotate("cubic: 100 %", (root, 100.0), (10, -34), **BESIDE)
+    axes.annotate("at rest", (0.0, 100.0), (0, -14), **BESIDE)
     axes.set(xlabel="step length $t$", ylabel="volume [%]")
     axes.locator_params(axis="x", nbins=5)
     figure.savefig(FOLDER / "volume_along.png", dpi=150)
