@@ -96,7 +96,7 @@ def bend(hand: Hand) -> None:
 
 def gizmo_of(hand: Hand) -> tuple[Any, float]:
     """Return the centre of the gizmo and the radius of its ring, in pixels."""
-    gizmo = hand.editor.stage.dragger.gizmo
+    gizmo = hand.editor.widgets.dragger.gizmo
     view = hand.editor.view
     return hand.at(gizmo.centre[None])[0], 1.15 * gizmo.radius / view.pixel_at(gizmo.centre)
 

@@ -53,8 +53,9 @@ def convergence() -> None:
     parts = cactus(1500)
     targets = rotated(parts["mesh"], parts["handle"], 30)
     ours = deformer_of(parts).solve(targets)
-    printed = deformer_of(parts, window=0).solve(targets)
-    linear = deformer_of(parts, window=0, exact_volume=False)
+    paper = {"acceleration": 0, "exact_hessian": False}
+    printed = deformer_of(parts, **paper).solve(targets)
+    linear = deformer_of(parts, exact_volume=False, **paper)
     linearised = [abs(linear.solve(targets, max_steps=1).volume_change) for _ in range(60)]
     exact = deformer_of(parts)
     errors = [abs(exact.solve(targets, max_steps=1).volume_change) for _ in range(ours.steps)]
