@@ -36,8 +36,8 @@ what to do. There are no other exceptions, no warnings, and no computations of m
 Triangles without area are allowed: a closed mesh with such triangles is accepted and deformed like
 any other.
 
-Each input is tested with each operation that accepts its type, in {cases} cases: {answered} return a
-result and {refused} raise an error that names the fault.
+Each input is tested with each operation that accepts its type, in {cases} cases: {answered} return
+a result and {refused} raise an error that names the fault.
 """
 
 
