@@ -54,6 +54,7 @@ def test_every_example_has_a_number_to_hold():
 
 @pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize("name", RIGHT)
+@pytest.mark.usefixtures("cached_models")
 def test_the_example_runs_and_its_number_is_right(name, whole, monkeypatch, tmp_path):
     folder = tmp_path / "some" / "where"  # which it makes
     monkeypatch.setattr("sys.argv", [name, str(folder)] if name in LEAVES else [name])
