@@ -22,7 +22,7 @@ from vtk_segdeform.widgets import CageDisplay, HandleDragger, View, film, replay
 FILE = DOCS / "pictures" / "drag.gif"
 SIZE = (460, 380)  # pixels
 CAMERA = [(0.35, -3.0, 0.75), (0.02, 0.0, 0.5), (0.0, 0.0, 1.0)]
-N_FRAMES = 56
+N_FRAMES = 57  # odd: no frame returns to the start exactly, to be labelled 1e-16
 SWING = 40.0  # degrees to each side
 PIVOT = [0.0, 0.0, 0.3]
 ARROW = [[0, 0], [0, -17], [4, -13.5], [6.5, -19], [9, -18], [6.5, -12.5], [11.5, -12]]  # pixels
