@@ -1,7 +1,4 @@
-"""What every test runs under: no window, one thread per worker, no user settings.
-
-A cactus or a dinosaur of as many vertices is the same each time, and frozen: it is made once.
-"""
+"""Settings of all tests: no window, one thread per worker, no user settings."""
 
 from __future__ import annotations
 
@@ -21,11 +18,18 @@ if sys.platform == "linux" and not os.environ.get("DISPLAY"):
     # Without a screen VTK warns once per window that X cannot be reached; EGL needs none.
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
+import pytest  # noqa: E402
 import pyvista as pv  # noqa: E402 - reads what is set above
 
 from vtk_segdeform import models  # noqa: E402
 
 pv.global_theme.multi_samples = 1  # smooth edges take five times as long to draw in software
 
-models.cactus = functools.cache(models.cactus)  # the one that makes it anew is its __wrapped__
-models.dinosaur = functools.cache(models.dinosaur)
+_MODELS = {name: functools.cache(getattr(models, name)) for name in ("cactus", "dinosaur")}
+
+
+@pytest.fixture
+def cached_models(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Create each cactus and dinosaur once per process; meshes are immutable."""
+    for name, cached in _MODELS.items():
+        monkeypatch.setattr(models, name, cached)

@@ -305,5 +305,6 @@ def test_small_multiples_have_a_panel_for_each_quantity(tmp_path, monkeypatch):
     charts.small_multiples(tmp_path / "history.png", ["a", "b", "c"], panels)
     ((_, axes),) = figures
     assert [axis.get_title() for axis in axes if axis.get_visible()] == ["0", "1", "2", "3"]
-    assert axes[0].lines[0].get_xdata().tolist() == [0, 2]
+    assert list(axes[0].lines[0].get_xdata()) == [0, 2]
+    assert axes[0].get_ylim() == pytest.approx((0.0, 2.2))
     assert (tmp_path / "history.png").stat().st_size > 5000

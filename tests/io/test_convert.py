@@ -312,3 +312,23 @@ def test_real_files_are_read_as_an_independent_reader_does():
     assert_array_equal(koala.faces, theirs.regular_faces)
     assert_array_equal(koala.vertices.astype(np.float32), theirs.points.astype(np.float32))
     assert read_polydata(path_of("dino.off")).point_data["RGBA"][0].tolist() == [192, 192, 192, 255]
+
+
+@pytest.mark.parametrize("suffix", [*EXACT, ".stl", ".vtu", ".glb", ".gltf"])
+def test_an_empty_file_is_called_empty(tmp_path, suffix):
+    (tmp_path / f"a{suffix}").write_bytes(b"")
+    with pytest.raises(MeshError, match=r"the file is empty \(0 bytes\); copy or export it again"):
+        read_polydata(tmp_path / f"a{suffix}")
+
+
+def test_a_file_without_polygons_says_what_it_holds(tmp_path):
+    pv.PolyData().save(tmp_path / "a.vtp")
+    with pytest.raises(MeshError, match="holds no surface: 0 points, 0 polygons"):
+        read_polydata(tmp_path / "a.vtp")
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".vtp", ".vtu", ".vtkhdf"])
+def test_a_file_with_the_suffix_of_another_format_says_so(tmp_path, suffix):
+    (tmp_path / f"a{suffix}").write_text("v 0 0 0\n")
+    with pytest.raises(MeshError, match=f"does not begin as a {suffix} file does"):
+        read_polydata(tmp_path / f"a{suffix}")

@@ -15,6 +15,7 @@ from solids import CUBE, OCTAHEDRON, icosphere
 
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.io.convert import read_mesh, read_polydata
+from vtk_segdeform.io.gltf_buffers import Document
 from vtk_segdeform.io.polygons import triangles_of
 
 VERTICES, FACES = icosphere(1)
@@ -197,7 +198,7 @@ LIES = {  # path into the JSON, what is put there, and a part of the message
     "fraction": ("accessors 0 count", 5.5, "count is 5.5"),
     "truth": ("accessors 0 count", True, "count is True"),
     "word": ("accessors 0 count", "6", "count is '6'"),
-    "no count": ("accessors 0 count", None, "count is None"),
+    "no count": ("accessors 0 count", None, "count is missing"),
     "huge offset": ("accessors 0 byteOffset", 2**62, "ends at byte"),
     "negative offset": ("accessors 0 byteOffset", -12, "byteOffset is -12"),
     "component": ("accessors 0 componentType", 5124, "component type 5124"),
@@ -232,7 +233,7 @@ LIES = {  # path into the JSON, what is put there, and a part of the message
     "mode": ("meshes 0 primitives 0 mode", 7, "mode is 7"),
     "lines": ("meshes 0 primitives 0 mode", 1, "contains no triangles"),
     "position": ("meshes 0 primitives 0 attributes POSITION", 1, "is of type 'SCALAR'"),
-    "skin": ("nodes 0 skin", 0, "skins: index is 0"),
+    "skin": ("nodes 0 skin", 0, "has no skins"),
     "targets": ("meshes 0 primitives 0 targets", [{"POSITION": 8}], "weights"),
     "draco": ("extensionsRequired", ["KHR_draco_mesh_compression"], "KHR_draco_mesh_compression"),
     "meshopt": ("extensionsRequired", ["EXT_meshopt_compression"], "EXT_meshopt_compression"),
@@ -271,7 +272,7 @@ def test_sparse_parts_that_do_not_fit_are_refused(tmp_path):
         ({"indices": {"bufferView": 2, "componentType": 5122}}, "not unsigned"),
         ({"indices": {"bufferView": 3, "componentType": 5123}}, "replaces element"),
         ({"values": {"bufferView": 2}}, "ends at byte"),
-        ({"values": {}}, "index is None"),
+        ({"values": {}}, "index is missing"),
         ({"indices": []}, "must be an object"),
     ]:
         document = octahedron(*OCTAHEDRON)
@@ -310,6 +311,57 @@ def test_many_instances_of_many_primitives_are_refused_quickly(tmp_path):
         primitive["mode"] = 1
     with pytest.raises(MeshError, match="more than 50000000 vertices"):
         read_polydata(document.save(tmp_path / "a.glb"))
+
+
+def test_a_mesh_shown_by_many_nodes_is_read_once(tmp_path, monkeypatch):
+    document, read = octahedron(*OCTAHEDRON), []
+    document.head["nodes"] = [{"mesh": 0, "translation": [3.0 * k, 0, 0]} for k in range(50)]
+    document.head["scenes"][0]["nodes"] = list(range(50))
+    viewed = Document._viewed
+
+    def count(self, index, *rest):
+        read.append(index)
+        return viewed(self, index, *rest)
+
+    monkeypatch.setattr(Document, "_viewed", count)
+    mesh = read_mesh(document.save(tmp_path / "a.glb"))
+    assert len(read) == len(set(read)) == 2
+    vertices, faces = (np.asarray(each) for each in OCTAHEDRON)
+    expected = vertices[None] + 3.0 * np.arange(50)[:, None, None] * [1, 0, 0]
+    assert_allclose(mesh.vertices, expected.reshape(-1, 3))
+    assert_array_equal(mesh.faces.reshape(50, -1, 3), faces + 6 * np.arange(50)[:, None, None])
+
+
+def test_nodes_that_share_a_mesh_have_morph_weights_and_orientations_of_their_own(tmp_path):
+    document = octahedron(*OCTAHEDRON)
+    vertices = np.asarray(OCTAHEDRON[0], dtype=float)
+    grown = document.array(vertices)
+    document.head["meshes"][0]["primitives"][0]["targets"] = [{"POSITION": grown}]
+    document.head["nodes"] = [
+        {"mesh": 0, "weights": [0]},
+        {"mesh": 0, "weights": [1], "translation": [9, 0, 0]},
+        {"mesh": 0, "weights": [0], "scale": [-1, 1, 1], "translation": [20, 0, 0]},
+        {"mesh": 0, "weights": [0], "translation": [30, 0, 0]},
+    ]
+    document.head["scenes"][0]["nodes"] = [0, 1, 2, 3]
+    mesh = read_mesh(document.save(tmp_path / "a.glb"))
+    expected = [
+        vertices,
+        2 * vertices + [9, 0, 0],
+        vertices * [-1, 1, 1] + [20, 0, 0],
+        vertices + [30, 0, 0],
+    ]
+    assert_allclose(mesh.vertices, np.concatenate(expected))
+
+
+@pytest.mark.parametrize("count", [True, -3, 1.5, "6", None])
+def test_a_number_that_is_none_says_which_and_what_it_must_be(tmp_path, count):
+    document = octahedron(*OCTAHEDRON)
+    document.head["accessors"][0]["count"] = count
+    with pytest.raises(MeshError, match=r"accessor 0: count is .* of at least 1") as no:
+        read_polydata(document.save(tmp_path / "a.glb"))
+    assert "inf" not in str(no.value)
+    assert "Export the file again" in str(no.value)
 
 
 @pytest.mark.parametrize("levels", [10, 5_000])

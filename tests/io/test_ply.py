@@ -196,3 +196,31 @@ def test_colours_of_other_types_are_not_cut_to_bytes(tmp_path):
         head = HEADER.format(kind="ascii", n=8, rest=colours.format(kind) + rest)
         (tmp_path / "a.ply").write_text(head + "\n".join([*lines, "3 0 1 2"]))
         assert np.asarray(read_polydata(tmp_path / "a.ply").point_data[name][0]).tolist() == value
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian"])
+def test_a_truncated_file_says_so_wherever_it_ends(tmp_path, kind):
+    vertices, faces = TETRAHEDRON
+    if kind == "ascii":
+        whole = text(vertices, [f"3 {a} {b} {c}" for a, b, c in faces], FACES.format(m=4)).encode()
+        pieces = whole.split()
+        cuts = [b" ".join(pieces[:-k]) for k in range(1, 4 * 4 + 4 * 3)]
+        head = HEADER.format(kind=kind, n=4, rest=FACES.format(m=4)).encode()
+        cuts = [head + cut[len(b" ".join(head.split())) :] for cut in cuts]
+    else:
+        write_mesh(tmp_path / "a.ply", Mesh(vertices, faces))
+        whole = (tmp_path / "a.ply").read_bytes()
+        cuts = [whole[:-k] for k in range(1, 4 * (1 + 3 * 4) + 4 * 3 * 8)]
+    for cut in cuts:
+        (tmp_path / "a.ply").write_bytes(cut)
+        with pytest.raises(MeshError, match="is truncated or damaged, copy or export it again"):
+            read_polydata(tmp_path / "a.ply")
+    (tmp_path / "a.ply").write_bytes(whole)
+    assert read_mesh(tmp_path / "a.ply").n_faces == 4
+
+
+def test_a_word_among_numbers_is_shown(tmp_path):
+    whole = text(TETRAHEDRON[0], ["3 0 1 2"], FACES.format(m=1))
+    (tmp_path / "a.ply").write_text(whole.replace("3 0 1 2", "3 0 one 2"))
+    with pytest.raises(MeshError, match="'one' where a number must be"):
+        read_polydata(tmp_path / "a.ply")

@@ -184,3 +184,39 @@ def test_a_sphere_with_smoothing_is_as_exact_as_one_without(tmp_path):
     assert_array_equal(again.points, surface.points)
     assert_array_equal(again.faces, surface.faces)
     assert set(again.cell_data["Smoothing"]) == {1}
+
+
+TETRA = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+HUGE = "99999999999999999999999"
+
+
+@pytest.mark.parametrize(
+    ("good", "bad", "message"),
+    [
+        ("f 3 1 4", f"f 3 1 {HUGE}", f"refers to {HUGE}, which is too large"),
+        ("f 3 1 4", f"f 3/{HUGE} 1 4", f"refers to {HUGE}, which is too large"),
+        ("f 3 1 4", f"f 3 1 -{HUGE}", f"refers to -{HUGE}; indices start at 1"),
+        ("f 3 1 4", "f 3 1 4294967295", "refers to vertex 4294967295 of 4"),
+        ("f 3 1 4", "f 3 a 4", "refers to 'a'; indices are whole numbers"),
+        ("v 0 0 1", "v 0 x 1", "vertex 4 is '0 x 1'; must be 3 numbers"),
+        ("v 0 1 0", "v 0 1", "vertex 3 is '0 1'; must be 3 numbers"),
+        ("f 1 3 2", "vt 0 0\nvt 0 y\nf 1 3 2", "texture coordinate 2 is '0 y'; must be 2 numbers"),
+    ],
+)
+def test_a_number_that_cannot_be_is_named(tmp_path, good, bad, message):
+    (tmp_path / "a.obj").write_text(TETRA)
+    assert read_mesh(tmp_path / "a.obj").n_faces == 4
+    (tmp_path / "a.obj").write_text(TETRA.replace(good, bad))
+    with pytest.raises(MeshError, match=message):
+        read_polydata(tmp_path / "a.obj")
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32"])
+@pytest.mark.parametrize("name", ["a.obj", "a.off"])
+def test_text_in_utf_16_is_named_and_what_to_save_it_as(tmp_path, encoding, name):
+    off = "OFF\n4 1 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n"
+    (tmp_path / name).write_text(TETRA if name == "a.obj" else off, encoding=encoding)
+    with pytest.raises(MeshError, match="UTF-16 text, or not text at all; save it as UTF-8"):
+        read_polydata(tmp_path / name)
+    (tmp_path / name).write_text(TETRA if name == "a.obj" else off, encoding="utf-8-sig")
+    assert read_polydata(tmp_path / name).n_points == 4

@@ -356,3 +356,19 @@ def test_benchmark_meshes_in_obj_files_are_sound(name):
     vertices = np.array([w[1:4] for w in lines if w and w[0] == "v"], dtype=float)
     faces = [[int(i.partition("/")[0]) - 1 for i in w[1:4]] for w in lines if w and w[0] == "f"]
     assert find_faults(vertices, faces).ok
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_boxes_that_begin_within_another_are_among_few_candidates(axis):
+    rng = np.random.default_rng(3)
+    low = np.concatenate([rng.integers(0, 9, (300, 3)).astype(float), 9 * rng.random((100, 3))])
+    low[:, axis] *= 20.0  # along this axis the boxes overlap least
+    high = low + rng.integers(1, 6, (400, 3))
+    order, starts, stops = shells._beginning_within(low, high)
+    for k in range(400):
+        within = ((low > low[k]) & (high < high[k])).all(axis=1)
+        assert set(np.flatnonzero(within)) <= set(order[starts[k] : stops[k]])
+    row = 0.5 * rng.random((1000, 3))
+    row[:, axis] = 3.0 * np.arange(1000)  # separate boxes
+    _, starts, stops = shells._beginning_within(row - 1.0, row + 1.0)
+    assert (stops <= starts).all()

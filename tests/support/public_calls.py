@@ -82,7 +82,6 @@ def calls(modules: tuple[str, ...]) -> Iterator[Call]:
             if inspect.isclass(thing):
                 yield from _calls_of_class(thing)
             elif callable(thing):
-                thing = inspect.unwrap(thing)  # of the cache that `conftest` puts around models
                 yield _call(name, functools.partial(lambda f: f, thing), thing)
 
 
@@ -111,7 +110,9 @@ def _names(module: Any) -> list[str]:
 def _calls_of_class(cls: type) -> Iterator[Call]:
     if issubclass(cls, enum.Enum | BaseException):
         return
-    if cls in MADE_BY_HAND or cls.__module__.startswith("vtk_segdeform.widgets"):
+    made_by_pyvista = cls.__module__ == "vtk_segdeform.widgets.plugin"
+    ours = cls.__module__.startswith("vtk_segdeform.widgets") and not made_by_pyvista
+    if cls in MADE_BY_HAND or ours:
         yield _call(cls.__name__, lambda: cls, cls)
     for name, member in inspect.getmembers(cls):
         if name.startswith("_") or name in NOT_CALLED:

@@ -25,9 +25,9 @@ def module_names() -> list[str]:
 
 
 @pytest.mark.parametrize("name", module_names())
-def test_the_examples_print_what_they_say(name, monkeypatch, tmp_path):
+def test_the_examples_print_what_they_say(name, monkeypatch, tmp_path, cached_models):
     monkeypatch.chdir(tmp_path)  # an example that writes a file writes it here
-    if name.startswith(("vtk_segdeform.widgets.qt", "vtk_segdeform.widgets.panel")):
+    if name.startswith("vtk_segdeform.widgets.qt"):
         pytest.importorskip("pyvistaqt", exc_type=ImportError)
     module = importlib.import_module(name)
     linecache.clearcache()  # else doctest looks after every file in it, before each docstring

@@ -19,6 +19,8 @@ from vtk_segdeform.geometry.distortion import distortion
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.subspace.subspace import cage_subspace
 
+pytestmark = pytest.mark.usefixtures("cached_models")
+
 QUICK = ["cactus", "torus", "two components", "hand.off", "botsch-sorkine/cylinder.off"]
 ALL = [*QUICK, "dinosaur", "dino.off", "botsch-sorkine/cactus.off", "koala.obj"]
 

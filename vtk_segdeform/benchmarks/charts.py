@@ -115,8 +115,9 @@ def small_multiples(
                 there, [values[x] for x in there],
                 marker=_MARKERS[k % len(_MARKERS)], color=colour, label=name,
             )  # fmt: skip
-        axis.set_title(label, fontsize=8)
-        axis.set_ylim(bottom=0.0)
+        axis.set_title(label, fontsize=7)
+        known = [value for values in lines.values() for value in values if not math.isnan(value)]
+        axis.set_ylim(0.0, 1.1 * max(known, default=0.0) or 1.0)
         axis.set_xticks(range(len(labels)), labels, rotation=90, fontsize=6)
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", frameon=False)
     with replacing(path) as draft:

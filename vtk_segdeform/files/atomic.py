@@ -30,7 +30,7 @@ _DRAFT = re.compile(r"\.segdeform-[0-9a-f]{16}\.part(\.\w{1,8})?")
 _IN_FOLDER = re.compile(r"\d{4,}\.png")  # the only files written to a folder
 _LOCKS = sys.platform != "win32"  # a locked file cannot be written through another handle there
 _A_DAY = 86_400.0  # seconds
-_TRIES = 5
+_TRIES = 50  # a sweep may hold the lock of a new draft for a moment; five were too few under load
 
 
 @contextmanager

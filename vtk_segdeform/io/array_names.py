@@ -14,6 +14,8 @@ import numpy as np
 import pyvista as pv
 from vtkmodules.vtkCommonCore import vtkStringArray
 
+from ..errors import MeshError
+
 _log = logging.getLogger(__name__)
 _LONGEST = 200  # readers written in C keep a name in a buffer of fixed size
 
@@ -24,6 +26,13 @@ def decoded(data: bytes) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
         return data.decode("latin-1")
+
+
+def text_of(data: bytes) -> str:
+    """Return the text of a file, `decoded`; MeshError if it is in UTF-16, or not text at all."""
+    if b"\0" in data[:1000]:
+        raise MeshError("is UTF-16 text, or not text at all; save it as UTF-8 or ASCII text")
+    return decoded(data)
 
 
 def plain_names(

@@ -106,6 +106,8 @@ def read_polydata(path: str | Path) -> pv.PolyData:
         raise MeshError(f"{path}: there is no such file") from None
     if what := fault_of(status):
         raise MeshError(f"{path}: {what}")
+    if not status.st_size:
+        raise MeshError(f"{path}: the file is empty (0 bytes); copy or export it again")
     suffix = path.suffix.lower()
     if not is_mesh_file(path):
         known = {*_READERS, *_VTK_READS, *meshlab.READS}
@@ -126,7 +128,10 @@ def read_polydata(path: str | Path) -> pv.PolyData:
         size = f"{status.st_size / 1e9:.2g} GB"
         raise MeshError(f"{path}: too large for the memory of this machine ({size})") from None
     if not surface.n_points or not surface.n_cells:
-        raise MeshError(f"{path}: holds no surface; give it polygons")
+        raise MeshError(
+            f"{path}: holds no surface: {surface.n_points} points, {surface.n_cells} polygons; "
+            "export the mesh itself"
+        )
     return surface
 
 

@@ -125,15 +125,18 @@ def _local(node: dict[str, Any], name: str) -> FloatArray:
     if "matrix" in node:
         columns: FloatArray = numbers(node, "matrix", name, [0.0] * 16).reshape(4, 4)
         return columns.T
-    x, y, z, w = numbers(node, "rotation", name, [0.0, 0.0, 0.0, 1.0])
     matrix = np.eye(4)
-    turn = np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip
-    matrix[:3, :3] = turn * numbers(node, "scale", name, [1.0, 1.0, 1.0])
-    matrix[:3, 3] = numbers(node, "translation", name, [0.0, 0.0, 0.0])
+    if "rotation" in node:
+        x, y, z, w = numbers(node, "rotation", name, [0.0, 0.0, 0.0, 1.0])
+        matrix[:3, :3] = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    if "scale" in node:
+        matrix[:3, :3] *= numbers(node, "scale", name, [1.0, 1.0, 1.0])
+    if "translation" in node:
+        matrix[:3, 3] = numbers(node, "translation", name, [0.0, 0.0, 0.0])
     return matrix
 
 

@@ -60,6 +60,7 @@ class Document:
         self.size = len(data)  # total number of bytes read
         self._folder = path.parent
         self._buffers: dict[int, bytes] = {}
+        self._arrays: dict[tuple[int, tuple[str, ...]], Any] = {}  # by accessor and allowed types
         self._lists: dict[str, list[dict[str, Any]]] = {}
         self._spent = 0
 
@@ -80,8 +81,14 @@ class Document:
 
     def item(self, key: str, index: object) -> dict[str, Any]:
         """Return one object of such a list."""
-        found = self.items(key)
-        return found[whole({"index": index}, "index", key, most=len(found) - 1)]
+        return self.items(key)[self.index(key, index)]
+
+    def index(self, key: str, index: object) -> int:
+        """Return an index into such a list as a number; MeshError if the list has no such item."""
+        count = len(self.items(key))
+        if not count:
+            raise MeshError(f"refers to {key} {index!r:.40}, but has no {key}; export it again")
+        return whole({"index": index}, "index", key, most=count - 1)
 
     def array(self, index: object, *types: str) -> Any:
         """Return the numbers of an accessor, (n, width), in their own type or, normalised, float64.
@@ -93,6 +100,15 @@ class Document:
         *types : str
             Allowed types: "SCALAR", "VEC3" ...
         """
+        number = self.index("accessors", index)
+        # Many nodes may show one mesh: its numbers are read and checked once.
+        if (number, types) not in self._arrays:
+            self._arrays[number, types] = self._read(number, types)
+        array = self._arrays[number, types]
+        self.spend(len(array))
+        return array
+
+    def _read(self, index: int, types: tuple[str, ...]) -> Any:
         accessor, name = self.item("accessors", index), f"accessor {index}"
         type_ = accessor.get("type")
         if type_ not in types:
@@ -106,7 +122,6 @@ class Document:
             raise MeshError(f"{name} declares {count} elements, but has no buffer")
         else:
             array = np.zeros(shape, dtype=kind)
-        self.spend(count)
         if "sparse" in accessor:
             array = self._replaced(array, object_(accessor, "sparse", name), name)
         if accessor.get("normalized") is True and array.dtype.kind in "iu":
@@ -208,7 +223,9 @@ def whole(
     if isinstance(value, float) and value.is_integer():
         value = int(value)
     if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-        raise MeshError(f"{name}: {key} is {value!r:.40}; must be {least} to {most}")
+        end = f"of at least {least}" if most == math.inf else f"from {least} to {most}"
+        got = "is missing" if value is None else f"is {value!r:.40}"
+        raise MeshError(f"{name}: {key} {got}; must be a whole number {end}. Export the file again")
     return value
 
 

@@ -16,7 +16,7 @@ import pyvista as pv
 
 from ..arrays import IntArray
 from ..errors import MeshError
-from .array_names import decoded, warn_left_out
+from .array_names import text_of, warn_left_out
 from .polygons import polydata_of, polygons_of, rows
 
 _KIND = re.compile(r"(ST)?(C)?(N)?OFF\b", re.IGNORECASE)
@@ -25,7 +25,7 @@ _WIDTHS = {"N": 3, "C": 4, "ST": 2}
 
 def read_off(path: Path) -> pv.PolyData:
     """Return the surface in an OFF file; colours of vertices as "RGBA", normals are dropped."""
-    text = re.sub(r"#[^\r\n]*", "", decoded(path.read_bytes()))
+    text = re.sub(r"#[^\r\n]*", "", text_of(path.read_bytes()))
     lines = [line for line in re.split(r"[\r\n]+", text) if line.strip()]
     kind = _KIND.match(lines[0].strip()) if lines else None
     if kind is None:

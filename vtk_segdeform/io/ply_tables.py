@@ -72,7 +72,7 @@ def tables_of(data: bytes) -> dict[str, Table]:
     order = _ORDERS[kind]
     stored = elements
     if kind == "ascii":
-        data, start = np.array(data[start:].split(), dtype="<f8").tobytes(), 0
+        data, start = _doubles(data[start:].split()).tobytes(), 0
         stored = [_as_doubles(element) for element in elements]
     tables: dict[str, Table] = {}
     for element, rows in zip(elements, stored, strict=True):
@@ -117,6 +117,24 @@ def _type(name: str, line: bytes) -> str:
     return TYPES[name]
 
 
+def _doubles(words: list[bytes]) -> Any:
+    try:
+        return np.array(words, dtype="<f8")
+    except ValueError:
+        wrong = next(word for word in words if not _is_number(word))
+        raise MeshError(
+            f"the PLY file has {decoded(wrong)[:40]!r} where a number must be; export it again"
+        ) from None
+
+
+def _is_number(word: bytes) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
 def _as_doubles(element: _Element) -> _Element:
     doubles = [_Property(each.name, "f8", each.length and "f8") for each in element.properties]
     return _Element(element.name, element.count, doubles)
@@ -141,7 +159,7 @@ def _table(data: bytes, start: int, element: _Element, order: str) -> tuple[Tabl
     if element.count * element.smallest > len(data) - start:
         raise MeshError(
             f"declares {element.count} rows of {element.name!r}, which the rest of the file cannot "
-            "hold"
+            "hold; it is truncated or damaged, copy or export it again"
         )
     first, _ = _row(data, start, element, order)
     parts: list[Any] = []  # of a row, if all are as long as the first
@@ -178,10 +196,21 @@ def _row(data: bytes, start: int, element: _Element, order: str) -> tuple[list[A
     for each in element.properties:
         n = 1
         if each.length:
-            length = np.frombuffer(data, order + each.length, 1, start)
+            length = _numbers(data, start, element, (order + each.length, 1))
             n, start = int(length[0]), start + length.itemsize
-        if not 0 <= n <= len(data) - start:
-            raise MeshError(f"a list of {element.name!r} has the length {n}")
-        row.append(np.frombuffer(data, order + each.kind, n, start))
+        if n < 0:
+            raise MeshError(f"a list of {element.name!r} has the length {n}; export the file again")
+        row.append(_numbers(data, start, element, (order + each.kind, n)))
         start += row[-1].nbytes
     return row, start
+
+
+def _numbers(data: bytes, start: int, element: _Element, what: tuple[str, int]) -> Any:
+    """Return so many numbers of a type: *what* is both."""
+    kind, n = what
+    if n * np.dtype(kind).itemsize > len(data) - start:
+        raise MeshError(
+            f"ends in the middle of a row of {element.name!r}; the file is truncated or damaged, "
+            "copy or export it again"
+        )
+    return np.frombuffer(data, kind, n, start)

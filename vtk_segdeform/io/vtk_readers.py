@@ -37,7 +37,10 @@ def read_with_vtk(path: Path) -> pv.PolyData:
     suffix = path.suffix.lower()
     with path.open("rb") as file:
         if not _BEGINS[suffix].match(file.read(1000)):
-            raise MeshError(f"is no readable {suffix} file")
+            raise MeshError(
+                f"does not begin as a {suffix} file does; it is damaged, or of another format: "
+                "give it the suffix of its format"
+            )
     if suffix in _XML:
         _require_room_for_counts(path)
     try:

@@ -27,12 +27,13 @@ import pyvista as pv
 
 from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
-from .array_names import decoded, get_names, plain_names, set_names, warn_left_out, warn_renamed
+from .array_names import get_names, plain_names, set_names, text_of, warn_left_out, warn_renamed
 from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of, rows
 
 _POINT_TEXTURE, _CORNER_TEXTURE = "TextureCoordinates", "TextureCorners"
 _NAMED = {"o": "Object", "g": "Group", "usemtl": "Material"}
 _SMOOTHING, _LIBRARY = "Smoothing", "MaterialLibrary"
+_MOST = 2**62  # an index
 _Runs: TypeAlias = dict[
     str, list[tuple[int, str]]
 ]  # by statement: the first face it applies to, and its value
@@ -47,7 +48,7 @@ def read_obj(path: Path) -> pv.PolyData:
     texture_of: list[int] = []
     runs: _Runs = {word: [] for word in (*_NAMED, "s")}
     libraries = []
-    text = decoded(path.read_bytes()).replace("\r\n", "\n").replace("\r", "\n")
+    text = text_of(path.read_bytes()).replace("\r\n", "\n").replace("\r", "\n")
     for line in text.replace("\\\n", " ").split("\n"):
         word, rest = (*line.split(None, 1), "", "")[:2]
         if word == "v":
@@ -66,14 +67,21 @@ def read_obj(path: Path) -> pv.PolyData:
             runs[word].append((len(counts), rest.strip()))
         elif word == "mtllib":
             libraries.append(rest.strip())
-    table = _table(points, (3, 4, 6, 7))
+    if max(corners, default=0) >= len(points):
+        raise MeshError(
+            f"a face refers to vertex {max(corners) + 1} of {len(points)}; the file is truncated "
+            "or damaged, export it again"
+        )
+    table = _table("vertex", points, (3, 4, 6, 7))
     surface = polydata_of(
         table[:, :3], np.array(counts, dtype=np.int64), np.array(corners, dtype=np.int64)
     )
     if table.shape[1] >= 6:
         colour = np.nan_to_num(table[:, 3:6]).clip(0.0, 1.0)
         surface.point_data["RGB"] = np.round(255.0 * colour).astype(np.uint8)
-    _keep_texture(surface, _table(textures, (2,)), np.array(texture_of, dtype=np.int64))
+    _keep_texture(
+        surface, _table("texture coordinate", textures, (2,)), np.array(texture_of, dtype=np.int64)
+    )
     _keep_runs(surface, runs)
     if libraries:
         set_names(surface, _LIBRARY, libraries)
@@ -86,18 +94,35 @@ def _words(rest: str) -> list[str]:
 
 def _number(word: str, count: int) -> int:
     """Return the index from 0 for one that counts from 1, or backwards from the last of *count*."""
-    number = int(word)
+    try:
+        number = int(word)
+    except ValueError:
+        raise MeshError(f"a face refers to {word[:40]!r}; indices are whole numbers") from None
     if number == 0 or number < -count:
-        raise MeshError(f"a face refers to {number}; indices start at 1, or at -1 from the end")
+        raise MeshError(f"a face refers to {word[:40]}; indices start at 1, or at -1 from the end")
+    if number > _MOST:
+        raise MeshError(f"a face refers to {word[:40]}, which is too large; export the file again")
     return number - 1 if number > 0 else count + number
 
 
-def _table(lines: list[list[str]], widths: tuple[int, ...]) -> FloatArray:
+def _table(what: str, lines: list[list[str]], widths: tuple[int, ...]) -> FloatArray:
     if not lines:
         return np.empty((0, 3))
     if len({len(row) for row in lines}) > 1 or len(lines[0]) not in widths:
         lines = [row[: min(widths)] for row in lines]
-    return np.array(lines, dtype=float)
+    try:
+        return np.array(lines, dtype=float)
+    except ValueError:
+        number = next(k for k, row in enumerate(lines, 1) if not _are_numbers(row, min(widths)))
+        row = " ".join(lines[number - 1])[:60]
+        raise MeshError(f"{what} {number} is {row!r}; must be {min(widths)} numbers") from None
+
+
+def _are_numbers(words: list[str], least: int) -> bool:
+    try:
+        return len([float(word) for word in words]) >= least
+    except ValueError:
+        return False
 
 
 def _keep_texture(surface: pv.PolyData, texture: FloatArray, texture_of: IntArray) -> None:

@@ -114,12 +114,30 @@ def _depths(vertices: FloatArray, faces: IntArray, shells: IntArray) -> IntArray
     owned = [np.unique(faces[mine]) for mine in by_shell]
     low = np.array([vertices[ids].min(axis=0) for ids in owned])
     high = np.array([vertices[ids].max(axis=0) for ids in owned])
+    order, starts, stops = _beginning_within(low, high)
     for outer, its_faces in enumerate(by_shell):
-        within = ((low > low[outer]) & (high < high[outer])).all(axis=1)
-        for inner in np.flatnonzero(within):
+        near = order[starts[outer] : stops[outer]]
+        within = ((low[near] > low[outer]) & (high[near] < high[outer])).all(axis=1)
+        for inner in near[within]:
             points = vertices[owned[inner]]
             extremes = np.unique([points.argmin(axis=0), points.argmax(axis=0)])
             corners = np.searchsorted(owned[outer], faces[its_faces])
             w = winding_number(points[extremes], vertices[owned[outer]], corners)
             depth[inner] += bool((np.abs(w) > 0.5).all())
     return depth
+
+
+def _beginning_within(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Return the boxes ``order[starts[k]:stops[k]]`` whose lower end lies within that of box k.
+
+    That is tested along one axis, the one that leaves the fewest pairs: all pairs of 200,000 boxes
+    would take a quarter of an hour.
+    """
+    found = []
+    for axis in range(3):
+        order = np.argsort(low[:, axis])
+        begins = low[order, axis]
+        starts = np.searchsorted(begins, low[:, axis], side="right")
+        stops = np.searchsorted(begins, high[:, axis], side="left")
+        found.append((int(np.maximum(stops - starts, 0).sum()), axis, order, starts, stops))
+    return min(found)[2:]
