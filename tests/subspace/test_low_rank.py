@@ -115,15 +115,15 @@ def test_a_large_mesh_is_mapped_by_its_factors_and_keeps_its_volume(
 
 def test_factoring_reports_its_progress_and_can_be_cancelled(monkeypatch):
     monkeypatch.setattr(sizes, "LOW_RANK", 1000)
-    told = []
+    reports = []
 
     def listen(share, message):
-        told.append((share, message))
+        reports.append((share, message))
 
     SCENE.deformer(progress=listen)
-    shares = [share for share, _ in told]
+    shares = [share for share, _ in reports]
     assert shares == sorted(shares)
-    assert {message for _, message in told} >= {"factoring the subspace"}
+    assert {message for _, message in reports} >= {"factoring the subspace"}
 
     def stop(share, message):
         if message == "factoring the subspace":
