@@ -6,6 +6,7 @@
 #   make lint       ruff, nothing changed      make format     ruff, files rewritten
 #   make test-paraview   the plugin in a real ParaView
 #   make docs       the documentation, docs/build/html/index.html
+#   make drag-film  the moving picture of the README
 #   make types      mypy --strict              make bench      a report of timings
 #   make bench-history   plot the timings of earlier runs of make bench
 #
@@ -24,9 +25,9 @@ ifeq ($(shell uname -s)$(DISPLAY)$(WAYLAND_DISPLAY),Linux)
 export VTK_DEFAULT_OPENGL_WINDOW ?= vtkEGLRenderWindow
 endif
 
-.PHONY: help demo test test-paraview campaign soak docs lint format types bench bench-history clean
+.PHONY: help demo test test-paraview campaign soak docs drag-film lint format types bench bench-history clean
 help:
-	@sed -n '3,10s/^# *//p' Makefile
+	@sed -n '3,11s/^# *//p' Makefile
 
 demo: $(VENV)/installed
 	$(BIN)/segdeform demo -o demo-output
@@ -61,10 +62,13 @@ SECONDS ?= 3600
 soak: $(VENV)/installed-test
 	SEGDEFORM_SOAK=$(SECONDS) $(BIN)/python -m pytest -m campaign -s tests/whole/test_soak.py -k hands
 
-# Pictures, gallery and the table of keys are made anew where the code is newer.
+# Pictures and gallery are drawn again where the code is newer.
 docs: $(VENV)/installed-docs
 	$(BIN)/python -m sphinx -q -W --keep-going -d docs/build/doctrees docs docs/build/html
 	@echo "docs/build/html/index.html"
+
+drag-film: $(VENV)/installed
+	PYTHONPATH=docs $(BIN)/python -m making.drag
 
 lint: $(VENV)/installed-test
 	$(BIN)/ruff check .

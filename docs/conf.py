@@ -1,22 +1,30 @@
-"""The documentation site: `make docs` builds it, any warning ends the build.
+"""The documentation site. `make docs` builds it, and any warning fails the build.
 
-Pages are written; these things are made when the site is built, by what lies in `making/`, so
-that they cannot go stale: the pictures, the gallery of `examples/`, the table of keys.
+The modules in `making/` draw the pictures and write the table of keys during each build, and
+Sphinx-Gallery runs `examples/`, so that none of them goes stale.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE)]
 
-from vtk_segdeform.version import __version__  # noqa: E402 - only now can it be found
+from making.made import older  # noqa: E402 - found by the line above
+
+from vtk_segdeform.version import __version__  # noqa: E402
+
+# Draw without a window, in the examples and in the processes that draw pictures.
+os.environ.update(PYVISTA_OFF_SCREEN="true", MPLBACKEND="Agg")
+if sys.platform == "linux" and not os.environ.get("DISPLAY"):
+    os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
 
 project = "vtk_segdeform"
 author = "the vtk_segdeform authors"
-copyright = author  # noqa: A001 - Sphinx's word
+copyright = author  # noqa: A001 - Sphinx's name
 version = release = __version__
 
 extensions = [
@@ -24,22 +32,43 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx.ext.viewcode",
     "numpydoc",
+    "sphinx_gallery.gen_gallery",
     "making.equations",
     "making.keys",
-    "making.changelog",
+    "myst_parser",  # for CHANGELOG.md
     "making.headers",
     "making.made",
 ]
 exclude_patterns = ["build"]
 
-# Whatever a page refers to must be there.  Names in single backticks, as docstrings have them,
-# lead to what is public, and are set as code where they name inner things (`making.headers`).
+# Every example runs again if the package is newer than its page.
+sphinx_gallery_conf = {
+    "examples_dirs": "../examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": ".*",
+    "ignore_pattern": "qt_application",  # needs a screen; embedding/qt shows it
+    "image_scrapers": ("making.gallery.pictures",),
+    "reset_argv": "making.gallery.arguments",
+    "reset_modules": (),
+    "run_stale_examples": older(HERE / "gallery" / "bend_the_cactus.py.md5", []),
+    "within_subsection_order": "FileNameSortKey",
+    "backreferences_dir": "gallery/backreferences",
+    "doc_module": ("vtk_segdeform",),
+    "capture_repr": (),
+    "abort_on_example_error": True,
+    "download_all_examples": False,
+    "show_signature": False,
+    "write_computation_times": False,
+}
+
+# Every reference must resolve. Names in single backticks link to their page; private names, which
+# have no page, are set as code (`making.headers`).
 nitpicky = True
 default_role = "py:obj"
 
-# What the pages of the API show, and how.  Qt need not be there to be written about.
-autodoc_mock_imports = ["pyvistaqt", "qtpy", "vtk_segdeform.widgets.panel"]
-autodoc_typehints = "none"  # the docstrings tell types, with shapes
+# The API pages. They are built without Qt.
+autodoc_mock_imports = ["pyvistaqt", "qtpy", "vtk_segdeform.widgets.qt.panel"]
+autodoc_typehints = "none"  # the docstrings give types, with shapes
 autodoc_member_order = "bysource"
 autosummary_generate = False
 numpydoc_show_class_members = False

@@ -1,6 +1,12 @@
-"""A grid of hexahedra inside the cactus rides along while its skin is bent.
+"""
+Carry a grid
+============
 
-Run it with a folder's name to have both grids written there.
+A grid of hexahedra inside the cactus moves with the surface.
+
+    python examples/carry_a_grid.py FOLDER
+
+writes both grids and a picture of them.
 """
 
 import sys
@@ -11,14 +17,14 @@ import pyvista as pv
 from scipy.spatial.transform import Rotation
 
 import vtk_segdeform as sd
-from vtk_segdeform.io.convert import to_polydata
+from vtk_segdeform.io import to_polydata
 
 mesh = sd.models.cactus(3000)
-skin, height = to_polydata(mesh), mesh.vertices[:, 2]
+surface, height = to_polydata(mesh), mesh.vertices[:, 2]
 lattice = pv.ImageData(dimensions=(37, 13, 43), spacing=(0.025, 0.025, 0.025))
-lattice.origin = np.array(skin.center) - lattice.center
+lattice.origin = np.array(surface.center) - lattice.center
 grid = lattice.cast_to_structured_grid().cast_to_unstructured_grid()
-is_inside = grid.select_interior_points(skin)["selected_points"].astype(bool)
+is_inside = grid.select_interior_points(surface)["selected_points"].astype(bool)
 grid = grid.extract_cells(is_inside[grid.cells_dict[pv.CellType.HEXAHEDRON]].all(axis=1))
 
 regions = sd.segment(mesh, n_regions=3)
@@ -33,8 +39,19 @@ bent = grid.copy()
 bent.points = deformer.carry(grid.points)
 
 sizes = bent.compute_cell_sizes()["Volume"] / grid.compute_cell_sizes()["Volume"]
-print(f"{grid.n_cells} hexahedra, the most squeezed to {sizes.min():.2f} of itself")
+print(f"{grid.n_cells} hexahedra; smallest volume ratio {sizes.min():.2f}")
 if len(sys.argv) > 1:
-    Path(sys.argv[1]).mkdir(parents=True, exist_ok=True)
-    grid.save(f"{sys.argv[1]}/grid.vtu")
-    bent.save(f"{sys.argv[1]}/bent.vtu")
+    folder = Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    grid.save(folder / "grid.vtu")
+    bent.save(folder / "bent.vtu")
+    plotter = pv.Plotter(off_screen=True, shape=(1, 2), border=False, window_size=(1200, 700))
+    plotter.set_background("white")
+    for panel, shown in enumerate((grid, bent)):
+        plotter.subplot(0, panel)
+        plotter.add_mesh(shown, color="lightsteelblue", show_edges=True)
+    plotter.link_views()
+    plotter.camera_position = [(0.9, -2.9, 1.1), (0.15, 0.0, 0.45), (0.0, 0.0, 1.0)]
+    plotter.camera.zoom(1.5)
+    plotter.screenshot(folder / "grids.png")
+    plotter.close()

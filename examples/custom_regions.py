@@ -1,7 +1,12 @@
-"""Regions of your own: labels to begin with, then painted, merged and split as you like.
+"""
+Custom regions
+==============
 
-Each step can be undone, and whatever is wrong is said in words.  Pictures go to a folder, if one
-is given.
+Regions from labels, then painted, merged and split. Each step can be undone.
+
+    python examples/custom_regions.py FOLDER
+
+writes a picture.
 """
 
 import sys
@@ -14,15 +19,15 @@ import vtk_segdeform as sd
 mesh = sd.models.cactus(2500)
 x, _, height = mesh.vertices.T
 
-# A number for each vertex; neighbours then grow into each other by so many rings of edges.
+# One label per vertex; each region then grows over its neighbours by `overlap` edge rings.
 left, right = (x < -0.15) & (height > 0.3), (x > 0.13) & (height > 0.45)
 labels = np.select([left, right, height > 0.6], [1, 2, 3], default=0)
 session = sd.Session(mesh)
 session.set_regions(sd.Regions.from_labels(mesh, labels, overlap=4))
 
-session.paint_region(0, (height > 0.55) & (height < 0.7) & ~left & ~right)  # more overlap
-session.merge_regions([0, 3])  # the trunk is one after all
-session.split_region(0, height > 0.45, overlap=5)  # no: two, cut lower
+session.paint_region(0, (height > 0.55) & (height < 0.7) & ~left & ~right)  # a wider overlap
+session.merge_regions([0, 3])  # one region for the trunk
+session.split_region(0, height > 0.45, overlap=5)  # split lower down
 session.undo()
 
 session.fit_cages()
@@ -33,10 +38,10 @@ up[:3, 3] = 0.1, 0.0, 0.15
 session.move_handle("right hand", up)
 session.commit()
 
-print(f"{session.regions.n_regions} regions of {session.regions.membership.sum(axis=1)} vertices")
-print(f"volume changed by {session.volume_change:.0e} of itself")
+print(f"vertices in each region: {session.regions.membership.sum(axis=1)}")
+print(f"volume change: {session.volume_change:.0e}")
 if len(sys.argv) > 1:
-    from vtk_segdeform.pictures.pictures import picture_regions_and_cages
+    from vtk_segdeform.pictures import picture_regions_and_cages
 
     Path(sys.argv[1]).mkdir(parents=True, exist_ok=True)
     path = Path(sys.argv[1]) / "custom-regions.png"

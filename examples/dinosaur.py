@@ -1,6 +1,13 @@
-"""The paper's figure 8: a dinosaur lowers its head and lifts its tail, and weighs what it did.
+"""
+Dinosaur
+========
 
-Two handles at once; its legs stand still.  Pictures go to a folder, if one is given.
+Figure 8 of the paper: two handles in one solve. The head goes down and the tail up, the feet are
+fixed, and the volume is preserved.
+
+    python examples/dinosaur.py FOLDER
+
+writes pictures.
 """
 
 import sys
@@ -18,8 +25,8 @@ head = np.flatnonzero((x > 0.6) & (height > 0.8))
 tail = np.flatnonzero(x < -0.95)
 
 
-def turned(vertices, axis, degrees, pivot):
-    """Return the places of some vertices after a turn about a line through a point."""
+def rotated(vertices, axis, degrees, pivot):
+    """Return some vertices, rotated about an axis through *pivot*."""
     turn = Rotation.from_euler(axis, degrees, degrees=True)
     return turn.apply(mesh.vertices[vertices] - pivot) + pivot
 
@@ -33,16 +40,16 @@ session.add_handle(head, "head")
 session.add_handle(tail, "tail")
 solution = session.drag(
     {
-        "head": turned(head, "y", 60, [0.4, 0.0, 0.55]),
-        "tail": turned(tail, "y", 40, [-0.5, 0.0, 0.4]),
+        "head": rotated(head, "y", 60, [0.4, 0.0, 0.55]),
+        "tail": rotated(tail, "y", 40, [-0.5, 0.0, 0.4]),
     }
 )
 session.commit("graze")
 
 print(f"{session.regions.n_regions} regions, {solution.steps} steps: {solution.status}")
-print(f"volume changed by {session.volume_change:.0e} of itself")
+print(f"volume change: {session.volume_change:.0e}")
 if len(sys.argv) > 1:
-    from vtk_segdeform.pictures.pictures import picture_before_after, picture_regions_and_cages
+    from vtk_segdeform.pictures import picture_before_after, picture_regions_and_cages
 
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)

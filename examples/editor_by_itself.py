@@ -1,9 +1,14 @@
-"""The editor from a bare mesh to a bent one, by mouse and keys alone; it draws README pictures.
+"""
+Editor driven by events
+=======================
+
+Mouse and key events take the editor from a bare mesh to a bent one: regions are segmented, cages
+fitted, the foot and the tip selected by rectangles, and the tip is dragged and then rotated by the
+ring of its gizmo.
 
     python examples/editor_by_itself.py FOLDER
 
-Regions are found and cages fitted, the foot and the tip are marked by rectangles, the tip is
-dragged aside and turned by the ring of its gizmo.
+writes pictures.
 """
 
 import sys
@@ -26,7 +31,7 @@ session = editor.session
 
 
 def play(*lines):
-    """Do what *lines* of a recording say."""
+    """Replay *lines* of a recording."""
     replay(plotter, ["vtk_segdeform recording 1", *lines], busy=lambda: editor.is_busy)
 
 
@@ -36,25 +41,25 @@ def keys(*names):
 
 
 def drag(places):
-    """Press at the first of some pixels, release at the last."""
-    seen = [f"{x:.0f} {y:.0f}" for x, y in places]
+    """Press at the first pixel, release at the last."""
+    pixels = [f"{x:.0f} {y:.0f}" for x, y in places]
     play(
-        f"0.0 MouseMove {seen[0]}",
-        f"0.0 LeftButtonPress {seen[0]}",
-        *(f"0.0 MouseMove {place}" for place in seen[1:]),
-        f"0.0 LeftButtonRelease {seen[-1]}",
-        "0.0 Timer 80",  # and what is left to refine
+        f"0.0 MouseMove {pixels[0]}",
+        f"0.0 LeftButtonPress {pixels[0]}",
+        *(f"0.0 MouseMove {place}" for place in pixels[1:]),
+        f"0.0 LeftButtonRelease {pixels[-1]}",
+        "0.0 Timer 80",  # time to converge
     )
 
 
 def around(vertices):
-    """Return two corners of a rectangle around some vertices."""
-    seen = editor.view.to_display(session.vertices[vertices])[:, :2]
-    return seen.min(axis=0) - 3.0, seen.max(axis=0) + 3.0
+    """Return two corners of a rectangle around some vertices, in pixels."""
+    pixels = editor.view.to_display(session.vertices[vertices])[:, :2]
+    return pixels.min(axis=0) - 3.0, pixels.max(axis=0) + 3.0
 
 
 def picture(name):
-    """Keep what is seen, if a folder was named."""
+    """Save a screenshot, if a folder is given."""
     if len(sys.argv) > 1:
         Path(sys.argv[1]).mkdir(parents=True, exist_ok=True)
         plotter.screenshot(f"{sys.argv[1]}/{name}.png")
@@ -63,13 +68,13 @@ def picture(name):
 height = mesh.vertices[:, 2]
 keys("g", "f", "2")
 picture("editor-cages")
-keys("3", "t", "v", "s")  # a rectangle, through the body, for what stays
+keys("3", "t", "v", "s")  # fixed vertices: a rectangle, through the body
 drag(around(height < 0.08))
-keys("d")  # and for what is dragged
+keys("d")  # handle: likewise
 drag(around(height > 0.92))
 keys("4", "o")
 
-gizmo = editor.stage.dragger.gizmo
+gizmo = editor.widgets.dragger.gizmo
 (centre,) = editor.view.to_display(gizmo.centre[None])[:, :2]
 drag(centre + t * np.array([170.0, -75.0]) for t in np.linspace(0.0, 1.0, 20))
 (centre,) = editor.view.to_display(gizmo.centre[None])[:, :2]
@@ -80,5 +85,5 @@ keys("h")
 picture("editor-help")
 
 moved = np.linalg.norm(session.vertices - mesh.vertices, axis=1).max()
-print(f"moved by {moved:.2f}, volume changed by {session.volume_change:.0e} of itself")
+print(f"largest displacement: {moved:.2f}, volume change: {session.volume_change:.0e}")
 plotter.close()

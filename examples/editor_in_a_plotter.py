@@ -1,7 +1,12 @@
-"""The editor in a plotter of yours, beside whatever else is in it.
+"""
+Editor in a plotter
+===================
 
-A recording works in it here instead of a person: keys and a drag, written down as `Recorder`
-does.  Run it with the word "show" to work in it yourself.
+The editor in a PyVista plotter, beside other meshes. A recording of keys and a drag drives it here.
+
+    python examples/editor_in_a_plotter.py show
+
+opens the window for you instead.
 """
 
 import sys
@@ -11,15 +16,15 @@ import numpy as np
 import pyvista as pv
 
 import vtk_segdeform as sd
-from vtk_segdeform.io.convert import to_polydata
-from vtk_segdeform.widgets.recording.recording import replay
+from vtk_segdeform.io import to_polydata
+from vtk_segdeform.widgets import replay
 
 show = sys.argv[1:] == ["show"]
 mesh = to_polydata(sd.models.cactus(1500))
 height = mesh.points[:, 2]
 
 plotter = pv.Plotter(off_screen=not show, window_size=(800, 600))
-plotter.add_mesh(mesh)  # the editor draws it from now on
+plotter.add_mesh(mesh)  # the editor hides this actor and draws the mesh itself
 plotter.add_mesh(pv.Plane(i_size=1.2, j_size=1.2), color="wheat")
 editor = plotter.segdeform.edit(mesh)
 session = editor.session
@@ -34,9 +39,9 @@ if not show:
     path = [f"MouseMove {x + dx:.0f} {y - dx / 3:.0f}" for dx in np.linspace(0.0, 100.0, 11)]
     recording = [
         "vtk_segdeform recording 1",
-        "0.0 KeyPress 400 300 key=g",  # find regions
+        "0.0 KeyPress 400 300 key=g",  # segment
         "1.0 KeyPress 400 300 key=f",  # fit cages
-        "2.0 KeyPress 400 300 key=4",  # drag handles
+        "2.0 KeyPress 400 300 key=4",  # deform
         f"3.0 {path[0]}",
         f"3.1 {path[0].replace('MouseMove', 'LeftButtonPress')}",
         *(f"3.{k + 10} {place}" for k, place in enumerate(path[1:])),
@@ -48,5 +53,5 @@ if not show:
         plotter.screenshot(f"{sys.argv[1]}/editor.png")
 
 moved = np.linalg.norm(session.vertices - session.mesh.vertices, axis=1).max()
-print(f"moved by {moved:.2f}, volume changed by {session.volume_change:.0e} of itself")
+print(f"largest displacement: {moved:.2f}, volume change: {session.volume_change:.0e}")
 plotter.close()

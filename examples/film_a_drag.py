@@ -1,6 +1,12 @@
-"""A drag as a film: the cactus bends over and back, one picture for each target.
+"""
+Film of a drag
+==============
 
-The GIF goes to a folder, if one is given.
+The cactus bends over and back, one frame for each target.
+
+    python examples/film_a_drag.py FOLDER
+
+keeps the GIF.
 """
 
 import sys
@@ -11,7 +17,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import vtk_segdeform as sd
-from vtk_segdeform.widgets.recording.film import film
+from vtk_segdeform.widgets import film
 
 mesh = sd.models.cactus(2000)
 height = mesh.vertices[:, 2]
@@ -22,7 +28,7 @@ session.set_fixed(height < 0.08)
 session.add_handle(height > 0.92, "tip")
 
 pivot = [0.0, 0.0, 0.4]
-angles = 60.0 * np.sin(np.linspace(0.0, np.pi, 16))  # degrees, to and fro
+angles = 60.0 * np.sin(np.linspace(0.0, np.pi, 16))  # degrees
 tip = mesh.vertices[session.handles["tip"]] - pivot
 targets = [Rotation.from_euler("y", a, degrees=True).apply(tip) + pivot for a in angles]
 
@@ -32,5 +38,5 @@ with tempfile.TemporaryDirectory() as here:
     path = Path(sys.argv[1] if len(sys.argv) > 1 else here) / "bend.gif"
     path.parent.mkdir(parents=True, exist_ok=True)
     film(path, session, targets, fps=12, size=(480, 480))
-    print(f"{len(targets)} pictures, {path.stat().st_size // 1024} kB")
-print(f"volume never changed by more than {max(map(abs, changes)):.0e} of itself")
+    print(f"{len(targets)} frames, {path.stat().st_size // 1024} kB")
+print(f"largest volume change: {max(map(abs, changes)):.0e}")

@@ -1,7 +1,14 @@
-"""The paper's figure 9: a single cage bends what it should leave alone, several cages do not.
+"""
+One cage or several
+===================
 
-An arm of the cactus is laid down.  To one cage it is near the trunk and the other arm; cages of
-their own know better, at the same number of cage vertices.  Pictures go to a folder, if given.
+Figure 9 of the paper: one arm of the cactus is bent down. With a single cage the trunk and the
+other arm move as well, because they are close to it in space. With a cage for each region, and the
+same total number of cage vertices, they hardly move.
+
+    python examples/one_cage_or_several.py FOLDER
+
+writes pictures.
 """
 
 import sys
@@ -11,7 +18,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import vtk_segdeform as sd
-from vtk_segdeform.geometry.distortion import distortion
+from vtk_segdeform.geometry import distortion
 
 mesh = sd.models.cactus(2500)
 x, _, height = mesh.vertices.T
@@ -30,10 +37,10 @@ for n_regions in (1, 5):
     other_arm = np.linalg.norm(solution.vertices - mesh.vertices, axis=1)[x < -0.15].max()
     print(
         f"{n_regions} cage(s): distortion {distortions[-1]:.3f}, {solution.steps} steps, "
-        f"the other arm moved by {other_arm:.2f} of the height"
+        f"other arm moved by {other_arm:.2f}"
     )
     if len(sys.argv) > 1:
-        from vtk_segdeform.pictures.pictures import picture_before_after, picture_regions_and_cages
+        from vtk_segdeform.pictures import picture_before_after, picture_regions_and_cages
 
         Path(sys.argv[1]).mkdir(parents=True, exist_ok=True)
         stem = f"{Path(sys.argv[1])}/{n_regions}-cages"

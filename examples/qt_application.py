@@ -1,7 +1,6 @@
-"""A Qt application of one's own with the editor in it: a window, a menu, a label for the volume.
+"""A Qt application with the editor in its window, a menu and a label for the volume change.
 
-python examples/qt_application.py [MESH]          on a screen
-python examples/qt_application.py --picture FILE  draws its window once, and ends
+``python examples/qt_application.py --picture FILE`` saves a picture of the window and exits.
 """
 
 import sys
@@ -9,11 +8,11 @@ import sys
 from qtpy import QtCore, QtWidgets
 
 import vtk_segdeform as sd
-from vtk_segdeform.widgets.qt.widget import DeformWidget
+from vtk_segdeform.widgets.qt import DeformWidget
 
 
 class Window(QtWidgets.QMainWindow):
-    """The application's window; the editor is what it has in the middle."""
+    """The main window, with the editor as its central widget."""
 
     def __init__(self, mesh):
         super().__init__()
@@ -26,11 +25,11 @@ class Window(QtWidgets.QMainWindow):
         self.editor.error.connect(lambda words: self.statusBar().showMessage(words, 5000))
 
     def show_volume(self):
-        """Tell by how much the volume has changed."""
-        self.volume.setText(f"volume {self.editor.session.volume_change:+.1e}")
+        """Show the volume change in the status bar."""
+        self.volume.setText(f"Volume change {self.editor.session.volume_change:+.1e}")
 
-    def closeEvent(self, event):  # noqa: N802 - Qt's word
-        """Free what is drawn, while the window is still there."""
+    def closeEvent(self, event):  # noqa: N802 - Qt's name
+        """Release VTK's resources before the window is destroyed."""
         self.editor.close()
         super().closeEvent(event)
 

@@ -1,1 +1,1 @@
-"""What the site is made of besides its pages: extensions of Sphinx, and what draws its pictures."""
+"""Sphinx extensions of the documentation site, and the modules that draw its pictures."""

@@ -1,12 +1,12 @@
-r"""Formulas as MathML, which browsers set themselves; displayed ones with the paper's numbers.
+r"""Formulas as MathML, which browsers render themselves, with the paper's equation numbers.
 
     .. equation:: 13
 
        h = -H^{-1} (d + G^T \lambda)
 
-is shown with "(13)" beside it; an empty line begins another formula of the same number.
-``:ref:`eq-13``` leads there from any page.  Without a number, none is shown.  Nothing is loaded
-from elsewhere and no script runs.
+is displayed with "(13)" beside it. An empty line starts another formula of the same number, and the
+argument may be omitted.  ``:ref:`eq-13``` links to it from any page.  The pages need no script and
+no network.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from sphinx.util.docutils import SphinxDirective
 
 
 class Equation(SphinxDirective):
-    """A displayed formula; its number, if any, is the argument."""
+    """A displayed formula. The optional argument is its number."""
 
     has_content = True
     optional_arguments = 1
     final_argument_whitespace = True
 
     def run(self) -> list[nodes.Node]:
-        """Return the formula, in a frame with its number."""
+        """Return a container with the formula and its number."""
         formulas = "\n".join(self.content).split("\n\n")
         blocks = [nodes.math_block(f, f, number=None, label=None) for f in formulas]
         frame = nodes.container("", nodes.container("", *blocks), classes=["equation"])
@@ -43,27 +43,29 @@ class Equation(SphinxDirective):
 
 
 def as_mathml(latex: str, display: str) -> str:
-    """Return a formula as MathML; whoever reads its source finds the LaTeX beside it."""
+    """Return a formula as MathML, with the LaTeX source as its alternative text."""
     made = convert(latex, display=display)
     if "\\" in made:
-        raise ExtensionError(f"the formula {latex} has a command that is not understood")
+        raise ExtensionError(
+            f"the formula {latex} has a command that latex2mathml does not support"
+        )
     return made.replace("<math ", f'<math alttext="{html.escape(latex)}" ', 1)
 
 
 def visit_inline(writer: Any, node: nodes.math) -> None:
-    """Write a formula in the line."""
+    """Write an inline formula."""
     writer.body.append(as_mathml(node.astext(), "inline"))
     raise nodes.SkipNode
 
 
 def visit_block(writer: Any, node: nodes.math_block) -> None:
-    """Write a formula on a line of its own."""
+    """Write a displayed formula."""
     writer.body.append(as_mathml(node.astext(), "block"))
     raise nodes.SkipNode
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Tell Sphinx."""
+    """Register the extension."""
     app.add_directive("equation", Equation)
     app.add_html_math_renderer("mathml", (visit_inline, None), (visit_block, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

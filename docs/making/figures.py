@@ -1,8 +1,8 @@
-"""The pictures of the pages, each drawn from the mesh that the page speaks of.
+"""The pictures of the pages.
 
-``python -m making.figures NAME ...`` draws some.  Pictures that are compared are files of their
-own, NAME-1.png, NAME-2.png ..., seen by one camera at one scale: the page sets captions below
-them, and on a narrow screen sets them below each other.
+``python -m making.figures NAME ...`` draws some of them.  Pictures to be compared are separate
+files, NAME-1.png, NAME-2.png ..., with one camera and one scale, so that each has a caption and a
+narrow screen shows them below each other.
 """
 
 from __future__ import annotations
@@ -20,31 +20,36 @@ from making.made import FIGURES as FOLDER
 from making.plots import convergence, volume_along_a_step
 from making.scene import (
     Drawing,
-    add_balls,
+    add_spheres,
     add_wires,
     bar,
     body,
-    bound,
     cactus,
+    deformer_of,
     region_colours,
-    turned,
+    rotated,
     write,
 )
-from vtk_segdeform.filters.deform_filter import SegmentedCageDeformFilter
-from vtk_segdeform.io.convert import to_polydata
-from vtk_segdeform.io.polygons import polydata_of
-from vtk_segdeform.pictures.canvas import add_surface
-from vtk_segdeform.pictures.palette import BODY, FIXED, HANDLE, of_region, rgb
-from vtk_segdeform.pictures.pictures import picture_volume_change
+from vtk_segdeform.filters import SegmentedCageDeformFilter
+from vtk_segdeform.io import polydata_of, to_polydata
+from vtk_segdeform.pictures import (
+    BODY,
+    FIXED,
+    HANDLE,
+    add_surface,
+    of_region,
+    picture_volume_change,
+    rgb,
+)
 
 RISING = LinearSegmentedColormap.from_list("rising", ["#DFE7EE", "#E69F00", "#A63A00"])
 
 
 def front() -> None:
-    """Draw the cactus with its regions, with its cages, and bent by them."""
+    """Draw the cactus with its regions, with its cages, and bent."""
     parts = cactus()
     mesh, cages = parts["mesh"], parts["cages"]
-    solution = bound(parts).solve(turned(mesh, parts["handle"], 60))
+    solution = deformer_of(parts).solve(rotated(mesh, parts["handle"], 60))
     colours = region_colours(mesh, parts["regions"].weights)
 
     def caged(vertices: Any, cage_vertices: Sequence[Any]) -> Drawing:
@@ -65,7 +70,7 @@ def front() -> None:
 
 
 def regions() -> None:
-    """Draw labels, regions that overlap, and weights that fade."""
+    """Draw labels, overlapping regions and blend weights."""
     mesh, labels = cactus()["mesh"], cactus()["regions"].labels
     grown = sd.Regions.from_labels(mesh, labels, overlap=8)
     apart = labels == np.arange(3)[:, None]
@@ -75,7 +80,7 @@ def regions() -> None:
 
 
 def cages() -> None:
-    """Draw all cages, and one of them with what it moves."""
+    """Draw all cages, and one of them with the vertices it moves."""
     parts = cactus()
     mesh, fitted, weights, arm = parts["mesh"], parts["cages"], parts["regions"].weights, 1
     pale = 0.35 * region_colours(mesh, weights) + 0.65 * 255
@@ -94,7 +99,7 @@ def cages() -> None:
 
 
 def influence() -> None:
-    """Draw how much one cage vertex has to say, and what happens when it is pulled."""
+    """Draw the weights of one cage vertex, and the deformation when it moves."""
     mesh = sd.models.bar(size=(0.25, 0.25, 1.0), divisions=(12, 12, 48))
     box = sd.models.bar(size=(0.4, 0.4, 1.15), divisions=(1, 1, 3))
     cage = box.vertices - [0.0, 0.0, 0.075]
@@ -103,24 +108,24 @@ def influence() -> None:
     pulled = cage.copy()
     pulled[corner] += [0.3, 0.0, 0.08]
 
-    def weighed(p: Any) -> Drawing:
+    def coloured(p: Any) -> Drawing:
         def draw(plotter: pv.Plotter) -> None:
             surface = polydata_of(weights @ p, np.full(mesh.n_faces, 3), mesh.faces.ravel())
             surface.point_data["weight"] = weights[:, corner]
             add_surface(plotter, surface, scalars="weight", cmap=RISING)
             add_wires(plotter, 5, box.faces, p)
-            add_balls(plotter, p[[corner]], HANDLE, 30.0)
+            add_spheres(plotter, p[[corner]], HANDLE, 30.0)
 
         return draw
 
-    write("influence", [weighed(cage), weighed(pulled)], np.concatenate([cage, pulled]))
+    write("influence", [coloured(cage), coloured(pulled)], np.concatenate([cage, pulled]))
 
 
 def handles() -> None:
-    """Draw what stays, what is dragged, and what becomes of the rest."""
+    """Draw fixed vertices and a handle, at rest and bent."""
     parts = cactus()
     mesh = parts["mesh"]
-    bent = bound(parts).solve(turned(mesh, parts["handle"], 60)).vertices
+    bent = deformer_of(parts).solve(rotated(mesh, parts["handle"], 60)).vertices
     colours = np.tile(rgb(BODY), (mesh.n_faces, 1)).astype(float)
     for name, colour in (("fixed", FIXED), ("handle", HANDLE)):
         colours[np.isin(mesh.faces, parts[name]).all(axis=1)] = rgb(colour)
@@ -129,18 +134,18 @@ def handles() -> None:
 
 
 def exact_volume() -> None:
-    """Draw the paper's figure 7: the same bend with the volume free, and with it held."""
-    parts, free, held = bar()
-    poses = [free.vertices, held.vertices]
+    """Draw figure 7 of the paper: the same bend without and with volume preservation."""
+    parts, free, exact = bar()
+    poses = [free.vertices, exact.vertices]
     write("exact_volume", [body(parts["mesh"], x) for x in poses], np.concatenate(poses))
 
 
 def several() -> None:
-    """Draw the paper's figure 9: one cage bends what it should leave alone, several do not."""
+    """Draw figure 9 of the paper: one cage bends the trunk as well, several do not."""
     mesh = sd.models.cactus(2500)
     x, _, height = mesh.vertices.T
     foot, tip = np.flatnonzero(height < 0.08), np.flatnonzero((x > 0.17) & (height > 0.75))
-    targets = turned(mesh, tip, 90, np.array([0.2, 0.0, 0.56]))
+    targets = rotated(mesh, tip, 90, np.array([0.2, 0.0, 0.56]))
     drawings, seen = [body(mesh)], [mesh.vertices]
     for found in (sd.Regions.single(mesh), sd.segment(mesh, n_regions=5)):
         fitted = sd.fit_cages(mesh, found, n_vertices=155)
@@ -151,15 +156,15 @@ def several() -> None:
 
 
 def local_volume() -> None:
-    """Draw where the body swells and where it is pinched."""
+    """Draw the local volume change."""
     parts = cactus()
     mesh = parts["mesh"]
-    x = bound(parts).solve(turned(mesh, parts["handle"], 60)).vertices
+    x = deformer_of(parts).solve(rotated(mesh, parts["handle"], 60)).vertices
     picture_volume_change(FOLDER / "local_volume.png", mesh, x, sd.local_volume_change(mesh, x))
 
 
 def pipeline() -> None:
-    """Draw what comes out of the filter for three settings of it."""
+    """Draw the output of the filter for three motions."""
     parts = cactus(2500)
     bend = SegmentedCageDeformFilter()
     bend.SetInputDataObject(0, to_polydata(parts["mesh"]))
@@ -188,11 +193,11 @@ FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "volume_along": (volume_along_a_step, 0),
     "convergence": (convergence, 0),
 }
-"""What draws each, and how many files it is that are compared; 0 for a single one, NAME.png."""
+"""The function that draws each, and its number of files; 0 for a single one, NAME.png."""
 
 
 def files(name: str) -> list[str]:
-    """Return the files that a figure is written to."""
+    """Return the file names of a figure."""
     count = FIGURES[name][1]
     return [f"{name}-{k}.png" for k in range(1, count + 1)] if count else [f"{name}.png"]
 

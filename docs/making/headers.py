@@ -1,7 +1,7 @@
-"""Docstrings as they are on the pages of the API.
+"""Docstrings on the API pages.
 
-What is indented in the header of a module, a diagram or a piece of code, is set as it stands.
-`names` in docstrings become links where there is a page for them, and code elsewhere.
+Indented blocks in the docstring of a module, diagrams or code, become code blocks.  `names` in
+docstrings become links if they are documented, and code otherwise.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from sphinx.application import Sphinx
 def mark_blocks(
     app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
 ) -> None:
-    """Mark each indented block of a module's docstring as what it is, in place."""
+    """Turn each indented block of a module's docstring into a code block, in place."""
     del app, name, obj, options
     if what != "module":
         return
@@ -30,7 +30,7 @@ def mark_blocks(
 
 
 def language_of(block: str) -> str:
-    """Return what an indented block is written in."""
+    """Return the language of an indented block."""
     try:
         ast.parse(textwrap.dedent(block))
     except SyntaxError:
@@ -39,13 +39,13 @@ def language_of(block: str) -> str:
 
 
 def set_as_code(app: Sphinx, env: object, node: Any, content: nodes.Node) -> nodes.Node | None:
-    """Return a name that has no page as it is."""
+    """Return a name without a page unchanged."""
     del app, env
     return content if node.get("reftype") == "obj" else None
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Tell Sphinx."""
+    """Register the extension."""
     app.connect("autodoc-process-docstring", mark_blocks, priority=400)  # before numpydoc
     app.connect("missing-reference", set_as_code)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

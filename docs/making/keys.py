@@ -1,7 +1,4 @@
-"""The editor's keys, from the table by which it works.
-
-``.. keys::`` is replaced by a section for each mode, as on the editor's own card.
-"""
+"""The directive ``.. keys::``: a section for each mode of the editor, from its table of keys."""
 
 from __future__ import annotations
 
@@ -18,7 +15,7 @@ class Keys(SphinxDirective):
     """A table of keys for each mode."""
 
     def run(self) -> list[nodes.Node]:
-        """Return the tables under their headings."""
+        """Return the sections."""
         self.env.note_dependency("../widgets/editor/bindings.py")
         found = []
         for heading, rows in help_sections():
@@ -29,7 +26,7 @@ class Keys(SphinxDirective):
 
 
 def table(rows: list[Row]) -> nodes.table:
-    """Return rows of keys and what they do."""
+    """Return a table of keys and labels."""
     body = nodes.tbody()
     for keys, label in rows:
         caps = nodes.paragraph()
@@ -42,6 +39,6 @@ def table(rows: list[Row]) -> nodes.table:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Tell Sphinx."""
+    """Register the extension."""
     app.add_directive("keys", Keys)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

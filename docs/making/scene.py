@@ -1,4 +1,4 @@
-"""What several pictures show: the cactus, the bar, how they are held, and how they are drawn."""
+"""Models, deformers and drawing functions that several pictures share."""
 
 from __future__ import annotations
 
@@ -12,10 +12,8 @@ from scipy.spatial.transform import Rotation
 
 import vtk_segdeform as sd
 from making.made import FIGURES
-from vtk_segdeform.io.polygons import polydata_of
-from vtk_segdeform.pictures.canvas import view_of, write_panels
-from vtk_segdeform.pictures.palette import of_region
-from vtk_segdeform.pictures.pictures import draw_mesh
+from vtk_segdeform.io import polydata_of
+from vtk_segdeform.pictures import draw_mesh, of_region, view_of, write_panels
 
 Drawing = Callable[[pv.Plotter], None]
 PIVOT = np.array([0.0, 0.0, 0.4])
@@ -23,7 +21,7 @@ PIVOT = np.array([0.0, 0.0, 0.4])
 
 @cache
 def cactus(n_vertices: int = 5430) -> dict[str, Any]:
-    """Return the cactus with its regions, its cages and what is held."""
+    """Return the cactus with its regions, cages, fixed vertices and handle."""
     mesh = sd.models.cactus(n_vertices)
     height = mesh.vertices[:, 2]
     return parts_of(mesh, np.flatnonzero(height < 0.08), np.flatnonzero(height > 0.92))
@@ -38,35 +36,35 @@ def parts_of(mesh: sd.Mesh, fixed: Any, handle: Any) -> dict[str, Any]:
 
 @cache
 def bar() -> tuple[dict[str, Any], sd.Solution, sd.Solution]:
-    """Return a bar, bent by 120 degrees with its volume free, and with it held."""
+    """Return a bar, and its poses bent by 120 degrees without and with volume preservation."""
     mesh = sd.models.bar(size=(0.2, 0.2, 1.0), divisions=(8, 8, 40))
     height = mesh.vertices[:, 2]
     parts = parts_of(mesh, np.flatnonzero(height < 0.05), np.flatnonzero(height > 0.95))
-    targets = turned(mesh, parts["handle"], 120)
-    free = bound(parts, preserve_volume=False).solve(targets)
-    return parts, free, bound(parts).solve(targets)
+    targets = rotated(mesh, parts["handle"], 120)
+    free = deformer_of(parts, preserve_volume=False).solve(targets)
+    return parts, free, deformer_of(parts).solve(targets)
 
 
-def bound(parts: dict[str, Any], **options: Any) -> sd.Deformer:
+def deformer_of(parts: dict[str, Any], **options: Any) -> sd.Deformer:
     """Return a deformer of these parts."""
-    held = {name: parts[name] for name in ("fixed", "handle")}
-    return sd.Deformer(parts["mesh"], parts["regions"], parts["cages"], **held, **options)
+    ends = {name: parts[name] for name in ("fixed", "handle")}
+    return sd.Deformer(parts["mesh"], parts["regions"], parts["cages"], **ends, **options)
 
 
-def turned(mesh: sd.Mesh, handle: Any, degrees: float, pivot: Any = PIVOT) -> Any:
-    """Return where *handle* is after a turn about y."""
+def rotated(mesh: sd.Mesh, handle: Any, degrees: float, pivot: Any = PIVOT) -> Any:
+    """Return the vertices of *handle*, rotated about y."""
     turn = Rotation.from_euler("y", degrees, degrees=True)
     return turn.apply(mesh.vertices[handle] - pivot) + pivot
 
 
 def region_colours(mesh: sd.Mesh, shares: Any) -> Any:
-    """Return (m, 3): the colours of the regions, mixed by *shares* (r, n) at the vertices."""
+    """Return (m, 3) face colours: those of the regions, mixed by *shares* (r, n)."""
     palette = np.array([of_region(r) for r in range(len(shares))], dtype=float)
     return (np.asarray(shares).T @ palette)[mesh.faces].mean(axis=1)
 
 
 def body(mesh: sd.Mesh, vertices: Any = None, colours: Any = None) -> Drawing:
-    """Return what draws a mesh, deformed and coloured if so wanted."""
+    """Return a function that draws a mesh, optionally deformed and coloured."""
 
     def draw(plotter: pv.Plotter) -> None:
         draw_mesh(plotter, mesh, vertices=vertices, colours=colours)
@@ -75,21 +73,21 @@ def body(mesh: sd.Mesh, vertices: Any = None, colours: Any = None) -> Drawing:
 
 
 def add_wires(plotter: pv.Plotter, region: int, faces: Any, vertices: Any) -> None:
-    """Add a cage as lines and balls in the colour of its region."""
+    """Add a cage as lines and spheres in the colour of its region."""
     surface = polydata_of(vertices, np.full(len(faces), 3), faces.ravel())
     colour = tuple(0.8 * of_region(region) / 255)
     plotter.add_mesh(surface.extract_all_edges(), color=colour, line_width=4.0, lighting=False)
-    add_balls(plotter, vertices, colour, 14.0)
+    add_spheres(plotter, vertices, colour, 14.0)
 
 
-def add_balls(plotter: pv.Plotter, points: Any, colour: Any, size: float) -> None:
-    """Add balls of so many pixels."""
+def add_spheres(plotter: pv.Plotter, points: Any, colour: Any, size: float) -> None:
+    """Add spheres of *size* pixels."""
     points = np.asarray(points)
     plotter.add_points(points, color=colour, point_size=size, render_points_as_spheres=True)
 
 
-def write(name: str, drawings: Sequence[Drawing], seen: Any) -> None:
-    """Write NAME-1.png and so on: *drawings*, all with room for the points *seen*."""
+def write(name: str, drawings: Sequence[Drawing], points: Any) -> None:
+    """Write *drawings* to NAME-1.png and so on, with one camera that sees all *points*."""
     for number, draw in enumerate(drawings, start=1):
         path = FIGURES / f"{name}-{number}.png"
-        write_panels(path, [("", draw)], seen, view_of(seen, seen))
+        write_panels(path, [("", draw)], points, view_of(points, points))

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from scenes import sausage
 from solids import CUBE, icosphere, rotation, torus
 
+from vtk_segdeform import sizes
 from vtk_segdeform.geometry import local_volume
 from vtk_segdeform.geometry.local_volume import LocalVolume, local_volume_change
 from vtk_segdeform.mesh.mesh import Mesh
@@ -19,8 +20,8 @@ MESHES = {"sphere": icosphere(3), "torus": torus(), "cube": CUBE}
 def either(request, monkeypatch):
     """Compute on all vertices, as for small meshes, and on cells, as for large ones."""
     if request.param:
-        monkeypatch.setattr(local_volume, "_LARGE", 100)
-        monkeypatch.setattr(local_volume, "_CELLS", 400)
+        monkeypatch.setattr(sizes, "LOCAL_VOLUME_CELLS", 100)
+        monkeypatch.setattr(sizes, "LOCAL_VOLUME_POINTS", 400)
         monkeypatch.setattr(local_volume, "_AT_ONCE", 300)
 
 
@@ -66,8 +67,8 @@ def test_cells_agree_with_vertices_and_interpolate_smoothly(monkeypatch):
     girth = 1.0 - 0.3 * np.exp(-(x[:, :1] ** 2) / 0.5)
     pose = x * np.hstack([np.ones_like(girth), girth, girth])
     whole = local_volume_change(mesh, pose)
-    monkeypatch.setattr(local_volume, "_LARGE", 100)
-    monkeypatch.setattr(local_volume, "_CELLS", 500)
+    monkeypatch.setattr(sizes, "LOCAL_VOLUME_CELLS", 100)
+    monkeypatch.setattr(sizes, "LOCAL_VOLUME_POINTS", 500)
     local = LocalVolume(mesh)
     cells = local.change(pose)
     assert_allclose(cells, whole, atol=0.12)  # of 0.44: the smoothing differs slightly
@@ -79,8 +80,8 @@ def test_cells_agree_with_vertices_and_interpolate_smoothly(monkeypatch):
 
 
 def test_cells_on_one_side_of_a_thin_plate_do_not_affect_the_other(monkeypatch):
-    monkeypatch.setattr(local_volume, "_LARGE", 100)
-    monkeypatch.setattr(local_volume, "_CELLS", 1500)
+    monkeypatch.setattr(sizes, "LOCAL_VOLUME_CELLS", 100)
+    monkeypatch.setattr(sizes, "LOCAL_VOLUME_POINTS", 1500)
     ball, faces = icosphere(5)
     local = LocalVolume(Mesh(ball * [1.0, 1.0, 0.02], faces))
     (matrix,) = local._interpolation
@@ -101,8 +102,8 @@ def test_tiny_components_are_handled_and_do_not_affect_a_body_beside_them(monkey
     if with_a_body:
         ball, more = icosphere(4)
         x, faces = np.vstack([x, 9.0 * ball - 50.0]), np.vstack([faces, len(x) + more])
-    monkeypatch.setattr(local_volume, "_LARGE", 100)
-    monkeypatch.setattr(local_volume, "_CELLS", 200)
+    monkeypatch.setattr(sizes, "LOCAL_VOLUME_CELLS", 100)
+    monkeypatch.setattr(sizes, "LOCAL_VOLUME_POINTS", 200)
     change = local_volume_change(Mesh(x, faces), x * [1.0, 1.0, 1.1])
     assert np.isfinite(change).all()
     assert_allclose(change[4 * len(places) :] if with_a_body else change, 0.1, atol=1e-9)

@@ -1,4 +1,4 @@
-"""The last operation of a solve: the mesh itself on its own volume, by a step or by its size."""
+"""The last operation of a solve: the mesh is moved or scaled onto its exact volume."""
 
 from __future__ import annotations
 
@@ -8,65 +8,65 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from solids import icosphere, rotation
 
-from vtk_segdeform.deformer import deformer as chapter
+from vtk_segdeform import sizes
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
-from vtk_segdeform.solver import coarse_volume, exact_volume
-from vtk_segdeform.solver.exact_volume import scaled
+from vtk_segdeform.solver import exact_volume
+from vtk_segdeform.solver.exact_volume import scale_to_volume
 from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.solver.volume_constraints import total_volume
-from vtk_segdeform.subspace.device import DeviceError, DeviceSurface
+from vtk_segdeform.subspace.gpu import GPUError, GPUSurface
 
 SCENE = sausage()
 TARGETS = SCENE.turned(40)
 
 
 @pytest.fixture
-def wide(monkeypatch):
-    """Small meshes are landed as large ones are."""
-    monkeypatch.setattr(coarse_volume, "_LARGE", 1000)
-    monkeypatch.setattr(coarse_volume, "_POINTS", 700)
-    monkeypatch.setattr(chapter, "_WIDE", 1000)
+def scaled(monkeypatch):
+    """Scale small meshes to their volume, as large ones are."""
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", 1000)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 700)
+    monkeypatch.setattr(sizes, "SCALED_VOLUME", 1000)
 
 
 @pytest.mark.parametrize("missing", [-0.3, -1e-5, 1e-9, 0.4])
-def test_scaling_restores_the_volume_and_leaves_the_centre_where_it_was(missing):
+def test_scaling_restores_the_volume_and_keeps_the_centre(missing):
     points, faces = icosphere(3)
     points = points * [2.0, 1.0, 0.5] + [5.0, -3.0, 1.0]
     constraint = total_volume(Mesh(points, faces))
     x = points + 0.0
     x[:, 2] *= 1.0 + missing
     before, centre = x.copy(), x[7].copy()
-    scale = scaled(constraint, x, centre)
+    scale = scale_to_volume(constraint, x, centre)
     assert signed_volume(x, faces) / constraint.target == pytest.approx(1.0, abs=1e-14)
     assert scale**3 == pytest.approx(1.0 / (1.0 + missing), rel=1e-12)
     assert_allclose(x[7], centre, atol=1e-14)
     assert_allclose(x, centre + scale * (before - centre), atol=1e-13)
 
 
-def test_a_surface_turned_inside_out_is_left_alone():
+def test_a_surface_that_is_inside_out_stays_as_it_is():
     points, faces = icosphere(2)
     constraint = total_volume(Mesh(points, faces))
     mirrored = points * [1.0, 1.0, -1.0]
     x = mirrored.copy()
-    assert scaled(constraint, x, np.zeros(3)) == 1.0
+    assert scale_to_volume(constraint, x, np.zeros(3)) == 1.0
     assert_array_equal(x, mirrored)
 
 
-@pytest.mark.usefixtures("wide")
-def test_a_large_mesh_is_landed_by_its_size_and_its_cages_with_it():
+@pytest.mark.usefixtures("scaled")
+def test_a_large_mesh_is_scaled_and_its_cages_with_it():
     deformer = SCENE.deformer()
     solution = deformer.solve(TARGETS)
     assert solution.status is Status.CONVERGED
     assert abs(solution.volume_change) < 1e-14
     assert_allclose(deformer.surface(solution.cage_vertices), solution.vertices, atol=1e-13)
-    assert deformer._ladder.solver.volumes.constraints[0].target != pytest.approx(
-        deformer._volumes.constraints[0].target, rel=1e-9
-    )  # held is what the stand-in has where the mesh has its own
+    assert deformer._continuation.solver.volumes.constraints[0].target != pytest.approx(
+        deformer._constraints.volumes.constraints[0].target, rel=1e-9
+    )  # the coarse volume of the pose in which the mesh has its own
 
 
-@pytest.mark.usefixtures("wide")
-def test_the_pose_does_not_depend_on_the_way_there():
+@pytest.mark.usefixtures("scaled")
+def test_a_scaled_pose_does_not_depend_on_the_poses_before():
     direct = SCENE.deformer().solve(TARGETS)
     deformer = SCENE.deformer()
     for degrees in (-30.0, 10.0, 60.0, 50.0):
@@ -81,17 +81,17 @@ def test_the_pose_does_not_depend_on_the_way_there():
     assert_array_equal(deformer.solve(TARGETS).vertices, direct.vertices)
 
 
-@pytest.mark.usefixtures("wide")
-def test_its_pose_is_that_of_the_whole(monkeypatch):
+@pytest.mark.usefixtures("scaled")
+def test_a_scaled_pose_is_near_that_with_the_whole_mesh(monkeypatch):
     by_size = SCENE.deformer().solve(TARGETS)
-    monkeypatch.setattr(coarse_volume, "_LARGE", 10**9)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", 10**9)
     whole = SCENE.deformer().solve(TARGETS)
     away = np.linalg.norm(by_size.vertices - whole.vertices, axis=1).max()
     assert away < 3e-3 * SCENE.mesh.diagonal
 
 
-@pytest.mark.usefixtures("wide")
-def test_a_turned_and_shifted_scene_is_landed_alike():
+@pytest.mark.usefixtures("scaled")
+def test_a_rotated_and_shifted_scene_is_scaled_alike():
     turn, shift = rotation([1.0, 2.0, 3.0], 1.1), np.array([300.0, -20.0, 7.0])
     here = SCENE.deformer().solve(TARGETS)
     there = SCENE.transformed(turn, 0.5, shift).deformer().solve(0.5 * TARGETS @ turn.T + shift)
@@ -99,21 +99,21 @@ def test_a_turned_and_shifted_scene_is_landed_alike():
     assert_allclose(there.vertices, 0.5 * here.vertices @ turn.T + shift, atol=1e-7)
 
 
-@pytest.mark.usefixtures("wide")
-def test_volumes_of_regions_are_still_landed_one_by_one():
+@pytest.mark.usefixtures("scaled")
+def test_volumes_of_regions_are_restored_one_by_one():
     solution = SCENE.deformer(preserve_region_volumes=True).solve(TARGETS)
     assert np.abs(solution.region_volume_change).max() < 1e-12
 
 
-@pytest.mark.usefixtures("wide")
-def test_a_gpu_lands_a_mesh_where_the_processor_does(monkeypatch):
+@pytest.mark.usefixtures("scaled")
+def test_a_gpu_and_the_processor_give_the_same_mesh(monkeypatch):
     here = SCENE.deformer().solve(TARGETS)
     monkeypatch.setattr(exact_volume, "gpu_arrays", lambda: np)  # the lines that a GPU runs
     used = []
     monkeypatch.setattr(
-        DeviceSurface,
+        GPUSurface,
         "map",
-        lambda *given, plain=DeviceSurface.map: used.append(1) or plain(*given),
+        lambda *given, plain=GPUSurface.map: used.append(1) or plain(*given),
     )
     there = SCENE.deformer().solve(TARGETS)
     assert used
@@ -121,17 +121,17 @@ def test_a_gpu_lands_a_mesh_where_the_processor_does(monkeypatch):
     assert abs(there.volume_change) < 1e-14
 
 
-@pytest.mark.usefixtures("wide")
-@pytest.mark.parametrize("when", ["__init__", "map", "scaled", "host"])
-def test_a_gpu_that_fails_is_gone_on_without(monkeypatch, when):
+@pytest.mark.usefixtures("scaled")
+@pytest.mark.parametrize("when", ["__init__", "map", "scale_to_volume", "host"])
+def test_after_a_failure_of_the_gpu_the_processor_is_used(monkeypatch, when):
     here = SCENE.deformer().solve(TARGETS)
     monkeypatch.setattr(exact_volume, "gpu_arrays", lambda: np)
 
     def failing(*_):
-        raise DeviceError("out of memory")
+        raise GPUError("out of memory")
 
-    monkeypatch.setattr(DeviceSurface, when, failing)
+    monkeypatch.setattr(GPUSurface, when, failing)
     deformer = SCENE.deformer()
     there = deformer.solve(TARGETS)
     assert_array_equal(there.vertices, here.vertices)
-    assert deformer._large._device is None
+    assert deformer._scaled_surface._gpu is None

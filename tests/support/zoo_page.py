@@ -1,6 +1,6 @@
-"""The page of the documentation that tells what becomes of which bad input.
+"""The page of the documentation on bad input.
 
-What the tests of the zoo expect of each case is what is told: the page needs no case to be run.
+It lists the results that the tests of the zoo expect, so no case has to run.
 """
 
 from __future__ import annotations
@@ -9,35 +9,35 @@ from collections.abc import Iterable
 
 import zoo_operations
 
-# Kinds of exhibits, as `zoo_operations.OTHERS` has them, and what they are called on the page.
+# Kinds of exhibits, as in `zoo_operations.OTHERS`, and their headings on the page.
 HEADINGS = {
     "": "Meshes",
     "regions": "Regions",
-    "overlaps": "Overlaps of regions",
+    "overlaps": "Overlaps",
     "cages": "Cages",
-    "cage poses": "Poses of a cage",
+    "cage poses": "Cage poses",
     "held": "Fixed vertices and handles",
     "targets": "Targets",
-    "motions": "Motions of a handle",
-    "numbers": "Options that are numbers",
-    "PolyData": "Surfaces of VTK",
+    "motions": "Handle motions",
+    "numbers": "Numeric options",
+    "PolyData": "VTK surfaces",
 }
 HEAD = """\
 Bad input
 =========
 
-.. Made by `SEGDEFORM_ZOO=1 python -m pytest tests/whole/test_zoo.py`, of what the tests expect.
+.. Generated from the tests by `SEGDEFORM_ZOO=1 python -m pytest tests/whole/test_zoo.py`.
 
-What becomes of meshes with faults, cages that do not fit, targets out of sight. Either the answer
-is right: finite, of exact volume, with the handles in place or a status that says that they are
-not. Or an error of :mod:`vtk_segdeform.errors` names the fault and says what to do. Nothing else
-comes out: no other exception, no warning, nothing that takes minutes.
+This page lists input with faults: damaged meshes, cages that do not fit, targets out of range. For
+each, either the result is correct: finite, of exact volume, with the handles at their targets or a
+status that says they are not. Or an error of :mod:`vtk_segdeform.errors` names the fault and says
+what to do. There are no other exceptions, no warnings, and no computations of many minutes.
 
-Triangles without area are allowed: a closed mesh that contains some is accepted, bound and posed
-like any other.
+Triangles without area are allowed: a closed mesh with such triangles is accepted and deformed like
+any other.
 
-Each input below met each operation that could take it, {cases} cases: {answered} were answered and
-{refused} refused with a named fault.
+Each input is tested with each operation that accepts its type, in {cases} cases: {answered} return
+a result and {refused} raise an error that names the fault.
 """
 
 
@@ -58,13 +58,13 @@ def page(cases: Iterable[tuple]) -> str:
 
 
 def _section(heading: str, exhibits: dict[str, list]) -> str:
-    """Return what is answered, in a line, and a table of what is refused."""
+    """Return a section: a line of accepted input, and a table of refused input."""
     sound = [name for name, ends in exhibits.items() if not any(fault for _, fault in ends)]
     lines = [heading, "-" * len(heading), ""]
     if sound:
-        lines += [f"Answered: {'; '.join(map(_plain, sound))}.", ""]
+        lines += [f"Accepted: {'; '.join(map(_plain, sound))}.", ""]
     lines += [".. list-table::", "   :header-rows: 1", "   :widths: 30 40 30", ""]
-    lines += _row("refused", "the error says", "answered all the same by")
+    lines += _row("refused", "the message contains", "accepted by")
     for name, ends in exhibits.items():
         says = sorted({_words(fault) for _, fault in ends if fault})
         fine = [operation for operation, fault in ends if not fault]
@@ -84,5 +84,5 @@ def _words(fault: str) -> str:
 
 
 def _plain(text: str) -> str:
-    """Return *text* with nothing in it that reStructuredText reads."""
+    """Return *text* with the markup of reStructuredText escaped."""
     return "".join(f"\\{letter}" if letter in "\\*`|_" else letter for letter in text)

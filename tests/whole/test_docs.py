@@ -1,6 +1,6 @@
-"""The pages of the documentation, read as text: nothing in them is missing, made up or stale.
+"""The pages of the documentation, read as text: nothing in them is missing, invented or stale.
 
-`make docs` sees the rest: references, markup, and whether the pictures can be drawn.
+`make docs` checks the rest: references, markup, and whether the pictures can be drawn.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from vtk_segdeform.widgets.editor.bindings import help_sections
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-MADE = ("build", "figures", "gallery")  # by `make docs`
+GENERATED = ("build", "figures", "gallery")  # by `make docs`
 PAGES = {
     path.relative_to(DOCS).with_suffix("").as_posix(): path.read_text(encoding="utf-8")
     for path in sorted(DOCS.rglob("*.rst"))
-    if path.relative_to(DOCS).parts[0] not in MADE
+    if path.relative_to(DOCS).parts[0] not in GENERATED
 }
-INDEX = "gallery/index"  # made, and lists the rest of the gallery
-HELD = {"Ctrl", "Shift"}  # while something else is done
+INDEX = "gallery/index"  # generated, and lists the rest of the gallery
+MODIFIERS = {"Ctrl", "Shift"}
 DRAW = {"embedding/pyvista"}
 NEED_MESHLAB = {"embedding/meshlab"}
 
 
-def told_in_toctrees() -> list[str]:
+def pages_in_toctrees() -> list[str]:
     """Return the pages that toctrees name."""
     found = []
     for name, text in PAGES.items():
@@ -49,7 +49,7 @@ def told_in_toctrees() -> list[str]:
 
 
 def constant(module: str, name: str) -> ast.expr:
-    """Return what a name is set to in a file of docs/making."""
+    """Return the value of a constant in a file of docs/making."""
     tree = ast.parse((DOCS / "making" / f"{module}.py").read_text(encoding="utf-8"))
     for node in tree.body:
         target = node.targets[0] if isinstance(node, ast.Assign) else getattr(node, "target", None)
@@ -83,8 +83,8 @@ def inclusions(text: str) -> list[tuple[Path, dict[str, str]]]:
 
 
 def test_every_page_is_in_one_toctree():
-    told = told_in_toctrees()
-    assert sorted(told) == sorted({*PAGES, INDEX} - {"index"})
+    found = pages_in_toctrees()
+    assert sorted(found) == sorted({*PAGES, INDEX} - {"index"})
 
 
 def test_every_picture_that_a_page_names_is_there_or_is_drawn():
@@ -99,38 +99,54 @@ def test_every_picture_that_is_drawn_is_shown():
     assert drawn() <= {Path(picture).stem for picture in pictures_named()}
 
 
-def test_pictures_that_are_kept_are_small():
-    assert sum(path.stat().st_size for path in DOCS.glob("pictures/*")) < 1.5e6
+def test_pictures_in_the_repository_are_small():
+    sizes = {path.name: path.stat().st_size for path in DOCS.glob("pictures/*")}
+    assert sizes.pop("drag.gif") < 2e6
+    assert sum(sizes.values()) < 1e6
+
+
+def test_pictures_in_the_repository_are_shown():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = "\n".join([readme, *PAGES.values()])
+    kept = [path.name for path in DOCS.glob("pictures/*")]
+    assert [name for name in kept if f"pictures/{name}" not in shown] == []
+
+
+def test_links_of_the_readme_lead_somewhere():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    links = [link for link in re.findall(r"\]\(([^)#]+)\)", readme) if "://" not in link]
+    assert len(links) > 10
+    assert [link for link in links if not (ROOT / link).exists()] == []
 
 
 @pytest.mark.parametrize(("module", "name"), [(m, n) for m in (sd, widgets) for n in m.__all__])
-def test_the_api_tells_of_every_public_name(module, name):
+def test_the_api_pages_have_every_public_name(module, name):
     listed = PAGES["api/index"].split(f"``{module.__name__}``\n")[1].split(".. rubric::")[0]
     assert re.search(rf"(?m)^   {name}$", listed)
-    told = "\n".join(text for page, text in PAGES.items() if page.startswith(("api/", "errors")))
+    api = "\n".join(text for page, text in PAGES.items() if page.startswith(("api/", "errors")))
     full = rf"(?:{re.escape(module.__name__)}\.)?{name}"
-    assert re.search(rf"(?m)^\.\. (?:auto\w+|py:module):: {full}$", told)
+    assert re.search(rf"(?m)^\.\. (?:auto\w+|py:module):: {full}$", api)
 
 
-def test_every_error_is_told_of():
+def test_every_error_is_on_its_page():
     errors = [n for n, e in vars(sd.errors).items() if isinstance(e, type)]
     assert all(f".. autoexception:: {name}\n" in PAGES["errors"] for name in errors)
 
 
-def test_what_is_said_of_errors_is_what_they_say():
-    said = re.findall(r"(?m)^   \* - ``(.+)``$", PAGES["errors"])
+def test_the_messages_on_the_page_of_errors_are_those_of_the_code():
+    messages = re.findall(r"(?m)^   \* - ``(.+)``$", PAGES["errors"])
     source = "".join(path.read_text() for path in ROOT.glob("vtk_segdeform/**/*.py"))
-    assert len(said) > 5
-    assert all(words in source for words in said)
+    assert len(messages) > 5
+    assert [message for message in messages if message not in source] == []
 
 
 def test_the_qt_example_is_included_as_it_is():
-    whole = {"language": "python"}  # no option that leaves something out
+    whole = {"language": "python"}  # no option that omits a part
     assert inclusions(PAGES["embedding/qt"]) == [(ROOT / "examples" / "qt_application.py", whole)]
 
 
 @pytest.mark.parametrize("page", [name for name, text in PAGES.items() if inclusions(text)])
-def test_what_is_included_is_there(page):
+def test_the_markers_of_inclusions_are_there(page):
     for path, options in inclusions(PAGES[page]):
         text = path.read_text(encoding="utf-8")
         assert options.get("start-at", "") in text
@@ -153,7 +169,7 @@ def test_the_examples_on_a_page_print_what_they_say(page, monkeypatch, tmp_path,
             require_offscreen()
         except MissingDependencyError as missing:
             pytest.skip(str(missing))
-    linecache.clearcache()  # else doctest looks after every file in it first
+    linecache.clearcache()  # else doctest checks every file in it first
     failed, tried = doctest.testfile(
         str(DOCS / f"{page}.rst"), module_relative=False, optionflags=doctest.NORMALIZE_WHITESPACE
     )
@@ -162,28 +178,52 @@ def test_the_examples_on_a_page_print_what_they_say(page, monkeypatch, tmp_path,
 
 
 @pytest.mark.parametrize("page", [name for name, text in PAGES.items() if ":kbd:" in text])
-def test_every_key_that_a_page_tells_of_does_something(page):
+def test_every_key_on_a_page_has_an_action(page):
     keys = {key for _, rows in help_sections() for caps, _ in rows for key in caps.split("  ")}
-    assert set(re.findall(r":kbd:`(.+?)`", PAGES[page])) <= keys | HELD
+    assert set(re.findall(r":kbd:`(.+?)`", PAGES[page])) <= keys | MODIFIERS
 
 
-def test_the_tables_of_keys_are_made_of_the_editors_own():
+def test_the_tables_of_keys_are_generated():
     assert ".. keys::" in PAGES["keys"]
 
 
 @pytest.mark.parametrize(
     "line", sorted({line for t in PAGES.values() for line in re.findall(r"\$ segdeform (.+)", t)})
 )
-def test_every_command_that_a_page_tells_of_is_understood(line):
+def test_every_command_on_a_page_is_valid(line):
     words = _with_signed_vectors(shlex.split(line))
     assert callable(_parser().parse_args(words).run)
 
 
-def test_files_that_are_said_to_be_read_are():
+def test_the_formats_on_the_page_of_files_are_readable():
     table = PAGES["files"].split("Sessions\n")[0]
     suffixes = re.findall(r"``(\.\w+)``", table)
     assert len(suffixes) > 10
     assert all(is_mesh_file(f"mesh{suffix}") for suffix in suffixes)
+
+
+@pytest.mark.parametrize("page", ["architecture", "mathematics", "speed"])
+def test_the_files_that_a_page_names_are_there(page):
+    named = set(re.findall(r"[\w/]+/\w+\.py", PAGES[page]))
+    folders = (ROOT, ROOT / "vtk_segdeform")
+    assert named
+    assert [name for name in named if not any((f / name).is_file() for f in folders)] == []
+
+
+def test_the_architecture_has_every_folder():
+    folders = [path.parent.name for path in ROOT.glob("vtk_segdeform/*/__init__.py")]
+    folders += [path.parent.name for path in ROOT.glob("widgets/*/__init__.py")]
+    assert len(folders) > 20
+    assert [name for name in folders if f"``{name}/``" not in PAGES["architecture"]] == []
+
+
+def test_the_functions_on_the_way_to_the_factor_are_in_their_files():
+    line = r"(?m)^ +(?:\w+\.)?(\w+)(?:[:(].*)? {2,}(\w+/\w+\.py)$"
+    found = re.findall(line, PAGES["architecture"])
+    assert len(found) > 10
+    for name, path in found:
+        source = (ROOT / "vtk_segdeform" / path).read_text()
+        assert re.search(rf"\b{name}\b", source), f"no {name} in {path}"
 
 
 def test_numbers_of_equations_are_those_of_the_paper():

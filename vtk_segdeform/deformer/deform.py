@@ -1,4 +1,4 @@
-"""From a mesh and its handles to a pose in one call: segment, fit cages, bind, solve."""
+"""The whole method in one call: segment, fit cages, bind, solve."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from ..checks import as_flag
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part
 from ..regions import segment
-from ..solver import Solution, checked_constraints, checked_targets
+from ..solver import Solution
+from .arguments import checked_constraints, checked_targets
 from .deformer import Deformer
 
 
@@ -26,25 +27,25 @@ def deform(
 ) -> Solution:
     """Return *mesh* deformed so that its handle vertices are at *targets*.
 
-    For one pose.  To drag, or to choose regions and cages, keep a `Deformer`.
+    For one pose only.  To drag, or to choose regions and cages, use a `Deformer`.
 
     Parameters
     ----------
     mesh : Mesh
         n vertices.
     fixed, handle : (k,) int or (n,) bool
-        Vertices held in place, and vertices that move.
+        Vertices that stay in place, and vertices that follow *targets*.
     targets : (len(handle), 3) float
-        Where the handle vertices shall be, in the order of *handle* (of its true entries, if it
-        is a mask).
+        Positions of the handle vertices, in the order of *handle* (of its true entries, if it is a
+        mask).
     n_regions : int or None
         How many regions; None lets `segment` choose.
     n_cage_vertices : int
-        Vertices of all cages together.
+        Total number of cage vertices.
     preserve_volume : bool
-        Hold the enclosed volume exactly.
+        Preserve the enclosed volume exactly.
     progress : Progress, optional
-        Called while the cages are made and bound, and before every step; may cancel.
+        Called while cages are fitted and bound, and before every step; may cancel.
 
     Returns
     -------
@@ -53,7 +54,7 @@ def deform(
     Raises
     ------
     ConstraintError
-        If fixed, handle or targets make no sense.
+        If *fixed*, *handle* or *targets* are invalid.
     """
     require_mesh(mesh)
     as_flag(preserve_volume, "preserve_volume")

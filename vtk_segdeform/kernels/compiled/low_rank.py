@@ -1,4 +1,4 @@
-"""Product with W~ as two narrow factors, for `low_rank`; accumulated in double precision."""
+"""The map of `low_rank.LowRankSubspace`, in double precision from factors in single."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ _compile = kernel(fastmath={"reassoc", "contract"})
 
 
 @_compile
-def put_patches(x, base, p, vertices, columns, left, right, starts, first, last):
-    """Put W~ @ p.T into *x* for patches first..last; *p* is (k, m) with k a multiple of 3.
+def map_low_rank(x, base, p, vertices, columns, left, right, starts, first, last):
+    """Put W~ @ p.T into *x* for patches *first* to *last*; *p* is (k, m), k a multiple of 3.
 
     *base* (n, 3), in the order of the patches, is added to the first three columns unless empty.
     """

@@ -156,8 +156,8 @@ def _add_adjoints(p, rows, block, y, z):
 
 
 @_compile
-def put_groups(x, base, p, rows, columns, weights, starts):
-    """Put W~ @ p into *x* for all groups of `products.Groups`; *p* is (m, k), k a multiple of 3.
+def map_packed(x, base, p, rows, columns, weights, starts):
+    """Put W~ @ p into *x* for all packed blocks of `subspace.Subspace`; *p* is (m, k), k by threes.
 
     *base* (n, 3) is added to the first three columns unless empty.
     """
@@ -180,11 +180,11 @@ def put_groups(x, base, p, rows, columns, weights, starts):
 
 
 @_compile
-def add_groups_adjoint(p, y, z, rows, columns, weights, starts):
-    """Add (W~.T @ y).T to *p* (3, m), for *y* (n, 3); with *z*, both to *p* (6, m).
+def add_packed_adjoint(p, y, z, rows, columns, weights, starts):
+    """Add (W~.T @ y).T to *p* (3, m), for *y* (n, 3); or of *y* and *z*, one below the other.
 
-    Groups and their rows are processed in reverse order, since `put_groups` leaves the last ones
-    in the cache, and this function leaves the first ones there.
+    From the last group to the first, and in each from its last rows on: these are what
+    `map_packed` has left in the cache, as this leaves it the first.
     """
     here = np.empty(p.size)
     for g in range(len(starts) - 2, -1, -1):
