@@ -70,7 +70,7 @@ keys("g", "f", "2")
 picture("editor-cages")
 keys("3", "t", "v", "s")  # fixed vertices: a rectangle, through the body
 drag(around(height < 0.08))
-keys("d")  # handle: likewise
+keys("d")  # the handle, by a rectangle as well
 drag(around(height > 0.92))
 keys("4", "o")
 
