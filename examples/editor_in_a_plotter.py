@@ -2,7 +2,7 @@
 Editor in a plotter
 ===================
 
-The editor in a PyVista plotter, next to other meshes. A recording of keys and a drag drives it here.
+The editor in a PyVista plotter, next to other meshes. A recording of keys and a drag works it here.
 
     python examples/editor_in_a_plotter.py show
 
