@@ -10,11 +10,10 @@ import pytest
 from numpy.testing import assert_array_equal
 from scenes import sausage
 
-from vtk_segdeform import Deformer, Mesh, Regions, Session
+from vtk_segdeform import Deformer, Mesh, Regions, Session, sizes
 from vtk_segdeform.deformer import binding, binding_cache
 from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.session import posing
-from vtk_segdeform.solver import coarse_volume
 
 SCENE = sausage(2)
 TARGETS = SCENE.turned(20)
@@ -22,24 +21,24 @@ TARGETS = SCENE.turned(20)
 
 @pytest.fixture
 def counted(monkeypatch):
-    """Count how often cages are bound."""
-    binding_cache = []
-    whole = binding.bind
+    """Count how often W~ is computed."""
+    calls = []
+    plain = binding.cage_subspace
 
-    def bind(*arguments, **options):
-        binding_cache.append(1)
-        return whole(*arguments, **options)
+    def cage_subspace(*arguments, **options):
+        calls.append(1)
+        return plain(*arguments, **options)
 
-    monkeypatch.setattr(binding, "bind", bind)
-    return binding_cache
+    monkeypatch.setattr(binding, "cage_subspace", cage_subspace)
+    return calls
 
 
 @pytest.mark.parametrize("large", [500, 10**9])
 def test_the_second_time_nothing_is_bound_and_the_pose_is_the_same_bit_for_bit(
     tmp_path, counted, monkeypatch, large
 ):
-    monkeypatch.setattr(coarse_volume, "_LARGE", large)
-    monkeypatch.setattr(coarse_volume, "_POINTS", 300)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", large)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 300)
     first = SCENE.deformer(cache=tmp_path).solve(TARGETS)
     assert len(counted) == 1
     again = SCENE.deformer(cache=tmp_path).solve(TARGETS)
@@ -242,17 +241,17 @@ def test_a_file_that_is_replaced_while_it_is_read_is_ignored(tmp_path, counted, 
         whole(*arguments)
 
     monkeypatch.setattr(binding_cache, "in_parallel", parallel)
-    assert binding_cache.Binding.read(path, SCENE.mesh.n_vertices) is None
+    assert binding_cache.read_binding(path, SCENE.mesh.n_vertices) is None
 
 
 @posix
 def test_making_room_deletes_only_our_own_bindings(tmp_path, monkeypatch):
-    theirs = ["my.bound.npz", "0" * 39 + ".bound.npz", "precious.npz", ".bound.npz"]
+    theirs = ["my.binding.npz", "0" * 39 + ".binding.npz", "precious.npz", ".binding.npz"]
     for name in theirs:
         (tmp_path / name).write_text("mine")
-    (tmp_path / ("1" * 40 + ".bound.npz")).symlink_to("precious.npz")
-    os.mkfifo(tmp_path / ("2" * 40 + ".bound.npz"))
-    (tmp_path / ("3" * 40 + ".bound.npz")).mkdir()
+    (tmp_path / ("1" * 40 + ".binding.npz")).symlink_to("precious.npz")
+    os.mkfifo(tmp_path / ("2" * 40 + ".binding.npz"))
+    (tmp_path / ("3" * 40 + ".binding.npz")).mkdir()
     before = set(os.listdir(tmp_path))
     monkeypatch.setattr(binding_cache, "_MOST", 0)
     SCENE.deformer(cache=tmp_path)

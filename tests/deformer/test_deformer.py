@@ -15,7 +15,7 @@ from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.cages.fit import fit_cages
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionError
-from vtk_segdeform.geometry import rotations
+from vtk_segdeform.geometry import kmeans
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.models.shapes import cactus
@@ -263,7 +263,8 @@ def test_with_nothing_held_rounding_carries_nothing_off_even_over_slivers():
         ({"rotation_groups": 0}, "rotation_groups must be a whole number, 1 or more; got 0"),
         ({"tolerance": np.nan}, "tolerance must be a positive number"),
         ({"max_steps": 0}, "max_steps must be a whole number, 1 or more"),
-        ({"window": -1}, "window must be a whole number, 0 or more"),
+        ({"acceleration": -1}, "acceleration must be a whole number, 0 or more"),
+        ({"exact_hessian": 1}, "exact_hessian must be True or False"),
     ],
 )
 def test_options_that_make_no_sense_are_refused_by_name(option, says):
@@ -432,8 +433,8 @@ def test_many_bodies_are_one_mesh():
 def test_small_groups_of_vertices_are_told_apart_without_starting_threads(monkeypatch):
     started = []
     monkeypatch.setattr(threading.Thread, "start", started.append)
-    monkeypatch.setattr(rotations, "n_threads", lambda: 2)
+    monkeypatch.setattr(kmeans, "n_threads", lambda: 2)
     parts = np.repeat(np.arange(200), 40)
-    groups = rotations.rotation_groups(np.random.default_rng(0).random((8000, 3)), parts, 300)
+    groups = kmeans.cluster_within_parts(np.random.default_rng(0).random((8000, 3)), parts, 300)
     assert len(np.unique(groups)) >= 200
     assert not started

@@ -9,19 +9,19 @@ from scenes import sausage
 from solids import rotation
 
 from vtk_segdeform.energy.energy import shape_energy
-from vtk_segdeform.energy.hessian import _rotations_part, curved_factor, factored
-from vtk_segdeform.geometry.rotations import group_by_position
-from vtk_segdeform.subspace.subspace import bind
+from vtk_segdeform.energy.hessian import _rotation_term, full_factor, quadratic_factor
+from vtk_segdeform.geometry.kmeans import cluster_positions
+from vtk_segdeform.subspace.subspace import cage_subspace
 
 SCENE = sausage()
 REST = np.concatenate([cage.vertices for cage in SCENE.cages])
 RNG = np.random.default_rng(5)
 
 
-def energy_of(n_groups):
-    subspace = bind(SCENE.regions, SCENE.cages)
-    groups = n_groups and group_by_position(SCENE.mesh.vertices, n_groups)
-    return shape_energy(SCENE.mesh, subspace, 10.0, groups)
+def energy_of(n_clusters):
+    subspace = cage_subspace(SCENE.regions, SCENE.cages)
+    clusters = n_clusters and cluster_positions(SCENE.mesh.vertices, n_clusters)
+    return shape_energy(SCENE.mesh, subspace, 10.0, clusters)
 
 
 def bent(p):
@@ -33,7 +33,7 @@ def bent(p):
 
 def hessian_times(energy, p, dp):
     """Return half the Hessian of E at *p* times *dp*, from the two parts that the solver adds."""
-    lower = np.tril(_rotations_part(energy, p))
+    lower = np.tril(_rotation_term(energy, p))
     part = lower + np.tril(lower, -1).T
     return energy.quadratic @ dp - (part @ dp.T.ravel()).reshape(3, -1).T
 
@@ -42,9 +42,9 @@ def slope(energy, p):
     return energy.local_step(p, energy.subspace.map(p))[1]
 
 
-@pytest.mark.parametrize("n_groups", [40, None])
-def test_it_is_the_derivative_of_the_gradient_to_second_order(n_groups):
-    energy, p = energy_of(n_groups), bent(REST)
+@pytest.mark.parametrize("n_clusters", [40, None])
+def test_it_is_the_derivative_of_the_gradient_to_second_order(n_clusters):
+    energy, p = energy_of(n_clusters), bent(REST)
     dp = RNG.normal(size=p.shape)
     exact = hessian_times(energy, p, dp)
     errors = []
@@ -57,17 +57,17 @@ def test_it_is_the_derivative_of_the_gradient_to_second_order(n_groups):
 
 @pytest.mark.parametrize("stretch", [10.0, 0.0])
 def test_energy_and_gradient_are_those_of_the_dense_operators(stretch):
-    subspace, p = bind(SCENE.regions, SCENE.cages), bent(REST)
-    groups = group_by_position(SCENE.mesh.vertices, 250)
-    energy = shape_energy(SCENE.mesh, subspace, stretch, groups)
-    assert energy.fit.size > 60_000  # as many as are multiplied without their zeros
-    u, _, vt = np.linalg.svd((energy.fit @ p).reshape(-1, 3, 3))
-    pulled = energy.pull.T @ (u @ vt).reshape(-1, 3)
+    subspace, p = cage_subspace(SCENE.regions, SCENE.cages), bent(REST)
+    clusters = cluster_positions(SCENE.mesh.vertices, 250)
+    energy = shape_energy(SCENE.mesh, subspace, stretch, clusters)
+    assert energy.covariance_operator.size > 60_000  # as many as are multiplied without their zeros
+    u, _, vt = np.linalg.svd((energy.covariance_operator @ p).reshape(-1, 3, 3))
+    load = energy.load_operator.T @ (u @ vt).reshape(-1, 3)
     product = energy.quadratic @ p
     value, half = energy.local_step(p, subspace.map(p))
-    exact = np.vdot(p, product) - 2.0 * np.vdot(p, pulled) + energy.constant
+    exact = np.vdot(p, product) - 2.0 * np.vdot(p, load) + energy.constant
     assert abs(value - exact) < 1e-12 * energy.constant
-    assert_allclose(half, product - pulled, atol=1e-12 * np.abs(product).max())
+    assert_allclose(half, product - load, atol=1e-12 * np.abs(product).max())
 
 
 def test_turning_the_whole_costs_nothing():
@@ -92,9 +92,9 @@ def test_the_factor_solves_in_both_of_its_forms():
     energy, p = energy_of(40), bent(REST)
     held = energy.quadratic + np.eye(len(p)) * np.trace(energy.quadratic)
     y = RNG.normal(size=p.shape)
-    plain = factored(held)
+    plain = quadratic_factor(held)
     assert_allclose(held @ plain.solve(y), y, atol=1e-9)
-    curved = curved_factor(held, energy, p)
+    curved = full_factor(held, energy, p)
     h = curved.solve(y)
     back = hessian_times(energy, p, h) + (held - energy.quadratic) @ h
     assert_allclose(back, y, atol=2e-3 * np.abs(y).max())  # a thousandth of the part is kept back
@@ -105,7 +105,7 @@ def test_how_volumes_curve_is_added_where_it_belongs():
     held = energy.quadratic + np.eye(m) * np.trace(energy.quadratic)
     g = 1e-3 * np.trace(energy.quadratic) / m * RNG.normal(size=(3, m, m))
     g -= np.swapaxes(g, 1, 2)
-    with_it, without = (curved_factor(held, energy, p, of) for of in (g, None))
+    with_it, without = (full_factor(held, energy, p, of) for of in (g, None))
     added = with_it.triangle @ with_it.triangle.T - without.triangle @ without.triangle.T
     blocks = added.reshape(3, m, 3, m)
     for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
@@ -115,14 +115,14 @@ def test_how_volumes_curve_is_added_where_it_belongs():
 
 
 def test_what_is_not_convex_has_no_factor():
-    assert factored(-np.eye(4)) is None
+    assert quadratic_factor(-np.eye(4)) is None
     energy = energy_of(40)
-    assert curved_factor(-energy.quadratic, energy, REST) is None
+    assert full_factor(-energy.quadratic, energy, REST) is None
 
 
 def test_a_mirrored_pose_still_has_a_factor():
     energy = energy_of(40)
     mirrored = REST * [1.0, 1.0, -1.0]
     held = energy.quadratic + 1e-3 * np.eye(len(REST)) * np.trace(energy.quadratic)
-    factor = curved_factor(held, energy, mirrored)
+    factor = full_factor(held, energy, mirrored)
     assert factor is None or np.isfinite(factor.solve(mirrored)).all()

@@ -11,7 +11,7 @@ from solids import icosphere, rotation
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.energy import rotation_clusters
 from vtk_segdeform.energy.energy import Energy
-from vtk_segdeform.geometry.rotations import rotation_groups
+from vtk_segdeform.geometry.kmeans import cluster_within_parts
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
 
@@ -24,7 +24,7 @@ def fine(scene: Scene) -> tuple[Energy, np.ndarray, tuple[np.ndarray, ...]]:
     deformer = scene.deformer(rotation_groups=scene.mesh.n_vertices)
     n = scene.mesh.n_vertices
     bits = deformer._rest.vertices, scene.regions.labels, np.ones(n, dtype=np.int64)
-    return deformer._energy, deformer._rest_cages, bits
+    return deformer._binding.energy, deformer._rest_cages, bits
 
 
 @functools.cache
@@ -35,9 +35,9 @@ def joined(scene: Scene, n_groups: int = 100) -> tuple[Energy, np.ndarray]:
 def plain(scene: Scene, n_groups: int = 100) -> Energy:
     """Return the energy with clusters of position for groups, and nothing taken off."""
     energy, _, (positions, parts, _) = fine(scene)
-    groups = rotation_groups(positions, parts, n_groups)
-    rows = np.asarray(energy.fit).reshape(len(groups), 3, -1)
-    return rotation_clusters._with_rotations(energy, rotation_clusters._added(rows, groups))
+    groups = cluster_within_parts(positions, parts, n_groups)
+    rows = np.asarray(energy.covariance_operator).reshape(len(groups), 3, -1)
+    return rotation_clusters._with_rotations(energy, rotation_clusters._sums(rows, groups))
 
 
 @functools.cache
@@ -82,18 +82,18 @@ def test_a_pose_comes_closer_to_that_of_a_rotation_for_each_vertex(monkeypatch):
     true = every.solve(scene.turned(50)).vertices
     near = distance(rotation_groups=60)
     monkeypatch.setattr(rotation_clusters, "_ROUNDS", 0)
-    monkeypatch.setattr(rotation_clusters, "_TAKEN", 0.0)
+    monkeypatch.setattr(rotation_clusters, "_SUBTRACTED", 0.0)
     assert near < 0.6 * distance(rotation_groups=60)
 
 
 def test_the_excess_is_the_spread_of_turning_within_the_groups():
     energy, rest, (positions, parts, _) = fine(SCENE)
     move = np.random.default_rng(0).normal(size=rest.shape)
-    rows = np.asarray(energy.fit).reshape(len(parts), 3, -1)
-    groups = rotation_groups(positions, parts, 100)
+    rows = np.asarray(energy.covariance_operator).reshape(len(parts), 3, -1)
+    groups = cluster_within_parts(positions, parts, 100)
     one, whole = (
         rotation_clusters._response(k, rest, move[:, None])
-        for k in (rows, rotation_clusters._added(rows, groups))
+        for k in (rows, rotation_clusters._sums(rows, groups))
     )
     step = 1e-4
     measured = value(plain(SCENE), rest + step * move) - value(energy, rest + step * move)
@@ -148,7 +148,7 @@ def test_groups_lie_across_what_bends():
 
     x, parts, _ = fine(blade())[2]
     thin = np.abs(x[:, 0]) < 0.2 * x[:, 0].max()
-    assert width(joined(blade(), 60)[1]) > 1.5 * width(rotation_groups(x, parts, 60))
+    assert width(joined(blade(), 60)[1]) > 1.5 * width(cluster_within_parts(x, parts, 60))
 
 
 def test_what_nothing_holds_together_is_grouped_by_position():

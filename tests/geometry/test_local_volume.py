@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from scenes import sausage
 from solids import CUBE, icosphere, rotation, torus
 
+from vtk_segdeform import sizes
 from vtk_segdeform.geometry import local_volume
 from vtk_segdeform.geometry.local_volume import LocalVolume, local_volume_change
 from vtk_segdeform.mesh.mesh import Mesh
@@ -17,8 +18,8 @@ MESHES = {"sphere": icosphere(3), "torus": torus(), "cube": CUBE}
 def either(request, monkeypatch):
     """As small meshes are measured, and as large ones are."""
     if request.param:
-        monkeypatch.setattr(local_volume, "_LARGE", 100)
-        monkeypatch.setattr(local_volume, "_CELLS", 400)
+        monkeypatch.setattr(sizes, "LOCAL_VOLUME_CELLS", 100)
+        monkeypatch.setattr(sizes, "LOCAL_VOLUME_POINTS", 400)
         monkeypatch.setattr(local_volume, "_AT_ONCE", 300)
 
 
@@ -64,8 +65,8 @@ def test_cells_say_what_the_whole_says_and_without_steps_between_them(monkeypatc
     girth = 1.0 - 0.3 * np.exp(-(x[:, :1] ** 2) / 0.5)
     pinched = x * np.hstack([np.ones_like(girth), girth, girth])
     whole = local_volume_change(mesh, pinched)
-    monkeypatch.setattr(local_volume, "_LARGE", 100)
-    monkeypatch.setattr(local_volume, "_CELLS", 500)
+    monkeypatch.setattr(sizes, "LOCAL_VOLUME_CELLS", 100)
+    monkeypatch.setattr(sizes, "LOCAL_VOLUME_POINTS", 500)
     local = LocalVolume(mesh)
     cells = local.change(pinched)
     assert_allclose(cells, whole, atol=0.12)  # of 0.44: they are smoothed a little otherwise
@@ -77,8 +78,8 @@ def test_cells_say_what_the_whole_says_and_without_steps_between_them(monkeypatc
 
 
 def test_across_a_thin_plate_cells_of_one_side_say_nothing_of_the_other(monkeypatch):
-    monkeypatch.setattr(local_volume, "_LARGE", 100)
-    monkeypatch.setattr(local_volume, "_CELLS", 1500)
+    monkeypatch.setattr(sizes, "LOCAL_VOLUME_CELLS", 100)
+    monkeypatch.setattr(sizes, "LOCAL_VOLUME_POINTS", 1500)
     ball, faces = icosphere(5)
     local = LocalVolume(Mesh(ball * [1.0, 1.0, 0.02], faces))
     (spread,) = local._spread
@@ -99,8 +100,8 @@ def test_crumbs_are_answered_and_hide_no_body_beside_them(monkeypatch, with_a_bo
     if with_a_body:
         ball, more = icosphere(4)
         x, faces = np.vstack([x, 9.0 * ball - 50.0]), np.vstack([faces, len(x) + more])
-    monkeypatch.setattr(local_volume, "_LARGE", 100)
-    monkeypatch.setattr(local_volume, "_CELLS", 200)
+    monkeypatch.setattr(sizes, "LOCAL_VOLUME_CELLS", 100)
+    monkeypatch.setattr(sizes, "LOCAL_VOLUME_POINTS", 200)
     change = local_volume_change(Mesh(x, faces), x * [1.0, 1.0, 1.1])
     assert np.isfinite(change).all()
     assert_allclose(change[4 * len(places) :] if with_a_body else change, 0.1, atol=1e-9)

@@ -3,14 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from solids import icosphere, rotation, somewhere
+from solids import rotation, somewhere
 
-from vtk_segdeform.geometry.rotations import (
-    closest_rotations,
-    group_by_position,
-    rigid_fit,
-    rotation_groups,
-)
+from vtk_segdeform.geometry.rotations import closest_rotations, rigid_fit
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.5, 3.0, np.pi])
@@ -53,30 +48,3 @@ def test_one_point_turns_nothing_and_a_line_only_as_far_as_it_must():
     line = np.outer(np.arange(4.0), [1.0, 0, 0])
     found, _ = rigid_fit(line, line @ rotation([0, 0, 1], 0.6).T)
     assert_allclose(found, rotation([0, 0, 1], 0.6), atol=1e-12)
-
-
-def test_groups_are_about_as_many_as_asked_and_all_are_used():
-    positions = icosphere(3)[0]
-    groups = group_by_position(positions, 40)
-    assert groups.min() == 0
-    assert 30 <= groups.max() + 1 <= 40
-    assert (np.bincount(groups) > 0).all()
-
-
-def test_groups_do_not_depend_on_the_frame_even_where_distances_tie():
-    positions = icosphere(3)[0]  # full of ties
-    turned = positions @ rotation([1, 2, 3], 1.1).T
-    assert (group_by_position(positions, 25) == group_by_position(turned, 25)).all()
-
-
-def test_no_group_spans_two_parts():
-    positions = icosphere(3)[0]
-    parts = (positions[:, 0] > 0).astype(int) + 2 * (positions[:, 1] > 0.5)
-    groups = rotation_groups(positions, parts, 30)
-    for group in range(groups.max() + 1):
-        assert len(np.unique(parts[groups == group])) == 1
-
-
-def test_as_many_groups_as_vertices_puts_each_in_its_own():
-    positions = somewhere(20)
-    assert len(np.unique(group_by_position(positions, 20))) == 20

@@ -20,8 +20,7 @@ from vtk_segdeform.geometry.rotations import closest_rotations
 from vtk_segdeform.geometry.volume import signed_volume, volume_along, volume_gradient
 from vtk_segdeform.kernels import dispatch, threads
 from vtk_segdeform.regions.regions import Regions
-from vtk_segdeform.subspace.products import add_product, adjoint_product
-from vtk_segdeform.subspace.subspace import Subspace
+from vtk_segdeform.subspace.subspace import Subspace, _add_product, _adjoint_product
 
 MESH = models.torus(3000)
 RNG = np.random.default_rng(2)
@@ -91,7 +90,7 @@ def test_products_agree_and_are_taken_in_double_precision(twin, dtype, columns):
 
     def product():
         x = np.ones((6000, columns))
-        add_product(x, rows, block, p, heavy=True)
+        _add_product(x, rows, block, p, compiled=True)
         return x
 
     quick, plain = twin(product)
@@ -99,7 +98,7 @@ def test_products_agree_and_are_taken_in_double_precision(twin, dtype, columns):
     exact[rows] += block.astype(np.float64) @ p
     assert_allclose(plain, exact, atol=1e-12)
     assert_allclose(quick, exact, atol=1e-12)
-    quick, plain = twin(lambda: adjoint_product(rows, block, y, heavy=True))
+    quick, plain = twin(lambda: _adjoint_product(rows, block, y, compiled=True))
     assert_allclose(quick, plain, atol=1e-10)
     assert_allclose(plain, block.astype(np.float64).T @ y[rows], atol=1e-10)
 
@@ -188,7 +187,7 @@ def test_a_small_subspace_multiplied_in_one_call_is_the_sum_over_its_regions(twi
     rows = [np.sort(RNG.permutation(4001)[:count]) for count in (3000, 1801, 0, 7)]
     blocks = [RNG.normal(size=(len(own), m)) for own, m in zip(rows, (50, 33, 20, 12), strict=True)]
     subspace = Subspace(4001, tuple(rows), tuple(blocks))
-    reached = subspace.reached_alike()
+    reached = subspace.sets_by_cages()
     assert 5 <= len(reached) <= 8  # by none, by one, by two, by three
     assert_array_equal(np.sort(np.concatenate(reached)), np.arange(4001))
     p, start, y = (RNG.normal(size=(k, c)) for k, c in ((115, columns), (4001, 3), (4001, 3)))
@@ -201,7 +200,7 @@ def test_a_small_subspace_multiplied_in_one_call_is_the_sum_over_its_regions(twi
         lambda: subspace.adjoints([y, 2.0 * y, -y]),
     ):
         quick, plain = twin(call)
-        assert subspace._is_small
+        assert subspace._is_packed
         assert_allclose(quick, plain, rtol=1e-12, atol=1e-11)
     assert subspace.adjoints([]) == []
 
@@ -214,16 +213,16 @@ def test_the_cages_that_reach_a_vertex_are_found_for_any_number_of_regions(regio
     subspace = Subspace(n, tuple(rows), tuple(RNG.normal(size=(len(own), 2)) for own in rows))
     dense = subspace.map(np.eye(2 * regions))
     membership = np.array([np.isin(np.arange(n), own) for own in rows])
-    alike = subspace.reached_alike()
+    alike = subspace.sets_by_cages()
     kinds = np.unique(membership.T, axis=0)  # in this order: by the first region, then the second
     assert len(alike) == len(kinds)
     for ids, kind in zip(alike, kinds, strict=True):
         assert_array_equal(ids, np.flatnonzero((kind == membership.T).all(axis=1)))
-        columns, w = subspace.reaching(ids)
+        columns, w = subspace.nonzeros(ids)
         assert_array_equal(columns, np.flatnonzero(np.repeat(kind, 2)))
         assert_array_equal(w, dense[np.ix_(ids, columns)])
     some = np.sort(RNG.permutation(n)[:50])
-    columns, w = subspace.reaching(some)
+    columns, w = subspace.nonzeros(some)
     assert_array_equal(columns, np.flatnonzero(np.repeat(membership[:, some].any(axis=1), 2)))
     assert_array_equal(w, dense[np.ix_(some, columns)])
 
@@ -252,7 +251,7 @@ def test_set_up_runs_a_trial_step_so_the_first_frame_waits_for_no_kernel(monkeyp
 
         monkeypatch.setattr(dispatch._kernels(), name, called)
     deformer = Deformer(mesh, regions, cages, progress=lambda _, text: messages.append(text))
-    assert messages[-2:] == ["trying a step", "ready"]
+    assert messages[-2:] == ["taking a trial step", "ready"]
     before = set(loaded)
     held = deformer.hold(fixed=mesh.vertices[:, 0] < -1.0, handle=[0, 1, 2])
     assert held.solve(mesh.vertices[:3] + [0.1, 0.0, 0.0]).steps > 0

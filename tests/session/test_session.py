@@ -22,7 +22,7 @@ from vtk_segdeform.session.listeners import Change
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.session.state import Options, State
 from vtk_segdeform.solver.solution import Status
-from vtk_segdeform.subspace.subspace import bind
+from vtk_segdeform.subspace.subspace import cage_subspace
 from vtk_segdeform.widgets.volume_overlay.region_volumes import RegionVolumes
 
 SCENE = sausage(2)
@@ -145,7 +145,7 @@ def test_region_volumes_are_held_if_asked_for():
 def test_a_pose_is_the_product_of_its_cage_vertices_and_nothing_else():
     session = ready()
     solution = session.drag(SCENE.turned(50))
-    subspace = bind(SCENE.regions, SCENE.cages)
+    subspace = cage_subspace(SCENE.regions, SCENE.cages)
     expected = subspace.map(np.concatenate(session.cage_vertices))
     assert_allclose(session.vertices, expected, atol=1e-13)
     assert solution.vertices is session.vertices

@@ -8,14 +8,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from solids import icosphere, rotation
 
-from vtk_segdeform.deformer import deformer as chapter
+from vtk_segdeform import sizes
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
-from vtk_segdeform.solver import coarse_volume, exact_volume
-from vtk_segdeform.solver.exact_volume import scaled
+from vtk_segdeform.solver import exact_volume
+from vtk_segdeform.solver.exact_volume import scale_to_volume
 from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.solver.volume_constraints import total_volume
-from vtk_segdeform.subspace.device import DeviceError, DeviceSurface
+from vtk_segdeform.subspace.gpu import GPUError, GPUSurface
 
 SCENE = sausage()
 TARGETS = SCENE.turned(40)
@@ -24,9 +24,9 @@ TARGETS = SCENE.turned(40)
 @pytest.fixture
 def wide(monkeypatch):
     """Small meshes are landed as large ones are."""
-    monkeypatch.setattr(coarse_volume, "_LARGE", 1000)
-    monkeypatch.setattr(coarse_volume, "_POINTS", 700)
-    monkeypatch.setattr(chapter, "_WIDE", 1000)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", 1000)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 700)
+    monkeypatch.setattr(sizes, "SCALED_VOLUME", 1000)
 
 
 @pytest.mark.parametrize("missing", [-0.3, -1e-5, 1e-9, 0.4])
@@ -37,7 +37,7 @@ def test_scaling_restores_the_volume_and_leaves_the_centre_where_it_was(missing)
     x = points + 0.0
     x[:, 2] *= 1.0 + missing
     before, centre = x.copy(), x[7].copy()
-    scale = scaled(constraint, x, centre)
+    scale = scale_to_volume(constraint, x, centre)
     assert signed_volume(x, faces) / constraint.target == pytest.approx(1.0, abs=1e-14)
     assert scale**3 == pytest.approx(1.0 / (1.0 + missing), rel=1e-12)
     assert_allclose(x[7], centre, atol=1e-14)
@@ -49,7 +49,7 @@ def test_a_surface_turned_inside_out_is_left_alone():
     constraint = total_volume(Mesh(points, faces))
     mirrored = points * [1.0, 1.0, -1.0]
     x = mirrored.copy()
-    assert scaled(constraint, x, np.zeros(3)) == 1.0
+    assert scale_to_volume(constraint, x, np.zeros(3)) == 1.0
     assert_array_equal(x, mirrored)
 
 
@@ -60,8 +60,8 @@ def test_a_large_mesh_is_landed_by_its_size_and_its_cages_with_it():
     assert solution.status is Status.CONVERGED
     assert abs(solution.volume_change) < 1e-14
     assert_allclose(deformer.surface(solution.cage_vertices), solution.vertices, atol=1e-13)
-    assert deformer._ladder.solver.volumes.constraints[0].target != pytest.approx(
-        deformer._volumes.constraints[0].target, rel=1e-9
+    assert deformer._continuation.solver.volumes.constraints[0].target != pytest.approx(
+        deformer._constraints.volumes.constraints[0].target, rel=1e-9
     )  # held is what the stand-in has where the mesh has its own
 
 
@@ -84,7 +84,7 @@ def test_the_pose_does_not_depend_on_the_way_there():
 @pytest.mark.usefixtures("wide")
 def test_its_pose_is_that_of_the_whole(monkeypatch):
     by_size = SCENE.deformer().solve(TARGETS)
-    monkeypatch.setattr(coarse_volume, "_LARGE", 10**9)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", 10**9)
     whole = SCENE.deformer().solve(TARGETS)
     away = np.linalg.norm(by_size.vertices - whole.vertices, axis=1).max()
     assert away < 3e-3 * SCENE.mesh.diagonal
@@ -111,9 +111,9 @@ def test_a_gpu_lands_a_mesh_where_the_processor_does(monkeypatch):
     monkeypatch.setattr(exact_volume, "gpu_arrays", lambda: np)  # the lines that a GPU runs
     used = []
     monkeypatch.setattr(
-        DeviceSurface,
+        GPUSurface,
         "map",
-        lambda *given, plain=DeviceSurface.map: used.append(1) or plain(*given),
+        lambda *given, plain=GPUSurface.map: used.append(1) or plain(*given),
     )
     there = SCENE.deformer().solve(TARGETS)
     assert used
@@ -122,16 +122,16 @@ def test_a_gpu_lands_a_mesh_where_the_processor_does(monkeypatch):
 
 
 @pytest.mark.usefixtures("wide")
-@pytest.mark.parametrize("when", ["__init__", "map", "scaled", "host"])
+@pytest.mark.parametrize("when", ["__init__", "map", "scale_to_volume", "host"])
 def test_a_gpu_that_fails_is_gone_on_without(monkeypatch, when):
     here = SCENE.deformer().solve(TARGETS)
     monkeypatch.setattr(exact_volume, "gpu_arrays", lambda: np)
 
     def failing(*_):
-        raise DeviceError("out of memory")
+        raise GPUError("out of memory")
 
-    monkeypatch.setattr(DeviceSurface, when, failing)
+    monkeypatch.setattr(GPUSurface, when, failing)
     deformer = SCENE.deformer()
     there = deformer.solve(TARGETS)
     assert_array_equal(there.vertices, here.vertices)
-    assert deformer._large._device is None
+    assert deformer._scaled_surface._gpu is None

@@ -6,7 +6,8 @@ from scenes import sausage
 from solids import rotation
 
 from vtk_segdeform.geometry.volume import signed_volume
-from vtk_segdeform.solver.volume_constraints import region_volumes, restore, total_volume
+from vtk_segdeform.solver.exact_volume import steps_to_volume
+from vtk_segdeform.solver.volume_constraints import region_volumes, total_volume
 
 SCENE = sausage(3)
 MESH = SCENE.mesh
@@ -61,10 +62,10 @@ def test_gradients_are_right_to_second_order():
         assert_allclose(errors[0] / errors[1], 4.0, rtol=0.1)
 
 
-def test_curvature_is_the_derivative_of_the_gradient():
+def test_the_hessian_is_the_derivative_of_the_gradient():
     x, dx = MESH.vertices + wobble(3), wobble(4, 1.0)
     for constraint in (total_volume(MESH), *region_volumes(MESH, SCENE.regions.labels)):
-        halves = constraint.curvature(x).toarray().reshape(3, len(x), -1)
+        halves = constraint.hessian_halves(x).toarray().reshape(3, len(x), -1)
         bends = [half @ dx - half.T @ dx for half in halves]  # M_c dx
         product = np.stack(
             [bends[2][:, 1] - bends[1][:, 2], bends[0][:, 2] - bends[2][:, 0]]
@@ -85,8 +86,8 @@ def test_restore_meets_every_constraint_at_once():
     constraints = region_volumes(MESH, SCENE.regions.labels)
     x = MESH.vertices + wobble(2)
     directions = [c.gradient(MESH.vertices) for c in constraints]
-    t = restore(constraints, np.hstack([x, *directions]))
+    t = steps_to_volume(constraints, np.hstack([x, *directions]))
     x = x + sum(step * d for step, d in zip(t, directions, strict=True))
     assert max(abs(c.violation(x)) for c in constraints) < 1e-12
-    (step,) = restore([total_volume(MESH)], np.hstack([x, MESH.vertices]))
+    (step,) = steps_to_volume([total_volume(MESH)], np.hstack([x, MESH.vertices]))
     assert abs(step) < 1e-12

@@ -28,14 +28,13 @@ from vtk_segdeform.io.polygons import polydata_of
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.solver import exact_volume
 from vtk_segdeform.solver.volume_constraints import total_volume
-from vtk_segdeform.subspace import device, gpu, products
-from vtk_segdeform.subspace.device import DeviceError, DeviceSurface
-from vtk_segdeform.subspace.gpu import TorchArrays, gpu_arrays
-from vtk_segdeform.subspace.subspace import Subspace, bind
+from vtk_segdeform.subspace import gpu, subspace
+from vtk_segdeform.subspace.gpu import GPUError, GPUSurface, TorchArrays, gpu_arrays
+from vtk_segdeform.subspace.subspace import Subspace, cage_subspace
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = sausage()
-SUBSPACE = bind(SCENE.regions, SCENE.cages)
+SUBSPACE = cage_subspace(SCENE.regions, SCENE.cages)
 SINGLE = replace(SUBSPACE, blocks=tuple(b.astype(np.float32) for b in SUBSPACE.blocks))
 MOVES = 0.3 * np.random.default_rng(4).normal(size=(SUBSPACE.n_columns, 3))
 BEAD = icosphere(3)
@@ -46,8 +45,8 @@ CACTUS = models.cactus(900)
 @pytest.fixture(params=["numpy", "torch", "gpu"])
 def arrays(request, monkeypatch):
     """Return each library in turn; meshes come in many pieces, as large ones do."""
-    monkeypatch.setattr(device, "_FACES", 1000)
-    monkeypatch.setattr(products, "_DENSE", 5000)
+    monkeypatch.setattr(gpu, "_FACES", 1000)
+    monkeypatch.setattr(subspace, "_DENSE", 5000)
     if request.param == "numpy":
         return np
     if request.param == "torch":
@@ -55,9 +54,9 @@ def arrays(request, monkeypatch):
     return gpu_arrays() or pytest.skip("no GPU here")
 
 
-def still(points, faces, arrays) -> DeviceSurface:
+def still(points, faces, arrays) -> GPUSurface:
     """Return a surface without cages."""
-    return DeviceSurface(Subspace(len(points), (), ()), points, faces, arrays)
+    return GPUSurface(Subspace(len(points), (), ()), points, faces, arrays)
 
 
 def normals_of(points, faces, arrays):
@@ -68,7 +67,7 @@ def normals_of(points, faces, arrays):
 @pytest.mark.parametrize("subspace", [SUBSPACE, SINGLE], ids=["double", "single"])
 def test_the_map_is_that_of_the_subspace(arrays, subspace):
     rest = SCENE.mesh.vertices
-    surface = DeviceSurface(subspace, rest, SCENE.mesh.faces, arrays)
+    surface = GPUSurface(subspace, rest, SCENE.mesh.faces, arrays)
     for moves in (MOVES, 0.0 * MOVES, -MOVES):  # nothing is left of the last
         assert_allclose(
             surface.host(surface.map(moves)), subspace.map(moves, rest.copy()), rtol=0, atol=1e-14
@@ -76,7 +75,7 @@ def test_the_map_is_that_of_the_subspace(arrays, subspace):
 
 
 def test_nothing_moved_is_the_rest_to_the_last_digit(arrays):
-    surface = DeviceSurface(SINGLE, SCENE.mesh.vertices, SCENE.mesh.faces, arrays)
+    surface = GPUSurface(SINGLE, SCENE.mesh.vertices, SCENE.mesh.faces, arrays)
     assert_array_equal(surface.host(surface.map(0.0 * MOVES)), SCENE.mesh.vertices)
 
 
@@ -104,13 +103,14 @@ def test_the_volume_is_as_exact_as_ever_and_the_same_every_time(arrays, far):
 def test_a_frame_ends_on_the_volume_of_the_rest(arrays):
     rest, faces = SCENE.mesh.vertices, SCENE.mesh.faces
     constraint = total_volume(SCENE.mesh)
-    surface = DeviceSurface(SINGLE, rest, faces, arrays)
+    surface = GPUSurface(SINGLE, rest, faces, arrays)
     x = surface.map(MOVES)
     centre = np.array([0.3, -2.0, 1.0])
     there = surface.host(x).copy()
     assert abs(constraint.relative(there)) > 1e-2
-    scale = surface.scaled(x, constraint.target, centre)
-    assert scale == pytest.approx(exact_volume.scaled(constraint, there, centre), rel=1e-14)
+    scale = surface.scale_to_volume(x, constraint.target, centre)
+    expected = exact_volume.scale_to_volume(constraint, there, centre)
+    assert scale == pytest.approx(expected, rel=1e-14)
     assert_allclose(surface.host(x), there, rtol=0, atol=1e-14)
     assert abs(constraint.relative(surface.host(x))) < 1e-14
 
@@ -120,7 +120,7 @@ def test_a_surface_turned_inside_out_is_left_alone(arrays):
     mirrored = points * [1.0, 1.0, -1.0]
     x = arrays.asarray(mirrored)
     surface = still(points, faces, arrays)
-    assert surface.scaled(x, signed_volume(points, faces), np.ones(3)) == 1.0
+    assert surface.scale_to_volume(x, signed_volume(points, faces), np.ones(3)) == 1.0
     assert_array_equal(surface.host(x), mirrored)
 
 
@@ -180,12 +180,12 @@ def test_a_vertex_without_faces_has_no_normal(arrays):
 
 
 def test_no_call_takes_more_memory_than_its_chapter_says(monkeypatch):
-    monkeypatch.setattr(device, "_FACES", 1 << 10)
+    monkeypatch.setattr(gpu, "_FACES", 1 << 10)
     points, faces = torus(240, 120)
     n, m = len(points), len(faces)
     whole = np.arange(n)
     subspace = Subspace(n, (whole,), (np.ones((n, 2), dtype=np.float32),))
-    piece = 300 * device._FACES
+    piece = 300 * gpu._FACES
 
     def taken(call):
         tracemalloc.start()
@@ -195,7 +195,7 @@ def test_no_call_takes_more_memory_than_its_chapter_says(monkeypatch):
         tracemalloc.stop()
         return kept, after - before, peak - before
 
-    surface, stays, _ = taken(lambda: DeviceSurface(subspace, points, faces, np))
+    surface, stays, _ = taken(lambda: GPUSurface(subspace, points, faces, np))
     assert stays < 1.01 * (8 * 2 * n + 24 * n + 24 * m)
     _, stays, _ = taken(lambda: surface._fans)
     assert stays < 60 * m
@@ -206,16 +206,16 @@ def test_no_call_takes_more_memory_than_its_chapter_says(monkeypatch):
 
 
 @pytest.mark.parametrize("fault", [MemoryError("2 bytes wanted"), RuntimeError("CUDA error")])
-def test_a_device_that_gives_up_says_so_by_name(fault):
+def test_a_failure_of_the_gpu_raises_a_gpu_error(fault):
     def fails(*_, **__):
         raise fault
 
     full = types.SimpleNamespace(**{**vars(np), "empty": fails})
-    with pytest.raises(DeviceError, match=f"the GPU gave up: {fault}"):
-        DeviceSurface(SUBSPACE, SCENE.mesh.vertices, SCENE.mesh.faces, full)
+    with pytest.raises(GPUError, match=f"the GPU gave up: {fault}"):
+        GPUSurface(SUBSPACE, SCENE.mesh.vertices, SCENE.mesh.faces, full)
     lost = still(*BEAD, types.SimpleNamespace(**{**vars(np), "take": fails}))
-    for call in (lost.volume, lost.normals, lambda x: lost.scaled(x, 1.0, np.zeros(3))):
-        with pytest.raises(DeviceError, match=f"^the GPU gave up: {fault}$"):
+    for call in (lost.volume, lost.normals, lambda x: lost.scale_to_volume(x, 1.0, np.zeros(3))):
+        with pytest.raises(GPUError, match=f"^the GPU gave up: {fault}$"):
             call(BEAD[0])
 
 

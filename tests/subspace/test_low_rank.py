@@ -7,12 +7,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 
-from vtk_segdeform.deformer import binding
-from vtk_segdeform.deformer import deformer as chapter
+from vtk_segdeform import sizes
 from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.subspace import low_rank
-from vtk_segdeform.subspace.low_rank import Patches
+from vtk_segdeform.subspace.low_rank import LowRankSubspace
 from vtk_segdeform.subspace.subspace import Subspace
 
 SCENE = sausage(3)
@@ -24,16 +23,16 @@ MOVES = 0.1 * np.random.default_rng(5).normal(size=(len(CAGES), 9))
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
-    """Patches for a small mesh."""
-    monkeypatch.setattr(low_rank, "_TOGETHER", 100)
-    monkeypatch.setattr(low_rank, "_WORTH", np.inf)
+    """LowRankSubspace for a small mesh."""
+    monkeypatch.setattr(low_rank, "_PATCH", 100)
+    monkeypatch.setattr(low_rank, "_WORTHWHILE", np.inf)
 
 
-def made() -> Patches:
-    return Patches.of(SUBSPACE, REST, CAGES)
+def made() -> LowRankSubspace:
+    return LowRankSubspace.of(SUBSPACE, REST, CAGES)
 
 
-def parts(of: Patches):
+def parts(of: LowRankSubspace):
     return list(of._parts(0, len(of.starts) - 1))
 
 
@@ -80,7 +79,7 @@ def test_it_maps_as_the_whole_does_compiled_and_not(monkeypatch, columns, compil
         monkeypatch.setattr(dispatch, "_kernels", lambda: None)
     of, p = made(), MOVES[:, :columns]
     for start in (None, REST):
-        mapped = of.map(p, None if start is None else of.start(start))
+        mapped = of.map(p, None if start is None else of.base(start))
         assert_allclose(mapped, SUBSPACE.map(p, start), atol=1e-6)
     exact = np.zeros((len(REST), columns))
     for ids, own, left, right in parts(of):
@@ -89,22 +88,22 @@ def test_it_maps_as_the_whole_does_compiled_and_not(monkeypatch, columns, compil
 
 
 def test_where_patches_would_be_no_smaller_there_are_none(monkeypatch):
-    monkeypatch.setattr(low_rank, "_WORTH", 0.7)
+    monkeypatch.setattr(low_rank, "_WORTHWHILE", 0.7)
     rough = tuple(np.random.default_rng(3).random(block.shape) for block in SUBSPACE.blocks)
-    assert Patches.of(Subspace(len(REST), SUBSPACE.rows, rough), REST, CAGES) is None
+    assert LowRankSubspace.of(Subspace(len(REST), SUBSPACE.rows, rough), REST, CAGES) is None
 
 
 @pytest.mark.parametrize("region_volumes", [False, True])
 def test_a_large_mesh_is_posed_by_its_patches_and_keeps_its_volume(
     tmp_path, monkeypatch, region_volumes
 ):
-    monkeypatch.setattr(chapter, "_WIDE", 1000)
+    monkeypatch.setattr(sizes, "SCALED_VOLUME", 1000)
     whole = SCENE.deformer(preserve_region_volumes=region_volumes).solve(SCENE.turned(40))
-    monkeypatch.setattr(binding, "_LARGE", 1000)
+    monkeypatch.setattr(sizes, "LOW_RANK", 1000)
     poses = []
     for _ in range(2):  # bound, and read again
         deformer = SCENE.deformer(preserve_region_volumes=region_volumes, cache=tmp_path)
-        assert isinstance(deformer._mapping, Patches)
+        assert isinstance(deformer._binding.mapping, LowRankSubspace)
         pose = deformer.solve(SCENE.turned(40))
         assert abs(pose.volume_change) < 1e-14
         assert_allclose(deformer.surface(pose.cage_vertices), pose.vertices, atol=1e-13)
@@ -115,7 +114,7 @@ def test_a_large_mesh_is_posed_by_its_patches_and_keeps_its_volume(
 
 
 def test_making_them_tells_how_far_it_is_and_can_be_cancelled(monkeypatch):
-    monkeypatch.setattr(binding, "_LARGE", 1000)
+    monkeypatch.setattr(sizes, "LOW_RANK", 1000)
     told = []
 
     def listen(share, message):
@@ -124,10 +123,10 @@ def test_making_them_tells_how_far_it_is_and_can_be_cancelled(monkeypatch):
     SCENE.deformer(progress=listen)
     shares = [share for share, _ in told]
     assert shares == sorted(shares)
-    assert {message for _, message in told} >= {"making patches"}
+    assert {message for _, message in told} >= {"factoring the subspace"}
 
     def stop(share, message):
-        if message == "making patches":
+        if message == "factoring the subspace":
             raise Cancelled
 
     with pytest.raises(Cancelled):

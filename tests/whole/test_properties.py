@@ -177,7 +177,7 @@ def test_the_volume_is_exact_wherever_a_handle_is_put(move, degrees, axis):
     assert np.isfinite(solution.vertices).all()
     assert abs(now - rest) <= 1e-12 * rest
     # Back at rest the objective is what is left of two sums as large as its constant.
-    rounding = 2e-13 * deformer._energy.constant
+    rounding = 2e-13 * deformer._binding.energy.constant
     assert all(
         b <= a * (1 + 1e-12) + rounding
         for a, b in zip(solution.merits, solution.merits[1:], strict=False)

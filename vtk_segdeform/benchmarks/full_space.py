@@ -16,7 +16,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from ..arrays import FloatArray
-from ..energy import grams, surface_operators
+from ..energy import reduced_operators, surface_operators
 from ..geometry import (
     IntrinsicTriangulation,
     closest_rotations,
@@ -62,7 +62,7 @@ def _factored(task: Task, subspace: Subspace) -> tuple[Any, Any, float]:
     surface = IntrinsicTriangulation.of(mesh.vertices, mesh.faces)
     shape = surface_operators(surface, np.arange(mesh.n_vertices))
     areas, laplacian = shape.areas, shape.laplacian
-    inside, between, *_ = grams(subspace, laplacian, 0.25 / areas, areas)
+    inside, between, *_ = reduced_operators(subspace, laplacian, 0.25 / areas, areas)
     share = _STRETCH * float(np.trace(inside) / np.trace(between))
     matrix = laplacian.T @ sparse.diags_array(0.25 / areas) @ laplacian + share * laplacian
     weight = _HOLD * float(matrix.diagonal().mean())

@@ -26,7 +26,8 @@ from .measuring import timed
 
 # The paper's own formulation: one rotation a vertex, detail only, volume linearised, plain steps.
 PAPER: dict[str, Any] = {
-    "rotation_groups": None, "stretch": 0.0, "exact_volume": False, "window": 0,
+    "rotation_groups": None, "stretch": 0.0, "exact_volume": False,
+    "acceleration": 0, "exact_hessian": False,
 }  # fmt: skip
 NEAR = 1e-4  # diagonals: converged is when the next step moves nothing by more
 

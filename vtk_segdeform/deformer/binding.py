@@ -1,60 +1,55 @@
-"""All that is computed once for a mesh, its regions and its cages: what takes seconds.
+"""Binding: all that is computed once for a mesh, its regions and its cages, in seconds.
 
-    W~              `subspace.bind`
-    E(p)            `energy.shape_energy`, `cage_stiffness`
-    the stand-in    `coarse_volume.StandIn`
-    W~ in patches   `low_rank.Patches`, of a large mesh
+    W~                 `subspace.cage_subspace`, figure 6 of the paper
+    E(p)               `energy.shape_energy`, eqs. (5), (10), (20), and the stiffness of the cages
+    coarse volume      `coarse_volume.CoarseVolume`, of a large mesh
+    low-rank W~        `low_rank.LowRankSubspace`, of a very large mesh
 
-With a *cache*, a folder, the binding is kept on disk (`binding_cache`), named by a hash of all
-that it depends on, so that the same mesh with the same cages is bound once.
+It does not depend on fixed vertices, handles or targets.  `binding_cache` keeps it on disk.
 """
 
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
+from .. import sizes
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage
 from ..energy import Energy, join_rotations, shape_energy, with_cage_stiffness
-from ..geometry import rotation_groups
+from ..geometry import cluster_within_parts
 from ..mesh import Mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions
-from ..solver import StandIn
-from ..subspace import Patches, bind
-from .binding_cache import ENDING, Binding
+from ..solver import CoarseVolume
+from ..subspace import LowRankSubspace, Subspace, cage_subspace
 
-_FORMAT = 8  # increment whenever the content of a binding changes
-_BITS, _EACH = 2000, 6  # rotations at first: so many, or more, for each one asked for
-_LARGE = 100_000  # vertices beyond which what every frame maps by is kept in patches
+_FORMAT = 9  # increment whenever the content of a binding changes
 
 
 @dataclass(frozen=True, eq=False)
-class Binder:
-    """What is to be bound, and how; `binding_cache` does it.
+class BindingInputs:
+    """All that a binding depends on.
 
     Parameters
     ----------
     rest : Mesh
         The mesh at rest, size about 1.
     regions : Regions
-        Of the mesh.
+        Of the mesh in scene coordinates.
     cages : sequence of Cage
-        In the mesh's own unit, and ...
+        In scene coordinates.
     rest_cages : (m, 3) float
-        ... their vertices as *rest* is.
+        The stacked cage vertices, in the coordinates of *rest*.
     blend : (r, n) float or None
-        See `subspace.bind`.
+        Blend weights instead of those of *regions*.
     stretch : float
         See `energy.shape_energy`.
-    n_groups : int or None
-        Rotations, None for one per vertex.
+    n_clusters : int or None
+        Number of rotation clusters; None gives each vertex its own rotation.
     """
 
     rest: Mesh
@@ -63,78 +58,94 @@ class Binder:
     rest_cages: FloatArray
     blend: FloatArray | None
     stretch: float
-    n_groups: int | None
-
-    def bound(
-        self, cache: str | os.PathLike[str] | None = None, progress: Progress | None = None
-    ) -> Binding:
-        """Return the binding, from the folder *cache* if it is there, and leave it there."""
-        path = None
-        if cache is not None and self.n_groups is not None and self.stretch > 0.0:
-            path = Path(cache) / (self._name() + ENDING)
-            if found := Binding.read(path, self.rest.n_vertices):
-                return found
-        binding = self._make(progress)
-        if path is not None:
-            binding.write(path)
-        return binding
-
-    def _make(self, progress: Progress | None) -> Binding:
-        tell(progress, 0.0, "checking cages")
-        blend, share = self.blend, part(progress, 0.0, 0.8)
-        subspace = bind(self.regions, self.cages, blend=blend, progress=share)
-        tell(progress, 0.8, "grouping rotations")
-        groups = self._groups()
-        share = part(progress, 0.82, 0.85)
-        energy = shape_energy(self.rest, subspace, self.stretch, groups, progress=share)
-        if groups is not None and energy.exact:
-            faces = [cage.faces for cage in self.cages]
-            energy = with_cage_stiffness(energy, self.rest_cages, faces, groups)
-            energy = self._joined(energy, groups, part(progress, 0.85, 0.86))
-        share, whole = part(progress, 0.86, 0.9), energy.turns_vertices
-        stand_in = StandIn.of(self.regions.mesh, subspace, whole=whole, progress=share)
-        patches = None
-        if self.rest.n_vertices > _LARGE:
-            share = part(progress, 0.9, 1.0)
-            patches = Patches.of(subspace, self.rest.vertices, self.rest_cages, progress=share)
-        return Binding(energy, stand_in, patches)
-
-    def _groups(self) -> IntArray | None:
-        """Return the rotation of each vertex; more than asked for, where `_joined` follows."""
-        n, count = self.rest.n_vertices, self.n_groups
-        if count is None:
-            return None
-        many = self.stretch > 0.0
-        count = max(_BITS, _EACH * count) if many else count
-        if count >= n:
-            return np.arange(n)
-        return rotation_groups(self.rest.vertices, self._parts, count, quick=many)
+    n_clusters: int | None
 
     @property
-    def _parts(self) -> IntArray:
+    def is_reduced(self) -> bool:
+        """Whether the energy is in the subspace completely, without operators on the mesh."""
+        return self.n_clusters is not None and self.stretch > 0.0
+
+    @property
+    def parts(self) -> IntArray:
+        """Numbers (n,) of the parts that no rotation cluster spans: regions, shell by shell."""
         component = self.regions.mesh.components
         return np.asarray(self.regions.labels * (int(component.max()) + 1) + component)
 
-    def _joined(self, energy: Energy, groups: IntArray, progress: Progress | None) -> Energy:
-        """Return *energy* with as many rotations as asked for."""
-        assert self.n_groups is not None
-        counts = np.bincount(groups)
-        if len(counts) <= self.n_groups:
-            return energy
-        means = np.stack([np.bincount(groups, x) / counts for x in self.rest.vertices.T], axis=1)
-        parts = np.zeros(len(counts), dtype=np.int64)
-        parts[groups] = self._parts
-        bits = means, parts, counts
-        return join_rotations(energy, self.rest_cages, bits, self.n_groups, progress=progress)[0]
-
-    def _name(self) -> str:
-        """Return a name that is the same exactly when the binding is."""
+    def digest(self) -> str:
+        """Return 40 hexadecimal digits that are equal exactly for equal inputs."""
         regions = self.regions
         seen = hashlib.blake2b(digest_size=20)
-        seen.update(repr((_FORMAT, self.stretch, self.n_groups, regions.smoothness)).encode())
+        seen.update(repr((_FORMAT, self.stretch, self.n_clusters, regions.smoothness)).encode())
         arrays = [regions.mesh.vertices, regions.mesh.faces, regions.membership, self.blend]
         for array in [*arrays, *(a for cage in self.cages for a in (cage.vertices, cage.faces))]:
             if array is not None:
                 seen.update(repr((array.shape, array.dtype.str)).encode())
                 seen.update(np.ascontiguousarray(array).view(np.uint8).data)
         return seen.hexdigest()
+
+
+@dataclass(frozen=True, eq=False)
+class Binding:
+    """The subspace, energy and volumes with which a `Deformer` solves."""
+
+    energy: Energy
+    coarse_volume: CoarseVolume
+    low_rank: LowRankSubspace | None = None
+
+    @property
+    def mapping(self) -> Subspace | LowRankSubspace:
+        """The map from the cages to the mesh: W~, or its low-rank factors."""
+        return self.low_rank or self.energy.subspace
+
+    @classmethod
+    def compute(cls, inputs: BindingInputs, progress: Progress | None = None) -> Binding:
+        """Return the binding of *inputs*."""
+        tell(progress, 0.0, "checking cages")
+        rest, regions, cages = inputs.rest, inputs.regions, inputs.cages
+        share = part(progress, 0.0, 0.8)
+        subspace = cage_subspace(regions, cages, blend=inputs.blend, progress=share)
+        tell(progress, 0.8, "clustering rotations")
+        clusters = _first_clusters(inputs)
+        share = part(progress, 0.82, 0.85)
+        energy = shape_energy(rest, subspace, inputs.stretch, clusters, progress=share)
+        if clusters is not None and energy.has_exact_gradient:
+            faces = [cage.faces for cage in cages]
+            energy = with_cage_stiffness(energy, inputs.rest_cages, faces, clusters)
+            energy = _joined(inputs, energy, clusters, part(progress, 0.85, 0.86))
+        share, whole = part(progress, 0.86, 0.9), energy.has_vertex_rotations
+        coarse = CoarseVolume.of(regions.mesh, subspace, whole=whole, progress=share)
+        low_rank = None
+        if rest.n_vertices > sizes.LOW_RANK:
+            share = part(progress, 0.9, 1.0)
+            cages_at_rest = inputs.rest_cages
+            low_rank = LowRankSubspace.of(subspace, rest.vertices, cages_at_rest, progress=share)
+        return cls(energy, coarse, low_rank)
+
+
+def _first_clusters(inputs: BindingInputs) -> IntArray | None:
+    """Return the rotation cluster of each vertex; many small ones where `_joined` follows."""
+    n, count = inputs.rest.n_vertices, inputs.n_clusters
+    if count is None:
+        return None
+    if inputs.is_reduced:
+        count = max(sizes.FIRST_CLUSTERS, sizes.FIRST_CLUSTERS_EACH * count)
+    if count >= n:
+        return np.arange(n)
+    return cluster_within_parts(inputs.rest.vertices, inputs.parts, count, quick=inputs.is_reduced)
+
+
+def _joined(
+    inputs: BindingInputs, energy: Energy, clusters: IntArray, progress: Progress | None
+) -> Energy:
+    """Return *energy* with the requested number of rotations."""
+    assert inputs.n_clusters is not None
+    counts = np.bincount(clusters)
+    if len(counts) <= inputs.n_clusters:
+        return energy
+    x = inputs.rest.vertices
+    means = np.stack([np.bincount(clusters, axis) / counts for axis in x.T], axis=1)
+    parts = np.zeros(len(counts), dtype=np.int64)
+    parts[clusters] = inputs.parts
+    patches = means, parts, counts
+    n_clusters = inputs.n_clusters
+    return join_rotations(energy, inputs.rest_cages, patches, n_clusters, progress=progress)[0]

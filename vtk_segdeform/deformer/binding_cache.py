@@ -1,9 +1,9 @@
-"""What a mesh, its regions and its cages are bound to, and how that is kept on disk.
+"""Bindings kept on disk, so that a mesh with the same regions and cages is bound once.
 
-A folder holds one file for each binding, an ``.npz`` whose name is a digest of all that it was
-computed from (`binding`).  The file contains this digest as well, so that a renamed file is
-detected.  Files of other users, symbolic links and pipes are neither read nor replaced.  A file
-that is ignored is logged, once for each reason.
+A folder holds one file for each binding, an ``.npz`` whose name is a digest of its inputs
+(`binding`).  The file contains this digest as well, so that a renamed file is detected.  Files of
+other users, symbolic links and pipes are neither read nor replaced.  A file that is ignored is
+logged, once for each reason.
 
 A binding of a million vertices is some 400 megabytes.  First touch of fresh memory dominates, so
 the arrays are read in parallel.
@@ -17,7 +17,7 @@ import os
 import re
 import sys
 from contextlib import suppress
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -26,94 +26,100 @@ import numpy as np
 from ..energy import Energy
 from ..files import fault_of, open_regular, replacing
 from ..kernels import in_parallel
-from ..solver import StandIn
-from ..subspace import Patches, Subspace
+from ..progress import Progress
+from ..solver import CoarseVolume
+from ..subspace import LowRankSubspace, Subspace
+from .binding import Binding, BindingInputs
 
-ENDING = ".bound.npz"
+ENDING = ".binding.npz"
 _MOST = 4 << 30  # bytes in a folder
 _OURS = re.compile(r"[0-9a-f]{40}" + re.escape(ENDING))
 
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, eq=False)
-class Binding:
-    """What a `Deformer` solves with."""
+def cached_binding(
+    inputs: BindingInputs, folder: Path | None, progress: Progress | None = None
+) -> Binding:
+    """Return the binding of *inputs*, read from *folder*, or else computed and written there.
 
-    energy: Energy
-    stand_in: StandIn
-    patches: Patches | None = None
+    A binding with operators on the mesh, as of a rotation for each vertex, is always computed.
+    """
+    if folder is None or not inputs.is_reduced:
+        return Binding.compute(inputs, progress)
+    path = folder / (inputs.digest() + ENDING)
+    binding = read_binding(path, inputs.rest.n_vertices)
+    if binding is None:
+        binding = Binding.compute(inputs, progress)
+        write_binding(path, binding)
+    return binding
 
-    @property
-    def mapping(self) -> Subspace | Patches:
-        """What maps the cages to the mesh: W~, or W~ in patches."""
-        return self.patches or self.energy.subspace
 
-    @classmethod
-    def read(cls, path: Path, n_vertices: int) -> Binding | None:
-        """Return what is in a file; None if there is none, or none that can be believed."""
-        try:
-            arrays = _read(path)
-            subspace = _subspace(arrays, "w", n_vertices)
-            pull = arrays["pull"]
-            energy = Energy(
-                quadratic=arrays["quadratic"],
-                constant=float(arrays["constant"]),
-                scale=float(arrays["scale"]),
-                mass=arrays["mass"],
-                fit=pull,
-                pull=pull,
-                subspace=subspace,
-            )
-            stand_in = StandIn(subspace)
-            if "cells" in arrays:
-                surface = _subspace(arrays, "s", int(arrays["n_cells"]))
-                stand_in = StandIn(surface, arrays["cells"], arrays["shares"])
-            patches = None
-            if "patch_starts" in arrays:
-                patches = Patches(*(arrays["patch_" + each.name] for each in fields(Patches)))
-            os.utime(path)  # used: among the last to be thrown away
-        except FileNotFoundError:
-            return None
-        except Exception as fault:  # noqa: BLE001 - damaged files raise a dozen kinds
-            _warn_once(path, f"ignored, {getattr(fault, 'strerror', None) or fault}")
-            return None
-        return cls(energy, stand_in, patches)
+def read_binding(path: Path, n_vertices: int) -> Binding | None:
+    """Return the binding in a file; None if there is no file, or no valid one."""
+    try:
+        arrays = _read(path)
+        subspace = _subspace(arrays, "w", n_vertices)
+        operator = arrays["operator"]
+        energy = Energy(
+            quadratic=arrays["quadratic"],
+            constant=float(arrays["constant"]),
+            scale=float(arrays["scale"]),
+            mass=arrays["mass"],
+            covariance_operator=operator,
+            load_operator=operator,
+            subspace=subspace,
+        )
+        coarse = CoarseVolume(subspace)
+        if "cells" in arrays:
+            surface = _subspace(arrays, "c", int(arrays["n_cells"]))
+            coarse = CoarseVolume(surface, arrays["cells"], arrays["shares"])
+        low_rank = None
+        if "low_rank_starts" in arrays:
+            names = [each.name for each in fields(LowRankSubspace)]
+            low_rank = LowRankSubspace(*(arrays["low_rank_" + name] for name in names))
+        os.utime(path)  # recently used files are deleted last
+    except FileNotFoundError:
+        return None
+    except Exception as fault:  # noqa: BLE001 - damaged files raise a dozen kinds
+        _warn_once(path, f"ignored, {getattr(fault, 'strerror', None) or fault}")
+        return None
+    return Binding(energy, coarse, low_rank)
 
-    def write(self, path: Path) -> None:
-        """Keep it in a file, whole or not at all; without room for it, it is not kept."""
-        energy, stand_in = self.energy, self.stand_in
-        arrays: dict[str, Any] = {
-            "key": np.array(_key(path)),
-            "quadratic": energy.quadratic,
-            "constant": np.array(energy.constant),
-            "scale": np.array(energy.scale),
-            "mass": energy.mass,
-            "pull": energy.pull,
-            **_arrays(energy.subspace, "w"),
-        }
-        if stand_in.cells is not None:
-            arrays |= {"cells": stand_in.cells, "shares": stand_in.shares}
-            arrays |= {"n_cells": np.array(stand_in.surface.n_vertices)}
-            arrays |= _arrays(stand_in.surface, "s")
-        if patches := self.patches:
-            arrays |= {
-                "patch_" + each.name: getattr(patches, each.name) for each in fields(Patches)
-            }
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with suppress(FileNotFoundError):
-                if fault := fault_of(os.lstat(path), own=True):
-                    raise OSError(f"is {fault}")
-            with replacing(path, follow=False, durable=False) as draft, open(draft, "wb") as file:
-                np.savez(file, allow_pickle=False, **arrays)
-            _make_room(path.parent)
-        except OSError as fault:  # full disk or read-only folder: go without the file
-            _warn_once(path, f"not written, {fault.strerror or fault}")
+
+def write_binding(path: Path, binding: Binding) -> None:
+    """Write a binding to a file, completely or not at all; without room for it, not at all."""
+    energy, coarse = binding.energy, binding.coarse_volume
+    arrays: dict[str, Any] = {
+        "key": np.array(_key(path)),
+        "quadratic": energy.quadratic,
+        "constant": np.array(energy.constant),
+        "scale": np.array(energy.scale),
+        "mass": energy.mass,
+        "operator": energy.load_operator,
+        **_arrays(energy.subspace, "w"),
+    }
+    if coarse.cells is not None:
+        arrays |= {"cells": coarse.cells, "shares": coarse.shares}
+        arrays |= {"n_cells": np.array(coarse.surface.n_vertices)}
+        arrays |= _arrays(coarse.surface, "c")
+    if low_rank := binding.low_rank:
+        for each in fields(LowRankSubspace):
+            arrays["low_rank_" + each.name] = getattr(low_rank, each.name)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with suppress(FileNotFoundError):
+            if fault := fault_of(os.lstat(path), own=True):
+                raise OSError(f"is {fault}")
+        with replacing(path, follow=False, durable=False) as draft, open(draft, "wb") as file:
+            np.savez(file, allow_pickle=False, **arrays)
+        _make_room(path.parent)
+    except OSError as fault:  # full disk or read-only folder: continue without the file
+        _warn_once(path, f"not written, {fault.strerror or fault}")
 
 
 def cache_folder() -> Path | None:
-    """Return where this user's programs keep bindings; None if ``SEGDEFORM_CACHE`` is 0."""
+    """Return the folder of this user's bindings; None if ``SEGDEFORM_CACHE`` is 0."""
     chosen = os.environ.get("SEGDEFORM_CACHE", "")
     if chosen:
         return None if chosen == "0" else Path(chosen)
@@ -123,7 +129,7 @@ def cache_folder() -> Path | None:
         base = Path.home() / "Library" / "Caches"
     else:
         base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "segdeform" / "bound"
+    return Path(base) / "segdeform" / "bindings"
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -132,16 +138,16 @@ def _read(path: Path) -> dict[str, Any]:
         first, names = os.fstat(raw.fileno()), list(file.files)
         key = str(file["key"]) if "key" in names else ""
     if key != _key(path):
-        raise ValueError(f"it was renamed; its content is {key or 'of an older version'}")
+        raise ValueError(f"it was renamed; it contains {key or 'an older format'}")
     arrays: dict[str, Any] = {}
 
-    def some(start: int, stop: int) -> None:
+    def read_some(start: int, stop: int) -> None:
         with open_regular(path, own=True) as raw, np.load(raw, allow_pickle=False) as file:
             if not os.path.samestat(first, os.fstat(raw.fileno())):
                 raise ValueError("it was replaced while it was read")
             arrays.update({name: file[name] for name in names[start:stop]})
 
-    in_parallel(some, len(names), 1)
+    in_parallel(read_some, len(names), 1)
     return arrays
 
 
@@ -156,7 +162,7 @@ def _warn_once(path: Path, reason: str) -> None:
 
 
 def _make_room(folder: Path) -> None:
-    """Throw away what has not been used for longest, until the folder is small enough."""
+    """Delete the bindings that are unused for longest, until the folder is small enough."""
     files = [
         (status, path)
         for path in folder.iterdir()

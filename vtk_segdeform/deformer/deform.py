@@ -9,7 +9,8 @@ from ..checks import as_flag
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part
 from ..regions import segment
-from ..solver import Solution, checked_constraints, checked_targets
+from ..solver import Solution
+from .arguments import checked_constraints, checked_targets
 from .deformer import Deformer
 
 

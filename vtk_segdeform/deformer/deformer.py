@@ -1,14 +1,26 @@
-"""The main algorithm, bound to one mesh: cages, subspace, energy, solver.
+"""The whole method bound to one mesh: from targets to a pose.
 
-    mesh, regions, cages  ->  W~            `subspace.bind`, once
-                          ->  E(p)          `energy.shape_energy`, once
-    fixed, handle         ->  H = L L^T     `gauss_newton.GaussNewton`, once
-    targets               ->  p, x = W~ p   `Deformer.solve`, at every move of the mouse
+    x = W~ p                                      mesh vertices from cage vertices      (2), (3)
+    minimise  E(p) + sum_i omega_i |x_i - u_i|^2                                        (20)
+    subject to  V(x) = V_0, or the same for every region                                (8), (9)
 
-All of it happens in a frame of the mesh's own, its vertices centred in a ball of diameter 1, so
-that neither the unit of the scene nor its place matters, nor, as with a box, how it is turned.
+    mesh, regions, cages  ->  W~, E             `binding.Binding`, once
+    fixed, handle         ->  H = L L^T         `gauss_newton.GaussNewton`, once per set of handles
+    targets               ->  p                 `Deformer.solve`, at every motion of the mouse
 
-Long because every option of the method meets here, and each is told in the docstring.
+A solve does the following; `gauss_newton` has the steps.
+
+1. Divide a far motion of the handles into short ones (`waypoints`).
+2. For each of them take the steps (21) to the minimum, starting from the last p.
+3. Raise the weights omega of handles and fixed vertices that miss their places, and solve again
+   (`weights`).
+4. Map the cages to the mesh, x = W~ p, and restore its exact volume (`exact_volume`): moved along
+   the solver's directions, or, for a large mesh, scaled.  Scaling moves handles a little; if it is
+   by more than 3e-5, go back to 3 with the coarse volumes of the scaled mesh as targets.
+
+Positions are in the coordinates of the solver, where the mesh has size 1; see `frame`.
+
+Long because every option of the method is explained in the docstring of `Deformer`.
 """
 
 from __future__ import annotations
@@ -16,7 +28,7 @@ from __future__ import annotations
 import itertools
 import os
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -24,10 +36,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..arrays import FloatArray, as_numbers, as_points, is_number, is_whole
+from .. import sizes
+from ..arrays import FloatArray, IntArray, as_numbers
 from ..cages import Cage
-from ..checks import all_of, as_callable, as_flag, as_path, require_sequence, shown
-from ..errors import ArgumentError, CageError, Cancelled, ConstraintError
+from ..checks import all_of, as_callable, as_flag, as_path
+from ..errors import Cancelled
 from ..freezing import read_only
 from ..kernels import compiled_kernels, one_blas_thread
 from ..mesh import Mesh, require_mesh
@@ -35,41 +48,67 @@ from ..progress import Progress, tell
 from ..regions import Regions, require_regions
 from ..solver import (
     GaussNewton,
-    Iteration,
-    Ladder,
-    LargeSurface,
+    ScaledSurface,
     Solution,
     SolverOptions,
+    SolverResult,
     Status,
     VolumeConstraint,
     Volumes,
-    along,
-    checked_constraints,
-    checked_targets,
+    WeightContinuation,
     connected_sets,
     errors_at,
+    moved_along,
     position_term,
     region_volumes,
-    require_together,
+    steps_to_volume,
     total_volume,
     waypoints,
 )
-from ..subspace import Passengers, Subspace, board
-from .binding import Binder
+from ..subspace import Passengers, Subspace, bind_passengers
+from .arguments import (
+    check_distance,
+    check_options,
+    checked_constraints,
+    checked_targets,
+    require_together,
+    stacked_cages,
+)
+from .binding import BindingInputs
+from .binding_cache import cached_binding
+from .frame import Frame
 
-_LEG_TOLERANCE, _LEG_STEPS = 1e-3, 12  # for the targets on the way to a far one
-_POSITION_WEIGHT = 90.0  # times the shape energy's scale, divided among each handle's vertices
-_FAR = 1e3  # mesh sizes
-_NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
-_WIDE = 20_000  # vertices beyond which mapping directions too is what takes long
-_LANDINGS, _NEAR, _SAME = 4, 3e-5, 1e-7  # times it is gone on to that scale; and one of rounding
-_LEFT = 0.97  # share of the progress bar that each step leaves
-_TRIAL = 1e-4  # mesh sizes
+_POSITION_WEIGHT = 90.0  # of a handle or fixed patch, times the scale of the shape energy
+_WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
+_SOLVES_PER_SCALING, _SCALED, _ROUNDING = 4, 3e-5, 1e-7  # solves at most; relative sizes
 _MET = 1e-3  # diagonals within which a vertex counts as in its place
+_TRIAL_MOTION = 1e-4  # mesh sizes
+_SHARE_LEFT = 0.97  # of the progress bar, after each step
+_NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class _Constraints:
+    """Fixed vertices and handles, in solver coordinates; made by `Deformer._constrain`."""
+
+    fixed_at: FloatArray  # the fixed vertices in scene coordinates
+
+    handles: list[IntArray]  # indices into the targets, one array for each connected handle
+    places_of_targets: sparse.csr_array  # (s, k), from targets to the places of their sets
+    places_of_fixed: FloatArray  # (s, 3)
+    fixed_box: FloatArray  # (2, 3), corners of the box around the fixed vertices; or (0, 3)
+    anchor: FloatArray  # (3,), mean of the fixed vertices: the centre when a pose is scaled
+    volumes: Volumes
+    is_scaled: bool  # whether exact volume is restored by scaling
+    solver: GaussNewton  # with the initial weights
+
+    def places(self, targets: FloatArray) -> FloatArray:
+        """Return the places (s, 3) of all sets, for *targets* (k, 3) of the handles."""
+        return np.asarray(self.places_of_targets @ targets + self.places_of_fixed)
 
 
 class Deformer:
-    """Deform one mesh by its handles, again and again; warm-started from the last solution.
+    """Deform one mesh by its handles, again and again, each time from the last solution.
 
     Parameters
     ----------
@@ -80,48 +119,52 @@ class Deformer:
     cages : sequence of r Cage
         One around each region.
     fixed, handle : (k,) int or (n,) bool
-        Vertices held in place, and vertices that follow *targets*.  Sets of handle vertices not
-        joined by an edge are handles of their own, moved and turned independently.
+        Vertices that stay in place, and vertices that follow *targets*.  Sets of handle vertices
+        that no edge connects are separate handles, moved and rotated independently.
     preserve_volume : bool
-        Hold the enclosed volume exactly, eq. (9).
+        Preserve the enclosed volume exactly, eq. (9).
     preserve_region_volumes : bool
-        Hold the volume of every region as well.
+        Preserve the volume of every region as well.
     stretch : float
         Strength of the stretch term relative to the detail term; 0 is the paper's energy.
     rotation_groups : int or None
-        How many rotations the detail turns by; None is one per vertex, as in the paper.
+        Number of rotation clusters; None gives each vertex its own rotation, as in the paper.
     tolerance, max_steps : float, int
-        When to stop: the surface moves less than this in a step, root mean square, as a share of
-        the mesh's size (the diameter of a ball about its centre that holds it).
-    window : int
-        Steps the acceleration remembers; 0 is the paper's plain iteration, rotations taken for
-        given.
+        The solver stops when a step moves the surface by less, root mean square, as a share of
+        the mesh's size (the diameter of a ball about its centre that contains it); or after so
+        many steps.
+    acceleration : int
+        Number of steps that Anderson acceleration remembers; 0 turns it off.
+    exact_hessian : bool
+        Include the derivatives of local rotations and volumes in the Hessian.  False, with
+        ``acceleration=0``, is the paper's iteration.
     exact_volume : bool
         False leaves the paper's linearised multiplier, for comparison.
     hold_tolerance : float
-        Share of the mesh's size by which a handle or fixed vertex may miss its place before its
-        weight is raised.
+        Distance, as a share of the mesh's size, by which a handle or fixed vertex may miss its
+        place before its weight is raised.
     blend : (r, n) float, optional
-        Blend weights instead of ``regions.weights``, for comparison; `cage_distance_weights` gives
-        those of eq. (4) as printed.
+        Blend weights instead of ``regions.weights``, for comparison; `cage_distance_weights`
+        computes those of eq. (4) as printed.
     cache : path, optional
-        A folder where what is bound is kept, and found the next time; see `binding`.
+        A folder in which bindings are kept and found again; see `binding_cache`.
     progress : Progress, optional
         Called while binding; may cancel.
 
     Raises
     ------
     ConstraintError
-        If fixed or handle name no vertex of the mesh, or share one.
+        If *fixed* or *handle* is no set of vertices of the mesh, or they share a vertex.
     CageError
-        If there is not one cage per region, or a cage leaves out part of its region.
+        If there is not one cage per region, or a cage does not enclose its region.
     RegionError
         If *regions* belong to another mesh, or *blend* is no partition of unity over them.
     """
 
-    _ladder: Ladder
-    _p: FloatArray  # (m, 3), the cages of the last pose, in the frame of the mesh's own
-    _targets: FloatArray  # (k, 3), what it was for
+    _constraints: _Constraints
+    _continuation: WeightContinuation
+    _p: FloatArray  # (m, 3), the cages of the last pose, in solver coordinates
+    _targets: FloatArray  # (k, 3), the targets of the last pose
 
     @one_blas_thread()
     def __init__(
@@ -138,7 +181,8 @@ class Deformer:
         rotation_groups: int | None = 300,
         tolerance: float = 1e-7,
         max_steps: int = 500,
-        window: int = 5,
+        acceleration: int = 5,
+        exact_hessian: bool = True,
         exact_volume: bool = True,
         hold_tolerance: float = 5e-4,
         blend: ArrayLike | None = None,
@@ -148,45 +192,41 @@ class Deformer:
         require_mesh(mesh)
         require_regions(regions, mesh)
         cages = all_of(cages, Cage, "cages")
-        as_flag(preserve_volume, "preserve_volume")
-        as_flag(preserve_region_volumes, "preserve_region_volumes")
-        self.mesh, self.regions, self.cages = mesh, regions, cages
-        self._centre = mesh.vertices.mean(axis=0)
-        self._size = 2.0 * float(np.linalg.norm(mesh.vertices - self._centre, axis=1).max())
-        self._rest = mesh.with_vertices(self._inward(mesh.vertices))
-        # Poses are taken about here, so that far from the origin they keep their digits.
-        is_far = float(np.linalg.norm(self._centre)) > self._size
-        self._origin = self._centre if is_far else np.zeros(3)
-        self._here = mesh.with_vertices(mesh.vertices - self._origin) if is_far else mesh
-        if not is_number(hold_tolerance, 0.0):
-            raise ArgumentError(f"hold_tolerance must be 0 or more; got {shown(hold_tolerance)}")
-        if not is_number(stretch, 0.0):
-            raise ArgumentError(f"stretch must be a number, 0 or more; got {shown(stretch)}")
-        if rotation_groups is not None and not is_whole(rotation_groups, 1):
-            raise ArgumentError(
-                f"rotation_groups must be a whole number, 1 or more; got {shown(rotation_groups)}"
-            )
-        self._hold_tolerance = hold_tolerance
-        self._options = SolverOptions(tolerance, max_steps, window, exact_volume)
-
-        self._rest_cages = np.concatenate([_NO_POINTS, *(self._inward(c.vertices) for c in cages)])
-        own = None if blend is None else as_numbers(blend, "blend")
-        what = self._rest, regions, self.cages, self._rest_cages, own
-        cache = None if cache is None else as_path(cache, "cache")
-        binding = Binder(*what, stretch, rotation_groups).bound(cache, progress)
-        self._own_blend, self._energy, self._stand_in = own, binding.energy, binding.stand_in
-        self._mapping = binding.mapping
-        self._total_volume = total_volume(self._here)
-        here = self._here.vertices
-        self._start = self._mapping.start(here)
-        self._large = LargeSurface(
-            self.subspace, self._mapping, here, self._total_volume, start=self._start
+        check_options(hold_tolerance, stretch, rotation_groups)
+        self._options = SolverOptions(
+            tolerance, max_steps, acceleration, exact_hessian, exact_volume
         )
-        self._keep(preserve_volume, preserve_region_volumes)
-        self._take_hold(fixed, handle)
+        self._hold_tolerance = hold_tolerance
+        self._preserve_volume = as_flag(preserve_volume, "preserve_volume")
+        self._preserve_region_volumes = as_flag(preserve_region_volumes, "preserve_region_volumes")
+        self._own_blend = None if blend is None else as_numbers(blend, "blend")
+        folder = None if cache is None else as_path(cache, "cache")
+
+        self.mesh, self.regions, self.cages = mesh, regions, cages
+        self._frame = Frame.of(mesh.vertices)
+        self._rest = mesh.with_vertices(self._frame.inward(mesh.vertices))
+        inside = [self._frame.inward(cage.vertices) for cage in cages]
+        self._rest_cages = np.concatenate([_NO_POINTS, *inside])
+        inputs = BindingInputs(
+            self._rest, regions, cages, self._rest_cages, self._own_blend, stretch, rotation_groups
+        )
+        self._binding = cached_binding(inputs, folder, progress)
+
+        at_origin = self._frame.about_origin(mesh.vertices)
+        self._rest_pose = mesh.with_vertices(at_origin) if self._frame.is_far else mesh
+        self._base = self._binding.mapping.base(self._rest_pose.vertices)
+        self._total_volume = total_volume(self._rest_pose)
+        self._scaled_surface = ScaledSurface(
+            self.subspace,
+            self._binding.mapping,
+            self._rest_pose.vertices,
+            self._total_volume,
+            base=self._base,
+        )
+        self._constrain(fixed, handle)
         if compiled_kernels(mesh.n_vertices):
-            tell(progress, 0.99, "trying a step")
-            self._try_a_step()
+            tell(progress, 0.99, "taking a trial step")
+            self._take_trial_step()
         tell(progress, 1.0, "ready")
 
     @one_blas_thread()
@@ -198,27 +238,25 @@ class Deformer:
         preserve_volume: bool | None = None,
         preserve_region_volumes: bool | None = None,
     ) -> Deformer:
-        """Return a deformer at rest that holds other vertices or volumes; cages stay bound.
+        """Return a deformer at rest with other constraints, which shares the binding of this one.
 
-        None keeps the volumes that this one keeps.
+        None preserves the volumes that this deformer preserves.
         """
-        if preserve_volume is not None:
-            as_flag(preserve_volume, "preserve_volume")
-        if preserve_region_volumes is not None:
-            as_flag(preserve_region_volumes, "preserve_region_volumes")
         other = self._shared()
-        before = other._keeps
-        other._keep(
-            before[0] if preserve_volume is None else preserve_volume,
-            before[1] if preserve_region_volumes is None else preserve_region_volumes,
-        )
-        other._take_hold(fixed, handle)
+        if preserve_volume is not None:
+            other._preserve_volume = as_flag(preserve_volume, "preserve_volume")
+        if preserve_region_volumes is not None:
+            other._preserve_region_volumes = as_flag(
+                preserve_region_volumes, "preserve_region_volumes"
+            )
+        other._constrain(fixed, handle)
         return other
 
     def copy(self) -> Deformer:
-        """Return a deformer in the same pose that goes on from there by itself."""
+        """Return a deformer in the same pose that continues independently."""
         other = self._shared()
-        other._at_rest, other._ladder = self._at_rest.copy(), self._ladder.copy()
+        other._constraints = replace(self._constraints, solver=self._constraints.solver.copy())
+        other._continuation = self._continuation.copy()
         return other
 
     __copy__ = copy
@@ -234,42 +272,43 @@ class Deformer:
 
     @property
     def subspace(self) -> Subspace:
-        """W~, from which ``subspace.map`` makes mesh vertices of stacked cage vertices."""
-        return self._energy.subspace
+        """W~; ``subspace.map`` computes mesh vertices from stacked cage vertices."""
+        return self._binding.energy.subspace
 
     @property
     def step_volumes(self) -> Volumes:
-        """What the solver's steps hold: the volumes, and the surface they are taken over."""
-        return self._volumes
+        """The volumes that the solver's steps preserve, and the surface they are computed on."""
+        return self._constraints.volumes
 
     @one_blas_thread()
     def passengers(self, points: ArrayLike, *, progress: Progress | None = None) -> Passengers:
         """Bind other points (k, 3) to the cages, to be moved with them; see `passengers`."""
         blend = self.regions.weights if self._own_blend is None else self._own_blend
-        return board(self.mesh, blend, self.cages, points, progress=progress)
+        return bind_passengers(self.mesh, blend, self.cages, points, progress=progress)
 
     @one_blas_thread()
     def carry(self, points: ArrayLike) -> FloatArray:
-        """Return where other points (k, 3), given at rest, are in the last pose.
+        """Return the positions of other points (k, 3), given at rest, in the last pose.
 
-        For many poses keep the `passengers`: binding is what takes long.
+        For many poses keep the `passengers`: most of the time is spent on binding the points.
         """
-        p = self._outward(self._p)
+        p = self._frame.outward(self._p)
         return self.passengers(points).moved([p[columns] for columns in self.subspace.columns])
 
     @one_blas_thread()
     def surface(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
         """Return the mesh (n, 3) with its cages at *cage_vertices*, (m_r, 3) each: x = W~ p."""
-        return self._placed(self._surface(self._stacked(cage_vertices) - self._centre))
+        offsets = stacked_cages(self.cages, cage_vertices) - self._frame.centre
+        return self._frame.in_scene(self._map(offsets))
 
     def reset(self) -> None:
-        """Forget the last pose: the next solve starts from rest."""
+        """Return to rest: the next solve starts from there."""
         self._begin(self._rest_cages, self._rest.vertices[self.handle])
 
     def resume(self, cage_vertices: Sequence[ArrayLike], targets: ArrayLike) -> None:
-        """Go on from an earlier pose: a `Solution.cage_vertices`, and the targets it was for."""
-        p = self._inward(self._stacked(cage_vertices))
-        self._begin(p, self._inward(checked_targets(targets, len(self.handle))))
+        """Continue from an earlier pose: its `Solution.cage_vertices` and its targets."""
+        p = self._frame.inward(stacked_cages(self.cages, cage_vertices))
+        self._begin(p, self._frame.inward(checked_targets(targets, len(self.handle))))
 
     @one_blas_thread()
     def solve(
@@ -279,16 +318,16 @@ class Deformer:
         max_steps: int | None = None,
         progress: Progress | None = None,
     ) -> Solution:
-        """Return the pose whose handle vertices are at *targets*.
+        """Return the pose with the handle vertices at *targets*.
 
         Parameters
         ----------
         targets : (k, 3) float
-            One for each vertex of `handle`, in its order.  A far jump goes through targets in
-            between, so that nothing folds over.
+            One for each vertex of `handle`, in its order.  A far motion goes through waypoints, so
+            that the mesh does not fold.
         max_steps : int, optional
-            Instead of the deformer's own limit, for the last leg: a drag may stop early and go
-            on with the next event.
+            Instead of the deformer's own limit, from the last waypoint on: a drag may stop early
+            and continue with the next event.
         progress : Progress, optional
             Called before every step; may cancel, which restores the pose before the call.
 
@@ -296,15 +335,11 @@ class Deformer:
         ------
         ConstraintError
             If *targets* has the wrong shape, holds NaN or infinite coordinates, or is so far away,
-            from the mesh or from what is fixed, that it must be in another unit.
+            from the mesh or from the fixed vertices, that it must be in another unit.
         """
-        goal = self._inward(checked_targets(targets, len(self.handle)))
-        if max(goal.max(initial=0.0), -goal.min(initial=0.0)) > _FAR:
-            raise ConstraintError(
-                f"a target is {np.abs(goal).max():.0e} times the mesh's size away from it; "
-                "are both in the same unit?"
-            )
-        require_together(self._rest, goal, self._ends_of_fixed)
+        goal = self._frame.inward(checked_targets(targets, len(self.handle)))
+        check_distance(goal)
+        require_together(self._rest, goal, self._constraints.fixed_box)
         before = self._p, self._targets
         try:
             return self._solve(goal, max_steps, _counting(progress))
@@ -317,134 +352,141 @@ class Deformer:
     ) -> Solution:
         limit = self._options.max_steps if max_steps is None else max_steps
         options = replace(self._options, max_steps=limit, progress=progress)
-        *way, _ = waypoints(self._targets, goal, self._handles)
-        on_the_way = replace(options, tolerance=_LEG_TOLERANCE, max_steps=_LEG_STEPS)
-        steps = sum(self._ladder.hurry(self._places(leg), on_the_way).steps for leg in way)
-        can_hurry = max_steps is not None and self._ladder.is_climbed
-        is_in_haste = can_hurry and not np.array_equal(goal, self._targets)
-        move = self._ladder.hurry if is_in_haste else self._ladder.move
-        result = move(self._places(goal), options)
+        places = self._constraints.places(goal)
+        steps = self._follow_waypoints(goal, options)
+        is_drag = max_steps is not None and not np.array_equal(goal, self._targets)
+        if is_drag and self._continuation.has_raised_weights:
+            result = self._continuation.solve_at_current_weights(places, options)
+        else:
+            result = self._continuation.solve(places, options)
         self._targets = goal
         steps += result.steps
-        x, missed = self._landed(result)
-        for _ in range(_LANDINGS):
-            if missed <= _NEAR or result.status is Status.STEP_LIMIT:
+        x, scaled_by = self._with_exact_volume(result)
+        for _ in range(_SOLVES_PER_SCALING):
+            if scaled_by <= _SCALED or result.status is Status.STEP_LIMIT:
                 break
-            result = self._ladder.move(self._places(goal), options)
+            result = self._continuation.solve(places, options)
             steps += result.steps
-            x, missed = self._landed(result)
+            x, scaled_by = self._with_exact_volume(result)
         return self._solution(result, x, steps)
 
-    def _try_a_step(self) -> None:
-        """Load the kernels, or compile them at their very first use, before the first frame."""
-        handle = [0]
-        targets = self.mesh.vertices[handle] + _TRIAL * self._size
-        self.hold(handle=handle).solve(targets, max_steps=1)
+    def _follow_waypoints(self, goal: FloatArray, options: SolverOptions) -> int:
+        """Move through the waypoints before *goal*; return the number of steps."""
+        options = replace(options, tolerance=_WAYPOINT_TOLERANCE, max_steps=_WAYPOINT_STEPS)
+        *on_the_way, _ = waypoints(self._targets, goal, self._constraints.handles)
+        steps = 0
+        for targets in on_the_way:
+            places = self._constraints.places(targets)
+            steps += self._continuation.solve_at_current_weights(places, options).steps
+        return steps
 
-    def _stacked(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
-        require_sequence(cage_vertices, "cage_vertices")
-        poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
-        expected, got = [cage.n_vertices for cage in self.cages], [len(pose) for pose in poses]
-        if got != expected:
-            raise CageError(f"cage_vertices must hold {expected} points, cage by cage; got {got}")
-        return np.concatenate(poses)
+    def _with_exact_volume(self, result: SolverResult) -> tuple[FloatArray, float]:
+        """Restore the exact volumes; return the mesh and by how much it was scaled.
 
-    def _keep(self, volume: bool, of_regions: bool) -> None:
-        self._keeps = volume, of_regions
-        self._constraints: tuple[VolumeConstraint, ...] = ()
-        if of_regions:
-            self._constraints = self._region_volumes
-        elif volume:
-            self._constraints = (self._total_volume,)
+        The latter is 0 if the mesh was moved along the directions of the solver instead.
+        """
+        self._p, directions, size = result.p, result.directions, self._frame.size
+        if not directions or not self._options.exact_volume:
+            return self._map(self._p * size), 0.0
+        if self._constraints.is_scaled:
+            return self._scaled()
+        paths = self._map(self._p * size, [z * size for z in directions])
+        steps = steps_to_volume(self._preserved_volumes, paths)
+        self._p = self._p + sum(tk * z for tk, z in zip(steps, directions, strict=True))
+        return moved_along(paths, steps), 0.0
+
+    def _scaled(self) -> tuple[FloatArray, float]:
+        """Scale the mesh and its cages to the exact volume; return the mesh and by how much."""
+        frame, anchor = self._frame, self._constraints.anchor
+        moves = (self._p - self._rest_cages) * frame.size
+        centre = frame.centre - frame.origin + anchor
+        x, scale = self._scaled_surface.scaled(moves, centre)
+        inside = anchor / frame.size
+        self._p = inside + scale * (self._p - inside)
+        scaled_by = abs(scale - 1.0)
+        if scaled_by > _ROUNDING:
+            self._continuation.continue_from(self._p)
+        return x, scaled_by
+
+    def _map(self, offsets: FloatArray, directions: Sequence[FloatArray] = ()) -> FloatArray:
+        """Return x for cages at *offsets* (m, 3) from the centre; and W~ z of *directions* beside.
+
+        x is rest + W~ (p - rest), which is W~ p, but at rest exact however W~ is rounded.
+        """
+        moves = offsets - self._rest_cages * self._frame.size
+        return self._binding.mapping.map(np.hstack([moves, *directions]), self._base)
+
+    @property
+    def _preserved_volumes(self) -> tuple[VolumeConstraint, ...]:
+        if self._preserve_region_volumes:
+            return self._region_volumes
+        return (self._total_volume,) if self._preserve_volume else ()
 
     @cached_property
     def _region_volumes(self) -> tuple[VolumeConstraint, ...]:
-        return region_volumes(self._here, self.regions.labels)
+        return region_volumes(self._rest_pose, self.regions.labels)
 
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:
         return np.array([each.relative(x) for each in self._region_volumes])
 
-    def _take_hold(self, fixed: ArrayLike, handle: ArrayLike) -> None:
-        mesh = self.mesh
+    def _constrain(self, fixed: ArrayLike, handle: ArrayLike) -> None:
+        """Set fixed vertices and handles, factor their problem and return to rest."""
+        mesh, rest, binding = self.mesh, self._rest.vertices, self._binding
         self.fixed, self.handle = map(read_only, checked_constraints(mesh, fixed, handle))
-        self._handles = connected_sets(mesh, self.handle)
+        handles = connected_sets(mesh, self.handle)
         patches = connected_sets(mesh, self.fixed)
-        # Sets lie side by side here, and their vertices in them as in `handle` and `fixed`.
+        # The sets one after the other, each in the order of `handle` or `fixed`.
         ids = np.concatenate([self.handle, self.fixed])
-        order = [*self._handles, *(len(self.handle) + patch for patch in patches)]
+        order = [*handles, *(len(self.handle) + patch for patch in patches)]
         in_order = sparse.eye_array(len(ids)).tocsr()[np.concatenate([_NONE, *order])]
-        weight = _POSITION_WEIGHT * self._energy.scale
+        weight = _POSITION_WEIGHT * binding.energy.scale
         positions = position_term(
-            self.subspace, self._rest.vertices, [ids[places] for places in order], weight
+            self.subspace, self._rest, [ids[places] for places in order], weight
         )
         gathered = in_order if positions.mean is None else positions.mean @ in_order
-        self._rest_of_fixed = mesh.vertices[self.fixed]
-        self._to_places = gathered[:, : len(self.handle)].tocsr()
-        self._fixed_places = gathered[:, len(self.handle) :] @ self._rest.vertices[self.fixed]
-        self._volumes = self._stand_in.volumes(self._constraints, self._rest.vertices)
-        self._at_rest = GaussNewton(self._energy, positions, self._volumes)
-        one = len(self._constraints) == 1 and self._keeps == (True, False)
-        self._is_wide = one and self._stand_in.cells is not None and mesh.n_vertices > _WIDE
-        held = self._rest.vertices[self.fixed] if len(self.fixed) else np.zeros((1, 3))
-        self._ends_of_fixed = np.stack([held.min(axis=0), held.max(axis=0)])[: 2 * len(self.fixed)]
-        self._anchor = held.mean(axis=0) * self._size  # stays where it is when the mesh is scaled
+        volumes = binding.coarse_volume.volumes(self._preserved_volumes, rest)
+        fixed_at = rest[self.fixed] if len(self.fixed) else np.zeros((1, 3))
+        box = np.stack([fixed_at.min(axis=0), fixed_at.max(axis=0)])
+        only_total = self._preserve_volume and not self._preserve_region_volumes
+        is_large = mesh.n_vertices > sizes.SCALED_VOLUME
+        self._constraints = _Constraints(
+            fixed_at=mesh.vertices[self.fixed],
+            handles=handles,
+            places_of_targets=gathered[:, : len(self.handle)].tocsr(),
+            places_of_fixed=gathered[:, len(self.handle) :] @ rest[self.fixed],
+            fixed_box=box[: 2 * len(self.fixed)],
+            anchor=fixed_at.mean(axis=0) * self._frame.size,
+            volumes=volumes,
+            is_scaled=only_total and is_large and binding.coarse_volume.cells is not None,
+            solver=GaussNewton(binding.energy, positions, volumes),
+        )
         self.reset()
 
     def _begin(self, p: FloatArray, targets: FloatArray) -> None:
-        self._at_rest.volumes = self._volumes
-        self._ladder = Ladder(self._at_rest, p, self._hold_tolerance)
+        """Begin at cages *p* (m, 3), which are a pose for *targets* (k, 3)."""
+        solver = self._constraints.solver
+        solver.volumes = self._constraints.volumes
+        self._continuation = WeightContinuation(solver, p, self._hold_tolerance)
         self._p, self._targets = p, targets
-        if self._is_wide and p is not self._rest_cages:
-            self._ladder.go_on_from(p)
+        if self._constraints.is_scaled and p is not self._rest_cages:
+            self._continuation.continue_from(p)
 
-    def _places(self, targets: FloatArray) -> FloatArray:
-        """Return the places for *targets* (k, 3) of the handle."""
-        return np.asarray(self._to_places @ targets + self._fixed_places)
+    def _take_trial_step(self) -> None:
+        """Compile the kernels, or load them, before the first frame needs them."""
+        handle = [0]
+        targets = self.mesh.vertices[handle] + _TRIAL_MOTION * self._frame.size
+        self.hold(handle=handle).solve(targets, max_steps=1)
 
-    def _landed(self, result: Iteration) -> tuple[FloatArray, float]:
-        """Take the mesh onto the volume held; return its vertices, and by how much it was off.
-
-        That is as a scale; where it went along the solver's own directions, 0.
-        """
-        self._p, directions = result.p, result.directions
-        if not directions or not self._options.exact_volume:
-            return self._surface(self._p * self._size), 0.0
-        if self._is_wide:
-            moves = (self._p - self._rest_cages) * self._size
-            x, scale = self._large.landed(moves, self._centre - self._origin + self._anchor)
-            anchor = self._anchor / self._size
-            self._p = anchor + scale * (self._p - anchor)
-            missed = abs(scale - 1.0)
-            if missed > _SAME:
-                self._ladder.go_on_from(self._p)
-            return x, missed
-        paths = self._surface(self._p * self._size, [z * self._size for z in directions])
-        steps, x = along(self._constraints, paths)
-        self._p = self._p + sum(tk * z for tk, z in zip(steps, directions, strict=True))
-        return x, 0.0
-
-    def _surface(self, p: FloatArray, directions: Sequence[FloatArray] = ()) -> FloatArray:
-        """Return x for cages at *p* (m, 3), about the centre; and W~ z for *directions* z beside.
-
-        x is rest + W~ (p - rest), which is W~ p: the rest shape keeps its last digit however W~
-        is rounded.
-        """
-        moves = p - self._rest_cages * self._size
-        return self._mapping.map(np.hstack([moves, *directions]), self._start)
-
-    def _placed(self, x: FloatArray) -> FloatArray:
-        return x + self._origin if self._origin.any() else x
-
-    def _solution(self, result: Iteration, x: FloatArray, steps: int) -> Solution:
-        p = self._p * self._size
-        x = self._placed(x)
+    def _solution(self, result: SolverResult, x: FloatArray, steps: int) -> Solution:
+        p = self._p * self._frame.size
+        x = self._frame.in_scene(x)
         errors = partial(self._errors, self._targets)
         status = result.status
         if status is Status.CONVERGED and max(errors(x)) > _MET:
             status = Status.MISSED
         return Solution(
             vertices=x,
-            cage_vertices=tuple(p[columns] + self._centre for columns in self.subspace.columns),
+            cage_vertices=tuple(p[own] + self._frame.centre for own in self.subspace.columns),
             steps=steps,
             status=status,
             merits=result.merits,
@@ -454,18 +496,8 @@ class Deformer:
         )
 
     def _errors(self, targets: FloatArray, x: FloatArray) -> tuple[float, ...]:
-        places = self._outward(targets), self._rest_of_fixed
+        places = self._frame.outward(targets), self._constraints.fixed_at
         return errors_at((self.handle, self.fixed), places, self.mesh.diagonal, x)
-
-    def _inward(self, points: FloatArray) -> FloatArray:
-        inside: FloatArray = points - self._centre
-        inside /= self._size
-        return inside
-
-    def _outward(self, points: FloatArray) -> FloatArray:
-        outside: FloatArray = points * self._size
-        outside += self._centre
-        return outside
 
 
 def _counting(progress: Progress | None) -> Progress | None:
@@ -476,6 +508,6 @@ def _counting(progress: Progress | None) -> Progress | None:
     steps = itertools.count()
 
     def report(_: float, message: str) -> None:
-        progress(1.0 - _LEFT ** next(steps), message)
+        progress(1.0 - _SHARE_LEFT ** next(steps), message)
 
     return report

@@ -2,29 +2,25 @@
 
 The files, in reading order:
 
-    energy               `shape_energy`, eqs. (1), (10) and (20)
-    operators            its operators on the mesh
+    energy               `shape_energy`, eqs. (1), (10) and (20), and the stiffness of the cages
+    operators            its operators on the mesh and in the subspace
     cubature             a weighted sample of vertices in place of all
     rotation_clusters    one local rotation for several vertices
-    hessian              the exact Hessian, local rotations included
-    cage_stiffness       regularisation where the mesh does not determine the cages
-    grams                products with the subspace
+    hessian              the exact Hessian, local rotations included, and its factor
 """
 
-from .cage_stiffness import with_cage_stiffness
-from .energy import Energy, shape_energy
-from .grams import grams
-from .hessian import Factor, curved_factor, factored
-from .operators import surface_operators
+from .energy import Energy, shape_energy, with_cage_stiffness
+from .hessian import Factor, full_factor, quadratic_factor
+from .operators import reduced_operators, surface_operators
 from .rotation_clusters import join_rotations
 
 __all__ = [
     "Energy",
     "Factor",
-    "curved_factor",
-    "factored",
-    "grams",
+    "full_factor",
     "join_rotations",
+    "quadratic_factor",
+    "reduced_operators",
     "shape_energy",
     "surface_operators",
     "with_cage_stiffness",

@@ -1,20 +1,21 @@
-"""How the shape energy curves: the Hessian of E(p), local rotations and all.
+"""The exact Hessian of the shape energy, local rotations included, and its factor.
 
-The paper's step takes the rotations for given, so that its Hessian is Q alone; they follow one
-step behind, and stiff directions that are a matter of turning converge slowly.  But how they
-follow is known.  With S = K p, one 3 x 3 matrix per group, and N = R S its symmetric part,
+The paper's step holds the rotations fixed, so that its Hessian is Q alone; the rotations then
+follow one step behind, and stiff directions that are mostly rotation converge slowly.  But their
+derivative is known.  With S = K p, one 3 x 3 matrix per cluster, and N = R S its symmetric part,
 
     f(S) = max_R tr(R S),      f(S + dS) = f(S) + tr(R dS) + 1/2 b^T M^-1 b + ...
     b = axis of (R dS),  b_k = eps_kij (R dS)_ij,      M = tr(N) I - N
 
-b is the torque that dS leaves and M the stiffness that answers it, both about the same axes, so
-that half the Hessian of E = tr(p^T Q p) - 2 sum_g f(K_g p) + c is
+b is the torque of dS and M the stiffness against it, both about the same axes, so that half the
+Hessian of E = tr(p^T Q p) - 2 sum_g f(K_g p) + c is
 
     H = Q (x) I  -  sum_g T_g M_g^-1 T_g^T,      T_g^T dp = b
 
-All of the sum would let the whole turn freely about a single handle, so a little is kept back.
-Compressed or mirrored groups can make H indefinite; as much of the sum is then left out as it
-takes.  With nothing left it is the paper's.  Coordinates are stacked axis by axis.
+With all of the sum the whole mesh could turn freely about a single handle, so a thousandth is left
+out.  Compressed or mirrored clusters can make H indefinite; then the largest share of the sum that
+leaves H convex is used.  With no share of it H is the paper's.  Coordinates are stacked axis by
+axis.
 
 Source
 ------
@@ -37,12 +38,12 @@ from ..geometry import closest_rotations
 from ..kernels import compiled_kernels
 from .energy import Energy
 
-_SHARES = 0.999, 0.99, 0.96, 0.8, 0.5  # of the rotations' part; the largest that leaves H convex
-_SOFTEST = 1e-3  # least stiffness of a group about an axis, as a share of its largest
-_CHUNK = 1000  # groups at a time
-_TIMES = 10  # numbers of a triangle that take as long as a face of a volume
-_RIGHT = 8  # right-hand sides beyond which LAPACK is as quick
-# eps_kic as (k, c, i), axis of turning, column of dp, row of R S; k and c side by side.
+_SHARES = 0.999, 0.99, 0.96, 0.8, 0.5  # of the rotations' term; the first that leaves H convex
+_SOFTEST = 1e-3  # least stiffness of a cluster about an axis, as a share of its largest
+_CHUNK = 1000  # clusters at a time
+_PER_FACE = 10  # numbers of a factor that take as long as a face of a volume
+_MOST_SIDES = 8  # right-hand sides; with more LAPACK is as fast
+# eps_kic as (k, c, i): axis of rotation, column of dp, row of R S; k and c side by side.
 _EPSILON = np.zeros((9, 3))
 for _k, _i, _j in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
     _EPSILON[3 * _k + _j, _i], _EPSILON[3 * _k + _i, _j] = 1.0, -1.0
@@ -63,15 +64,15 @@ class Factor:
         """Return H^-1 y for each y (m, 3)."""
         n = len(self.triangle)
         solved = np.concatenate([y.T for y in ys]).reshape(-1, n)
-        kernels = compiled_kernels(n * n // _TIMES) if len(solved) <= _RIGHT else None
+        kernels = compiled_kernels(n * n // _PER_FACE) if len(solved) <= _MOST_SIDES else None
         if kernels:
             kernels.solve_factored(np.ascontiguousarray(self.triangle.T), solved)
         else:
-            solved = lapack.dpotrs(self.triangle, solved.T, lower=1)[0].T  # half of cho_solve
+            solved = lapack.dpotrs(self.triangle, solved.T, lower=1)[0].T
         return [own.T for own in solved.reshape(len(ys), 3, -1)]
 
 
-def factored(hessian: FloatArray) -> Factor | None:
+def quadratic_factor(hessian: FloatArray) -> Factor | None:
     """Return the factor of a Hessian (m, m) that is the same for all axes; None if not convex."""
     try:
         return Factor(linalg.cholesky(hessian, lower=True), coupled=False)
@@ -79,28 +80,28 @@ def factored(hessian: FloatArray) -> Factor | None:
         return None
 
 
-def curved_factor(
+def full_factor(
     hessian: FloatArray, energy: Energy, p: FloatArray, volumes: FloatArray | None = None
 ) -> Factor | None:
-    """Return the factor of *hessian* (m, m) less the rotations' part at *p* (m, 3).
+    """Return the factor of *hessian* (m, m) minus the rotations' term at *p* (m, 3).
 
     The Hessian of the preserved *volumes*, G (3, m, m) of `volume_constraints.Volumes`, is added.
-    None if no share of the rotations' part leaves the sum convex.
+    None if no share of the rotations' term leaves the sum convex.
     """
     m = len(p)
-    part = _rotations_part(energy, p)
+    term = _rotation_term(energy, p)
     for share in _SHARES:
-        curved = -share * part
+        full = -share * term
         for axis in range(3):
             block = slice(axis * m, (axis + 1) * m)
-            curved[block, block] += hessian
+            full[block, block] += hessian
         if volumes is not None:  # below the diagonal: eps_abc G_c for a > b
-            curved[m : 2 * m, :m] -= volumes[2]
-            curved[2 * m :, :m] += volumes[1]
-            curved[2 * m :, m : 2 * m] -= volumes[0]
+            full[m : 2 * m, :m] -= volumes[2]
+            full[2 * m :, :m] += volumes[1]
+            full[2 * m :, m : 2 * m] -= volumes[0]
         try:
             return Factor(
-                linalg.cholesky(curved, lower=True, overwrite_a=True, check_finite=False),
+                linalg.cholesky(full, lower=True, overwrite_a=True, check_finite=False),
                 coupled=True,
             )
         except linalg.LinAlgError:
@@ -108,13 +109,13 @@ def curved_factor(
     return None
 
 
-def _rotations_part(energy: Energy, p: FloatArray) -> FloatArray:
+def _rotation_term(energy: Energy, p: FloatArray) -> FloatArray:
     """Return the lower half of sum_g T_g M_g^-1 T_g^T, (3m, 3m), stacked axis by axis."""
     m = len(p)
     total = np.zeros((3 * m, 3 * m))  # its upper half; the transpose is in BLAS's order
     twists = _twists(energy.covariances(p))
-    for groups, columns, reduced in energy.fitted_rows(_CHUNK):
-        rows = (twists[groups] @ reduced).reshape(-1, 3 * reduced.shape[2])  # T^T in M's own axes
+    for clusters, columns, reduced in energy.covariance_rows(_CHUNK):
+        rows = (twists[clusters] @ reduced).reshape(-1, 3 * reduced.shape[2])  # T^T in M's own axes
         part = blas.dsyrk(1.0, rows.T, lower=1).T
         places = [slice(a * m + own.start, a * m + own.stop) for a in range(3) for own in columns]
         ends = np.cumsum([place.stop - place.start for place in places])
@@ -128,7 +129,7 @@ def _rotations_part(energy: Energy, p: FloatArray) -> FloatArray:
 
 
 def _twists(covariances: FloatArray) -> FloatArray:
-    """Return (G, 9, 3): what makes M^-1/2 T^T of K_g, for the axis of turning and that of dp."""
+    """Return (G, 9, 3), which takes K_g to M^-1/2 T^T, for each axis of rotation and of dp."""
     rotations = closest_rotations(covariances)
     stretched = rotations @ covariances
     symmetric = 0.5 * (stretched + np.swapaxes(stretched, 1, 2))

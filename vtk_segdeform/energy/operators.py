@@ -1,11 +1,16 @@
-"""What the shape energy is made of, over the vertices of a mesh or of a sample of it.
+"""Operators of the shape energy on a surface, and their products with the subspace.
 
-The mean-curvature normals delta, eq. (5), their areas and their Laplacian; and what the rotation
-of each vertex, or group of vertices, is fitted to: 3 x 3 matrices that are linear in x (`energy`).
+On the vertices of a mesh, or of a sample of it: the mean-curvature normals delta, eq. (5), their
+areas and Laplacian C; and K, which takes vertices to the 3 x 3 matrices to which the rotation of
+each vertex, or cluster of vertices, is fitted (`energy`).
+
+In the subspace: the Galerkin products W~^T A W~, (m, m), which make a step independent of the size
+of the mesh.
 """
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,77 +24,142 @@ from ..geometry import (
     mixed_voronoi_areas,
     with_least_areas,
 )
+from ..kernels import in_parallel
+from ..subspace import Subspace
 
 _CHUNK = 400_000  # faces
+_PIECE, _BATCH = 1 << 19, 32  # numbers of W~ multiplied together; such pieces computed at once
 
 
 class SurfaceOperators(NamedTuple):
     """Operators of n vertices, for E = detail + s stretch."""
 
-    counts: FloatArray  # c, (n,): how often what a vertex says is counted; 1 over a whole mesh
+    weights: FloatArray  # c, (n,): of the vertices in the sums over a sample; 1 over a whole mesh
     areas: FloatArray  # A, (n,)
     delta: FloatArray  # (n, 3), eq. (5)
     laplacian: sparse.csr_array  # C, (n, n)
-    stiffness: sparse.csr_array  # C of triangles that count as often as their corners, (n, n)
-    detail: sparse.csr_array  # K of the detail, (3 G, n): 3 x 3 matrices S_g by rows
+    stiffness: sparse.csr_array  # C with each triangle weighted as its corners, (n, n)
+    detail: sparse.csr_array  # K of the detail, (3G, n): 3 x 3 matrices S_g by rows
     fans: sparse.csr_array  # K of the stretch, over s
 
 
 def surface_operators(
-    surface: IntrinsicTriangulation, groups: IntArray, counts: FloatArray | None = None
+    surface: IntrinsicTriangulation, clusters: IntArray, weights: FloatArray | None = None
 ) -> SurfaceOperators:
-    """Return the operators of *surface* for the rotation group of each vertex, *groups* (n,).
+    """Return the operators of *surface* for the rotation cluster of each vertex, *clusters* (n,).
 
-    *counts* (n,) are those of a `Sample`, whose triangles *surface* then has.
+    For a `Sample`, *surface* has its triangles, and *weights* (n,) are its weights.
     """
     n, faces = len(surface.vertices), surface.faces
     areas = with_least_areas(mixed_voronoi_areas(surface), faces)
     laplacian = stiffness = cotangent_laplacian(faces, surface.cotangents, n)
-    if counts is None:
-        counts = np.ones(n)
+    if weights is None:
+        weights = np.ones(n)
     else:
-        shared = surface.cotangents * counts[faces].mean(axis=1, keepdims=True)
+        shared = surface.cotangents * weights[faces].mean(axis=1, keepdims=True)
         stiffness = cotangent_laplacian(faces, shared, n)
     delta = (laplacian @ surface.vertices) / (2.0 * areas)[:, None]  # eq. (5)
     return SurfaceOperators(
-        counts=counts,
+        weights=weights,
         areas=areas,
         delta=delta,
         laplacian=laplacian,
         stiffness=stiffness,
-        detail=_grouped(0.5 * counts[:, None] * delta, groups) @ laplacian,
-        fans=_fans(area_gradients(surface) / 3.0, faces, groups, counts),
+        detail=_summed(0.5 * weights[:, None] * delta, clusters) @ laplacian,
+        fans=_fans(area_gradients(surface) / 3.0, faces, clusters, weights),
     )
 
 
-def _grouped(values: FloatArray, groups: IntArray) -> sparse.csr_array:
-    """Return (3 G, n): row 3 g + a has ``values[i, a]`` at each vertex i of group g."""
-    n = len(groups)
-    rows = (3 * groups[:, None] + np.arange(3)).ravel()
+def _summed(values: FloatArray, clusters: IntArray) -> sparse.csr_array:
+    """Return (3G, n): row 3 g + a has ``values[i, a]`` at each vertex i of cluster g."""
+    n = len(clusters)
+    rows = (3 * clusters[:, None] + np.arange(3)).ravel()
     entries = (values.ravel(), (rows, np.repeat(np.arange(n), 3)))
-    return sparse.coo_array(entries, (3 * (int(groups.max()) + 1), n)).tocsr()
+    return sparse.coo_array(entries, (3 * (int(clusters.max()) + 1), n)).tocsr()
 
 
 def _fans(
-    gradients: FloatArray, faces: IntArray, groups: IntArray, counts: FloatArray
+    gradients: FloatArray, faces: IntArray, clusters: IntArray, weights: FloatArray
 ) -> sparse.csr_array:
-    """Return (3 G, n): row 3 g + a is axis a of sum_{i in g} c_i sum_{T at i} A_T / 3 J_T^T.
+    """Return (3G, n): row 3 g + a is axis a of sum_{i in g} c_i sum_{T at i} A_T / 3 J_T^T.
 
-    *gradients* (m, 3, 3) are thirds of `area_gradients`: every corner sees the whole face.
+    *gradients* (m, 3, 3) are a third of `area_gradients`: a face is compared with three rotations.
     """
-    n, shape = len(groups), (3 * (int(groups.max()) + 1), len(groups))
-    seen_from, asked = groups[faces], counts[faces]
-    alike = seen_from[:, :, None] == seen_from[:, None]
-    own = (alike * asked[:, None]).sum(axis=2)  # counts of the corners in each one's group
+    n, shape = len(clusters), (3 * (int(clusters.max()) + 1), len(clusters))
+    at, weight = clusters[faces], weights[faces]
+    alike = at[:, :, None] == at[:, None]
+    own = (alike * weight[:, None]).sum(axis=2)  # weights of the corners in the same cluster
     axes = (np.bincount(faces.ravel(), (own * g).ravel(), n) for g in np.moveaxis(gradients, 2, 0))
-    fans = _grouped(np.stack(list(axes), axis=1), groups)
-    border = np.flatnonzero(~alike.all(axis=(1, 2)))  # what is left: corners of other groups
+    fans = _summed(np.stack(list(axes), axis=1), clusters)
+    border = np.flatnonzero(~alike.all(axis=(1, 2)))  # faces with corners in several clusters
     for start in range(0, len(border), _CHUNK):
         some = border[start : start + _CHUNK]
-        other = ~alike[some] & (asked[some] > 0.0)[:, :, None]
+        other = ~alike[some] & (weight[some] > 0.0)[:, :, None]
         face, seen, corner = np.nonzero(other)
-        rows = 3 * seen_from[some[face], seen][:, None] + np.arange(3)
+        rows = 3 * at[some[face], seen][:, None] + np.arange(3)
         columns = np.repeat(faces[some[face], corner], 3)
-        share = gradients[some[face], corner] * asked[some[face], seen][:, None]
+        share = gradients[some[face], corner] * weight[some[face], seen][:, None]
         fans = fans + sparse.coo_array((share.ravel(), (rows.ravel(), columns)), shape).tocsr()
     return sparse.csr_array(fans)
+
+
+def reduced_operators(
+    subspace: Subspace,
+    laplacian: sparse.csr_array,
+    strength: FloatArray,
+    mass: FloatArray,
+    *,
+    stiffness: sparse.csr_array | None = None,
+    clusters: IntArray | None = None,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return W~^T C diag(strength) C W~, W~^T B W~ and W~^T diag(mass) W~, (m, m) each.
+
+    And (n,), the contribution of each vertex to the trace of the first.
+
+    C and B (n, n) are the symmetric *laplacian* and *stiffness*; without *stiffness*, B is C.
+    The sums go over pieces of the mesh, of vertices that lie together: few cages move a piece and
+    its neighbours, so the dense matrix of their weights is narrow and stays in the cache.  Cages
+    that move no common piece have a zero block, which is why several cages are faster than one.
+    Pieces follow *clusters* (n,) of neighbours, or else the regions; the results are the same.
+    """
+    both = [laplacian] if stiffness is None or stiffness is laplacian else [laplacian, stiffness]
+    m = subspace.n_columns
+    order = np.argsort(_last_region(subspace) if clusters is None else clusters, kind="stable")
+    size = max(_PIECE // m, 1)
+    found: dict[int, tuple[IntArray, list[FloatArray]]] = {}
+    traces = np.empty(subspace.n_vertices)
+
+    def work(first: int, start: int, stop: int) -> None:
+        vertices = order[first + start : first + stop]
+        rings = [each[vertices] for each in both]
+        met = [vertices, *(ring.indices.astype(np.int64) for ring in rings)]
+        used, place = np.unique(np.concatenate(met), return_inverse=True)
+        columns, w = subspace.nonzeros(used)
+        own, *places = np.split(place.astype(np.int32), np.cumsum([len(ids) for ids in met[:-1]]))
+        here, products = w[own], []
+        for ring, at in zip(rings, places, strict=True):
+            compact = ring.data, at, ring.indptr.astype(np.int32)
+            products.append(sparse.csr_array(compact, (len(vertices), len(used))) @ w)
+        traces[vertices] = strength[vertices] * np.einsum("ij,ij->i", products[0], products[0])
+        squares = (products[0] * strength[vertices][:, None]).T @ products[0]
+        plain, masses = here.T @ products[-1], (here * mass[vertices][:, None]).T @ here
+        found[start] = columns, [squares, plain, masses]
+
+    totals = np.zeros((3, m, m))
+    for first in range(0, subspace.n_vertices, _BATCH * size):  # summed in a fixed order
+        stop = min(first + _BATCH * size, subspace.n_vertices)
+        in_parallel(partial(work, first), stop - first, size)
+        for start in sorted(found):
+            columns, products = found.pop(start)
+            for total, product in zip(totals, products, strict=True):
+                total[np.ix_(columns, columns)] += product
+    squares, plain, masses = 0.5 * (totals + np.swapaxes(totals, 1, 2))
+    return squares, plain, masses, traces
+
+
+def _last_region(subspace: Subspace) -> IntArray:
+    """Return the last region of each vertex, (n,)."""
+    region = np.zeros(subspace.n_vertices, dtype=np.int64)
+    for r, rows in enumerate(subspace.rows):
+        region[rows] = r
+    return region

@@ -6,6 +6,7 @@ The files, in reading order:
     differential    mean-curvature normals, eq. (5)
     intrinsic       intrinsic triangulation: the same surface without bad triangles
     rotations       local rotations
+    kmeans          clusters of points, and points far from each other
     thinning        subsets of vertices at even distances
     normals         vertex normals for drawing
     distortion      stretch and shear, a number per triangle
@@ -15,15 +16,10 @@ The files, in reading order:
 from .differential import area_gradients, cotangent_laplacian, mixed_voronoi_areas, with_least_areas
 from .distortion import distortion, triangle_distortion
 from .intrinsic import IntrinsicTriangulation
+from .kmeans import cluster_positions, cluster_within_parts, farthest_points
 from .local_volume import LocalVolume, local_volume_change
 from .normals import VertexNormals
-from .rotations import (
-    closest_rotations,
-    farthest_points,
-    group_by_position,
-    rigid_fit,
-    rotation_groups,
-)
+from .rotations import closest_rotations, rigid_fit
 from .thinning import cells, distinct_lengths, faces_between, nearest_of, unique_edges
 from .volume import signed_volume, step_to_volume, volume_along, volume_along_path, volume_gradient
 
@@ -34,17 +30,17 @@ __all__ = [
     "area_gradients",
     "cells",
     "closest_rotations",
+    "cluster_positions",
+    "cluster_within_parts",
     "cotangent_laplacian",
     "distinct_lengths",
     "distortion",
     "faces_between",
     "farthest_points",
-    "group_by_position",
     "local_volume_change",
     "mixed_voronoi_areas",
     "nearest_of",
     "rigid_fit",
-    "rotation_groups",
     "signed_volume",
     "step_to_volume",
     "triangle_distortion",

@@ -28,6 +28,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from .. import sizes
 from ..arrays import FloatArray, IntArray, as_points
 from ..kernels import in_parallel
 from ..mesh import Mesh, require_mesh
@@ -39,7 +40,6 @@ _MOST_SHRINKS = 30
 _NARROWEST = np.cos(np.radians(40.0))  # a ball touching under a smaller angle sees its own skin
 _WIDTH = 0.25  # of the median ball's diameter
 _MOST_ROUNDS = 100
-_LARGE, _CELLS = 20_000, 8_000  # vertices beyond which, and about how many, cells stand for them
 _REACH = 1.6  # distances of neighbouring cells
 _AT_ONCE = 1 << 15  # vertices
 _LEAST = 0.05  # share of the mean flesh under which a quotient is not trusted
@@ -61,8 +61,8 @@ class LocalVolume:
         points, faces = mesh.vertices, mesh.faces
         self._means: sparse.csr_array | None = None
         self._spread: list[sparse.csr_array] = []
-        if mesh.n_vertices > _LARGE:
-            _, cells = cells_of(mesh, _CELLS, np.random.default_rng(0))
+        if mesh.n_vertices > sizes.LOCAL_VOLUME_CELLS:
+            _, cells = cells_of(mesh, sizes.LOCAL_VOLUME_POINTS, np.random.default_rng(0))
             between = faces_between(cells, faces)
             if len(between):  # none is left of a heap of crumbs, which have no cells to spare
                 self._means, faces = _means(cells), between

@@ -7,11 +7,10 @@ The files, in reading order:
     compiled    the kernels themselves, compiled by numba
 """
 
-from .dispatch import WORTHWHILE, advice, compiled_kernels, inputs, writable
+from .dispatch import advice, compiled_kernels, inputs, writable
 from .threads import in_parallel, n_threads, one_blas_thread
 
 __all__ = [
-    "WORTHWHILE",
     "advice",
     "compiled_kernels",
     "in_parallel",

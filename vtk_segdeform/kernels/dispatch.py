@@ -18,13 +18,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import sizes
+
 _LIBRARIES = "numba", "threadpoolctl"  # required for speed only
-WORTHWHILE = 2000  # faces, points: fewer are as quick in numpy
 
 
-def compiled_kernels(size: int = WORTHWHILE) -> Any:
-    """Return the compiled kernels if *size* is worth them and numba is there; else None."""
-    return _kernels() if size >= WORTHWHILE else None
+def compiled_kernels(size: int | None = None) -> Any:
+    """Return the compiled kernels; None without numba, or if *size* is not worth a call."""
+    return _kernels() if size is None or size >= sizes.COMPILED else None
 
 
 def advice() -> str:

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_points, frozen, plain
 from ..checks import shown
+from ..deformer import FARTHEST_APART, checked_constraints
 from ..errors import ConstraintError
 from ..mesh import Mesh
-from ..solver import FARTHEST_APART, checked_constraints
 from .naming import fault_of
 from .state import Pose, State, pieces
 

@@ -32,11 +32,12 @@ from numpy.typing import ArrayLike
 from ..arrays import FloatArray, IntArray, as_points, frozen, is_whole, plain
 from ..cages import Cage, fit_cages
 from ..checks import require, shown
+from ..deformer import checked_constraints
 from ..errors import CageError, RegionError, SessionError
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress
 from ..regions import Regions, segment
-from ..solver import Solution, Status, checked_constraints
+from ..solver import Solution, Status
 from . import handles, naming, painting
 from .history import Timeline
 from .listeners import Change

@@ -19,11 +19,11 @@ import numpy as np
 from ..arrays import FloatArray, IntArray, as_points, frozen, is_number
 from ..cages import Cage
 from ..checks import all_of, require, require_sequence, shown
+from ..deformer import checked_constraints
 from ..errors import CageError, ConstraintError, RegionError, SessionError
 from ..freezing import Frozen
 from ..mesh import Mesh
 from ..regions import Regions
-from ..solver import checked_constraints
 from .listeners import Change
 from .naming import Names, called, checked_names, fault_of
 

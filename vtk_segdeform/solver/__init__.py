@@ -3,55 +3,42 @@
 The files, in reading order:
 
     gauss_newton            the iteration, eqs. (11) to (14) and (21)
-    iteration               its options, state and result
     volume_constraints      volume of the mesh or of each region, eqs. (8) and (9)
     position_constraints    fixed vertices and handles, eqs. (6) and (7)
     weights                 continuation of the position weights
     anderson                Anderson acceleration
+    exact_volume            motion of a pose onto its exact volumes
     coarse_volume           volume of a large mesh from a coarse surface
-    exact_volume            final projection onto the exact volume
     waypoints               intermediate targets for large motions
     solution                `Solution` and `Status`
 """
 
-from .coarse_volume import StandIn
-from .exact_volume import LargeSurface, along
-from .gauss_newton import GaussNewton
-from .iteration import Iteration, SolverOptions
-from .position_constraints import (
-    FARTHEST_APART,
-    checked_constraints,
-    checked_targets,
-    connected_sets,
-    errors_at,
-    position_term,
-    require_together,
-)
+from .coarse_volume import CoarseVolume
+from .exact_volume import ScaledSurface, moved_along, steps_to_volume
+from .gauss_newton import GaussNewton, SolverOptions, SolverResult
+from .position_constraints import connected_sets, errors_at, position_term
 from .solution import Solution, Status
 from .volume_constraints import VolumeConstraint, Volumes, region_volumes, total_volume
 from .waypoints import waypoints
-from .weights import Ladder
+from .weights import WeightContinuation
 
 __all__ = [
-    "FARTHEST_APART",
+    "CoarseVolume",
     "GaussNewton",
-    "Iteration",
-    "Ladder",
-    "LargeSurface",
+    "ScaledSurface",
     "Solution",
     "SolverOptions",
-    "StandIn",
+    "SolverResult",
     "Status",
     "VolumeConstraint",
     "Volumes",
-    "along",
-    "checked_constraints",
-    "checked_targets",
+    "WeightContinuation",
     "connected_sets",
     "errors_at",
+    "moved_along",
     "position_term",
     "region_volumes",
-    "require_together",
+    "steps_to_volume",
     "total_volume",
     "waypoints",
 ]

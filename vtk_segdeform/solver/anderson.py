@@ -23,8 +23,8 @@ from ..arrays import FloatArray
 class Anderson:
     """The last few (p, h) and the combination of them whose residual is smallest.
 
-    Residuals are measured by H: plain distances between cage vertices count what moves nothing,
-    and take a sixth more steps.
+    Residuals are measured in the norm of H.  Plain distances between cage vertices also count
+    vertices that hardly move the mesh, and take a sixth more steps.
     """
 
     def __init__(self, window: int) -> None:
@@ -32,16 +32,16 @@ class Anderson:
         self.forget()
 
     def forget(self) -> None:
-        """Start again from the next step."""
+        """Discard all steps."""
         self._last: tuple[FloatArray, FloatArray] | None = None
         self._moves: list[FloatArray] = []  # differences of q = p + h
         self._changes: list[FloatArray] = []  # differences of the residual
 
     def begin_elsewhere(self) -> None:
-        """Keep what was learned; the next p does not follow on the last one.
+        """Keep the differences; the next p does not follow from the last one.
 
-        A drag moves the fixed point, but hardly changes how residuals answer to moves: what the
-        last frames learned of that saves the next one half of its steps.
+        A drag moves the fixed point, but hardly changes how residuals depend on p: the differences
+        of the last frames save the next frame half of its steps.
         """
         self._last = None
 

@@ -1,16 +1,14 @@
-"""A coarse stand-in for a large surface, over which the solver's steps take the volume.
+"""Coarse volume: the volume of a large mesh over a coarse surface, for the steps of the solver.
 
-A step asks how the volume changes with the cages, and lands where it has not changed.  Over a
-million vertices that would take longer than all the rest of it.  So a large mesh is cut into a few
-thousand *cells* of neighbouring vertices; each counts as one point, the mean of its vertices, and
-each triangle whose corners lie in three cells as one triangle.  Means of x = W~ p are means of
-rows of W~ times p: the stand-in moves with the same cages and costs the same whatever it stands
-for.  Merging vertices leaves a closed surface closed, so its volume is as good a cubic as the
-mesh's own.
+A step needs the gradient of the volume in the cages, and the root of its cubic.  On a million
+vertices these would take longer than the rest of the step.  So the vertices of a large mesh are
+divided into a few thousand *cells* of neighbours.  A cell is one point, the mean of its vertices;
+a triangle whose corners lie in three cells is one triangle.  Means of x = W~ p are means of rows
+of W~ times p: the coarse surface moves with the same cages, at a cost that does not depend on the
+mesh.  Merging vertices leaves a closed surface closed, so its volume is a cubic as well.
 
-Its volume differs from the mesh's by some per cent, what the cages do to the two by far less;
-and the last operation of every solve takes the mesh itself onto its own volume, exactly
-(`Deformer`).
+Its volume differs from the mesh's by some per cent, but their changes differ far less; and the last
+operation of every solve moves the mesh itself onto its exact volume (`exact_volume`).
 """
 
 from __future__ import annotations
@@ -23,32 +21,31 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .. import sizes
 from ..arrays import FloatArray, IntArray
 from ..geometry import cells as cells_of
-from ..geometry import faces_between, group_by_position
+from ..geometry import cluster_positions, faces_between
 from ..mesh import Mesh
 from ..progress import Progress
 from ..subspace import Subspace
 from .volume_constraints import VolumeConstraint, Volumes
 
-_POINTS = 2000  # about how many cells
-_LARGE = 3_000  # vertices beyond which a mesh has a stand-in
-_FEW = 700  # points that tell how the volume curves
-_SIDES = 0.1  # of the mesh's size: how far apart opposite sides count
+_SIDES = 0.1  # of the mesh's size: distance added between surfaces that face opposite ways
 
 
 @dataclass(frozen=True, eq=False)
-class StandIn:
-    """Cells of a mesh, and W~ over them; made by `StandIn.of`.
+class CoarseVolume:
+    """Cells of a mesh, and W~ of their means; made by `CoarseVolume.of`.
 
     Parameters
     ----------
     surface : Subspace
-        W~ over the cells; where there are none, over the mesh.
+        W~ of the cells; of a small mesh, its own.
     cells : (n,) int or None
-        The cell of each vertex; None where a mesh stands for itself.
+        The cell of each vertex; None for a small mesh.
     shares : (n,) float or None
-        What each vertex counts in the mean of its cell.
+        The weight of each vertex in the mean of its cell: its share of the area.  The mean by
+        number of vertices would depend on how finely each part is meshed.
     """
 
     surface: Subspace
@@ -63,66 +60,67 @@ class StandIn:
         *,
         whole: bool = False,
         progress: Progress | None = None,
-    ) -> StandIn:
-        """Return the stand-in of a *mesh* at rest that moves by *subspace*.
+    ) -> CoarseVolume:
+        """Return the coarse volume of a *mesh* at rest with W~ *subspace*.
 
-        A small mesh stands for itself; with *whole*, a large one as well.
+        Of a small mesh, or with *whole*, it is the volume of the mesh itself.
         """
         n = mesh.n_vertices
-        if n <= _LARGE or whole:
+        if n <= sizes.COARSE_VOLUME or whole:
             return cls(subspace)
-        _, cells = cells_of(mesh, _POINTS, np.random.default_rng(0), progress)
+        _, cells = cells_of(mesh, sizes.COARSE_VOLUME_POINTS, np.random.default_rng(0), progress)
         areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), n)
         shares = areas / np.bincount(cells, areas)[cells]
         return cls(subspace.averaged(_matrix(cells, shares)), cells, shares)
 
     def volumes(self, constraints: Sequence[VolumeConstraint], rest: FloatArray) -> Volumes:
-        """Return *constraints* on the mesh as constraints on the cages, held from *rest* (n, 3) on.
+        """Return *constraints* on the mesh as constraints on the cages.
 
-        *rest* may be scaled and moved: its own volumes are what is held.
+        Their targets are the coarse volumes of *rest* (n, 3), which may be scaled and moved.
         """
         points = rest
         if self.cells is not None and self.shares is not None:
             constraints = [_coarse(each, self.cells) for each in constraints]
             points = _matrix(self.cells, self.shares) @ rest
         free = [replace(each, target=0.0) for each in constraints]
-        held = tuple(replace(each, target=each.violation(points)) for each in free)
-        return Volumes(self.surface, held, _Curve(self.surface, held, points) if held else None)
+        preserved = tuple(replace(each, target=each.violation(points)) for each in free)
+        hessian = _VolumeHessian(self.surface, preserved, points) if preserved else None
+        return Volumes(self.surface, preserved, hessian)
 
 
 @dataclass(frozen=True, eq=False)
-class _Curve:
-    """How volumes curve with the cages, told by few points; called as `Volumes.curve`."""
+class _VolumeHessian:
+    """Second derivatives of volumes by the cages, from few points; called as `Volumes.hessian`."""
 
     surface: Subspace
     constraints: tuple[VolumeConstraint, ...]
-    points: FloatArray  # (n, 3), where the surface is at rest
+    points: FloatArray  # (n, 3), the surface at rest
 
     def __call__(self, p: FloatArray, multipliers: FloatArray) -> FloatArray:
         """Return G (3, m, m) at *p* (m, 3)."""
-        weights, constraints = self._of_few
+        weights, constraints = self._over_few_points
         x = weights @ p
         each = zip(multipliers, constraints, strict=True)
-        halves = sum(multiplier * constraint.curvature(x) for multiplier, constraint in each)
+        halves = sum(multiplier * constraint.hessian_halves(x) for multiplier, constraint in each)
         half = (halves.astype(np.float32) @ weights).reshape(3, len(x), -1)
         reduced = weights.T @ half
         return np.asarray(reduced - np.swapaxes(reduced, 1, 2), dtype=np.float64)
 
     @cached_property
-    def _of_few(self) -> tuple[NDArray[np.float32], tuple[VolumeConstraint, ...]]:
+    def _over_few_points(self) -> tuple[NDArray[np.float32], tuple[VolumeConstraint, ...]]:
         """W~ (k, m) of few points, in single precision, and the constraints over them.
 
-        Neighbours that face the same way are one point, so that thin parts keep both their sides.
+        Neighbours that face the same way are merged, so that thin parts keep both their sides.
         """
         n = len(self.points)
         cells, shares = np.arange(n), np.ones(n)
-        if n > _FEW:
+        if n > sizes.VOLUME_HESSIAN_POINTS:
             outward = np.sum([each.gradient(self.points) for each in self.constraints], axis=0)
             areas = np.linalg.norm(outward, axis=1) + np.finfo(float).tiny
             places = np.hstack([self.points, _SIDES * outward / areas[:, None]])
-            cells = group_by_position(places, _FEW, rounds=3, seeded=False)
+            cells = cluster_positions(places, sizes.VOLUME_HESSIAN_POINTS, rounds=3, seeded=False)
             shares = areas / np.bincount(cells, areas)[cells]
-        weights = self.surface.left(_matrix(cells, shares)).astype(np.float32)
+        weights = self.surface.premultiplied(_matrix(cells, shares)).astype(np.float32)
         return weights, tuple(_coarse(each, cells) for each in self.constraints)
 
 
@@ -141,5 +139,5 @@ def _coarse(constraint: VolumeConstraint, cells: IntArray) -> VolumeConstraint:
 
 
 def _matrix(cells: IntArray, shares: FloatArray) -> sparse.csr_array:
-    """Return (k, n), from vertices to the means of their cells."""
+    """Return the matrix (k, n) from vertices to the means of their cells."""
     return sparse.coo_array((shares, (cells, np.arange(len(cells))))).tocsr()

@@ -1,10 +1,12 @@
-"""The last operation of a solve: the mesh itself comes onto its own volume, exactly.
+"""Exact volume: move a pose onto its volumes, to rounding.
 
-    along    x + t W~ z      t the root of a cubic; for every mesh, and for volumes of regions
-    scaled   c + s (x - c)   s^3 = V_0 / V; for large meshes, where only x itself is then mapped
+    along directions    x + sum_k t_k z_k     the root of a cubic; Newton's method for several
+    by scaling          c + s (x - c)         s^3 = V_0 / V; for large meshes, whose map takes long
 
-The steps before have taken the volume over a stand-in (`coarse_volume`), so a little is missing.
-Mean value coordinates follow scaling: the cages are scaled alike, and x = W~ p still.
+The first is the last operation of every step of the solver, and of a solve; the second, for one
+volume of a large mesh, is the last of a solve only: its steps take the volume over a coarse surface
+(`coarse_volume`), so a little is missing.  Mean value coordinates scale with the cages: the caller
+scales these alike, and x = W~ p still.
 """
 
 from __future__ import annotations
@@ -17,29 +19,56 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..kernels import in_parallel
-from ..subspace import DeviceError, DeviceSurface, Patches, Subspace, gpu_arrays
-from .volume_constraints import VolumeConstraint, moved, restore
+from ..subspace import GPUError, GPUSurface, LowRankSubspace, Subspace, gpu_arrays
+from .volume_constraints import VolumeConstraint
 
 _log = logging.getLogger(__name__)
-_CACHED = 1 << 14  # vertices at a time
-_SHARES = 4  # that threads are handed: to wake for each piece would take as long
+_NEWTON_STEPS = 6
+_CACHED = 1 << 14  # vertices moved together
+_SHARES = 4  # of a mesh that threads scale; smaller ones take less time than waking a thread
 
 
-def along(
-    constraints: Sequence[VolumeConstraint], paths: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return steps (c,) along c directions, and the vertices (n, 3) after them.
+def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) -> FloatArray:
+    """Return the step t (c,) along each of c directions that meets all constraints.
 
-    *paths* (n, 3 + 3 c) has the vertices and their directions side by side.
+    *paths* (n, 3 + 3 c) has the vertices and their c directions side by side.  One constraint:
+    the exact root of its cubic.  Several: Newton's method on t.
     """
-    steps = restore(constraints, paths)
-    return steps, moved(paths, steps)
+    if len(constraints) == 1:
+        return np.array([constraints[0].exact_step(paths)])
+    x, *directions = np.split(paths, len(constraints) + 1, axis=1)
+    t = np.zeros(len(constraints))
+    here = x
+    for _ in range(_NEWTON_STEPS):
+        g = np.array([c.violation(here) for c in constraints])
+        gradients = [c.gradient(here) for c in constraints]
+        jacobian = np.array([[np.vdot(j, d) for d in directions] for j in gradients])
+        step = np.linalg.lstsq(jacobian, -g, rcond=1e-12)[0]
+        t += step
+        here = x + sum(tk * d for tk, d in zip(t, directions, strict=True))
+        if np.abs(g).max() <= 1e-15 * sum(abs(c.target) for c in constraints):
+            break
+    return t
 
 
-def scaled(constraint: VolumeConstraint, x: FloatArray, centre: FloatArray) -> float:
-    """Scale *x* (n, 3) in place about *centre* (3,) onto the volume; return by how much.
+def moved_along(paths: FloatArray, t: FloatArray) -> FloatArray:
+    """Return the vertices of *paths* (n, 3 + 3 c) after the step *t* (c,) along its directions."""
+    x = np.empty((len(paths), 3))
 
-    Where the surface is inside-out, so that no size would do, nothing is scaled.
+    def work(start: int, stop: int) -> None:
+        piece = paths[start:stop]
+        x[start:stop] = piece[:, :3]
+        for k, tk in enumerate(t, start=1):
+            x[start:stop] += tk * piece[:, 3 * k : 3 * k + 3]
+
+    in_parallel(work, len(paths), _CACHED)
+    return x
+
+
+def scale_to_volume(constraint: VolumeConstraint, x: FloatArray, centre: FloatArray) -> float:
+    """Scale *x* (n, 3) in place about *centre* (3,) onto the volume; return the factor.
+
+    A surface that is inside out has no such factor: it stays as it is, and 1 is returned.
     """
     ratio = constraint.relative(x)
     if not ratio > -1.0:
@@ -59,56 +88,58 @@ def scaled(constraint: VolumeConstraint, x: FloatArray, centre: FloatArray) -> f
     return scale
 
 
-class LargeSurface:
-    """A large mesh as it moves by its cages, landed by its size: on a GPU where there is one.
+class ScaledSurface:
+    """A large mesh moved by its cages and scaled to its exact volume; on a GPU if there is one.
+
+    The path on a GPU is untested there; see `subspace.gpu`.
 
     Parameters
     ----------
     subspace : Subspace
         W~.
-    mapping : Subspace or Patches
-        W~ as it is mapped by where there is no GPU.
-    rest, start : (n, 3) float
-        Where the mesh is while no cage vertex has moved; and that as *mapping* begins with it.
+    mapping : Subspace or LowRankSubspace
+        W~ as it is mapped without a GPU.
+    rest, base : (n, 3) float
+        The mesh at rest; and its ``mapping.base``.
     constraint : VolumeConstraint
-        The total volume, kept.
+        The total volume.
     """
 
     def __init__(
         self,
         subspace: Subspace,
-        mapping: Subspace | Patches,
+        mapping: Subspace | LowRankSubspace,
         rest: FloatArray,
         constraint: VolumeConstraint,
         *,
-        start: FloatArray,
+        base: FloatArray,
     ) -> None:
         self._subspace, self._mapping = subspace, mapping
-        self._rest, self._start, self._constraint = rest, start, constraint
+        self._rest, self._base, self._constraint = rest, base, constraint
 
-    def landed(self, moves: FloatArray, centre: FloatArray) -> tuple[FloatArray, float]:
-        """Return the mesh (n, 3) for *moves* (m, 3) of the cages, and the scale about *centre*."""
-        if self._device is not None:
+    def scaled(self, moves: FloatArray, centre: FloatArray) -> tuple[FloatArray, float]:
+        """Return the mesh (n, 3) for *moves* (m, 3) of the cages, and its factor about *centre*."""
+        if self._gpu is not None:
             try:
-                there = self._device.map(moves)
-                scale = self._device.scaled(there, self._constraint.target, centre)
-                return self._device.host(there), scale
-            except DeviceError as fault:
-                self._give_up(fault)
-        x = self._mapping.map(moves, self._start)
-        return x, scaled(self._constraint, x, centre)
+                x = self._gpu.map(moves)
+                scale = self._gpu.scale_to_volume(x, self._constraint.target, centre)
+                return self._gpu.host(x), scale
+            except GPUError as fault:
+                self._turn_off_gpu(fault)
+        x = self._mapping.map(moves, self._base)
+        return x, scale_to_volume(self._constraint, x, centre)
 
     @cached_property
-    def _device(self) -> DeviceSurface | None:
+    def _gpu(self) -> GPUSurface | None:
         arrays = gpu_arrays()
         if arrays is None:
             return None
         try:
-            return DeviceSurface(self._subspace, self._rest, self._constraint.faces, arrays)
-        except DeviceError as fault:
-            self._give_up(fault)
+            return GPUSurface(self._subspace, self._rest, self._constraint.faces, arrays)
+        except GPUError as fault:
+            self._turn_off_gpu(fault)
             return None
 
-    def _give_up(self, fault: DeviceError) -> None:
-        _log.info("going on without the GPU: %s", fault)
-        self._device = None
+    def _turn_off_gpu(self, fault: GPUError) -> None:
+        _log.info("continuing without the GPU: %s", fault)
+        self._gpu = None

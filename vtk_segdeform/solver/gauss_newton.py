@@ -1,8 +1,8 @@
-"""Gauss-Newton in the subspace of the cages, with volume held by Lagrange multipliers.
+"""Gauss-Newton in the subspace of the cages, with volumes preserved by Lagrange multipliers.
 
     minimise  E(p) + sum_i omega_i |x_i - u_i|^2    subject to  g(x) = 0,   x = W~ p    (20)
 
-with E the shape energy (5), u_i where the fixed vertices (6) and handles (7) belong, and g the
+E is the shape energy (5), u_i are the places of fixed vertices (6) and handles (7), and g are the
 volume constraints (9).  The paper's step, with J_f replaced by A, is eq. (21):
 
     h = -H^-1 (d + G^T lambda),   lambda = (G H^-1 G^T)^-1 (g - G H^-1 d)
@@ -10,19 +10,23 @@ volume constraints (9).  The paper's step, with J_f replaced by A, is eq. (21):
     H  W~^T A^T A W~ plus the position weights: constant, factored once by Cholesky
     d  half the gradient of the objective;  G = J_g W~, one row per constraint
 
-(The paper prints a minus before its lambda; with it G h = -g would not hold.)
+(The paper prints a minus before its lambda; then G h = -g would not hold.)
 
-Four things are added, each told by a number from the cactus bent by 60 degrees:
+    `GaussNewton._step`       h, lambda and Z = H^-1 G^T: eq. (21), line by line
+    `GaussNewton._retract`    p + h, moved along Z onto g = 0
+    `GaussNewton.minimise`    the iteration
 
-1. *Exact volume.*  Along Z = H^-1 G^T the volume is a cubic of the step length; its root is the
-   last operation of every step.  |dV| / V is then about 1e-15; (21) alone leaves 1e-4.
-2. *Curvature* (`hessian`).  (21) lets rotations follow one step behind: hundreds of steps, and
-   a small one says little of how far there is to go.  With their part in H, and that of the
-   volumes held, it is Newton's step, and about as long as the way that is left.
-3. *Anderson acceleration* (`anderson`) of (21) as a fixed-point map p -> q(p), for what has
-   turned since H was factored.
+Four things are added; the numbers are of the cactus bent by 60 degrees:
+
+1. *Exact volume.*  Along Z the volume is a cubic of the step length; its root is the last operation
+   of every step (`exact_volume`).  |dV| / V is then about 1e-15; (21) alone leaves 1e-4.
+2. *Exact Hessian* (`hessian`).  In (21) rotations follow one step behind: hundreds of steps are
+   needed, and a small step does not mean that the minimum is near.  With the derivatives of the
+   rotations and of the volumes in H, h is Newton's step, about as long as the remaining distance.
+3. *Anderson acceleration* (`anderson`) of (21) as a fixed-point map p -> q(p), for the rotation
+   since H was factored.
 4. *Safeguard.*  All iterates meet the constraints, so the objective itself is the merit: where it
-   rises an accelerated step gives way to the plain one, and that is shortened (epsilon, 3.3).
+   rises, the plain step replaces the accelerated one, and is shortened (epsilon, section 3.3).
 
 Source
 ------
@@ -35,205 +39,328 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..arrays import FloatArray
-from ..energy import Energy, Factor, curved_factor, factored
-from ..errors import CageError
-from ..progress import tell
+from ..arrays import FloatArray, is_number, is_whole
+from ..checks import as_flag, shown
+from ..energy import Energy, Factor, full_factor, quadratic_factor
+from ..errors import ArgumentError, CageError
+from ..progress import Progress, tell
 from .anderson import Anderson
-from .iteration import Course, Iteration, Point, SolverOptions
-from .position_constraints import PositionTerm, Pull
+from .exact_volume import moved_along, steps_to_volume
+from .position_constraints import PositionTerm, TargetTerm
 from .solution import Status
-from .volume_constraints import Volumes, moved, restore
+from .volume_constraints import Volumes
 
 _RISE = 1e-13  # relative rise of the merit that counts as rounding
 _DAMPING = 1e-9  # of the mean diagonal of H
-_CLOSE = 1e-2  # the paper's step, to where multipliers tell how volumes curve
-_SHORTEST = 1.0 / 64.0  # epsilon of section 3.3 below which a step is given up
-_NOTHING = np.empty((0, 3))
+_SHORTEST = 1.0 / 64.0  # least epsilon of section 3.3
+# Step lengths, root mean square over the surface of a mesh of size 1:
+_CLOSE = 1e-2  # of the paper's step: below it multipliers are accurate enough for volume Hessians
+_FAR = 2e-2  # beyond it volume Hessians are not valid at the end of the step
+_LONG = 1e-2  # beyond it H is computed again
+_OLD = 20  # steps after which H is computed again
+_NO_SURFACE = np.empty((0, 3))
+
+
+@dataclass(frozen=True)
+class SolverOptions:
+    """How to iterate; the defaults are those of the interactive editor."""
+
+    tolerance: float = 1e-7  # of a step's length, root mean square, mesh size 1
+    max_steps: int = 500
+    acceleration: int = 5  # steps that Anderson acceleration remembers; 0 turns it off
+    exact_hessian: bool = True  # False holds rotations and volumes' gradients fixed, as in (21)
+    exact_volume: bool = True  # False leaves the linearised multiplier of (21), for comparison
+    progress: Progress | None = field(default=None, compare=False)  # called before every step
+
+    def __post_init__(self) -> None:
+        if not (is_number(self.tolerance) and self.tolerance > 0.0):
+            raise ArgumentError(f"tolerance must be a positive number; got {shown(self.tolerance)}")
+        for name, least in (("max_steps", 1), ("acceleration", 0)):
+            value = getattr(self, name)
+            if not is_whole(value, least):
+                raise ArgumentError(
+                    f"{name} must be a whole number, {least} or more; got {shown(value)}"
+                )
+        as_flag(self.exact_hessian, "exact_hessian")
+        as_flag(self.exact_volume, "exact_volume")
+
+
+@dataclass(frozen=True, eq=False)
+class SolverResult:
+    """The last iterate, and how it was reached."""
+
+    p: FloatArray  # (m, 3), cage vertices
+    multipliers: FloatArray
+    directions: tuple[FloatArray, ...]  # Z, (m, 3) for each constraint
+    status: Status
+    steps: int
+    step_size: float  # of the last step, root mean square over the surface
+    shape: float  # E(p): the objective without the position term
+    merits: tuple[float, ...]  # the objective at the start and after each step
+
+
+@dataclass(frozen=True, eq=False)
+class _Iterate:
+    """A pose, with the objective and the constraints there."""
+
+    p: FloatArray
+    x: FloatArray  # the surface of the volumes; empty if no term needs it
+    shape: float  # E
+    shape_slope: FloatArray  # half its gradient
+    rows: tuple[FloatArray, ...]  # of G, one (m, 3) for each constraint
+    merit: float  # E and the position term
+    slope: FloatArray  # d
+
+    def toward(self, term: TargetTerm) -> _Iterate:
+        """Return the same pose for other targets."""
+        value, slope = term.value_and_slope(self.p)
+        return replace(self, merit=self.shape + value, slope=self.shape_slope + slope)
+
+
+@dataclass(eq=False)
+class _State:
+    """The running state of an iteration, from which a later call continues."""
+
+    acceleration: Anderson
+    factor: Factor  # of H
+    age: int = _OLD  # of the factor, in steps
+    step_size: float = math.inf  # of the last step
+    _end: tuple[FloatArray, FloatArray, SolverOptions] | None = None
+
+    @property
+    def factor_is_old(self) -> bool:
+        """Whether H should be computed again."""
+        return self.age >= _OLD or self.step_size > _LONG
+
+    @property
+    def is_near(self) -> bool:
+        """Whether the last step, if any, was not much longer than those of a drag."""
+        return not _FAR < self.step_size < math.inf
+
+    @property
+    def step_is_doubtful(self) -> bool:
+        """Whether the step just computed is too long for a factor from another pose."""
+        return self.age > 1 and self.step_size > _LONG
+
+    def renew_factor(self, factor: Factor) -> None:
+        """Use a factor of H at this pose."""
+        self.factor, self.age = factor, 0
+
+    def drop_factor(self) -> None:
+        """Have H computed again before the next step."""
+        self.age = _OLD
+
+    def for_other_targets(self, options: SolverOptions) -> _State:
+        """Return the state with which a solve for other targets begins."""
+        self.acceleration.begin_elsewhere()
+        is_same = self.acceleration.window == options.acceleration
+        acceleration = self.acceleration if is_same else Anderson(options.acceleration)
+        return _State(acceleration, self.factor, self.age, 0.0)
+
+    def ended_at(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> _State:
+        """Remember where the call ended; return itself."""
+        self._end = p, targets, replace(options, progress=None)
+        return self
+
+    def continues(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> bool:
+        """Tell whether a call with these arguments begins where the last one ended."""
+        if self._end is None or replace(options, max_steps=1) != replace(self._end[2], max_steps=1):
+            return False
+        return np.array_equal(p, self._end[0]) and np.array_equal(targets, self._end[1])
 
 
 @dataclass(eq=False)
 class GaussNewton:
-    """The factored problem; `minimise` runs it for one set of targets."""
+    """The factored problem; `minimise` solves it for one set of targets."""
 
     energy: Energy
     positions: PositionTerm
     volumes: Volumes
     _hessian: FloatArray = field(init=False, repr=False)
     _factor: Factor = field(init=False, repr=False)
-    _left: Course | None = field(init=False, repr=False, default=None)
-    _last: Point | None = field(init=False, repr=False, default=None)
+    _state: _State | None = field(init=False, repr=False, default=None)
+    _last: _Iterate | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         hessian = self.energy.quadratic + self.positions.quadratic()
         # Cage vertices that move nothing (a region without fixed vertices or handles, weights
-        # near zero) leave H singular.  A share of the identity damps the step there; d is
-        # untouched, and with it every point where the iteration can rest.
+        # near zero) leave H singular.  A share of the identity damps the step there; d, and with
+        # it every stationary point, stays the same.
         trace = np.trace(hessian) / len(hessian)
         damping = np.diag(np.full(len(hessian), _DAMPING * trace))
-        if not len(self.positions.rows):  # nothing holds the whole: rounding would carry it off
+        if not len(self.positions.rows):  # without positions rounding would move the whole mesh
             mean = self.energy.subspace.adjoint(np.ones((self.energy.subspace.n_vertices, 1)))
             damping += trace * (mean @ mean.T) / np.vdot(mean, mean)
         self._hessian = hessian + damping
-        factor = factored(self._hessian)
+        factor = quadratic_factor(self._hessian)
         if factor is None:
             raise CageError(
-                "the cages hardly move the mesh, so no pose can be solved for: "
-                "make them fit more tightly"
+                "the cages hardly move the mesh, so no pose can be computed; fit them more tightly"
             )
         self._factor = factor
 
     def copy(self) -> GaussNewton:
-        """Return one that goes on from here as this one would, on its own."""
+        """Return a solver that continues from here independently."""
         other = copy.copy(self)
-        other._left = copy.deepcopy(self._left)
+        other._state = copy.deepcopy(self._state)
         return other
 
     def forget(self) -> None:
-        """Let the next call begin as if it were the first."""
-        self._left = self._last = None
+        """Discard the running state: the next call begins like the first."""
+        self._state = self._last = None
 
-    def minimise(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> Iteration:
+    def minimise(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> SolverResult:
         """Iterate from cage vertices *p* (m, 3) for positions *targets* (k, 3).
 
-        From where the last call ended, for the same targets, it goes on as if it had not.
+        Called again with the last p and targets, it continues as if it had never returned.
         """
-        course, self._left = self._left, None
-        if course is None:
-            course = Course(Anderson(options.window), self._factor)
-        elif not course.goes_on(p, targets, options):
-            course = course.for_other_targets(options)
+        state = self._begin(p, targets, options)
+        term = self.positions.toward(targets)
+        here = self._iterate_at(p, term)
+        merits = [here.merit]
         multipliers = np.zeros(len(self.volumes.constraints))
         directions: list[FloatArray] = []
-        pull = self.positions.toward(targets)
-        here = self._taken_up(p, pull)
-        merits = [here.merit]
+        newton = options.exact_hessian and self.energy.has_exact_gradient
         status = Status.STEP_LIMIT
-        curved = bool(options.window) and self.energy.exact
         while len(merits) <= options.max_steps:
             tell(options.progress, (len(merits) - 1) / options.max_steps, "solving")
-            if curved and (course.factor_is_old):
-                course.renew(self._curved(here, course) or self._factor)
-            course.age += 1
-            step, multipliers, directions = self._step(here, course.factor)
-            course.size = self._size(step)
-            if curved and course.is_astray:
-                course.doubt_factor()
+            if newton and state.factor_is_old:
+                state.renew_factor(self._full_factor(here, state) or self._factor)
+            state.age += 1
+            step, multipliers, directions = self._step(here, state.factor)
+            state.step_size = self._length(step)
+            if newton and state.step_is_doubtful:
+                state.drop_factor()
                 continue
-            if course.size <= options.tolerance:
+            if state.step_size <= options.tolerance:
                 status = Status.CONVERGED
                 break
             ahead = None
-            if options.window:
+            if options.acceleration:
                 residual = self._factor.triangle.T @ step
-                guess = course.memory.extrapolate(here.p, step, residual)
-                ahead = self._retract(guess, directions, pull, options)
+                guess = state.acceleration.extrapolate(here.p, step, residual)
+                ahead = self._retract(guess, directions, term, options)
                 if not self._improves(ahead, here):
-                    course.memory.forget()
+                    state.acceleration.forget()
                     ahead = None
-                    if curved and course.age > 1:  # look again before giving way to the plain step
-                        course.doubt_factor()
-                        continue
-            ahead = ahead or self._shortened(here, step, directions, pull, options)
+            is_renewable = newton and state.age > 1  # H is of an earlier pose
+            if ahead is None and not (is_renewable and options.acceleration):
+                ahead = self._shortened(here, step, directions, term, options)
+            if ahead is None and is_renewable:
+                state.drop_factor()
+                continue
             if ahead is None:
                 status = Status.STALLED
                 break
             here = ahead
             merits.append(here.merit)
-        self._left, self._last = course.ended(here.p, targets, options), here
-        return Iteration(
+        self._state, self._last = state.ended_at(here.p, targets, options), here
+        return SolverResult(
             p=here.p,
             multipliers=multipliers,
             directions=tuple(directions),
             status=status,
             steps=len(merits) - 1,
-            step_size=course.size,
+            step_size=state.step_size,
             shape=here.shape,
             merits=tuple(merits),
         )
 
-    def _curved(self, here: Point, course: Course) -> Factor | None:
-        curve = self.volumes.curve if course.is_near else None
-        step, multipliers, _ = self._step(here, self._factor)
-        of_volumes = curve(here.p, multipliers) if curve and self._size(step) < _CLOSE else None
-        return curved_factor(self._hessian, self.energy, here.p, of_volumes)
-
-    def _step(self, here: Point, factor: Factor) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
-        """Return h and lambda of (21), and the directions Z in which the volume is restored."""
-        constraints, rows = self.volumes.constraints, here.rows
-        h, *directions = factor.solve_all([-here.slope, *rows])
-        if not constraints:
+    def _step(
+        self, here: _Iterate, factor: Factor
+    ) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
+        """Return h and lambda of (21), and Z = H^-1 G^T, one direction for each constraint."""
+        h, *z = factor.solve_all([-here.slope, *here.rows])  # -H^-1 d, and Z
+        if not self.volumes.constraints:
             return h, np.zeros(0), []
-        matrix = np.array([[np.vdot(row, z) for z in directions] for row in rows])
-        g = np.array([c.violation(here.x) for c in constraints])
-        along = np.array([np.vdot(row, h) for row in rows])
-        multipliers = np.linalg.lstsq(matrix, g + along, rcond=1e-12)[0]
-        for multiplier, z in zip(multipliers, directions, strict=True):
-            h -= multiplier * z
-        return h, multipliers, directions
+        gz = np.array([[np.vdot(row, direction) for direction in z] for row in here.rows])
+        g = np.array([constraint.violation(here.x) for constraint in self.volumes.constraints])
+        gh = np.array([np.vdot(row, h) for row in here.rows])
+        multipliers = np.linalg.lstsq(gz, g + gh, rcond=1e-12)[0]
+        for multiplier, direction in zip(multipliers, z, strict=True):
+            h -= multiplier * direction
+        return h, multipliers, z
 
     def _retract(
         self,
         p: FloatArray,
         directions: Sequence[FloatArray],
-        pull: Pull,
+        term: TargetTerm,
         options: SolverOptions,
-    ) -> Point:
+    ) -> _Iterate:
         """Return *p* moved along *directions* onto the constraints, and the objective there."""
         if not np.isfinite(p).all():
-            return Point(p, p, math.inf, p, (), math.inf, p)
+            return _Iterate(p, p, math.inf, p, (), math.inf, p)
         if not directions or not options.exact_volume:
-            return self._evaluate(p, self._surface(p), pull)
+            return self._evaluate(p, self._surface(p), term)
         paths = self.volumes.surface.map(np.hstack([p, *directions]))
-        t = restore(self.volumes.constraints, paths)
+        t = steps_to_volume(self.volumes.constraints, paths)
         p = p + sum(tk * z for tk, z in zip(t, directions, strict=True))
-        return self._evaluate(p, moved(paths, t), pull)
+        return self._evaluate(p, moved_along(paths, t), term)
+
+    def _full_factor(self, here: _Iterate, state: _State) -> Factor | None:
+        """Return the factor of the exact Hessian; None if it is not convex."""
+        of_volumes = None
+        step, multipliers, _ = self._step(here, self._factor)
+        if state.is_near and self.volumes.hessian and self._length(step) < _CLOSE:
+            of_volumes = self.volumes.hessian(here.p, multipliers)
+        return full_factor(self._hessian, self.energy, here.p, of_volumes)
+
+    def _begin(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> _State:
+        """Return the state from which a call with these arguments begins."""
+        state, self._state = self._state, None
+        if state is None:
+            return _State(Anderson(options.acceleration), self._factor)
+        if state.continues(p, targets, options):
+            return state
+        return state.for_other_targets(options)
 
     def _surface(self, p: FloatArray) -> FloatArray:
-        asked = self.volumes.constraints or self.energy.turns_vertices
-        return self.volumes.surface.map(p) if asked else _NOTHING
+        needed = self.volumes.constraints or self.energy.has_vertex_rotations
+        return self.volumes.surface.map(p) if needed else _NO_SURFACE
 
-    def _evaluate(self, p: FloatArray, x: FloatArray, pull: Pull) -> Point:
-        pulled = self.energy.pulled(p, x)
-        forces = [c.gradient(x) for c in self.volumes.constraints]
-        if self.energy.turns_vertices:  # they, too, are on the surface: in one pass over W~
-            pulled, *rows = self.volumes.surface.adjoints([pulled, *forces])
+    def _evaluate(self, p: FloatArray, x: FloatArray, term: TargetTerm) -> _Iterate:
+        load = self.energy.rotation_load(p, x)
+        gradients = [constraint.gradient(x) for constraint in self.volumes.constraints]
+        if self.energy.has_vertex_rotations:  # the load is on the surface, too: one pass over W~
+            load, *rows = self.volumes.surface.adjoints([load, *gradients])
         else:
-            rows = self.volumes.surface.adjoints(forces)
-        value, slope = self.energy.settled(p, pulled)
-        return Point(p, x, value, slope, tuple(rows), value, slope).toward(pull)
+            rows = self.volumes.surface.adjoints(gradients)
+        value, slope = self.energy.value_and_slope(p, load)
+        return _Iterate(p, x, value, slope, tuple(rows), value, slope).toward(term)
 
-    def _taken_up(self, p: FloatArray, pull: Pull) -> Point:
-        """Return the point at *p*; where the last call ended, most of it is known."""
+    def _iterate_at(self, p: FloatArray, term: TargetTerm) -> _Iterate:
+        """Return the iterate at *p*; where the last call ended only the targets have changed."""
         last = self._last
         if last is None or last.p is not p:
-            return self._evaluate(p, self._surface(p), pull)
-        return last.toward(pull)
+            return self._evaluate(p, self._surface(p), term)
+        return last.toward(term)
 
     def _shortened(
         self,
-        here: Point,
+        here: _Iterate,
         step: FloatArray,
         directions: Sequence[FloatArray],
-        pull: Pull,
+        term: TargetTerm,
         options: SolverOptions,
-    ) -> Point | None:
-        """Return the longest of the steps h, h/2, h/4 ... that lowers the objective, or None."""
+    ) -> _Iterate | None:
+        """Return the first of the steps h, h/2, h/4 ... that lowers the objective, or None."""
         epsilon = 1.0
         while epsilon >= _SHORTEST:
-            ahead = self._retract(here.p + epsilon * step, directions, pull, options)
-            comparable = self.energy.exact and options.exact_volume
-            if self._improves(ahead, here) or (not comparable and np.isfinite(ahead.merit)):
+            ahead = self._retract(here.p + epsilon * step, directions, term, options)
+            is_merit = self.energy.has_exact_gradient and options.exact_volume
+            if self._improves(ahead, here) or (not is_merit and np.isfinite(ahead.merit)):
                 return ahead
             epsilon *= 0.5
         return None
 
-    def _improves(self, ahead: Point, here: Point) -> bool:
+    def _improves(self, ahead: _Iterate, here: _Iterate) -> bool:
         return ahead.merit <= here.merit + _RISE * (self.energy.constant + abs(here.merit))
 
-    def _size(self, step: FloatArray) -> float:
+    def _length(self, step: FloatArray) -> float:
+        """Return the root mean square of a *step* over the surface."""
         return math.sqrt(max(0.0, float(np.vdot(step, self.energy.mass @ step))))

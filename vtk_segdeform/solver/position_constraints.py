@@ -1,74 +1,82 @@
-"""Vertices with a place to be: fixed ones (6) and handles (7), as weighted squares.
+"""Position constraints: fixed vertices (6) and handles (7), as weighted squares.
 
     sum_i omega_i |x_i - u_i|^2,    x_i = W~_i p
 
-Vertices joined by mesh edges form a *set*: a fixed patch, or a handle that moves on its own.
-Every set weighs the same, shared out evenly over its vertices, so that a handle of one vertex
-holds as well as a patch of a thousand; in a patch of many thousands, neighbours share a place,
-their mean.  A coarse cage cannot put every vertex of a set in place; `PositionTerm.stiffened`
-raises the weight of the sets that are off by too much.
+Vertices joined by mesh edges form a *set*: a fixed patch, or a handle that moves independently.
+All sets have the same total weight, divided evenly among their vertices, so that a handle of one
+vertex is as strong as a patch of a thousand; in larger sets neighbours share a place, their mean.
+A coarse cage cannot put every vertex of a set in its place; `weights` raises the weight of sets
+that miss their places by too much.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from ..arrays import FloatArray, IntArray, as_ids, as_points
-from ..errors import ConstraintError
-from ..geometry import group_by_position
+from .. import sizes
+from ..arrays import FloatArray, IntArray
+from ..geometry import cluster_positions
 from ..mesh import Mesh
 from ..subspace import Subspace
 
-FARTHEST_APART = 20.0
-"""Diagonals of a mesh between places of what it is held by.
-
-So far apart, volumes are rounded to a few 1e-13 of themselves; it grows with the cube of that."""
-
-_MANY, _PLACES = 1000, 500  # vertices of a set beyond which it has so many places
-_STIFFER = 10.0
-_STIFFEST = 1e4  # times the weight it started with
-_Set: TypeAlias = tuple[slice, FloatArray | None, FloatArray]
+_MOST_CHECKED = 5000  # vertices of a border
+_CHECK_FACTOR = 1.5  # between the errors allowed at a checked vertex and at a place
+_SetRows: TypeAlias = tuple[slice, FloatArray | None, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
-class Pull:
-    """The term for targets that stay, as r rows: sum_i omega_i |rows_i p - aims_i|^2 + beyond."""
+class TargetTerm:
+    """The term for given targets, as r rows: sum_i omega_i |rows_i p - aims_i|^2 + constant."""
 
     rows: FloatArray  # (r, m)
     aims: FloatArray  # (r, 3)
     weights: FloatArray  # (r,)
-    beyond: float
+    constant: float
 
     def value_and_slope(self, p: FloatArray) -> tuple[float, FloatArray]:
         """Return the term at *p* (m, 3) and half its gradient (m, 3)."""
         away = self.rows @ p - self.aims
-        pull = away * self.weights[:, None]
-        return self.beyond + float(np.vdot(away, pull)), self.rows.T @ pull
+        weighted = away * self.weights[:, None]
+        return self.constant + float(np.vdot(away, weighted)), self.rows.T @ weighted
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedVertices:
+    """Vertices without a weight, at which the errors of sets with shared places are checked.
+
+    The largest error of a set is at its border, where the rest of the mesh pulls, or else far from
+    the middle of a place.
+    """
+
+    rows: FloatArray  # W~ at these vertices, (c, m)
+    set_of: IntArray  # (c,)
 
 
 @dataclass(frozen=True, eq=False)
 class PositionTerm:
     """The term for k vertices in sets; `strength` (s,) multiplies the weight of each set.
 
-    A set of many vertices reaches few cage vertices: its rows Q R count as R, with targets Q^T u.
-    What of the targets is beyond Q no pose can meet, and it says nothing of where to go.
+    A set of many vertices is moved by few cage vertices: its rows Q R are replaced by R, with
+    targets Q^T u.  The rest of the targets, which no pose can meet, adds a constant.
+
+    With shared places, the targets are those of the k places and of the c checked vertices.
     """
 
     rows: FloatArray  # W~ at the k places, (k, m)
     set_of: IntArray  # (k,), in order
     base: FloatArray  # omega before strength, (k,), the same within a set
     strength: FloatArray
-    mean: sparse.csr_array | None = None  # (k, v), from the vertices held to the places
-    known: list[_Set] | None = None  # what `_sets` is, if it is known
+    mean: sparse.csr_array | None = None  # (k + c, v), from the vertices of the sets to the targets
+    checks: CheckedVertices | None = None
+    factored: list[_SetRows] | None = None  # `_sets`, if it has been computed
 
     @property
     def weights(self) -> FloatArray:
@@ -76,13 +84,13 @@ class PositionTerm:
         return self.base * self.strength[self.set_of]
 
     @cached_property
-    def _sets(self) -> list[_Set]:
-        """For each set its places, Q if it is worth it, and R; or else its rows."""
-        if self.known is not None:
-            return self.known
+    def _sets(self) -> list[_SetRows]:
+        """For each set its places, Q and R; or None and its rows, if these are not more than R."""
+        if self.factored is not None:
+            return self.factored
         size = np.bincount(self.set_of, minlength=len(self.strength))
         ends = np.cumsum(size)
-        sets: list[_Set] = []
+        sets: list[_SetRows] = []
         for start, end in zip(ends - size, ends, strict=True):
             rows = self.rows[start:end]
             reached = np.flatnonzero(rows.any(axis=0))
@@ -99,18 +107,18 @@ class PositionTerm:
         """Return rows^T omega rows, (m, m)."""
         return (self.rows.T * self.weights) @ self.rows
 
-    def toward(self, u: FloatArray) -> Pull:
+    def toward(self, u: FloatArray) -> TargetTerm:
         """Return the term for targets *u* (k, 3)."""
-        aims, beyond, omega = [np.empty((0, 3))], 0.0, self.weights
+        aims, constant, omega = [np.empty((0, 3))], 0.0, self.weights
         for places, q, _ in self._sets:
             aim = u[places]
             if q is not None:
                 aim = q.T @ u[places]
                 left = u[places] - q @ aim
-                beyond += float(omega[places.start] * np.vdot(left, left))
+                constant += float(omega[places.start] * np.vdot(left, left))
             aims.append(aim)
         rows, weights = self._short
-        return Pull(rows, np.concatenate(aims), weights, beyond)
+        return TargetTerm(rows, np.concatenate(aims), weights, constant)
 
     @cached_property
     def _short(self) -> tuple[FloatArray, FloatArray]:
@@ -124,119 +132,110 @@ class PositionTerm:
         """Return the term at *p* and half its gradient (m, 3), for targets *u* (k, 3)."""
         return self.toward(u).value_and_slope(p)
 
-    def stiffened(self, errors: FloatArray, tolerance: float) -> PositionTerm | None:
-        """Return the term with more weight where *errors* (k,) pass *tolerance*, or None.
+    def errors(self, p: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the largest errors of each set at *p* (m, 3): at its places, at checked vertices.
 
-        None means that nothing is off, or that what is off already has all the weight allowed.
+        Both (s,).  The latter are divided by 1.5, and 0 for a set without shared places.
         """
+        count = len(self.rows)
+        places = self._worst(self.rows @ p - u[:count], self.set_of)
+        if self.checks is None:
+            return places, np.zeros_like(places)
+        checks = self._worst(self.checks.rows @ p - u[count:], self.checks.set_of)
+        return places, checks / _CHECK_FACTOR
+
+    def _worst(self, away: FloatArray, set_of: IntArray) -> FloatArray:
         worst = np.zeros(len(self.strength))
-        np.maximum.at(worst, self.set_of, errors)
-        raised = (worst > tolerance) & (self.strength < _STIFFEST)
-        if not raised.any():
-            return None
-        strength = np.where(raised, self.strength * _STIFFER, self.strength)
-        return PositionTerm(self.rows, self.set_of, self.base, strength, self.mean, self._sets)
+        np.maximum.at(worst, set_of, np.sqrt(np.einsum("ij,ij->i", away, away)))
+        return worst
+
+    def with_strength(self, strength: FloatArray) -> PositionTerm:
+        """Return the term with other weights."""
+        return replace(self, strength=strength, factored=self._sets)
 
 
 def position_term(
-    subspace: Subspace, vertices: FloatArray, held: list[IntArray], weight: float
+    subspace: Subspace, mesh: Mesh, sets: list[IntArray], weight: float
 ) -> PositionTerm:
-    """Return the term for sets of vertices *held*, each of total *weight*.
+    """Return the term for *sets* of vertices, each of total *weight*.
 
     Parameters
     ----------
     subspace : Subspace
         W~.
-    vertices : (n, 3) float
-        The mesh at rest.
-    held : list of (k_s,) int
-        The vertices of each set, as they follow each other in the targets.
+    mesh : Mesh
+        At rest.
+    sets : list of (k_s,) int
+        The vertices of each set, in the order of the targets.
     weight : float
         Of each set.
     """
-    places = [_places(vertices[ids]) for ids in held]
+    places = [_places(mesh.vertices[ids]) for ids in sets]
     size = np.array([int(place.max()) + 1 for place in places], dtype=np.int64)
-    set_of = np.repeat(np.arange(len(held)), size)
+    set_of = np.repeat(np.arange(len(sets)), size)
     base = weight / size[set_of]
-    strength = np.ones(len(held))
-    ids = np.concatenate([np.zeros(0, dtype=np.int64), *held])
+    strength = np.ones(len(sets))
+    ids = np.concatenate([np.zeros(0, dtype=np.int64), *sets])
     if len(ids) == len(set_of):
         return PositionTerm(subspace.at(ids), set_of, base, strength)
     begins = np.concatenate([[0], np.cumsum(size)])
     row = np.concatenate([begin + place for begin, place in zip(begins, places, strict=False)])
     share = 1.0 / np.bincount(row)[row]
     mean = sparse.coo_array((share, (row, np.arange(len(ids))))).tocsr()
-    on_mesh = sparse.coo_array((share, (row, ids)), (len(set_of), len(vertices))).tocsr()
-    return PositionTerm(subspace.left(on_mesh), set_of, base, strength, mean)
+    on_mesh = sparse.coo_array((share, (row, ids)), (len(set_of), mesh.n_vertices)).tocsr()
+    count = np.array([len(own) for own in sets])
+    begins = np.cumsum(count) - count
+    at, with_shared = [], np.flatnonzero(size < count)
+    for k in with_shared:
+        farthest = _farthest(mesh.vertices[sets[k]], places[k])
+        at.append(begins[k] + np.union1d(_border(mesh, sets[k]), farthest))
+    checked = np.concatenate(at)
+    checks = CheckedVertices(
+        subspace.at(ids[checked]), np.repeat(with_shared, [len(own) for own in at])
+    )
+    to_targets = sparse.vstack([mean, sparse.eye_array(len(ids)).tocsr()[checked]]).tocsr()
+    return PositionTerm(
+        subspace.premultiplied(on_mesh), set_of, base, strength, mean=to_targets, checks=checks
+    )
+
+
+def _border(mesh: Mesh, ids: IntArray) -> IntArray:
+    """Return indices into *ids* (k,) of vertices with other neighbours, at most some 5,000."""
+    outside = np.ones(mesh.n_vertices)
+    outside[ids] = 0.0
+    border = np.flatnonzero(mesh.adjacency[ids] @ outside)
+    return border[:: 1 + len(border) // _MOST_CHECKED]
+
+
+def _farthest(points: FloatArray, place: IntArray) -> IntArray:
+    """Return the index of the point farthest from the mean of each *place*, of points (k, 3)."""
+    share = 1.0 / np.bincount(place)
+    middle = np.stack([np.bincount(place, x) * share for x in points.T], axis=1)
+    order = np.lexsort((np.linalg.norm(points - middle[place], axis=1), place))
+    return order[np.cumsum(np.bincount(place)) - 1]
 
 
 def _places(points: FloatArray) -> IntArray:
-    """Return (k,) the place of each point of a set: its own, or one shared by those near by."""
-    if len(points) <= _MANY:
+    """Return (k,) the place of each point of a set: its own, or one shared with its neighbours."""
+    if len(points) <= sizes.SHARED_PLACES:
         return np.arange(len(points))
-    return group_by_position(points, _PLACES)
+    return cluster_positions(points, sizes.PLACES)
 
 
 def errors_at(
     ids: Sequence[IntArray], places: Sequence[FloatArray], unit: float, x: FloatArray
 ) -> tuple[float, ...]:
-    """Return, for each list of vertices of *x* (n, 3), how far its farthest is from its place.
+    """Return the largest distance of vertices of *x* (n, 3) from their places, for each list.
 
-    Over *unit*; 0 where none is listed.
+    In multiples of *unit*; 0 for an empty list.
     """
-    ways = [np.take(x, own, axis=0) - there for own, there in zip(ids, places, strict=True)]
-    return tuple(math.sqrt(np.einsum("ij,ij->i", way, way).max(initial=0.0)) / unit for way in ways)
-
-
-def checked_constraints(
-    mesh: Mesh, fixed: ArrayLike, handle: ArrayLike
-) -> tuple[IntArray, IntArray]:
-    """Return the vertex numbers of *fixed* and *handle*, or raise a ConstraintError."""
-    try:
-        fixed = as_ids(fixed, mesh.n_vertices, "fixed")
-        handle = as_ids(handle, mesh.n_vertices, "handle")
-    except ValueError as fault:
-        raise ConstraintError(str(fault)) from None
-    both = np.intersect1d(fixed, handle)
-    if len(both):
-        raise ConstraintError(
-            f"{len(both)} vertices are both fixed and handle (the first is {both[0]}); "
-            "take them out of one of the two"
-        )
-    return fixed, handle
-
-
-def checked_targets(targets: ArrayLike, n_handle: int) -> FloatArray:
-    """Return *targets* as (n_handle, 3), or raise a ConstraintError; without handles, any empty."""
-    try:
-        array = as_points(targets, "targets") if n_handle or np.size(targets) else np.empty((0, 3))
-    except ValueError as fault:
-        raise ConstraintError(str(fault)) from None
-    if len(array) != n_handle:
-        raise ConstraintError(
-            f"targets must give one point for each of the {n_handle} handle vertices; "
-            f"got shape {array.shape}"
-        )
-    return array
-
-
-def require_together(mesh: Mesh, *places: FloatArray) -> None:
-    """Raise a ConstraintError if *places* (k, 3), targets and fixed, are senselessly far apart."""
-    held = [points for points in places if len(points)]
-    if not held:
-        return
-    low = np.min([points.min(axis=0) for points in held], axis=0)
-    high = np.max([points.max(axis=0) for points in held], axis=0)
-    apart = float((high - low).max()) / mesh.diagonal
-    if not apart <= FARTHEST_APART:
-        raise ConstraintError(
-            f"targets and fixed vertices are {apart:.3g} diagonals of the mesh apart; at most "
-            f"{FARTHEST_APART:.0f} are allowed: are both in the same unit?"
-        )
+    offsets = [np.take(x, own, axis=0) - there for own, there in zip(ids, places, strict=True)]
+    squares = (np.einsum("ij,ij->i", each, each).max(initial=0.0) for each in offsets)
+    return tuple(math.sqrt(square) / unit for square in squares)
 
 
 def connected_sets(mesh: Mesh, ids: IntArray) -> list[IntArray]:
-    """Return places in *ids* (k,), one array for each set of vertices joined by mesh edges."""
+    """Return indices into *ids* (k,), one array for each set of vertices joined by mesh edges."""
     if not len(ids):
         return []
     among = sparse.csr_array(mesh.adjacency[ids][:, ids])

@@ -1,4 +1,4 @@
-"""The answer of a solve: the pose, and how well and by which way it was reached."""
+"""The result of a solve: the pose, how it was reached, and its errors."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ _T = TypeVar("_T")
 
 
 class Status(enum.Enum):
-    """Why the iteration ended, in words a status bar can show."""
+    """Why the iteration ended, as a text for a status bar."""
 
     CONVERGED = "converged"
-    STEP_LIMIT = "stopped at the step limit; solve again to go on, or raise max_steps"
-    STALLED = "no shorter step improves the shape; the targets may be out of reach"
+    STEP_LIMIT = "not fully converged: solve again to continue, or raise max_steps"
+    STALLED = "no further improvement: the cages may not be able to reach this pose"
     MISSED = (
-        "converged, but not every handle or fixed vertex is in its place: "
-        "use more cage vertices, move less, or leave more room between handle and fixed vertices"
+        "the cages cannot reach this pose: add cage vertices, move less, or leave more room "
+        "between handle and fixed vertices"
     )
 
     def __str__(self) -> str:
@@ -31,30 +31,30 @@ class Status(enum.Enum):
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A pose of the mesh, in the mesh's own unit and place."""
+    """A pose of the mesh, in the coordinates of the mesh."""
 
     vertices: FloatArray
     """(n, 3) float: the deformed mesh."""
     cage_vertices: tuple[FloatArray, ...]
-    """One (m_r, 3) float per region: the cages that move it there."""
+    """One (m_r, 3) float per region: the cages in this pose."""
     steps: int
-    """Gauss-Newton steps, those on the way to a far target included."""
+    """Gauss-Newton steps, including those for waypoints to a far target."""
     status: Status
-    """Why the iteration ended; ``str(status)`` is advice."""
+    """Why the iteration ended; ``str(status)`` says what to do."""
     merits: tuple[float, ...]
-    """The objective at the start of the last leg and after each of its steps; it never rises."""
+    """The objective before and after each step from the last waypoint on; it never rises."""
     errors: Callable[[FloatArray], tuple[float, ...]] = field(repr=False)
-    """What measures `handle_error` and `fixed_error`."""
+    """Computes `handle_error` and `fixed_error`."""
     volume: Callable[[], float] = field(repr=False)
-    """What measures `volume_change`."""
+    """Computes `volume_change`."""
     region_volumes: Callable[[FloatArray], FloatArray] = field(repr=False)
-    """What measures `region_volume_change`."""
+    """Computes `region_volume_change`."""
 
     def __post_init__(self) -> None:
         for name in ("vertices", "cage_vertices"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
-    # Copies and pickles store the values measured on demand instead of the deformer.
+    # Copies and pickles store the computed values instead of the functions.
 
     def __getstate__(self) -> dict[str, Any]:
         measured = {
@@ -74,17 +74,17 @@ class Solution:
 
     @property
     def handle_error(self) -> float:
-        """Distance of the farthest handle vertex from its target, in diagonals; on demand."""
+        """Largest distance of a handle vertex from its target, in diagonals of the mesh."""
         return self._errors[0]
 
     @property
     def fixed_error(self) -> float:
-        """Distance of the farthest fixed vertex from its place, likewise."""
+        """Largest distance of a fixed vertex from its rest position, in diagonals of the mesh."""
         return self._errors[1]
 
     @cached_property
     def volume_change(self) -> float:
-        """(V - V0) / V0 of `vertices`, signed; measured on demand.
+        """(V - V0) / V0 of `vertices`, signed; computed on first access.
 
         The solver reaches about 1e-15.  Far from the origin float64 coordinates are too coarse for
         that: rounding changes V by at most eps m A, where eps = 2.2e-16, m is the largest
@@ -95,7 +95,7 @@ class Solution:
 
     @cached_property
     def region_volume_change(self) -> FloatArray:
-        """(V - V0) / V0 of each region that owns a face, closed at its border; on demand."""
+        """(V - V0) / V0 of each region that has a face, closed at its border."""
         return read_only(self.region_volumes(self.vertices))
 
 

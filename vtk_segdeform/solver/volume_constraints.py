@@ -1,17 +1,17 @@
-"""Equality constraints, held exactly: the volume of the whole mesh, or of each of its regions.
+"""Volume constraints: the volume of the whole mesh, or of each of its regions, is preserved.
 
     g_c(x) = V_c(x) - V_c(rest) = 0                                                     (9)
 
-A region is not closed, but its border can be: all border edges that hang together are spanned by
-a fan around their common centre, seen from both sides.  Region volumes then are volumes of closed
-surfaces, do not depend on an origin, and add up to the volume of the mesh.  The fans' centres are
-means of mesh vertices, so each V_c is the volume (8) of a few more triangles over
-``extension @ x`` instead of x.
+A region is an open surface, and is closed at its border: each connected part of the border is
+spanned by a fan of triangles around its centre, which the regions on both sides share.  Region
+volumes are then volumes of closed surfaces, do not depend on an origin, and add up to the volume of
+the mesh.  The centres are means of mesh vertices, so V_c is the volume (8) of a few more triangles
+over ``extension @ x`` instead of x.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,16 +20,15 @@ from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import signed_volume, step_to_volume, volume_along_path, volume_gradient
-from ..kernels import in_parallel
 from ..mesh import Mesh
 from ..subspace import Subspace
 
 
 @dataclass(frozen=True, eq=False)
 class VolumeConstraint:
-    """The volume inside closed *faces* over the points ``extension @ x`` stays at *target*.
+    """The volume enclosed by *faces* over the points ``extension @ x`` is equal to *target*.
 
-    These are the points *x* and some more.
+    These points are *x* and the centres of the fans.
     """
 
     faces: IntArray
@@ -41,7 +40,7 @@ class VolumeConstraint:
         return signed_volume(self._extended(x), self.faces) - self.target
 
     def relative(self, x: FloatArray) -> float:
-        """Return g(x) over the volume wanted."""
+        """Return g(x) / target."""
         return self.violation(x) / self.target
 
     def gradient(self, x: FloatArray) -> FloatArray:
@@ -49,11 +48,11 @@ class VolumeConstraint:
         gradient = volume_gradient(self._extended(x), self.faces)
         return gradient if self.extension is None else self.extension.T @ gradient
 
-    def curvature(self, x: FloatArray) -> sparse.csr_array:
+    def hessian_halves(self, x: FloatArray) -> sparse.csr_array:
         """Return U_c for each axis c, (3n, n) one below the other, at *x* (n, 3).
 
-        They make the Hessian, d^2 g / dx_ia dx_jb = sum_c eps_abc (U_c - U_c^T)_ij: of
-        det(x_i, x_j, x_k) / 6 it is the axis c of x_k / 6.
+        The Hessian is d^2 g / dx_ia dx_jb = sum_c eps_abc (U_c - U_c^T)_ij; U_c of
+        det(x_i, x_j, x_k) / 6 is the axis c of x_k / 6.
         """
         i, j, k = (np.concatenate(np.roll(self.faces.T, -turn, axis=0)) for turn in range(3))
         points = self._extended(x) / 6.0
@@ -79,21 +78,21 @@ class VolumeConstraint:
 
 @dataclass(frozen=True, eq=False)
 class Volumes:
-    """Constraints as functions of the cage vertices: over ``surface.map(p)``.
+    """Constraints as functions of the cage vertices p, on the surface ``surface.map(p)``.
 
-    How they *curve*, if it is known, is a function of p and their multipliers: G (3, m, m), of
+    *hessian*, if given, is a function of p and the multipliers lambda.  It returns G (3, m, m) with
     sum_k lambda_k d^2 g_k / dp_ia dp_jb = sum_c eps_abc G_cij.
     """
 
     surface: Subspace
     constraints: tuple[VolumeConstraint, ...]
-    curve: Callable[[FloatArray, FloatArray], FloatArray] | None = None
+    hessian: Callable[[FloatArray, FloatArray], FloatArray] | None = None
 
-    def held_at(self, p: FloatArray) -> Volumes:
-        """Return the same that are held as they are with cage vertices at *p* (m, 3)."""
+    def preserved_at(self, p: FloatArray) -> Volumes:
+        """Return the constraints with the volumes at cage vertices *p* (m, 3) as their targets."""
         x = self.surface.map(p)
-        held = (replace(each, target=each.target + each.violation(x)) for each in self.constraints)
-        return replace(self, constraints=tuple(held))
+        now = (replace(each, target=each.target + each.violation(x)) for each in self.constraints)
+        return replace(self, constraints=tuple(now))
 
 
 def total_volume(mesh: Mesh) -> VolumeConstraint:
@@ -113,7 +112,7 @@ def region_volumes(mesh: Mesh, labels: IntArray) -> tuple[VolumeConstraint, ...]
     of_several = _of_several(face_labels, mesh.faces, n)
     near = of_several[mesh.faces].any(axis=1)
     halves = mesh.faces[near][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)  # directed edges, 3 a face
-    inner = of_several[halves].all(axis=1)  # those at a border, and their opposites, are among them
+    inner = of_several[halves].all(axis=1)  # includes all border edges and their opposites
     halves, owner = halves[inner], np.repeat(face_labels[near], 3)[inner]
     key, opposite = halves[:, 0] * n + halves[:, 1], halves[:, 1] * n + halves[:, 0]
     order = np.argsort(key)
@@ -130,53 +129,12 @@ def region_volumes(mesh: Mesh, labels: IntArray) -> tuple[VolumeConstraint, ...]
     return tuple(constraints)
 
 
-def restore(constraints: Sequence[VolumeConstraint], paths: FloatArray) -> FloatArray:
-    """Return the step t (c,) along each of c directions that meets all constraints.
-
-    *paths* (n, 3 + 3 c) has the vertices and their c directions side by side.  One constraint:
-    the exact root of its cubic.  Several: Newton's method on t.
-    """
-    if len(constraints) == 1:
-        return np.array([constraints[0].exact_step(paths)])
-    x, *directions = np.split(paths, len(constraints) + 1, axis=1)
-    t = np.zeros(len(constraints))
-    here = x
-    for _ in range(_NEWTON_STEPS):
-        g = np.array([c.violation(here) for c in constraints])
-        gradients = [c.gradient(here) for c in constraints]
-        jacobian = np.array([[np.vdot(j, d) for d in directions] for j in gradients])
-        step = np.linalg.lstsq(jacobian, -g, rcond=1e-12)[0]
-        t += step
-        here = x + sum(tk * d for tk, d in zip(t, directions, strict=True))
-        if np.abs(g).max() <= 1e-15 * sum(abs(c.target) for c in constraints):
-            break
-    return t
-
-
-def moved(paths: FloatArray, t: FloatArray) -> FloatArray:
-    """Return the vertices of *paths* (n, 3 + 3 c) after the step *t* (c,) along its directions."""
-    x = np.empty((len(paths), 3))
-
-    def work(start: int, stop: int) -> None:
-        piece = paths[start:stop]
-        x[start:stop] = piece[:, :3]
-        for k, tk in enumerate(t, start=1):
-            x[start:stop] += tk * piece[:, 3 * k : 3 * k + 3]
-
-    in_parallel(work, len(paths), _CACHED)
-    return x
-
-
-_NEWTON_STEPS = 6
-_CACHED = 1 << 14  # vertices moved at a time
-
-
 def _in_order(faces: IntArray) -> IntArray:
-    """Return *faces* sorted by vertex, in short integers: summed up in a third of the time."""
+    """Return *faces* sorted by vertex, as 32-bit integers: sums take a third of the time."""
     short = faces.astype(np.int32)
     key = np.minimum(short[:, 0], short[:, 1]).astype(np.int64)
     np.minimum(key, short[:, 2], out=key)
-    key <<= 32  # numbers of their own below it: sorted, they say from where
+    key <<= 32  # room for the index of each face
     key |= np.arange(len(key))
     key.sort()
     return np.take(short, key & 0xFFFFFFFF, axis=0)
@@ -187,7 +145,7 @@ def _face_labels(corners: IntArray) -> IntArray:
 
 
 def _of_several(face_labels: IntArray, faces: IntArray, n: int) -> BoolArray:
-    """Tell which of n vertices are corners of faces with different labels."""
+    """Return a mask of the n vertices that are corners of faces with different labels."""
     least, most = np.full(n, face_labels.max()), np.full(n, face_labels.min())
     for corner in faces.T:
         np.minimum.at(least, corner, face_labels)
@@ -196,7 +154,7 @@ def _of_several(face_labels: IntArray, faces: IntArray, n: int) -> BoolArray:
 
 
 def _with_centres(edges: IntArray, n: int) -> tuple[sparse.csr_array, IntArray]:
-    """Return the map from x to x and the borders' centres, and each border vertex's centre."""
+    """Return the extension of x by the centres of the borders, and the centre of each vertex."""
     graph = sparse.coo_array((np.ones(len(edges)), edges.T), (n, n))
     _, part = csgraph.connected_components(graph, directed=False)
     on_border = np.unique(edges)

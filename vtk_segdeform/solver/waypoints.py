@@ -1,13 +1,13 @@
-"""The way of a handle to a far target: intermediate targets along a screw.
+"""Waypoints: intermediate targets along a screw motion to a far target.
 
-Asked to turn a handle by 180 degrees at once, the local rotations of the first step see a fold
-and stay in it.  So a far jump is cut in short ones.  A rigid motion (R, t) is a screw: a turn
-about an axis line and a slide along it (Chasles), which can be done by any fraction s:
+If a handle is rotated by 180 degrees at once, the mesh folds in the first step, and the local
+rotations keep the fold.  So a large motion is divided into short ones.  A rigid motion (R, t) is a
+screw motion, a rotation about a line and a translation along it (Chasles), and has fractions s:
 
     x(s) = c + exp(s theta [a]) (x - c) + s (a . t) a
 
-a, theta are the axis and angle of R and c is a point on the axis.  What is not rigid in a
-handle's motion is added in proportion to s, turned along.
+a, theta are the axis and angle of R and c is a point on the axis.  The rest of a handle's motion,
+which is not rigid, is rotated along and added in proportion to s.
 """
 
 from __future__ import annotations
@@ -21,40 +21,40 @@ from ..geometry import rigid_fit
 _LONGEST_TURN = np.radians(30.0)
 _SHORT_TURN = np.radians(10.0)
 _LONGEST_MOVE = 0.2  # of the mesh's size
-_MOST_LEGS = 50
-_SOME = 500  # vertices of a large handle that tell whether it moved far
-_HALF_TURN = 1e-6  # radians short of 180 degrees that count as 180
+_MOST_MOTIONS = 50
+_SAMPLE = 500  # vertices of a large handle that are tested for a far motion
+_HALF_TURN = 1e-6  # radians below 180 degrees that count as 180
 
 
 def waypoints(start: FloatArray, end: FloatArray, handles: list[IntArray]) -> list[FloatArray]:
-    """Return the targets (k, 3) to solve for one after the other; the last one is *end*.
+    """Return the targets (k, 3) to solve for in order; the last one is *end*.
 
     Parameters
     ----------
     start, end : (k, 3) float
-        Where the handle vertices are and shall be, mesh size 1.
+        Present and final positions of the handle vertices, mesh size 1.
     handles : list of int arrays
-        The places in 0..k-1 of each handle, moved on its own.
+        The indices in 0..k-1 of each handle, which has a motion of its own.
     """
-    some = [h[:: max(1, len(h) // _SOME)] for h in handles]
-    if all(_is_short(start[h], end[h]) for h in some):
+    samples = [h[:: max(1, len(h) // _SAMPLE)] for h in handles]
+    if all(_is_short(start[h], end[h]) for h in samples):
         return [end]
-    motions = [_Screw(start[h], end[h]) for h in handles]
-    count = max([1, *(motion.legs for motion in motions)])
+    motions = [_ScrewMotion(start[h], end[h]) for h in handles]
+    count = max([1, *(motion.parts for motion in motions)])
     way = []
-    for leg in range(1, count):
+    for k in range(1, count):
         targets = np.empty_like(end)
         for handle, motion in zip(handles, motions, strict=True):
-            targets[handle] = motion.at(leg / count)
+            targets[handle] = motion.at(k / count)
         way.append(targets)
     return [*way, end]
 
 
 def _is_short(start: FloatArray, end: FloatArray) -> bool:
-    """Tell whether one leg is plainly enough: cheaper to see than the screw itself.
+    """Tell whether a motion is so short that it needs no waypoint; faster than `_ScrewMotion`.
 
-    A turn by theta moves points by 2 sin(theta / 2) times their distance from its axis, and no
-    axis is nearer to all of them than the one they are longest along.
+    A rotation by theta moves points by 2 sin(theta / 2) times their distance from its axis, and
+    the sum of squared distances is least for the axis along which the points are longest.
     """
     move, share = end - start, np.full(len(start), 1.0 / len(start))
     if np.einsum("ij,ij->i", move, move).max() > _LONGEST_MOVE**2:
@@ -65,13 +65,13 @@ def _is_short(start: FloatArray, end: FloatArray) -> bool:
     return bool(np.vdot(move, move) <= _SHORT_TURN**2 * about_longest)
 
 
-class _Screw:
+class _ScrewMotion:
     def __init__(self, start: FloatArray, end: FloatArray) -> None:
         self._start = start
         rotation, self._shift = rigid_fit(start, end)
         turn = Rotation.from_matrix(rotation)
-        # What is left over, expressed before the turn.
-        self._rest = turn.inv().apply(end - self._shift) - start
+        # The rest of the motion, before the rotation.
+        self._remainder = turn.inv().apply(end - self._shift) - start
         rotvec = turn.as_rotvec()
         self._angle = float(np.linalg.norm(rotvec))
         self._axis = rotvec / self._angle if self._angle > 0.0 else np.zeros(3)
@@ -82,17 +82,17 @@ class _Screw:
         half = np.tan(0.5 * self._angle)
         screw = self._angle > 1e-9
         self._centre = 0.5 * (across + np.cross(self._axis, across) / half) if screw else None
-        # The longest way of any of its points decides how many legs it takes.
+        # The longest path of any of its points decides the number of parts.
         way = np.linalg.norm(end - start, axis=1)
         if self._centre is not None:
             arms = np.cross(start - self._centre, self._axis)
             way = np.maximum(way, self._angle * np.linalg.norm(arms, axis=1))
         ratio = max(self._angle / _LONGEST_TURN, float(way.max()) / _LONGEST_MOVE)
-        self.legs = min(int(np.ceil(ratio - 1e-6)), _MOST_LEGS)
+        self.parts = min(int(np.ceil(ratio - 1e-6)), _MOST_MOTIONS)
 
     def at(self, s: float) -> FloatArray:
-        """Return the handle after the share *s* of its way, (k, 3)."""
-        points = self._start + s * self._rest
+        """Return the handle after the fraction *s* of its motion, (k, 3)."""
+        points = self._start + s * self._remainder
         if self._centre is None:
             return points + s * self._shift
         turn = Rotation.from_rotvec(s * self._angle * self._axis)
@@ -101,7 +101,7 @@ class _Screw:
 
 
 def _side(axis: FloatArray, points: FloatArray) -> float:
-    """Return 1 or -1, so that which way round half a turn goes does not hang on rounding."""
+    """Return 1 or -1, so that rounding does not decide the direction of half a turn."""
     along = (points - points.mean(axis=0)) @ axis
     far = along[np.argmax(np.round(np.abs(along), 9))]
     return -1.0 if far < 0.0 else 1.0

@@ -1,9 +1,15 @@
-"""Solving again, with more weight, where handles or fixed vertices miss their places.
+"""Continuation of the position weights, where handles or fixed vertices miss their places.
 
-What is off at the weights a set begins with gets ten times as much, and so on: a rung of a ladder
-each.  A pose is final when the ladder was climbed from the lowest rung, so that the weights, and
-with them the pose, depend on the targets and not on how they were reached.  Every rung goes on
-from where it was.  A drag in haste stays on the rung where it is until the targets rest.
+Weights are found in two passes.  The first raises them: a set that misses its places has its
+weight multiplied by ten, and again, until it meets them.  A set then has up to ten times the
+weight that it needs, and excess weight distorts the mesh, so the second pass interpolates between
+the last weight that was too low and the first that was not.  The errors end just below the
+tolerance, and the pose changes smoothly with the targets.
+
+A pose is final when the continuation began with the initial weights, so that the weights, and with
+them the pose, depend on the targets and not on the poses before.  The solver of each combination
+of weights starts from its own last pose.  During a fast drag the weights stay the same until the
+targets rest.
 """
 
 from __future__ import annotations
@@ -13,127 +19,236 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import FloatArray
-from .gauss_newton import GaussNewton
-from .iteration import Iteration, SolverOptions
+from .gauss_newton import GaussNewton, SolverOptions, SolverResult
 from .solution import Status
 
+_FACTOR = 10.0  # by which a weight is raised
+_HIGHEST = 1e4  # times the initial weight
 # A higher weight must reduce the errors to this share and raise the energy by no more than this
 # factor; beyond it, poses begin to fold.
-_WORTH, _COST = 0.7, 1.75
+_GAIN, _COST = 0.7, 1.75
+_AIM = 0.95  # of the tolerance; closer to it, interpolation too often fails
+_TRIES = 3
+_ALL = 0.98  # share of the higher weights beyond which these are used
+_SAME = 1e-6  # relative difference of weights that are equal but for rounding
 
 
 @dataclass(eq=False)
-class _Rung:
-    solver: GaussNewton
-    p: FloatArray  # (m, 3), where it is
+class _Weighted:
+    """A solver with certain weights, and its last pose."""
 
-    def move(self, places: FloatArray, options: SolverOptions) -> Iteration:
+    solver: GaussNewton
+    p: FloatArray  # (m, 3)
+
+    @property
+    def strength(self) -> FloatArray:
+        """The weight of each set, as a multiple of its initial weight, (s,)."""
+        return self.solver.positions.strength
+
+    def solve(self, places: FloatArray, options: SolverOptions) -> SolverResult:
         result = self.solver.minimise(self.p, places, options)
         self.p = result.p
         return result
 
-    def copy(self) -> _Rung:
-        return _Rung(self.solver.copy(), self.p)
-
-    def errors(self, places: FloatArray) -> FloatArray:
-        """Return how far each place is missed, (k,)."""
-        away = self.solver.positions.rows @ self.p - places
-        return np.asarray(np.linalg.norm(away, axis=1))
+    def copy(self) -> _Weighted:
+        return _Weighted(self.solver.copy(), self.p)
 
 
-class Ladder:
-    """Solvers that differ in the weight of what is held, and where each of them is.
+@dataclass(frozen=True, eq=False)
+class _Errors:
+    """The largest errors of each set, (s,): at its places, and at checked vertices between them."""
+
+    places: FloatArray
+    checks: FloatArray
+
+    @classmethod
+    def of(cls, weighted: _Weighted, places: FloatArray) -> _Errors:
+        return cls(*weighted.solver.positions.errors(weighted.p, places))
+
+    @property
+    def both(self) -> FloatArray:
+        return np.maximum(self.places, self.checks)
+
+    def improve_on(self, before: _Errors) -> bool:
+        """Tell whether errors at places are clearly smaller, and at checked vertices not larger."""
+        is_smaller = self.places.max() <= _GAIN * before.places.max()
+        return bool(is_smaller and self.checks.max() <= before.checks.max())
+
+
+@dataclass(frozen=True, eq=False)
+class _Bracket:
+    """For each set (s,) a weight that is too low, one that is not, and the errors at both.
+
+    For a set with its initial weight the two are the same.
+    """
+
+    low: FloatArray
+    low_errors: FloatArray
+    high: FloatArray
+    high_errors: FloatArray
+
+    def raised(self, strength: FloatArray, errors: FloatArray) -> _Bracket:
+        """Return the bracket after weights were raised to *strength*: the former were too low."""
+        is_raised = strength > self.high
+        low = np.where(is_raised, self.high, self.low)
+        low_errors = np.where(is_raised, self.high_errors, self.low_errors)
+        return _Bracket(low, low_errors, strength, errors)
+
+    def narrowed(self, strength: FloatArray, errors: FloatArray, allowed: FloatArray) -> _Bracket:
+        """Return the bracket after weights within it, too low where *errors* exceed *allowed*."""
+        is_low = errors > allowed
+        low = np.where(is_low, strength, self.low)
+        return replace(self, low=low, low_errors=np.where(is_low, errors, self.low_errors))
+
+    def at(self, aim: float) -> FloatArray | None:
+        """Return the weights at which errors should be *aim*; None if those are the high ones.
+
+        Errors are approximately a power of the weight.
+        """
+        inside = (self.high > self.low) & (self.high_errors < aim)
+        above = np.where(inside, self.low_errors, np.e)
+        below, aims = np.where(inside, self.high_errors, 1.0), np.where(inside, aim, 1.0)
+        share = np.log(above / aims) / np.log(above / below)
+        strength = self.low * (self.high / self.low) ** share
+        return strength if (strength < _ALL * self.high).any() else None
+
+
+class _Run:
+    """One continuation for *places* (k, 3): the solvers it has used, and their steps."""
+
+    def __init__(self, places: FloatArray, options: SolverOptions) -> None:
+        self.places = places
+        self.used: list[_Weighted] = []
+        self.steps = 0
+        self._options = options
+
+    def solve(self, weighted: _Weighted) -> SolverResult:
+        result = weighted.solve(self.places, self._options)
+        self.used.append(weighted)
+        self.steps += result.steps
+        return result
+
+
+class WeightContinuation:
+    """Solvers that differ in the weights of positions, each with its last pose.
 
     Parameters
     ----------
     solver : GaussNewton
-        With the weights to begin with.
+        With the initial weights.
     p : (m, 3) float
         Cage vertices to begin at.
     tolerance : float
-        Distance by which a vertex may miss its place before it gets more weight.
+        Distance by which a vertex may miss its place before its set gets more weight.
     """
 
     def __init__(self, solver: GaussNewton, p: FloatArray, tolerance: float) -> None:
         solver.forget()
-        self._lowest = _Rung(solver, p)
-        self._above: list[_Rung] = []  # those met in the last climb
-        self._top = self._lowest  # the rung whose pose counts
-        self._has_hurried = False  # and all but the top are elsewhere
+        self._initial = _Weighted(solver, p)
+        self._raised: list[_Weighted] = []  # with higher weights, used for the last pose
+        self._current = self._initial  # the solver of the last pose
+        self._only_current = False  # whether only that solver has followed the last targets
         self._tolerance = tolerance
 
-    def copy(self) -> Ladder:
-        """Return one that goes on from here by itself."""
-        other = Ladder(self._lowest.solver.copy(), self._lowest.p, self._tolerance)
-        other._lowest, *other._above = (rung.copy() for rung in [self._lowest, *self._above])
-        there = [self._lowest, *self._above].index(self._top)
-        other._top = [other._lowest, *other._above][there]
-        other._has_hurried = self._has_hurried
+    def copy(self) -> WeightContinuation:
+        """Return a continuation that proceeds from here independently."""
+        initial = self._initial
+        other = WeightContinuation(initial.solver.copy(), initial.p, self._tolerance)
+        other._initial, *other._raised = (each.copy() for each in [initial, *self._raised])
+        index = [initial, *self._raised].index(self._current)
+        other._current = [other._initial, *other._raised][index]
+        other._only_current = self._only_current
         return other
 
     @property
     def solver(self) -> GaussNewton:
-        """The solver of the pose that counts."""
-        return self._top.solver
+        """The solver of the last pose."""
+        return self._current.solver
 
     @property
     def p(self) -> FloatArray:
-        """Cage vertices of the pose that counts, (m, 3)."""
-        return self._top.p
+        """Cage vertices of the last pose, (m, 3)."""
+        return self._current.p
 
     @property
-    def is_climbed(self) -> bool:
-        """Whether the pose that counts has more weight somewhere than there was to begin with."""
-        return self._top is not self._lowest
+    def has_raised_weights(self) -> bool:
+        """Whether the last pose has more than the initial weights."""
+        return self._current is not self._initial
 
-    def go_on_from(self, p: FloatArray) -> None:
-        """Go on from cage vertices *p* (m, 3); the volumes held are those that are there."""
-        self._top.p = p
-        self._has_hurried = self.is_climbed
-        self._above = [self._top] if self.is_climbed else []
-        volumes = self._top.solver.volumes.held_at(p)
-        for rung in (self._lowest, *self._above):
-            rung.solver.volumes = volumes
+    def continue_from(self, p: FloatArray) -> None:
+        """Continue from cage vertices *p* (m, 3), and preserve the volumes of that pose."""
+        self._current.p = p
+        self._only_current = self.has_raised_weights
+        self._raised = [self._current] if self.has_raised_weights else []
+        volumes = self._current.solver.volumes.preserved_at(p)
+        for weighted in (self._initial, *self._raised):
+            weighted.solver.volumes = volumes
 
-    def hurry(self, places: FloatArray, options: SolverOptions) -> Iteration:
-        """Return a pose for *places* (k, 3) at the weights of the last; it is not final."""
-        self._has_hurried = self.is_climbed
-        return replace(self._top.move(places, options), status=Status.STEP_LIMIT)
+    def solve_at_current_weights(self, places: FloatArray, options: SolverOptions) -> SolverResult:
+        """Return a pose for *places* (k, 3) at the weights of the last pose; it is not final."""
+        self._only_current = self.has_raised_weights
+        return replace(self._current.solve(places, options), status=Status.STEP_LIMIT)
 
-    def move(self, places: FloatArray, options: SolverOptions) -> Iteration:
-        """Return the pose for *places* (k, 3); its steps are those of all rungs."""
-        if self._has_hurried:
-            self._lowest.p, self._above, self._has_hurried = self._top.p, [self._top], False
-        here, visited, steps = self._lowest, [], 0
-        result = here.move(places, options)
-        while result.status is not Status.STEP_LIMIT:
-            rung = self._stiffer(here, places)
-            if rung is None:
-                break
-            visited.append(rung)
-            steps += result.steps
-            held = rung.move(places, options)
-            # Where a cage cannot put a vertex in place, weight wins nothing and wrecks the rest.
-            gain = rung.errors(places).max() / here.errors(places).max()
-            if gain > _WORTH or held.shape > _COST * result.shape:
-                status = held.status if held.status is Status.STEP_LIMIT else result.status
-                result = replace(result, status=status, steps=held.steps)
-                break
-            here, result = rung, held
-        if result.status is Status.STEP_LIMIT and self.is_climbed:
-            steps += result.steps  # what is on the screen stays as stiff as it was
-            result = replace(self._top.move(places, options), status=Status.STEP_LIMIT)
-            self._above = visited + [rung for rung in self._above if rung not in visited]
+    def solve(self, places: FloatArray, options: SolverOptions) -> SolverResult:
+        """Return the final pose for *places* (k, 3); its steps are those at all weights."""
+        if self._only_current:
+            self._initial.p, self._raised = self._current.p, [self._current]
+            self._only_current = False
+        run = _Run(places, options)
+        found, result = self._raise(run)
+        if result.status is Status.STEP_LIMIT and self.has_raised_weights:
+            # The pose on the screen keeps its weights until a final one is known.
+            result = replace(run.solve(self._current), status=Status.STEP_LIMIT)
+            self._raised = list(dict.fromkeys([*run.used[1:], *self._raised]))
         else:
-            self._top, self._above = here, visited
-        return replace(result, steps=steps + result.steps)
+            self._current, self._raised = found, run.used[1:]
+        return replace(result, steps=run.steps)
 
-    def _stiffer(self, below: _Rung, places: FloatArray) -> _Rung | None:
-        """Return the rung above *below*, where it was if it is known, or None if none is due."""
-        positions = below.solver.positions.stiffened(below.errors(places), self._tolerance)
-        if positions is None:
-            return None
-        for rung in self._above:
-            if np.array_equal(rung.solver.positions.strength, positions.strength):
-                return rung
-        return _Rung(replace(below.solver, positions=positions), below.p)
+    def _raise(self, run: _Run) -> tuple[_Weighted, SolverResult]:
+        """Raise the weights from the initial ones as needed; return the solver and its pose."""
+        here = self._initial
+        result = run.solve(here)
+        errors = _Errors.of(here, run.places)
+        bracket = _Bracket(here.strength, errors.both, here.strength, errors.both)
+        while result.status is not Status.STEP_LIMIT:
+            is_off = (errors.places > self._tolerance) & (here.strength < _HIGHEST)
+            if not is_off.any():
+                break
+            ahead = self._at(np.where(is_off, _FACTOR * here.strength, here.strength), near=here)
+            attempt = run.solve(ahead)
+            reached = _Errors.of(ahead, run.places)
+            # If the cages cannot put a vertex in place, more weight only distorts the rest.
+            if not reached.improve_on(errors) or attempt.shape > _COST * result.shape:
+                is_limit = attempt.status is Status.STEP_LIMIT
+                result = replace(result, status=attempt.status if is_limit else result.status)
+                break
+            here, result, errors = ahead, attempt, reached
+            bracket = bracket.raised(here.strength, errors.both)
+        return self._lower(run, here, result, bracket)
+
+    def _lower(
+        self, run: _Run, here: _Weighted, result: SolverResult, bracket: _Bracket
+    ) -> tuple[_Weighted, SolverResult]:
+        """Return a solver with less weight and no larger errors, and its pose; or *here*."""
+        allowed = np.maximum(self._tolerance, bracket.high_errors)
+        for _ in range(_TRIES):
+            strength = bracket.at(_AIM * self._tolerance)
+            if strength is None or result.status is Status.STEP_LIMIT:
+                break
+            between = self._at(strength, near=here)
+            attempt = run.solve(between)
+            if attempt.status is Status.STEP_LIMIT:
+                return here, replace(result, status=attempt.status)
+            errors = _Errors.of(between, run.places).both
+            if (errors <= allowed).all():
+                return between, attempt
+            bracket = bracket.narrowed(strength, errors, allowed)
+        return here, result
+
+    def _at(self, strength: FloatArray, *, near: _Weighted) -> _Weighted:
+        """Return the solver with these weights, in its last pose or else in that of *near*."""
+        for weighted in self._raised:
+            if np.allclose(weighted.strength, strength, rtol=_SAME, atol=0.0):
+                return weighted
+        positions = near.solver.positions.with_strength(strength)
+        return _Weighted(replace(near.solver, positions=positions), near.p)

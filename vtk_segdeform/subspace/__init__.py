@@ -2,27 +2,24 @@
 
 The files, in reading order:
 
-    subspace      `Subspace`: the block matrix of figure 6 of the paper
-    products      products with W~ and its transpose
+    subspace      `Subspace`: the block matrix of figure 6 of the paper, and its products
     low_rank      W~ of a large mesh in two narrow factors
-    passengers    points that are carried along by a deformation
-    device        the map on a GPU
-    gpu           the GPU library in use
+    passengers    other points that a deformation moves
+    gpu           the passes over a whole mesh on a GPU; untested there
 """
 
-from .device import DeviceError, DeviceSurface
-from .gpu import gpu_arrays
-from .low_rank import Patches
-from .passengers import Passengers, board
-from .subspace import Subspace, bind
+from .gpu import GPUError, GPUSurface, gpu_arrays
+from .low_rank import LowRankSubspace
+from .passengers import Passengers, bind_passengers
+from .subspace import Subspace, cage_subspace
 
 __all__ = [
-    "DeviceError",
-    "DeviceSurface",
+    "GPUError",
+    "GPUSurface",
+    "LowRankSubspace",
     "Passengers",
-    "Patches",
     "Subspace",
-    "bind",
-    "board",
+    "bind_passengers",
+    "cage_subspace",
     "gpu_arrays",
 ]

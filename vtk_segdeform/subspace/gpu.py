@@ -1,32 +1,216 @@
-"""Which library has a GPU for us: cupy, or else torch, or none.
+"""The passes over a whole mesh on a GPU: the map, the volume and the normals.
 
-    arrays = gpu_arrays()        for `device.DeviceSurface`, or None
+    arrays = gpu_arrays()             cupy, or else torch, if a GPU works with it; or None
 
-Both are optional; ``pip install 'vtk-segdeform[gpu]'`` brings cupy.  The driver is asked first, so
-where there is no GPU nothing is imported, which would take seconds, and nothing is said.
-``SEGDEFORM_GPU=0`` does without.
+    x = rest + W~ moves               `GPUSurface.map`               x stays on the GPU
+    V(x)                              `GPUSurface.volume`            as `volume.signed_volume`
+    c + s (x - c)                     `GPUSurface.scale_to_volume`   as in `exact_volume`
+    n(x)                              `GPUSurface.normals`
+
+*Untested on a GPU.*  The tests run these lines with numpy, and with torch on the processor where it
+is installed; they have never run on a GPU, and no time has been measured there.
+
+Each pass is written once, with functions that numpy, cupy and torch share, so that the tests run
+the lines that a GPU runs.  All numbers are in double precision, and no two threads add to one
+number, so results agree with those of the processor to rounding and are the same every time.
+
+Both libraries are optional; ``pip install 'vtk-segdeform[gpu]'`` installs cupy.  The driver is
+queried first: without a GPU neither library is imported, which would take seconds, and nothing is
+logged.  ``SEGDEFORM_GPU=0`` turns the GPU off.
+
+For n vertices, m faces and N numbers in the blocks of W~ the GPU stores 8 N + 24 n + 24 m bytes,
+and 60 m more once normals are computed.  A call takes, its result included,
+
+    map 80 n        volume 8 m + 300 MB at most        normals 100 m + 300 MB at most
+
+which for a million vertices and 155 cage vertices is 1.1 gigabytes in all.  W~ is in double
+precision on the GPU even where `subspace` has it in single precision: converting it in every frame
+would take longer than reading it.
 """
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import functools
 import importlib
 import logging
 import os
 import sys
+from collections.abc import Iterator
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .device import DeviceArray, DeviceError, DeviceSurface
-from .subspace import Subspace
+from ..arrays import FloatArray, IntArray
+from ..errors import SegDeformError
+from .subspace import Subspace, row_pieces
+
+GPUArray = Any  # of cupy, torch or numpy
+
+_FACES = 1 << 20  # whose corners are gathered together
+_SUMMED = 4096  # numbers to a partial sum of a volume
 
 _log = logging.getLogger(__name__)
 
 
+class GPUError(SegDeformError, RuntimeError):
+    """The GPU has too little memory or has failed; its work is done by the processor instead."""
+
+
+@contextlib.contextmanager
+def _faults_named() -> Iterator[None]:
+    try:
+        yield
+    except GPUError:
+        raise
+    except (MemoryError, RuntimeError) as fault:  # raised by cupy and torch
+        raise GPUError(f"the GPU gave up: {fault}") from fault
+
+
+class GPUSurface:
+    """A mesh and its W~, stored on a GPU.
+
+    Parameters
+    ----------
+    subspace : Subspace
+        W~ of n vertices and m cage vertices.
+    rest_vertices : (n, 3) float
+        The mesh at rest.
+    faces : (k, 3) int
+        Closed and outward oriented.
+    arrays : module or TorchArrays
+        The array library: `gpu_arrays`, or numpy for comparison.
+
+    Raises
+    ------
+    GPUError
+        Here and in every method, if the GPU has too little memory or has failed.
+    """
+
+    def __init__(
+        self, subspace: Subspace, rest_vertices: FloatArray, faces: IntArray, arrays: Any
+    ) -> None:
+        self._arrays, self._host_faces, self._columns = arrays, faces, subspace.columns
+        with _faults_named():
+            self._rest = arrays.asarray(np.asarray(rest_vertices, dtype=np.float64))
+            self._corners = [self._ids(corner) for corner in faces.T]
+            self._rows = [self._ids(rows) for rows in subspace.rows]
+            self._blocks = [self._widened(block) for block in subspace.blocks]
+
+    @_faults_named()
+    def map(self, moves: FloatArray) -> GPUArray:
+        """Return x = rest + W~ moves, (n, 3) on the GPU, for *moves* (m, 3) of the cages."""
+        moves = self._arrays.asarray(np.asarray(moves, dtype=np.float64))
+        x = self._rest + 0.0
+        for rows, block, columns in zip(self._rows, self._blocks, self._columns, strict=True):
+            x[rows] += block @ moves[columns]  # no row is there twice
+        return x
+
+    @_faults_named()
+    def volume(self, x: GPUArray) -> float:
+        """Return the enclosed volume of *x* (n, 3), with its first vertex as the origin."""
+        n_sums = -(-len(self._host_faces) // _SUMMED)
+        determinants = self._arrays.zeros((n_sums * _SUMMED,))
+        for piece, a, e, f in self._corners_and_edges(x):
+            determinants[piece] = ((a - x[0]) * self._arrays.cross(e, f)).sum(1)
+        return float(self.host(determinants.reshape(n_sums, _SUMMED).sum(1)).sum() / 6.0)
+
+    @_faults_named()
+    def scale_to_volume(self, x: GPUArray, target: float, centre: ArrayLike) -> float:
+        """Scale *x* (n, 3) in place about *centre* (3,) to the volume *target*; return the factor.
+
+        A surface that is inside out has no such factor: it stays as it is, and 1 is returned.
+        """
+        ratio = (self.volume(x) - target) / target
+        if not ratio > -1.0:
+            return 1.0
+        scale = float(np.cbrt(1.0 / (1.0 + ratio)))
+        x *= scale
+        x += self._arrays.asarray((1.0 - scale) * np.asarray(centre, dtype=np.float64))
+        return scale
+
+    @_faults_named()
+    def normals(self, x: GPUArray) -> GPUArray:
+        """Return the unit normals (n, 3) of *x* (n, 3), on the GPU.
+
+        The normal of a vertex is the sum of the cross products of the faces around it, so that
+        faces are weighted by area.  Where the sum is zero, as in a fan that has shrunk to a point,
+        the normal is zero.
+        """
+        rounds, owners, places = self._fans
+        sums = self._arrays.empty((len(self._host_faces), 3))
+        for piece, _, e, f in self._corners_and_edges(x):
+            sums[piece] = self._arrays.cross(e, f)
+        for kept, added in rounds:
+            longer, sums = sums, self._arrays.take(sums, kept, axis=0)
+            sums[: len(added)] += self._arrays.take(longer, added, axis=0)
+        normals = self._arrays.zeros(tuple(x.shape))
+        normals[owners] = self._arrays.take(sums, places, axis=0)
+        # Scaled to size 1 first, so that their squares neither overflow nor vanish.
+        largest = self._arrays.amax(abs(normals), 1)
+        normals /= (largest + (largest == 0.0))[:, None]
+        normals /= ((normals * normals).sum(1) + (largest == 0.0))[:, None] ** 0.5
+        return normals
+
+    @_faults_named()
+    def host(self, x: GPUArray) -> Any:
+        """Return *x* as a numpy array, once the GPU has computed it."""
+        return x if isinstance(x, np.ndarray) else self._arrays.asnumpy(x)
+
+    def _corners_and_edges(
+        self, x: GPUArray
+    ) -> Iterator[tuple[slice, GPUArray, GPUArray, GPUArray]]:
+        """Yield faces piece by piece: their first corners a, b - a and c - a, (k, 3) each."""
+        for start in range(0, len(self._host_faces), _FACES):
+            piece = slice(start, min(start + _FACES, len(self._host_faces)))
+            a, b, c = (self._arrays.take(x, corner[piece], axis=0) for corner in self._corners)
+            yield piece, a, b - a, c - a
+
+    def _ids(self, ids: IntArray) -> GPUArray:
+        return self._arrays.asarray(np.ascontiguousarray(ids, dtype=np.int64))
+
+    def _widened(self, block: FloatArray) -> GPUArray:
+        wide = self._arrays.empty(block.shape)
+        for piece in row_pieces(*block.shape):
+            wide[piece] = self._arrays.asarray(block[piece])
+        return wide
+
+    @cached_property
+    def _fans(self) -> tuple[list[tuple[GPUArray, GPUArray]], GPUArray, GPUArray]:
+        rounds, owners, places = _pairwise(self._host_faces)
+        there = [(self._ids(kept), self._ids(added)) for kept, added in rounds]
+        return there, self._ids(owners), self._ids(places)
+
+
+def _pairwise(faces: IntArray) -> tuple[list[tuple[IntArray, IntArray]], IntArray, IntArray]:
+    """Return how to sum a value of each of *faces* (m, 3) over the faces around each vertex.
+
+    The sum is pairwise, in rounds: the numbers *kept* are the list of the next round, and the
+    numbers *added* are added to the first of them.  Each round halves the fans.  In the end the
+    sums at *places* are those of the vertices *owners*.
+    """
+    order = np.argsort(faces, axis=None, kind="stable")
+    owners, places = faces.ravel()[order], order // 3
+    rounds: list[tuple[IntArray, IntArray]] = []
+    while True:
+        here = np.arange(len(owners))
+        begins = np.diff(owners, prepend=-1) != 0
+        is_added = (here - np.maximum.accumulate(np.where(begins, here, 0))) % 2 == 1
+        if not is_added.any():
+            return rounds, owners, places
+        is_added_to = np.append(is_added[1:], False)
+        is_alone = ~is_added & ~is_added_to
+        kept = np.concatenate([np.flatnonzero(is_added_to), np.flatnonzero(is_alone)])
+        rounds.append((places[kept], places[is_added]))
+        places = np.argsort(kept, kind="stable")  # by vertex again
+        owners = owners[kept][places]
+
+
 class TorchArrays:
-    """*torch* in the words of numpy, as many as `device` speaks; *device* is "cuda" or "cpu"."""
+    """*torch* with the names of numpy that `GPUSurface` uses; *device* is "cuda" or "cpu"."""
 
     def __init__(self, torch: Any, device: str) -> None:
         self.asarray = functools.partial(torch.tensor, device=device)
@@ -35,19 +219,19 @@ class TorchArrays:
         self.cross, self.amax = torch.linalg.cross, torch.amax
         self._index_select = torch.index_select
 
-    def take(self, x: DeviceArray, ids: DeviceArray, axis: int) -> DeviceArray:
+    def take(self, x: GPUArray, ids: GPUArray, axis: int) -> GPUArray:
         """Return the entries *ids* of *x* along an *axis*."""
         return self._index_select(x, axis, ids)
 
-    def asnumpy(self, x: DeviceArray) -> Any:
-        """Return *x* as an array of numpy's."""
+    def asnumpy(self, x: GPUArray) -> Any:
+        """Return *x* as a numpy array."""
         return x.cpu().numpy()
 
 
 def gpu_arrays() -> Any:
     """Return the module cupy, or a `TorchArrays`, if a GPU works with it here; else None.
 
-    What is found the first time is what there is; it is tried out then, which can take seconds.
+    The first call searches for a GPU and tests it, which can take seconds; its answer is kept.
     """
     return None if os.environ.get("SEGDEFORM_GPU", "1") == "0" else _found()
 
@@ -56,12 +240,12 @@ def gpu_arrays() -> Any:
 def _found() -> Any:
     if not _driver_has_a_gpu():
         return None
-    for made in (_cupy, _torch):
+    for load in (_cupy, _torch):
         try:
-            arrays = made()
-            _try_out(arrays)
+            arrays = load()
+            _test(arrays)
         except _faults() as fault:
-            _log.info("a GPU is not used: %s", fault)
+            _log.info("GPU not used: %s", fault)
         else:
             return arrays
     return None
@@ -84,25 +268,25 @@ def _cupy() -> Any:
 def _torch() -> Any:
     torch = importlib.import_module("torch")
     if not torch.cuda.is_available():
-        raise DeviceError("torch is one without CUDA")
+        raise GPUError("this torch has no CUDA")
     return TorchArrays(torch, "cuda")
 
 
-def _try_out(arrays: Any) -> None:
-    """Do with *arrays* all that `device` does, on a tetrahedron."""
+def _test(arrays: Any) -> None:
+    """Run every pass with *arrays* on a tetrahedron, and raise a GPUError if a result is wrong."""
     corners = np.vstack([np.zeros(3), np.eye(3)])
     faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
     subspace = Subspace(4, (np.arange(4),), (np.eye(4, dtype=np.float32),))
-    surface = DeviceSurface(subspace, corners, faces, arrays)
-    x = surface.map(corners)  # twice as large
-    surface.scaled(x, 1.0 / 6.0, np.zeros(3))
+    surface = GPUSurface(subspace, corners, faces, arrays)
+    x = surface.map(corners)  # twice the size
+    surface.scale_to_volume(x, 1.0 / 6.0, np.zeros(3))
     normal = surface.host(surface.normals(x))[0]
     if not (abs(surface.volume(x) - 1.0 / 6.0) < 1e-15 and np.ptp(normal) < 1e-15 > normal.max()):
-        raise DeviceError("it does not count right")
+        raise GPUError("it computes wrong results")
 
 
 def _faults() -> tuple[type[Exception], ...]:
-    """Return what libraries raise that find no GPU, or no way to use it."""
+    """Return the exceptions of libraries that find no GPU, or cannot use it."""
     compiler = sys.modules.get("cupy.cuda.compiler")
     own = (compiler.CompileException,) if compiler else ()
     return ImportError, OSError, MemoryError, RuntimeError, *own

@@ -1,20 +1,20 @@
-"""Points that ride along with a deformation: a lattice, a grid inside the body, a cloud, a line.
+"""Passengers: other points that a deformation moves, such as a lattice, a grid or a point cloud.
 
-A mesh vertex is a blend of what the cages of its regions say, eqs. (2), (3).  Any other point q
-is the same,
+A mesh vertex is a blend of its positions in the cages of its regions, eqs. (2), (3).  So is any
+other point q,
 
     x(q) = sum_r  alpha_r(q)  sum_j w_j(q; r) p_j(r)
 
-with its mean value coordinates w in each cage.  What is missing is alpha away from the mesh.  It
-is interpolated from the mesh vertices i near by, those nearer than the K-th,
+with its mean value coordinates w in each cage.  The blend weights alpha of q are interpolated from
+the nearest mesh vertices i, those nearer than the K-th,
 
     alpha_r(q) = sum_i s_i alpha_ri / sum_i s_i,      s_i = ((d_K - d_i) / (d_K d_i))^2
 
-so that it is continuous, is not negative, sums to 1, and is the mesh's own at a mesh vertex.
-Hence mesh vertices as passengers stay on the mesh, an affine map of all cages is an affine map of
-all passengers, and whatever is on both sides of an overlap follows both.
+so that alpha is continuous and non-negative, sums to 1, and at a mesh vertex is the mesh's own.
+Hence passengers at mesh vertices stay on the mesh, an affine map of all cages is an affine map of
+all passengers, and passengers in an overlap follow all its regions.
 
-The exact volume is reached by moving cages, so passengers follow that as well.
+The exact volume is reached by moving cages, so passengers follow that motion as well.
 
 Source
 ------
@@ -46,22 +46,22 @@ _FARTHEST = 1e60  # sizes of the mesh; beyond it, distances overflow
 
 @dataclass(frozen=True, eq=False)
 class Passengers(Frozen):
-    """k points bound to the cages; made by `board` or `Deformer.passengers`."""
+    """k points bound to the cages; made by `bind_passengers` or `Deformer.passengers`."""
 
     points: FloatArray
-    """(k, 3) float: where they are at rest."""
+    """(k, 3) float: the points at rest."""
     subspace: Subspace
-    """x = W~ p for them."""
+    """W~ of the points: x = W~ p."""
 
     def moved(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
-        """Return where they are (k, 3) with the cages at *cage_vertices*, (m_r, 3) each.
+        """Return the points (k, 3) moved by cages at *cage_vertices*, (m_r, 3) each.
 
-        As `Solution.cage_vertices` has them, and `Session.cage_vertices`.
+        These are `Solution.cage_vertices` or `Session.cage_vertices`.
 
         Raises
         ------
         CageError
-            If these are not the cages that the points were bound to.
+            If *cage_vertices* do not fit the cages that the points are bound to.
         """
         require_sequence(cage_vertices, "cage_vertices")
         poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
@@ -69,11 +69,11 @@ class Passengers(Frozen):
         if got != expected:
             raise CageError(f"cage_vertices must hold {expected} points, cage by cage; got {got}")
         p = np.concatenate(poses)
-        centre = p.mean(axis=0)  # about it, so that far from the origin no digits are lost
+        centre = p.mean(axis=0)  # moved about it, no digits are lost far from the origin
         return np.asarray(centre + self.subspace.map(p - centre))
 
 
-def board(
+def bind_passengers(
     mesh: Mesh,
     weights: FloatArray,
     cages: Sequence[Cage],
@@ -92,7 +92,7 @@ def board(
     cages : sequence of r Cage
         At rest.
     points : (k, 3) float
-        Where the passengers are, at rest; inside the body, on it, or not far from it.
+        The passengers at rest; inside the body, on it, or not far from it.
     progress : Progress, optional
         Called as the coordinates in each cage are computed; may cancel.
     """
@@ -107,15 +107,15 @@ def board(
     rows, blocks = [], []
     for r, cage in enumerate(cages):
         share = part(progress, r / len(cages), (r + 1) / len(cages))
-        riders = np.flatnonzero(alpha[r] > 0.0)
-        block = mean_value_coordinates(points[riders], cage.vertices, cage.faces, progress=share)
-        rows.append(riders)
-        blocks.append(block * alpha[r, riders][:, None])
+        members = np.flatnonzero(alpha[r] > 0.0)
+        block = mean_value_coordinates(points[members], cage.vertices, cage.faces, progress=share)
+        rows.append(members)
+        blocks.append(block * alpha[r, members][:, None])
     return Passengers(points, Subspace(len(points), tuple(rows), tuple(blocks)))
 
 
 def blend_at(vertices: FloatArray, weights: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the blend weights (r, k) at *points* (k, 3), of those (r, n) at *vertices* (n, 3)."""
+    """Interpolate blend *weights* (r, n) of *vertices* (n, 3) at *points* (k, 3): (r, k)."""
     vertices, points = as_points(vertices, "vertices"), as_points(points, "points")
     weights = as_numbers(weights, "weights")
     if not len(vertices) or weights.ndim != 2 or weights.shape[1] != len(vertices):
@@ -133,7 +133,7 @@ def blend_at(vertices: FloatArray, weights: FloatArray, points: FloatArray) -> F
     strength = ((farthest - distance) / (farthest * distance)) ** 2
     strength[on_vertex] = 0.0
     strength[on_vertex, 0] = 1.0
-    level = strength.max(axis=1) <= 0.0  # all are equally far
+    level = strength.max(axis=1) <= 0.0  # equally far vertices
     strength[level] = 1.0
     strength /= strength.sum(axis=1, keepdims=True)
     return np.asarray(np.einsum("rks,ks->rk", weights[:, near], strength))

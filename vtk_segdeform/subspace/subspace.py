@@ -1,12 +1,17 @@
-"""The subspace of the cages, x = W~ p: the block matrix of the paper's figure 6, blended.
+"""The subspace of the cages, x = W~ p: the block matrix of figure 6 of the paper, blended.
 
-Vertex i of the mesh is a blend of what the cages of its regions say, eqs. (2), (3):
+A mesh vertex is a blend of its positions in the cages of its regions, eqs. (2), (3):
 
     x_i = sum_r  alpha_ri  sum_j w_ij(r) p_j(r)
 
 alpha are the blend weights of `Regions`, w the mean value coordinates in the cage of region r.
-W~ is zero wherever a vertex is outside a region, so it is kept as one dense block per region,
-blend included; nothing below ever forms the zeros.
+W~ is zero wherever a vertex is outside a region, so it is stored as one dense block per region,
+blend weights included; the zeros are never stored.
+
+A block of a large mesh is in single precision.  Its rounded numbers then *are* W~: every product
+with it is computed in double precision, so x = W~ p is as linear, and its volume as exact, as with
+double precision, and half as much memory is read.  Products go over a block piece by piece, so
+that no large copy of it is made.
 """
 
 from __future__ import annotations
@@ -15,24 +20,28 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
+from .. import sizes
 from ..arrays import FloatArray, IntArray, as_numbers
 from ..cages import MOST_CAGE_VERTICES, Cage, mean_value_coordinates
 from ..errors import CageError, RegionError
-from ..kernels import compiled_kernels
+from ..kernels import compiled_kernels, in_parallel, inputs, writable
 from ..progress import Progress, part
 from ..regions import Regions
-from .products import Groups, add_product, adjoint_product, double, is_heavy, pieces
 
-_LARGEST = 1e3  # mesh diagonals a cage may measure
-_BOUND = 1 << 15  # vertices at a time
-_AT_ONCE = 1 << 20  # numbers in all blocks that one thread multiplies in one call
-_BITS = 32  # regions processed at a time, one bit each
-_SINGLE = 8_000_000  # numbers in a block times regions beyond which W~ is kept in single precision
+_LARGEST_CAGE = 1e3  # diagonals of the mesh
+_COORDINATES = 1 << 15  # vertices whose mean value coordinates are computed together
+_REGION_BITS = 32  # regions that are encoded in one integer
+_PER_FACE = 24  # numbers whose product takes as long as a face of a volume
+_CACHED = 1 << 17  # numbers of a block that are multiplied together: a megabyte
+_PIECES = 16  # of a block at most, for compiled kernels: each call takes some microseconds
+_DENSE = 1 << 22  # numbers in a dense piece: 32 megabytes
+_NOTHING = inputs(np.empty((0, 3)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,61 +59,64 @@ class Subspace:
 
     @cached_property
     def columns(self) -> tuple[slice, ...]:
-        """For each region, its cage's place among all m cage vertices."""
+        """For each region, the indices of its cage among all m cage vertices."""
         ends = np.cumsum([0, *(block.shape[1] for block in self.blocks)])
         return tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(ends))
 
     @cached_property
-    def _is_heavy(self) -> bool:
-        return is_heavy(self.blocks)
+    def _is_compiled(self) -> bool:
+        """Whether W~ has enough numbers for compiled kernels."""
+        return sum(block.size for block in self.blocks) // _PER_FACE >= sizes.COMPILED
 
     @cached_property
-    def _is_small(self) -> bool:
-        return self._is_heavy and 0 < sum(block.size for block in self.blocks) <= _AT_ONCE
+    def _is_packed(self) -> bool:
+        """Whether W~ has few enough numbers for one call of a kernel."""
+        size = sum(block.size for block in self.blocks)
+        return self._is_compiled and 0 < size <= sizes.ONE_CALL
 
     @cached_property
-    def _groups(self) -> Groups:
-        return Groups.of([(ids, *self.reaching(ids)) for ids in self.reached_alike()])
+    def _packed(self) -> _PackedBlocks:
+        return _PackedBlocks.of([(ids, *self.nonzeros(ids)) for ids in self.sets_by_cages()])
 
     @cached_property
-    def _places(self) -> sparse.csr_array:
-        """(n, r) int: 1 + the place of each vertex among the rows of a region."""
+    def _rows_of(self) -> sparse.csr_array:
+        """(n, r) int: 1 + the row of each vertex in the block of each region; 0 is outside."""
         each = [np.arange(1, len(rows) + 1) for rows in self.rows]
         region = np.repeat(np.arange(len(self.rows)), [len(rows) for rows in self.rows])
         entries = np.concatenate(each), (np.concatenate(self.rows), region)
         return sparse.coo_array(entries, (self.n_vertices, len(self.rows))).tocsr()
 
-    def start(self, points: FloatArray) -> FloatArray:
-        """Return *points* (n, 3) of the mesh as `map` begins with them: as they are."""
+    def base(self, points: FloatArray) -> FloatArray:
+        """Return *points* (n, 3) in the order in which `map` adds them: the vertices' own."""
         return points
 
-    def map(self, p: FloatArray, start: FloatArray | None = None) -> FloatArray:
+    def map(self, p: FloatArray, base: FloatArray | None = None) -> FloatArray:
         """Return x = W~ p, (n, k), for stacked cage vertices *p* (m, k).
 
-        With `start` of some points these are added to the first three columns.
+        A *base*, `base` of some points, is added to the first three columns.
         """
-        if self._is_small and p.shape[1] % 3 == 0 and (kernels := compiled_kernels()):
-            return self._groups.map(p, start, kernels)
-        make = np.zeros if start is None else np.empty
+        if self._is_packed and p.shape[1] % 3 == 0 and (kernels := compiled_kernels()):
+            return self._packed.map(p, base, kernels)
+        make = np.zeros if base is None else np.empty
         x = make((self.n_vertices, p.shape[1]))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
-            add_product(x, rows, block, p[columns], heavy=self._is_heavy, base=start)
-            start = None
+            _add_product(x, rows, block, p[columns], compiled=self._is_compiled, base=base)
+            base = None
         return x
 
     def adjoint(self, y: FloatArray) -> FloatArray:
         """Return W~^T y, (m, 3), for *y* (n, 3) on the mesh."""
-        if self._is_small and y.shape[1] == 3 and (kernels := compiled_kernels()):
-            return self._groups.adjoints([y], self.n_columns, kernels)[0]
+        if self._is_packed and y.shape[1] == 3 and (kernels := compiled_kernels()):
+            return self._packed.adjoints([y], self.n_columns, kernels)[0]
         p = np.empty((self.n_columns, y.shape[1]))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
-            p[columns] = adjoint_product(rows, block, y, heavy=self._is_heavy)
+            p[columns] = _adjoint_product(rows, block, y, compiled=self._is_compiled)
         return p
 
     def adjoints(self, ys: Sequence[FloatArray]) -> list[FloatArray]:
-        """Return `adjoint` of each of *ys* (n, 3); W~ is read once for two of them."""
-        if self._is_small and (kernels := compiled_kernels()):
-            return self._groups.adjoints(ys, self.n_columns, kernels)
+        """Return `adjoint` of each of *ys* (n, 3); a small W~ is read once for two of them."""
+        if self._is_packed and (kernels := compiled_kernels()):
+            return self._packed.adjoints(ys, self.n_columns, kernels)
         return [self.adjoint(y) for y in ys]
 
     def at(self, vertices: IntArray) -> FloatArray:
@@ -118,9 +130,9 @@ class Subspace:
             out[found >= 0, columns] = block[found[found >= 0]]
         return out
 
-    def reaching(self, vertices: IntArray) -> tuple[IntArray, FloatArray]:
-        """Return the columns of W~ that reach *vertices* (k,), in order, and W~ there (k, c)."""
-        met = self._places[vertices].tocsc()
+    def nonzeros(self, vertices: IntArray) -> tuple[IntArray, FloatArray]:
+        """Return the nonzero columns (c,) of W~ at *vertices* (k,), and W~ there (k, c)."""
+        met = self._rows_of[vertices].tocsc()
         reached = []
         for r in np.flatnonzero(np.diff(met.indptr)):
             entries = slice(met.indptr[r], met.indptr[r + 1])
@@ -134,11 +146,11 @@ class Subspace:
         columns = [np.arange(own.start, own.stop) for *_, own in reached]
         return np.concatenate([np.arange(0), *columns]), w
 
-    def reached_alike(self) -> list[IntArray]:
-        """Return all vertices, those together that the same cages reach."""
+    def sets_by_cages(self) -> list[IntArray]:
+        """Return all vertices in sets; those of a set are moved by the same cages."""
         label = np.zeros(self.n_vertices, dtype=np.int64)
-        for start in range(0, len(self.rows), _BITS):
-            some = self.rows[start : start + _BITS]
+        for start in range(0, len(self.rows), _REGION_BITS):
+            some = self.rows[start : start + _REGION_BITS]
             label <<= len(some)
             for bit, rows in enumerate(reversed(some)):
                 label[rows] += 1 << bit
@@ -146,15 +158,15 @@ class Subspace:
         order = np.argsort(label, kind="stable")
         return np.split(order, np.cumsum(np.bincount(label))[:-1])
 
-    def left(self, operator: sparse.csr_array) -> FloatArray:
+    def premultiplied(self, operator: sparse.csr_array) -> FloatArray:
         """Return operator @ W~, dense (k, m), for a sparse *operator* (k, n) with few rows."""
         by_column = operator.tocsc()
         is_met = np.diff(by_column.indptr) > 0
         out = np.zeros((operator.shape[0], self.n_columns))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
             met = np.flatnonzero(is_met[rows])
-            for piece in pieces(len(met), block.shape[1]):
-                out[:, columns] += by_column[:, rows[met[piece]]] @ double(block[met[piece]])
+            for piece in row_pieces(len(met), block.shape[1]):
+                out[:, columns] += by_column[:, rows[met[piece]]] @ _double(block[met[piece]])
         return out
 
     def averaged(self, mean: sparse.csr_array) -> Subspace:
@@ -163,32 +175,143 @@ class Subspace:
         for members, block in zip(self.rows, self.blocks, strict=True):
             own = np.unique(by_column[:, members].indices).astype(np.int64)
             averages = np.zeros((len(own), block.shape[1]))
-            for piece in pieces(len(members), block.shape[1]):
-                averages += by_column[:, members[piece]].tocsr()[own] @ double(block[piece])
+            for piece in row_pieces(len(members), block.shape[1]):
+                averages += by_column[:, members[piece]].tocsr()[own] @ _double(block[piece])
             rows.append(own)
             blocks.append(averages)
         return Subspace(mean.shape[0], tuple(rows), tuple(blocks))
 
-    def squares(self, groups: IntArray) -> FloatArray:
-        """Return sum_{i in g} W~_ij^2, (G, m), for the group of each vertex *groups* (n,)."""
-        out = np.zeros((int(groups.max()) + 1, self.n_columns))
+    def sums_of_squares(self, clusters: IntArray) -> FloatArray:
+        """Return sum_{i in g} W~_ij^2, (G, m), for *clusters* g of the vertices, (n,)."""
+        out = np.zeros((int(clusters.max()) + 1, self.n_columns))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
-            for piece in pieces(len(rows), block.shape[1]):
+            for piece in row_pieces(len(rows), block.shape[1]):
                 size = piece.stop - piece.start
-                places = (groups[rows[piece]], np.arange(size))
+                places = (clusters[rows[piece]], np.arange(size))
                 member = sparse.csr_array((np.ones(size), places), (len(out), size))
-                out[:, columns] += member @ double(block[piece]) ** 2
+                out[:, columns] += member @ _double(block[piece]) ** 2
         return out
 
 
-def bind(
+@dataclass(frozen=True, eq=False)
+class _PackedBlocks:
+    """A small W~ end to end in memory, so that one call of a kernel multiplies by all of it.
+
+    One dense block for each set of vertices that the same cages move; so each vertex is in one
+    block only, and there is no call per region.
+
+    Parameters
+    ----------
+    rows, columns, weights : (n,) int, (sum c,) int, (sum k c,) float
+        For each block its vertices, the cage vertices that move them, and W~ there.
+    starts : (blocks + 1, 3) int
+        Where each block begins in these arrays.
+    """
+
+    rows: IntArray
+    columns: IntArray
+    weights: FloatArray
+    starts: IntArray
+
+    @classmethod
+    def of(cls, blocks: Sequence[tuple[IntArray, IntArray, FloatArray]]) -> _PackedBlocks:
+        """Return *blocks* of (rows (k,), columns (c,), weights (k, c)) end to end."""
+        lengths = [[array.size for array in arrays] for arrays in blocks]
+        starts = np.concatenate([np.zeros((1, 3), dtype=np.int64), np.cumsum(lengths, axis=0)])
+        parts = (np.concatenate([a.ravel() for a in each]) for each in zip(*blocks, strict=True))
+        return cls(*inputs(*parts, starts))
+
+    def map(self, p: FloatArray, base: FloatArray | None, kernels: Any) -> FloatArray:
+        """Return `Subspace.map` of *p* (m, k), k a multiple of 3."""
+        x = np.empty((len(self.rows), p.shape[1]))
+        (added,) = _NOTHING if base is None else inputs(base)
+        kernels.map_packed(
+            x, added, writable(p), self.rows, self.columns, self.weights, self.starts
+        )
+        return x
+
+    def adjoints(self, ys: Sequence[FloatArray], n_columns: int, kernels: Any) -> list[FloatArray]:
+        """Return `Subspace.adjoint` of each of *ys* (n, 3), two at a time."""
+        result = []
+        for k in range(0, len(ys), 2):
+            y, z = ys[k], (ys[k + 1] if k + 1 < len(ys) else None)
+            p = np.zeros((6 if z is not None else 3, n_columns))
+            beside = None if z is None else writable(z)
+            kernels.add_packed_adjoint(
+                p, writable(y), beside, self.rows, self.columns, self.weights, self.starts
+            )
+            result += [p[d : d + 3].T for d in range(0, len(p), 3)]
+        return result
+
+
+def _add_product(
+    x: FloatArray,
+    rows: IntArray,
+    block: FloatArray,
+    p: FloatArray,
+    *,
+    compiled: bool,
+    base: FloatArray | None = None,
+) -> None:
+    """Add block @ p to the *rows* of x, in double precision whatever the block is in.
+
+    With *base* (n, 3), the first three columns of x (n, k) are first set to it and the others to
+    0: piece by piece, while a piece is in the cache.
+    """
+    kernels = compiled_kernels() if compiled and p.shape[1] % 3 == 0 else None
+    size = max(_CACHED // block.shape[1], 1)
+    if kernels:
+        arguments = inputs(x, rows, block, p.T)
+        size = max(8 * size, -(-len(rows) // _PIECES))
+
+    def add(start: int, stop: int) -> None:
+        if base is not None:
+            first = rows[start] if start else 0
+            last = rows[stop] if stop < len(rows) else len(x)
+            x[first:last, :3] = base[first:last, : x.shape[1]]
+            x[first:last, 3:] = 0.0
+        if kernels:
+            kernels.add_product(x, *arguments, start, stop)
+        else:
+            x[rows[start:stop]] += _double(block[start:stop]) @ p
+
+    if base is not None and not len(rows):
+        x[:, :3], x[:, 3:] = base[:, : x.shape[1]], 0.0
+    in_parallel(add, len(rows), size)
+
+
+def _adjoint_product(
+    rows: IntArray, block: FloatArray, y: FloatArray, *, compiled: bool
+) -> FloatArray:
+    """Return block.T @ y[rows], in double precision."""
+    kernels = compiled_kernels() if compiled and y.shape[1] == 3 else None
+    if kernels:
+        kernels.add_adjoint(total := np.zeros((3, block.shape[1])), *inputs(rows, block, y))
+        return total.T
+    p = np.zeros((block.shape[1], y.shape[1]))
+    for piece in row_pieces(len(rows), block.shape[1]):
+        p += _double(block[piece]).T @ y[rows[piece]]
+    return p
+
+
+def _double(block: FloatArray) -> FloatArray:
+    return block.astype(np.float64, copy=False)
+
+
+def row_pieces(n: int, width: int) -> list[slice]:
+    """Return 0..n in slices of rows whose dense arrays of *width* columns take 32 megabytes."""
+    size = max(_DENSE // width, 1)
+    return [slice(start, min(start + size, n)) for start in range(0, n, size)]
+
+
+def cage_subspace(
     regions: Regions,
     cages: Sequence[Cage],
     *,
     blend: ArrayLike | None = None,
     progress: Progress | None = None,
 ) -> Subspace:
-    """Express every mesh vertex by the cages of its regions.
+    """Return W~: every mesh vertex expressed by the cages of its regions.
 
     Parameters
     ----------
@@ -205,10 +328,10 @@ def bind(
     Raises
     ------
     CageError
-        If there is not one cage per region, or a cage leaves out part of its region or is so
-        large that it hardly moves it.
+        If there is not one cage per region, a cage does not enclose its region, or it is so large
+        that it hardly moves it.
     RegionError
-        If *blend* is not as said above.
+        If *blend* has another shape, or is no partition of unity over the regions.
     """
     _check_cages(regions, cages)
     weights = regions.weights if blend is None else _checked_blend(blend, regions)
@@ -217,10 +340,10 @@ def bind(
         share = part(progress, r / len(cages), (r + 1) / len(cages))
         members = np.flatnonzero(weights[r] > 0.0)
         points = regions.mesh.vertices[members]
-        is_large = np.count_nonzero(weights) * cage.n_vertices > _SINGLE
+        is_large = np.count_nonzero(weights) * cage.n_vertices > sizes.SINGLE_PRECISION
         block = np.empty((len(members), cage.n_vertices), np.float32 if is_large else np.float64)
-        for start in range(0, len(members), _BOUND):
-            piece = slice(start, min(start + _BOUND, len(members)))
+        for start in range(0, len(members), _COORDINATES):
+            piece = slice(start, min(start + _COORDINATES, len(members)))
             ways = part(share, start / len(members), piece.stop / len(members))
             w = mean_value_coordinates(points[piece], cage.vertices, cage.faces, progress=ways)
             w *= weights[r, members[piece]][:, None]
@@ -255,10 +378,10 @@ def _check_cages(regions: Regions, cages: Sequence[Cage]) -> None:
         )
     mesh = regions.mesh
     for r, cage in enumerate(cages):
-        if np.ptp(cage.vertices, axis=0).max() > _LARGEST * mesh.diagonal:
+        if np.ptp(cage.vertices, axis=0).max() > _LARGEST_CAGE * mesh.diagonal:
             raise CageError(
-                f"the cage of region {r} is more than {_LARGEST:.0f} times as large as the mesh "
-                "and hardly moves it; make it fit more tightly"
+                f"the cage of region {r} is more than {_LARGEST_CAGE:.0f} times as large as the "
+                "mesh and hardly moves it; fit it more tightly"
             )
         members = mesh.vertices[regions.membership[r]]
         cage.require_encloses(members, f"vertices of region {r}")

@@ -1,8 +1,8 @@
 """The inner loops in compiled form, by numba; each does what a twin in numpy does, to rounding.
 
     volumes         `volume.signed_volume`, `volume.volume_along_path`, `volume.volume_gradient`
-    products        `products.add_product`, `products.adjoint_product`, `products.Groups`
-    low_rank        `low_rank.Patches`
+    products        `subspace.Subspace`
+    low_rank        `low_rank.LowRankSubspace`
     mean_value      `mean_value.mean_value_coordinates`
     normals         `normals.VertexNormals`
     rotations       `rotations.closest_rotations`
@@ -13,19 +13,19 @@ at a time.  Their arguments are positional, as numba wants it, and outputs come 
 """
 
 from .factor import solve_factored
-from .low_rank import put_patches
+from .low_rank import map_low_rank
 from .mean_value import weights
 from .normals import ring_normals, rings
-from .products import add_adjoint, add_groups_adjoint, add_product, put_groups
+from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
 from .rotations import rotations
 from .volumes import volume_along_sums, volume_gradient, volume_sums
 
 __all__ = [
     "add_adjoint",
-    "add_groups_adjoint",
+    "add_packed_adjoint",
     "add_product",
-    "put_groups",
-    "put_patches",
+    "map_low_rank",
+    "map_packed",
     "ring_normals",
     "rings",
     "rotations",

@@ -1,4 +1,4 @@
-"""The product of `low_rank.Patches`, W~ in two narrow factors; single precision is widened."""
+"""The map of `low_rank.LowRankSubspace`, in double precision from factors in single."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ _compile = kernel(fastmath={"reassoc", "contract"})
 
 
 @_compile
-def put_patches(x, base, p, vertices, columns, left, right, starts, first, last):
-    """Put W~ @ p.T into *x* for some patches of `low_rank.Patches`; *p* is (k, m), k by threes.
+def map_low_rank(x, base, p, vertices, columns, left, right, starts, first, last):
+    """Put W~ @ p.T into *x* for patches *first* to *last*; *p* is (k, m), k a multiple of 3.
 
     To the first three columns *base* (n, 3), patch by patch, is added; or (0, 3), which is nothing.
     """

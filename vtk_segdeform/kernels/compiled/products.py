@@ -156,8 +156,8 @@ def _add_adjoints(p, rows, block, y, z):
 
 
 @_compile
-def put_groups(x, base, p, rows, columns, weights, starts):
-    """Put W~ @ p into *x* for all groups of `products.Groups`; *p* is (m, k), k by threes.
+def map_packed(x, base, p, rows, columns, weights, starts):
+    """Put W~ @ p into *x* for all packed blocks of `subspace.Subspace`; *p* is (m, k), k by threes.
 
     To the first three columns *base* (n, 3) is added; or (0, 3), which is nothing.
     """
@@ -180,11 +180,11 @@ def put_groups(x, base, p, rows, columns, weights, starts):
 
 
 @_compile
-def add_groups_adjoint(p, y, z, rows, columns, weights, starts):
+def add_packed_adjoint(p, y, z, rows, columns, weights, starts):
     """Add (W~.T @ y).T to *p* (3, m), for *y* (n, 3); or of *y* and *z*, one below the other.
 
     From the last group to the first, and in each from its last rows on: these are what
-    `put_groups` has left in the cache, as this leaves it the first.
+    `map_packed` has left in the cache, as this leaves it the first.
     """
     here = np.empty(p.size)
     for g in range(len(starts) - 2, -1, -1):

@@ -7,18 +7,17 @@ import pytest
 from scenes import sausage
 from solids import rotation
 
-from vtk_segdeform.energy.cage_stiffness import with_cage_stiffness
-from vtk_segdeform.energy.energy import shape_energy
-from vtk_segdeform.geometry.rotations import group_by_position
-from vtk_segdeform.subspace.subspace import bind
+from vtk_segdeform.energy.energy import shape_energy, with_cage_stiffness
+from vtk_segdeform.geometry.kmeans import cluster_positions
+from vtk_segdeform.subspace.subspace import cage_subspace
 
 SCENE = sausage(2)  # in cages 1.75 times as large as their regions
-SUBSPACE = bind(SCENE.regions, SCENE.cages)
+SUBSPACE = cage_subspace(SCENE.regions, SCENE.cages)
 REST = np.concatenate([cage.vertices for cage in SCENE.cages])
 FACES = [cage.faces for cage in SCENE.cages]
-GROUPS = group_by_position(SCENE.mesh.vertices, 40)
-WITHOUT = shape_energy(SCENE.mesh, SUBSPACE, 10.0, GROUPS)
-ENERGY = with_cage_stiffness(WITHOUT, REST, FACES, GROUPS)
+CLUSTERS = cluster_positions(SCENE.mesh.vertices, 40)
+WITHOUT = shape_energy(SCENE.mesh, SUBSPACE, 10.0, CLUSTERS)
+ENERGY = with_cage_stiffness(WITHOUT, REST, FACES, CLUSTERS)
 
 
 def value_and_slope(energy, p):

@@ -1,0 +1,33 @@
+from __future__ import annotations
+
+import numpy as np
+from solids import icosphere, rotation, somewhere
+
+from vtk_segdeform.geometry.kmeans import cluster_positions, cluster_within_parts
+
+
+def test_there_are_about_as_many_clusters_as_asked_for_and_none_is_empty():
+    positions = icosphere(3)[0]
+    clusters = cluster_positions(positions, 40)
+    assert clusters.min() == 0
+    assert 30 <= clusters.max() + 1 <= 40
+    assert (np.bincount(clusters) > 0).all()
+
+
+def test_clusters_do_not_depend_on_the_frame_even_where_distances_tie():
+    positions = icosphere(3)[0]  # full of ties
+    turned = positions @ rotation([1, 2, 3], 1.1).T
+    assert (cluster_positions(positions, 25) == cluster_positions(turned, 25)).all()
+
+
+def test_no_cluster_spans_two_parts():
+    positions = icosphere(3)[0]
+    parts = (positions[:, 0] > 0).astype(int) + 2 * (positions[:, 1] > 0.5)
+    clusters = cluster_within_parts(positions, parts, 30)
+    for cluster in range(clusters.max() + 1):
+        assert len(np.unique(parts[clusters == cluster])) == 1
+
+
+def test_with_as_many_clusters_as_points_each_point_has_its_own():
+    positions = somewhere(20)
+    assert len(np.unique(cluster_positions(positions, 20))) == 20

@@ -1,0 +1,101 @@
+"""Checks of the arguments of a `Deformer`; each raises an error that names the argument."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import FloatArray, IntArray, as_ids, as_points, is_number, is_whole
+from ..cages import Cage
+from ..checks import require_sequence, shown
+from ..errors import ArgumentError, CageError, ConstraintError
+from ..mesh import Mesh
+
+_FARTHEST = 1e3  # sizes of the mesh
+FARTHEST_APART = 20.0
+"""Diagonals of the mesh between two targets or fixed vertices, at most.
+
+At this distance volumes are rounded to a few 1e-13 of themselves; the error grows with its cube."""
+
+
+def check_options(hold_tolerance: float, stretch: float, rotation_groups: int | None) -> None:
+    """Raise an ArgumentError unless all are numbers in their range."""
+    if not is_number(hold_tolerance, 0.0):
+        raise ArgumentError(f"hold_tolerance must be 0 or more; got {shown(hold_tolerance)}")
+    if not is_number(stretch, 0.0):
+        raise ArgumentError(f"stretch must be a number, 0 or more; got {shown(stretch)}")
+    if rotation_groups is not None and not is_whole(rotation_groups, 1):
+        raise ArgumentError(
+            f"rotation_groups must be a whole number, 1 or more; got {shown(rotation_groups)}"
+        )
+
+
+def check_distance(targets: FloatArray) -> None:
+    """Raise a ConstraintError if *targets*, in units of the mesh's size, are absurdly far away."""
+    if max(targets.max(initial=0.0), -targets.min(initial=0.0)) > _FARTHEST:
+        raise ConstraintError(
+            f"a target is {np.abs(targets).max():.0e} times the mesh's size away from it; "
+            "are both in the same unit?"
+        )
+
+
+def stacked_cages(cages: Sequence[Cage], cage_vertices: Sequence[ArrayLike]) -> FloatArray:
+    """Return *cage_vertices* (m, 3) of all *cages*, or raise a CageError if they do not fit."""
+    require_sequence(cage_vertices, "cage_vertices")
+    poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
+    expected, got = [cage.n_vertices for cage in cages], [len(pose) for pose in poses]
+    if got != expected:
+        raise CageError(f"cage_vertices must hold {expected} points, cage by cage; got {got}")
+    return np.concatenate(poses)
+
+
+def checked_constraints(
+    mesh: Mesh, fixed: ArrayLike, handle: ArrayLike
+) -> tuple[IntArray, IntArray]:
+    """Return the vertex numbers of *fixed* and *handle*, or raise a ConstraintError."""
+    try:
+        fixed = as_ids(fixed, mesh.n_vertices, "fixed")
+        handle = as_ids(handle, mesh.n_vertices, "handle")
+    except ValueError as fault:
+        raise ConstraintError(str(fault)) from None
+    both = np.intersect1d(fixed, handle)
+    if len(both):
+        raise ConstraintError(
+            f"{len(both)} vertices are both fixed and handle (the first is {both[0]}); "
+            "remove them from one of the two"
+        )
+    return fixed, handle
+
+
+def checked_targets(targets: ArrayLike, n_handle: int) -> FloatArray:
+    """Return *targets* as (n_handle, 3), or raise a ConstraintError.
+
+    Without handles, any empty sequence is accepted.
+    """
+    try:
+        array = as_points(targets, "targets") if n_handle or np.size(targets) else np.empty((0, 3))
+    except ValueError as fault:
+        raise ConstraintError(str(fault)) from None
+    if len(array) != n_handle:
+        raise ConstraintError(
+            f"targets must give one point for each of the {n_handle} handle vertices; "
+            f"got shape {array.shape}"
+        )
+    return array
+
+
+def require_together(mesh: Mesh, *places: FloatArray) -> None:
+    """Raise a ConstraintError if *places* (k, 3), targets and fixed vertices, are too far apart."""
+    given = [points for points in places if len(points)]
+    if not given:
+        return
+    low = np.min([points.min(axis=0) for points in given], axis=0)
+    high = np.max([points.max(axis=0) for points in given], axis=0)
+    apart = float((high - low).max()) / mesh.diagonal
+    if not apart <= FARTHEST_APART:
+        raise ConstraintError(
+            f"targets and fixed vertices are {apart:.3g} diagonals of the mesh apart; at most "
+            f"{FARTHEST_APART:.0f} are allowed: are both in the same unit?"
+        )
