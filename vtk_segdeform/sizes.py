@@ -10,27 +10,33 @@ from __future__ import annotations
 COMPILED = 2_000
 """Faces, or work as long as that of so many faces, for which compiled kernels are worth a call.
 
-Handing arrays to a kernel takes some microseconds, and importing numba half a second."""
+Handing arrays to a kernel takes some microseconds, and importing numba half a second.  The volume
+of 8,000 faces takes 0.03 ms instead of 0.13."""
 
 PARALLEL_SEARCH = 2_000
 """Points whose nearest cluster centres are searched in several threads.
 
-SciPy starts new threads at every search, which takes longer than a search of fewer points."""
+SciPy starts new threads at every search: with them clustering 500 points takes 1.8 ms instead of
+1.1, 8,000 points as long as in one thread."""
 
 ONE_CALL = 1 << 20
 """Numbers in W~ up to which one call of a kernel multiplies by all of it, in one thread.
 
 Eight megabytes stay in the cache between a map and its transpose, and waking other threads takes
-longer than the product."""
+longer than the product: 0.10 ms instead of 0.13 for a map and its transpose of 386,000 numbers."""
 
 COARSE_VOLUME = 3_000
-"""Vertices beyond which the solver's steps take the volume over a coarse surface."""
+"""Vertices beyond which the solver's steps compute the volume over a coarse surface.
+
+A step then costs the same for every mesh: a frame of 12,000 vertices takes 12 ms instead of 21."""
 
 COARSE_VOLUME_POINTS = 2_000
 """Points of that coarse surface, about."""
 
 VOLUME_HESSIAN_POINTS = 700
-"""Points beyond which the second derivatives of the volumes are computed from so many."""
+"""Points beyond which the second derivatives of the volumes are computed from so many.
+
+The cost is quadratic in the cage vertices at every point: 73 ms instead of 124 for 2,000 points."""
 
 SHARED_PLACES = 1_000
 """Vertices of a fixed patch or handle beyond which neighbours share a place."""
@@ -38,10 +44,14 @@ SHARED_PLACES = 1_000
 PLACES = 500
 """Places that the vertices of such a set share.
 
-A set reaches a few dozen cage vertices, so that 500 places determine them many times over."""
+A set depends on a few dozen cage vertices, which 500 places determine many times over.  With
+20,000 fixed and as many handle vertices a frame takes 14 ms instead of 33."""
 
 FIRST_CLUSTERS = 2_000
-"""Rotation clusters of position, at least, that are joined to as many clusters as requested."""
+"""Rotation clusters of position, at least, that are joined to as many clusters as requested.
+
+Their rows of K are computed, not those of all vertices: a mesh of 22,000 vertices is bound in 1.9 s
+instead of 5.8."""
 
 FIRST_CLUSTERS_EACH = 6
 """First clusters for each one requested, if these are more."""
@@ -49,22 +59,26 @@ FIRST_CLUSTERS_EACH = 6
 SCALED_VOLUME = 20_000
 """Vertices beyond which a pose is scaled to its exact volume instead of moved along a direction.
 
-A frame then maps the vertices once, not the direction of the volume as well; of a small mesh
-that saves nothing."""
+A frame then maps the vertices once, not the direction of the volume as well: 32 ms instead of 37
+for 87,000 vertices."""
 
 CACHED_BINDING = 20_000
 """Vertices from which a session keeps a binding on disk.
 
-A smaller mesh is bound in less than a second."""
+A mesh of 22,000 vertices is bound in 1.1 s, and read in 0.05 s."""
 
 LOCAL_VOLUME_CELLS = 20_000
-"""Vertices beyond which local volume change is computed for cells of vertices."""
+"""Vertices beyond which local volume change is computed for cells of vertices.
+
+It is smooth, and an overlay needs it in every frame: 1 ms instead of 12 for 22,000 vertices."""
 
 LOCAL_VOLUME_POINTS = 8_000
 """Cells of such a mesh, about."""
 
 LOW_RANK = 100_000
-"""Vertices beyond which W~ is mapped by its low-rank factors."""
+"""Vertices beyond which W~ is mapped by its low-rank factors.
+
+A map reads fewer numbers: 6.2 ms instead of 8.1 for 350,000 vertices."""
 
 CUBATURE_SAMPLE = 36_000
 """Vertices in the weighted sample from which the energy of a large mesh is computed."""
@@ -76,9 +90,10 @@ CUBATURE_FACTOR = 8
 """Vertices for each sampled one from which the sample is used: 8 x 36,000 = 288,000 vertices.
 
 The triangles at a sampled vertex have six other corners, so that a denser sample would cost as
-much as all vertices."""
+much as all vertices.  A mesh of 350,000 vertices is bound in 13 s instead of 15."""
 
 SINGLE_PRECISION = 8_000_000
 """Vertices in regions times cage vertices, in a region, beyond which W~ is in single precision.
 
-The product of so many numbers is limited by memory: half the bytes take half the time."""
+Such a product is limited by memory, and half the bytes are read.  A map by 5.7 million numbers
+takes 1.6 ms instead of 6.7."""

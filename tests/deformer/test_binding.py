@@ -1,4 +1,4 @@
-"""What was bound once is found again, and nothing else is."""
+"""A binding is computed once and then read from the cache, if its inputs are the same."""
 
 from __future__ import annotations
 
@@ -34,9 +34,7 @@ def counted(monkeypatch):
 
 
 @pytest.mark.parametrize("large", [500, 10**9])
-def test_the_second_time_nothing_is_bound_and_the_pose_is_the_same_bit_for_bit(
-    tmp_path, counted, monkeypatch, large
-):
+def test_a_cached_binding_gives_the_same_pose_bit_for_bit(tmp_path, counted, monkeypatch, large):
     monkeypatch.setattr(sizes, "COARSE_VOLUME", large)
     monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 300)
     first = SCENE.deformer(cache=tmp_path).solve(TARGETS)
@@ -47,7 +45,7 @@ def test_the_second_time_nothing_is_bound_and_the_pose_is_the_same_bit_for_bit(
     assert len(list(tmp_path.iterdir())) == 1
 
 
-def without_a_vertex_moved():
+def with_a_vertex_moved():
     vertices = np.array(SCENE.mesh.vertices)
     vertices[5] *= 1.0 + 1e-15
     return Mesh(vertices, SCENE.mesh.faces)
@@ -55,7 +53,7 @@ def without_a_vertex_moved():
 
 OTHERS = {
     "mesh": lambda cache: Deformer(
-        mesh := without_a_vertex_moved(),
+        mesh := with_a_vertex_moved(),
         Regions.from_masks(mesh, SCENE.regions.membership),
         SCENE.cages,
         cache=cache,
@@ -78,13 +76,13 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("other", OTHERS)
-def test_whatever_it_depends_on_makes_another_one(tmp_path, counted, other):
+def test_other_inputs_give_another_binding(tmp_path, counted, other):
     SCENE.deformer(cache=tmp_path)
     OTHERS[other](tmp_path)
     assert len(counted) == 2
 
 
-def test_what_does_not_matter_to_it_finds_the_same(tmp_path, counted):
+def test_options_that_binding_does_not_depend_on_find_the_same(tmp_path, counted):
     SCENE.deformer(cache=tmp_path)
     SCENE.deformer(cache=tmp_path, preserve_volume=False, tolerance=1e-3)
     assert len(counted) == 1
@@ -93,7 +91,7 @@ def test_what_does_not_matter_to_it_finds_the_same(tmp_path, counted):
 @pytest.mark.parametrize(
     "damage", ["cut", "empty", "other", "flipped", "an array", "encrypted", "compressed", "header"]
 )
-def test_a_damaged_file_is_as_good_as_none(tmp_path, counted, damage):
+def test_a_damaged_file_is_ignored(tmp_path, counted, damage):
     sound = SCENE.deformer(cache=tmp_path).solve(TARGETS)
     (path,) = tmp_path.iterdir()
     content = bytearray(path.read_bytes())
@@ -116,13 +114,13 @@ def test_a_damaged_file_is_as_good_as_none(tmp_path, counted, damage):
     assert_array_equal(again.vertices, sound.vertices)
 
 
-def test_a_folder_that_cannot_be_made_is_done_without(tmp_path):
+def test_without_a_folder_nothing_is_cached(tmp_path):
     (tmp_path / "file").write_text("in the way")
     solution = SCENE.deformer(cache=tmp_path / "file" / "folder").solve(TARGETS)
     assert abs(solution.volume_change) < 1e-12
 
 
-def test_cancelled_leaves_nothing_behind(tmp_path):
+def test_a_cancelled_binding_leaves_no_file(tmp_path):
     def stop(fraction, message):
         if fraction > 0.3:
             raise Cancelled
@@ -132,7 +130,7 @@ def test_cancelled_leaves_nothing_behind(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_what_was_not_used_for_longest_goes_first(tmp_path, monkeypatch):
+def test_the_binding_unused_for_longest_is_deleted_first(tmp_path, monkeypatch):
     kept = {}
     for k, stretch in enumerate([1.0, 2.0, 3.0]):
         SCENE.deformer(cache=tmp_path, stretch=stretch)
@@ -144,7 +142,7 @@ def test_what_was_not_used_for_longest_goes_first(tmp_path, monkeypatch):
     assert [path.exists() for path in kept.values()] == [True, False, True]
 
 
-def test_a_session_over_a_large_mesh_keeps_its_binding(tmp_path, counted, monkeypatch):
+def test_a_session_caches_the_binding_of_a_large_mesh(tmp_path, counted, monkeypatch):
     monkeypatch.setenv("SEGDEFORM_CACHE", str(tmp_path))
     monkeypatch.setattr(posing, "_DEAR", 100)
     for _ in range(2):

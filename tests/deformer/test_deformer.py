@@ -1,8 +1,7 @@
-"""What a caller sees: motion, scale, many handles, far jumps, too little or wrong input."""
+"""`Deformer` as a caller sees it: motion, scale, many handles, far targets, bad input."""
 
 from __future__ import annotations
 
-import threading
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +14,6 @@ from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.cages.fit import fit_cages
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionError
-from vtk_segdeform.geometry import kmeans
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.models.shapes import cactus
@@ -29,13 +27,13 @@ VERTICES = SCENE.mesh.vertices
 REST = SCENE.mesh.vertices[SCENE.handle]
 
 
-def test_nothing_asked_is_nothing_done():
+def test_at_rest_no_step_is_taken():
     solution = SCENE.deformer().solve(REST)
     assert_allclose(solution.vertices, VERTICES, atol=1e-9)
     assert solution.steps == 0
 
 
-def test_moving_every_handle_rigidly_and_fixing_nothing_moves_the_mesh_rigidly():
+def test_without_fixed_vertices_a_rigid_motion_of_the_handle_moves_the_mesh_rigidly():
     scene = replace(SCENE, fixed=np.array([], dtype=int))
     turn = rotation([1, 2, 0], 0.4)
     solution = scene.deformer(tolerance=1e-9, max_steps=2000).solve(REST @ turn.T + [0.5, 0, 0])
@@ -43,7 +41,7 @@ def test_moving_every_handle_rigidly_and_fixing_nothing_moves_the_mesh_rigidly()
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
-def test_turning_and_scaling_the_scene_turns_and_scales_the_answer(scale):
+def test_rotating_and_scaling_the_scene_rotates_and_scales_the_pose(scale):
     turn = rotation([1, 2, 3], 1.2)
     targets = SCENE.turned(50)
     plain = SCENE.held().solve(targets)
@@ -53,7 +51,7 @@ def test_turning_and_scaling_the_scene_turns_and_scales_the_answer(scale):
     assert moved.steps == plain.steps
 
 
-def test_far_from_the_origin_only_the_digits_of_the_coordinates_are_lost():
+def test_far_from_the_origin_a_pose_is_rounded_to_the_coordinates_only():
     shift = 1e4 * SCENE.mesh.diagonal * np.array([0.6, -0.8, 0.0])
     targets = SCENE.turned(50)
     plain = SCENE.held().solve(targets)
@@ -78,7 +76,7 @@ def test_the_volume_change_is_that_of_the_returned_vertices_at_any_distance(diag
 
 
 @pytest.mark.parametrize("degrees", [30, 70, 120, 180])
-def test_far_jumps_arrive_with_exact_volume_and_no_fold(degrees):
+def test_far_motions_end_with_exact_volume_and_without_folds(degrees):
     scene = sausage(3)
     solution = scene.deformer().solve(scene.turned(degrees, about=(0.0, 0.0, 1.2)))
     assert abs(solution.volume_change) < 1e-12
@@ -87,7 +85,7 @@ def test_far_jumps_arrive_with_exact_volume_and_no_fold(degrees):
     x, faces = solution.vertices, scene.mesh.faces
     a, b, c = x[faces.T]
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    # One or two of the 2048 may be pinched hard, wherever the fold would be; none is gone.
+    # One or two of the 2048 faces may be much smaller where a fold would be; none vanishes.
     ratio = area / scene.mesh.face_areas
     assert ratio.min() > 0.01
     assert np.quantile(ratio, 0.01) > 0.2
@@ -102,7 +100,7 @@ def test_a_jump_and_a_drag_end_in_the_same_place():
     assert_allclose(solution.vertices, jump.vertices, atol=1e-4 * SCENE.mesh.diagonal)
 
 
-def test_there_and_back_is_at_rest_again_and_reset_is_at_once():
+def test_solving_for_the_rest_targets_and_reset_both_return_to_rest():
     deformer = SCENE.deformer(tolerance=1e-8, max_steps=2000)
     deformer.solve(SCENE.turned(45))
     back = deformer.solve(REST)
@@ -112,7 +110,7 @@ def test_there_and_back_is_at_rest_again_and_reset_is_at_once():
     assert_allclose(deformer.solve(REST).vertices, VERTICES, atol=1e-9)
 
 
-def test_two_handles_are_moved_and_turned_on_their_own():
+def test_two_handles_are_moved_and_rotated_independently():
     x = VERTICES[:, 0]
     left, right = np.flatnonzero(x < -2.4), np.flatnonzero(x > 2.4)
     scene = replace(
@@ -127,7 +125,7 @@ def test_two_handles_are_moved_and_turned_on_their_own():
     assert abs(solution.volume_change) < 1e-13
 
 
-def test_one_free_handle_vertex_just_carries_the_mesh_along():
+def test_a_single_handle_vertex_translates_the_mesh():
     scene = replace(SCENE, fixed=np.array([], dtype=int), handle=np.array([7]))
     solution = scene.deformer().solve(VERTICES[[7]] + [0.4, 0.1, 0.0])
     assert_allclose(solution.vertices, VERTICES + [0.4, 0.1, 0.0], atol=1e-5)
@@ -140,14 +138,14 @@ def test_without_any_constraint_the_mesh_stays_at_rest():
     assert_allclose(solution.vertices, VERTICES, atol=1e-9)
 
 
-def test_one_cage_around_everything_works_as_well():
+def test_one_cage_around_the_mesh_works_as_well():
     scene = sausage(1)
     solution = scene.deformer().solve(scene.turned(40))
     assert abs(solution.volume_change) < 1e-13
     assert solution.handle_error < 1e-3
 
 
-def test_stopping_early_says_so_and_goes_on_next_time():
+def test_a_solve_that_stops_early_reports_it_and_continues_next_time():
     deformer = SCENE.held()
     first = deformer.solve(SCENE.turned(20), max_steps=2)
     assert first.status is Status.STEP_LIMIT
@@ -155,8 +153,8 @@ def test_stopping_early_says_so_and_goes_on_next_time():
     assert deformer.solve(SCENE.turned(20)).status is Status.CONVERGED
 
 
-def test_one_step_at_a_time_is_the_same_way_as_all_at_once():
-    targets = SCENE.turned(4)  # near: nothing in between
+def test_single_steps_give_the_same_poses_as_one_solve():
+    targets = SCENE.turned(4)  # near: no waypoints
     at_once = SCENE.deformer().solve(targets)
     deformer = SCENE.held()
     way = [deformer.solve(targets, max_steps=1)]
@@ -167,7 +165,7 @@ def test_one_step_at_a_time_is_the_same_way_as_all_at_once():
     assert_allclose(way[-1].vertices, at_once.vertices, rtol=0, atol=1e-9)
 
 
-def test_after_a_reset_nothing_is_known_of_what_was_before():
+def test_a_reset_discards_the_running_state():
     deformer = SCENE.held()
     deformer.solve(SCENE.turned(20), max_steps=3)
     deformer.solve(SCENE.turned(10), max_steps=3)
@@ -177,7 +175,7 @@ def test_after_a_reset_nothing_is_known_of_what_was_before():
     assert_array_equal(again.vertices, anew.vertices)
 
 
-def test_a_drag_learns_from_frame_to_frame(monkeypatch):
+def test_acceleration_continues_from_frame_to_frame(monkeypatch):
     def drag():
         deformer = SCENE.deformer(hold_tolerance=1.0)
         poses = [deformer.solve(SCENE.turned(degrees)) for degrees in range(25)]
@@ -210,7 +208,7 @@ def test_wrong_constraints_are_named(change, says):
         (REST[:, :2], r"shape \(n, 3\)"),
     ],
 )
-def test_wrong_targets_are_named_and_leave_the_pose_as_it_was(targets, says):
+def test_wrong_targets_are_named_and_keep_the_pose(targets, says):
     deformer = SCENE.held()
     with pytest.raises(ConstraintError, match=says):
         deformer.solve(targets)
@@ -230,7 +228,7 @@ def test_regions_of_another_mesh_are_refused():
         Deformer(Mesh(*icosphere(3)), SCENE.regions, SCENE.cages)
 
 
-def test_the_printed_blend_can_be_compared_and_nonsense_is_refused():
+def test_the_printed_blend_weights_are_accepted_and_invalid_ones_refused():
     printed = cage_distance_weights(SCENE.regions, SCENE.cages)
     solution = SCENE.deformer(blend=printed).solve(SCENE.turned(30))
     assert abs(solution.volume_change) < 1e-13
@@ -239,7 +237,7 @@ def test_the_printed_blend_can_be_compared_and_nonsense_is_refused():
         SCENE.deformer(blend=0.5 * printed)
 
 
-def test_with_nothing_held_rounding_carries_nothing_off_even_over_slivers():
+def test_without_constraints_rounding_does_not_move_the_mesh_even_with_slivers():
     vertices, faces = icosphere(3)
     middle = 0.5 * (vertices[faces[0, 0]] + vertices[faces[0, 1]])
     a, b, c = faces[0]
@@ -267,12 +265,12 @@ def test_with_nothing_held_rounding_carries_nothing_off_even_over_slivers():
         ({"exact_hessian": 1}, "exact_hessian must be True or False"),
     ],
 )
-def test_options_that_make_no_sense_are_refused_by_name(option, says):
+def test_invalid_options_are_refused_by_name(option, says):
     with pytest.raises(ValueError, match=says):
         SCENE.deformer(**option)
 
 
-def test_a_target_in_another_unit_is_asked_about():
+def test_a_target_in_another_unit_is_refused():
     with pytest.raises(ConstraintError, match="both in the same unit"):
         SCENE.held().solve(1e6 * REST)
     with pytest.raises(ConstraintError, match="both in the same unit"):
@@ -280,7 +278,7 @@ def test_a_target_in_another_unit_is_asked_about():
 
 
 @pytest.mark.parametrize("way", [(1.0, 0.9, -0.8), (0.0, 1.0, 0.0)])
-def test_the_volume_stays_however_far_apart_targets_may_be(way):
+def test_the_volume_is_exact_for_targets_as_far_apart_as_allowed(way):
     both = np.concatenate([SCENE.fixed, SCENE.handle])
     scene = replace(SCENE, fixed=both[:0], handle=both)
     deformer = scene.deformer()
@@ -295,7 +293,7 @@ def test_the_volume_stays_however_far_apart_targets_may_be(way):
         deformer.solve(rest + 10.5 * far)
 
 
-def test_a_mesh_may_go_far_as_a_whole():
+def test_a_whole_mesh_may_move_far():
     scene = replace(SCENE, fixed=SCENE.fixed[:0])
     away = np.array([0.0, 100.0, 0.0]) * SCENE.mesh.diagonal
     solution = scene.deformer().solve(REST + away)
@@ -312,7 +310,7 @@ def test_a_cage_so_large_that_it_moves_nothing_is_refused():
         scene.deformer()
 
 
-def test_holding_elsewhere_needs_no_new_cages_and_changes_nothing_in_the_old():
+def test_other_constraints_share_the_binding_and_do_not_change_the_deformer():
     deformer = SCENE.deformer()
     before = deformer.solve(SCENE.turned(30))
     other = deformer.hold(fixed=SCENE.handle, handle=SCENE.fixed)
@@ -324,7 +322,7 @@ def test_holding_elsewhere_needs_no_new_cages_and_changes_nothing_in_the_old():
     assert_allclose(deformer.solve(SCENE.turned(30)).vertices, before.vertices, atol=1e-4)
 
 
-def test_a_pose_can_be_taken_up_again_where_it_was_left():
+def test_a_pose_can_be_resumed():
     deformer = SCENE.deformer()
     first = deformer.solve(SCENE.turned(30))
     deformer.solve(SCENE.turned(-40))
@@ -350,7 +348,7 @@ def test_binding_reports_its_progress_and_can_be_cancelled():
         SCENE.deformer(progress=stop)
 
 
-def test_set_up_says_what_it_does_and_stops_at_whatever_it_says():
+def test_set_up_reports_every_stage_and_can_be_cancelled_at_each():
     mesh = cactus(4000)
     regions = segment(mesh, 2)
     cages = fit_cages(mesh, regions, 60)
@@ -372,7 +370,7 @@ def test_set_up_says_what_it_does_and_stops_at_whatever_it_says():
                 work(stop)
 
 
-def test_a_copy_goes_on_as_the_deformer_would_and_leaves_it_where_it_is():
+def test_a_copy_continues_like_the_deformer_and_independently():
     deformer = SCENE.held()
     deformer.solve(SCENE.turned(20), max_steps=3)
     ahead = deformer.copy().solve(SCENE.turned(30))
@@ -389,7 +387,7 @@ def test_cages_with_too_many_vertices_are_refused():
         Deformer(SCENE.mesh, SCENE.regions, big)
 
 
-def test_a_cancelled_solve_leaves_the_pose_before_it():
+def test_a_cancelled_solve_restores_the_pose_before():
     plain, work = SCENE.held(), SCENE.held()
     first, second = SCENE.turned(20), SCENE.turned(60)
     for deformer in (plain, work):
@@ -411,8 +409,8 @@ def test_a_cancelled_solve_leaves_the_pose_before_it():
     assert_allclose(solution.vertices, plain.solve(second).vertices, atol=1e-4)
 
 
-def test_many_bodies_are_one_mesh():
-    # As many rotation groups at least as bodies, and a region for each if it is wanted.
+def test_a_mesh_may_have_many_bodies():
+    # At least as many rotation clusters as bodies, and a region for each if requested.
     ball, faces = icosphere(1)
     grid = np.stack(np.meshgrid(*3 * [3.0 * np.arange(3)]), axis=-1).reshape(-1, 3)
     vertices = np.concatenate([ball + place for place in grid])
@@ -428,13 +426,3 @@ def test_many_bodies_are_one_mesh():
         assert abs(solution.volume_change) < 1e-12
         assert solution.handle_error < 1e-3
         assert len(np.unique(mesh.components[top])) == 9
-
-
-def test_small_groups_of_vertices_are_told_apart_without_starting_threads(monkeypatch):
-    started = []
-    monkeypatch.setattr(threading.Thread, "start", started.append)
-    monkeypatch.setattr(kmeans, "n_threads", lambda: 2)
-    parts = np.repeat(np.arange(200), 40)
-    groups = kmeans.cluster_within_parts(np.random.default_rng(0).random((8000, 3)), parts, 300)
-    assert len(np.unique(groups)) >= 200
-    assert not started

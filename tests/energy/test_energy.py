@@ -1,4 +1,4 @@
-"""The cages' own stiffness: free under motion, a true gradient, and no cage flies off."""
+"""The shape energy: zero under rigid motion, exact gradient, and the stiffness of the cages."""
 
 from __future__ import annotations
 
@@ -20,25 +20,29 @@ WITHOUT = shape_energy(SCENE.mesh, SUBSPACE, 10.0, CLUSTERS)
 ENERGY = with_cage_stiffness(WITHOUT, REST, FACES, CLUSTERS)
 
 
+def wobble(seed=0, size=0.05):
+    return REST + size * np.random.default_rng(seed).normal(size=REST.shape)
+
+
 def value_and_slope(energy, p):
     return energy.local_step(p, SUBSPACE.map(p))
 
 
-def test_a_rigid_motion_of_all_cages_costs_nothing_and_pulls_nowhere():
+def test_cage_stiffness_is_zero_under_rigid_motion():
     for p in (REST, REST @ rotation([1, 2, 3], 2.0).T + [3.0, 2.0, 1.0]):
         value, slope = value_and_slope(ENERGY, p)
         assert abs(value) < 1e-9 * ENERGY.constant
         assert np.abs(slope).max() < 1e-9 * np.abs(ENERGY.quadratic).max()
 
 
-def test_what_hardly_moves_the_mesh_costs_much_more_than_without():
+def test_cage_stiffness_resists_motion_that_hardly_moves_the_mesh():
     step = np.random.default_rng(3).normal(size=REST.shape)
-    weak = np.linalg.eigh(WITHOUT.quadratic)[1][:, 3:6]  # the softest but for translations
+    weak = np.linalg.eigh(WITHOUT.quadratic)[1][:, 3:6]  # the softest except translations
     p = REST + 0.3 * weak @ (weak.T @ step)
     assert value_and_slope(ENERGY, p)[0] > 5.0 * value_and_slope(WITHOUT, p)[0]
 
 
-def test_the_slope_is_half_the_gradient():
+def test_with_cage_stiffness_the_slope_is_half_the_gradient():
     rng = np.random.default_rng(0)
     p, direction = REST + 0.05 * rng.normal(size=REST.shape), rng.normal(size=REST.shape)
     value, slope = value_and_slope(ENERGY, p)
@@ -50,10 +54,53 @@ def test_the_slope_is_half_the_gradient():
 
 
 @pytest.mark.parametrize("n_regions", [1, 2])
-def test_loose_cages_stay_by_the_mesh(n_regions):
+def test_loose_cages_stay_near_the_mesh(n_regions):
     scene = sausage(n_regions)
     solution = scene.deformer().solve(scene.turned(60))
     middle = solution.vertices.mean(axis=0)
     for vertices, cage in zip(solution.cage_vertices, scene.cages, strict=True):
         reach = np.linalg.norm(cage.vertices - scene.mesh.vertices.mean(axis=0), axis=1).max()
         assert np.linalg.norm(vertices - middle, axis=1).max() < 3.0 * reach
+
+
+BOTH = pytest.mark.parametrize("n_clusters", [None, 40], ids=["per vertex", "clusters"])
+
+
+def test_cages_that_share_no_vertex_do_not_couple():
+    scene = sausage(3)
+    subspace = cage_subspace(scene.regions, scene.cages)
+    energy = shape_energy(scene.mesh, subspace, 10.0, None)
+    first, last = subspace.columns[0], subspace.columns[2]
+    assert (energy.quadratic[first, last] == 0.0).all()
+    assert np.abs(energy.quadratic[first, subspace.columns[1]]).max() > 0.0
+
+
+def shape(stretch, n_clusters):
+    n = SCENE.mesh.n_vertices
+    n_clusters = None if n_clusters is None else np.arange(n) % n_clusters
+    return shape_energy(SCENE.mesh, SUBSPACE, stretch, n_clusters)
+
+
+@BOTH
+@pytest.mark.parametrize("stretch", [0.0, 1.0, 10.0])
+def test_it_is_zero_with_no_gradient_under_rigid_motion(stretch, n_clusters):
+    energy = shape(stretch, n_clusters)
+    for p in (REST, REST @ rotation([1, 2, 3], 2.0).T + [3.0, 2.0, 1.0]):
+        value, slope = energy.local_step(p, SUBSPACE.map(p))
+        assert abs(value) < 1e-9 * energy.constant
+        assert np.abs(slope).max() < 1e-9 * np.abs(energy.quadratic).max()
+    value, _ = energy.local_step(wobble(), SUBSPACE.map(wobble()))
+    assert value > 1e-5 * energy.constant  # bending is not free
+
+
+@BOTH
+@pytest.mark.parametrize("stretch", [1.0, 10.0])
+def test_the_slope_is_half_the_gradient(stretch, n_clusters):
+    energy = shape(stretch, n_clusters)
+    p, direction = wobble(), wobble(1, 1.0) - REST
+    value, slope = energy.local_step(p, SUBSPACE.map(p))
+    errors = []
+    for t in (2e-4, 1e-4):
+        ahead, _ = energy.local_step(p + t * direction, SUBSPACE.map(p + t * direction))
+        errors.append(abs(ahead - value - 2.0 * t * np.vdot(slope, direction)))
+    assert 3.5 < errors[0] / errors[1] < 4.5

@@ -1,4 +1,4 @@
-"""The Hessian of the shape energy: it is what differences of the gradient tend to."""
+"""The Hessian of the shape energy: the limit of differences of the gradient."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def bent(p):
 
 
 def hessian_times(energy, p, dp):
-    """Return half the Hessian of E at *p* times *dp*, from the two parts that the solver adds."""
+    """Return half the Hessian of E at *p* times *dp*, from the two terms that the solver adds."""
     lower = np.tril(_rotation_term(energy, p))
     part = lower + np.tril(lower, -1).T
     return energy.quadratic @ dp - (part @ dp.T.ravel()).reshape(3, -1).T
@@ -60,7 +60,7 @@ def test_energy_and_gradient_are_those_of_the_dense_operators(stretch):
     subspace, p = cage_subspace(SCENE.regions, SCENE.cages), bent(REST)
     clusters = cluster_positions(SCENE.mesh.vertices, 250)
     energy = shape_energy(SCENE.mesh, subspace, stretch, clusters)
-    assert energy.covariance_operator.size > 60_000  # as many as are multiplied without their zeros
+    assert energy.covariance_operator.size > 60_000  # enough to be multiplied without its zeros
     u, _, vt = np.linalg.svd((energy.covariance_operator @ p).reshape(-1, 3, 3))
     load = energy.load_operator.T @ (u @ vt).reshape(-1, 3)
     product = energy.quadratic @ p
@@ -70,7 +70,7 @@ def test_energy_and_gradient_are_those_of_the_dense_operators(stretch):
     assert_allclose(half, product - load, atol=1e-12 * np.abs(product).max())
 
 
-def test_turning_the_whole_costs_nothing():
+def test_a_rotation_of_the_whole_mesh_costs_nothing():
     energy = energy_of(40)
     for axis in np.eye(3):
         turn = np.cross(axis, REST)
@@ -79,7 +79,7 @@ def test_turning_the_whole_costs_nothing():
         assert abs(cost) < 1e-9 * np.vdot(turn, energy.quadratic @ turn)
 
 
-def test_it_turns_with_the_pose():
+def test_the_hessian_rotates_with_the_pose():
     energy, p = energy_of(40), bent(REST)
     turn = rotation([1.0, 2.0, 0.5], 1.1)
     dp = RNG.normal(size=p.shape)
@@ -88,7 +88,7 @@ def test_it_turns_with_the_pose():
     assert_allclose(turned, expected, atol=1e-9 * np.abs(expected).max())
 
 
-def test_the_factor_solves_in_both_of_its_forms():
+def test_both_forms_of_the_factor_solve():
     energy, p = energy_of(40), bent(REST)
     held = energy.quadratic + np.eye(len(p)) * np.trace(energy.quadratic)
     y = RNG.normal(size=p.shape)
@@ -97,10 +97,10 @@ def test_the_factor_solves_in_both_of_its_forms():
     curved = full_factor(held, energy, p)
     h = curved.solve(y)
     back = hessian_times(energy, p, h) + (held - energy.quadratic) @ h
-    assert_allclose(back, y, atol=2e-3 * np.abs(y).max())  # a thousandth of the part is kept back
+    assert_allclose(back, y, atol=2e-3 * np.abs(y).max())  # a thousandth of the term is left out
 
 
-def test_how_volumes_curve_is_added_where_it_belongs():
+def test_the_hessian_of_the_volumes_is_added():
     energy, p, m = energy_of(40), bent(REST), len(REST)
     held = energy.quadratic + np.eye(m) * np.trace(energy.quadratic)
     g = 1e-3 * np.trace(energy.quadratic) / m * RNG.normal(size=(3, m, m))
@@ -114,7 +114,7 @@ def test_how_volumes_curve_is_added_where_it_belongs():
         assert np.abs(blocks[a, :, a]).max() < 1e-9 * np.abs(g).max()
 
 
-def test_what_is_not_convex_has_no_factor():
+def test_a_hessian_that_is_not_convex_has_no_factor():
     assert quadratic_factor(-np.eye(4)) is None
     energy = energy_of(40)
     assert full_factor(-energy.quadratic, energy, REST) is None

@@ -20,11 +20,11 @@ SCENE = sausage()
 
 @functools.cache
 def fine(scene: Scene) -> tuple[Energy, np.ndarray, tuple[np.ndarray, ...]]:
-    """Return the energy with a rotation for each vertex, the cages at rest, and the bits."""
+    """Return the energy with a rotation for each vertex, the cages at rest, and the patches."""
     deformer = scene.deformer(rotation_groups=scene.mesh.n_vertices)
     n = scene.mesh.n_vertices
-    bits = deformer._rest.vertices, scene.regions.labels, np.ones(n, dtype=np.int64)
-    return deformer._binding.energy, deformer._rest_cages, bits
+    patches = deformer._rest.vertices, scene.regions.labels, np.ones(n, dtype=np.int64)
+    return deformer._binding.energy, deformer._rest_cages, patches
 
 
 @functools.cache
@@ -33,7 +33,7 @@ def joined(scene: Scene, n_groups: int = 100) -> tuple[Energy, np.ndarray]:
 
 
 def plain(scene: Scene, n_groups: int = 100) -> Energy:
-    """Return the energy with clusters of position for groups, and nothing taken off."""
+    """Return the energy with clusters of position, without the correction."""
     energy, _, (positions, parts, _) = fine(scene)
     groups = cluster_within_parts(positions, parts, n_groups)
     rows = np.asarray(energy.covariance_operator).reshape(len(groups), 3, -1)
@@ -65,14 +65,14 @@ def blade() -> Scene:
     return Scene(mesh, Regions.single(mesh), (cage,), fixed, handle)
 
 
-def test_a_pose_costs_about_what_it_costs_with_a_rotation_for_each_vertex():
+def test_the_energy_of_a_pose_is_near_that_with_a_rotation_for_each_vertex():
     true = value(fine(SCENE)[0], bent())
     excess = value(plain(SCENE), bent()) - true
     assert excess > 0.05 * true
     assert abs(value(joined(SCENE)[0], bent()) - true) < 0.3 * excess
 
 
-def test_a_pose_comes_closer_to_that_of_a_rotation_for_each_vertex(monkeypatch):
+def test_a_pose_is_near_that_with_a_rotation_for_each_vertex(monkeypatch):
     def distance(**options):
         x = scene.deformer(**options).solve(scene.turned(50)).vertices
         return np.sqrt(((x - true) ** 2).sum(axis=1).mean())
@@ -86,7 +86,7 @@ def test_a_pose_comes_closer_to_that_of_a_rotation_for_each_vertex(monkeypatch):
     assert near < 0.6 * distance(rotation_groups=60)
 
 
-def test_the_excess_is_the_spread_of_turning_within_the_groups():
+def test_the_excess_is_the_spread_of_rotations_within_the_clusters():
     energy, rest, (positions, parts, _) = fine(SCENE)
     move = np.random.default_rng(0).normal(size=rest.shape)
     rows = np.asarray(energy.covariance_operator).reshape(len(parts), 3, -1)
@@ -100,7 +100,7 @@ def test_the_excess_is_the_spread_of_turning_within_the_groups():
     assert_allclose(measured / step**2, one.turned.sum() - whole.turned.sum(), rtol=2e-3)
 
 
-def test_the_rest_shape_stays_at_rest_turned_and_moved():
+def test_the_rest_shape_moved_rigidly_is_at_rest():
     _, rest, _ = fine(SCENE)
     energy, _ = joined(SCENE)
     scale = np.trace(energy.quadratic)
@@ -110,14 +110,14 @@ def test_the_rest_shape_stays_at_rest_turned_and_moved():
         assert np.abs(slope).max() < 1e-12 * scale
 
 
-def test_turning_a_pose_costs_nothing():
+def test_rotating_a_pose_costs_nothing():
     energy, _ = joined(SCENE)
     turned = bent() @ rotation([3, -1, 2], 2.0).T
     assert_allclose(value(energy, turned), value(energy, bent()), rtol=1e-9)
 
 
 @pytest.mark.parametrize("size", [0.01, 0.1, 1.0])
-def test_no_pose_costs_less_than_nothing(size):
+def test_no_pose_has_negative_energy(size):
     energy, rest = joined(SCENE)[0], fine(SCENE)[1]
     rng = np.random.default_rng(1)
     stretches = np.eye(3) + rng.normal(0.0, size, (5, 3, 3))
@@ -125,7 +125,7 @@ def test_no_pose_costs_less_than_nothing(size):
     assert min(value(energy, p) for p in poses) > 0.0
 
 
-def test_no_group_spans_two_parts_and_all_are_used():
+def test_no_cluster_spans_two_parts_and_none_is_empty():
     _, groups = joined(SCENE)
     parts = fine(SCENE)[2][1]
     assert_array_equal(np.unique(groups), np.arange(groups.max() + 1))
@@ -133,14 +133,14 @@ def test_no_group_spans_two_parts_and_all_are_used():
     assert all(len(np.unique(parts[groups == g])) == 1 for g in range(groups.max() + 1))
 
 
-def test_groups_do_not_depend_on_place_size_and_direction():
+def test_clusters_do_not_depend_on_position_size_and_orientation():
     moved = SCENE.transformed(rotation([1, 2, 3], 1.1), 70.0, (5.0, -3.0, 2.0))
     energy, groups = joined(moved)
     assert_array_equal(groups, joined(SCENE)[1])
     assert_allclose(energy.quadratic, joined(SCENE)[0].quadratic, atol=1e-6 * energy.mass.max())
 
 
-def test_groups_lie_across_what_bends():
+def test_clusters_lie_across_a_bending_limb():
     def width(groups):
         """Return how much wider than long groups are, where the blade is thin."""
         spans = np.array([np.ptp(x[groups == k], axis=0) for k in np.unique(groups[thin])])
@@ -151,8 +151,8 @@ def test_groups_lie_across_what_bends():
     assert width(joined(blade(), 60)[1]) > 1.5 * width(cluster_within_parts(x, parts, 60))
 
 
-def test_what_nothing_holds_together_is_grouped_by_position():
-    energy, rest, bits = fine(SCENE)
+def test_a_body_without_stiffness_is_clustered_by_position():
+    energy, rest, patches = fine(SCENE)
     loose = rotation_clusters.replace(energy, quadratic=0.0 * energy.quadratic)
-    _, groups = rotation_clusters.join_rotations(loose, rest, bits, 100)
+    _, groups = rotation_clusters.join_rotations(loose, rest, patches, 100)
     assert 80 <= groups.max() + 1 <= 101

@@ -1,8 +1,11 @@
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 from solids import icosphere, rotation, somewhere
 
+from vtk_segdeform.geometry import kmeans
 from vtk_segdeform.geometry.kmeans import cluster_positions, cluster_within_parts
 
 
@@ -31,3 +34,13 @@ def test_no_cluster_spans_two_parts():
 def test_with_as_many_clusters_as_points_each_point_has_its_own():
     positions = somewhere(20)
     assert len(np.unique(cluster_positions(positions, 20))) == 20
+
+
+def test_small_sets_of_points_are_clustered_without_starting_threads(monkeypatch):
+    started = []
+    monkeypatch.setattr(threading.Thread, "start", started.append)
+    monkeypatch.setattr(kmeans, "n_threads", lambda: 2)
+    parts = np.repeat(np.arange(200), 40)
+    clusters = cluster_within_parts(np.random.default_rng(0).random((8000, 3)), parts, 300)
+    assert len(np.unique(clusters)) >= 200
+    assert not started

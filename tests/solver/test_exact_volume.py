@@ -1,4 +1,4 @@
-"""The last operation of a solve: the mesh itself on its own volume, by a step or by its size."""
+"""The last operation of a solve: the mesh is moved or scaled onto its exact volume."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ TARGETS = SCENE.turned(40)
 
 
 @pytest.fixture
-def wide(monkeypatch):
-    """Small meshes are landed as large ones are."""
+def scaled(monkeypatch):
+    """Scale small meshes to their volume, as large ones are."""
     monkeypatch.setattr(sizes, "COARSE_VOLUME", 1000)
     monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 700)
     monkeypatch.setattr(sizes, "SCALED_VOLUME", 1000)
 
 
 @pytest.mark.parametrize("missing", [-0.3, -1e-5, 1e-9, 0.4])
-def test_scaling_restores_the_volume_and_leaves_the_centre_where_it_was(missing):
+def test_scaling_restores_the_volume_and_keeps_the_centre(missing):
     points, faces = icosphere(3)
     points = points * [2.0, 1.0, 0.5] + [5.0, -3.0, 1.0]
     constraint = total_volume(Mesh(points, faces))
@@ -44,7 +44,7 @@ def test_scaling_restores_the_volume_and_leaves_the_centre_where_it_was(missing)
     assert_allclose(x, centre + scale * (before - centre), atol=1e-13)
 
 
-def test_a_surface_turned_inside_out_is_left_alone():
+def test_a_surface_that_is_inside_out_stays_as_it_is():
     points, faces = icosphere(2)
     constraint = total_volume(Mesh(points, faces))
     mirrored = points * [1.0, 1.0, -1.0]
@@ -53,8 +53,8 @@ def test_a_surface_turned_inside_out_is_left_alone():
     assert_array_equal(x, mirrored)
 
 
-@pytest.mark.usefixtures("wide")
-def test_a_large_mesh_is_landed_by_its_size_and_its_cages_with_it():
+@pytest.mark.usefixtures("scaled")
+def test_a_large_mesh_is_scaled_and_its_cages_with_it():
     deformer = SCENE.deformer()
     solution = deformer.solve(TARGETS)
     assert solution.status is Status.CONVERGED
@@ -62,11 +62,11 @@ def test_a_large_mesh_is_landed_by_its_size_and_its_cages_with_it():
     assert_allclose(deformer.surface(solution.cage_vertices), solution.vertices, atol=1e-13)
     assert deformer._continuation.solver.volumes.constraints[0].target != pytest.approx(
         deformer._constraints.volumes.constraints[0].target, rel=1e-9
-    )  # held is what the stand-in has where the mesh has its own
+    )  # the coarse volume of the pose in which the mesh has its own
 
 
-@pytest.mark.usefixtures("wide")
-def test_the_pose_does_not_depend_on_the_way_there():
+@pytest.mark.usefixtures("scaled")
+def test_a_scaled_pose_does_not_depend_on_the_poses_before():
     direct = SCENE.deformer().solve(TARGETS)
     deformer = SCENE.deformer()
     for degrees in (-30.0, 10.0, 60.0, 50.0):
@@ -81,8 +81,8 @@ def test_the_pose_does_not_depend_on_the_way_there():
     assert_array_equal(deformer.solve(TARGETS).vertices, direct.vertices)
 
 
-@pytest.mark.usefixtures("wide")
-def test_its_pose_is_that_of_the_whole(monkeypatch):
+@pytest.mark.usefixtures("scaled")
+def test_a_scaled_pose_is_near_that_with_the_whole_mesh(monkeypatch):
     by_size = SCENE.deformer().solve(TARGETS)
     monkeypatch.setattr(sizes, "COARSE_VOLUME", 10**9)
     whole = SCENE.deformer().solve(TARGETS)
@@ -90,8 +90,8 @@ def test_its_pose_is_that_of_the_whole(monkeypatch):
     assert away < 3e-3 * SCENE.mesh.diagonal
 
 
-@pytest.mark.usefixtures("wide")
-def test_a_turned_and_shifted_scene_is_landed_alike():
+@pytest.mark.usefixtures("scaled")
+def test_a_rotated_and_shifted_scene_is_scaled_alike():
     turn, shift = rotation([1.0, 2.0, 3.0], 1.1), np.array([300.0, -20.0, 7.0])
     here = SCENE.deformer().solve(TARGETS)
     there = SCENE.transformed(turn, 0.5, shift).deformer().solve(0.5 * TARGETS @ turn.T + shift)
@@ -99,14 +99,14 @@ def test_a_turned_and_shifted_scene_is_landed_alike():
     assert_allclose(there.vertices, 0.5 * here.vertices @ turn.T + shift, atol=1e-7)
 
 
-@pytest.mark.usefixtures("wide")
-def test_volumes_of_regions_are_still_landed_one_by_one():
+@pytest.mark.usefixtures("scaled")
+def test_volumes_of_regions_are_restored_one_by_one():
     solution = SCENE.deformer(preserve_region_volumes=True).solve(TARGETS)
     assert np.abs(solution.region_volume_change).max() < 1e-12
 
 
-@pytest.mark.usefixtures("wide")
-def test_a_gpu_lands_a_mesh_where_the_processor_does(monkeypatch):
+@pytest.mark.usefixtures("scaled")
+def test_a_gpu_and_the_processor_give_the_same_mesh(monkeypatch):
     here = SCENE.deformer().solve(TARGETS)
     monkeypatch.setattr(exact_volume, "gpu_arrays", lambda: np)  # the lines that a GPU runs
     used = []
@@ -121,9 +121,9 @@ def test_a_gpu_lands_a_mesh_where_the_processor_does(monkeypatch):
     assert abs(there.volume_change) < 1e-14
 
 
-@pytest.mark.usefixtures("wide")
+@pytest.mark.usefixtures("scaled")
 @pytest.mark.parametrize("when", ["__init__", "map", "scale_to_volume", "host"])
-def test_a_gpu_that_fails_is_gone_on_without(monkeypatch, when):
+def test_after_a_failure_of_the_gpu_the_processor_is_used(monkeypatch, when):
     here = SCENE.deformer().solve(TARGETS)
     monkeypatch.setattr(exact_volume, "gpu_arrays", lambda: np)
 

@@ -33,7 +33,7 @@ def test_region_volumes_do_not_change_when_the_mesh_is_moved():
 
 
 def test_region_volumes_keep_their_digits_far_from_the_origin():
-    # Coordinates of 30 binary digits, so that moving the mesh rounds nothing.
+    # Coordinates of 30 binary digits: the translation is exact.
     mesh = MESH.with_vertices(np.round(MESH.vertices * 2.0**28) / 2.0**28)
     bent = np.round((mesh.vertices + wobble()) * 2.0**28) / 2.0**28
     far = np.array([2.0**22, -(2.0**21), 2.0**22])
@@ -51,7 +51,7 @@ def test_a_slab_has_the_volume_of_a_slab():
     assert middle > left
 
 
-def test_gradients_are_right_to_second_order():
+def test_gradients_are_correct_to_second_order():
     direction = wobble(1, 1.0)
     for constraint in (total_volume(MESH), *region_volumes(MESH, SCENE.regions.labels)):
         slope = np.vdot(constraint.gradient(MESH.vertices), direction)
@@ -77,12 +77,12 @@ def test_the_hessian_is_the_derivative_of_the_gradient():
         assert_allclose(product, exact, atol=1e-12)
 
 
-def test_one_region_is_the_whole():
+def test_one_region_has_the_volume_of_the_mesh():
     (constraint,) = region_volumes(MESH, np.zeros(MESH.n_vertices, dtype=int))
     assert_allclose(constraint.target, total_volume(MESH).target, rtol=1e-14)
 
 
-def test_restore_meets_every_constraint_at_once():
+def test_steps_to_volume_meet_every_constraint():
     constraints = region_volumes(MESH, SCENE.regions.labels)
     x = MESH.vertices + wobble(2)
     directions = [c.gradient(MESH.vertices) for c in constraints]

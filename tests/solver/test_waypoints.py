@@ -11,7 +11,7 @@ ALL = [np.arange(50)]
 
 
 @pytest.mark.parametrize("degrees", [5.0, 70.0, 120.0, 180.0])
-def test_a_turn_goes_round_in_equal_legs_that_keep_the_shape(degrees):
+def test_a_rotation_is_divided_into_equal_parts_that_keep_the_shape(degrees):
     start, axis, centre = somewhere(size=0.1), [0.3, 1.0, -0.2], np.array([0.0, 0.1, 0.7])
     end = (start - centre) @ rotation(axis, np.radians(degrees)).T + centre
     way = waypoints(start, end, ALL)
@@ -31,19 +31,19 @@ def arm(points, axis):
     return np.linalg.norm(np.cross(points, axis / np.linalg.norm(axis)), axis=1)
 
 
-def test_a_short_move_is_made_at_once():
+def test_a_short_motion_has_no_waypoint():
     start = somewhere(size=0.1)
     assert len(waypoints(start, start + 0.05, ALL)) == 1
 
 
-def test_a_long_slide_is_straight():
+def test_a_long_translation_is_straight():
     start = somewhere(size=0.1)
     way = waypoints(start, start + [0.9, 0.0, 0.0], ALL)
     assert len(way) == 5
     assert_allclose(way[1], start + [0.36, 0.0, 0.0], atol=1e-12)
 
 
-def test_handles_go_their_own_ways():
+def test_handles_have_separate_motions():
     start = somewhere(size=0.1)
     halves = [np.arange(25), np.arange(25, 50)]
     end = start.copy()
@@ -54,7 +54,7 @@ def test_handles_go_their_own_ways():
         assert_allclose(leg[25:], start[25:], atol=1e-12)
 
 
-def test_half_a_turn_goes_the_same_way_round_in_every_frame():
+def test_half_a_turn_has_the_same_direction_in_every_frame():
     start = somewhere(size=0.1) + [0.0, 0.0, 0.4]
     end = start @ rotation([1, 0, 0], np.pi).T
     for seed in range(5):
@@ -64,5 +64,5 @@ def test_half_a_turn_goes_the_same_way_round_in_every_frame():
             assert_allclose(leg, expected @ turn.T, atol=1e-6)
 
 
-def test_no_handles_is_no_way():
+def test_without_handles_there_is_no_waypoint():
     assert len(waypoints(np.empty((0, 3)), np.empty((0, 3)), [])) == 1

@@ -1,4 +1,4 @@
-"""More weight for what misses its place: how much depends on the targets, not on the way there."""
+"""Sets that miss their places get more weight, which depends on the targets only."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SCENE = sausage()  # its cages are so coarse that the handle needs more weight a
 
 
 def bent(degrees):
-    """Return targets turned, and shifted in proportion."""
+    """Return rotated targets, shifted in proportion."""
     return SCENE.turned(degrees) + degrees * np.array([0.01, 0.02, 0.0])
 
 
@@ -20,7 +20,7 @@ NEAR, MIDDLE, FAR = bent(2.0), bent(10.0), bent(20.0)
 
 
 def rested(deformer, targets, max_steps):
-    """Go on as an editor does, so many steps at a time, until the pose is final."""
+    """Solve as an editor does, so many steps at a time, until the pose is final."""
     for _ in range(500):
         solution = deformer.solve(targets, max_steps=max_steps)
         if solution.status is not Status.STEP_LIMIT:
@@ -41,7 +41,7 @@ def direct():
     return SCENE.held().solve(MIDDLE)
 
 
-def test_what_is_missed_gets_more_weight_and_is_met():
+def test_a_set_that_misses_its_places_gets_more_weight_and_meets_them():
     loose, firm = SCENE.deformer(hold_tolerance=1.0), SCENE.held()
     assert firm.solve(FAR).handle_error < 5e-4 < loose.solve(FAR).handle_error
     assert strength(firm) > strength(loose) == 1.0
@@ -66,7 +66,7 @@ def test_no_set_has_more_weight_than_it_needs(degrees):
     assert (off(deformer) > 0.8).all()  # at weights of 10 and 100: 0.4 to 0.66
 
 
-def test_the_pose_changes_smoothly_where_more_weight_becomes_due():
+def test_the_pose_changes_smoothly_as_weights_rise():
     deformer, poses, weights = SCENE.held(), [], []
     for degrees in np.arange(1.0, 16.0):
         poses.append(deformer.solve(bent(degrees)).vertices)
@@ -77,7 +77,7 @@ def test_the_pose_changes_smoothly_where_more_weight_becomes_due():
     assert bends.max() < 1e-3  # with ten times the weight at once: 2.5e-3
 
 
-def test_the_pose_is_the_same_from_where_less_weight_was_due_and_from_where_more_was(direct):
+def test_the_pose_is_the_same_after_poses_with_lower_and_with_higher_weights(direct):
     deformer, weights = SCENE.held(), []
     for way in (NEAR, MIDDLE, FAR, MIDDLE):
         solution = deformer.solve(way)
@@ -91,7 +91,7 @@ def test_the_pose_is_the_same_from_where_less_weight_was_due_and_from_where_more
 
 
 @pytest.mark.parametrize("steps", [1, 2, 3, 8])
-def test_however_few_steps_an_event_is_given_it_ends_in_the_same_pose(direct, steps):
+def test_any_number_of_steps_per_event_ends_in_the_same_pose(direct, steps):
     deformer = SCENE.held()
     for degrees in (5.0, 10.0, 15.0, 20.0, 20.0, 20.0, 15.0, 10.0):
         solution = deformer.solve(bent(degrees), max_steps=steps)
@@ -99,7 +99,7 @@ def test_however_few_steps_an_event_is_given_it_ends_in_the_same_pose(direct, st
     assert away(rested(deformer, MIDDLE, steps), direct) < 1e-5
 
 
-def test_under_a_moving_pointer_the_weight_stays_and_no_pose_is_called_final():
+def test_during_a_drag_weights_stay_the_same_and_no_pose_is_final():
     deformer = SCENE.held()
     deformer.solve(FAR)
     before = strength(deformer)
@@ -109,7 +109,7 @@ def test_under_a_moving_pointer_the_weight_stays_and_no_pose_is_called_final():
         assert strength(deformer) == before
 
 
-def test_a_copy_climbs_by_itself():
+def test_a_copy_continues_independently():
     deformer = SCENE.held()
     deformer.solve(FAR)
     other = deformer.copy()

@@ -1,7 +1,6 @@
-"""What a GPU would do, done by its own lines over numpy, torch and whatever GPU there is.
+"""The passes of a GPU, run with numpy, with torch on the processor, and on a GPU if there is one.
 
-Without a GPU the lines are the same and the library is another: numpy always, torch on the
-processor where it is installed.
+Without a GPU the same lines run with another library: numpy always, torch where it is installed.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ CACTUS = models.cactus(900)
 
 @pytest.fixture(params=["numpy", "torch", "gpu"])
 def arrays(request, monkeypatch):
-    """Return each library in turn; meshes come in many pieces, as large ones do."""
+    """Return each library in turn; meshes are divided into pieces, as large ones are."""
     monkeypatch.setattr(gpu, "_FACES", 1000)
     monkeypatch.setattr(subspace, "_DENSE", 5000)
     if request.param == "numpy":
@@ -68,13 +67,13 @@ def normals_of(points, faces, arrays):
 def test_the_map_is_that_of_the_subspace(arrays, subspace):
     rest = SCENE.mesh.vertices
     surface = GPUSurface(subspace, rest, SCENE.mesh.faces, arrays)
-    for moves in (MOVES, 0.0 * MOVES, -MOVES):  # nothing is left of the last
+    for moves in (MOVES, 0.0 * MOVES, -MOVES):  # independent of the last call
         assert_allclose(
             surface.host(surface.map(moves)), subspace.map(moves, rest.copy()), rtol=0, atol=1e-14
         )
 
 
-def test_nothing_moved_is_the_rest_to_the_last_digit(arrays):
+def test_without_motion_the_rest_shape_is_exact(arrays):
     surface = GPUSurface(SINGLE, SCENE.mesh.vertices, SCENE.mesh.faces, arrays)
     assert_array_equal(surface.host(surface.map(0.0 * MOVES)), SCENE.mesh.vertices)
 
@@ -87,7 +86,7 @@ def test_known_solids_have_their_known_volumes(arrays):
 
 
 @pytest.mark.parametrize("far", [0.0, 1e4])
-def test_the_volume_is_as_exact_as_ever_and_the_same_every_time(arrays, far):
+def test_the_volume_is_exact_and_reproducible(arrays, far):
     points, faces = RING[0] + far, RING[1]
     surface, x = still(points, faces, arrays), arrays.asarray(points)
     volume = surface.volume(x)
@@ -100,7 +99,7 @@ def test_the_volume_is_as_exact_as_ever_and_the_same_every_time(arrays, far):
     )
 
 
-def test_a_frame_ends_on_the_volume_of_the_rest(arrays):
+def test_scaling_restores_the_volume_of_the_rest_shape(arrays):
     rest, faces = SCENE.mesh.vertices, SCENE.mesh.faces
     constraint = total_volume(SCENE.mesh)
     surface = GPUSurface(SINGLE, rest, faces, arrays)
@@ -115,7 +114,7 @@ def test_a_frame_ends_on_the_volume_of_the_rest(arrays):
     assert abs(constraint.relative(surface.host(x))) < 1e-14
 
 
-def test_a_surface_turned_inside_out_is_left_alone(arrays):
+def test_a_surface_that_is_inside_out_stays_as_it_is(arrays):
     points, faces = BEAD
     mirrored = points * [1.0, 1.0, -1.0]
     x = arrays.asarray(mirrored)
@@ -125,7 +124,7 @@ def test_a_surface_turned_inside_out_is_left_alone(arrays):
 
 
 @pytest.mark.parametrize("mesh", [Mesh(*BEAD), CACTUS], ids=["bead", "cactus"])
-def test_normals_are_those_that_vtk_draws_with(arrays, mesh):
+def test_normals_agree_with_those_of_vtk(arrays, mesh):
     drawn = vtkTriangleMeshPointNormals()
     drawn.SetInputData(polydata_of(mesh.vertices, np.full(mesh.n_faces, 3), mesh.faces.ravel()))
     drawn.Update()
@@ -133,7 +132,7 @@ def test_normals_are_those_that_vtk_draws_with(arrays, mesh):
     assert_allclose(normals_of(mesh.vertices, mesh.faces, arrays), theirs, rtol=0, atol=1e-6)
 
 
-def test_normals_point_where_the_volume_grows_fastest(arrays):
+def test_normals_are_directions_of_the_volume_gradient(arrays):
     points, faces = CACTUS.vertices, CACTUS.faces
     slope = volume_gradient(points, faces)
     slope /= np.linalg.norm(slope, axis=1, keepdims=True)
@@ -141,7 +140,7 @@ def test_normals_point_where_the_volume_grows_fastest(arrays):
 
 
 @pytest.mark.parametrize("unit", [1e-150, 1e-6, 1e100])
-def test_normals_turn_with_the_mesh_and_do_not_ask_for_its_unit(arrays, unit):
+def test_normals_rotate_with_the_mesh_in_any_unit(arrays, unit):
     points, faces = RING
     turn = rotation([1.0, 2.0, -0.5], 1.1)
     before = normals_of(points, faces, arrays)
@@ -149,7 +148,7 @@ def test_normals_turn_with_the_mesh_and_do_not_ask_for_its_unit(arrays, unit):
     assert_allclose(after, before @ turn.T, rtol=0, atol=1e-12)
 
 
-def test_a_vertex_with_a_thousand_faces_has_a_normal_like_any_other(arrays):
+def test_a_vertex_with_a_thousand_faces_has_a_normal(arrays):
     angle = np.linspace(0.0, 2.0 * np.pi, 1001)[:-1]
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(1000)], axis=1)
     points = np.vstack([ring, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
@@ -160,12 +159,12 @@ def test_a_vertex_with_a_thousand_faces_has_a_normal_like_any_other(arrays):
     assert_allclose(normals_of(points, faces, arrays), expected, atol=1e-12)
 
 
-def test_what_has_shrunk_to_nothing_has_no_normal_and_none_is_no_number(arrays):
+def test_a_fan_that_has_shrunk_to_a_point_has_a_zero_normal(arrays):
     points, faces = BEAD
     assert_array_equal(normals_of(0.0 * points + 7.0, faces, arrays), 0.0 * points)
     flat = points.copy()
     gone = np.unique(faces[(faces == 5).any(axis=1)])
-    flat[gone] = flat[5]  # all around vertex 5 lies on it
+    flat[gone] = flat[5]  # all neighbours of vertex 5 lie on it
     normals = normals_of(flat, faces, arrays)
     assert_array_equal(normals[5], np.zeros(3))
     others = np.setdiff1d(np.arange(len(points)), gone)
@@ -179,7 +178,7 @@ def test_a_vertex_without_faces_has_no_normal(arrays):
     assert_array_equal(normals_of(alone, faces + 1, arrays), expected)
 
 
-def test_no_call_takes_more_memory_than_its_chapter_says(monkeypatch):
+def test_no_call_takes_more_memory_than_documented(monkeypatch):
     monkeypatch.setattr(gpu, "_FACES", 1 << 10)
     points, faces = torus(240, 120)
     n, m = len(points), len(faces)
@@ -219,7 +218,7 @@ def test_a_failure_of_the_gpu_raises_a_gpu_error(fault):
             call(BEAD[0])
 
 
-def test_a_library_is_taken_only_if_it_counts_right(monkeypatch, capsys):
+def test_a_library_is_used_only_if_its_results_are_right(monkeypatch, capsys):
     def absent():
         raise ImportError("no such library")
 
@@ -244,7 +243,7 @@ def test_a_library_is_taken_only_if_it_counts_right(monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("status", "number", "expected"), [(0, 2, True), (0, 0, False), (100, 1, False)]
 )
-def test_it_is_the_driver_that_knows(monkeypatch, status, number, expected):
+def test_the_driver_reports_whether_there_is_a_gpu(monkeypatch, status, number, expected):
     def tell(place):
         place._obj.value = number
         return 0
@@ -254,14 +253,14 @@ def test_it_is_the_driver_that_knows(monkeypatch, status, number, expected):
     assert gpu._driver_has_a_gpu() is expected
 
 
-def test_whoever_wants_no_gpu_gets_none(monkeypatch):
+def test_an_environment_variable_turns_the_gpu_off(monkeypatch):
     monkeypatch.setattr(gpu, "_found", lambda: np)
     assert gpu_arrays() is np
     monkeypatch.setenv("SEGDEFORM_GPU", "0")
     assert gpu_arrays() is None
 
 
-def test_where_there_is_no_gpu_neither_library_is_imported_and_nothing_is_said(tmp_path):
+def test_without_a_gpu_neither_library_is_imported_and_nothing_is_printed(tmp_path):
     for name in ("cupy", "torch"):
         (tmp_path / f"{name}.py").write_text(f"print('{name} was imported')\n")
     program = (

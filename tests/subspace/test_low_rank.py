@@ -1,4 +1,4 @@
-"""W~ of a large mesh in patches of low rank: it maps as W~ itself does."""
+"""Low-rank factors of W~: they map like W~ itself."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOVES = 0.1 * np.random.default_rng(5).normal(size=(len(CAGES), 9))
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
-    """LowRankSubspace for a small mesh."""
+    """Allow low-rank factors of a small mesh, in small patches."""
     monkeypatch.setattr(low_rank, "_PATCH", 100)
     monkeypatch.setattr(low_rank, "_WORTHWHILE", np.inf)
 
@@ -36,7 +36,7 @@ def parts(of: LowRankSubspace):
     return list(of._parts(0, len(of.starts) - 1))
 
 
-def test_every_vertex_is_in_one_patch_with_the_cages_that_reach_it():
+def test_every_vertex_is_in_one_patch_with_the_cages_that_move_it():
     of = made()
     assert_array_equal(np.sort(of.vertices), np.arange(len(REST)))
     for ids, own, _, _ in parts(of):
@@ -47,7 +47,7 @@ def test_every_vertex_is_in_one_patch_with_the_cages_that_reach_it():
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 3e-7])
-def test_no_row_is_farther_off_than_said_and_a_looser_one_takes_fewer_numbers(
+def test_errors_of_rows_are_within_the_tolerance_and_a_looser_one_needs_fewer_numbers(
     monkeypatch, tolerance
 ):
     monkeypatch.setattr(low_rank, "_TOLERANCE", tolerance)
@@ -61,7 +61,7 @@ def test_no_row_is_farther_off_than_said_and_a_looser_one_takes_fewer_numbers(
     assert made().left.size > of.left.size
 
 
-def test_moving_all_cages_affinely_loses_nothing_however_loose_the_tolerance(monkeypatch):
+def test_affine_maps_of_all_cages_are_exact_at_any_tolerance(monkeypatch):
     monkeypatch.setattr(low_rank, "_TOLERANCE", 1e-2)
     of, affine = made(), np.random.default_rng(1).normal(size=(3, 3))
     x = of.map(CAGES @ affine + [0.5, -2.0, 1.0])
@@ -72,7 +72,7 @@ def test_moving_all_cages_affinely_loses_nothing_however_loose_the_tolerance(mon
 
 @pytest.mark.parametrize("columns", [3, 6, 9])
 @pytest.mark.parametrize("compiled", [True, False])
-def test_it_maps_as_the_whole_does_compiled_and_not(monkeypatch, columns, compiled):
+def test_it_maps_like_the_subspace_compiled_or_not(monkeypatch, columns, compiled):
     if compiled:
         pytest.importorskip("numba")
     else:
@@ -87,21 +87,21 @@ def test_it_maps_as_the_whole_does_compiled_and_not(monkeypatch, columns, compil
     assert_allclose(of.map(p), exact, atol=1e-14)
 
 
-def test_where_patches_would_be_no_smaller_there_are_none(monkeypatch):
+def test_a_subspace_that_does_not_shrink_is_not_factored(monkeypatch):
     monkeypatch.setattr(low_rank, "_WORTHWHILE", 0.7)
     rough = tuple(np.random.default_rng(3).random(block.shape) for block in SUBSPACE.blocks)
     assert LowRankSubspace.of(Subspace(len(REST), SUBSPACE.rows, rough), REST, CAGES) is None
 
 
 @pytest.mark.parametrize("region_volumes", [False, True])
-def test_a_large_mesh_is_posed_by_its_patches_and_keeps_its_volume(
+def test_a_large_mesh_is_mapped_by_its_factors_and_keeps_its_volume(
     tmp_path, monkeypatch, region_volumes
 ):
     monkeypatch.setattr(sizes, "SCALED_VOLUME", 1000)
     whole = SCENE.deformer(preserve_region_volumes=region_volumes).solve(SCENE.turned(40))
     monkeypatch.setattr(sizes, "LOW_RANK", 1000)
     poses = []
-    for _ in range(2):  # bound, and read again
+    for _ in range(2):  # computed, then read from the cache
         deformer = SCENE.deformer(preserve_region_volumes=region_volumes, cache=tmp_path)
         assert isinstance(deformer._binding.mapping, LowRankSubspace)
         pose = deformer.solve(SCENE.turned(40))
@@ -113,7 +113,7 @@ def test_a_large_mesh_is_posed_by_its_patches_and_keeps_its_volume(
     assert_array_equal(*poses)
 
 
-def test_making_them_tells_how_far_it_is_and_can_be_cancelled(monkeypatch):
+def test_factoring_reports_its_progress_and_can_be_cancelled(monkeypatch):
     monkeypatch.setattr(sizes, "LOW_RANK", 1000)
     told = []
 

@@ -1,4 +1,4 @@
-"""Passengers: on the mesh they are the mesh, an affine map is one, and nothing jumps or flips."""
+"""Passengers: at mesh vertices they follow the mesh, elsewhere continuously and without flips."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_mesh_vertices_as_passengers_stay_on_the_mesh(bent):
     assert_allclose(deformer.carry(MESH.vertices), solution.vertices, rtol=0, atol=1e-12)
 
 
-def test_an_affine_map_of_the_cages_is_one_of_the_passengers(bent):
+def test_an_affine_map_of_the_cages_is_an_affine_map_of_the_passengers(bent):
     passengers = bent[0].passengers(INSIDE)
     matrix = rotation([1, 2, 3], 0.7) @ np.diag([1.0, 1.4, 0.6]) + 0.1 * RNG.normal(size=(3, 3))
     shift = np.array([3.0, -1.0, 2.0])
@@ -46,24 +46,24 @@ def test_blend_weights_in_space_sum_to_one_and_are_continuous():
     assert (alpha >= 0.0).all()
     coarse = np.abs(np.diff(alpha[:, ::4], axis=1)).max()
     fine = np.abs(np.diff(alpha, axis=1)).max()
-    assert fine < 0.6 * coarse  # a jump would stay what it is
+    assert fine < 0.6 * coarse  # a discontinuity would not become smaller
     near = MESH.vertices + 1e-7 * RNG.normal(size=MESH.vertices.shape)
     assert_allclose(blend_at(MESH.vertices, weights, near), weights, atol=1e-5)
 
 
-def test_tetrahedra_inside_are_not_turned_inside_out(bent):
+def test_tetrahedra_inside_are_not_inverted(bent):
     deformer, solution = bent
     corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
     tets = 0.5 * INSIDE[:, None] + 0.05 * corners  # (400, 4, 3)
     moved = deformer.carry(tets.reshape(-1, 3)).reshape(-1, 4, 3)
     ratio = np.linalg.det(moved[:, 1:] - moved[:, :1]) / np.linalg.det(tets[:, 1:] - tets[:, :1])
     assert ratio.min() > 0.25
-    assert np.abs(moved - tets).max() > 0.5  # and they do move
+    assert np.abs(moved - tets).max() > 0.5  # and they have moved
     low, high = solution.vertices.min(axis=0), solution.vertices.max(axis=0)
     assert ((moved > low) & (moved < high)).all()
 
 
-def test_they_are_bound_once_and_moved_often(bent):
+def test_passengers_are_bound_once_for_many_poses(bent):
     deformer, solution = bent
     passengers = deformer.passengers(INSIDE)
     assert_allclose(passengers.moved(solution.cage_vertices), deformer.carry(INSIDE), atol=1e-12)
@@ -71,7 +71,7 @@ def test_they_are_bound_once_and_moved_often(bent):
         passengers.moved(solution.cage_vertices[:2])
 
 
-def test_it_can_be_cancelled_and_nonsense_is_named(bent):
+def test_binding_can_be_cancelled_and_bad_arguments_are_named(bent):
     def stop(fraction, text):
         raise Cancelled("enough")
 
@@ -81,7 +81,7 @@ def test_it_can_be_cancelled_and_nonsense_is_named(bent):
         bent[0].carry([[0.0, np.nan, 0.0]])
 
 
-def test_a_session_carries_too():
+def test_a_session_carries_points_as_well():
     session = Session(MESH)
     session.set_regions(SCENE.regions)
     session.set_cages(SCENE.cages)

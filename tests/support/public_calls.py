@@ -409,7 +409,8 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "visible": lambda: True,
     "when": lambda: lambda: True,
     "while_busy": lambda: False,
-    "window": lambda: 3,
+    "acceleration": lambda: 3,
+    "exact_hessian": lambda: False,
 }
 
 SPECIAL: dict[str, Callable[[], Any]] = {
