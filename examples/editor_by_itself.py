@@ -69,7 +69,7 @@ keys("d")  # and for what is dragged
 drag(around(height > 0.92))
 keys("4", "o")
 
-gizmo = editor.stage.dragger.gizmo
+gizmo = editor.widgets.dragger.gizmo
 (centre,) = editor.view.to_display(gizmo.centre[None])[:, :2]
 drag(centre + t * np.array([170.0, -75.0]) for t in np.linspace(0.0, 1.0, 20))
 (centre,) = editor.view.to_display(gizmo.centre[None])[:, :2]

@@ -103,7 +103,7 @@ def bend(hand: Hand) -> None:
 
 def gizmo_of(hand: Hand) -> tuple[Any, float]:
     """Return where the gizmo's middle is, and how far from it the ring is, in pixels."""
-    gizmo = hand.editor.stage.dragger.gizmo
+    gizmo = hand.editor.widgets.dragger.gizmo
     view = hand.editor.view
     return hand.at(gizmo.centre[None])[0], 1.15 * gizmo.radius / view.pixel_at(gizmo.centre)
 

@@ -110,9 +110,9 @@ class AppHand:
         until(lambda: self.page is not self.window.pages.waiting, "the file")
         if self.window.has_mesh:
             until(lambda: not self.window.editor.is_busy, "the job")
-            dragger = self.window.editor.stage.dragger
+            dragger = self.window.editor.widgets.dragger
             until(lambda: not dragger.is_refining, "refinement")
-        until(lambda: self.window.keeper.is_idle, "the keeper")
+        until(lambda: self.window.autosaver.is_idle, "the autosave")
 
     def click(self, button):
         assert button.isVisible()
@@ -165,7 +165,7 @@ class AppHand:
 
     def way(self, *, by=(0.0, 60.0), steps=6):
         """Return places on the screen that lead away from the middle of the handle."""
-        view, gizmo = self.window.editor.view, self.window.editor.stage.dragger.gizmo
+        view, gizmo = self.window.editor.view, self.window.editor.widgets.dragger.gizmo
         start = view.to_display(np.array([gizmo.centre]))[0, :2]
         return [start + t * np.array(by) for t in np.linspace(0.0, 1.0, steps)]
 

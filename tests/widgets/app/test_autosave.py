@@ -51,7 +51,7 @@ def crash(folder, session=None, about=ABOUT):
 
 def test_what_a_program_that_is_gone_has_left_is_found_as_it_was(folder):
     crash(folder)
-    (slot,) = Autosaves(folder).left()
+    (slot,) = Autosaves(folder).abandoned()
     assert slot.about == ABOUT
     assert abs((slot.when - datetime.now()).total_seconds()) < 100
     session = slot.read(no_progress)
@@ -67,9 +67,9 @@ def test_work_of_a_program_that_runs_is_nobody_elses(folder):
         capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert theirs.stdout.split() == ["None"]
-    assert Autosaves(folder).left() == []  # nor another window's of the same program
+    assert Autosaves(folder).abandoned() == []  # nor another window's of the same program
     mine.release()
-    assert len(Autosaves(folder).left()) == 1
+    assert len(Autosaves(folder).abandoned()) == 1
 
 
 _HOLD = """
@@ -85,7 +85,7 @@ def test_of_two_that_ask_at_once_one_gets_it(folder):
 
     def ask():
         ready.wait()
-        found.extend(Autosaves(folder).left())
+        found.extend(Autosaves(folder).abandoned())
 
     threads = [threading.Thread(target=ask) for _ in range(4)]
     for thread in threads:
@@ -101,16 +101,16 @@ def test_what_is_left_is_offered_until_it_is_removed_and_the_latest_first(folder
         os.utime(path, (seconds, seconds))
     autosaves = Autosaves(folder)
     for _ in range(2):
-        left = autosaves.left()
+        left = autosaves.abandoned()
         assert [slot.about.name for slot in left] == ["new", "older", "old"]
         for slot in left:
             slot.release()
-    left = autosaves.left()
+    left = autosaves.abandoned()
     left[0].remove()
     left[0].remove()  # nothing more happens
     for slot in left[1:]:
         slot.release()
-    assert [slot.about.name for slot in autosaves.left()] == ["older", "old"]
+    assert [slot.about.name for slot in autosaves.abandoned()] == ["older", "old"]
 
 
 def test_removing_leaves_nothing_and_what_a_killed_write_left_goes_too(folder):
@@ -125,7 +125,7 @@ def test_a_slot_with_nothing_in_it_is_swept_away_but_not_one_that_is_held(folder
     autosaves = Autosaves(folder)
     begun, gone = autosaves.new(ABOUT), autosaves.new(ABOUT)
     gone.release()
-    assert autosaves.left() == []
+    assert autosaves.abandoned() == []
     assert list(folder.iterdir()) == [begun.path.parent]
     begun.write(work())
 
@@ -137,17 +137,17 @@ def test_work_without_a_word_of_what_it_is_on_is_work_all_the_same(folder):
             about.unlink()
         else:
             about.write_text(damage)
-    assert {slot.about for slot in Autosaves(folder).left()} == {About()}
+    assert {slot.about for slot in Autosaves(folder).abandoned()} == {About()}
 
 
 def test_damaged_work_is_told_of_and_stays(folder):
     path = crash(folder) / "session.segdeform"
     path.write_bytes(path.read_bytes()[:-100])
-    (slot,) = Autosaves(folder).left()
+    (slot,) = Autosaves(folder).abandoned()
     with pytest.raises(SessionError, match="readable"):
         slot.read(no_progress)
     slot.release()
-    assert len(Autosaves(folder).left()) == 1
+    assert len(Autosaves(folder).abandoned()) == 1
 
 
 def test_a_write_that_fails_leaves_what_was_there(folder, monkeypatch):
@@ -170,7 +170,7 @@ def test_where_nothing_can_be_kept_that_is_said(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     with pytest.raises(SessionError, match="file"):
         Autosaves(tmp_path / "file" / "unsaved").new(ABOUT)
-    assert Autosaves(tmp_path / "nowhere").left() == []
+    assert Autosaves(tmp_path / "nowhere").abandoned() == []
     monkeypatch.setattr(autosave, "hold", lambda _: None)
     with pytest.raises(SessionError, match="locked"):
         Autosaves(tmp_path).new(ABOUT)
@@ -245,7 +245,7 @@ def tree_of(folder):
 def ask(folder):
     """List the remaining slots twice, and release all of them."""
     for _ in range(2):
-        for slot in Autosaves(folder).left():
+        for slot in Autosaves(folder).abandoned():
             slot.release()
 
 
@@ -282,7 +282,7 @@ def test_links_are_never_followed(folder, tmp_path):
     lock.unlink()
     lock.symlink_to(outside / "lock")
     before = tree_of(tmp_path)
-    assert Autosaves(folder).left() == []
+    assert Autosaves(folder).abandoned() == []
     ask(folder)
     assert tree_of(tmp_path) == before
 
@@ -292,7 +292,7 @@ def test_unsaved_work_is_not_written_through_a_link(folder, tmp_path):
     slot = Autosaves(folder).new(ABOUT)
     (tmp_path / "precious").write_text("mine")
     slot.path.symlink_to(tmp_path / "precious")
-    with pytest.raises(SessionError, match="is a link"):
+    with pytest.raises(SessionError, match="is a symbolic link"):
         slot.write(work())
     slot.remove()
     assert (tmp_path / "precious").read_text() == "mine"
@@ -337,7 +337,7 @@ def test_slots_of_earlier_versions_are_found_and_removed_too(folder):
     begun.release()
     for each in (path, begun.path.parent):  # they left the lock empty
         (each / "lock").write_bytes(b"")
-    (slot,) = Autosaves(folder).left()
+    (slot,) = Autosaves(folder).abandoned()
     assert slot.about == ABOUT
     slot.remove()
     assert list(folder.iterdir()) == []
@@ -348,8 +348,8 @@ def test_slots_of_earlier_versions_are_found_and_removed_too(folder):
 def test_files_of_another_user_are_unchanged(folder):
     path = crash(folder)
     os.chown(path, 12345, 12345)
-    assert Autosaves(folder).left() == []
+    assert Autosaves(folder).abandoned() == []
     os.chown(path, 0, 0)
     os.chown(path / "session.segdeform", 12345, 12345)
-    assert Autosaves(folder).left() == []
+    assert Autosaves(folder).abandoned() == []
     assert (path / "session.segdeform").exists()

@@ -98,7 +98,7 @@ def start(tmp_path, boxes):
     yield begin
     for hand in made:
         if hand.window.has_mesh:
-            hand.window.editor.desk.file.keeps(hand.window.session)
+            hand.window.editor.controller.file.mark_saved(hand.window.session)
         delete(hand.window)
     made.clear()
     hand = None
@@ -127,7 +127,7 @@ def drop(hand, *paths):
         enter = QtGui.QDragEnterEvent(place, *about)
     application().sendEvent(window, enter)
     if enter.isAccepted():
-        assert hand.window.pages.start.target._is_lit
+        assert hand.window.pages.start.target.is_highlighted
         application().sendEvent(window, QtGui.QDropEvent(QtCore.QPointF(place), *about))
     application().processEvents()
     return enter.isAccepted()
@@ -143,10 +143,10 @@ def test_it_starts_with_a_page_from_which_the_cactus_can_be_tried(start, monkeyp
     assert hand.title == "segdeform"
     assert not any(can for text, (can, _) in hand.reads("File").items() if "Save" in text)
     number = int(hand.window.winId())
-    hand.click(hand.page.cactus)
+    hand.click(hand.page.sample)
     hand.settle()
     assert hand.page is hand.window.editor_widget
-    assert hand.title == "the cactus - segdeform"
+    assert hand.title == "cactus - segdeform"
     assert int(hand.window.winId()) == number  # it did not flicker
     assert hand.window.editor_widget.plotter.hasFocus()
     assert slots(tmp_path) == []
@@ -244,7 +244,7 @@ def test_closing_asks_and_does_what_it_is_told(start, ball_file, tmp_path, monke
         boxes.answers.append(answer)
         hand.choose("File", "Quit")
         assert hand.window.isVisible()
-        assert boxes.seen[-1].startswith("Save the changes to ball.vtp?")
+        assert boxes.seen[-1].startswith("Save changes to ball.vtp?")
     choose_file(monkeypatch, None)
     boxes.answers.append("Save")  # but then no file is named
     assert not hand.window.close()
@@ -296,7 +296,7 @@ def test_a_mesh_is_saved_with_all_that_was_in_its_file_and_not_over_it(
 
     monkeypatch.setattr(QtWidgets.QFileDialog, "getSaveFileName", name)
     hand.choose("File", "Save mesh")
-    assert proposed == ["ball-bent.vtp"]
+    assert proposed == ["ball-deformed.vtp"]
     bent = convert.read_polydata(tmp_path / "bent.vtp")
     assert_array_equal(bent.point_data["height"], BALL.vertices[:, 2])
     (tmp_path / "bent.vtp").unlink()
@@ -318,7 +318,7 @@ def test_a_mesh_is_saved_with_all_that_was_in_its_file_and_not_over_it(
 
 def test_the_buttons_of_the_panel_do_what_the_menus_do(start, ball_file, tmp_path, monkeypatch):
     hand = start(ball_file)
-    head = hand.window.editor_widget.panel.head
+    head = hand.window.editor_widget.panel.toolbar
     change(hand)
     choose_file(monkeypatch, tmp_path / "knob.segdeform")
     head.save.menu().actions()[1].trigger()
@@ -329,7 +329,7 @@ def test_the_buttons_of_the_panel_do_what_the_menus_do(start, ball_file, tmp_pat
     hand.settle()
     assert hand.title == "ball.vtp - segdeform"
     choose_file(monkeypatch, tmp_path / "again.vtp")
-    hand.window.editor_widget.panel.head.save.menu().actions()[2].trigger()
+    hand.window.editor_widget.panel.toolbar.save.menu().actions()[2].trigger()
     assert "height" in convert.read_polydata(tmp_path / "again.vtp").point_data
 
 
@@ -339,7 +339,7 @@ def test_the_buttons_of_the_panel_do_what_the_menus_do(start, ball_file, tmp_pat
 def test_a_mesh_dropped_anywhere_on_the_window_is_opened(start, ball_file, arm_file):
     hand = start()
     assert drop(hand, ball_file)
-    assert not hand.window.pages.start.target._is_lit
+    assert not hand.window.pages.start.target.is_highlighted
     hand.settle()
     assert hand.title == "ball.vtp - segdeform"
     assert drop(hand, arm_file, ball_file)  # on the view: not added beside the other
@@ -373,9 +373,9 @@ def test_a_file_that_is_broken_is_told_of_in_words_and_the_window_stays(start, t
         boxes.answers.append("OK")
         assert drop(hand, tmp_path / name)
         until(lambda: not boxes.answers, f"words on {name}")
-        assert boxes.seen[-1].startswith(f"{name} could not be opened\n")
+        assert boxes.seen[-1].startswith(f"Could not open {name}\n")
         assert words in boxes.seen[-1]
-        assert "fault:" not in boxes.seen[-1]
+        assert "Internal error" not in boxes.seen[-1]
         assert hand.page is hand.window.pages.start
 
 
@@ -386,8 +386,8 @@ def test_the_view_menu_shows_and_hides_and_knows_what_is_shown(start, arm_file):
     hand = start(arm_file)
     hand.view_hand()
     for name, is_shown in (
-        ("Cages", lambda: hand.window.editor.stage.cages.is_shown),
-        ("Volume change", lambda: hand.window.editor.stage.overlay.is_shown),
+        ("Cages", lambda: hand.window.editor.widgets.cages.is_shown),
+        ("Local volume change", lambda: hand.window.editor.widgets.overlay.is_shown),
     ):
         assert hand.reads("View")[name] == (True, False)
         hand.choose("View", name)
@@ -397,11 +397,11 @@ def test_the_view_menu_shows_and_hides_and_knows_what_is_shown(start, arm_file):
         hand.choose("View", name)
         hand.settle()
         assert not is_shown()
-    hand.choose("Help", "Keys")
-    assert hand.window.editor.desk.help.is_shown
+    hand.choose("Help", "Keyboard shortcuts")
+    assert hand.window.editor.controller.help.is_shown
     plotter = hand.window.editor_widget.plotter
     plotter.camera.zoom(5.0)
-    hand.choose("View", "Whole mesh")
+    hand.choose("View", "Fit to view")
     places = hand.window.editor.view.to_display(hand.window.session.vertices)[:, :2]
     assert (places > 0).all()
     assert (places < plotter.window_size).all()
@@ -427,8 +427,8 @@ def test_a_picture_is_what_is_seen_without_words_and_gizmo(start, arm_file, tmp_
     places[:, 1] = len(picture) - 1 - places[:, 1]
     here = [columns.min(), rows.min()], [columns.max(), rows.max()]
     assert_allclose(here, [places.min(axis=0), places.max(axis=0)], atol=2.0)  # the mesh alone
-    assert "picture written" in hand.window.editor.status
-    assert hand.window.editor.stage.dragger.GetEnabled()
+    assert "Picture saved" in hand.window.editor.status
+    assert hand.window.editor.widgets.dragger.GetEnabled()
 
 
 # Work that is not lost.
@@ -504,7 +504,7 @@ def test_what_is_recovered_later_or_never(start, arm, ball_file, tmp_path, boxes
     hand.settle()
     assert hand.window.document.surface.point_data["height"][7] == BALL.vertices[7, 2]
     assert hand.title == "ball.vtp* - segdeform"
-    assert "recovered" in hand.window.editor.status
+    assert "Recovered" in hand.window.editor.status
     assert hand.reads("File")["Recover unsaved work ..."] == (False, False)
     boxes.answers.append("Discard")
     assert hand.window.close()
@@ -524,7 +524,7 @@ def test_of_several_that_were_left_the_others_stay(start, tmp_path, boxes):
     assert len(slots(tmp_path)) == 3
     boxes.answers += ["Discard", "Discard"]
     start()  # another program: what is being worked on is not offered to it
-    assert slots(tmp_path) == [hand.window.keeper._slot.path]
+    assert slots(tmp_path) == [hand.window.autosaver._slot.path]
 
 
 def test_work_that_cannot_be_read_is_told_of_and_left(start, tmp_path, boxes):
@@ -542,10 +542,10 @@ def test_work_that_cannot_be_read_is_told_of_and_left(start, tmp_path, boxes):
 def test_where_nothing_can_be_kept_that_is_said_once_and_work_goes_on(start, ball_file, tmp_path):
     (tmp_path / "unsaved").write_text("in the way")
     hand, told = start(ball_file, interval=0.05), []
-    hand.window.keeper.failed.connect(told.append)
+    hand.window.autosaver.failed.connect(told.append)
     change(hand)
     until(lambda: told, "the word")
-    assert "cannot be kept" in hand.window.editor.status
+    assert "Could not autosave" in hand.window.editor.status
     (tmp_path / "unsaved").unlink()
     until(lambda: slots(tmp_path), "another attempt")
     assert len(told) == 1

@@ -1,4 +1,4 @@
-"""The log of steps: what drags and jobs took, each written down once."""
+"""The log: one entry for each drag and each job."""
 
 from __future__ import annotations
 
@@ -89,7 +89,9 @@ def test_a_cage_moved_by_hand_is_solved_for_by_nobody(written):
     session.commit()
     (entry,) = log.entries
     assert (entry.what, entry.steps) == ("drag the cage of region 2", None)
-    assert entry.text.endswith("moved freely\nvolume " + entry.text.rpartition(" ")[2])
+    assert entry.text.endswith(
+        "  drag the cage of region 2\nCage edited\nvolume " + entry.text.rpartition(" ")[2]
+    )
 
 
 def test_the_oldest_is_forgotten_first_and_others_are_not_listened_to(written):
@@ -107,7 +109,7 @@ def test_the_oldest_is_forgotten_first_and_others_are_not_listened_to(written):
     other.move_handle("tip", up(0.1), max_steps=1)
     other.commit()
     assert [entry.number for entry in log.entries] == [6]
-    log.rest()
+    log.unfollow()
     assert not other._listeners._listeners
 
 
@@ -125,22 +127,22 @@ def test_a_job_is_written_down_with_what_was_said_of_it():
         raise Cancelled("stopped")
 
     jobs = [
-        ("talking", lambda _: 7, lambda seven: editor.desk.say(f"{seven} found")),
-        ("being silent", lambda _: 7, lambda _: None),  # what was said before is not of it
-        ("failing", fail, None),
-        ("failing late", lambda _: 7, fail),
-        ("stopping", cancel, None),
+        ("Counting", lambda _: 7, lambda seven: f"{seven} found"),
+        ("Being silent", lambda _: 7, lambda _: None),  # not the outcome of the job before
+        ("Failing", fail, None),
+        ("Failing late", lambda _: 7, fail),
+        ("Stopping", cancel, None),
     ]
     for doing, work, done in jobs:
-        editor.desk.start(doing, work, done)
+        editor.controller.start(doing, work, done)
         with editor.view.guarded():
             editor.wait()
-    assert [(entry.what, entry.outcome) for entry in editor.desk.log.entries] == [
-        ("talking", "7 found"),
-        ("being silent", "done"),
-        ("failing", "no room for it"),
-        ("failing late", "failed"),
-        ("stopping", "cancelled"),
+    assert [(entry.what, entry.outcome) for entry in editor.controller.log.entries] == [
+        ("Counting", "7 found"),
+        ("Being silent", "Done"),
+        ("Failing", "no room for it"),
+        ("Failing late", "Failed"),
+        ("Stopping", "Cancelled"),
     ]
     editor.remove()
 
@@ -148,10 +150,10 @@ def test_a_job_is_written_down_with_what_was_said_of_it():
 @pytest.mark.parametrize(
     ("entry", "lines"),
     [
-        (Entry(1, 0.0, "fitting cages", 2.04, "done"), ["2.0 s: done"]),
+        (Entry(1, 0.0, "Fitting cages", 2.04, "Done"), ["2.0 s: Done"]),
         (
             Entry(1, 0.0, "drag tip", 0.0314, "converged", 1, 1.234e-4, -2e-16),
-            ["1 step, 31 ms: converged", "volume -2.0e-16, handle off by 1.2e-04 of the diagonal"],
+            ["1 step, 31 ms: converged", "volume -2.0e-16, handle error 0.012 % of model size"],
         ),
     ],
 )

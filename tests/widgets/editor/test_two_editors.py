@@ -47,11 +47,11 @@ def test_keys_go_to_the_one_under_the_pointer(halves):
 
 def test_a_widgets_keys_too(halves):
     (left, right), hand = halves
-    before = left.stage.selector.radius, right.stage.selector.radius
+    before = left.widgets.selector.radius, right.widgets.selector.radius
     hand.move(RIGHT)
     hand.key("bracketright")
-    assert left.stage.selector.radius == before[0]
-    assert right.stage.selector.radius > before[1]
+    assert left.widgets.selector.radius == before[0]
+    assert right.widgets.selector.radius > before[1]
 
 
 def test_removing_one_leaves_the_other_as_it_is_drawn(halves, capfd):
@@ -68,7 +68,7 @@ def test_removing_one_leaves_the_other_as_it_is_drawn(halves, capfd):
 def test_one_that_was_removed_cannot_be_woken(halves):
     (left, _), _ = halves
     left.remove()
-    with pytest.raises(RuntimeError, match="make another one"):
+    with pytest.raises(RuntimeError, match="create another one"):
         left.On()
 
 

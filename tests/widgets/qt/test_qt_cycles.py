@@ -138,10 +138,10 @@ def dragged(host):
     hand, changes = QtHand(host.drawn_on, editor.view), []
     session = editor.session
     stop = session.on_change(lambda _: changes.append(session.volume_change))
-    start = np.array(hand.at(editor.stage.dragger.gizmo.centre))
+    start = np.array(hand.at(editor.widgets.dragger.gizmo.centre))
     hand.drag(start + t * np.array([5.0, 25.0]) for t in np.linspace(0.0, 1.0, 4))
     stop()
-    moved = np.array(hand.at(editor.stage.dragger.gizmo.centre)) - start
+    moved = np.array(hand.at(editor.widgets.dragger.gizmo.centre)) - start
     assert moved == pytest.approx([5.0, 25.0], abs=3.0)
     assert hand.failures == []
     return changes
@@ -171,7 +171,7 @@ def one_cycle(kind, *, in_a_job):
         host.editor.mode = Mode.REGIONS
         application().processEvents()
         host.panel.refresh()
-        QtTest.QTest.mouseClick(host.panel.regions.find, Qt.LeftButton)
+        QtTest.QTest.mouseClick(host.panel.regions.segment, Qt.LeftButton)
         assert host.editor.is_busy
     window = host.editor.view.window
     drawn = [vtkWeakReference() for _ in range(3)]
@@ -179,7 +179,7 @@ def one_cycle(kind, *, in_a_job):
         drawn, (window, window.GetInteractor(), host.editor.view.renderer), strict=True
     ):
         reference.Set(each)
-    parts = host.window, host.editor, host.panel, host.drawn_on, host.editor.stage.dragger, host
+    parts = host.window, host.editor, host.panel, host.drawn_on, host.editor.widgets.dragger, host
     gone = [*map(weakref.ref, parts), *(reference.Get for reference in drawn)]
     del window, each, parts
     host.end()

@@ -98,12 +98,12 @@ def test_the_whole_story_in_qt(qt):
     hand.key("4")
     until(is_done, "binding")
     assert editor.mode is Mode.DEFORM
-    start = np.array(hand.at(editor.stage.dragger.gizmo.centre))
+    start = np.array(hand.at(editor.widgets.dragger.gizmo.centre))
     changes.clear()
     hand.drag(start + t * np.array([80.0, -25.0]) for t in np.linspace(0.0, 1.0, 12))
-    moved = np.array(hand.at(editor.stage.dragger.gizmo.centre)) - start
+    moved = np.array(hand.at(editor.widgets.dragger.gizmo.centre)) - start
     assert moved == pytest.approx([80.0, -25.0], abs=3.0)  # y is up, and a pixel is a pixel
-    until(lambda: not editor.stage.dragger.is_refining, "refinement, by timers of Qt")
+    until(lambda: not editor.widgets.dragger.is_refining, "refinement, by timers of Qt")
     assert len(changes) >= 12
     assert max(map(abs, changes)) < 1e-12
     bent = session.vertices
@@ -124,13 +124,13 @@ def test_a_job_is_stopped_by_escape_while_qt_runs(qt, monkeypatch):
             time.sleep(0.001)
         return Regions.single(mesh)
 
-    monkeypatch.setattr(actions, "segmented", endless)
+    monkeypatch.setattr(actions, "segment_mesh", endless)
     hand.key("g")
     until(lambda: "looking everywhere" in editor.status, "the job")
     hand.key("Escape")
     until(lambda: not editor.is_busy, "the end")
     assert editor.session.regions is None
-    assert "cancelled" in editor.status
+    assert "Cancelled" in editor.status
 
 
 def test_the_camera_is_turned_beside_the_mesh_and_ctrl_takes_away(qt):

@@ -134,7 +134,7 @@ def test_killed_in_a_drag_it_offers_the_last_pose_that_was_kept_or_a_later_one(
     rests = seed % 4 == 0  # after a drag that was finished
     program = programs("rest" if rests else "drag", folder)
     ((_, finished),) = program.wait_for("finished")
-    assert Autosaves(folder / "unsaved").left() == []  # as long as it runs, it is its own
+    assert Autosaves(folder / "unsaved").abandoned() == []  # as long as it runs, it is its own
     if rests:
         time.sleep(random.Random(seed).uniform(0.0, 0.4))
         program.kill()
