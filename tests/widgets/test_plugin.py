@@ -90,7 +90,7 @@ def test_a_handle_that_misses_its_target_is_logged(bar, caplog):
     assert "handle error" in caplog.text
 
 
-def test_regions_come_as_arrays_of_a_copy(bar):
+def test_regions_are_arrays_of_a_copy(bar):
     coloured = bar.segdeform.regions(2)
     assert "region" not in bar.point_data
     assert set(coloured["region"]) == {0, 1}
@@ -115,7 +115,7 @@ def test_check_names_the_faults_of_a_surface(bar):
 # Plotters.
 
 
-def test_the_overlay_shows_in_a_plotter_and_goes_with_it(plotter, session):
+def test_the_overlay_is_shown_in_a_plotter_and_removed_with_it(plotter, session):
     blank = picture(View.of(plotter))
     overlay = plotter.segdeform.add_volume_overlay(session)
     plotter.show(auto_close=False, interactive=False)
@@ -126,7 +126,7 @@ def test_the_overlay_shows_in_a_plotter_and_goes_with_it(plotter, session):
     session.drag(SCENE.turned(10.0))  # nobody draws any more
 
 
-def test_the_editor_takes_the_place_of_the_mesh_and_goes_with_the_plotter(plotter, bar):
+def test_the_editor_replaces_the_mesh_and_is_removed_with_the_plotter(plotter, bar):
     actor = plotter.add_mesh(bar)
     other = plotter.add_mesh(pv.Sphere(center=(2, 0, 0)))
     editor = plotter.segdeform.edit(bar, path="bar.segdeform")
@@ -155,7 +155,7 @@ def test_a_handle_is_dragged_in_a_plotter_by_hand(plotter, session):
 # Finding it.
 
 
-def test_pyvista_is_led_to_the_plugin():
+def test_pyvista_finds_the_plugin_by_its_entry_points():
     parser = configparser.ConfigParser()
     parser.read(ROOT / "setup.cfg", encoding="utf-8")
     for group in ("pyvista.plotter_components", "pyvista.accessors"):
@@ -213,7 +213,7 @@ def test_off_screen_the_window_closes_at_once_and_nothing_is_changed(kind, bar):
         assert_array_equal(back["number"], bar["number"])
 
 
-def test_what_is_done_in_the_window_comes_back(session, monkeypatch):
+def test_the_window_returns_the_edited_session(session, monkeypatch):
     show, failures = pv.Plotter.show, []
 
     def show_and_work(plotter):
@@ -234,7 +234,7 @@ def test_what_is_done_in_the_window_comes_back(session, monkeypatch):
     assert_array_equal(other.points, session.vertices)
 
 
-def test_the_command_writes_what_came_of_it(tmp_path, session, monkeypatch, capsys):
+def test_the_command_writes_the_deformed_mesh(tmp_path, session, monkeypatch, capsys):
     saved, out = tmp_path / "work.segdeform", tmp_path / "out.vtp"
     sd.save_session(saved, session)
 
@@ -286,7 +286,7 @@ def test_the_command_explains_itself(capsys):
     assert "-o OUT" in text
 
 
-def test_what_is_no_mesh_is_refused():
+def test_other_types_are_refused():
     with pytest.raises(ValueError, match="a PolyData or a Session; got 'cactus'"):
         sd.edit("cactus")
     with pytest.raises(MissingDependencyError, match="off-screen"):

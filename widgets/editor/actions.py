@@ -40,11 +40,11 @@ def with_tool(tool: Tool) -> Action:
     return select
 
 
-def painting(what: Paint) -> Action:
-    """Return the action that paints *what*."""
+def painting(target: Paint) -> Action:
+    """Return the action that selects the *target* of painting."""
 
     def paint(controller: Controller) -> None:
-        controller.widgets.selector.paints = what
+        controller.widgets.selector.paints = target
 
     return paint
 
@@ -254,5 +254,5 @@ def _handle_names(controller: Controller) -> list[str]:
     return names
 
 
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

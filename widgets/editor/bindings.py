@@ -108,12 +108,12 @@ def pressed_key(interactor: Any) -> str:
     key = _ALSO.get(key, key.removeprefix("kp_"))
     # Shift is needed to type "?" or "+", so it counts as a modifier of letters only.
     shift = interactor.GetShiftKey() and len(key) == 1 and key.isalpha()
-    held = (
+    modifiers = (
         (interactor.GetControlKey(), "ctrl+"),
         (interactor.GetAltKey(), "alt+"),
         (shift, "shift+"),
     )
-    return "".join(name for is_down, name in held if is_down) + key
+    return "".join(name for is_down, name in modifiers if is_down) + key
 
 
 def binding_of(key: str, mode: Mode) -> Binding | None:

@@ -150,7 +150,7 @@ class DeformEditor:
 
     # Switching.
 
-    def On(self) -> None:  # noqa: N802 - VTK's word
+    def On(self) -> None:  # noqa: N802 - VTK's name
         """Respond to events of the view.
 
         Raises

@@ -7,6 +7,7 @@ dropped first.
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from collections.abc import Callable
@@ -28,7 +29,7 @@ class Entry:
     """1, 2, ...; unchanged when the entry is updated."""
     time: float
     """When it ended, as returned by `time.time`."""
-    what: str
+    title: str
     """A short description."""
     seconds: float
     """Time spent in the solver, or duration of the job."""
@@ -47,7 +48,7 @@ class Entry:
         took = f"{self.seconds:.1f} s" if self.seconds >= 1.0 else f"{1e3 * self.seconds:.0f} ms"
         if self.steps is not None:
             took = f"{self.steps} step{'s' * (self.steps != 1)}, {took}"
-        lines = [f"{time.strftime('%H:%M:%S', time.localtime(self.time))}  {self.what}"]
+        lines = [f"{time.strftime('%H:%M:%S', time.localtime(self.time))}  {self.title}"]
         lines.append(f"{took}: {self.outcome}" if self.seconds else self.outcome)
         if self.volume_change is not None:
             lines.append(f"volume {precise(self.volume_change)}")
@@ -100,10 +101,10 @@ class Log:
         if self._stop is not None:
             self._stop()
 
-    def add_job(self, what: str, seconds: float, outcome: str) -> None:
+    def add_job(self, title: str, seconds: float, outcome: str) -> None:
         """Add the entry of a job that has ended."""
         self._refinable = False
-        self._append(Entry(0, time.time(), what, seconds, outcome))
+        self._append(Entry(0, time.time(), title, seconds, outcome))
 
     def _changed(self, session: Session, change: Change) -> None:
         if session.is_dragging:
@@ -115,7 +116,7 @@ class Log:
             self._refinable, self._drag = not change & Change.POSE, None
         elif self._refinable and change == Change.POSE and session.solution is not None:
             last = self._entries.pop()
-            now = self._entry(session.effort, last.what, session.solution, session.volume_change)
+            now = self._entry(session.effort, last.title, session.solution, session.volume_change)
             more = Effort((last.steps or 0) + (now.steps or 0), last.seconds + now.seconds)
             now = replace(now, number=last.number, steps=more.steps, seconds=more.seconds)
             self._entries.append(now)
@@ -124,13 +125,13 @@ class Log:
         self._before = session.effort
 
     def _entry(
-        self, effort: Effort, what: str, solution: Solution | None, volume_change: float
+        self, effort: Effort, title: str, solution: Solution | None, volume_change: float
     ) -> Entry:
         seconds, steps = effort.seconds - self._before.seconds, effort.steps - self._before.steps
         if solution is None:
-            return Entry(0, time.time(), what, seconds, "Cage edited", None, None, volume_change)
+            return Entry(0, time.time(), title, seconds, "Cage edited", None, None, volume_change)
         status, error = str(solution.status), solution.handle_error
-        return Entry(0, time.time(), what, seconds, status, steps, error, volume_change)
+        return Entry(0, time.time(), title, seconds, status, steps, error, volume_change)
 
     def _append(self, entry: Entry) -> None:
         self._count += 1
@@ -143,6 +144,8 @@ def _percent(share: float) -> str:
     >>> _percent(1.3e-3), _percent(0.2), _percent(4e-9)
     ('0.13 %', '20 %', 'below 0.001 %')
     """
-    if 100.0 * share < 0.001:
+    percent = 100.0 * share
+    if percent < 0.001:
         return "below 0.001 %" if share else "0 %"
-    return f"{100.0 * share:.3f}".rstrip("0").rstrip(".") + " %"
+    digits = min(3, max(0, 1 - math.floor(math.log10(percent))))  # two significant digits
+    return f"{percent:.{digits}f} %"

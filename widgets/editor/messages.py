@@ -95,7 +95,8 @@ class Messages:
         if self._error:
             self._line.warn(self._error, mode)
         else:
-            self._line.say(" · ".join(filter(None, (self._note, hint))), mode)
+            note = "" if self._note in hint else self._note  # the hint may contain it
+            self._line.say(" · ".join(filter(None, (note, hint))), mode)
         self._notify()
 
     def show_progress(self, mode: str, text: str, fraction: float, *, is_cancelled: bool) -> None:

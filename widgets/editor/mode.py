@@ -6,7 +6,7 @@ import enum
 
 
 class Mode(enum.Enum):
-    """What the mouse does on the mesh."""
+    """The current action of the mouse on the mesh."""
 
     REGIONS = 1
     """Paint regions."""

@@ -1,4 +1,4 @@
-"""Actions of a panel: those that need a region, a handle, a file or a number.
+"""Actions of a panel, with a region, a handle, a file or a number as argument.
 
 Each function returns an action: a function of the `Controller`, as in `actions`.
 """

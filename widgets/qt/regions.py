@@ -98,9 +98,7 @@ class RegionsPart(QtWidgets.QGroupBox):
         ]
         new = widgets.selector.region
         if editor.mode is Mode.REGIONS and new >= widgets.n_regions:
-            rows.append(
-                _Row(new, f"{editor.session.region_name(new)} (not painted yet)", "", None, "")
-            )
+            rows.append(_Row(new, f"{editor.session.region_name(new)} (new)", "", None, ""))
         return rows
 
     def _show(self, rows: list[_Row]) -> None:

@@ -49,7 +49,7 @@ def crash(folder, session=None, about=ABOUT):
     return slot.path.parent
 
 
-def test_what_a_program_that_is_gone_has_left_is_found_as_it_was(folder):
+def test_the_autosave_of_a_crashed_program_is_found_unchanged(folder):
     crash(folder)
     (slot,) = Autosaves(folder).abandoned()
     assert slot.about == ABOUT
@@ -59,7 +59,7 @@ def test_what_a_program_that_is_gone_has_left_is_found_as_it_was(folder):
     assert_array_equal(session.handles["handle 1"], work().handles["handle 1"])
 
 
-def test_work_of_a_program_that_runs_is_nobody_elses(folder):
+def test_the_autosave_of_a_running_program_is_not_offered(folder):
     mine = Autosaves(folder).new(ABOUT)
     mine.write(work())
     theirs = subprocess.run(
@@ -78,7 +78,7 @@ print(runpy.run_path(sys.argv[1])["hold"](pathlib.Path(sys.argv[2])))
 """
 
 
-def test_of_two_that_ask_at_once_one_gets_it(folder):
+def test_of_two_simultaneous_programs_one_gets_the_autosave(folder):
     for _ in range(5):
         crash(folder)
     found, ready = [], threading.Barrier(4)
@@ -95,7 +95,7 @@ def test_of_two_that_ask_at_once_one_gets_it(folder):
     assert len(found) == len({slot.path for slot in found}) == 5
 
 
-def test_what_is_left_is_offered_until_it_is_removed_and_the_latest_first(folder):
+def test_abandoned_autosaves_are_offered_until_removed_the_latest_first(folder):
     for name, seconds in (("old", 1000.0), ("new", 3000.0), ("older", 2000.0)):
         path = crash(folder, about=About(name)) / "session.segdeform"
         os.utime(path, (seconds, seconds))
@@ -113,7 +113,7 @@ def test_what_is_left_is_offered_until_it_is_removed_and_the_latest_first(folder
     assert [slot.about.name for slot in autosaves.abandoned()] == ["older", "old"]
 
 
-def test_removing_leaves_nothing_and_what_a_killed_write_left_goes_too(folder):
+def test_removing_a_slot_also_removes_the_draft_of_a_killed_write(folder):
     slot = Autosaves(folder).new(ABOUT)
     slot.write(work())
     (slot.path.parent / ".segdeform-0123456789abcdef.part").write_bytes(b"half")
@@ -121,7 +121,7 @@ def test_removing_leaves_nothing_and_what_a_killed_write_left_goes_too(folder):
     assert list(folder.iterdir()) == []
 
 
-def test_a_slot_with_nothing_in_it_is_swept_away_but_not_one_that_is_held(folder):
+def test_an_empty_slot_is_deleted_unless_it_is_locked(folder):
     autosaves = Autosaves(folder)
     begun, gone = autosaves.new(ABOUT), autosaves.new(ABOUT)
     gone.release()
@@ -130,7 +130,7 @@ def test_a_slot_with_nothing_in_it_is_swept_away_but_not_one_that_is_held(folder
     begun.write(work())
 
 
-def test_work_without_a_word_of_what_it_is_on_is_work_all_the_same(folder):
+def test_work_without_a_description_is_recovered_too(folder):
     for damage in (None, "", "{", "[]", '{"name": 3}', json.dumps({"name": "x"})):
         about = crash(folder) / "about.json"
         if damage is None:
@@ -140,7 +140,7 @@ def test_work_without_a_word_of_what_it_is_on_is_work_all_the_same(folder):
     assert {slot.about for slot in Autosaves(folder).abandoned()} == {About()}
 
 
-def test_damaged_work_is_told_of_and_stays(folder):
+def test_damaged_work_is_reported_and_kept(folder):
     path = crash(folder) / "session.segdeform"
     path.write_bytes(path.read_bytes()[:-100])
     (slot,) = Autosaves(folder).abandoned()
@@ -150,7 +150,7 @@ def test_damaged_work_is_told_of_and_stays(folder):
     assert len(Autosaves(folder).abandoned()) == 1
 
 
-def test_a_write_that_fails_leaves_what_was_there(folder, monkeypatch):
+def test_a_failed_write_leaves_the_previous_autosave(folder, monkeypatch):
     slot = Autosaves(folder).new(ABOUT)
     slot.write(work(0.8))
     monkeypatch.setattr("os.replace", _full)
@@ -166,7 +166,7 @@ def _full(*_):
     raise OSError(28, "No space left on device")
 
 
-def test_where_nothing_can_be_kept_that_is_said(tmp_path, monkeypatch):
+def test_an_unwritable_folder_is_reported(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     with pytest.raises(SessionError, match="file"):
         Autosaves(tmp_path / "file" / "unsaved").new(ABOUT)
@@ -176,7 +176,7 @@ def test_where_nothing_can_be_kept_that_is_said(tmp_path, monkeypatch):
         Autosaves(tmp_path).new(ABOUT)
 
 
-def test_a_lock_is_held_once_and_not_on_a_file_that_went(tmp_path):
+def test_a_lock_is_acquired_once_and_not_on_a_deleted_file(tmp_path):
     path = tmp_path / "lock"
     first = hold(path)
     assert first is not None
@@ -206,7 +206,7 @@ def test_the_folder_is_the_users_own(monkeypatch, tmp_path):
     assert user_folder() == tmp_path / "local" / "segdeform" / "unsaved"
 
 
-def test_a_session_can_be_kept_by_another_thread_while_it_is_changed(folder):
+def test_another_thread_can_save_a_session_while_it_changes(folder):
     session, slot = work(), Autosaves(folder).new(ABOUT)
     done = threading.Event()
     kept = []
@@ -315,7 +315,7 @@ def test_pipes_and_folders_with_our_names_neither_block_nor_are_deleted(folder):
         assert {f"{digit}{number:015d}/{name}" for digit in "ab"} <= left
 
 
-def test_a_foreign_file_in_a_slot_is_kept_and_so_is_the_folder(folder):
+def test_a_foreign_file_in_a_slot_and_the_folder_are_kept(folder):
     slot = Autosaves(folder).new(ABOUT)
     slot.write(work())
     mine = slot.path.with_name("precious.ply")

@@ -128,9 +128,7 @@ def later(poses: list[str], pose: str) -> list[str]:
 
 
 @pytest.mark.parametrize("seed", [3, 4, *(pytest.param(k, marks=MANY) for k in range(5, 54))])
-def test_killed_in_a_drag_it_offers_the_last_pose_that_was_kept_or_a_later_one(
-    programs, folder, seed
-):
+def test_killed_in_a_drag_it_offers_the_last_saved_pose_or_a_later_one(programs, folder, seed):
     rests = seed % 4 == 0  # after a drag that was finished
     program = programs("rest" if rests else "drag", folder)
     ((_, finished),) = program.wait_for("finished")
@@ -149,7 +147,7 @@ def test_killed_in_a_drag_it_offers_the_last_pose_that_was_kept_or_a_later_one(
 
 
 @pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=MANY) for k in range(2, 52))])
-def test_killed_while_it_saves_every_file_is_whole_and_old_or_new(programs, folder, seed):
+def test_killed_while_saving_every_file_is_complete_and_old_or_new(programs, folder, seed):
     program = programs("save", folder)
     program.wait_for("saving", times=2)  # and one is saved
     time.sleep(random.Random(seed).uniform(0.0, 0.06))

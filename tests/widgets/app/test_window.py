@@ -136,7 +136,7 @@ def drop(hand, *paths):
 # Beginning.
 
 
-def test_it_starts_with_a_page_from_which_the_cactus_can_be_tried(start, monkeypatch, tmp_path):
+def test_the_start_page_opens_the_sample_model(start, monkeypatch, tmp_path):
     monkeypatch.setattr(models, "cactus", lambda: BALL)
     hand = start()
     assert hand.page is hand.window.pages.start
@@ -152,9 +152,7 @@ def test_it_starts_with_a_page_from_which_the_cactus_can_be_tried(start, monkeyp
     assert slots(tmp_path) == []
 
 
-def test_a_file_from_the_menu_is_opened_in_another_thread_while_the_window_goes_on(
-    start, ball_file, monkeypatch
-):
+def test_a_file_from_the_menu_is_opened_in_another_thread(start, ball_file, monkeypatch):
     hand, read, threads = start(), documents.read_polydata, []
     go_on = threading.Event()
 
@@ -208,7 +206,7 @@ def test_recent_files_are_there_after_a_restart_and_open_at_a_click(
 # Saving, and being asked.
 
 
-def test_the_title_has_a_star_exactly_while_something_could_be_lost(
+def test_the_title_has_a_star_exactly_while_changes_are_unsaved(
     start, ball_file, tmp_path, monkeypatch
 ):
     hand = start(ball_file)
@@ -237,7 +235,7 @@ def test_the_title_has_a_star_exactly_while_something_could_be_lost(
     assert len(load_session(tmp_path / "knob.segdeform").handles) == 2
 
 
-def test_closing_asks_and_does_what_it_is_told(start, ball_file, tmp_path, monkeypatch, boxes):
+def test_closing_asks_and_follows_the_answer(start, ball_file, tmp_path, monkeypatch, boxes):
     hand = start(ball_file)
     change(hand)
     for answer in ("Cancel", "Escape"):
@@ -261,7 +259,7 @@ def test_closing_asks_and_does_what_it_is_told(start, ball_file, tmp_path, monke
     assert start().page is not None  # nothing is offered
 
 
-def test_opening_another_asks_first_and_a_file_that_fails_costs_nothing(
+def test_opening_another_file_asks_first_and_an_unreadable_file_loses_nothing(
     start, ball_file, arm_file, tmp_path, boxes
 ):
     hand = start(ball_file)
@@ -283,7 +281,7 @@ def test_opening_another_asks_first_and_a_file_that_fails_costs_nothing(
     assert slots(tmp_path) == []
 
 
-def test_a_mesh_is_saved_with_all_that_was_in_its_file_and_not_over_it(
+def test_a_mesh_is_saved_with_all_its_arrays_and_not_over_the_original(
     start, ball_file, tmp_path, monkeypatch, boxes
 ):
     hand = start(ball_file)
@@ -316,7 +314,9 @@ def test_a_mesh_is_saved_with_all_that_was_in_its_file_and_not_over_it(
     assert "no folder" in boxes.seen[-1]
 
 
-def test_the_buttons_of_the_panel_do_what_the_menus_do(start, ball_file, tmp_path, monkeypatch):
+def test_the_buttons_of_the_panel_call_the_functions_of_the_menus(
+    start, ball_file, tmp_path, monkeypatch
+):
     hand = start(ball_file)
     head = hand.window.editor_widget.panel.toolbar
     change(hand)
@@ -367,7 +367,7 @@ def bad_files(tmp_path):
     yield "x" * 300 + ".obj", "no such"
 
 
-def test_a_file_that_is_broken_is_told_of_in_words_and_the_window_stays(start, tmp_path, boxes):
+def test_an_invalid_file_is_reported_in_plain_words_and_the_window_stays(start, tmp_path, boxes):
     hand = start()
     for name, words in bad_files(tmp_path):
         boxes.answers.append("OK")
@@ -382,7 +382,7 @@ def test_a_file_that_is_broken_is_told_of_in_words_and_the_window_stays(start, t
 # View and help.
 
 
-def test_the_view_menu_shows_and_hides_and_knows_what_is_shown(start, arm_file):
+def test_the_view_menu_shows_hides_and_ticks(start, arm_file):
     hand = start(arm_file)
     hand.view_hand()
     for name, is_shown in (
@@ -407,14 +407,16 @@ def test_the_view_menu_shows_and_hides_and_knows_what_is_shown(start, arm_file):
     assert (places < plotter.window_size).all()
 
 
-def test_about_says_what_it_is(start, boxes):
+def test_about_names_the_program(start, boxes):
     hand = start()
     boxes.answers.append("OK")
     hand.choose("Help", "About")
     assert "vtk_segdeform" in boxes.seen[-1]
 
 
-def test_a_picture_is_what_is_seen_without_words_and_gizmo(start, arm_file, tmp_path, monkeypatch):
+def test_a_picture_shows_the_view_without_status_line_and_gizmo(
+    start, arm_file, tmp_path, monkeypatch
+):
     hand = start(arm_file)
     hand.view_hand()
     choose_file(monkeypatch, tmp_path / "arm")
@@ -434,9 +436,7 @@ def test_a_picture_is_what_is_seen_without_words_and_gizmo(start, arm_file, tmp_
 # Work that is not lost.
 
 
-def test_after_a_drag_by_mouse_exactly_its_pose_is_kept_and_none_once_it_is_saved(
-    start, arm_file, tmp_path
-):
+def test_after_a_drag_its_pose_is_autosaved_until_the_session_is_saved(start, arm_file, tmp_path):
     hand = start(arm_file)
     mouse = hand.view_hand()
     mouse.drag(hand.way())
@@ -450,7 +450,7 @@ def test_after_a_drag_by_mouse_exactly_its_pose_is_kept_and_none_once_it_is_save
     assert digest(load_session(arm_file)) == digest(hand.window.session)
 
 
-def test_a_drag_that_goes_on_is_kept_too_and_by_another_thread(
+def test_an_ongoing_drag_is_autosaved_too_and_by_another_thread(
     start, arm_file, tmp_path, monkeypatch
 ):
     threads, write = [], Slot.write
@@ -475,7 +475,7 @@ def test_a_drag_that_goes_on_is_kept_too_and_by_another_thread(
     assert threading.main_thread() not in threads
 
 
-def test_work_that_was_left_is_offered_and_recovered(start, arm, arm_file, tmp_path, boxes):
+def test_abandoned_work_is_offered_and_recovered(start, arm, arm_file, tmp_path, boxes):
     left(tmp_path, bent(arm), About("arm.segdeform", str(arm_file)))
     boxes.answers.append("Recover")
     hand = start(arm_file)
@@ -491,7 +491,7 @@ def test_work_that_was_left_is_offered_and_recovered(start, arm, arm_file, tmp_p
     assert slots(tmp_path) == []
 
 
-def test_what_is_recovered_later_or_never(start, arm, ball_file, tmp_path, boxes):
+def test_recovering_work_later_or_never(start, arm, ball_file, tmp_path, boxes):
     slot = left(tmp_path, Session(BALL), About("ball.vtp", "", str(ball_file)))
     for answer, path in (("Escape", None), ("Later", ball_file)):
         boxes.answers.append(answer)
@@ -514,7 +514,7 @@ def test_what_is_recovered_later_or_never(start, arm, ball_file, tmp_path, boxes
     assert slots(tmp_path) == []
 
 
-def test_of_several_that_were_left_the_others_stay(start, tmp_path, boxes):
+def test_recovering_one_of_several_autosaves_keeps_the_others(start, tmp_path, boxes):
     for name in "abc":
         left(tmp_path, Session(BALL), About(name))
     boxes.answers += ["Later", "Recover"]
@@ -527,7 +527,7 @@ def test_of_several_that_were_left_the_others_stay(start, tmp_path, boxes):
     assert slots(tmp_path) == [hand.window.autosaver._slot.path]
 
 
-def test_work_that_cannot_be_read_is_told_of_and_left(start, tmp_path, boxes):
+def test_unreadable_work_is_reported_and_kept(start, tmp_path, boxes):
     path = left(tmp_path, Session(BALL), About("ball.vtp"))
     path.write_bytes(path.read_bytes()[:-50])
     boxes.answers += ["Recover", "OK"]
@@ -539,7 +539,7 @@ def test_work_that_cannot_be_read_is_told_of_and_left(start, tmp_path, boxes):
     assert slots(tmp_path) == []
 
 
-def test_where_nothing_can_be_kept_that_is_said_once_and_work_goes_on(start, ball_file, tmp_path):
+def test_a_failing_autosave_is_reported_once_and_work_continues(start, ball_file, tmp_path):
     (tmp_path / "unsaved").write_text("in the way")
     hand, told = start(ball_file, interval=0.05), []
     hand.window.autosaver.failed.connect(told.append)
@@ -575,7 +575,7 @@ def bent(arm):
 
 
 @pytest.mark.parametrize("times", [1, pytest.param(30, marks=pytest.mark.campaign)])
-def test_nothing_is_left_of_windows_that_were_closed(ball_file, tmp_path, boxes, times):
+def test_closed_windows_leave_nothing_in_memory(ball_file, tmp_path, boxes, times):
     def open_and_close():
         window = Window(settings_in(tmp_path), Autosaves(tmp_path / "unsaved"))
         hand = AppHand(window)
@@ -599,7 +599,7 @@ def test_nothing_is_left_of_windows_that_were_closed(ball_file, tmp_path, boxes,
     assert application().topLevelWidgets() == []
 
 
-def test_a_window_that_is_deleted_without_a_word_is_spoken_to_no_more(tmp_path, ball_file, boxes):
+def test_a_window_deleted_by_qt_receives_no_more_calls(tmp_path, ball_file, boxes):
     hand = AppHand(Window(settings_in(tmp_path), Autosaves(tmp_path / "unsaved")))
     hand.window.open(ball_file)
     hand.settle()
@@ -631,6 +631,6 @@ def test_without_qt_one_sentence_says_how_to_get_it(missing, monkeypatch, capsys
     assert "pip install 'vtk-segdeform[app]'" in line
 
 
-def test_without_a_screen_that_is_said(capsys):
+def test_without_a_screen_one_sentence_says_so(capsys):
     assert main(["app", "horse.ply"]) == 1  # the tests draw off-screen
     assert "off-screen" in capsys.readouterr().err

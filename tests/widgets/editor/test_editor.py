@@ -220,7 +220,7 @@ def turn_by_a_ring(bench):
 # Modes, keys and words.
 
 
-def test_every_mode_says_what_it_lacks_and_the_key_that_makes_it(bare):
+def test_each_mode_shows_what_is_missing_and_the_key_that_adds_it(bare):
     said = []
     for key in "1234":
         bare.type(key)
@@ -248,7 +248,7 @@ def test_every_mode_says_what_it_lacks_and_the_key_that_makes_it(bare):
     assert bare.hand.failures == []
 
 
-def test_each_mode_has_its_own_widget_and_shows_what_belongs_to_it(bench):
+def test_each_mode_switches_on_its_own_widget_and_display(bench):
     widgets = bench.editor.widgets
     owners = {
         "1": widgets.selector,
@@ -272,7 +272,7 @@ def test_each_mode_has_its_own_widget_and_shows_what_belongs_to_it(bench):
     assert widgets.overlay.is_shown
 
 
-def test_what_is_painted_is_chosen_by_keys(bench):
+def test_keys_select_the_target_of_painting(bench):
     selector = bench.editor.widgets.selector
     tools = {"l": Tool.LASSO, "t": Tool.RECTANGLE, "k": Tool.COMPONENT, "b": Tool.BRUSH}
     for key, tool in tools.items():
@@ -295,7 +295,7 @@ def test_what_is_painted_is_chosen_by_keys(bench):
     assert selector.radius > radius
 
 
-def test_without_regions_one_paints_the_first_beside_all_the_rest(bare):
+def test_without_regions_painting_splits_the_mesh_into_the_stroke_and_the_rest(bare):
     bare.type("g", "n", "n", "z")
     assert bare.session.regions is None
     bare.hand.click(bare.hand.at([-2.0, 0.0, 0.0]))
@@ -320,14 +320,14 @@ def test_without_regions_one_paints_the_first_beside_all_the_rest(bare):
         ("3n", "No handle yet"),
     ],
 )
-def test_a_key_with_nothing_to_work_on_says_what_comes_first(bare, keys, says):
+def test_a_key_that_needs_something_else_first_names_it(bare, keys, says):
     bare.type(*keys)
     assert says in bare.editor.status
     bare.type("3", "Delete")
     assert "No handle yet" in bare.editor.status
 
 
-def test_what_a_stroke_leaves_alone_is_told(bench):
+def test_the_status_line_reports_vertices_that_a_stroke_left_unchanged(bench):
     hand, held = bench.hand, bench.session.regions.membership.sum(axis=0)
     size = np.count_nonzero(bench.session.regions.membership[0])
     bench.type("t", "v")  # all of it, through the body
@@ -338,7 +338,7 @@ def test_what_a_stroke_leaves_alone_is_told(bench):
     assert left == np.count_nonzero(held[bench.session.regions.membership[0]] == 1)
 
 
-def test_painting_over_a_pose_says_that_it_is_at_rest_again(bench):
+def test_painting_a_region_in_a_pose_resets_it_and_says_so(bench):
     bench.type("4")
     pull_handle(bench)
     bench.type("1", "plus")
@@ -349,7 +349,7 @@ def test_painting_over_a_pose_says_that_it_is_at_rest_again(bench):
     assert "Pose reset" not in bench.editor.status
 
 
-def test_regions_are_merged_cut_grown_and_shrunk(bench):
+def test_regions_are_merged_split_grown_and_shrunk(bench):
     hand, selector = bench.hand, bench.editor.widgets.selector
     size = np.count_nonzero(bench.session.regions.membership[0])
     bench.type("plus")
@@ -369,7 +369,7 @@ def test_regions_are_merged_cut_grown_and_shrunk(bench):
     assert selector.region == 0  # there is only one again
 
 
-def test_handles_are_chosen_and_removed(bench):
+def test_handles_are_selected_and_removed(bench):
     bench.type("3", "d", "a", "t")
     x = bench.session.mesh.vertices[:, 0]
     corners = bench.around((x > 0.0) & (x < 0.4))
@@ -386,7 +386,7 @@ def test_handles_are_chosen_and_removed(bench):
     ]
 
 
-def test_back_to_rest_and_the_volume_let_go(bench):
+def test_resetting_the_pose_and_turning_volume_preservation_off(bench):
     bench.type("4")
     pull_handle(bench)
     assert bench.session.state.pose is not None
@@ -419,13 +419,13 @@ def test_z_undoes_but_constrains_while_a_handle_is_dragged(bench):
     assert not bench.session.state.changes(before)
 
 
-def test_no_two_bindings_want_the_same_key_in_the_same_mode():
+def test_no_key_has_two_bindings_in_one_mode():
     taken = [(key, mode) for b in BINDINGS if b.action for key in b.keys for mode in b.modes]
     assert len(taken) == len(set(taken))
     assert "q" not in {key for key, _ in taken}
 
 
-def test_a_key_of_another_mode_is_kept_from_vtk_and_explained(bench):
+def test_a_key_of_another_mode_is_explained_and_withheld_from_vtk(bench):
     heard = []
     bench.view.interactor.AddObserver("CharEvent", lambda *_: heard.append("char"), -1.0)
     bench.type("s")  # surface, to VTK; fixed vertices, in mode 3
@@ -435,7 +435,7 @@ def test_a_key_of_another_mode_is_kept_from_vtk_and_explained(bench):
     assert heard == ["char"]
 
 
-def test_the_card_of_keys_comes_and_goes(bench):
+def test_the_help_card_is_shown_and_hidden(bench):
     without = picture(bench.view)
     for key in ("h", "question", "F1"):
         bench.type(key)
@@ -455,7 +455,7 @@ def test_without_numba_the_status_line_says_so_until_the_first_action(monkeypatc
     made.editor.remove()
 
 
-def test_what_goes_wrong_is_said_until_something_succeeds(bench):
+def test_an_error_is_shown_until_an_action_succeeds(bench):
     bench.hand.click(bench.hand.at([-2.0, 0.0, 0.0]), control=True)  # out of the only region there
     assert "in no region but region 1" in bench.editor.status
     assert [type(failure).__name__ for failure in bench.hand.failures] == ["RegionError"]
@@ -472,7 +472,7 @@ def test_what_goes_wrong_is_said_until_something_succeeds(bench):
     bench.hand.failures.clear()
 
 
-def test_a_fault_of_our_own_is_said_too(bench):
+def test_an_internal_error_is_shown_too(bench):
     bench.session.on_change(lambda change: 1 // 0)
     bench.type("2", "z")
     assert "Nothing to undo" in bench.editor.status
@@ -485,7 +485,7 @@ def test_a_fault_of_our_own_is_said_too(bench):
 # Jobs.
 
 
-def test_while_a_job_runs_the_camera_works_and_nothing_else_does(bare):
+def test_during_a_job_only_the_camera_works(bare):
     bare.hand.key("g")
     assert bare.editor.is_busy
     assert "Detecting regions" in bare.editor.status
@@ -532,7 +532,7 @@ def test_a_second_escape_does_not_restart_a_cancelled_job(bench):
     assert bench.session.is_bound
 
 
-def test_cages_for_regions_that_another_window_has_changed_are_not_taken(bare):
+def test_cages_fitted_to_outdated_regions_are_rejected(bare):
     bare.type("g")
     bare.settle()
     bare.hand.key("f")
@@ -547,7 +547,7 @@ def test_cages_for_regions_that_another_window_has_changed_are_not_taken(bare):
     assert len(bare.session.cages) == bare.session.regions.n_regions
 
 
-def test_a_job_that_fails_says_so_and_the_editor_goes_on(bench):
+def test_a_failed_job_shows_its_error_and_the_editor_continues(bench):
     bench.session.change_options(n_cage_vertices=8, offset=1e-9)
     bench.type("f")
     assert len(bench.hand.failures) == 1
@@ -557,7 +557,7 @@ def test_a_job_that_fails_says_so_and_the_editor_goes_on(bench):
     assert bench.session.undo_label == "drag handle 1"
 
 
-def test_switched_off_or_removed_in_the_middle_of_a_job_it_lets_go(bare):
+def test_switching_off_or_removing_the_editor_cancels_its_job(bare):
     bare.hand.key("g")
     bare.editor.Off()
     assert not bare.editor.is_busy
@@ -575,7 +575,7 @@ def test_switched_off_or_removed_in_the_middle_of_a_job_it_lets_go(bare):
 
 
 @pytest.mark.parametrize("end", ["Off", "remove"])
-def test_it_can_be_left_while_a_job_is_about_to_fail(bare, tmp_path, end):
+def test_the_editor_can_be_left_while_a_job_is_about_to_fail(bare, tmp_path, end):
     bare.editor.path = tmp_path / "none.segdeform"
     bare.hand.key("o", control=True)
     time.sleep(0.1)  # the job has failed, and nobody was told yet
@@ -585,7 +585,7 @@ def test_it_can_be_left_while_a_job_is_about_to_fail(bare, tmp_path, end):
     assert bare.hand.failures == []
 
 
-def test_opening_another_session_shows_it_and_goes_on_with_it(bench, tmp_path):
+def test_another_session_can_be_opened_and_edited(bench, tmp_path):
     bench.type("4")
     pull_handle(bench)
     posed = bench.session.vertices
@@ -610,7 +610,7 @@ def test_opening_another_session_shows_it_and_goes_on_with_it(bench, tmp_path):
     assert not first.is_dragging
 
 
-def test_what_was_chosen_stays_chosen_when_another_session_is_opened(bench, tmp_path):
+def test_tools_and_display_options_survive_opening_another_session(bench, tmp_path):
     half = sausage().transformed(scale=0.5).mesh
     path = tmp_path / "half.segdeform"
     save_session(path, Session(half))
@@ -629,7 +629,7 @@ def test_what_was_chosen_stays_chosen_when_another_session_is_opened(bench, tmp_
     assert widgets.overlay.is_shown
 
 
-def test_volumes_are_prepared_beside_the_event_loop_in_the_mode_of_cages_too(bench, monkeypatch):
+def test_local_volumes_are_measured_in_a_job_in_cage_mode_too(bench, monkeypatch):
     threads = []
 
     def prepare(overlay):
@@ -650,7 +650,7 @@ def test_volumes_are_prepared_beside_the_event_loop_in_the_mode_of_cages_too(ben
     assert threading.main_thread() not in threads
 
 
-def test_opening_asks_again_when_something_was_done_in_between(bench, tmp_path):
+def test_opening_asks_again_after_another_action(bench, tmp_path):
     bench.editor.save(tmp_path / "one.segdeform")
     first = bench.session
     bench.type("x", "ctrl+o", "n", "ctrl+o")
@@ -659,7 +659,7 @@ def test_opening_asks_again_when_something_was_done_in_between(bench, tmp_path):
     assert bench.session is not first
 
 
-def test_a_file_of_somebody_else_is_replaced_only_when_asked_twice(bench, tmp_path):
+def test_another_existing_file_is_replaced_only_if_confirmed(bench, tmp_path):
     path = tmp_path / "other.segdeform"
     path.write_text("something dear")
     bench.editor.path = path
@@ -673,7 +673,7 @@ def test_a_file_of_somebody_else_is_replaced_only_when_asked_twice(bench, tmp_pa
     assert "Saved to" in bench.editor.status
 
 
-def test_a_file_that_is_no_session_leaves_everything_as_it_was(bench, tmp_path):
+def test_opening_an_invalid_file_changes_nothing(bench, tmp_path):
     path = tmp_path / "noise.segdeform"
     path.write_bytes(b"noise")
     first = bench.session
@@ -690,7 +690,7 @@ def test_a_file_that_is_no_session_leaves_everything_as_it_was(bench, tmp_path):
     pull_handle(bench)
 
 
-def test_a_session_of_another_mesh_is_shown_whole(bench, tmp_path):
+def test_a_session_of_another_mesh_is_framed_by_the_camera(bench, tmp_path):
     path = tmp_path / "sphere.segdeform"
     sphere = models.sphere(200)
     save_session(path, Session(sphere.with_vertices(20.0 * sphere.vertices + [50.0, 0.0, 0.0])))
@@ -703,7 +703,7 @@ def test_a_session_of_another_mesh_is_shown_whole(bench, tmp_path):
 # Coming and going.
 
 
-def test_when_it_is_gone_everything_is_as_before(any_view):
+def test_removing_the_editor_restores_the_view(any_view):
     heard = []
     interactor, style = any_view.interactor, any_view.interactor.GetInteractorStyle()
     interactor.AddObserver("KeyPressEvent", lambda *_: heard.append(interactor.GetKeySym()), 0.5)
@@ -725,7 +725,7 @@ def test_when_it_is_gone_everything_is_as_before(any_view):
     assert bench.hand.failures == []
 
 
-def test_off_hears_nothing_and_on_goes_on(bench):
+def test_off_ignores_keys_and_on_responds_again(bench):
     bench.type("2")
     bench.editor.Off()
     assert bench.editor.status == ""
@@ -738,7 +738,7 @@ def test_off_hears_nothing_and_on_goes_on(bench):
 
 
 @pytest.mark.parametrize("mode", ["deform", 4, None])
-def test_only_a_mode_can_be_entered(bench, mode):
+def test_only_a_mode_is_accepted(bench, mode):
     with pytest.raises(ValueError, match="mode must be one of"):
         bench.editor.mode = mode
     bench.type("3")
@@ -750,7 +750,7 @@ def test_only_a_session_or_a_mesh_can_be_edited():
         DeformEditor(plain_view(), "cactus.obj")
 
 
-def test_a_window_of_one_pixel_is_drawn_without_complaint(bench, capfd):
+def test_a_window_of_one_pixel_is_drawn_without_warnings(bench, capfd):
     bench.type("4", "o", "h")
     for size in ((1, 300), (300, 1), (1, 1), (300, 300)):
         bench.view.window.SetSize(*size)

@@ -16,7 +16,7 @@ SECTIONS = [
 
 @pytest.mark.parametrize("size", [(300, 220), (800, 600), (600, 1000)])
 @pytest.mark.parametrize("background", [0.0, 1.0])
-def test_the_card_lies_inside_the_window_and_is_read_on_any_background(size, background):
+def test_the_card_fits_into_the_window_and_is_legible_on_any_background(size, background):
     view = plain_view(size)
     view.renderer.SetBackground(background, background, background)
     blank = picture(view)
@@ -40,7 +40,7 @@ def test_the_card_lies_inside_the_window_and_is_read_on_any_background(size, bac
     view.remove_front()
 
 
-def test_the_card_is_laid_out_anew_when_the_window_grows():
+def test_the_card_is_laid_out_again_when_the_window_grows():
     view = plain_view((300, 220))
     card = HelpCard(view, SECTIONS)
     card.toggle()

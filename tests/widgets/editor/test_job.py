@@ -37,7 +37,7 @@ def test_a_job_works_in_another_thread_and_delivers_in_this_one():
     assert not hand.failures
 
 
-def test_a_job_leaves_no_timer_behind():
+def test_a_job_removes_its_timer():
     hand = Hand(plain_view())
     timers = []
     hand.view.interactor.AddObserver("CreateTimerEvent", lambda *_: timers.append(1))
@@ -48,7 +48,7 @@ def test_a_job_leaves_no_timer_behind():
     assert timers == []
 
 
-def test_a_watcher_hears_how_far_it_is_and_last_of_its_end():
+def test_watch_receives_the_progress_and_finally_the_end():
     hand = Hand(plain_view())
     heard = []
     go_on = threading.Event()
@@ -74,7 +74,7 @@ def test_a_watcher_hears_how_far_it_is_and_last_of_its_end():
     assert heard == [(0.25, "a quarter", True), (1.0, "all", False), "done"]
 
 
-def test_what_the_work_raises_reaches_the_listeners_of_failures():
+def test_an_error_of_the_work_reaches_the_listeners_of_failures():
     hand = Hand(plain_view())
     delivered = []
 
@@ -87,7 +87,7 @@ def test_what_the_work_raises_reaches_the_listeners_of_failures():
     assert delivered == []
 
 
-def test_what_the_delivery_raises_does_too_and_only_once():
+def test_an_error_of_done_reaches_them_once():
     hand = Hand(plain_view())
     job = Job(view_timer(hand.view), lambda progress: 0, done=lambda result: 1 // result)
     tick_until_ended(hand, job)
@@ -95,7 +95,7 @@ def test_what_the_delivery_raises_does_too_and_only_once():
     assert [type(failure) for failure in hand.failures] == [ZeroDivisionError]
 
 
-def test_the_result_is_delivered_even_if_a_watcher_raises():
+def test_the_result_is_delivered_even_if_watch_raises():
     hand = Hand(plain_view())
     delivered = []
 
@@ -140,7 +140,7 @@ def test_a_job_cancelled_after_its_last_report_delivers_nothing_either():
     assert delivered == []
 
 
-def test_without_an_event_loop_one_waits():
+def test_wait_delivers_without_an_event_loop():
     view = plain_view()
     delivered = []
     job = Job(view_timer(view), lambda progress: time.sleep(0.05) or "there", done=delivered.append)
@@ -156,7 +156,7 @@ def test_without_an_event_loop_one_waits():
         Job(view_timer(view), fails, done=delivered.append).wait()
 
 
-def test_a_thread_that_computes_gets_on_while_the_window_is_idle():
+def test_a_computing_thread_makes_progress_while_the_window_is_idle():
     # Each tick leaves the thread some time; without that 200 of them would be over in no time.
     hand = Hand(plain_view())
 
@@ -175,7 +175,7 @@ def test_a_thread_that_computes_gets_on_while_the_window_is_idle():
     assert delivered == ["counted"]
 
 
-def test_a_job_gets_on_while_the_camera_is_dragged_and_is_delivered_after_it():
+def test_a_job_reports_during_a_camera_drag_and_delivers_after_it():
     view, told, done = plain_view((500, 300)), [], []
     view.render()
     hand = Hand(view)

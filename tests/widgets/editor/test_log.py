@@ -41,13 +41,13 @@ def written():
     return session, log
 
 
-def test_a_drag_is_one_entry_with_all_its_steps_and_its_end(written):
+def test_a_drag_is_one_entry_with_all_its_steps_and_its_outcome(written):
     session, log = written
     steps = [session.move_handle("tip", up(z), max_steps=2).steps for z in (0.1, 0.2, 0.3)]
     assert log.entries == ()
     session.commit()
     (entry,) = log.entries
-    assert (entry.what, entry.steps) == ("drag tip", sum(steps))
+    assert (entry.title, entry.steps) == ("drag tip", sum(steps))
     assert entry.outcome == str(Status.STEP_LIMIT)
     assert entry.handle_error == session.solution.handle_error
     assert entry.volume_change == session.volume_change
@@ -55,7 +55,7 @@ def test_a_drag_is_one_entry_with_all_its_steps_and_its_end(written):
 
 
 @pytest.mark.parametrize("at_once", [1, 5])
-def test_refining_goes_on_with_the_entry_until_something_else_is_done(written, at_once):
+def test_refinement_updates_the_entry_until_the_next_change(written, at_once):
     session, log = written
     steps = session.move_handle("tip", up(0.3), max_steps=2).steps
     session.commit()
@@ -70,7 +70,7 @@ def test_refining_goes_on_with_the_entry_until_something_else_is_done(written, a
     assert log.entries == (entry,)
 
 
-def test_what_was_taken_back_leaves_no_entry_and_undo_during_a_drag_leaves_one(written):
+def test_a_cancelled_drag_leaves_no_entry_and_undo_during_a_drag_leaves_one(written):
     session, log = written
     session.move_handle("tip", up(0.1), max_steps=1)
     session.revert()
@@ -80,21 +80,21 @@ def test_what_was_taken_back_leaves_no_entry_and_undo_during_a_drag_leaves_one(w
     session.move_handle("tip", up(0.1), max_steps=1)
     error = session.solution.handle_error
     session.undo()
-    assert [(each.what, each.handle_error) for each in log.entries] == [("drag tip", error)]
+    assert [(each.title, each.handle_error) for each in log.entries] == [("drag tip", error)]
 
 
-def test_a_cage_moved_by_hand_is_solved_for_by_nobody(written):
+def test_editing_a_cage_is_logged_without_solver_steps(written):
     session, log = written
     session.move_cage(1, session.cage_vertices[1] + [0.0, 0.0, 0.02])
     session.commit()
     (entry,) = log.entries
-    assert (entry.what, entry.steps) == ("drag the cage of region 2", None)
+    assert (entry.title, entry.steps) == ("drag the cage of region 2", None)
     assert entry.text.endswith(
         "  drag the cage of region 2\nCage edited\nvolume " + entry.text.rpartition(" ")[2]
     )
 
 
-def test_the_oldest_is_forgotten_first_and_others_are_not_listened_to(written):
+def test_the_oldest_entries_are_dropped_and_other_sessions_are_not_logged(written):
     session, log = written
     for k in range(5):
         session.move_handle("tip", up(0.01 * (k + 1)), max_steps=1)
@@ -113,7 +113,7 @@ def test_the_oldest_is_forgotten_first_and_others_are_not_listened_to(written):
     assert not other._listeners._listeners
 
 
-def test_a_job_is_written_down_with_what_was_said_of_it():
+def test_a_job_is_logged_with_its_outcome():
     window, renderer = vtkRenderWindow(), vtkRenderer()
     window.AddRenderer(renderer)
     editor = DeformEditor((renderer, vtkGenericRenderWindowInteractor()), ready())
@@ -137,7 +137,7 @@ def test_a_job_is_written_down_with_what_was_said_of_it():
         editor.controller.start(doing, work, done)
         with editor.view.guarded():
             editor.wait()
-    assert [(entry.what, entry.outcome) for entry in editor.controller.log.entries] == [
+    assert [(entry.title, entry.outcome) for entry in editor.controller.log.entries] == [
         ("Counting", "7 found"),
         ("Being silent", "Done"),
         ("Failing", "no room for it"),
@@ -157,7 +157,7 @@ def test_a_job_is_written_down_with_what_was_said_of_it():
         ),
     ],
 )
-def test_an_entry_is_read_in_two_or_three_lines(entry, lines):
+def test_an_entry_is_two_or_three_lines_of_text(entry, lines):
     first, *rest = entry.text.splitlines()
-    assert first.endswith(f":00  {entry.what}")
+    assert first.endswith(f":00  {entry.title}")
     assert rest == lines

@@ -17,7 +17,7 @@ from vtk_segdeform.widgets.recording.recording import replay
 from vtk_segdeform.widgets.region_selector.region_selector import Tool
 
 
-def test_what_hands_do_is_recorded_and_replayed_from_two_files_alone(bench, tmp_path):  # noqa: F811
+def test_the_input_is_recorded_and_replayed_from_two_files(bench, tmp_path):  # noqa: F811
     bench.editor.path = tmp_path / "work.segdeform"
     bench.type("3", "t", "v", "4")
     pull_handle(bench, (10, 15))
@@ -47,7 +47,7 @@ def test_what_hands_do_is_recorded_and_replayed_from_two_files_alone(bench, tmp_
     ]  # fmt: skip
 
 
-def test_the_drags_are_filmed_and_nothing_else(bench, tmp_path):  # noqa: F811
+def test_the_video_contains_the_drags_and_nothing_else(bench, tmp_path):  # noqa: F811
     bench.editor.path = tmp_path / "work.segdeform"
     bench.type("ctrl+m")
     assert "Recording video" in bench.editor.status
@@ -65,7 +65,7 @@ def test_the_drags_are_filmed_and_nothing_else(bench, tmp_path):  # noqa: F811
 
 
 @pytest.mark.parametrize("key", ["ctrl+r", "ctrl+m"])
-def test_where_nothing_can_be_written_it_is_said_at_once(bench, tmp_path, key):  # noqa: F811
+def test_an_unwritable_folder_is_reported_immediately(bench, tmp_path, key):  # noqa: F811
     bench.editor.path = tmp_path / "no" / "work.segdeform"
     bench.type(key)
     assert "no" in bench.editor.status
@@ -75,7 +75,7 @@ def test_where_nothing_can_be_written_it_is_said_at_once(bench, tmp_path, key): 
     assert "recording" not in bench.editor.status
 
 
-def test_the_line_at_the_bottom_shows_that_a_recording_goes_on(bench, tmp_path):  # noqa: F811
+def test_the_status_line_shows_an_ongoing_recording(bench, tmp_path):  # noqa: F811
     bench.editor.path = tmp_path / "work.segdeform"
     seen = []
     for key in ("ctrl+r", "ctrl+m", "ctrl+r", "ctrl+m"):
@@ -87,7 +87,7 @@ def test_the_line_at_the_bottom_shows_that_a_recording_goes_on(bench, tmp_path):
     assert not np.array_equal(seen[0], seen[2])
 
 
-def test_a_second_recording_leaves_the_first(bench, tmp_path):  # noqa: F811
+def test_a_second_recording_does_not_overwrite_the_first(bench, tmp_path):  # noqa: F811
     bench.editor.path = tmp_path / "work.segdeform"
     bench.type(*["ctrl+r"] * 4)
     assert (tmp_path / "work.recording.txt").exists()

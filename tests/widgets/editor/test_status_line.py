@@ -25,7 +25,7 @@ def strip_height(view) -> int:
     return int(np.argmax((column == 255).all(axis=1)))
 
 
-def test_the_line_says_what_it_is_told_and_is_drawn_at_once(line):
+def test_the_line_shows_its_text_immediately(line):
     before = picture(line.view)
     line.say("fit cages to the regions", "REGIONS")
     after = picture(line.view)
@@ -35,7 +35,7 @@ def test_the_line_says_what_it_is_told_and_is_drawn_at_once(line):
     assert changed.min() > 0.8 * len(after)  # at the bottom and nowhere else
 
 
-def test_a_warning_looks_different_until_something_else_is_said(line):
+def test_a_warning_looks_different_until_the_next_text(line):
     line.say("a handle needs one vertex or more")
     calm = picture(line.view)[-2, -2].astype(int)
     line.warn("a handle needs one vertex or more")
@@ -62,7 +62,7 @@ def test_a_long_text_takes_two_lines_and_a_warning_four_and_never_more(line, tel
     assert line.text.endswith("for any line,")
 
 
-def test_a_word_wider_than_the_window_is_broken_so_that_what_follows_is_seen(line):
+def test_a_word_wider_than_the_window_is_broken(line):
     line.say("short")
     one = strip_height(line.view)
     path = "/a/folder/" + "x" * 90 + "/file"
@@ -88,7 +88,7 @@ def test_the_line_follows_the_size_of_the_window(line):
     assert (picture(line.view)[-2, [2, 800, -2]] != 255).all()  # across the whole window
 
 
-def test_the_bar_is_as_long_as_the_share_that_is_done(line):
+def test_the_bar_shows_the_completed_fraction(line):
     for share in (0.2, 0.75):
         line.progress(share, "fitting cages")
         row = picture(line.view)[-2].astype(int)
@@ -101,7 +101,7 @@ def test_the_bar_is_as_long_as_the_share_that_is_done(line):
     assert line.fraction is None
 
 
-def test_a_line_that_is_removed_leaves_nothing(line):
+def test_a_removed_line_leaves_nothing(line):
     blank = np.full_like(picture(line.view), 255)
     line.say("drag a handle")
     assert (picture(line.view) != blank).any()

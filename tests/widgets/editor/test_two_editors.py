@@ -45,7 +45,7 @@ def test_keys_go_to_the_one_under_the_pointer(halves):
     assert (left.mode, right.mode) == (Mode.CAGES, Mode.HANDLES)
 
 
-def test_a_widgets_keys_too(halves):
+def test_keys_of_widgets_too(halves):
     (left, right), hand = halves
     before = left.widgets.selector.radius, right.widgets.selector.radius
     hand.move(RIGHT)
@@ -54,7 +54,7 @@ def test_a_widgets_keys_too(halves):
     assert right.widgets.selector.radius > before[1]
 
 
-def test_removing_one_leaves_the_other_as_it_is_drawn(halves, capfd):
+def test_removing_one_editor_leaves_the_display_of_the_other(halves, capfd):
     (left, right), _ = halves
     before = picture(right.view)[:, 400:]
     left.remove()
@@ -65,14 +65,14 @@ def test_removing_one_leaves_the_other_as_it_is_drawn(halves, capfd):
     assert right.view.window.GetNumberOfLayers() == 1
 
 
-def test_one_that_was_removed_cannot_be_woken(halves):
+def test_a_removed_editor_cannot_be_switched_on(halves):
     (left, _), _ = halves
     left.remove()
     with pytest.raises(RuntimeError, match="create another one"):
         left.On()
 
 
-def test_an_editor_alone_hears_keys_wherever_the_pointer_is(halves):
+def test_a_single_editor_receives_keys_wherever_the_pointer_is(halves):
     (left, right), hand = halves
     right.remove()
     hand.move(RIGHT)

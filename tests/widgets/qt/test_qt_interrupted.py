@@ -77,7 +77,7 @@ def settings(panel) -> list:
     [pytest.param(True, id="in mid-drag", marks=pytest.mark.campaign),
      pytest.param(False, id="converging")],
 )  # fmt: skip
-def test_any_action_in_the_panel_keeps_the_drag(stand, during):
+def test_any_action_in_the_panel_finishes_the_drag(stand, during):
     panel = stand.widget.panel
     panel.log.fold.setChecked(True)
     dragged(stand, during=False)
@@ -180,7 +180,7 @@ def test_two_editors_in_one_view_do_not_block_each_other(stand):
 
 
 @pytest.mark.parametrize("what", ["focus", "release"])
-def test_a_drag_that_loses_the_focus_or_its_release_is_kept(stand, what):
+def test_a_drag_that_loses_the_focus_or_its_release_is_finished(stand, what):
     place = dragged(stand, during=True)
     if what == "focus":
         stand.widget.panel.deform.stretch.setFocus()

@@ -133,7 +133,7 @@ def test_a_job_is_stopped_by_escape_while_qt_runs(qt, monkeypatch):
     assert "Cancelled" in editor.status
 
 
-def test_the_camera_is_turned_beside_the_mesh_and_ctrl_takes_away(qt):
+def test_the_camera_rotates_beside_the_mesh_and_ctrl_erases(qt):
     _, editor, hand, _ = qt
     before = editor.view.camera.GetPosition()
     hand.drag([(30, 400), (60, 380), (90, 380)])
@@ -145,7 +145,7 @@ def test_the_camera_is_turned_beside_the_mesh_and_ctrl_takes_away(qt):
     assert len(editor.session.fixed) == 0
 
 
-def test_a_window_that_is_closed_lets_the_editor_go(qt):
+def test_closing_a_window_removes_the_editor(qt):
     plotter, editor, hand, window = qt
     hand.key("g")  # in the middle of a job
     plotter.close()
@@ -167,7 +167,7 @@ def test_an_editor_that_was_removed_leaves_nothing_alive(qt):
 
 
 @pytest.mark.campaign
-def test_the_story_on_a_screen_with_larger_pixels():
+def test_the_story_on_a_high_resolution_screen():
     application()  # or skip
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", __file__, "-k", "whole_story and QtInteractor"],

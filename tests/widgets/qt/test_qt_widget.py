@@ -199,7 +199,7 @@ def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
     assert seen.errors == hand.failures == []
 
 
-def test_the_whole_mesh_is_seen_at_first(seen):
+def test_the_whole_mesh_is_visible_at_first(seen):
     view = seen.editor.view
     view.render()
     places = view.to_display(seen.session.vertices)[:, :2] / view.renderer.GetSize()
@@ -208,7 +208,7 @@ def test_the_whole_mesh_is_seen_at_first(seen):
     assert np.ptp(places, axis=0).max() > 0.4
 
 
-def test_regions_are_chosen_merged_and_cut_in_the_list(seen):
+def test_regions_are_selected_merged_and_split_in_the_list(seen):
     panel, session = seen.panel, seen.session
     seen.click_row(panel.regions.list, 1)
     assert seen.editor.widgets.selector.region == 1
@@ -220,7 +220,7 @@ def test_regions_are_chosen_merged_and_cut_in_the_list(seen):
     seen.click(panel.regions.split)
     assert session.regions.n_regions == 2
     seen.click(panel.regions.new)
-    assert rows(panel.regions.list)[2][0] == "region 3 (not painted yet)"
+    assert rows(panel.regions.list)[2][0] == "region 3 (new)"
     assert seen.editor.widgets.selector.region == 2
     assert not panel.regions.split.isEnabled()
 
@@ -234,7 +234,7 @@ def rename(tree, name):
     QtTest.QTest.keyClick(field, Qt.Key_Return)
 
 
-def test_regions_are_renamed_in_the_list_and_names_are_told_everywhere(seen):
+def test_regions_are_renamed_in_the_list_and_shown_by_name_everywhere(seen):
     tree, session = seen.panel.regions.list, seen.session
     assert [name for name, *_ in rows(tree)] == ["region 1", "region 2"]
     seen.click_row(tree, 1, column=2)  # beside the name
@@ -274,7 +274,7 @@ def test_a_tick_shows_one_cage_and_hides_it(seen):
     assert cages.is_visible(1)
 
 
-def test_handles_are_renamed_chosen_and_removed_in_the_list(seen):
+def test_handles_are_renamed_selected_and_removed_in_the_list(seen):
     seen.mode(Mode.HANDLES)
     tree = seen.panel.handles.list
     seen.click_row(tree, 1)
@@ -318,7 +318,7 @@ def test_options_are_steps_and_are_shown_when_they_are_undone(make):
     assert seen.panel.toolbar.undo.toolTip() == "Nothing to undo"
 
 
-def test_what_keys_and_the_wheel_do_is_shown_in_the_panel(seen):
+def test_the_panel_follows_keys_and_the_wheel(seen):
     hand, part = seen.view_hand(), seen.panel.painting
     hand.key("l")
     seen.settle()
@@ -351,7 +351,7 @@ def test_a_click_on_a_button_leaves_the_keys_to_the_view(seen):
     assert seen.editor.widgets.selector.tool is Tool.BRUSH
 
 
-def test_a_job_shows_how_far_it_is_and_is_cancelled(seen):
+def test_a_job_shows_its_progress_and_is_cancelled(seen):
     go_on, delivered = threading.Event(), []
 
     def work(progress):
@@ -383,7 +383,7 @@ def bend(seen, height=0.4):
     seen.session.commit()
 
 
-def test_the_log_unfolds_is_copied_and_cleared(seen):
+def test_the_history_unfolds_is_copied_and_cleared(seen):
     part, clipboard = seen.panel.log, application().clipboard()
     bend(seen)
     seen.click(part.fold)
@@ -411,7 +411,7 @@ def test_the_log_unfolds_is_copied_and_cleared(seen):
     assert not part.list.isVisible()
 
 
-def test_the_range_of_the_colours_is_typed_and_kept_for_the_next_session(seen, tmp_path):
+def test_the_colour_range_is_typed_and_kept_for_the_next_session(seen, tmp_path):
     seen.mode(Mode.DEFORM)
     part, overlay = seen.panel.deform, lambda: seen.editor.widgets.overlay
     assert not part.range.isEnabled()
@@ -431,7 +431,7 @@ def test_the_range_of_the_colours_is_typed_and_kept_for_the_next_session(seen, t
     assert overlay().half_range == chosen
 
 
-def test_what_goes_wrong_is_said_told_and_then_forgotten(seen):
+def test_an_error_is_shown_emitted_and_then_cleared(seen):
     seen.mode(Mode.HANDLES)
     seen.panel.handles.list.topLevelItem(1).setText(0, "")  # no name for a handle
     seen.settle()
@@ -472,7 +472,7 @@ def test_a_session_is_saved_and_opened_again(seen, tmp_path, monkeypatch):
     assert len(seen.session.fixed) == int(rows(seen.panel.handles.list)[0][1]) > 0
 
 
-def test_what_is_not_saved_is_given_up_only_when_asked(seen, tmp_path, monkeypatch):
+def test_unsaved_changes_are_discarded_only_if_confirmed(seen, tmp_path, monkeypatch):
     path = tmp_path / "ball.ply"
     from vtk_segdeform.io.convert import write_mesh
 
@@ -488,7 +488,7 @@ def test_what_is_not_saved_is_given_up_only_when_asked(seen, tmp_path, monkeypat
     assert seen.editor.path == tmp_path / "ball.segdeform"  # a mesh is not written over
 
 
-def test_the_mesh_is_written_as_it_is_now(seen, tmp_path, monkeypatch):
+def test_the_deformed_mesh_is_written(seen, tmp_path, monkeypatch):
     bend(seen)
     answer(monkeypatch, tmp_path / "bent.ply")
     seen.panel.toolbar.ask_and_export()
@@ -513,7 +513,7 @@ def with_arrays():
     return surface
 
 
-def test_a_surface_is_given_and_written_back_with_all_that_it_has(make, tmp_path, monkeypatch):
+def test_a_surface_is_written_back_with_all_its_arrays(make, tmp_path, monkeypatch):
     surface, (mesh, state) = with_arrays(), small()
     seen = make(surface)
     seen.session.set_regions(state.regions)
@@ -557,7 +557,7 @@ def test_a_surface_is_given_and_written_back_with_all_that_it_has(make, tmp_path
 # Hosts.
 
 
-def test_two_widgets_in_one_window_and_a_dock_mind_their_own_business(state):
+def test_two_widgets_and_a_dock_in_one_window_are_independent(state):
     app, (mesh, now) = application(), state
     window = QtWidgets.QMainWindow()
     tabs = QtWidgets.QSplitter(window)
@@ -593,7 +593,7 @@ def test_two_widgets_in_one_window_and_a_dock_mind_their_own_business(state):
     delete_now()
 
 
-def test_a_window_that_is_deleted_without_a_word_takes_all_with_it(state):
+def test_a_window_deleted_by_qt_releases_everything(state):
     application()
     mesh, now = state
     session, window = Session(mesh, state=now), QtWidgets.QMainWindow()
@@ -608,7 +608,7 @@ def test_a_window_that_is_deleted_without_a_word_takes_all_with_it(state):
     application().processEvents()
 
 
-def test_a_dock_that_is_deleted_leaves_the_editor_as_it_is(state):
+def test_deleting_a_dock_leaves_the_editor_unchanged(state):
     application()
     mesh, now = state
     window = QtWidgets.QMainWindow()
@@ -635,7 +635,7 @@ def test_a_dock_that_is_deleted_leaves_the_editor_as_it_is(state):
 
 
 @pytest.mark.parametrize("mode", list(Mode))
-def test_everything_is_reached_by_tab_and_tells_what_it_is(seen, mode):
+def test_every_control_is_reached_by_tab_and_has_a_tooltip(seen, mode):
     seen.mode(mode)
     kinds = (QtWidgets.QAbstractButton, QtWidgets.QAbstractSpinBox, QtWidgets.QTreeWidget)
     wanted = {
@@ -665,7 +665,7 @@ def test_everything_is_reached_by_tab_and_tells_what_it_is(seen, mode):
     assert seen.editor.mode is not mode
 
 
-def test_in_a_dark_palette_the_panel_is_dark_and_its_words_are_light(seen, tmp_path):
+def test_in_a_dark_palette_the_panel_is_dark_and_its_text_is_light(seen, tmp_path):
     before = application().palette()
     application().setPalette(QtGui.QPalette(QtGui.QColor("#3a3a3a"), QtGui.QColor("#2b2b2b")))
     try:
