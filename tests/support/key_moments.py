@@ -1,4 +1,4 @@
-"""Every key of the editor at its worst moments: in mid-drag, while a pose converges, during a job.
+"""Every key of the editor at critical moments: in mid-drag, while a pose converges, during a job.
 
 The keys are those of the editor's own table.  After any key,
 
@@ -147,14 +147,14 @@ class Stand:
         raise NotImplementedError
 
     def draw(self) -> None:
-        """Check that the things to grab are where they are displayed."""
+        """Render, so that drags start at the displayed positions."""
         self.editor.view.render()
 
     def close(self) -> None:
-        """End it."""
+        """Close the host."""
         raise NotImplementedError
 
-    # What hands do.
+    # Actions of the hand.
 
     @property
     def session(self) -> Session:
@@ -304,7 +304,7 @@ class Stand:
         self.settle()
 
     def first_overlay(self, *, during: bool) -> None:
-        """Type O where volumes were never shown: a job measures them, during a drag."""
+        """Type O before volumes were ever shown: a job measures them, during a drag."""
         self.begin(Mode.REGIONS)
         self.editor.load(self.folder / "start.segdeform")
         self.session.bind()  # otherwise binding would measure them already
@@ -413,7 +413,7 @@ def ready() -> Session:
 
 
 def aim(view: View) -> None:
-    """Look from the front, z up, at all of it."""
+    """Frame the whole mesh from the front, z up."""
     view.camera.SetPosition(0.0, -9.0, 0.0)
     view.camera.SetFocalPoint(0.0, 0.0, 0.0)
     view.camera.SetViewUp(0.0, 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""pyvista's extension points: plotters and meshes that can be deformed, and a window of its own."""
+"""pyvista's extension points: plotters, meshes, and the window of `edit`."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_the_overlay_is_shown_in_a_plotter_and_removed_with_it(plotter, session)
     assert (picture(View.of(plotter)) != blank).any()
     plotter.close()
     assert not overlay.is_shown
-    session.drag(SCENE.turned(10.0))  # nobody draws any more
+    session.drag(SCENE.turned(10.0))  # no longer drawn
 
 
 def test_the_editor_replaces_the_mesh_and_is_removed_with_the_plotter(plotter, bar):
@@ -138,7 +138,7 @@ def test_the_editor_replaces_the_mesh_and_is_removed_with_the_plotter(plotter, b
     assert_array_equal(editor.session.vertices, bar.points)
     plotter.close()
     assert not editor.GetEnabled()
-    editor.session.segment(2)  # nobody shows it any more
+    editor.session.segment(2)  # no longer shown
 
 
 def test_a_handle_is_dragged_in_a_plotter_by_hand(plotter, session):
@@ -152,7 +152,7 @@ def test_a_handle_is_dragged_in_a_plotter_by_hand(plotter, session):
     assert session.undo_label == "drag handle 1"
 
 
-# Finding it.
+# Registration.
 
 
 def test_pyvista_finds_the_plugin_by_its_entry_points():
@@ -189,11 +189,11 @@ def test_the_package_alone_does_not_load_pyvista():
     assert done.stdout.strip() == "False"
 
 
-# A window of its own.
+# The window of `edit`.
 
 
 def pull(hand: Hand, editor) -> None:
-    """Go to the mode for it, and drag the middle of the handle aside."""
+    """Switch to the deform mode and drag the centre of the handle."""
     hand.key("4")
     editor.wait()
     session = editor.session
@@ -253,7 +253,7 @@ def test_the_command_writes_the_deformed_mesh(tmp_path, session, monkeypatch, ca
 
 
 def without_screen() -> dict[str, str]:
-    """Return an environment in which no window can be seen."""
+    """Return an environment without a screen."""
     hidden = ("DISPLAY", "WAYLAND_DISPLAY", "PYVISTA_OFF_SCREEN")
     return {name: value for name, value in os.environ.items() if name not in hidden}
 

@@ -1,4 +1,4 @@
-"""Where unsaved work is kept: whose it is, what is left of a crash, and that nothing is halved."""
+"""Autosaves: their owner, recovery after a crash, and complete files."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ ABOUT = About("ball.ply", "/saved/ball.segdeform", "/meshes/ball.ply")
 
 
 def no_progress(fraction, text):
-    """Hear of progress."""
+    """Ignore progress."""
 
 
 def work(top=0.8):
-    """Return a session with something to lose."""
+    """Return a session with unsaved changes."""
     session = Session(BALL)
     session.add_handle(BALL.vertices[:, 2] > top)
     return session
@@ -42,7 +42,7 @@ def folder(tmp_path) -> Path:
 
 
 def crash(folder, session=None, about=ABOUT):
-    """Leave work behind, as a program does that is killed; return its folder."""
+    """Leave an autosave as a killed program does; return its folder."""
     slot = Autosaves(folder).new(about)
     slot.write(session or work())
     slot.release()
@@ -67,7 +67,7 @@ def test_the_autosave_of_a_running_program_is_not_offered(folder):
         capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert theirs.stdout.split() == ["None"]
-    assert Autosaves(folder).abandoned() == []  # nor another window's of the same program
+    assert Autosaves(folder).abandoned() == []  # nor for another window of the same program
     mine.release()
     assert len(Autosaves(folder).abandoned()) == 1
 
@@ -107,7 +107,7 @@ def test_abandoned_autosaves_are_offered_until_removed_the_latest_first(folder):
             slot.release()
     left = autosaves.abandoned()
     left[0].remove()
-    left[0].remove()  # nothing more happens
+    left[0].remove()  # a second call changes nothing
     for slot in left[1:]:
         slot.release()
     assert [slot.about.name for slot in autosaves.abandoned()] == ["older", "old"]
@@ -183,7 +183,7 @@ def test_a_lock_is_acquired_once_and_not_on_a_deleted_file(tmp_path):
     assert hold(path) is None
     if os.name == "posix":
         path.unlink()
-        second = hold(path)  # another file of that name
+        second = hold(path)  # another file of the same name
         assert second is not None
         os.close(second)
     os.close(first)
@@ -269,7 +269,7 @@ def test_links_are_never_followed(folder, tmp_path):
     outside = tmp_path / "outside"
     slot = crash(folder)
     (folder / "copy").mkdir()
-    slot.rename(outside)  # a whole slot, with its mark, but somewhere else
+    slot.rename(outside)  # a valid slot in another folder
     (folder / SLOT).symlink_to(outside)
     (folder / "fedcba9876543210").symlink_to("nowhere")
     (folder / "circle").symlink_to("circle")
@@ -335,7 +335,7 @@ def test_slots_of_earlier_versions_are_found_and_removed_too(folder):
     path = crash(folder)
     begun = Autosaves(folder).new(ABOUT)
     begun.release()
-    for each in (path, begun.path.parent):  # they left the lock empty
+    for each in (path, begun.path.parent):  # an empty lock
         (each / "lock").write_bytes(b"")
     (slot,) = Autosaves(folder).abandoned()
     assert slot.about == ABOUT

@@ -1,4 +1,4 @@
-"""The desktop program as a person meets it: menus, files, drops, questions, and work not lost."""
+"""The desktop program for its users: menus, files, drops, dialogs and autosave."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ BALL = models.sphere(300)
 
 @pytest.fixture(scope="module", autouse=True)
 def in_haste():
-    """Spend no time on smooth edges, nor on garbage, which Qt has collected in its thread only."""
+    """Save time on antialiasing, and collect garbage in Qt's thread only."""
     smooth = pv.global_theme.anti_aliasing
     pv.global_theme.anti_aliasing = None
     gc.collect()
@@ -54,7 +54,7 @@ def in_haste():
 
 @pytest.fixture(scope="module")
 def arm():
-    """Return a session that lacks nothing but a pose; nobody changes it."""
+    """Return a session, complete except for a pose; tests do not change it."""
     return ready_session()
 
 
@@ -74,7 +74,7 @@ def arm_file(arm, tmp_path) -> Path:
 
 @pytest.fixture
 def boxes():
-    gc.collect()  # what a test that failed has left
+    gc.collect()  # objects of a failed test
     application()
     made = Boxes()
     yield made
@@ -84,7 +84,7 @@ def boxes():
 
 @pytest.fixture
 def start(tmp_path, boxes):
-    """Yield a callable that starts the program, which finds what was there when it ran before."""
+    """Yield a function that starts the program, with the settings and autosaves of earlier runs."""
     made = []
 
     def begin(path=None, **options) -> AppHand:
@@ -111,19 +111,19 @@ def choose_file(monkeypatch, path):
 
 
 def change(hand):
-    """Do something that can be lost."""
+    """Make an unsaved change."""
     hand.window.session.add_handle([40, 41], "knob")
     hand.settle()
 
 
 def drop(hand, *paths):
-    """Hold files over the middle of the window, and drop them, as Qt is told by the system."""
+    """Drag files over the centre of the window and drop them, by system events."""
     mime, window = QtCore.QMimeData(), hand.window.windowHandle()
     mime.setUrls([QtCore.QUrl.fromLocalFile(str(path)) for path in paths])
     place = QtCore.QPoint(window.width() // 3, window.height() // 2)
     about = Qt.CopyAction, mime, Qt.LeftButton, Qt.NoModifier
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # where Qt would rather have a QPointF
+        warnings.simplefilter("ignore", DeprecationWarning)  # Qt prefers a QPointF
         enter = QtGui.QDragEnterEvent(place, *about)
     application().sendEvent(window, enter)
     if enter.isAccepted():
@@ -133,7 +133,7 @@ def drop(hand, *paths):
     return enter.isAccepted()
 
 
-# Beginning.
+# Starting.
 
 
 def test_the_start_page_opens_the_sample_model(start, monkeypatch, tmp_path):
@@ -147,7 +147,7 @@ def test_the_start_page_opens_the_sample_model(start, monkeypatch, tmp_path):
     hand.settle()
     assert hand.page is hand.window.editor_widget
     assert hand.title == "cactus - segdeform"
-    assert int(hand.window.winId()) == number  # it did not flicker
+    assert int(hand.window.winId()) == number  # the window was not re-created
     assert hand.window.editor_widget.plotter.hasFocus()
     assert slots(tmp_path) == []
 
@@ -197,13 +197,13 @@ def test_recent_files_are_there_after_a_restart_and_open_at_a_click(
     hand.settle()
     assert hand.title == "arm.segdeform - segdeform"
     hand.choose("File", "Open recent", "Clear")
-    hand.window.recent.add(tmp_path / ("x" * 300 + ".ply"))  # no file can have such a name
+    hand.window.recent.add(tmp_path / ("x" * 300 + ".ply"))  # too long for a file name
     hand = start()
     assert [button.isEnabled() for button in hand.page.recent] == [False]
     hand.choose("File", "Open recent", "Clear")
 
 
-# Saving, and being asked.
+# Saving and its dialogs.
 
 
 def test_the_title_has_a_star_exactly_while_changes_are_unsaved(
@@ -230,7 +230,9 @@ def test_the_title_has_a_star_exactly_while_changes_are_unsaved(
     hand.window.session.add_handle([50], "another")
     choose_file(monkeypatch, None)
     plotter = hand.window.editor_widget.plotter
-    QtTest.QTest.keyClick(plotter, Qt.Key_S, Qt.ControlModifier)  # now it has a file: no question
+    QtTest.QTest.keyClick(
+        plotter, Qt.Key_S, Qt.ControlModifier
+    )  # it has a file now, so no question
     hand.settle()
     assert len(load_session(tmp_path / "knob.segdeform").handles) == 2
 
@@ -244,7 +246,7 @@ def test_closing_asks_and_follows_the_answer(start, ball_file, tmp_path, monkeyp
         assert hand.window.isVisible()
         assert boxes.seen[-1].startswith("Save changes to ball.vtp?")
     choose_file(monkeypatch, None)
-    boxes.answers.append("Save")  # but then no file is named
+    boxes.answers.append("Save")  # but no file is chosen
     assert not hand.window.close()
     choose_file(monkeypatch, tmp_path / "knob.segdeform")
     boxes.answers.append("Save")
@@ -256,7 +258,7 @@ def test_closing_asks_and_follows_the_answer(start, ball_file, tmp_path, monkeyp
     again.choose("File", "Quit")
     assert not again.window.isVisible()
     assert slots(tmp_path) == []
-    assert start().page is not None  # nothing is offered
+    assert start().page is not None  # no recovery is offered
 
 
 def test_opening_another_file_asks_first_and_an_unreadable_file_loses_nothing(
@@ -298,10 +300,10 @@ def test_a_mesh_is_saved_with_all_its_arrays_and_not_over_the_original(
     bent = convert.read_polydata(tmp_path / "bent.vtp")
     assert_array_equal(bent.point_data["height"], BALL.vertices[:, 2])
     (tmp_path / "bent.vtp").unlink()
-    hand.choose("File", "Save mesh")  # now it is known where
+    hand.choose("File", "Save mesh")  # the file is known now
     assert (tmp_path / "bent.vtp").exists()
     boxes.answers.append("Cancel")
-    hand.choose("File", "Save mesh as")  # "bent" becomes bent.vtp, which is there
+    hand.choose("File", "Save mesh as")  # "bent" becomes bent.vtp, which exists
     assert boxes.seen[-1].startswith("Replace bent.vtp?")
     boxes.answers.append("Cancel")
     assert not hand.window.close()
@@ -333,7 +335,7 @@ def test_the_buttons_of_the_panel_call_the_functions_of_the_menus(
     assert "height" in convert.read_polydata(tmp_path / "again.vtp").point_data
 
 
-# Drops, and bad files.
+# Drops and invalid files.
 
 
 def test_a_mesh_dropped_anywhere_on_the_window_is_opened(start, ball_file, arm_file):
@@ -342,14 +344,14 @@ def test_a_mesh_dropped_anywhere_on_the_window_is_opened(start, ball_file, arm_f
     assert not hand.window.pages.start.target.is_highlighted
     hand.settle()
     assert hand.title == "ball.vtp - segdeform"
-    assert drop(hand, arm_file, ball_file)  # on the view: not added beside the other
+    assert drop(hand, arm_file, ball_file)  # on the view, which must not add it to the scene
     hand.settle()
     assert hand.title == "arm.segdeform - segdeform"
     assert not drop(hand)
 
 
 def bad_files(tmp_path):
-    """Yield files that cannot be opened, and a word of what is said of each."""
+    """Yield invalid files, each with a word of its error message."""
     open_ball = convert.to_polydata(BALL).remove_cells([0, 1])
     convert.write_mesh(tmp_path / "open.ply", open_ball)
     save_session(tmp_path / "cut.segdeform", Session(BALL))
@@ -433,7 +435,7 @@ def test_a_picture_shows_the_view_without_status_line_and_gizmo(
     assert hand.window.editor.widgets.dragger.GetEnabled()
 
 
-# Work that is not lost.
+# Autosave.
 
 
 def test_after_a_drag_its_pose_is_autosaved_until_the_session_is_saved(start, arm_file, tmp_path):
@@ -483,8 +485,8 @@ def test_abandoned_work_is_offered_and_recovered(start, arm, arm_file, tmp_path,
     assert said.startswith("Recover unsaved work on arm.segdeform from ")
     assert said.splitlines()[0].endswith("?")
     assert digest(hand.window.session) == digest(bent(arm))
-    assert hand.title == "arm.segdeform* - segdeform"  # it is still not saved
-    assert len(slots(tmp_path)) == 1  # and would survive another crash
+    assert hand.title == "arm.segdeform* - segdeform"  # still unsaved
+    assert len(slots(tmp_path)) == 1  # it would survive another crash
     hand.choose("File", "Save session")
     hand.settle()
     assert digest(load_session(arm_file)) == digest(bent(arm))
@@ -523,7 +525,7 @@ def test_recovering_one_of_several_autosaves_keeps_the_others(start, tmp_path, b
     assert hand.title == "b* - segdeform"
     assert len(slots(tmp_path)) == 3
     boxes.answers += ["Discard", "Discard"]
-    start()  # another program: what is being worked on is not offered to it
+    start()  # another program: locked autosaves are not offered
     assert slots(tmp_path) == [hand.window.autosaver._slot.path]
 
 
@@ -553,7 +555,7 @@ def test_a_failing_autosave_is_reported_once_and_work_continues(start, ball_file
 
 
 def left(tmp_path, session, about):
-    """Leave unsaved work behind; return its file."""
+    """Leave an autosave; return its file."""
     slot = Autosaves(tmp_path / "unsaved").new(about)
     slot.write(session)
     slot.release()
@@ -562,7 +564,7 @@ def left(tmp_path, session, about):
 
 
 def bent(arm):
-    """Return the session in a pose."""
+    """Return the session with a pose."""
     session = Session(arm.mesh, state=arm.state)
     up = np.eye(4)
     up[2, 3] = 0.5
@@ -571,7 +573,7 @@ def bent(arm):
     return session
 
 
-# Ending.
+# Closing.
 
 
 @pytest.mark.parametrize("times", [1, pytest.param(30, marks=pytest.mark.campaign)])
@@ -608,7 +610,7 @@ def test_a_window_deleted_by_qt_receives_no_more_calls(tmp_path, ball_file, boxe
     application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
     application().processEvents()
     assert not editor.GetEnabled()
-    session.add_handle([40, 41], "knob")  # and nobody fails to hear
+    session.add_handle([40, 41], "knob")  # no error in a former listener
     application().processEvents()
 
 

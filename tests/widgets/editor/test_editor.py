@@ -1,4 +1,4 @@
-"""The whole editor, by real events: from a bare mesh to a pose, undone, saved and opened again."""
+"""The whole editor by real events: from a mesh to a pose, undone, saved and opened again."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from scenes import sausage
 from scipy.spatial.transform import Rotation
 
 from vtk_segdeform import Session, load_session, models, save_session
-from vtk_segdeform.errors import RegionError
+from vtk_segdeform.errors import CageError, RegionError
 from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.widgets.editor import actions
 from vtk_segdeform.widgets.editor.bindings import BINDINGS
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import Part, Way
@@ -31,7 +32,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 
 class Bench:
-    """An editor in a view, seen from the front with z up, and a hand."""
+    """An editor in a view, seen from the front with z up, and a simulated hand."""
 
     def __init__(self, view: View, session):
         self.view = view
@@ -56,13 +57,13 @@ class Bench:
             self.hand.tick()
 
     def type(self, *keys):
-        """Type keys, "z" or "ctrl+z", and let what they begin be done."""
+        """Type keys such as "z" or "ctrl+z", and wait for the jobs that they start."""
         for key in keys:
             self.hand.key(key.split("+")[-1], control="ctrl+" in key, shift="shift+" in key)
             self.settle()
 
     def around(self, mask):
-        """Return the corners, in order, of a box around vertices as they are seen."""
+        """Return the corners, in order, of a box on the screen around vertices."""
         seen = self.view.to_display(self.session.vertices[mask])[:, :2]
         (x0, y0), (x1, y1) = seen.min(axis=0) - 4.0, seen.max(axis=0) + 4.0
         return [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
@@ -83,7 +84,7 @@ def any_view(request):
 
 @pytest.fixture(scope="module")
 def ready():
-    """Return the state of a small session with everything but a pose."""
+    """Return the state of a small session, complete except for a pose."""
     scene = sausage()
     session = Session(scene.mesh)
     session.set_regions(scene.regions)
@@ -105,14 +106,14 @@ def bench(ready):
 
 @pytest.fixture
 def bare():
-    """Yield an editor over a mesh and nothing else."""
+    """Yield an editor over a mesh without regions."""
     made = Bench(plain_view((500, 400)), sausage().mesh)
     yield made
     made.editor.remove()
 
 
 def pull_handle(bench, shift=(20, 30), moves=4):
-    """Grab the handle in the middle and drag it by as many pixels."""
+    """Drag the handle by its centre, *shift* pixels."""
     name = next(iter(bench.session.handles))
     middle = bench.session.vertices[bench.session.handles[name]].mean(axis=0)
     start = np.array(bench.hand.at(middle))
@@ -188,7 +189,7 @@ def test_the_whole_story(any_view, tmp_path, request):
     bench.type("ctrl+s")
     assert "cactus.segdeform" in bench.editor.status
     assert_array_equal(load_session(bench.editor.path).vertices, turned)
-    if "plain" in request.node.name:  # and in another process; once is enough
+    if "plain" in request.node.name:  # also in another process, once
         reopened = subprocess.run(
             [sys.executable, "-c", REOPEN, str(bench.editor.path)], capture_output=True, cwd=ROOT
         )
@@ -206,7 +207,7 @@ sys.stdout.buffer.write(load_session(sys.argv[1]).vertices.tobytes())
 
 
 def turn_by_a_ring(bench):
-    """Turn the handle about the line of sight, by a sixth of the outermost ring."""
+    """Rotate the handle about the view direction, by a sixth of the outermost ring."""
     dragger = bench.editor.widgets.dragger
     ring = dragger.gizmo.line(Part(Way.ABOUT))[:, :2]
     before = bench.session.targets[dragger.handle]
@@ -217,7 +218,7 @@ def turn_by_a_ring(bench):
     assert np.degrees(turn.magnitude()) == pytest.approx(60.0, abs=8.0)
 
 
-# Modes, keys and words.
+# Modes, keys and messages.
 
 
 def test_each_mode_shows_what_is_missing_and_the_key_that_adds_it(bare):
@@ -267,7 +268,7 @@ def test_each_mode_switches_on_its_own_widget_and_display(bench):
     bench.type("4", "o")
     assert widgets.overlay.is_shown
     bench.type("1")
-    assert not widgets.overlay.is_shown  # one paints on regions, not on volumes
+    assert not widgets.overlay.is_shown  # painting hides the overlay
     bench.type("4")
     assert widgets.overlay.is_shown
 
@@ -303,7 +304,7 @@ def test_without_regions_painting_splits_the_mesh_into_the_stroke_and_the_rest(b
     assert everything.all()
     assert 0 < np.count_nonzero(painted) < len(painted)
     assert "region 2" in bare.editor.status
-    bare.type("g", "a", "z", "z")  # from a new region after many back to none
+    bare.type("g", "a", "z", "z")  # undo to a session without regions
     assert "No regions yet" in bare.editor.status
     bare.hand.click(bare.hand.at([2.0, 0.0, 0.0]))
     assert bare.session.regions.n_regions == 2
@@ -330,7 +331,7 @@ def test_a_key_that_needs_something_else_first_names_it(bare, keys, says):
 def test_the_status_line_reports_vertices_that_a_stroke_left_unchanged(bench):
     hand, held = bench.hand, bench.session.regions.membership.sum(axis=0)
     size = np.count_nonzero(bench.session.regions.membership[0])
-    bench.type("t", "v")  # all of it, through the body
+    bench.type("t", "v")  # a rectangle with X-ray
     hand.drag([(2, 40), (398, 398)], control=True)
     left = np.count_nonzero(bench.session.regions.membership[0])
     assert 0 < left < size
@@ -366,7 +367,7 @@ def test_regions_are_merged_split_grown_and_shrunk(bench):
     assert selector.region == 1
     bench.type("z")
     bench.type("n")
-    assert selector.region == 0  # there is only one again
+    assert selector.region == 0  # only one region is left
 
 
 def test_handles_are_selected_and_removed(bench):
@@ -456,7 +457,9 @@ def test_without_numba_the_status_line_says_so_until_the_first_action(monkeypatc
 
 
 def test_an_error_is_shown_until_an_action_succeeds(bench):
-    bench.hand.click(bench.hand.at([-2.0, 0.0, 0.0]), control=True)  # out of the only region there
+    bench.hand.click(
+        bench.hand.at([-2.0, 0.0, 0.0]), control=True
+    )  # erase where there is only one region
     assert "in no region but region 1" in bench.editor.status
     assert [type(failure).__name__ for failure in bench.hand.failures] == ["RegionError"]
     bench.hand.failures.clear()
@@ -466,7 +469,7 @@ def test_an_error_is_shown_until_an_action_succeeds(bench):
     assert bench.session.undo_label == "paint region 1"
     assert bench.editor.status.startswith("Brush: paint region 1.")
     bench.hand.hover((5, 5))
-    bench.type("m")  # with the pointer beside the mesh
+    bench.type("m")  # the pointer is beside the mesh
     assert "Point at the region" in bench.editor.status
     assert len(bench.hand.failures) == 1
     bench.hand.failures.clear()
@@ -480,6 +483,30 @@ def test_an_internal_error_is_shown_too(bench):
     assert "ZeroDivisionError" in bench.editor.status
     assert bench.hand.failures
     bench.hand.failures.clear()
+
+
+def test_do_returns_the_error_of_an_action_or_none(bench):
+    def fail(controller):
+        raise CageError("no room for it")
+
+    assert bench.editor.do(actions.undo) is None
+    error = bench.editor.do(fail)
+    assert isinstance(error, CageError)
+    assert bench.hand.failures == [error]
+    assert bench.editor.status == "no room for it"
+    bench.editor.controller.start("Counting", lambda _: time.sleep(0.05), lambda _: None)
+    refusal = bench.editor.do(actions.undo)
+    assert str(refusal).startswith("Busy. Counting")
+    assert bench.editor.do(actions.toggle_help, while_busy=True) is None
+    bench.settle()
+    bench.hand.failures.clear()
+
+
+def test_the_status_line_does_not_repeat_a_result_that_the_hint_contains(bench):
+    bench.type("4", "p")
+    assert bench.editor.status.count("Volume preservation off") == 1
+    bench.type("1", "p", "p")
+    assert bench.editor.status.startswith("Volume preservation off · Brush")
 
 
 # Jobs.
@@ -513,7 +540,7 @@ def test_escape_cancels_a_job_and_nothing_is_changed(bare):
     assert not bare.session.can_undo
     assert "Cancelled" in bare.editor.status
     assert bare.hand.failures == []
-    bare.hand.click(bare.hand.at([0.0, -0.8, 0.0]))  # and the brush paints again
+    bare.hand.click(bare.hand.at([0.0, -0.8, 0.0]))  # the brush works again
     assert bare.session.undo_label == "paint region 2"
     bare.type("g")
     assert bare.session.regions is not None
@@ -578,7 +605,7 @@ def test_switching_off_or_removing_the_editor_cancels_its_job(bare):
 def test_the_editor_can_be_left_while_a_job_is_about_to_fail(bare, tmp_path, end):
     bare.editor.path = tmp_path / "none.segdeform"
     bare.hand.key("o", control=True)
-    time.sleep(0.1)  # the job has failed, and nobody was told yet
+    time.sleep(0.1)  # the job has failed but has not been delivered
     getattr(bare.editor, end)()
     assert not bare.editor.is_busy
     assert not bare.editor.GetEnabled()
@@ -603,7 +630,7 @@ def test_another_session_can_be_opened_and_edited(bench, tmp_path):
     assert "Opened" in bench.editor.status
     assert_array_equal(bench.editor.widgets.surface.points, posed)
     assert not bench.session.can_undo
-    first.set_fixed([])  # nobody listens to it any more
+    first.set_fixed([])  # no longer observed
     assert "Opened" in bench.editor.status
     pull_handle(bench, (0, -20))
     assert bench.session.can_undo
@@ -655,7 +682,7 @@ def test_opening_asks_again_after_another_action(bench, tmp_path):
     first = bench.session
     bench.type("x", "ctrl+o", "n", "ctrl+o")
     assert bench.session is first
-    bench.type("z", "ctrl+o")  # as it was saved: nothing to lose
+    bench.type("z", "ctrl+o")  # the saved state: no unsaved changes
     assert bench.session is not first
 
 
@@ -700,7 +727,7 @@ def test_a_session_of_another_mesh_is_framed_by_the_camera(bench, tmp_path):
     assert ((seen > 0) & (seen < [500, 400])).all()
 
 
-# Coming and going.
+# Removing and switching off.
 
 
 def test_removing_the_editor_restores_the_view(any_view):
@@ -720,7 +747,7 @@ def test_removing_the_editor_restores_the_view(any_view):
     bench.hand.key("n")
     assert heard == ["n"]
     session = bench.editor.session
-    session.segment(2)  # nobody listens any more
+    session.segment(2)  # no longer observed
     assert_array_equal(picture(any_view), blank)
     assert bench.hand.failures == []
 

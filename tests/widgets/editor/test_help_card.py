@@ -29,9 +29,9 @@ def test_the_card_fits_into_the_window_and_is_legible_on_any_background(size, ba
     assert 0 < rows[0] < rows[-1] < size[1] - 1
     assert 0 < columns[0] < columns[-1] < size[0] - 1
     inside = seen[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].astype(int).sum(axis=2) / 3
-    assert (inside > 240).mean() > 0.5  # paper
-    assert (inside < 100).mean() > 0.01  # letters
-    # Words keep clear of the rim: nothing is cut off.
+    assert (inside > 240).mean() > 0.5  # background of the card
+    assert (inside < 100).mean() > 0.01  # text
+    # The text keeps clear of the border: nothing is clipped.
     edge = inside[4:-4, 4:-4]
     assert (edge[:, [0, -1]] > 240).all()
     assert (edge[[0, -1]] > 240).all()
@@ -50,7 +50,7 @@ def test_the_card_is_laid_out_again_when_the_window_grows():
     view.render()
     seen = picture(view)
     wide = np.flatnonzero((seen != 255).any(axis=(0, 2)))
-    assert abs((wide[0] + wide[-1]) / 2 - 450) < 3  # in the middle again
+    assert abs((wide[0] + wide[-1]) / 2 - 450) < 3  # centred again
     assert wide[-1] - wide[0] > 300
     card.toggle()
     assert not card.is_shown

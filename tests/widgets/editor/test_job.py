@@ -68,7 +68,7 @@ def test_watch_receives_the_progress_and_finally_the_end():
     while not heard:
         assert time.monotonic() < end
         hand.tick()
-    hand.tick(3)  # nothing new: nobody is told again
+    hand.tick(3)  # nothing new: no further report
     go_on.set()
     tick_until_ended(hand, job)
     assert heard == [(0.25, "a quarter", True), (1.0, "all", False), "done"]
@@ -85,6 +85,20 @@ def test_an_error_of_the_work_reaches_the_listeners_of_failures():
     tick_until_ended(hand, job)
     assert [str(failure) for failure in hand.failures] == ["no cage fits"]
     assert delivered == []
+
+
+def test_an_error_of_the_work_reaches_failed_instead_if_it_is_given():
+    hand = Hand(plain_view())
+    failed = []
+
+    def work(progress):
+        raise CageError("no cage fits")
+
+    job = Job(view_timer(hand.view), work, done=failed.append, failed=failed.append)
+    tick_until_ended(hand, job)
+    assert failed == [job.error]
+    assert isinstance(job.error, CageError)
+    assert not hand.failures
 
 
 def test_an_error_of_done_reaches_them_once():
@@ -157,7 +171,7 @@ def test_wait_delivers_without_an_event_loop():
 
 
 def test_a_computing_thread_makes_progress_while_the_window_is_idle():
-    # Each tick leaves the thread some time; without that 200 of them would be over in no time.
+    # Each tick waits for the worker; otherwise 200 ticks would pass immediately.
     hand = Hand(plain_view())
 
     def work(progress):
@@ -186,7 +200,7 @@ def test_a_job_reports_during_a_camera_drag_and_delivers_after_it():
         assert go_on.wait(20.0)
         return "all"
 
-    hand.press((100, 150))  # the camera style has every event to itself now
+    hand.press((100, 150))  # the camera style now receives all events exclusively
     hand.move((120, 150))
     Job(
         view_timer(view),

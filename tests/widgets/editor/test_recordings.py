@@ -1,4 +1,4 @@
-"""Recording and filming from the editor, by real keys; and the replay that somebody else makes."""
+"""Recordings and videos of the editor, by real keys, and their replay."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_the_input_is_recorded_and_replayed_from_two_files(bench, tmp_path):  # 
     pull_handle(bench, (-15, 5))
     bench.type("3", "d", "ctrl+r")
     assert "Recording saved to" in bench.editor.status
-    bench.type("2")  # no part of it any more
+    bench.type("2")  # not recorded any more
 
     text = tmp_path / "work.recording.txt"
     start = load_session(text.with_suffix(".segdeform"))
@@ -79,7 +79,7 @@ def test_the_status_line_shows_an_ongoing_recording(bench, tmp_path):  # noqa: F
     bench.editor.path = tmp_path / "work.segdeform"
     seen = []
     for key in ("ctrl+r", "ctrl+m", "ctrl+r", "ctrl+m"):
-        bench.type(key, "1", "2")  # what was said of the key is gone
+        bench.type(key, "1", "2")  # the message of the key is gone
         seen.append(picture(bench.view)[-20:])
     bench.type("1", "2")
     last = picture(bench.view)[-20:]

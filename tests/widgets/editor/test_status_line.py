@@ -20,7 +20,7 @@ def line():
 
 
 def strip_height(view) -> int:
-    """Return how many rows from the bottom, at the window's left edge, are not background."""
+    """Return the height of the status line in pixels."""
     column = picture(view)[::-1, -2]
     return int(np.argmax((column == 255).all(axis=1)))
 
@@ -32,7 +32,7 @@ def test_the_line_shows_its_text_immediately(line):
     assert line.text == "fit cages to the regions"
     assert not line.is_warning
     changed = np.flatnonzero((before != after).any(axis=(1, 2)))
-    assert changed.min() > 0.8 * len(after)  # at the bottom and nowhere else
+    assert changed.min() > 0.8 * len(after)  # only at the bottom
 
 
 def test_a_warning_looks_different_until_the_next_text(line):
@@ -58,7 +58,7 @@ def test_a_long_text_takes_two_lines_and_a_warning_four_and_never_more(line, tel
     assert one < two <= full
     assert 0.7 * most < full / one < 1.1 * most
     letters = (picture(line.view)[-full:, -5:] > 200).all(axis=2)
-    assert not letters.any()  # nothing runs out of the window
+    assert not letters.any()  # no text is clipped
     assert line.text.endswith("for any line,")
 
 
@@ -71,11 +71,11 @@ def test_a_word_wider_than_the_window_is_broken(line):
     seen = picture(line.view)
     assert 1.5 * one < high < 3.0 * one
     assert not (seen[-high:, -5:] > 200).all(axis=2).any()
-    # The upper line is full of the path: it is not the sign of the warning alone.
+    # The upper line contains part of the path, not only the sign of the warning.
     assert (seen[-high : -high // 2, 300:-20] > 200).all(axis=2).any()
     line.warn(path)
     without = picture(line.view)
-    assert (seen[-one:] != without[-one:]).any()  # the reason is to be seen
+    assert (seen[-one:] != without[-one:]).any()  # the reason is visible
 
 
 def test_the_line_follows_the_size_of_the_window(line):

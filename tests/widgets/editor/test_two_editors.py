@@ -1,4 +1,4 @@
-"""Two editors side by side in one window: each hears what is meant for it, alone."""
+"""Two editors side by side in one window: each receives only its own events."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_removing_one_editor_leaves_the_display_of_the_other(halves, capfd):
     before = picture(right.view)[:, 400:]
     left.remove()
     assert np.array_equal(picture(right.view)[:, 400:], before)
-    assert (before[-20:] < 128).mean() > 0.5  # the status line is there
+    assert (before[-20:] < 128).mean() > 0.5  # the status line is shown
     assert capfd.readouterr().err == ""
     right.remove()
     assert right.view.window.GetNumberOfLayers() == 1

@@ -164,7 +164,7 @@ def test_two_editors_in_one_view_do_not_block_each_other(stand):
     other = DeformEditor(view, ready())
     other.On()
     try:
-        dragged(stand, during=False)  # the first refines, and the other begins and ends a job
+        dragged(stand, during=False)  # one editor refines while the other runs a job
         done = []
         other.do(lambda c: c.start("counting", lambda _: "counted", done.append))
         stand.until(lambda: done, "the other one's job")
@@ -187,7 +187,7 @@ def test_a_drag_that_loses_the_focus_or_its_release_is_finished(stand, what):
         event = QtCore.QEvent(QtCore.QEvent.WindowDeactivate)
         application().sendEvent(stand.widget, event)
         assert stand.session.is_dragging
-    else:  # in a dialog that came between: the next press, here beside the mesh, ends the drag
+    else:  # released in a dialog: the next press, beside the mesh, ends the drag
         stand.hand.press((5.0, 5.0))
         assert not stand.session.is_dragging
         stand.hand.release((5.0, 5.0))

@@ -40,12 +40,12 @@ MESH = models.cactus(500)
 
 @pytest.fixture
 def state():
-    """Return the mesh and the state of a session that lacks nothing but a pose."""
+    """Return the mesh and the state of a session, complete except for a pose."""
     return small()
 
 
 class Seen:
-    """A widget on the screen, what it told of, and a hand on it."""
+    """A widget on the screen, its signals, and a simulated hand."""
 
     def __init__(self, widget, window=None):
         window = window or widget
@@ -66,7 +66,7 @@ class Seen:
         return self.editor.session
 
     def view_hand(self):
-        """Return a hand on the view, which looks from the front."""
+        """Return a hand on the view, seen from the front."""
         plotter = self.widget.plotter
         plotter.camera_position = "xz"
         plotter.render()
@@ -74,13 +74,13 @@ class Seen:
         return QtHand(plotter.interactor, self.editor.view)
 
     def settle(self):
-        """Let Qt work until no job is running and the panel shows how things are."""
+        """Let Qt run until no job is running and the panel is up to date."""
         application().processEvents()
         until(lambda: not self.editor.is_busy, "the job")
         until(lambda: self.panel.is_up_to_date, "the panel")
 
     def click(self, button):
-        """Click in the middle of a button, or on the box of a check box."""
+        """Click on a button, or on the box of a check box."""
         assert button.isVisible()
         assert button.isEnabled()
         check = isinstance(button, QtWidgets.QCheckBox)
@@ -89,7 +89,7 @@ class Seen:
         self.settle()
 
     def click_row(self, tree, row, column=0, held=Qt.NoModifier):
-        """Click on a row of a list; in a column with a tick on the tick."""
+        """Click on a row of a list; in a column with a tick, on the tick."""
         box = tree.visualItemRect(tree.topLevelItem(row))
         box = tree.visualRect(tree.indexFromItem(tree.topLevelItem(row), column)) if column else box
         place = QtCore.QPoint(box.left() + 10, box.center().y())
@@ -110,7 +110,7 @@ class Seen:
 
 @pytest.fixture
 def make():
-    """Yield a callable that puts a widget over a session on the screen."""
+    """Yield a function that shows a widget over a session."""
     application()
     made = []
 
@@ -133,7 +133,7 @@ def seen(make, state):
 
 
 def delete_now():
-    """Let Qt delete what is to be deleted later, and then what PyQt has for that."""
+    """Let Qt process deferred deletes, and then collect the wrappers of PyQt."""
     for _ in range(2):
         application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
         application().processEvents()
@@ -147,7 +147,7 @@ def rows(tree):
 
 
 def around(seen, mask):
-    """Return two corners of a rectangle around some vertices, as they are seen."""
+    """Return two corners of a rectangle on the screen around some vertices."""
     places = seen.editor.view.to_display(seen.session.vertices[mask])[:, :2]
     return places.min(axis=0) - 4.0, places.max(axis=0) + 4.0
 
@@ -226,11 +226,11 @@ def test_regions_are_selected_merged_and_split_in_the_list(seen):
 
 
 def rename(tree, name):
-    """Type another name for the row that is chosen."""
+    """Type another name for the selected row."""
     tree.setFocus()
     QtTest.QTest.keyClick(tree, Qt.Key_F2)
     field = tree.viewport().findChild(QtWidgets.QLineEdit)
-    field.setText(name)  # a keyboard has no keys for all of them
+    field.setText(name)  # a keyboard lacks some of its letters
     QtTest.QTest.keyClick(field, Qt.Key_Return)
 
 
@@ -292,6 +292,20 @@ def test_handles_are_renamed_selected_and_removed_in_the_list(seen):
     assert [name for name, _ in rows(tree)] == ["Fixed", "New handle (not painted yet)"]
 
 
+def test_a_handle_called_fixed_is_not_mistaken_for_the_fixed_vertices(seen):
+    seen.session.rename_handle(next(iter(seen.session.handles)), "Fixed")
+    seen.mode(Mode.HANDLES)
+    tree, selector = seen.panel.handles.list, seen.editor.widgets.selector
+    assert [name for name, _ in rows(tree)][:2] == ["Fixed", "Fixed"]
+    seen.click_row(tree, 0)
+    assert selector.paints is Paint.FIXED
+    assert not seen.panel.handles.remove.isEnabled()
+    seen.click_row(tree, 1)
+    assert (selector.paints, selector.handle) == (Paint.HANDLE, "Fixed")
+    seen.click(seen.panel.handles.remove)
+    assert not seen.session.handles
+
+
 def test_options_are_steps_and_are_shown_when_they_are_undone(make):
     seen = make(models.sphere(300))
     seen.mode(Mode.CAGES)
@@ -334,7 +348,7 @@ def test_the_panel_follows_keys_and_the_wheel(seen):
     assert part.radius.value() == pytest.approx(1.2 * before, rel=1e-3)
     seen.type_number(part.radius, 0.25)
     assert seen.editor.widgets.selector.radius == pytest.approx(0.25)
-    for key in "qe4":  # the first two would end a window of pyvista's, or VTK's
+    for key in "qe4":  # Q and E would close a window of pyvista or VTK
         hand.key(key)
     seen.settle()
     assert seen.panel.toolbar.modes[Mode.DEFORM].isChecked()
@@ -363,7 +377,7 @@ def test_a_job_shows_its_progress_and_is_cancelled(seen):
     foot = seen.panel.status
     until(lambda: foot.bar.isVisible() and foot.bar.value() == 400, "the bar")
     assert foot.words.text() == "Counting: by hand · 40 % · Esc to cancel"
-    assert not seen.panel.regions.segment.isEnabled()  # nothing else is done meanwhile
+    assert not seen.panel.regions.segment.isEnabled()  # nothing else is possible meanwhile
     assert not seen.panel.toolbar.modes[Mode.DEFORM].isEnabled()
     QtTest.QTest.mouseClick(foot.cancel, Qt.LeftButton)
     until(lambda: "Stopping" in foot.words.text(), "the answer")
@@ -376,7 +390,7 @@ def test_a_job_shows_its_progress_and_is_cancelled(seen):
 
 
 def bend(seen, height=0.4):
-    """Lift the handle, by a script."""
+    """Move the handle upwards by a script."""
     shift = np.eye(4)
     shift[2, 3] = height
     seen.session.move_handle("handle 1", shift)
@@ -398,7 +412,7 @@ def test_the_history_unfolds_is_copied_and_cleared(seen):
     part.list.setFocus()
     QtTest.QTest.keyClick(part.list, Qt.Key_C, Qt.ControlModifier)
     assert clipboard.text() == texts[-1]
-    for _ in range(2):  # more than the log holds
+    for _ in range(2):  # more than the limit of the log
         for k in range(150):
             seen.editor.controller.log.add_job(f"job {k}", 1.0, "done")
         part.refresh()
@@ -420,7 +434,7 @@ def test_the_colour_range_is_typed_and_kept_for_the_next_session(seen, tmp_path)
     chosen = overlay().half_range
     seen.type_number(part.range, 37.5)
     assert overlay().half_range == 0.375 != chosen
-    assert seen.session.undo_label == "drag handle 1"  # it is no step
+    assert seen.session.undo_label == "drag handle 1"  # the range is not an undo step
     seen.editor.save(tmp_path / "a.segdeform")
     seen.editor.load(tmp_path / "a.segdeform")
     seen.settle()
@@ -433,7 +447,7 @@ def test_the_colour_range_is_typed_and_kept_for_the_next_session(seen, tmp_path)
 
 def test_an_error_is_shown_emitted_and_then_cleared(seen):
     seen.mode(Mode.HANDLES)
-    seen.panel.handles.list.topLevelItem(1).setText(0, "")  # no name for a handle
+    seen.panel.handles.list.topLevelItem(1).setText(0, "")  # not a valid name
     seen.settle()
     (error,) = seen.errors
     assert "name" in error
@@ -459,11 +473,11 @@ def test_a_session_is_saved_and_opened_again(seen, tmp_path, monkeypatch):
     assert list(load_session(path).handles) == ["handle 1"]
     before = seen.session
     answer(monkeypatch, path)
-    seen.click(seen.panel.toolbar.open)  # saved: no question
+    seen.click(seen.panel.toolbar.open)  # saved, so no question
     assert seen.sessions == [seen.session]
     assert seen.session is not before
     assert seen.session.regions.n_regions == len(rows(seen.panel.regions.list)) == 2
-    before.merge_regions([0, 1])  # the one that went is nobody's business any more
+    before.merge_regions([0, 1])  # the previous session is no longer observed
     assert seen.regions == []
     seen.session.merge_regions([0, 1])
     assert seen.regions == [seen.session.regions]
@@ -485,7 +499,7 @@ def test_unsaved_changes_are_discarded_only_if_confirmed(seen, tmp_path, monkeyp
         seen.click(seen.panel.toolbar.open)
         assert (seen.session is not before) is goes
     assert seen.session.mesh.n_vertices == models.sphere(300).n_vertices
-    assert seen.editor.path == tmp_path / "ball.segdeform"  # a mesh is not written over
+    assert seen.editor.path == tmp_path / "ball.segdeform"  # a mesh is never overwritten
 
 
 def test_the_deformed_mesh_is_written(seen, tmp_path, monkeypatch):
@@ -499,7 +513,7 @@ def test_the_deformed_mesh_is_written(seen, tmp_path, monkeypatch):
 
 
 def with_arrays():
-    """Return an ellipsoid with something of everything that a surface can have."""
+    """Return an ellipsoid with every kind of data that a surface can have."""
     mesh, _ = small()
     surface = to_polydata(mesh)
     rng = np.random.default_rng(1)
@@ -523,7 +537,7 @@ def test_a_surface_is_written_back_with_all_its_arrays(make, tmp_path, monkeypat
     now = seen.widget.deformed_polydata()
     assert_array_equal(now.points, seen.session.vertices)
     assert_array_equal(surface.points, mesh.vertices)
-    surface.point_data.clear()  # ours is as it was when it was given
+    surface.point_data.clear()  # the widget has its own copy
     everything = {"heat", "RGB", "flow", "uv"}
     for name, holds in {
         "a.vtp": everything, "a.vtk": everything, "a.vtkhdf": everything, "a.ply": {"heat", "RGB"},
@@ -539,7 +553,7 @@ def test_a_surface_is_written_back_with_all_its_arrays(make, tmp_path, monkeypat
         assert_array_equal(read.active_texture_coordinates, now.point_data["uv"])
     assert seen.errors == []
 
-    # The same from a file, of which a session file remembers the mesh alone.
+    # The same from a file; a session file stores its mesh only.
     answer(monkeypatch, tmp_path / "a.vtp")
     seen.editor.save(tmp_path / "a.segdeform")
     seen.click(seen.panel.toolbar.open)
@@ -549,7 +563,7 @@ def test_a_surface_is_written_back_with_all_its_arrays(make, tmp_path, monkeypat
     seen.editor.save(tmp_path / "b.segdeform")
     seen.editor.load(tmp_path / "b.segdeform")
     assert set(seen.widget.deformed_polydata().point_data.keys()) == everything
-    seen.editor.load(tmp_path / "a.segdeform")  # of another mesh
+    seen.editor.load(tmp_path / "a.segdeform")  # with another mesh
     assert seen.widget.deformed_polydata().point_data.keys() == []
     assert_array_equal(seen.widget.deformed_polydata().points, seen.session.vertices)
 
@@ -580,11 +594,11 @@ def test_two_widgets_and_a_dock_in_one_window_are_independent(state):
     hands[1].click_row(second.panel.regions.list, 1)
     hands[1].click(second.panel.regions.split)
     assert [seen.session.regions.n_regions for seen in hands] == [2, 3, 2]
-    first.close()  # one goes, the others stay
+    first.close()  # the others stay
     hands[2].mode(Mode.DEFORM)
     assert not first.editor.GetEnabled()
     assert second.editor.GetEnabled()
-    plotter.close()  # the dock's editor goes with the view it is in
+    plotter.close()  # this removes the dock's editor
     assert not dock.editor.GetEnabled()
     until(lambda: not dock.panel.isEnabled(), "the panel")
     second.close()
@@ -604,7 +618,7 @@ def test_a_window_deleted_by_qt_releases_everything(state):
     window.deleteLater()
     delete_now()
     assert not editor.GetEnabled()
-    session.merge_regions([0, 1])  # and nobody listens any more, nor fails to
+    session.merge_regions([0, 1])  # no longer observed, and no error
     application().processEvents()
 
 
@@ -631,7 +645,7 @@ def test_deleting_a_dock_leaves_the_editor_unchanged(state):
     delete_now()
 
 
-# For everybody.
+# Accessibility.
 
 
 @pytest.mark.parametrize("mode", list(Mode))
@@ -658,7 +672,7 @@ def test_every_control_is_reached_by_tab_and_has_a_tooltip(seen, mode):
     assert heights == sorted(heights)  # from the top down
     assert {each for each in wanted if each.focusPolicy() != Qt.NoFocus} <= reached
     exclusive = {each for each in wanted - reached if each.group() is not None}
-    assert wanted - reached == exclusive  # where arrows lead
+    assert wanted - reached == exclusive  # reached by the arrow keys
     here = seen.panel.toolbar.modes[mode]
     here.setFocus()
     QtTest.QTest.keyClick(here, Qt.Key_Left if mode is Mode.DEFORM else Qt.Key_Right)
@@ -702,7 +716,7 @@ def test_the_example_of_an_application_runs(tmp_path):
     )  # fmt: skip
     colours = np.array(Image.open(tmp_path / "window.png").convert("RGB")).astype(int)
     body = (np.ptp(colours, axis=2) > 10) & (colours.mean(axis=2) < 220)
-    assert 0.04 < body.mean() < 0.5  # the cactus, the mode that is on, the status line
+    assert 0.04 < body.mean() < 0.5  # the cactus, the current mode, the status line
 
 
 def test_a_bad_argument_is_one_of_our_errors_before_anything_is_created():
