@@ -34,7 +34,7 @@ if not show:
     path = [f"MouseMove {x + dx:.0f} {y - dx / 3:.0f}" for dx in np.linspace(0.0, 100.0, 11)]
     recording = [
         "vtk_segdeform recording 1",
-        "0.0 KeyPress 400 300 key=g",  # find regions
+        "0.0 KeyPress 400 300 key=g",  # auto-segment
         "1.0 KeyPress 400 300 key=f",  # fit cages
         "2.0 KeyPress 400 300 key=4",  # drag handles
         f"3.0 {path[0]}",
