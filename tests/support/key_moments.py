@@ -311,7 +311,14 @@ class Stand:
         self.begin(Mode.DEFORM)
         overlay, place = self.editor.widgets.overlay, self.drag(Mode.DEFORM)
         assert not overlay.is_prepared
-        self._meanwhile("o", place, during=during)
+        released, prepare = threading.Event(), overlay.prepare
+
+        def prepare_after_release():  # otherwise the job could end while the key is handled
+            assert released.wait(LONGEST)
+            prepare()
+
+        overlay.prepare = prepare_after_release
+        self._meanwhile("o", place, during=during, released=released)
         assert overlay.is_shown
 
     def film_that_ends(self, *, during: bool) -> None:
@@ -324,8 +331,13 @@ class Stand:
         self._meanwhile("ctrl+m", place, during=during)
         assert len(set(self.folder.glob("work.film*")) - before) == 1
 
-    def _meanwhile(self, key: str, place: np.ndarray, *, during: bool) -> None:
-        """Start a job by *key* before or after the release at *place*; nothing must be lost."""
+    def _meanwhile(
+        self, key: str, place: np.ndarray, *, during: bool, released: threading.Event | None = None
+    ) -> None:
+        """Start a job by *key* before or after the release at *place*; nothing must be lost.
+
+        *released* is set once the button is up, so that the job may end.
+        """
         if not during:
             self.hand.release(place)
             assert self.editor.widgets.dragger.is_refining
@@ -333,6 +345,8 @@ class Stand:
         assert self.editor.is_busy
         if during:
             self.hand.release(place)
+        if released is not None:
+            released.set()
         self.settle()
         assert self.session.solution.status is Status.CONVERGED
         assert Story.of(self.session).labels == [STEPS[Mode.DEFORM]]
