@@ -49,9 +49,9 @@ if len(sys.argv) > 1:
     plotter.set_background("white")
     for panel, shown in enumerate((grid, bent)):
         plotter.subplot(0, panel)
-        plotter.add_mesh(shown, color="lightsteelblue", show_edges=True)
+        plotter.add_mesh(shown, color="aliceblue", show_edges=True)
     plotter.link_views()
     plotter.camera_position = [(0.9, -2.9, 1.1), (0.15, 0.0, 0.45), (0.0, 0.0, 1.0)]
-    plotter.camera.zoom(1.5)
+    plotter.camera.zoom(1.3)
     plotter.screenshot(folder / "grids.png")
     plotter.close()

@@ -68,9 +68,9 @@ def picture(name):
 height = mesh.vertices[:, 2]
 keys("g", "f", "2")
 picture("editor-cages")
-keys("3", "t", "v", "s")  # fixed vertices: a rectangle, through the body
+keys("3", "t", "v", "s")  # a rectangle with X-ray, for fixed vertices
 drag(around(height < 0.08))
-keys("d")  # handle: likewise
+keys("d")  # for the handle
 drag(around(height > 0.92))
 keys("4", "o")
 

@@ -2,7 +2,7 @@
 Editor in a plotter
 ===================
 
-The editor in a PyVista plotter, beside other meshes. A recording of keys and a drag drives it here.
+The editor in a PyVista plotter, next to other meshes. A recording of keys and a drag works it here.
 
     python examples/editor_in_a_plotter.py show
 
@@ -39,7 +39,7 @@ if not show:
     path = [f"MouseMove {x + dx:.0f} {y - dx / 3:.0f}" for dx in np.linspace(0.0, 100.0, 11)]
     recording = [
         "vtk_segdeform recording 1",
-        "0.0 KeyPress 400 300 key=g",  # segment
+        "0.0 KeyPress 400 300 key=g",  # auto-segment
         "1.0 KeyPress 400 300 key=f",  # fit cages
         "2.0 KeyPress 400 300 key=4",  # deform
         f"3.0 {path[0]}",

@@ -1,16 +1,16 @@
-"""Interactive pieces over a plain VTK renderer or a pyvista plotter.
+"""Interactive widgets for a plain VTK renderer or a pyvista plotter.
 
     from vtk_segdeform.widgets import DeformEditor
 
     editor = DeformEditor(plotter, mesh)          # or ((renderer, interactor), session)
     editor.On()
 
-`RegionSelector` paints regions, fixed vertices and handles, `CageDisplay` shows cages and lets
-their vertices be dragged, `HandleDragger` moves and turns handles, `VolumeOverlay` shows where
-the body swells; `DeformEditor` is the four over one `Session`, with modes and keys.  Each works
-alone as well.  `Recorder` and `replay` keep what hands do, `film` what a session does.
+`RegionSelector` paints regions, fixed vertices and handles; `CageDisplay` shows cages and drags
+their vertices; `HandleDragger` moves and rotates handles; `VolumeOverlay` shows the local volume
+change.  Each of them works alone; `DeformEditor` combines all four over one `Session`, with modes
+and keys.  `Recorder` and `replay` record and repeat the input, `film` makes a video of a session.
 
-Widgets turn events into our words and ask a session; they never compute.
+Widgets translate events into calls of a session; they compute nothing themselves.
 """
 
 from .cage_display import CageDisplay

@@ -1,15 +1,15 @@
-"""What pyvista's plotters and meshes can do once this package is there, and `edit`.
+"""The extension of pyvista's plotters and meshes, and `edit`.
 
-    plotter.segdeform.edit(mesh)                     the editor, in a plotter of yours
-    plotter.segdeform.add_volume_overlay(session)    how the volume changes, in colours
-    mesh.segdeform(fixed, handle, targets)    a deformed copy, arrays and all
+    plotter.segdeform.edit(mesh)                     the editor, in an existing plotter
+    plotter.segdeform.add_volume_overlay(session)    the local volume change, in colours
+    mesh.segdeform(fixed, handle, targets)    a deformed copy with all arrays
     mesh.segdeform.regions(3)                        a copy with arrays of its regions
-    mesh.segdeform.check()                           what keeps it from being deformed
+    mesh.segdeform.check()                           the faults that prevent deforming it
     mesh.segdeform.repair()                          a repaired copy, with its arrays
 
-pyvista finds this module by its entry points, when ``segdeform`` is first asked for.  pyvistaqt
-hides those of plotters: there, and where the package is not installed, ``import vtk_segdeform``
-after pyvista does it, or ``import vtk_segdeform.widgets.plugin``.
+pyvista finds this module by its entry points when ``segdeform`` is first used.  pyvistaqt hides
+those of plotters: there, and if the package is not installed, ``import vtk_segdeform`` after
+pyvista or ``import vtk_segdeform.widgets.plugin``.
 """
 
 from __future__ import annotations
@@ -50,28 +50,28 @@ def edit(mesh: Session, *, path: _Path = None, title: str = ...) -> Session: ...
 @overload
 def edit(mesh: pv.PolyData, *, path: _Path = None, title: str = ...) -> pv.PolyData: ...
 def edit(mesh: Any, *, path: _Path = None, title: str = "segdeform") -> Any:
-    """Open a window to deform *mesh* in; return what it is like when the window closes.
+    """Open a window to deform *mesh*; return the deformed mesh when the window closes.
 
     Parameters
     ----------
     mesh : Mesh, pyvista.PolyData or Session
-        A closed surface; or a session to go on with.
+        A closed surface, or a session to continue.
     path : path, optional
-        Where the editor's keys save the session to and open it from.
+        The file that the editor's keys save and open.
     title : str
-        Of the window.
+        Title of the window.
 
     Returns
     -------
     deformed : of the type of *mesh*
-        A deformed copy; of a PolyData with all its arrays.  A session is the same one, unless
-        another was opened in the editor.  Off-screen, with pyvista's OFF_SCREEN, the window
-        closes at once.
+        A deformed copy; a PolyData with all its arrays.  A session is returned itself, unless
+        another one was opened in the editor.  With pyvista's OFF_SCREEN the window closes at
+        once.
 
     Raises
     ------
     MeshError
-        If *mesh* is a PolyData that is no closed, outward oriented two-manifold.
+        If *mesh* is a PolyData but not a closed, outward oriented two-manifold.
     MissingDependencyError
         If there is no screen.
     """
@@ -94,7 +94,7 @@ def edit(mesh: Any, *, path: _Path = None, title: str = "segdeform") -> Any:
 
 
 def deformed(surface: pv.PolyData, session: Session) -> pv.PolyData:
-    """Return a copy of *surface* as *session* has it, or the session's mesh if it is another."""
+    """Return a deformed copy of *surface*, or the session's mesh if that is another one."""
     require(surface, pv.PolyData, "surface")
     require(session, Session, "session")
     if surface.n_points == session.mesh.n_vertices:
@@ -104,14 +104,14 @@ def deformed(surface: pv.PolyData, session: Session) -> pv.PolyData:
 
 @pv.register_plotter_component("segdeform")
 class PlotterTools:
-    """Deformation in a plotter, also in pyvistaqt's; ``plotter.segdeform``.
+    """Deformation in a plotter, including those of pyvistaqt; ``plotter.segdeform``.
 
-    What is `added` here is taken out again before the plotter closes.
+    Everything in `added` is removed before the plotter closes.
 
     Parameters
     ----------
     plotter : pyvista.BasePlotter
-        Where.
+        The plotter to extend.
     """
 
     def __init__(self, plotter: pv.BasePlotter) -> None:
@@ -119,17 +119,17 @@ class PlotterTools:
         self.added: list[DeformEditor | VolumeOverlay] = []
 
     def edit(self, mesh: Mesh | pv.PolyData | Session, *, path: _Path = None) -> DeformEditor:
-        """Put the editor into the plotter, in the subplot in hand, and switch it on.
+        """Add the editor to the current subplot of the plotter, and switch it on.
 
-        What the plotter shows of *mesh* already is hidden: the editor draws it itself.
+        Actors of *mesh* in the plotter are hidden, because the editor draws the mesh itself.
 
         Parameters
         ----------
         mesh : Mesh, pyvista.PolyData or Session
-            What to edit; it is left as it is but for a session.  The editor's session has the
-            deformed vertices, in the same order.
+            What to edit.  A mesh is not changed; the editor's session has the deformed vertices,
+            in the same order.
         path : path, optional
-            Where the editor's keys save the session to and open it from.
+            The file that the editor's keys save and open.
         """
         from .editor import DeformEditor
 
@@ -140,7 +140,7 @@ class PlotterTools:
                 if getattr(getattr(actor, "mapper", None), "dataset", None) is mesh:
                     actor.visibility = False
         editor = DeformEditor(self._plotter, session)
-        editor.desk.file.surface = surface_of(mesh)
+        editor.controller.file.surface = surface_of(mesh)
         self.added.append(editor)
         if path is not None:
             editor.path = path
@@ -150,7 +150,7 @@ class PlotterTools:
         return editor
 
     def add_volume_overlay(self, session: Session) -> VolumeOverlay:
-        """Show the mesh of *session*, coloured by its local volume change, with a scale."""
+        """Show the mesh of *session*, coloured by its local volume change, with a colour scale."""
         from .volume_overlay import VolumeOverlay
 
         if not isinstance(session, Session):
@@ -167,11 +167,12 @@ class PlotterTools:
 
 @pv.register_dataset_accessor("segdeform", pv.PolyData)
 class PolyDataTools:
-    """Deformation of a surface; ``mesh.segdeform``.  The surface is left as it is.
+    """Deformation of a surface; ``mesh.segdeform``.  The surface itself is not changed.
 
     Parameters
     ----------
     surface : pyvista.PolyData
+        The surface.
     """
 
     def __init__(self, surface: pv.PolyData) -> None:
@@ -188,10 +189,10 @@ class PolyDataTools:
         preserve_volume: bool = True,
         progress: Progress | None = None,
     ) -> pv.PolyData:
-        """Return a deformed copy, handle points at *targets*, all arrays kept, normals anew.
+        """Return a deformed copy with the handle points at *targets* and all arrays.
 
-        The parameters, and what is raised, are those of `vtk_segdeform.deform`, which also tells
-        how the solver fared; here a handle that misses its target is only logged.
+        Normals are recomputed.  Parameters and exceptions are those of `vtk_segdeform.deform`,
+        which also returns the solver's status; here a missed target is only logged.
         """
         solution = deform(
             io.from_polydata(self._surface), fixed, handle, targets,
@@ -199,21 +200,22 @@ class PolyDataTools:
             preserve_volume=preserve_volume, progress=progress,
         )  # fmt: skip
         if solution.handle_error > _HANDLE_MET:
-            _log.warning("handle off by %.1e diagonals: %s", solution.handle_error, solution.status)
+            error = 100.0 * solution.handle_error
+            _log.warning("handle error %.2g %% of model size: %s", error, solution.status)
         return io.with_vertices(self._surface, solution.vertices)
 
     def regions(self, n_regions: int | None = 3, progress: Progress | None = None) -> pv.PolyData:
-        """Return a copy with the regions that a deformation would have, as point arrays.
+        """Return a copy with the regions used by a deformation, as point arrays.
 
-        ``region`` (n,) int is the region with the most weight, ``regions_here`` (n,) int in how
-        many a point is, ``region_weights`` (n, r) float their weights, which sum to 1.
+        ``region`` (n,) int is the region with the largest weight, ``regions_here`` (n,) int the
+        number of regions at a point, ``region_weights`` (n, r) float their weights, which sum to 1.
 
         Parameters
         ----------
         n_regions : int or None
-            How many; None lets `vtk_segdeform.segment` choose.
+            Number of regions; None lets `vtk_segdeform.segment` choose.
         progress : Progress, optional
-            Called meanwhile; may cancel.
+            Progress callback; may cancel.
         """
         found = segment(io.from_polydata(self._surface), n_regions, progress=progress)
         copy = self._surface.copy()
@@ -223,12 +225,12 @@ class PolyDataTools:
         return copy
 
     def check(self) -> MeshReport:
-        """Return what keeps the surface from being deformed: ``.ok``, ``.faults``, as text."""
+        """Return the faults that prevent deforming the surface: ``.ok``, ``.faults``."""
         points = np.asarray(self._surface.points, dtype=np.float64)
         return find_faults(points, triangles_of(self._surface))
 
     def repair(self, *, weld_distance: float = 0.0, largest_hole: int = 100) -> pv.PolyData:
-        """Return a repaired copy; polygons and arrays are kept wherever faces are kept.
+        """Return a repaired copy with the polygons and arrays of all remaining faces.
 
         Each repair, loss and remaining hole is logged on a line of its own.  The parameters are
         those of `vtk_segdeform.repair`.
@@ -244,12 +246,12 @@ class PolyDataTools:
 
 
 def surface_of(mesh: object) -> pv.PolyData | None:
-    """Return a PolyData with what else *mesh* has, if it is one, to be written with its pose."""
+    """Return a shallow copy of *mesh* if it is a PolyData, to save its arrays with the pose."""
     return mesh.copy(deep=False) if isinstance(mesh, pv.PolyData) else None
 
 
 def session_of(mesh: Mesh | pv.PolyData | Session) -> Session:
-    """Return a session over *mesh*, or the session that it is."""
+    """Return a session over *mesh*; a session is returned itself."""
     if isinstance(mesh, Session | Mesh):
         return mesh if isinstance(mesh, Session) else Session(mesh)
     if isinstance(mesh, pv.PolyData):

@@ -47,6 +47,7 @@ def main() -> None:
     plotter.camera.view_angle = 22.0
     plotter.show(interactive=False, auto_close=False)
     film(FILE, view, frames(plotter, view, dragger.gizmo.centre), fps=25)
+    dragger.Off()  # finishes the drag
     plotter.close()
 
 
@@ -58,11 +59,10 @@ def frames(plotter: pv.Plotter, view: View, start: Any) -> Iterator[Callable[[],
     path = PIVOT + arm * np.stack([np.sin(angles), 0.0 * angles, np.cos(angles)], axis=1)
     for k, place in enumerate(view.to_display(path)[:, :2].round()):
 
-        def play(place: Any = place, first: bool = k == 0, last: bool = k == N_FRAMES - 1) -> None:
+        def play(place: Any = place, first: bool = k == 0) -> None:
             at = f"{place[0]:.0f} {place[1]:.0f}"
             press = [f"0.0 LeftButtonPress {at}"] if first else []
-            release = [f"0.0 LeftButtonRelease {at}"] if last else []
-            lines = [f"0.0 MouseMove {at}", *press, "0.0 Timer 8", *release]
+            lines = [f"0.0 MouseMove {at}", *press, "0.0 Timer 8"]
             arrow.SetPosition(*place)
             replay(plotter, ["vtk_segdeform recording 1", *lines])
 

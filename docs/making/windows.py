@@ -35,7 +35,7 @@ def main() -> None:
         window = Window()
         window.resize(1180, 740)
         window.show()
-        window.open_cactus()
+        window.open_sample()
         when_idle(story(window, lambda: window.editor if window.has_mesh else None, "app.png"))
         application.exec()
         sys.argv = ["qt_application"]
@@ -71,9 +71,9 @@ def story(window: Any, editor_of: Callable[[], DeformEditor | None], name: str) 
     camera.SetViewUp(0.0, 0.0, 1.0)
     editor.mode = Mode.DEFORM
     yield editor.is_busy
-    editor.do(toggle_overlay)
     if name == "app.png":
         editor.do(toggle_cages)
+    editor.do(toggle_overlay)
     while editor.is_busy:
         yield True
     yield False

@@ -1,7 +1,7 @@
-"""Hands for the desktop program: a window on a screen, and somebody who answers its questions.
+"""Simulated hands for the desktop program: a window on a screen, and answers to its dialogs.
 
-Run by itself it waits for lines such as "drag FOLDER", and for each starts a program that drags,
-or else saves, or rests after a drag, until it is killed; ``FOLDER/told`` says what it does.
+Run as a program, it waits for lines such as "drag FOLDER" and for each starts a program that drags,
+saves, or rests after a drag, until it is killed; ``FOLDER/told`` contains its reports.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ INTERVAL = 0.3  # seconds
 
 
 def ready_session() -> Session:
-    """Return a session that lacks nothing but a pose."""
+    """Return a session, complete except for a pose."""
     scene = sausage()
     session = Session(scene.mesh)
     session.set_regions(scene.regions)
@@ -37,7 +37,7 @@ def ready_session() -> Session:
 
 
 def digest(session: Session) -> str:
-    """Return what tells one pose from another, to the last bit of what is seen and kept."""
+    """Return a digest of the pose, which differs if any stored bit differs."""
     pose, parts = session.state.pose, [session.vertices, session.fixed]
     if pose is not None:
         parts += [*pose.cage_vertices, *pose.targets.values()]
@@ -48,7 +48,7 @@ def digest(session: Session) -> str:
 
 
 class Boxes(QtCore.QObject):
-    """Somebody who reads each box and clicks what was agreed on; with none agreed, closes it.
+    """A user who reads each dialog and gives the next prepared answer, or else closes it.
 
     Attributes
     ----------
@@ -100,19 +100,19 @@ class AppHand:
 
     @property
     def title(self):
-        """The title as it is read: with a star if something is not saved."""
+        """The visible title: with a star if there are unsaved changes."""
         star = "*" if self.window.isWindowModified() else ""
         return self.window.windowTitle().replace("[*]", star)
 
     def settle(self):
-        """Let the window get on until nothing is opened, worked at or still to be kept."""
+        """Let the window run until nothing is being opened, computed or autosaved."""
         application().processEvents()
         until(lambda: self.page is not self.window.pages.waiting, "the file")
         if self.window.has_mesh:
             until(lambda: not self.window.editor.is_busy, "the job")
-            dragger = self.window.editor.stage.dragger
+            dragger = self.window.editor.widgets.dragger
             until(lambda: not dragger.is_refining, "refinement")
-        until(lambda: self.window.keeper.is_idle, "the keeper")
+        until(lambda: self.window.autosaver.is_idle, "the autosave")
 
     def click(self, button):
         assert button.isVisible()
@@ -121,7 +121,7 @@ class AppHand:
         application().processEvents()
 
     def choose(self, *path):
-        """Click through menus, by the beginnings of what they say."""
+        """Click through menus, by the beginnings of their labels."""
         bar = self.window.menuBar()
         action = _named(bar, path[0])
         _click(bar, action)
@@ -134,7 +134,7 @@ class AppHand:
         application().processEvents()
 
     def reads(self, *path):
-        """Return what a menu says, once it is open: (can it be chosen, is it ticked) by text."""
+        """Return (is enabled, is ticked) of the entries of an open menu, by label."""
         bar = self.window.menuBar()
         action = _named(bar, path[0])
         menus = [action.menu()]
@@ -164,8 +164,8 @@ class AppHand:
         return QtHand(plotter.interactor, editor.view)
 
     def way(self, *, by=(0.0, 60.0), steps=6):
-        """Return places on the screen that lead away from the middle of the handle."""
-        view, gizmo = self.window.editor.view, self.window.editor.stage.dragger.gizmo
+        """Return a path on the screen that starts at the centre of the handle."""
+        view, gizmo = self.window.editor.view, self.window.editor.widgets.dragger.gizmo
         start = view.to_display(np.array([gizmo.centre]))[0, :2]
         return [start + t * np.array(by) for t in np.linspace(0.0, 1.0, steps)]
 
@@ -183,17 +183,17 @@ def _click(menu, action):
 
 
 def slots(folder: Path) -> list[Path]:
-    """Return the files in which unsaved work is kept now, beside the settings in *folder*."""
+    """Return the current autosave files beside the settings in *folder*."""
     return sorted((folder / "unsaved").glob("*/session.segdeform"))
 
 
 def settings_in(folder: Path):
-    """Return settings that are not the user's."""
+    """Return settings for the tests."""
     return QtCore.QSettings(str(folder / "settings.ini"), QtCore.QSettings.Format.IniFormat)
 
 
 def delete(window) -> None:
-    """Close a window, and have nothing live on that Qt deletes with it.
+    """Close a window and release everything that Qt deletes with it.
 
     PySide would take what is new in the same place for what the views remember; of a test that
     failed they live on.
@@ -211,9 +211,9 @@ def delete(window) -> None:
 
 
 def _start_programs() -> None:
-    """Fork one for each line: what takes long, imports and what is compiled, is done once."""
+    """Fork a program for each line, so that imports and compilation happen once."""
     ready_session().bind()
-    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for them
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # do not wait for children
     for line in sys.stdin:
         if os.fork() == 0:
             signal.signal(signal.SIGCHLD, signal.SIG_DFL)
@@ -222,7 +222,7 @@ def _start_programs() -> None:
 
 
 def _run(what: str, folder: Path) -> None:
-    """Be the program: with a new session in every step, a file of it, and a drag on the view."""
+    """Run the program: open the session, then drag, rest or save, and report each step."""
     told = os.open(folder / "told", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
 
     def tell(*words):
@@ -246,7 +246,7 @@ def _run(what: str, folder: Path) -> None:
         until(lambda: what == "drag", "the end", 60.0)
         there = hand.way(by=(0.0, -90.0), steps=20)
         view.press(there[0])
-        while True:  # to and fro, and never let go
+        while True:  # back and forth, without releasing
             for place in [*there, *reversed(there)]:
                 view.move(place)
                 tell("moved")
@@ -259,13 +259,13 @@ def _run(what: str, folder: Path) -> None:
 
 
 def _told_poses(tell):
-    """Return what tells of a session's pose, if it is new; what is kept is told of as well."""
+    """Return a function that reports new poses of a session; autosaves are reported as well."""
     digests, poses, write = {}, [], Slot.write
 
     def tell_pose(session):
         pose = session.state.pose
         if id(pose) not in digests:
-            poses.append(pose)  # so that no other gets its number
+            poses.append(pose)  # so that its id is not reused
             digests[id(pose)] = digest(session)
             tell("pose", digests[id(pose)])
 

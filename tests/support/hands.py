@@ -1,4 +1,4 @@
-"""Hands for the tests: real interactor events, at display coordinates, and nothing else.
+"""Simulated hands for the tests: real interactor events at display coordinates.
 
 Where nothing can be rendered, VTK ends the process on its first picture: the tests of whoever
 imports this are skipped there.
@@ -73,7 +73,7 @@ class OneTimerHost:
 
 
 def picture(view: View) -> np.ndarray:
-    """Return what is seen, (h, w, 3) uint8, upper row first."""
+    """Return the picture of the view, (h, w, 3) uint8, upper row first."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
@@ -106,7 +106,7 @@ class Hand:
         view.on_failure(self.failures.append)
 
     def at(self, point: Iterable[float]) -> tuple[float, float]:
-        """Return where a world *point* is seen."""
+        """Return the display coordinates of a world *point*."""
         x, y, _ = self.view.to_display(np.array([list(point)]))[0]
         return float(x), float(y)
 

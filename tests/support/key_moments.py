@@ -1,4 +1,4 @@
-"""Every key of the editor at its worst moments: in mid-drag, while a pose converges, during a job.
+"""Every key of the editor at critical moments: in mid-drag, while a pose converges, during a job.
 
 The keys are those of the editor's own table.  After any key,
 
@@ -147,14 +147,14 @@ class Stand:
         raise NotImplementedError
 
     def draw(self) -> None:
-        """Check that the things to grab are where they are displayed."""
+        """Render, so that drags start at the displayed positions."""
         self.editor.view.render()
 
     def close(self) -> None:
-        """End it."""
+        """Close the host."""
         raise NotImplementedError
 
-    # What hands do.
+    # Actions of the hand.
 
     @property
     def session(self) -> Session:
@@ -170,32 +170,32 @@ class Stand:
     def settle(self) -> None:
         """Wait until the editor is idle, and check that it stays so."""
         self.until(lambda: not self.editor.is_busy, "the job")
-        dragger = self.editor.stage.dragger
+        dragger = self.editor.widgets.dragger
         self.until(lambda: not dragger.is_refining, "the pose")
         self.until(lambda: not self.has_timers(), "the timers")
-        assert not any(widget.is_grabbing for widget in self.editor.stage.widgets)
+        assert not any(widget.is_grabbing for widget in self.editor.widgets.interactive)
         assert not self.session.is_dragging
         assert self.hand.failures == []
 
     def begin(self, mode: Mode) -> None:
         """Reset everything, and start in *mode*."""
-        desk, stage = self.editor.desk, self.editor.stage
+        controller, widgets = self.editor.controller, self.editor.widgets
         while self.session.undo() is not None:
             pass
         self.session_before, self.start = self.session, self.session.state
-        desk.takes.remove()
-        desk.help.hide()
-        desk.voice.forget()
-        stage.cages_wanted = stage.overlay_wanted = False
-        stage.selector.tool, stage.selector.through = Tool.BRUSH, False
+        controller.recordings.remove()
+        controller.help.hide()
+        controller.messages.clear()
+        widgets.cages_wanted = widgets.overlay_wanted = False
+        widgets.selector.tool, widgets.selector.through = Tool.BRUSH, False
         shutil.copy(self.folder / "start.segdeform", self.folder / "work.segdeform")
         self.editor.path = self.folder / "work.segdeform"
         self.editor.mode = mode
         self.settle()
-        selector = stage.selector
+        selector = widgets.selector
         selector.region, selector.handle = 0, "tip"
         selector.paints = Paint.REGION if mode is Mode.REGIONS else Paint.HANDLE
-        stage.dragger.handle = "tip"
+        widgets.dragger.handle = "tip"
         self.hand.failures.clear()
 
     def way(self, mode: Mode) -> list[np.ndarray]:
@@ -219,7 +219,7 @@ class Stand:
         self.hand.press(first)
         for place in others:
             self.hand.move(place)
-        assert any(widget.is_grabbing for widget in self.editor.stage.widgets)
+        assert any(widget.is_grabbing for widget in self.editor.widgets.interactive)
         return others[-1]
 
     # The moments.
@@ -248,7 +248,7 @@ class Stand:
             self.hand.move(place + [-40.0, -30.0])  # no longer drags anything
             self.hand.move(place)
         else:
-            assert any(widget.is_grabbing for widget in self.editor.stage.widgets)
+            assert any(widget.is_grabbing for widget in self.editor.widgets.interactive)
             expected = dragged
         self.hand.release(place)
         self._ends_as(mode, key, expected, dragged)
@@ -258,7 +258,7 @@ class Stand:
         expected, dragged = self.long_after(mode, *keys), self.long_after(mode)
         self.begin(mode)
         self.hand.release(self.drag(mode))
-        assert self.editor.stage.dragger.is_refining
+        assert self.editor.widgets.dragger.is_refining
         for key in keys:
             self.hand.types(key)
         self._ends_as(mode, None, expected, dragged)
@@ -293,7 +293,7 @@ class Stand:
             progress(1.0, "counted")
             return "counted"
 
-        self.editor.do(lambda desk: desk.start("counting", work, delivered.append))
+        self.editor.do(lambda controller: controller.start("counting", work, delivered.append))
         assert self.editor.is_busy
         try:
             yield delivered
@@ -304,14 +304,21 @@ class Stand:
         self.settle()
 
     def first_overlay(self, *, during: bool) -> None:
-        """Type O where volumes were never shown: a job measures them, during a drag."""
+        """Type O before volumes were ever shown: a job measures them, during a drag."""
         self.begin(Mode.REGIONS)
         self.editor.load(self.folder / "start.segdeform")
         self.session.bind()  # otherwise binding would measure them already
         self.begin(Mode.DEFORM)
-        overlay, place = self.editor.stage.overlay, self.drag(Mode.DEFORM)
+        overlay, place = self.editor.widgets.overlay, self.drag(Mode.DEFORM)
         assert not overlay.is_prepared
-        self._meanwhile("o", place, during=during)
+        released, prepare = threading.Event(), overlay.prepare
+
+        def prepare_after_release():  # otherwise the job could end while the key is handled
+            assert released.wait(LONGEST)
+            prepare()
+
+        overlay.prepare = prepare_after_release
+        self._meanwhile("o", place, during=during, released=released)
         assert overlay.is_shown
 
     def film_that_ends(self, *, during: bool) -> None:
@@ -324,15 +331,22 @@ class Stand:
         self._meanwhile("ctrl+m", place, during=during)
         assert len(set(self.folder.glob("work.film*")) - before) == 1
 
-    def _meanwhile(self, key: str, place: np.ndarray, *, during: bool) -> None:
-        """Start a job by *key* before or after the release at *place*; nothing must be lost."""
+    def _meanwhile(
+        self, key: str, place: np.ndarray, *, during: bool, released: threading.Event | None = None
+    ) -> None:
+        """Start a job by *key* before or after the release at *place*; nothing must be lost.
+
+        *released* is set once the button is up, so that the job may end.
+        """
         if not during:
             self.hand.release(place)
-            assert self.editor.stage.dragger.is_refining
+            assert self.editor.widgets.dragger.is_refining
         self.hand.types(key)
         assert self.editor.is_busy
         if during:
             self.hand.release(place)
+        if released is not None:
+            released.set()
         self.settle()
         assert self.session.solution.status is Status.CONVERGED
         assert Story.of(self.session).labels == [STEPS[Mode.DEFORM]]
@@ -346,7 +360,7 @@ class Stand:
             self.hand.types(key)
             self.loop()
         assert delivered == ["counted"] * (key != "escape")
-        assert "cancelled" in self.editor.status or key != "escape"
+        assert "Cancelled" in self.editor.status or key != "escape"
         assert self.session is session
         assert (session.state, session.undo_label, session.redo_label) == before
 
@@ -413,7 +427,7 @@ def ready() -> Session:
 
 
 def aim(view: View) -> None:
-    """Look from the front, z up, at all of it."""
+    """Frame the whole mesh from the front, z up."""
     view.camera.SetPosition(0.0, -9.0, 0.0)
     view.camera.SetFocalPoint(0.0, 0.0, 0.0)
     view.camera.SetViewUp(0.0, 0.0, 1.0)

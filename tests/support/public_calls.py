@@ -392,7 +392,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "x": lambda: 1.0,
     "y": lambda: 1.0,
     "z": lambda: 1.0,
-    "action": lambda: lambda _desk: None,
+    "action": lambda: lambda _controller: None,
     "busy": lambda: lambda: False,
     "colours": lambda: None,
     "enabled": lambda: False,

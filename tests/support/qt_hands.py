@@ -1,4 +1,4 @@
-"""Hands for Qt: real mouse and key events, sent to a widget on an X server of the tests' own.
+"""Simulated hands for Qt: real mouse and key events, sent to a widget on a private X server.
 
 Qt draws VTK by an OpenGL widget, which its "offscreen" platform cannot: it takes an X server.
 The other tests of the same process go on drawing off-screen.  Where there is no Qt, no
@@ -28,25 +28,25 @@ from vtk_segdeform.widgets.scene.view import View
 
 QtWidgets = pytest.importorskip("qtpy.QtWidgets", reason="needs Qt", exc_type=ImportError)
 pytest.importorskip("pyvistaqt", reason="needs pyvistaqt", exc_type=ImportError)
-from qtpy import QtCore, QtTest  # noqa: E402 - only now is it known to be there
+from qtpy import QtCore, QtTest  # noqa: E402 - after the check for Qt
 
 if not shutil.which("Xvfb"):
     pytest.skip("needs Xvfb (apt-get install xvfb)", allow_module_level=True)
 
 Qt = QtCore.Qt
-TRIED = "SEGDEFORM_QT_TRIED"  # set where Qt was seen to work, for the programs started from there
-ONE_SCREEN = "SEGDEFORM_ONE_SCREEN"  # set where VTK is to have windows too, on the screen of Qt
+TRIED = "SEGDEFORM_QT_TRIED"  # set once Qt works, for child processes
+ONE_SCREEN = "SEGDEFORM_ONE_SCREEN"  # set if VTK opens windows too, on Qt's screen
 _SPECIAL = {"bracketleft": Qt.Key_BracketLeft, "bracketright": Qt.Key_BracketRight}
 
 
 @functools.cache
 def application():
-    """Return the one Qt application of the process, on a screen of its own."""
+    """Return the Qt application of the process, on a private screen."""
     if ONE_SCREEN in os.environ:
         os.environ.pop("VTK_DEFAULT_OPENGL_WINDOW", None)
         os.environ.update(DISPLAY=new_screen(), QT_QPA_PLATFORM="xcb")
         return QtWidgets.QApplication(["segdeform tests"])
-    # Where it lacks a library of X, Qt ends the process; somebody else's, at first.
+    # Without a library of X, Qt ends the process, so a child process tries first.
     code = "from qtpy import QtWidgets; QtWidgets.QApplication([])"
     # VTK's off-screen windows are EGL's; a thread cannot change between that and GLX.  Qt looks
     # when it first draws.
@@ -60,14 +60,14 @@ def application():
         if tried.returncode:
             pytest.skip(f"Qt cannot use X here: {' '.join(tried.stderr.split())[:300]}")
         os.environ[TRIED] = "yes"
-    with pytest.MonkeyPatch.context() as patch:  # nobody else is to see the screen
+    with pytest.MonkeyPatch.context() as patch:  # the variables apply here only
         for name, value in {**on_x, "DISPLAY": new_screen()}.items():
             patch.setenv(name, value)
         return QtWidgets.QApplication(["segdeform tests"])
 
 
 def new_screen() -> str:
-    """Start an X server that ends when the last of those who use it is gone; return its name."""
+    """Start an X server that ends with its last client; return its name."""
     reading, writing = os.pipe()
     os.set_inheritable(writing, True)
     screen = ["-screen", "0", "1600x1200x24", "-nolisten", "tcp"]
@@ -82,7 +82,7 @@ def new_screen() -> str:
 
 @functools.cache
 def small():
-    """Return an ellipsoid and the state of a session that lacks nothing but a pose."""
+    """Return an ellipsoid and the state of a session, complete except for a pose."""
     sphere, faces = icosphere(3)
     session = Session(Mesh(sphere * [3.0, 0.8, 0.8], faces))
     ball, ball_faces = icosphere(1)
@@ -116,7 +116,7 @@ class QtHand:
         view.on_failure(self.failures.append)
 
     def at(self, point: Iterable[float]) -> tuple[float, float]:
-        """Return where a world *point* is seen."""
+        """Return the display coordinates of a world *point*."""
         x, y, _ = self.view.to_display(np.array([list(point)]))[0]
         return float(x), float(y)
 
@@ -154,6 +154,6 @@ class QtHand:
         self.key(name, control | (Qt.ShiftModifier if "shift" in held else Qt.NoModifier))
 
     def _pixel(self, position):
-        """Return a place as Qt has it: device-independent, from the upper left corner."""
+        """Return a position in Qt's coordinates: device-independent, from the upper left corner."""
         x, y = np.asarray(position, dtype=float) / self.widget.devicePixelRatioF()
         return QtCore.QPoint(round(float(x)), round(self.widget.height() - 1 - float(y)))

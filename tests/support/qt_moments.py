@@ -52,11 +52,11 @@ class QtStand(Stand):
         super().settle()
         panel = self.widget.panel
         assert panel.isEnabled()
-        assert panel.head.open.isEnabled()
+        assert panel.toolbar.open.isEnabled()
         assert panel.log.isEnabled()
-        assert not panel.foot.cancel.isVisible()
+        assert not panel.status.cancel.isVisible()
         assert panel.regions.isEnabledTo(panel)
-        assert panel.head.undo.isEnabled() is self.session.can_undo
+        assert panel.toolbar.undo.isEnabled() is self.session.can_undo
 
     def close(self):
         self._plain.close()

@@ -74,7 +74,7 @@ class Monkey:
         session = self.editor.session
         self.frames += 1
         assert np.isfinite(session.vertices).all()
-        assert np.array_equal(self.editor.stage.surface.points, session.vertices)
+        assert np.array_equal(self.editor.widgets.surface.points, session.vertices)
         self.posed += session.vertices is not session.mesh.vertices
         pose = session.state.pose
         is_free = not session.options.preserve_volume or session is not self.met
@@ -119,7 +119,7 @@ class Monkey:
 
     def aims(self):
         """Go somewhere: to the gizmo, to the mesh, or anywhere."""
-        centre = self.editor.stage.dragger.gizmo.centre
+        centre = self.editor.widgets.dragger.gizmo.centre
         where = self.rng.random()
         if where < 0.5 and centre is not None:
             self.place = np.array(self.hand.at(centre)) + self.rng.normal(0, 15, 2)
@@ -159,13 +159,13 @@ class Monkey:
         self.waits()
         for _ in range(200):
             self.hand.tick()
-            if not self.editor.stage.dragger.is_refining:
+            if not self.editor.widgets.dragger.is_refining:
                 break
         self.looks()
-        stage = self.editor.stage
-        for widget in (stage.selector, stage.cages, stage.dragger):
+        widgets = self.editor.widgets
+        for widget in (widgets.selector, widgets.cages, widgets.dragger):
             assert not widget.is_grabbing
-        assert not stage.dragger.is_refining
+        assert not widgets.dragger.is_refining
         assert not self.editor.session.is_dragging
         camera = self.view.camera.GetPosition()
         self.hand.move(self.place + 5)

@@ -1,4 +1,4 @@
-"""pyvista's extension points: plotters and meshes that can be deformed, and a window of its own."""
+"""pyvista's extension points: plotters, meshes, and the window of `edit`."""
 
 from __future__ import annotations
 
@@ -87,10 +87,10 @@ def test_a_handle_that_misses_its_target_is_logged(bar, caplog):
         bar.segdeform.deform(
             height < 0.1, handle, bar.points[handle] + [0, 0, 15.0], n_regions=1, n_cage_vertices=12
         )
-    assert "handle off by" in caplog.text
+    assert "handle error" in caplog.text
 
 
-def test_regions_come_as_arrays_of_a_copy(bar):
+def test_regions_are_arrays_of_a_copy(bar):
     coloured = bar.segdeform.regions(2)
     assert "region" not in bar.point_data
     assert set(coloured["region"]) == {0, 1}
@@ -115,7 +115,7 @@ def test_check_names_the_faults_of_a_surface(bar):
 # Plotters.
 
 
-def test_the_overlay_shows_in_a_plotter_and_goes_with_it(plotter, session):
+def test_the_overlay_is_shown_in_a_plotter_and_removed_with_it(plotter, session):
     blank = picture(View.of(plotter))
     overlay = plotter.segdeform.add_volume_overlay(session)
     plotter.show(auto_close=False, interactive=False)
@@ -123,10 +123,10 @@ def test_the_overlay_shows_in_a_plotter_and_goes_with_it(plotter, session):
     assert (picture(View.of(plotter)) != blank).any()
     plotter.close()
     assert not overlay.is_shown
-    session.drag(SCENE.turned(10.0))  # nobody draws any more
+    session.drag(SCENE.turned(10.0))  # no longer drawn
 
 
-def test_the_editor_takes_the_place_of_the_mesh_and_goes_with_the_plotter(plotter, bar):
+def test_the_editor_replaces_the_mesh_and_is_removed_with_the_plotter(plotter, bar):
     actor = plotter.add_mesh(bar)
     other = plotter.add_mesh(pv.Sphere(center=(2, 0, 0)))
     editor = plotter.segdeform.edit(bar, path="bar.segdeform")
@@ -138,7 +138,7 @@ def test_the_editor_takes_the_place_of_the_mesh_and_goes_with_the_plotter(plotte
     assert_array_equal(editor.session.vertices, bar.points)
     plotter.close()
     assert not editor.GetEnabled()
-    editor.session.segment(2)  # nobody shows it any more
+    editor.session.segment(2)  # no longer shown
 
 
 def test_a_handle_is_dragged_in_a_plotter_by_hand(plotter, session):
@@ -152,10 +152,10 @@ def test_a_handle_is_dragged_in_a_plotter_by_hand(plotter, session):
     assert session.undo_label == "drag handle 1"
 
 
-# Finding it.
+# Registration.
 
 
-def test_pyvista_is_led_to_the_plugin():
+def test_pyvista_finds_the_plugin_by_its_entry_points():
     parser = configparser.ConfigParser()
     parser.read(ROOT / "setup.cfg", encoding="utf-8")
     for group in ("pyvista.plotter_components", "pyvista.accessors"):
@@ -189,11 +189,11 @@ def test_the_package_alone_does_not_load_pyvista():
     assert done.stdout.strip() == "False"
 
 
-# A window of its own.
+# The window of `edit`.
 
 
 def pull(hand: Hand, editor) -> None:
-    """Go to the mode for it, and drag the middle of the handle aside."""
+    """Switch to the deform mode and drag the centre of the handle."""
     hand.key("4")
     editor.wait()
     session = editor.session
@@ -213,7 +213,7 @@ def test_off_screen_the_window_closes_at_once_and_nothing_is_changed(kind, bar):
         assert_array_equal(back["number"], bar["number"])
 
 
-def test_what_is_done_in_the_window_comes_back(session, monkeypatch):
+def test_the_window_returns_the_edited_session(session, monkeypatch):
     show, failures = pv.Plotter.show, []
 
     def show_and_work(plotter):
@@ -234,7 +234,7 @@ def test_what_is_done_in_the_window_comes_back(session, monkeypatch):
     assert_array_equal(other.points, session.vertices)
 
 
-def test_the_command_writes_what_came_of_it(tmp_path, session, monkeypatch, capsys):
+def test_the_command_writes_the_deformed_mesh(tmp_path, session, monkeypatch, capsys):
     saved, out = tmp_path / "work.segdeform", tmp_path / "out.vtp"
     sd.save_session(saved, session)
 
@@ -253,7 +253,7 @@ def test_the_command_writes_what_came_of_it(tmp_path, session, monkeypatch, caps
 
 
 def without_screen() -> dict[str, str]:
-    """Return an environment in which no window can be seen."""
+    """Return an environment without a screen."""
     hidden = ("DISPLAY", "WAYLAND_DISPLAY", "PYVISTA_OFF_SCREEN")
     return {name: value for name, value in os.environ.items() if name not in hidden}
 
@@ -286,7 +286,7 @@ def test_the_command_explains_itself(capsys):
     assert "-o OUT" in text
 
 
-def test_what_is_no_mesh_is_refused():
+def test_other_types_are_refused():
     with pytest.raises(ValueError, match="a PolyData or a Session; got 'cactus'"):
         sd.edit("cactus")
     with pytest.raises(MissingDependencyError, match="off-screen"):

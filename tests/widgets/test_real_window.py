@@ -40,7 +40,7 @@ volumes = []
 
 def drawn(*_):
     volumes.append(session.volume_change)
-    centre = editor.stage.dragger.gizmo.centre
+    centre = editor.widgets.dragger.gizmo.centre
     at = None if centre is None else editor.view.to_display(centre[None])[0, :2].tolist()
     with open(place, "w") as file:
         json.dump([editor.mode.name, editor.is_busy, editor.status, at, len(volumes)], file)

@@ -3,16 +3,17 @@
 The files, in reading order:
 
     window        `Window`
-    pages         what fills the window
-    start_page    the page shown before a mesh is open
-    documents     what can be open, and opening it
-    opening       reading a document in another thread
+    pages         the pages of the window
+    start_page    the page shown before a document is open
+    documents     the open document, and readers for it
+    opening       the request to open a document, and the waiting page
+    qt_timer      a timer of Qt for background jobs
     saving        saving, and the questions asked before
-    asking        dialogs
+    dialogs       the dialogs
     menus         the menus
     drops         files dropped on the window
     recent        recent files
-    keeper        autosave
+    autosaver     when to autosave
     autosave      autosaved files, and recovery after a crash
 """
 

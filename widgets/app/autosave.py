@@ -1,16 +1,16 @@
-"""Where unsaved work is kept, whose it is, and which of it a crash has left behind.
+"""Autosaved work on disk: slots, their locks, and recovery after a crash.
 
-    folder/8f31.../lock                 held for as long as the program runs that works on it
-                   about.json           what the work is on
-                   session.segdeform    the work; written whole, as every session
+    folder/8f31.../lock                 locked while the program that owns the slot runs
+                   about.json           the document
+                   session.segdeform    the work, written atomically as every session
 
-Each document has a slot of its own from its first change until it is saved or given up.  A slot
-that nobody holds belongs to nobody any more: its program has crashed, or was killed.  Who asks
-for what is `left` holds it from then on, so that of several programs only one offers it.
+Each document has a slot from its first change until it is saved or discarded.  A slot without a
+lock is abandoned: its program has crashed or was killed.  `Autosaves.abandoned` locks the slots
+that it returns, so that only one of several programs offers to recover them.
 
 A folder is a slot only if its name has 16 hexadecimal digits and its lock contains the mark of this
-program.  Only these three files and their drafts (`atomic`) are ever deleted in it, and the folder
-itself once it is empty.  Symbolic links are not followed.
+program.  Only these three files and their drafts (`files.replacing`) are ever deleted in it, and
+the folder itself once it is empty.  Symbolic links are not followed.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ _LOCK, _ABOUT, _SESSION = "lock", "about.json", "session.segdeform"
 _NAME = re.compile(r"[0-9a-f]{16}")
 _MARK = b"vtk_segdeform: unsaved work, held while the program runs\n"
 _LONGEST_ABOUT = 1 << 20  # bytes
-_TRIES = 5
+_ATTEMPTS = 5
 
 
 def user_folder() -> Path:
-    """Return where this user's programs keep such things on this system."""
+    """Return the folder for autosaves in the user's data folder of this system."""
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"
     elif sys.platform == "darwin":
@@ -54,27 +54,27 @@ def user_folder() -> Path:
 
 @dataclass(frozen=True)
 class About:
-    """What some work is on."""
+    """The document of some unsaved work."""
 
     name: str = "a mesh"
-    """For people: "horse.ply"."""
+    """Its name for users: "horse.ply"."""
     session: str = ""
-    """The session file it is saved to, if any."""
+    """Its session file, if any."""
     mesh: str = ""
-    """The mesh file it began with, if any."""
+    """The mesh file it was created from, if any."""
 
 
 class Slot:
-    """A place for the work on one document; ours as long as it is held.
+    """The autosave of one document, locked by this program until it is released.
 
     Parameters
     ----------
     folder : Path
-        Where.
+        The folder of the slot.
     handle : int
-        What holds it.
+        File descriptor of the lock.
     about : About
-        What the work is on.
+        The document.
     """
 
     def __init__(self, folder: Path, handle: int, about: About) -> None:
@@ -85,36 +85,36 @@ class Slot:
 
     @property
     def when(self) -> datetime:
-        """When the work was last kept; local time."""
+        """Local time of the last autosave."""
         return datetime.fromtimestamp(self.path.stat().st_mtime)
 
     def write(self, session: Session) -> None:
-        """Keep *session*, as it is at this moment; in any thread.
+        """Write the current state of *session*; in any thread.
 
         Raises
         ------
         SessionError
-            If it cannot be written; what was kept before stays.
+            If it cannot be written; the previous autosave is then unchanged.
         """
         if self.path.is_symlink():
-            raise SessionError(f"{self.path}: is a link; unsaved work is not written through links")
+            raise SessionError(f"{self.path}: is a symbolic link; remove it to enable autosave")
         save_session(self.path, session)
 
     def read(self, progress: Progress) -> Session:
-        """Return what was kept; bound, if it is in a pose."""
+        """Return the autosaved session, bound if it has a pose."""
         return read_bound(self.path, progress)
 
     def release(self) -> None:
-        """Leave it to whoever asks for it next."""
+        """Unlock the slot, so that any program may recover it."""
         if self._handle is not None:
             os.close(self._handle)
             self._handle = None
 
     def remove(self) -> None:
-        """Delete it, the work first: half of it gone is no work left."""
+        """Delete the slot, the work first, so that an interrupted deletion leaves no slot."""
         if _is_file(self.path):
             self.path.unlink(missing_ok=True)
-        self.release()  # where open files cannot be deleted
+        self.release()  # some systems cannot delete open files
         with suppress(OSError):  # another process may have deleted it, or it is not empty
             for path in list(self._folder.iterdir()):
                 if (path.name in (_LOCK, _ABOUT) or is_draft(path.name)) and _is_file(path):
@@ -123,12 +123,12 @@ class Slot:
 
 
 class Autosaves:
-    """All slots in a folder.
+    """The autosaves in a folder.
 
     Parameters
     ----------
     folder : Path, optional
-        `user_folder` unless given; made when it is needed.
+        By default `user_folder`; created when needed.
 
     Examples
     --------
@@ -138,9 +138,9 @@ class Autosaves:
     ...     crashed, next_one = Autosaves(Path(folder)), Autosaves(Path(folder))
     ...     slot = crashed.new(About("ball.ply"))
     ...     slot.write(Session(models.sphere(300)))
-    ...     print([each.about.name for each in next_one.left()])
+    ...     print([each.about.name for each in next_one.abandoned()])
     ...     slot.release()  # as the operating system does when the program ends
-    ...     print([each.about.name for each in next_one.left()])
+    ...     print([each.about.name for each in next_one.abandoned()])
     []
     ['ball.ply']
     """
@@ -149,18 +149,18 @@ class Autosaves:
         self.folder = user_folder() if folder is None else folder
 
     def new(self, about: About) -> Slot:
-        """Return a slot that nobody else has.
+        """Return a new slot, locked by this program.
 
         Raises
         ------
         SessionError
-            If nothing can be written or held there.
+            If nothing can be written or locked there.
         """
         try:
-            for _ in range(_TRIES):
+            for _ in range(_ATTEMPTS):
                 folder = self.folder / secrets.token_hex(8)
                 folder.mkdir(parents=True, mode=0o700)
-                with suppress(FileNotFoundError):  # one who tidies up found it empty
+                with suppress(FileNotFoundError):  # another program has just deleted it as empty
                     handle = hold(folder / _LOCK)
                     if handle is not None:
                         os.write(handle, _MARK)
@@ -170,23 +170,23 @@ class Autosaves:
             raise SessionError(f"{self.folder}: {fault.strerror or fault}") from fault
         raise SessionError(f"{self.folder}: files there cannot be locked")
 
-    def left(self) -> list[Slot]:
-        """Return what programs that are gone have left, the latest first; all of it held now."""
-        return sorted(self._left(), key=lambda slot: slot.when, reverse=True)
+    def abandoned(self) -> list[Slot]:
+        """Return the slots of programs that have ended, the latest first, and lock them."""
+        return sorted(self._lock_abandoned(), key=lambda slot: slot.when, reverse=True)
 
     @property
-    def has_left(self) -> bool:
-        """Whether there is any; it stays whoever's it is."""
-        left = self.left()
-        for slot in left:
+    def has_abandoned(self) -> bool:
+        """Whether there are abandoned slots; none is locked afterwards."""
+        slots = self.abandoned()
+        for slot in slots:
             slot.release()
-        return bool(left)
+        return bool(slots)
 
-    def _left(self) -> Iterator[Slot]:
+    def _lock_abandoned(self) -> Iterator[Slot]:
         folders = sorted(self.folder.iterdir()) if self.folder.is_dir() else []
         for folder in folders:
             handle = None
-            with suppress(OSError):  # gone meanwhile, or not ours to open
+            with suppress(OSError):  # deleted meanwhile, or not readable by this user
                 handle = _hold(folder)
             if handle is None:
                 continue
@@ -196,7 +196,7 @@ class Autosaves:
             elif slot.path.exists() or slot.path.is_symlink():
                 slot.release()  # not a file that this program wrote
             else:
-                slot.remove()  # it ended before there was anything to keep
+                slot.remove()  # its program ended before the first autosave
 
 
 def _hold(folder: Path) -> int | None:
@@ -209,8 +209,8 @@ def _hold(folder: Path) -> int | None:
     if handle is None:
         return None
     mark = os.read(handle, len(_MARK) + 1)
-    by_earlier = not mark and (_is_file(folder / _SESSION) or _read_about(folder) != About())
-    if mark == _MARK or by_earlier:  # earlier versions left the lock empty
+    is_older = not mark and (_is_file(folder / _SESSION) or _read_about(folder) != About())
+    if mark == _MARK or is_older:  # earlier versions left the lock empty
         return handle
     os.close(handle)
     return None
@@ -230,10 +230,10 @@ def _write_about(folder: Path, about: About) -> None:
 
 
 def _read_about(folder: Path) -> About:
-    """Return what is told of the work; without it, or where it is damaged, there is still work."""
+    """Return the document of a slot; a default one if the file is missing or damaged."""
     try:
         with open_regular(folder / _ABOUT, own=True) as file:
-            told = json.loads(file.read(_LONGEST_ABOUT))
-        return About(str(told["name"]), str(told["session"]), str(told["mesh"]))
+            fields = json.loads(file.read(_LONGEST_ABOUT))
+        return About(str(fields["name"]), str(fields["session"]), str(fields["mesh"]))
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return About()

@@ -1,6 +1,6 @@
-"""What can be open in the window, and how it gets there.
+"""The document in the window, and readers for meshes, sessions and autosaves.
 
-Reading happens in any thread: nothing here knows of Qt.
+Readers run in any thread; this file does not use Qt.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
-from ..editor import SessionFile, is_mesh, read_bound, words_of
+from ..editor import SessionFile, error_text, is_mesh, read_bound
 from .autosave import About, Slot
 
 SUFFIX = ".segdeform"
@@ -27,37 +27,37 @@ SUFFIX = ".segdeform"
 
 @dataclass(frozen=True)
 class Document:
-    """Where a session came from, and where it goes."""
+    """The files of a session."""
 
     name: str
-    """What the title of the window says."""
+    """Name in the title of the window."""
     session_path: Path | None = None
-    """The file to save the session to; None: ask."""
+    """The file to save the session to; None to ask for one."""
     mesh_path: Path | None = None
-    """The file to save the mesh to; None: ask, for what was read is not to be written over."""
+    """The file to save the mesh to; None to ask, because the original is never overwritten."""
     source: Path | None = None
-    """The mesh file it began with, if it is known."""
+    """The original mesh file, if it is known."""
     surface: Any = None
-    """All that was in that file, a pyvista.PolyData, so that it can be written again."""
+    """The content of that file, a pyvista.PolyData, with all its arrays."""
 
     @property
     def proposal(self) -> Path:
-        """A path for its files, but for the suffix."""
+        """A proposed path for its files, apart from the suffix."""
         path = self.session_path or self.source
-        return Path.cwd() / self.name.removeprefix("the ") if path is None else path
+        return Path.cwd() / self.name if path is None else path
 
     @property
     def about(self) -> About:
-        """What to tell of it beside unsaved work."""
+        """The description stored with autosaved work."""
         return About(self.name, _text(self.session_path), _text(self.source))
 
     def file(self, session: Session, *, is_unsaved: bool = False) -> SessionFile:
-        """Return the editor's file for *session*; behind it from the start if *is_unsaved*."""
-        kept = Session(session.mesh) if is_unsaved else session
-        file = SessionFile(self.proposal.with_suffix(SUFFIX), kept)
+        """Return the editor's file for *session*, which is modified at first if *is_unsaved*."""
+        saved = Session(session.mesh) if is_unsaved else session
+        file = SessionFile(self.proposal.with_suffix(SUFFIX), saved)
         if self.session_path is not None:
             file.path = self.session_path
-            file.keeps(kept)
+            file.mark_saved(saved)
         file.surface = self.surface
         return file
 
@@ -67,43 +67,43 @@ Reader = Callable[[Progress], Opened]
 
 
 def from_file(path: Path) -> Reader:
-    """Return the reader of a mesh, with all its arrays, or of a session."""
+    """Return the reader of a mesh file, with all its arrays, or of a session file."""
 
     def read(progress: Progress) -> Opened:
         if not is_mesh(path):
             return Document(path.name, session_path=path), read_bound(path, progress)
-        progress(0.0, "reading")
+        progress(0.0, "Reading mesh")
         surface = read_polydata(path)
-        progress(0.0, "checking")
+        progress(0.0, "Checking mesh")
         return Document(path.name, source=path, surface=surface), Session(_mesh_of(path, surface))
 
     return read
 
 
 def from_slot(slot: Slot) -> Reader:
-    """Return the reader of unsaved work."""
+    """Return the reader of an autosave."""
 
     def read(progress: Progress) -> Opened:
         session, about = slot.read(progress), slot.about
         source = Path(about.mesh) if about.mesh else None
         path = Path(about.session) if about.session else None
-        surface = None if source is None else _surface_again(source, session.mesh)
+        surface = None if source is None else _surface_of(source, session.mesh)
         return Document(about.name, path, source=source, surface=surface), session
 
     return read
 
 
-def the_cactus(progress: Progress) -> Opened:
-    """Return something to try things on."""
-    progress(0.0, "growing")
-    return Document("the cactus"), Session(models.cactus())
+def sample_model(progress: Progress) -> Opened:
+    """Return the sample model, a cactus."""
+    progress(0.0, "Building mesh")
+    return Document("cactus"), Session(models.cactus())
 
 
-def words(error: BaseException) -> str:
-    """Return what went wrong; our own errors are in words already."""
+def opening_error(error: BaseException) -> str:
+    """Return the message of an error raised by a reader."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
-    return words_of(error)
+    return error_text(error)
 
 
 def _mesh_of(path: Path, surface: Any) -> Mesh:
@@ -112,12 +112,12 @@ def _mesh_of(path: Path, surface: Any) -> Mesh:
     except MeshError as fault:
         raise MeshError(
             f"{path.name} cannot be deformed: {fault}.\n\n"
-            f"'segdeform check {path.name} --repair -o mended{path.suffix}' may mend it."
+            f"'segdeform check {path.name} --repair -o repaired{path.suffix}' may repair it."
         ) from None
 
 
-def _surface_again(source: Path, mesh: Mesh) -> Any:
-    """Return what is in the file, if it is still there and still has this mesh; else None."""
+def _surface_of(source: Path, mesh: Mesh) -> Any:
+    """Return the surface in the file, or None if it no longer exists or has another mesh."""
     try:
         surface = read_polydata(source)
     except SegDeformError:

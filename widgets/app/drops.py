@@ -1,4 +1,4 @@
-"""Files that are dropped on a window, wherever on it."""
+"""Files dropped on a window."""
 
 from __future__ import annotations
 
@@ -11,37 +11,37 @@ _Event = QtCore.QEvent.Type
 
 
 class Drops(QtCore.QObject):
-    """Takes files of this machine for a window.
+    """Accept local files dropped anywhere on a window.
 
     Parameters
     ----------
     window : QWidget
-        Where; what is in it is not to take drops itself.
+        The window; its children must not accept drops themselves.
     """
 
-    held = QtCore.Signal(bool)
-    """Files are held over the window, or no more."""
+    hovered = QtCore.Signal(bool)
+    """Files are dragged over the window, or have left it."""
     dropped = QtCore.Signal(object)
-    """This file was dropped, the first of several: a Path.  Whoever held it was let go."""
+    """A file was dropped: the Path of the first one.  Emitted after the drop has been accepted."""
 
     def __init__(self, window: Any) -> None:
         super().__init__(window)
         window.setAcceptDrops(True)
         window.installEventFilter(self)
 
-    def eventFilter(self, window: Any, event: Any) -> bool:  # noqa: N802 - Qt's word
-        """See what is held over the window."""
+    def eventFilter(self, window: Any, event: Any) -> bool:  # noqa: N802 - Qt's name
+        """Handle drag and drop events of the window."""
         kind = event.type()
         if kind == _Event.DragEnter and _files(event):
             event.acceptProposedAction()
-            self.held.emit(True)
+            self.hovered.emit(True)
             return True
         if kind == _Event.DragLeave:
-            self.held.emit(False)
+            self.hovered.emit(False)
         elif kind == _Event.Drop and _files(event):
             path = _files(event)[0]
             event.acceptProposedAction()
-            self.held.emit(False)
+            self.hovered.emit(False)
             QtCore.QTimer.singleShot(0, lambda: self.dropped.emit(path))
             return True
         return bool(super().eventFilter(window, event))

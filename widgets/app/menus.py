@@ -1,4 +1,4 @@
-"""The menus of the window; what keys of the view do is done by those, and only told of here."""
+"""The menus of the window.  Entries for keys of the view only show the key."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vtk_segdeform.version import __version__
 
 from ..editor import actions
 from . import saving
-from .asking import tell_about
+from .dialogs import show_about
 from .start_page import home_as_tilde
 
 _FOLDER = 300  # points at most
@@ -25,7 +25,7 @@ class Menus:
     Parameters
     ----------
     window : Window
-        Whose.
+        The window to control.
     """
 
     def __init__(self, window: Any) -> None:
@@ -38,7 +38,7 @@ class Menus:
         self.refresh()
 
     def refresh(self) -> None:
-        """Allow what can be done now."""
+        """Enable the entries that are available."""
         for action in self._need_mesh:
             action.setEnabled(self._window.has_mesh)
 
@@ -46,9 +46,9 @@ class Menus:
         window, menu = self._window, self._menu("&File")
         self._add(menu, "&Open ...", window.ask_and_open, _Keys.Open)
         self.recent = menu.addMenu("Open &recent")
-        self.recent.aboutToShow.connect(self._show_recent)
+        self.recent.aboutToShow.connect(self._update_recent)
         recover = self._add(menu, "Recover &unsaved work ...", window.recover)
-        menu.aboutToShow.connect(lambda: recover.setEnabled(window.autosaves.has_left))
+        menu.aboutToShow.connect(lambda: recover.setEnabled(window.autosaves.has_abandoned))
         menu.addSeparator()
         for text, save, keys in (
             ("&Save session", saving.save_session, _Keys.Save),
@@ -65,34 +65,35 @@ class Menus:
         menu = self._menu("&Edit")
         self._undo = self._add(menu, "Undo", self._doing(actions.undo))
         self._redo = self._add(menu, "Redo", self._doing(actions.redo))
-        menu.aboutToShow.connect(self._show_steps)
+        menu.aboutToShow.connect(self._update_steps)
 
     def _view(self) -> None:
         menu = self._menu("&View")
         self._cages = self._add(menu, "&Cages\tC", self._doing(actions.toggle_cages))
-        self._overlay = self._add(menu, "&Volume change\tO", self._doing(actions.toggle_overlay))
+        show_volume = self._doing(actions.toggle_overlay)
+        self._overlay = self._add(menu, "Local &volume change\tO", show_volume)
         for action in (self._cages, self._overlay):
             action.setCheckable(True)
-        self._need_mesh.append(self._add(menu, "&Whole mesh", self._show_whole))
-        menu.aboutToShow.connect(self._show_what_is_shown)
+        self._need_mesh.append(self._add(menu, "&Fit to view", self._fit_to_view))
+        menu.aboutToShow.connect(self._update_view)
 
     def _help(self) -> None:
         menu = self._menu("&Help")
-        keys = self._add(menu, "&Keys\tH", self._doing(actions.toggle_help))
+        keys = self._add(menu, "&Keyboard shortcuts\tH", self._doing(actions.toggle_help))
         self._need_mesh.append(keys)
-        self._add(menu, "&About segdeform", self._tell_about).setMenuRole(_role("AboutRole"))
+        self._add(menu, "&About segdeform", self._show_about).setMenuRole(_role("AboutRole"))
 
-    def _show_whole(self) -> None:
+    def _fit_to_view(self) -> None:
         view = self._window.editor.view
         view.renderer.ResetCamera()
         view.render()
 
-    def _tell_about(self) -> None:
-        tell_about(self._window, __version__)
+    def _show_about(self) -> None:
+        show_about(self._window, __version__)
 
-    # What is shown when a menu opens.
+    # Entries that are updated when a menu opens.
 
-    def _show_recent(self) -> None:
+    def _update_recent(self) -> None:
         window, menu = self._window, self.recent
         menu.clear()
         for number, path in enumerate(window.recent.paths, 1):
@@ -104,11 +105,11 @@ class Menus:
             action.setEnabled(os.path.isfile(path))
             action.triggered.connect(_calling(window.open, path))
         menu.addSeparator()
-        clear = menu.addAction("&Clear")
+        clear = menu.addAction("&Clear list")
         clear.setEnabled(bool(window.recent.paths))
         clear.triggered.connect(lambda: window.clear_recent())
 
-    def _show_steps(self) -> None:
+    def _update_steps(self) -> None:
         window = self._window
         session = window.session if window.has_mesh else None
         is_free = session is not None and not window.editor.is_busy
@@ -120,14 +121,14 @@ class Menus:
             action.setText(f"{verb} {name}\t{keys}" if name else f"{verb}\t{keys}")
             action.setEnabled(is_free and bool(label))
 
-    def _show_what_is_shown(self) -> None:
+    def _update_view(self) -> None:
         window = self._window
         self._cages.setEnabled(window.has_mesh and bool(window.session.cages))
         self._overlay.setEnabled(window.has_mesh)
         if window.has_mesh:
-            stage = window.editor.stage
-            self._cages.setChecked(stage.cages.is_shown)
-            self._overlay.setChecked(stage.overlay_wanted)
+            widgets = window.editor.widgets
+            self._cages.setChecked(widgets.cages.is_shown)
+            self._overlay.setChecked(widgets.overlay_wanted)
 
     # Pieces.
 
@@ -146,13 +147,13 @@ class Menus:
         return lambda: self._window.editor.do(action, while_busy=while_busy)
 
 
-def lead_panel(window: Any) -> None:
-    """Have the buttons of the panel do what the menus do."""
-    head = window.editor_widget.panel.head
-    head.open.clicked.disconnect()
-    head.open.clicked.connect(window.ask_and_open)
+def connect_panel(window: Any) -> None:
+    """Connect the file buttons of the panel to the functions of the menus."""
+    toolbar = window.editor_widget.panel.toolbar
+    toolbar.open.clicked.disconnect()
+    toolbar.open.clicked.connect(window.ask_and_open)
     saves = saving.save_session, saving.save_session_as, saving.save_mesh_as
-    for action, save in zip(head.save.menu().actions(), saves, strict=True):
+    for action, save in zip(toolbar.save.menu().actions(), saves, strict=True):
         action.triggered.disconnect()
         action.triggered.connect(_calling(save, window))
 

@@ -1,4 +1,4 @@
-"""What fills the window: the page to start from, the page to wait at, or a `DeformWidget`."""
+"""The pages of the window: start page, waiting page, or a `DeformWidget`."""
 
 from __future__ import annotations
 
@@ -10,38 +10,38 @@ from .opening import WaitingPage
 from .start_page import StartPage
 
 _DELETE = QtCore.QEvent.Type.DeferredDelete
-_OURS = 2  # pages that are always there
+_PERMANENT = 2  # number of pages that are never deleted
 
 
 class Pages(QtWidgets.QStackedWidget):
-    """One page at a time.
+    """The pages, one of them shown.
 
     Attributes
     ----------
     start : StartPage
-        Before there is a mesh.
+        Shown until a document is open.
     waiting : WaitingPage
-        While one is read.
+        Shown while a document is read.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        # Without one from the start, Qt makes the window anew when the first view comes.
+        # Without an OpenGL widget from the start, Qt re-creates the window for the first view.
         QtOpenGLWidgets.QOpenGLWidget(self).hide()
         self.start, self.waiting = StartPage(), WaitingPage()
         self.addWidget(self.start)
         self.addWidget(self.waiting)
 
     def delete_views(self) -> None:
-        """Delete every other page, at once and with all that it holds.
+        """Delete every other page immediately, with all its objects.
 
-        PySide would take what Qt makes later, in the same place, for what a view remembers; so
-        nothing of a view is to outlive it, not even until the next collection of garbage.
+        PySide would mistake objects that Qt creates later at the same address for those of a
+        deleted view, so no reference may survive, not even until the next garbage collection.
         """
-        if self.count() == _OURS:
+        if self.count() == _PERMANENT:
             return
-        while self.count() > _OURS:
-            page = self.widget(_OURS)
+        while self.count() > _PERMANENT:
+            page = self.widget(_PERMANENT)
             self.removeWidget(page)
             page.deleteLater()
             QtCore.QCoreApplication.sendPostedEvents(page, getattr(_DELETE, "value", _DELETE))

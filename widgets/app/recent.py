@@ -1,4 +1,4 @@
-"""The files that were open last, kept in the user's settings."""
+"""Recently opened files, stored in the user's settings."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ _MOST = 8
 
 
 class Recent:
-    """A short list of files, the last one first.
+    """A short list of files, the latest first.
 
     Parameters
     ----------
     settings : QSettings
-        Where it is kept; another program that runs meanwhile writes there too.
+        Where the list is stored; other running programs may write there too.
     """
 
     def __init__(self, settings: Any) -> None:
@@ -23,28 +23,28 @@ class Recent:
 
     @property
     def paths(self) -> list[Path]:
-        """The files; some may be gone."""
+        """The files; some may no longer exist."""
         self._settings.sync()
-        kept = self._settings.value(_KEY) or []
-        names = kept if isinstance(kept, list) else [kept]
+        stored = self._settings.value(_KEY) or []
+        names = stored if isinstance(stored, list) else [stored]
         return [Path(name) for name in names if isinstance(name, str) and name]
 
     def add(self, path: Path) -> None:
-        """Put a file first, unless its name is not valid Unicode, which settings cannot store."""
+        """Add a file first, unless its name is invalid Unicode, which settings cannot store."""
         path = path.absolute()
         if not _is_text(str(path)):
             return
-        self._keep([path, *(each for each in self.paths if each != path)][:_MOST])
+        self._store([path, *(each for each in self.paths if each != path)][:_MOST])
 
     def drop(self, path: Path) -> None:
-        """Take a file out."""
-        self._keep([each for each in self.paths if each != path.absolute()])
+        """Remove a file."""
+        self._store([each for each in self.paths if each != path.absolute()])
 
     def clear(self) -> None:
-        """Take all out."""
-        self._keep([])
+        """Remove all files."""
+        self._store([])
 
-    def _keep(self, paths: list[Path]) -> None:
+    def _store(self, paths: list[Path]) -> None:
         self._settings.setValue(_KEY, [str(path) for path in paths])
         self._settings.sync()
 

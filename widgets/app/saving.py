@@ -1,6 +1,6 @@
-"""What the window's document is saved to: a session, a mesh, a picture; and who is asked before.
+"""Saving the window's document: as a session, a mesh or a picture, with the dialogs before.
 
-Every function takes the `Window` and returns whether the file is there.
+Every function takes the `Window` and returns whether the file was written.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from qtpy import QtCore, QtWidgets
 from vtk_segdeform.errors import SessionError
 from vtk_segdeform.files import replacing
 
-from ..editor import Action, Desk, exporting, saving
-from .asking import MESHES, Answer, ask_replace, ask_save, tell_failure
+from ..editor import Action, Controller, error_text, exporting, saving
+from .dialogs import MESHES, Answer, ask_replace, ask_save, show_error
 from .documents import SUFFIX
 
 _SESSIONS = f"Sessions (*{SUFFIX})"
@@ -25,28 +25,28 @@ _PICTURES = "Pictures (*.png *.jpg *.jpeg)"
 
 
 def save_session(window: Any) -> bool:
-    """Save the session to its file; ask for one if it has none."""
+    """Save the session to its file, or ask for one."""
     path = window.document.session_path
     if path is None:
         return save_session_as(window)
     if not _done(window, saving(path)):
         return False
-    window.keep_in_mind(window.document)
+    window.set_document(window.document)
     return True
 
 
 def save_session_as(window: Any) -> bool:
-    """Ask for a file, which is the session's from then on."""
+    """Ask for a file and save the session there; it becomes the session's file."""
     path = _path(window, "Save session", _SESSIONS, SUFFIX)
     if path is None or not _done(window, saving(path)):
         return False
-    window.keep_in_mind(replace(window.document, session_path=path, name=path.name))
+    window.set_document(replace(window.document, session_path=path, name=path.name))
     window.recent.add(path)
     return True
 
 
 def save_mesh(window: Any) -> bool:
-    """Save the mesh as it is in this pose to where it was saved before; else ask."""
+    """Save the posed mesh to its file, or ask for one."""
     path = window.document.mesh_path
     if path is None:
         return save_mesh_as(window)
@@ -57,26 +57,26 @@ def save_mesh(window: Any) -> bool:
 
 
 def save_mesh_as(window: Any) -> bool:
-    """Ask for a file for the mesh; its suffix is its format."""
+    """Ask for a file and save the posed mesh there, in the format of its suffix."""
     source = window.document.source
     suffix = ".ply" if source is None else source.suffix
     path = _path(window, "Save mesh", f"Meshes ({MESHES})", suffix)
     if path is None or not _done(window, exporting(path)):
         return False
-    window.keep_in_mind(replace(window.document, mesh_path=path))
+    window.set_document(replace(window.document, mesh_path=path))
     window.mesh_state = window.session.state
     return True
 
 
 def export_picture(window: Any) -> bool:
-    """Ask for a file, and draw there what the view shows, but for its words and what is grabbed."""
+    """Ask for a file and save a picture of the view, without status line and gizmos."""
     path = _path(window, "Export picture", _PICTURES, ".png")
-    return path is not None and _done(window, lambda desk: _draw(window, desk, path))
+    return path is not None and _done(window, lambda controller: _draw(window, controller, path))
 
 
-def may_be_given_up(window: Any) -> bool:
-    """Tell whether what is open can go: it is saved, or somebody said so."""
-    if not window.is_behind:
+def may_discard(window: Any) -> bool:
+    """Return whether the document may be closed: it is saved, or the user discards it."""
+    if not window.is_modified:
         return True
     mesh_is_saved = window.mesh_state is window.session.state
     answer = ask_save(window, window.document.name, mesh_is_saved=mesh_is_saved)
@@ -84,22 +84,20 @@ def may_be_given_up(window: Any) -> bool:
 
 
 def _done(window: Any, action: Action) -> bool:
-    """Do it, also beside a job; what goes wrong is told in a box, and in the editor's line."""
-    editor = window.editor
-    editor.do(action, while_busy=True)
-    fault = editor.desk.voice.fault
-    if fault:
-        tell_failure(window, "This could not be saved", fault)
-    return not fault
+    """Run the action, even during a job; show an error in a dialog and in the status line."""
+    error = window.editor.do(action, while_busy=True)
+    if error is not None:
+        show_error(window, "Could not save", error_text(error))
+    return error is None
 
 
 def _path(window: Any, title: str, kinds: str, suffix: str) -> Path | None:
-    """Return the path somebody chooses, with a suffix, or None."""
+    """Return the path that the user chooses, with a suffix, or None."""
     proposal = window.document.proposal
     if proposal.suffix != suffix or not title.endswith("session"):
         proposal = proposal.with_suffix(suffix)
-    if proposal == window.document.source:  # which is not to be written over by mere Enter
-        proposal = proposal.with_stem(f"{proposal.stem}-bent")
+    if proposal == window.document.source:  # never propose to overwrite the original
+        proposal = proposal.with_stem(f"{proposal.stem}-deformed")
     name, _ = QtWidgets.QFileDialog.getSaveFileName(window, title, str(proposal), kinds)
     if not name:
         return None
@@ -110,15 +108,9 @@ def _path(window: Any, title: str, kinds: str, suffix: str) -> Path | None:
     return path if not os.path.exists(path) or ask_replace(window, path.name) else None
 
 
-def _draw(window: Any, desk: Desk, path: Path) -> None:
-    mode = desk.mode
-    desk.stage.rest()  # no gizmo
-    desk.voice.be_silent()
-    desk.view.render()
-    picture = window.editor_widget.plotter.grabFramebuffer()
-    desk.mode = mode
-    dragger = desk.stage.dragger
-    dragger.refine_while_resting = dragger.refine_while_resting  # go on, if that was so
+def _draw(window: Any, controller: Controller, path: Path) -> None:
+    with controller.clean_view():
+        picture = window.editor_widget.plotter.grabFramebuffer()
     content = QtCore.QBuffer()
     content.open(QtCore.QIODevice.OpenModeFlag.WriteOnly)
     if path.suffix.lower() not in _PICTURE or not picture.save(content, path.suffix[1:].upper()):
@@ -128,4 +120,4 @@ def _draw(window: Any, desk: Desk, path: Path) -> None:
             draft.write_bytes(bytes(content.data()))
     except OSError as fault:
         raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
-    desk.say(f"picture written to {path}")
+    controller.say(f"Picture saved to {path}")

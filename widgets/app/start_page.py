@@ -1,4 +1,4 @@
-"""What the window shows before there is a mesh: where to drop one, and what was open last."""
+"""The page shown before a document is open: a drop area, two buttons and recent files."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ _MOST = 6  # recent files; the menu has the rest
 
 
 class StartPage(QtWidgets.QWidget):
-    """A place to drop files on, two buttons and a list.
+    """A drop area, two buttons and the recent files.
 
     Attributes
     ----------
-    open, cactus : QPushButton
-        Ask for a file; open the cactus.
+    open, sample : QPushButton
+        Ask for a file; open the sample model.
     recent : list of QPushButton
-        One for each file.
+        One button for each file.
     """
 
     open_wanted = QtCore.Signal()
-    """A file is to be asked for."""
-    cactus_wanted = QtCore.Signal()
-    """The cactus will do."""
+    """The user wants to choose a file."""
+    sample_wanted = QtCore.Signal()
+    """The user wants to open the sample model."""
     chosen = QtCore.Signal(object)
-    """This file is to be opened: a Path."""
+    """The user chose a recent file: its Path."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.open, self.cactus = _button("Open ..."), _button("Try the cactus")
+        self.open, self.sample = _button("Open ..."), _button("Open sample model")
         self.open.setDefault(True)
         self.open.clicked.connect(self.open_wanted)
-        self.cactus.clicked.connect(self.cactus_wanted)
-        self.cactus.setToolTip("A mesh to try things on; nothing is read or written")
+        self.sample.clicked.connect(self.sample_wanted)
+        self.sample.setToolTip("A cactus to try the editor on; no file is needed")
         self.target = _Target()
         self.recent: list[Any] = []
         self._heading = QtWidgets.QLabel("Recent")
@@ -47,7 +47,7 @@ class StartPage(QtWidgets.QWidget):
         self._list.setSpacing(0)
         buttons = QtWidgets.QHBoxLayout()
         buttons.addWidget(self.open)
-        buttons.addWidget(self.cactus)
+        buttons.addWidget(self.sample)
         inside = QtWidgets.QWidget()
         inside.setFixedWidth(_WIDTH * self.fontMetrics().averageCharWidth())
         column = QtWidgets.QVBoxLayout(inside)
@@ -60,7 +60,7 @@ class StartPage(QtWidgets.QWidget):
         layout.addWidget(inside, 0, Qt.AlignmentFlag.AlignCenter)
 
     def show_recent(self, paths: Sequence[Path]) -> None:
-        """List files, each under its name and folder; those that are gone are dim."""
+        """List files with their names and folders; missing files are disabled."""
         for button in self.recent:
             self._list.removeWidget(button)
             button.deleteLater()
@@ -84,27 +84,27 @@ class StartPage(QtWidgets.QWidget):
 
 
 class _Target(QtWidgets.QWidget):
-    """A dashed frame with words in it; it lights up when something is held over the window."""
+    """The drop area: a dashed frame, highlighted while a file is dragged over the window."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._is_lit = False
+        self.is_highlighted = False
         self.setMinimumHeight(9 * self.fontMetrics().height())
         self.setAccessibleName("Drop a mesh or a session here")
 
-    def light_up(self, is_lit: bool) -> None:
-        """Show that what is held over the window can be dropped, or that nothing is."""
-        self._is_lit = is_lit
+    def highlight(self, on: bool) -> None:
+        """Highlight the area, or end that."""
+        self.is_highlighted = on
         self.update()
 
-    def paintEvent(self, event: Any) -> None:  # noqa: N802, ARG002 - Qt's word
-        """Draw the frame and the words."""
+    def paintEvent(self, event: Any) -> None:  # noqa: N802, ARG002 - Qt's name
+        """Draw the frame and the text."""
         roles, palette = QtGui.QPalette.ColorRole, self.palette()
         ink = palette.color(roles.WindowText)
-        line = palette.color(roles.Highlight) if self._is_lit else QtGui.QColor(ink)
+        line = palette.color(roles.Highlight) if self.is_highlighted else QtGui.QColor(ink)
         fill = QtGui.QColor(line)
-        line.setAlphaF(1.0 if self._is_lit else 0.45)
-        fill.setAlphaF(0.15 if self._is_lit else 0.03)
+        line.setAlphaF(1.0 if self.is_highlighted else 0.45)
+        fill.setAlphaF(0.15 if self.is_highlighted else 0.03)
         painter = QtGui.QPainter(self)
         painter.setRenderHint(QtGui.QPainter.RenderHint.Antialiasing)
         painter.setPen(QtGui.QPen(line, 1.5, Qt.PenStyle.DashLine))
@@ -129,7 +129,7 @@ class _Target(QtWidgets.QWidget):
 
 
 def home_as_tilde(folder: Path) -> str:
-    """Return a folder as people write it."""
+    """Return a folder with "~" for the home folder."""
     try:
         return f"~/{folder.relative_to(Path.home())}".removesuffix("/.")
     except ValueError:

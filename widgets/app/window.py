@@ -1,11 +1,11 @@
-"""The window of the desktop program: a page to start from, or `DeformWidget` over one document.
+"""The window of the desktop program: a start page, or a `DeformWidget` for one document.
 
     window = Window()
     window.show()
     window.begin(Path("horse.ply"))
 
-Files are read in another thread.  What was open stays until the next one is there, so that a
-file that cannot be read costs nothing; unsaved work is kept by `Keeper` all the while.
+Files are read in another thread.  The current document stays open until the next one has been
+read, so an unreadable file loses nothing.  `Autosaver` saves unsaved work meanwhile.
 """
 
 from __future__ import annotations
@@ -18,44 +18,46 @@ from qtpy import QtCore, QtWidgets
 
 from vtk_segdeform.session import Session
 
-from ..editor import DeformEditor
+from ..editor import DeformEditor, Job
 from ..qt import DeformWidget
-from .asking import ask_file, choose_work, tell_failure
 from .autosave import Autosaves, Slot
-from .documents import Document, Opened, from_file, from_slot, the_cactus
+from .autosaver import INTERVAL, Autosaver, stops_of
+from .dialogs import ask_file, choose_work, show_error
+from .documents import Document, Opened, from_file, from_slot, opening_error, sample_model
 from .drops import Drops
-from .keeper import INTERVAL, Keeper, stops_of
-from .menus import Menus, lead_panel
-from .opening import Opening, Request
+from .menus import Menus, connect_panel
+from .opening import Request
 from .pages import Pages
+from .qt_timer import qt_timer
 from .recent import Recent
-from .saving import may_be_given_up
+from .saving import may_discard
 
 _SIZE = 1200, 800
+_PERIOD = 30  # milliseconds between two polls of the job that opens a document
 
 
 class Window(QtWidgets.QMainWindow):
-    """One document at a time, or none yet.
+    """The main window, with one document at a time or none.
 
     Parameters
     ----------
     settings : QSettings, optional
-        Where recent files are kept; the user's unless given.
+        Where recent files are stored; by default the user's settings.
     autosaves : Autosaves, optional
-        Where unsaved work is kept; in the user's folder unless given.
+        Where unsaved work is stored; by default the user's folder.
     interval : float
-        Seconds that a crash may cost.
+        Longest part of an ongoing drag that a crash may lose, in seconds.
 
     Attributes
     ----------
     document : Document
-        Where what is open came from.
+        The open document.
     editor_widget : DeformWidget or None
-        What it is edited in.
-    keeper, autosaves, recent : Keeper, Autosaves, Recent
-        Unsaved work, where it is kept, and the files that were open last.
+        The widget that edits it.
+    autosaver, autosaves, recent : Autosaver, Autosaves, Recent
+        The autosave, its folder, and the recently opened files.
     mesh_state : object
-        The state of the session of which the mesh is saved.
+        The state of the session when its mesh was last saved.
     """
 
     def __init__(
@@ -68,59 +70,60 @@ class Window(QtWidgets.QMainWindow):
         super().__init__()
         self.recent = Recent(settings or QtCore.QSettings("vtk_segdeform", "segdeform"))
         self.autosaves = autosaves or Autosaves()
-        self.keeper = Keeper(self.autosaves, self, interval=interval)
-        self.keeper.failed.connect(self._say)
+        self.autosaver = Autosaver(self.autosaves, self, interval=interval)
+        self.autosaver.failed.connect(self._say)
         self.document = Document("")
         self.mesh_state: object = None
         self.editor_widget: Any = None
-        self._opening: Opening | None = None
+        self._request: Request | None = None
+        self._job: Job[Opened] | None = None
         self._stops = stops_of(self)
         self.pages = Pages()
         self.pages.start.open_wanted.connect(self.ask_and_open)
-        self.pages.start.cactus_wanted.connect(self.open_cactus)
+        self.pages.start.sample_wanted.connect(self.open_sample)
         self.pages.start.chosen.connect(self.open)
-        self.pages.waiting.cancelled.connect(self._stop_opening)
+        self.pages.waiting.cancelled.connect(self._cancel_opening)
         self.setCentralWidget(self.pages)
         self.menus = Menus(self)
         drops = Drops(self)
-        drops.held.connect(self.pages.start.target.light_up)
+        drops.hovered.connect(self.pages.start.target.highlight)
         drops.dropped.connect(self.open)
         self.resize(*_SIZE)
         self._show_page()
 
-    # What is open.
+    # The open document.
 
     @property
     def has_mesh(self) -> bool:
-        """Whether something is open."""
+        """Whether a document is open."""
         return self.editor_widget is not None
 
     @property
     def editor(self) -> DeformEditor:
-        """The editor of what is open."""
+        """The editor of the document."""
         editor: DeformEditor = self.editor_widget.editor
         return editor
 
     @property
     def session(self) -> Session:
-        """The session of what is open."""
+        """The session of the document."""
         return self.editor.session
 
     @property
-    def is_behind(self) -> bool:
-        """Whether something would be lost if the window were closed now."""
-        return self.has_mesh and self.editor.desk.file.is_behind(self.session)
+    def is_modified(self) -> bool:
+        """Whether the document has unsaved changes."""
+        return self.has_mesh and self.editor.controller.file.is_modified(self.session)
 
-    def keep_in_mind(self, document: Document) -> None:
-        """Go on with the same session under what *document* tells of its files."""
+    def set_document(self, document: Document) -> None:
+        """Change the files of the open document; the session is unchanged."""
         self.document = document
-        self.keeper.about = document.about
-        self._heard()
+        self.autosaver.about = document.about
+        self._update_title()
 
     # Opening.
 
     def begin(self, path: Path | None = None) -> None:
-        """Offer what a crash has left; if it is not taken, open *path*."""
+        """Offer to recover autosaved work; otherwise open *path*."""
         if not self.recover() and path is not None:
             self.open(path)
 
@@ -132,16 +135,16 @@ class Window(QtWidgets.QMainWindow):
             self.open(path)
 
     def open(self, path: Path) -> None:
-        """Open a mesh or a session, once what is open may go."""
+        """Open a mesh or a session, unless the user keeps the current document."""
         path = path.absolute()
         self._open(Request(path.name, from_file(path), path))
 
-    def open_cactus(self) -> None:
-        """Open something to try things on."""
-        self._open(Request("the cactus", the_cactus))
+    def open_sample(self) -> None:
+        """Open the sample model."""
+        self._open(Request("sample model", sample_model))
 
     def recover(self) -> bool:
-        """Offer what crashed programs have left; tell whether some of it is taken."""
+        """Offer to recover autosaved work; return whether the user accepts."""
         slot = choose_work(self, self.autosaves)
         if slot is None:
             return False
@@ -150,64 +153,74 @@ class Window(QtWidgets.QMainWindow):
         return True
 
     def clear_recent(self) -> None:
-        """Forget which files were open."""
+        """Clear the list of recent files."""
         self.recent.clear()
         self._show_page()
 
     def _open(self, request: Request) -> bool:
-        """Begin to read; tell whether what is open may go for it."""
-        if not may_be_given_up(self):
+        """Start reading; return False if the user keeps the current document."""
+        if not may_discard(self):
             return False
-        self._stop_opening()
+        self._cancel_opening()
         self.pages.waiting.begin(request.name)
-        self._opening = Opening(request, self)
-        self._opening.got_on.connect(self.pages.waiting.show_progress)
-        self._opening.opened.connect(self._opened)
-        self._opening.failed.connect(self._failed)
+        self._request = request
+        self._job = Job(
+            qt_timer(self, _PERIOD),
+            request.reader,
+            done=lambda opened: self._opened(request, opened),
+            failed=lambda error: self._failed(request, opening_error(error)),
+            watch=self._show_progress,
+        )
         self._show_page()
         return True
 
+    def _show_progress(self, job: Job[Opened]) -> None:
+        if job is self._job:  # a cancelled job may still be running
+            self.pages.waiting.show_progress(job.fraction, job.text)
+
     def _opened(self, request: Request, opened: Opened) -> None:
         self._end_opening()
-        self.keeper.forget()
+        self.autosaver.discard()
         self._close_document()
         self.pages.delete_views()
         self.document, session = opened
         self.mesh_state = None
         widget = self.editor_widget = DeformWidget(session, self)
-        widget.editor.desk.file = self.document.file(session, is_unsaved=bool(request.slot))
-        lead_panel(self)
-        self._stops.append(widget.editor.desk.voice.on_word(self._heard))
-        widget.session_changed.connect(lambda _: self._mind())
-        self._mind(request.slot)
+        widget.editor.controller.file = self.document.file(session, is_unsaved=bool(request.slot))
+        connect_panel(self)
+        self._stops.append(widget.editor.controller.messages.on_change(self._update_title))
+        widget.session_changed.connect(lambda _: self._autosave())
+        self._autosave(request.slot)
         self.pages.addWidget(widget)
         if request.path is not None:
             self.recent.add(request.path)
         self._show_page()
         widget.setFocus()
         if request.slot is not None:
-            self._say("recovered; it is still to be saved")
+            self._say("Recovered (unsaved)")
 
     def _failed(self, request: Request, text: str) -> None:
-        self._stop_opening()
+        self._cancel_opening()
         if request.path is not None and not os.path.exists(request.path):
             self.recent.drop(request.path)
         self._show_page()
-        tell_failure(self, f"{request.name} could not be opened", text)
+        show_error(self, f"Could not open {request.name}", text)
 
-    def _stop_opening(self) -> None:
-        if self._opening is not None:
-            self._opening.cancel()
+    def _cancel_opening(self) -> None:
+        """Cancel; the job stops at its next progress report and is not waited for."""
+        if self._job is not None:
+            self._job.cancel()
+        if self._request is not None and self._request.slot is not None:
+            self._request.slot.release()
         self._end_opening()
 
     def _end_opening(self) -> None:
-        opening, self._opening = self._opening, None
-        if opening is not None:
-            opening.deleteLater()
+        job, self._job, self._request = self._job, None, None
+        if job is not None:
             self._show_page()
 
-    def _mind(self, slot: Slot | None = None) -> None:
-        self.keeper.mind(self.session, self.document.about, lambda: self.is_behind, slot=slot)
+    def _autosave(self, slot: Slot | None = None) -> None:
+        self.autosaver.watch(self.session, self.document.about, lambda: self.is_modified, slot=slot)
 
     def _close_document(self) -> None:
         widget, self.editor_widget = self.editor_widget, None
@@ -215,35 +228,35 @@ class Window(QtWidgets.QMainWindow):
             self._stops.pop()()
             widget.close()
 
-    # What is shown.
+    # Display.
 
     def _show_page(self) -> None:
         pages = self.pages
         here = self.editor_widget or pages.start
         if here is pages.start:
             pages.start.show_recent(self.recent.paths)
-        pages.setCurrentWidget(here if self._opening is None else pages.waiting)
+        pages.setCurrentWidget(here if self._job is None else pages.waiting)
         self.menus.refresh()
-        self._heard()
+        self._update_title()
 
-    def _heard(self) -> None:
-        """Show what the title is to say, and forget what is saved."""
+    def _update_title(self) -> None:
+        """Show the name and the unsaved mark; delete the autosave of saved work."""
         name = self.document.name if self.has_mesh else ""
-        is_behind = self.is_behind
+        is_modified = self.is_modified
         self.setWindowTitle(f"{name}[*] - segdeform" if name else "segdeform")
-        self.setWindowModified(is_behind)
-        if self.has_mesh and not is_behind:
-            self.keeper.keep()
+        self.setWindowModified(is_modified)
+        if self.has_mesh and not is_modified:
+            self.autosaver.save()
 
     def _say(self, text: str) -> None:
-        self.editor.desk.say(text)
+        self.editor.controller.say(text)
 
     def closeEvent(self, event: Any) -> None:  # noqa: N802
-        """Close once what is open may go; what is kept of it goes with it."""
-        if not may_be_given_up(self):
+        """Close the window and delete the autosave, unless the user keeps the document."""
+        if not may_discard(self):
             event.ignore()
             return
-        self._stop_opening()
-        self.keeper.close()
+        self._cancel_opening()
+        self.autosaver.discard()
         self._close_document()
         super().closeEvent(event)

@@ -1,26 +1,29 @@
-"""The four widgets together: modes, keys, background jobs, status and help.
+"""The four widgets together: modes, keys, background jobs, status line and help.
 
 The files, in reading order:
 
     editor           `DeformEditor`
-    desk             the state of the editor: session, mode, job, file
-    stage            the widgets, and which are on in which mode
-    actions take_actions panel_actions
-                     what keys, menus and panels do
+    controller       session, widgets, mode, job and file of the editor
+    mode widget_set  the four modes, and the widgets of each
+    actions recording_actions panel_actions
+                     the actions behind keys, menus and panels
     bindings         the table of keys
-    work jobs        background work, with progress and cancellation
-    session_file     the file that is saved to
-    takes            recordings and films
-    voice hints status_line help_card log
+    job              background work, with progress and cancellation
+    session_file     the file that the session is saved to
+    recordings       recordings of input and video
+    messages hints status_line help_card log
                      messages, hints, the help card and the history
 """
 
 from . import actions
 from .actions import Action, painting, save, split_region, toggle_cages, toggle_overlay
 from .bindings import binding_of, key_cap
-from .desk import Desk
+from .controller import Controller
 from .editor import DeformEditor
+from .job import Job, Timer
 from .log import Entry
+from .messages import error_text
+from .mode import Mode
 from .panel_actions import (
     choosing_handle,
     choosing_region,
@@ -28,29 +31,30 @@ from .panel_actions import (
     merging,
     naming_region,
     opening,
-    ranging,
-    reaching,
     renaming,
     saving,
+    selecting_through,
     setting,
+    setting_colour_range,
     showing_cage,
     with_radius,
 )
 from .session_file import SessionFile, is_mesh, read_bound
-from .stage import Mode
-from .voice import words_of
 
 __all__ = [
     "Action",
+    "Controller",
     "DeformEditor",
-    "Desk",
     "Entry",
+    "Job",
     "Mode",
     "SessionFile",
+    "Timer",
     "actions",
     "binding_of",
     "choosing_handle",
     "choosing_region",
+    "error_text",
     "exporting",
     "is_mesh",
     "key_cap",
@@ -58,17 +62,16 @@ __all__ = [
     "naming_region",
     "opening",
     "painting",
-    "ranging",
-    "reaching",
     "read_bound",
     "renaming",
     "save",
     "saving",
+    "selecting_through",
     "setting",
+    "setting_colour_range",
     "showing_cage",
     "split_region",
     "toggle_cages",
     "toggle_overlay",
     "with_radius",
-    "words_of",
 ]

@@ -1,29 +1,32 @@
-"""What the keys of the editor do, each in a few lines.
+"""The actions behind the keys of the editor.
 
-Every action is a function of the desk; which key means which is told in `bindings`.  What takes
-long is started as a job.  An action says what it has done, unless that is plain to see.
+Every action is a function of the `Controller`; `bindings` assigns keys to actions.  Long operations
+are started as jobs.  An action reports its result in the status line unless the view shows it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
+from vtk_segdeform.cages import Cage
 from vtk_segdeform.errors import CageError, ConstraintError, RegionError
-from vtk_segdeform.regions import segment as segmented
+from vtk_segdeform.progress import Progress
+from vtk_segdeform.regions import Regions
+from vtk_segdeform.regions import segment as segment_mesh
 
 from ..region_selector import Paint, Tool
-from .desk import Desk
-from .stage import Mode
+from .controller import Controller
+from .mode import Mode
 
-Action = Callable[[Desk], None]
+Action = Callable[[Controller], None]
 
 
 def to_mode(mode: Mode) -> Action:
     """Return the action that enters *mode*."""
 
-    def enter(desk: Desk) -> None:
-        desk.mode = mode
+    def enter(controller: Controller) -> None:
+        controller.mode = mode
 
     return enter
 
@@ -31,221 +34,225 @@ def to_mode(mode: Mode) -> Action:
 def with_tool(tool: Tool) -> Action:
     """Return the action that paints with *tool*."""
 
-    def take(desk: Desk) -> None:
-        desk.stage.selector.tool = tool
+    def select(controller: Controller) -> None:
+        controller.widgets.selector.tool = tool
 
-    return take
+    return select
 
 
-def painting(what: Paint) -> Action:
-    """Return the action that paints *what*."""
+def painting(target: Paint) -> Action:
+    """Return the action that selects the *target* of painting."""
 
-    def paint(desk: Desk) -> None:
-        desk.stage.selector.paints = what
+    def paint(controller: Controller) -> None:
+        controller.widgets.selector.paints = target
 
     return paint
 
 
-# Everywhere.
+# In all modes.
 
 
-def undo(desk: Desk) -> None:
-    """Take back the last step."""
-    label = desk.session.undo()
-    desk.say(f"undone: {label}" if label else "nothing to undo")
+def undo(controller: Controller) -> None:
+    """Undo the last step."""
+    label = controller.session.undo()
+    controller.say(f"Undo: {label}" if label else "Nothing to undo")
 
 
-def redo(desk: Desk) -> None:
-    """Do it again."""
-    label = desk.session.redo()
-    desk.say(f"done again: {label}" if label else "nothing to redo")
+def redo(controller: Controller) -> None:
+    """Redo the last undone step."""
+    label = controller.session.redo()
+    controller.say(f"Redo: {label}" if label else "Nothing to redo")
 
 
-def reset(desk: Desk) -> None:
-    """Go back to rest."""
-    desk.session.reset_pose()
-    desk.say("at rest")
+def reset(controller: Controller) -> None:
+    """Reset the pose."""
+    controller.session.reset_pose()
+    controller.say("Pose reset")
 
 
-def save(desk: Desk) -> None:
-    """Save to the editor's file; one that is somebody else's only when asked twice."""
-    place = desk.place
-    question = f"{place} already exists; save again to replace it"
-    if desk.file.may_replace(place) or desk.voice.confirms(question):
-        desk.save()
+def save(controller: Controller) -> None:
+    """Save to the editor's file; another existing file is replaced only if confirmed."""
+    place = controller.place
+    question = f"{place} already exists. Save again to replace it"
+    if controller.file.may_replace(place) or controller.messages.confirms(question):
+        controller.save()
 
 
-def open_file(desk: Desk) -> None:
-    """Open the editor's file; what is not saved is given up only when asked twice."""
-    path = desk.place
-    question = f"what was done is not saved: again to open {path} all the same"
-    if not desk.file.is_behind(desk.session) or desk.voice.confirms(question):
-        desk.open(path)
+def open_file(controller: Controller) -> None:
+    """Open the editor's file; unsaved changes are discarded only if confirmed."""
+    path = controller.place
+    question = f"Unsaved changes will be lost. Open again to continue with {path}"
+    is_modified = controller.file.is_modified(controller.session)
+    if not is_modified or controller.messages.confirms(question):
+        controller.open(path)
 
 
-def segment(desk: Desk) -> None:
-    """Find regions."""
-    session = desk.session
+def segment(controller: Controller) -> None:
+    """Segment the mesh into regions."""
+    session, widgets = controller.session, controller.widgets
 
-    def keep(regions: Any) -> None:
-        session.set_regions(regions, label="find regions")
-        desk.stage.choose_region(min(desk.stage.selector.region, regions.n_regions - 1))
-        desk.say(f"{_count(regions.n_regions, 'region')} found")
+    def show(regions: Regions) -> str:
+        session.set_regions(regions, label="auto-segment")
+        widgets.choose_region(min(widgets.selector.region, regions.n_regions - 1))
+        return f"{_count(regions.n_regions, 'region')} found"
 
-    desk.start("finding regions", lambda p: segmented(session.mesh, progress=p), keep)
+    def work(progress: Progress) -> Regions:
+        return segment_mesh(session.mesh, progress=progress)
+
+    controller.start("Detecting regions", work, show)
 
 
-def fit_cages(desk: Desk) -> None:
+def fit_cages(controller: Controller) -> None:
     """Fit cages to the regions."""
-    session, regions = desk.session, desk.session.regions
+    session, regions = controller.session, controller.session.regions
     if regions is None:
-        raise RegionError("there are no regions to fit cages to: G finds some, or paint them")
+        raise RegionError("No regions to fit cages to. Press G to detect them, or paint one")
 
-    def keep(cages: Any) -> None:
-        if session.regions is not regions:  # by another window of the same session
-            raise RegionError("regions changed while cages were fitted to them: F fits them anew")
+    def show(cages: Sequence[Cage]) -> str:
+        if session.regions is not regions:  # changed in another view of the same session
+            raise RegionError("The regions changed while cages were being fitted. Press F to refit")
         session.set_cages(cages, label="fit cages")
         total = sum(cage.n_vertices for cage in cages)
-        desk.say(f"{_count(len(cages), 'cage')} fitted, {total} vertices in all")
+        return f"{_count(len(cages), 'cage')} fitted, {total} vertices in total"
 
-    desk.start("fitting cages", session.fitted_cages, keep)
-
-
-def toggle_cages(desk: Desk) -> None:
-    """Show cages in every mode, or in their own only."""
-    if not desk.session.cages:
-        raise CageError("there are no cages to show yet: F fits them to the regions")
-    desk.stage.cages_wanted = not desk.stage.cages_wanted
-    desk.stage.show(desk.mode)
-    desk.say("cages shown" if desk.stage.cages.is_shown else "cages hidden")
+    controller.start("Fitting cages", session.fitted_cages, show)
 
 
-def toggle_overlay(desk: Desk) -> None:
-    """Show the local volume change, or not."""
-    desk.stage.overlay_wanted = not desk.stage.overlay_wanted
-    desk.stage.show(desk.mode)
-    desk.bind_if_ready()  # which shows it, once it is prepared
+def toggle_cages(controller: Controller) -> None:
+    """Show cages in all modes, or in their own mode only."""
+    if not controller.session.cages:
+        raise CageError("No cages to show yet. Press F to fit them to the regions")
+    controller.widgets.cages_wanted = not controller.widgets.cages_wanted
+    controller.widgets.show(controller.mode)
+    controller.say("Cages shown" if controller.widgets.cages.is_shown else "Cages hidden")
 
 
-def toggle_volume(desk: Desk) -> None:
-    """Hold the volume, or let it go."""
-    session = desk.session
+def toggle_overlay(controller: Controller) -> None:
+    """Show or hide the local volume change."""
+    controller.widgets.overlay_wanted = not controller.widgets.overlay_wanted
+    controller.widgets.show(controller.mode)
+    controller.prepare()  # which shows the overlay once it is ready
+
+
+def toggle_volume(controller: Controller) -> None:
+    """Turn volume preservation on or off."""
+    session = controller.session
     session.change_options(preserve_volume=not session.options.preserve_volume)
-    held = session.options.preserve_volume
-    desk.say("volume held from the next move on" if held else "volume let go: not held any more")
+    is_on = session.options.preserve_volume
+    controller.say(f"Volume preservation {'on from the next move' if is_on else 'off'}")
 
 
-def toggle_help(desk: Desk) -> None:
-    """Show the card of keys, or hide it."""
-    desk.help.toggle()
+def toggle_help(controller: Controller) -> None:
+    """Show or hide the help card."""
+    controller.help.toggle()
 
 
-def cancel(desk: Desk) -> None:
-    """Stop the job, or put away the card."""
-    desk.cancel()
+def cancel(controller: Controller) -> None:
+    """Cancel the job, the drag or the stroke, or close the help card."""
+    controller.cancel()
 
 
 # Painting.
 
 
-def toggle_through(desk: Desk) -> None:
-    """Reach the far side too, or what is seen only."""
-    selector = desk.stage.selector
+def toggle_through(controller: Controller) -> None:
+    """Select hidden vertices too, or the visible surface only."""
+    selector = controller.widgets.selector
     selector.through = not selector.through
-    if not selector.through:  # else the hint says so
-        desk.say("reaches only what is seen")
+    if not selector.through:  # otherwise the hint says so
+        controller.say("Visible surface only")
 
 
-def grow(desk: Desk) -> None:
-    """Paint one ring of edges more."""
-    desk.stage.selector.grow()
+def grow(controller: Controller) -> None:
+    """Grow the painted area by one ring."""
+    controller.widgets.selector.grow()
 
 
-def shrink(desk: Desk) -> None:
-    """Paint one ring of edges less."""
-    desk.stage.selector.shrink()
+def shrink(controller: Controller) -> None:
+    """Shrink the painted area by one ring."""
+    controller.widgets.selector.shrink()
 
 
-def next_region(desk: Desk) -> None:
-    """Paint another region."""
-    stage = desk.stage
-    stage.choose_region((stage.selector.region + 1) % max(1, stage.n_regions))
+def next_region(controller: Controller) -> None:
+    """Select the next region for painting."""
+    widgets = controller.widgets
+    widgets.choose_region((widgets.selector.region + 1) % max(1, widgets.n_regions))
 
 
-def new_region(desk: Desk) -> None:
-    """Paint a region that is not there yet."""
-    desk.stage.choose_region(desk.stage.n_regions)
+def new_region(controller: Controller) -> None:
+    """Start painting a new region."""
+    controller.widgets.choose_region(controller.widgets.n_regions)
 
 
-def merge_region(desk: Desk) -> None:
-    """Make one of the region that is painted and the one under the pointer."""
-    selector = desk.stage.selector
-    _require_regions(desk, "merge")
+def merge_region(controller: Controller) -> None:
+    """Merge the selected region with the one under the pointer."""
+    selector = controller.widgets.selector
+    _require_regions(controller, "merge")
     other = selector.region_under_pointer()
     if other is None or other == selector.region:
         raise RegionError(
-            "point at the region that is to become one with "
-            f"{desk.session.region_name(selector.region)}"
+            f"Point at the region to merge with {controller.session.region_name(selector.region)}"
         )
-    names = " and ".join(map(desk.session.region_name, sorted([selector.region, other])))
-    desk.session.merge_regions([selector.region, other])
+    names = " and ".join(map(controller.session.region_name, sorted([selector.region, other])))
+    controller.session.merge_regions([selector.region, other])
     selector.region = min(selector.region, other)
-    desk.say(f"{names} are one")
+    controller.say(f"Merged {names}")
 
 
-def split_region(desk: Desk) -> None:
-    """Cut the region that is painted in two."""
-    _require_regions(desk, "cut")
-    region = desk.stage.selector.region
-    desk.session.split_region(region)
-    desk.say(f"{desk.session.region_name(region)} cut in two")
+def split_region(controller: Controller) -> None:
+    """Split the selected region in two."""
+    _require_regions(controller, "split")
+    region = controller.widgets.selector.region
+    controller.session.split_region(region)
+    controller.say(f"Split {controller.session.region_name(region)}")
 
 
 # Handles.
 
 
-def next_handle(desk: Desk) -> None:
-    """Paint or drag another handle."""
-    names = _names(desk)
-    tool: Any = desk.stage.dragger if desk.mode is Mode.DEFORM else desk.stage.selector
+def next_handle(controller: Controller) -> None:
+    """Select the next handle, for painting or dragging."""
+    names = _handle_names(controller)
+    widgets = controller.widgets
+    tool: Any = widgets.dragger if controller.mode is Mode.DEFORM else widgets.selector
     here = names.index(tool.handle) if tool.handle in names else -1
     tool.handle = names[(here + 1) % len(names)]
-    desk.stage.selector.paints = Paint.HANDLE
+    widgets.selector.paints = Paint.HANDLE
 
 
-def new_handle(desk: Desk) -> None:
-    """Paint a handle that is not there yet."""
-    desk.stage.selector.paints = Paint.HANDLE
-    desk.stage.selector.handle = None
+def new_handle(controller: Controller) -> None:
+    """Start painting a new handle."""
+    controller.widgets.selector.paints = Paint.HANDLE
+    controller.widgets.selector.handle = None
 
 
-def remove_handle(desk: Desk) -> None:
-    """Let go of the handle that is painted or dragged."""
-    _names(desk)
-    stage = desk.stage
-    name = stage.dragger.handle if desk.mode is Mode.DEFORM else stage.selector.handle
+def remove_handle(controller: Controller) -> None:
+    """Remove the selected handle."""
+    _handle_names(controller)
+    widgets = controller.widgets
+    name = widgets.dragger.handle if controller.mode is Mode.DEFORM else widgets.selector.handle
     if name is None:
-        raise ConstraintError("no handle is chosen: N chooses one")
-    desk.session.remove_handle(name)
-    desk.say(f"{name} removed")
+        raise ConstraintError("No handle selected. Press N to select one")
+    controller.session.remove_handle(name)
+    controller.say(f"Removed {name}")
 
 
-def _require_regions(desk: Desk, verb: str) -> None:
-    region, count = desk.stage.selector.region, desk.stage.n_regions
+def _require_regions(controller: Controller, verb: str) -> None:
+    region, count = controller.widgets.selector.region, controller.widgets.n_regions
     if not count:
-        raise RegionError(f"there are no regions to {verb} yet: G finds some, or paint them")
+        raise RegionError(f"No regions to {verb} yet. Press G to detect them, or paint one")
     if region >= count:
-        name = desk.session.region_name(region)
-        raise RegionError(f"{name} is still to be painted; N chooses one to {verb}")
+        name = controller.session.region_name(region)
+        raise RegionError(f"Cannot {verb} {name}: not painted yet. Press N to select another")
 
 
-def _names(desk: Desk) -> list[str]:
-    """Return the names of the handles; an error says how to get one, where there is none."""
-    names = list(desk.session.handles)
+def _handle_names(controller: Controller) -> list[str]:
+    """Return the names of all handles; raise if there are none."""
+    names = list(controller.session.handles)
     if not names:
-        raise ConstraintError("there is no handle yet: in mode 3, D and then paint one")
+        raise ConstraintError("No handle yet. In mode 3, press D and paint one")
     return names
 
 
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

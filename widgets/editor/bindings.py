@@ -1,8 +1,8 @@
-"""The keys of the editor: one table, from which they work and from which the help card is made.
+"""The keys of the editor: one table for the key handler, the help card and the documentation.
 
-A key is VTK's name of it in lower case, after what is held down with it: "z", "ctrl+z", "f1",
-"ctrl+shift+z".  The same key may mean different things in different modes, and a key that means
-something in another mode only is not passed on to VTK, whose own keys would surprise.
+A key is VTK's name in lower case after its modifiers: "z", "ctrl+z", "f1", "ctrl+shift+z".  A key
+may have different actions in different modes.  A key of another mode is not passed on to VTK,
+whose own commands would surprise the user.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..region_selector import Paint, Tool
-from . import actions, take_actions
+from . import actions, recording_actions
 from .actions import Action
 from .help_card import Section
-from .stage import Mode
+from .mode import Mode
 
 R, C, H, D = Mode
 ALL = frozenset(Mode)
@@ -23,63 +23,63 @@ PAINTING = frozenset({R, H})
 
 @dataclass(frozen=True)
 class Binding:
-    """What some keys do in some modes."""
+    """The action of some keys in some modes."""
 
     keys: tuple[str, ...]
     modes: frozenset[Mode]
     label: str
     action: Action | None
-    """None if a widget takes these keys by itself, so that they are only told of."""
+    """None if a widget handles these keys itself and they are listed for the help card only."""
     while_busy: bool = False
-    """Whether it works while a job is running."""
+    """Whether the keys work while a job is running."""
 
 
 BINDINGS = (
     *(
         Binding((str(mode.value),), ALL, label, actions.to_mode(mode))
         for mode, label in (
-            (R, "regions: paint them"),
-            (C, "cages: drag vertices"),
-            (H, "handles: mark what moves"),
-            (D, "deform: drag handles"),
+            (R, "Regions: paint"),
+            (C, "Cages: drag vertices"),
+            (H, "Handles: paint"),
+            (D, "Deform: drag handles"),
         )
     ),
-    Binding(("g",), ALL, "find regions", actions.segment),
-    Binding(("f",), ALL, "fit cages", actions.fit_cages),
-    Binding(("z", "ctrl+z"), ALL, "undo", actions.undo),
-    Binding(("y", "ctrl+y", "ctrl+shift+z"), ALL, "redo", actions.redo),
-    Binding(("0", "home"), ALL, "back to rest", actions.reset),
-    Binding(("c",), ALL, "show or hide cages", actions.toggle_cages),
-    Binding(("p",), ALL, "hold or free the volume", actions.toggle_volume),
-    Binding(("ctrl+s",), ALL, "save", actions.save),
-    Binding(("ctrl+o",), ALL, "open", actions.open_file),
-    Binding(("ctrl+r",), ALL, "record what you do", take_actions.record),
-    Binding(("ctrl+m",), ALL, "film the drags", take_actions.film),
-    Binding(("h", "f1", "question"), ALL, "this card", actions.toggle_help, while_busy=True),
-    Binding(("escape",), ALL, "cancel", actions.cancel, while_busy=True),
-    Binding(("b",), PAINTING, "brush", actions.with_tool(Tool.BRUSH)),
-    Binding(("l",), PAINTING, "lasso", actions.with_tool(Tool.LASSO)),
-    Binding(("t",), PAINTING, "rectangle", actions.with_tool(Tool.RECTANGLE)),
-    Binding(("k",), PAINTING, "whole component", actions.with_tool(Tool.COMPONENT)),
-    Binding(("bracketleft", "bracketright"), PAINTING, "smaller, larger brush", None),
-    Binding(("v",), PAINTING, "reach through, or not", actions.toggle_through),
-    Binding(("plus", "equal"), PAINTING, "grow by one ring", actions.grow),
-    Binding(("minus",), PAINTING, "shrink by one ring", actions.shrink),
-    Binding(("n", "tab"), frozenset({R}), "next region", actions.next_region),
-    Binding(("a",), frozenset({R}), "new region", actions.new_region),
-    Binding(("m",), frozenset({R}), "merge with pointed at", actions.merge_region),
-    Binding(("x",), frozenset({R}), "cut in two", actions.split_region),
-    Binding(("s",), frozenset({H}), "paint what stays", actions.painting(Paint.FIXED)),
-    Binding(("d",), frozenset({H}), "paint what is dragged", actions.painting(Paint.HANDLE)),
-    Binding(("a",), frozenset({H}), "new handle", actions.new_handle),
-    Binding(("n", "tab"), frozenset({H, D}), "next handle", actions.next_handle),
-    Binding(("delete", "backspace"), frozenset({H, D}), "remove handle", actions.remove_handle),
-    Binding(("o",), frozenset({C, D}), "show or hide volumes", actions.toggle_overlay),
-    Binding(("x", "y", "z"), frozenset({D}), "in a drag: along an axis", None),
+    Binding(("g",), ALL, "Auto-segment", actions.segment),
+    Binding(("f",), ALL, "Fit cages", actions.fit_cages),
+    Binding(("z", "ctrl+z"), ALL, "Undo", actions.undo),
+    Binding(("y", "ctrl+y", "ctrl+shift+z"), ALL, "Redo", actions.redo),
+    Binding(("0", "home"), ALL, "Reset pose", actions.reset),
+    Binding(("c",), ALL, "Show cages in all modes", actions.toggle_cages),
+    Binding(("p",), ALL, "Preserve volume", actions.toggle_volume),
+    Binding(("ctrl+s",), ALL, "Save", actions.save),
+    Binding(("ctrl+o",), ALL, "Open", actions.open_file),
+    Binding(("ctrl+r",), ALL, "Record input", recording_actions.record_input),
+    Binding(("ctrl+m",), ALL, "Record video", recording_actions.record_video),
+    Binding(("h", "f1", "question"), ALL, "Show keys", actions.toggle_help, while_busy=True),
+    Binding(("escape",), ALL, "Cancel", actions.cancel, while_busy=True),
+    Binding(("b",), PAINTING, "Brush", actions.with_tool(Tool.BRUSH)),
+    Binding(("l",), PAINTING, "Lasso", actions.with_tool(Tool.LASSO)),
+    Binding(("t",), PAINTING, "Rectangle", actions.with_tool(Tool.RECTANGLE)),
+    Binding(("k",), PAINTING, "Connected part", actions.with_tool(Tool.COMPONENT)),
+    Binding(("bracketleft", "bracketright"), PAINTING, "Smaller, larger brush", None),
+    Binding(("v",), PAINTING, "Select through (X-ray)", actions.toggle_through),
+    Binding(("plus", "equal"), PAINTING, "Grow by one ring", actions.grow),
+    Binding(("minus",), PAINTING, "Shrink by one ring", actions.shrink),
+    Binding(("n", "tab"), frozenset({R}), "Next region", actions.next_region),
+    Binding(("a",), frozenset({R}), "New region", actions.new_region),
+    Binding(("m",), frozenset({R}), "Merge with region under pointer", actions.merge_region),
+    Binding(("x",), frozenset({R}), "Split region", actions.split_region),
+    Binding(("s",), frozenset({H}), "Paint fixed vertices", actions.painting(Paint.FIXED)),
+    Binding(("d",), frozenset({H}), "Paint handle", actions.painting(Paint.HANDLE)),
+    Binding(("a",), frozenset({H}), "New handle", actions.new_handle),
+    Binding(("n", "tab"), frozenset({H, D}), "Next handle", actions.next_handle),
+    Binding(("delete", "backspace"), frozenset({H, D}), "Remove handle", actions.remove_handle),
+    Binding(("o",), frozenset({C, D}), "Show local volume change", actions.toggle_overlay),
+    Binding(("x", "y", "z"), frozenset({D}), "While dragging: constrain to axis", None),
 )
 
 _HEADINGS = {
-    ALL: "Everywhere",
+    ALL: "All modes",
     frozenset({R}): "1 Regions",
     PAINTING: "1 Regions, 3 Handles",
     frozenset({H}): "3 Handles",
@@ -99,31 +99,31 @@ _CAPS = {
     "delete": "Del",
 }
 _ALSO = {"kp_add": "plus", "kp_subtract": "minus", "iso_left_tab": "tab"}
-_UNTOLD = {"equal", "backspace", "ctrl+shift+z"}  # what others expect, or some keyboards need
+_UNLISTED = {"equal", "backspace", "ctrl+shift+z"}  # alternatives, left out of the help card
 
 
 def pressed_key(interactor: Any) -> str:
-    """Return the key that is pressed now, as the table names it."""
+    """Return the pressed key, as named in the table."""
     key = (interactor.GetKeySym() or "").lower()
     key = _ALSO.get(key, key.removeprefix("kp_"))
-    # Shift is part of how "?" or "+" is typed, and says something with letters only.
+    # Shift is needed to type "?" or "+", so it counts as a modifier of letters only.
     shift = interactor.GetShiftKey() and len(key) == 1 and key.isalpha()
-    held = (
+    modifiers = (
         (interactor.GetControlKey(), "ctrl+"),
         (interactor.GetAltKey(), "alt+"),
         (shift, "shift+"),
     )
-    return "".join(name for is_down, name in held if is_down) + key
+    return "".join(name for is_down, name in modifiers if is_down) + key
 
 
 def binding_of(key: str, mode: Mode) -> Binding | None:
-    """Return what *key* does in *mode*, if anything."""
+    """Return the binding of *key* in *mode*, if any."""
     found = (b for b in BINDINGS if key in b.keys and mode in b.modes and b.action is not None)
     return next(found, None)
 
 
 def modes_of(key: str) -> list[tuple[Mode, str]]:
-    """Return the modes in which *key* does something, and what."""
+    """Return the modes in which *key* has an action, and its label there."""
     return [
         (mode, b.label) for b in BINDINGS if key in b.keys for mode in sorted_modes(b) if b.action
     ]
@@ -135,17 +135,17 @@ def sorted_modes(binding: Binding) -> list[Mode]:
 
 
 def key_cap(key: str) -> str:
-    """Return what stands on a key: "Ctrl+Z", "Esc", "["."""
+    """Return the name of a key for users: "Ctrl+Z", "Esc", "["."""
     return "+".join(_CAPS.get(part, part.capitalize()) for part in key.split("+"))
 
 
 def help_sections() -> list[Section]:
-    """Return the table for people, by the modes in which keys work."""
+    """Return the table for users, grouped by modes."""
     return [
         (
             heading,
             [
-                ("  ".join(key_cap(key) for key in b.keys if key not in _UNTOLD), b.label)
+                ("  ".join(key_cap(key) for key in b.keys if key not in _UNLISTED), b.label)
                 for b in BINDINGS
                 if b.modes == modes
             ],

@@ -1,7 +1,7 @@
-"""A card over the picture that lists the keys.
+"""A card over the view that lists the keys.
 
-White with a dark rim, so that it is read on any background.  Letters are as large as the window
-allows, up to a limit, in one column, two or three, whichever makes them largest.
+White with a dark border, so that it is legible on any background.  The text is as large as the
+window allows, up to a limit, in one, two or three columns, whichever allows the largest size.
 """
 
 from __future__ import annotations
@@ -16,24 +16,24 @@ from vtk_segdeform.pictures import INK, PAPER
 from ..scene import Panel, Stop, View, Words
 
 Section = tuple[str, Sequence[tuple[str, str]]]
-"""A heading, and for each key its name and what it does."""
+"""A heading, and pairs (key, action)."""
 
 _KEYS = "#0B4F82"
 _LARGEST, _SMALLEST = 24.0, 7.0  # pixels
-_LEADING, _MARGIN, _GAP = 1.5, 1.4, 2.0  # from line to line, around, between columns; in letters
-_WIDE, _HIGH, _FOOT = 0.94, 0.86, 0.1  # shares of the window: the most, and what stays free below
-_PROBE = 20.0  # the size in which widths are measured
+_LEADING, _MARGIN, _GAP = 1.5, 1.4, 2.0  # line height, margin, space between columns; in ems
+_WIDE, _HIGH, _FOOT = 0.94, 0.86, 0.1  # of the window: largest size, free space below
+_PROBE = 20.0  # font size at which widths are measured
 
 
 class HelpCard:
-    """A list of keys in the middle of a view, above a status line; hidden until `show`.
+    """A list of keys at the centre of a view, above the status line; hidden until `show`.
 
     Parameters
     ----------
     view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
-        Where it lies, over everything else.  Call `remove` before its window closes.
+        Where it is drawn, over everything else.  Call `remove` before its window closes.
     sections : sequence of (heading, rows)
-        Rows are pairs (key, what it does); a section is kept together.
+        Rows are pairs (key, action); a section stays in one column.
     """
 
     def __init__(self, view: Any, sections: Sequence[Section]) -> None:
@@ -45,17 +45,17 @@ class HelpCard:
 
     @property
     def is_shown(self) -> bool:
-        """Whether it lies there."""
+        """Whether it is shown."""
         return self._stop is not None
 
     def show(self) -> None:
-        """Lay it there."""
+        """Show it."""
         if self._stop is None:
             self._stop = self.view.before_render(self._lay_out)
             self.view.touch()
 
     def hide(self) -> None:
-        """Take it away, until it is shown again."""
+        """Hide it."""
         if self._stop is not None:
             self._stop()
             self._stop = None
@@ -63,14 +63,14 @@ class HelpCard:
             self.view.touch()
 
     def toggle(self) -> None:
-        """Show it if it is hidden, hide it if it is shown."""
+        """Show or hide it."""
         if self.is_shown:
             self.hide()
         else:
             self.show()
 
     def remove(self) -> None:
-        """Go out of the view, for good."""
+        """Remove it from the view, permanently."""
         self.hide()
 
     def _clear(self) -> None:
@@ -89,7 +89,7 @@ class HelpCard:
         choices = []
         for count in (1, 2, 3):
             columns = _shared(self.sections, count)
-            wide = count * column + (count - 1) * _GAP + 2 * _MARGIN  # in letters
+            wide = count * column + (count - 1) * _GAP + 2 * _MARGIN  # in ems
             high = max(map(_n_lines, columns)) * _LEADING + 2 * _MARGIN
             fitting = min(_WIDE * window[0] / wide, _HIGH * window[1] / high, _LARGEST)
             choices.append((fitting, -count, columns, wide, high))
@@ -108,7 +108,7 @@ class HelpCard:
     def _write(
         self, sections: Sequence[Section], tabs: tuple[float, float], top: float, size: float
     ) -> None:
-        """Write *sections* down from *top*, keys and what they do at the two *tabs*, pixels."""
+        """Write *sections* from *top* downwards, keys and actions at the two *tabs*, in pixels."""
         y = top - (_MARGIN + 0.5 * _LEADING) * size
         for heading, rows in sections:
             for left, right in ((heading, ""), *rows):
@@ -130,11 +130,12 @@ class HelpCard:
         return words
 
     def _widths(self) -> tuple[float, float]:
-        """Return how wide the keys and what they do are, in letters."""
+        """Return the widths of the keys and of the actions, in ems."""
         rows = [row for _, rows in self.sections for row in rows]
+        columns = ([key for key, _ in rows], True), ([label for _, label in rows], False)
         widths = [
             [self._put(text, INK, (0.0, 0.0), _PROBE, key=key).width() for text in texts]
-            for texts, key in (([key for key, _ in rows], True), ([say for _, say in rows], False))
+            for texts, key in columns
         ]
         self._clear_probes()
         keys, labels = (float(np.max(w, initial=0.0)) / _PROBE for w in widths)
@@ -147,12 +148,12 @@ class HelpCard:
 
 
 def _n_lines(sections: Sequence[Section]) -> float:
-    """Return how many lines *sections* take; half a line is free between two of them."""
+    """Return the number of lines of *sections*, with half a line between two of them."""
     return sum(1 + len(rows) for _, rows in sections) + 0.5 * max(0, len(sections) - 1)
 
 
 def _shared(sections: Sequence[Section], count: int) -> list[list[Section]]:
-    """Return *sections* in order, in *count* columns about as long as one another."""
+    """Return *sections* in order, in *count* columns of similar length."""
     columns: list[list[Section]] = [[] for _ in range(count)]
     total, before = _n_lines(sections), 0.0
     for section in sections:

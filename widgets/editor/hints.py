@@ -1,7 +1,6 @@
-"""What to do next, in each mode, in one line.
+"""Hints: the next step in each mode, in one line.
 
-A hint names the key that leads on, so that no mode is a dead end: whatever a mode needs can be
-made from where one stands.
+A hint names the key for that step, so that the user can reach every mode from every other one.
 """
 
 from __future__ import annotations
@@ -11,76 +10,78 @@ from vtk_segdeform.solver import Status
 
 from ..region_selector import Paint, Tool
 from ..volume_overlay import brief, signed
-from .stage import Mode, Stage
+from .mode import Mode
+from .widget_set import WidgetSet
 
 _TOOLS = {
-    Tool.BRUSH: "brush",
-    Tool.LASSO: "lasso",
-    Tool.RECTANGLE: "rectangle",
-    Tool.COMPONENT: "click",
+    Tool.BRUSH: "Brush",
+    Tool.LASSO: "Lasso",
+    Tool.RECTANGLE: "Rectangle",
+    Tool.COMPONENT: "Connected part",
 }
 
 
 def missing(session: Session, mode: Mode) -> str:
-    """Return what *mode* needs first and the key that makes it, or "" if nothing is missing."""
+    """Return what *mode* lacks and the key that adds it, or "" if nothing is missing."""
     if session.regions is None and mode is Mode.REGIONS:
-        return "no regions yet: G finds some, or paint one on the mesh"
+        return "No regions yet. Press G to detect them, or paint one"
     if session.regions is None and mode is not Mode.HANDLES:
-        return "no regions yet: G finds some, 1 to paint them"
+        return "No regions yet. Press G to detect them, or 1 to paint one"
     if not session.cages and mode in (Mode.CAGES, Mode.DEFORM):
-        return "no cages yet: F fits them to the regions"
+        return "No cages yet. Press F to fit them to the regions"
     if not session.handles and mode is Mode.DEFORM:
-        return "nothing to drag yet: 3 to mark a handle"
+        return "No handle yet. Press 3 to paint one"
     return ""
 
 
-def hint(stage: Stage, mode: Mode) -> str:
-    """Return what to do next in *mode*, and then."""
-    lacking = missing(stage.session, mode)
+def hint(widgets: WidgetSet, mode: Mode) -> str:
+    """Return the hint for *mode*: the current action, and the next step."""
+    lacking = missing(widgets.session, mode)
     if lacking:
         return lacking
     if mode is Mode.DEFORM:
-        return _of_drag(stage)
-    now = "drag a vertex of a cage" if mode is Mode.CAGES else _of_painting(stage)
-    then = _lead_on(stage, mode)
-    return f"{now} · {then}" if then else now
+        return _deform_hint(widgets)
+    now = "Drag a cage vertex" if mode is Mode.CAGES else _painting_hint(widgets)
+    next_step = _next_step(widgets, mode)
+    return f"{now} · {next_step}" if next_step else now
 
 
-def _of_painting(stage: Stage) -> str:
-    selector = stage.selector
+def _painting_hint(widgets: WidgetSet) -> str:
+    selector = widgets.selector
     if selector.paints is Paint.REGION:
-        new = selector.region >= stage.n_regions
-        name = stage.session.region_name(selector.region)
-        what = brief(name, called((), selector.region)) + (" (new)" if new else "")
+        new = selector.region >= widgets.n_regions
+        name = widgets.session.region_name(selector.region)
+        target = brief(name, called((), selector.region)) + (" (new)" if new else "")
     elif selector.paints is Paint.FIXED:
-        what = "what stays fixed"
+        target = "fixed vertices"
     else:
-        what = "a new handle" if selector.handle is None else selector.handle
-    far = ", through the body" if selector.through else ""
-    return f"{_TOOLS[selector.tool]} for {what}{far}, Ctrl takes away"
+        target = "new handle" if selector.handle is None else selector.handle
+    through = " (X-ray)" if selector.through else ""
+    return f"{_TOOLS[selector.tool]}: paint {target}{through}. Ctrl: erase"
 
 
-def _of_drag(stage: Stage) -> str:
-    session = stage.session
+def _deform_hint(widgets: WidgetSet) -> str:
+    session = widgets.session
     if session.is_dragging:
-        return f"volume {signed(100.0 * session.volume_change, 2)} % · Esc takes it back"
+        return f"Volume {signed(100.0 * session.volume_change, 2)} % · Esc to cancel"
     if not (session.options.preserve_volume or session.options.preserve_region_volumes):
-        return "drag or turn a handle, the volume is free · P holds it"
+        return "Move or rotate a handle · Volume preservation off (P to turn on)"
     solution = session.solution
     if solution is not None and solution.status not in (Status.CONVERGED, Status.STEP_LIMIT):
         return str(solution.status)
-    return "drag or turn a handle" + ("" if len(session.fixed) else " · 3, S for what stays")
+    next_step = "" if len(session.fixed) else " · 3, S: paint fixed vertices"
+    return f"Move or rotate a handle{next_step}"
 
 
-def _lead_on(stage: Stage, mode: Mode) -> str:
-    """Return the key that leads on from *mode*, once its own work is done."""
-    session = stage.session
-    if mode is Mode.HANDLES and stage.selector.paints is Paint.FIXED and not session.handles:
-        return "then D for what is dragged"
+def _next_step(widgets: WidgetSet, mode: Mode) -> str:
+    """Return the key for the next step after the work of *mode*."""
+    session = widgets.session
+    if mode is Mode.HANDLES and widgets.selector.paints is Paint.FIXED and not session.handles:
+        return "Next: D, paint a handle"
     if mode is Mode.HANDLES and not session.handles:
-        return "S for what stays"
+        return "S: paint fixed vertices"
     if session.regions is None:
-        return "then G finds regions"
+        return "Next: G, detect regions"
     if not session.cages:
-        return "then F fits cages"
-    return "then 4 to deform" if session.handles else "then 3 to mark handles"
+        return "Next: F, fit cages"
+    return "Next: 4, deform" if session.handles else "Next: 3, paint a handle"

@@ -1,6 +1,6 @@
-"""What a panel does besides what keys do: it can name a region, a handle, a file or a number.
+"""Actions of a panel, with a region, a handle, a file or a number as argument.
 
-As in `actions`, everything here is a function of the desk, or returns one.
+Each function returns an action: a function of the `Controller`, as in `actions`.
 """
 
 from __future__ import annotations
@@ -12,131 +12,131 @@ from vtk_segdeform.errors import RegionError, SessionError
 
 from ..region_selector import Paint
 from .actions import Action
-from .desk import Desk
-from .stage import Mode
+from .controller import Controller
+from .mode import Mode
 
 
 def choosing_region(region: int) -> Action:
-    """Return the action that goes on with *region*."""
-    return lambda desk: desk.stage.choose_region(region)
+    """Return the action that selects *region*."""
+    return lambda controller: controller.widgets.choose_region(region)
 
 
 def merging(regions: Sequence[int]) -> Action:
-    """Return the action that makes one of some *regions*."""
+    """Return the action that merges *regions*."""
 
-    def merge(desk: Desk) -> None:
+    def merge(controller: Controller) -> None:
         if len(regions) < 2:
-            raise RegionError("choose two regions or more that are to become one")
-        *names, last = map(desk.session.region_name, sorted(regions))
-        desk.session.merge_regions(sorted(regions))
-        desk.stage.choose_region(min(regions))
-        desk.say(f"{', '.join(names)} and {last} are one")
+            raise RegionError("Select two or more regions to merge")
+        *names, last = map(controller.session.region_name, sorted(regions))
+        controller.session.merge_regions(sorted(regions))
+        controller.widgets.choose_region(min(regions))
+        controller.say(f"Merged {', '.join(names)} and {last}")
 
     return merge
 
 
 def naming_region(region: int, name: str) -> Action:
-    """Return the action that calls *region* something else, or by its place where it is ""."""
+    """Return the action that renames *region*; "" restores its default name."""
 
-    def call(desk: Desk) -> None:
-        before = desk.session.region_name(region)
-        desk.session.rename_region(region, name)
-        desk.say(f"{before} is now {desk.session.region_name(region)}")
-
-    return call
-
-
-def showing_cage(region: int, visible: bool) -> Action:
-    """Return the action that shows or hides the cage of *region* among those that are shown."""
-    return lambda desk: desk.stage.cages.set_visible(region, visible)
-
-
-def choosing_handle(name: str) -> Action:
-    """Return the action that goes on with a handle."""
-
-    def choose(desk: Desk) -> None:
-        desk.stage.selector.handle = desk.stage.dragger.handle = name
-        if desk.mode is Mode.HANDLES:
-            desk.stage.selector.paints = Paint.HANDLE
-
-    return choose
-
-
-def renaming(name: str, new_name: str) -> Action:
-    """Return the action that calls a handle something else."""
-
-    def rename(desk: Desk) -> None:
-        desk.session.rename_handle(name, new_name)
-        if desk.stage.selector.handle == name:
-            desk.stage.selector.handle = new_name
-        desk.say(f"{name} is now {new_name}")
+    def rename(controller: Controller) -> None:
+        before = controller.session.region_name(region)
+        controller.session.rename_region(region, name)
+        controller.say(f"Renamed {before} to {controller.session.region_name(region)}")
 
     return rename
 
 
-def reaching(through: bool) -> Action:
-    """Return the action that lets strokes reach what is hidden, or not."""
+def showing_cage(region: int, visible: bool) -> Action:
+    """Return the action that shows or hides the cage of *region*."""
+    return lambda controller: controller.widgets.cages.set_visible(region, visible)
 
-    def reach(desk: Desk) -> None:
-        desk.stage.selector.through = through
 
-    return reach
+def choosing_handle(name: str) -> Action:
+    """Return the action that selects a handle."""
+
+    def select(controller: Controller) -> None:
+        controller.widgets.selector.handle = controller.widgets.dragger.handle = name
+        if controller.mode is Mode.HANDLES:
+            controller.widgets.selector.paints = Paint.HANDLE
+
+    return select
+
+
+def renaming(name: str, new_name: str) -> Action:
+    """Return the action that renames a handle."""
+
+    def rename(controller: Controller) -> None:
+        controller.session.rename_handle(name, new_name)
+        if controller.widgets.selector.handle == name:
+            controller.widgets.selector.handle = new_name
+        controller.say(f"Renamed {name} to {new_name}")
+
+    return rename
+
+
+def selecting_through(through: bool) -> Action:
+    """Return the action that includes hidden vertices in strokes, or excludes them."""
+
+    def select(controller: Controller) -> None:
+        controller.widgets.selector.through = through
+
+    return select
 
 
 def with_radius(radius: float) -> Action:
-    """Return the action that makes the brush as large."""
+    """Return the action that sets the brush radius."""
 
-    def take(desk: Desk) -> None:
-        desk.stage.selector.radius = radius
+    def resize(controller: Controller) -> None:
+        controller.widgets.selector.radius = radius
 
-    return take
+    return resize
 
 
-def ranging(share: float | None) -> Action:
-    """Return the action that has the colours of volumes end at plus and minus a *share*.
+def setting_colour_range(share: float | None) -> Action:
+    """Return the action that sets the colour range of the overlay to plus and minus *share*.
 
-    None has the overlay choose.
+    None selects it automatically.
     """
 
-    def take(desk: Desk) -> None:
-        desk.stage.overlay.wanted_range = share
+    def set_range(controller: Controller) -> None:
+        controller.widgets.overlay.wanted_range = share
 
-    return take
+    return set_range
 
 
 def setting(**changes: float | bool | None) -> Action:
-    """Return the action that changes some of the session's options."""
-    return lambda desk: desk.session.change_options(**changes)
+    """Return the action that changes options of the session."""
+    return lambda controller: controller.session.change_options(**changes)
 
 
 def opening(path: Path) -> Action:
-    """Return the action that goes on with the session, or the mesh, in a file."""
-    return lambda desk: desk.open(path)
+    """Return the action that opens a session or a mesh."""
+    return lambda controller: controller.open(path)
 
 
 def saving(path: Path) -> Action:
-    """Return the action that saves the session to *path*, from now on its file."""
+    """Return the action that saves the session to *path*, which becomes its file."""
 
-    def save(desk: Desk) -> None:
-        desk.file.path = path
-        desk.save()
+    def save(controller: Controller) -> None:
+        controller.file.path = path
+        controller.save()
 
     return save
 
 
 def exporting(path: Path) -> Action:
-    """Return the action that writes the mesh in its pose, with all it came with.
+    """Return the action that writes the posed mesh with its original arrays.
 
-    In the format of the suffix, which may not hold all of it: see `convert.write_mesh`.
+    The suffix selects the format, which may not support all arrays: see `io.write_mesh`.
     """
 
-    def export(desk: Desk) -> None:
+    def export(controller: Controller) -> None:
         from vtk_segdeform.io import write_mesh  # which imports pyvista
 
-        session = desk.session
+        session = controller.session
         if session.is_dragging:
-            raise SessionError("let go of what is dragged before the mesh is written")
-        write_mesh(path, desk.file.deformed(session))
-        desk.say(f"mesh written to {path}")
+            raise SessionError("Finish the drag before saving the mesh")
+        write_mesh(path, controller.file.deformed(session))
+        controller.say(f"Mesh saved to {path}")
 
     return export

@@ -1,4 +1,4 @@
-"""The file that the editor saves to and opens from, and whether it is up to date."""
+"""The file that the editor saves to and opens from, and whether the session has changed since."""
 
 from __future__ import annotations
 
@@ -16,58 +16,60 @@ _SUFFIX = ".segdeform"
 
 
 class SessionFile:
-    """A place for sessions.
+    """The file of a session.
 
     Parameters
     ----------
     path : Path
-        Where to write to; need not be there yet.
+        Where to write; need not exist yet.
     session : Session
-        What would be no loss if it were given up now.
+        A session without unsaved changes.
 
     Attributes
     ----------
     path : Path
-        May be changed.
+        The path; may be changed.
     surface : pyvista.PolyData or None
-        All that came with the mesh, arrays, colours, polygons, for `deformed`; may be changed.
+        The original surface with its arrays, colours and polygons, for `deformed`; may be
+        changed.
     """
 
     def __init__(self, path: Path, session: Session) -> None:
         self.path = path
-        self._ours: Path | None = None
-        self._kept = session.state
+        self._written: Path | None = None
+        self._saved = session.state
         self.surface: Any = None
 
     @property
-    def is_ours(self) -> bool:
-        """Whether nothing of others is lost by writing: it was written or read before."""
+    def may_overwrite(self) -> bool:
+        """Whether writing to `path` replaces nothing but this session's own file."""
         return self.may_replace(self.path)
 
     def may_replace(self, place: Path) -> bool:
-        """Return whether writing to *place* overwrites no file of another origin."""
-        return self._ours == place or not os.path.isfile(place)
+        """Return whether *place* is unused, or was written or read before."""
+        return self._written == place or not os.path.isfile(place)
 
-    def is_behind(self, session: Session) -> bool:
-        """Tell whether something would be lost if *session* were given up now."""
-        return bool(self._kept.changes(session.state))
+    def is_modified(self, session: Session) -> bool:
+        """Return whether *session* has unsaved changes."""
+        return bool(self._saved.changes(session.state))
 
-    def took(self, path: Path, session: Session, surface: Any = None) -> None:
-        """Go on beside *path*, from which *session* was read; over a mesh nothing is written.
+    def opened(self, path: Path, session: Session, surface: Any = None) -> None:
+        """Continue with *path*, from which *session* was read; a mesh file is never overwritten.
 
-        A session without a *surface* goes on with the one that is there, if it has the same mesh.
+        Without a *surface* the current one is kept; `deformed` uses it if it has the same mesh.
         """
         self.surface = self.surface if surface is None else surface
         if is_mesh(path):
-            self.path, self._ours, self._kept = path.with_suffix(_SUFFIX), None, session.state
+            self.path, self._written = path.with_suffix(_SUFFIX), None
+            self._saved = session.state
         else:
             self.path = path
-            self.keeps(session)
+            self.mark_saved(session)
 
     def deformed(self, session: Session) -> Any:
-        """Return the mesh of *session* in its pose, a pyvista.PolyData, with all it came with.
+        """Return the posed mesh of *session* as a pyvista.PolyData, with its original arrays.
 
-        Normals are made anew, as `convert.with_vertices` does.
+        Normals are recomputed, as by `io.with_vertices`.
         """
         from vtk_segdeform.io import to_polydata, with_vertices  # which import pyvista
 
@@ -79,24 +81,24 @@ class SessionFile:
     def write(self, session: Session, place: Path) -> None:
         """Save *session* to *place*, which differs from `path` in a replay; see `save_session`."""
         save_session(place, session)
-        self._ours, self._kept = place, session.state
+        self._written, self._saved = place, session.state
 
-    def keeps(self, session: Session) -> None:
-        """Remember that *session* is what the file holds."""
-        self._ours, self._kept = self.path, session.state
+    def mark_saved(self, session: Session) -> None:
+        """Record that the file contains *session*."""
+        self._written, self._saved = self.path, session.state
 
 
 def is_mesh(path: Path) -> bool:
-    """Tell whether a file is by its name a mesh, not a session."""
+    """Return whether the name of a file is that of a mesh, not of a session."""
     from vtk_segdeform.io import is_mesh_file  # which imports pyvista
 
     return is_mesh_file(path)
 
 
 def read_all(path: Path, progress: Progress) -> tuple[Session, Any]:
-    """Return the session in a file, or one over the mesh in it, and that file's surface or None.
+    """Return the session in a file, or a new one over the mesh in it, and the surface or None.
 
-    The session is bound if it is in a pose, which cannot be drawn without.
+    A session with a pose is bound, because the pose cannot be drawn otherwise.
     """
     if not is_mesh(path):
         return read_bound(path, progress), None
@@ -111,7 +113,7 @@ def read_all(path: Path, progress: Progress) -> tuple[Session, Any]:
 
 
 def read_bound(path: Path, progress: Progress) -> Session:
-    """Return the session in a file, or one over the mesh in it; see `read_all`."""
+    """Return the session in a file, or a new one over the mesh in it; see `read_all`."""
     if is_mesh(path):
         return read_all(path, progress)[0]
     session = load_session(path)

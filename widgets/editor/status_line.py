@@ -1,8 +1,8 @@
-"""One line at the bottom of a view: what to do next, what went wrong, how far a job is.
+"""The status line at the bottom of a view: hints, errors and the progress of a job.
 
-A warning has another colour and a sign, and stays until something else is said.  What does not
-fit into the window's width is broken into two lines, a warning into four, within a word where it
-is as long as a path; what does not fit then ends in dots.
+A warning has another colour and a sign.  A text that is too wide for the window is wrapped into
+two lines, a warning into four, within a word if it is as long as a path; the rest is replaced by
+dots.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class StatusLine:
     Parameters
     ----------
     view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
-        Where it lies, over everything else.  Call `remove` before its window closes.
+        Where it is drawn, over everything else.  Call `remove` before its window closes.
     """
 
     def __init__(self, view: Any) -> None:
@@ -34,62 +34,62 @@ class StatusLine:
         self._bar = Panel(front, _BAR, layer=3)
         self._tag = Words(front, _TAG, bold=True, layer=4)
         self._lines = [Words(front, _LETTERS, layer=4) for _ in range(_LINES_OF_WARNING)]
-        self._said: tuple[str, str, bool, float | None] = "", "", False, None
+        self._content: tuple[str, str, bool, float | None] = "", "", False, None
         self._laid_out: tuple[Any, ...] = ()
         self._stop = self.view.before_render(self._lay_out)
 
     @property
     def text(self) -> str:
-        """What it says, whether or not the window is wide enough for it."""
-        return self._said[1]
+        """The whole text, even if the window is too narrow for it."""
+        return self._content[1]
 
     @property
     def is_warning(self) -> bool:
-        """Whether what it says is that something went wrong."""
-        return self._said[2]
+        """Whether the text is a warning."""
+        return self._content[2]
 
     @property
     def fraction(self) -> float | None:
-        """How far the job is that it tells of, 0..1; or None."""
-        return self._said[3]
+        """Completed fraction of the job that is shown, 0..1; or None."""
+        return self._content[3]
 
     def say(self, text: str, tag: str = "") -> None:
-        """Say *text*; before it stands *tag*, a word or two."""
-        self._now(tag, text, False, None)
+        """Show *text* after *tag*, a word or two."""
+        self._set(tag, text, False, None)
 
     def warn(self, text: str, tag: str = "") -> None:
-        """Say that something went wrong."""
-        self._now(tag, text, True, None)
+        """Show *text* as a warning."""
+        self._set(tag, text, True, None)
 
     def progress(self, fraction: float, text: str, tag: str = "") -> None:
-        """Say how far a job is, 0..1, and what it does."""
-        self._now(tag, text, False, min(max(fraction, 0.0), 1.0))
+        """Show the progress of a job, 0..1, and its description."""
+        self._set(tag, text, False, min(max(fraction, 0.0), 1.0))
 
     def remove(self) -> None:
-        """Go out of the view, for good."""
+        """Remove it from the view, permanently."""
         self._stop()
         parts: list[Panel | Words] = [self._strip, self._bar, self._tag, *self._lines]
         for part in parts:
             part.remove()
 
-    def _now(self, tag: str, text: str, warning: bool, fraction: float | None) -> None:
-        said = tag, " ".join(text.split()), warning, fraction
-        if said != self._said:
-            self._said = said
+    def _set(self, tag: str, text: str, warning: bool, fraction: float | None) -> None:
+        content = tag, " ".join(text.split()), warning, fraction
+        if content != self._content:
+            self._content = content
             self.view.touch()
 
     def _lay_out(self) -> None:
         width, height = self.view.renderer.GetSize()
-        if (width, height, self._said) == self._laid_out:
+        if (width, height, self._content) == self._laid_out:
             return
-        self._laid_out = width, height, self._said
-        tag, text, warning, fraction = self._said
+        self._laid_out = width, height, self._content
+        tag, text, warning, fraction = self._content
         size = letter_size(width, height)
         margin, leading = 0.7 * size, 1.45 * size
         self._tag.say(tag, size)
         left = margin + (self._tag.width() + size if tag else 0.0)
         room, most = width - margin - left, _LINES_OF_WARNING if warning else _LINES
-        lines = self._broken(f"! {text}" if warning else text, size, room, most)
+        lines = self._wrapped(f"! {text}" if warning else text, size, room, most)
         foot = 0.35 * size if fraction is None else 0.8 * size  # room for the bar
         high = foot + leading * len(lines) + 0.35 * size
         for k, words in enumerate(self._lines):
@@ -102,7 +102,7 @@ class StatusLine:
         self._bar.show(fraction is not None)
         self._bar.place(0.0, 0.0, width * (fraction or 0.0), 0.35 * size)
 
-    def _broken(self, text: str, size: float, room: float, most: int) -> list[str]:
+    def _wrapped(self, text: str, size: float, room: float, most: int) -> list[str]:
         """Return *text* in at most *most* lines, each no wider than *room* pixels."""
         lines = list[str]()
         while text and len(lines) < most:
@@ -115,18 +115,18 @@ class StatusLine:
         return lines
 
     def _fitting(self, text: str, size: float, room: float) -> int:
-        """Return after how many letters to break *text*, at best between two words."""
+        """Return the index at which to break *text*, between two words if possible."""
         probe = self._lines[0]
-        low, high = 1, len(text)  # the first low letters fit, or nothing does
+        low, high = 1, len(text)  # the first `low` letters fit, or none
         while low < high:
             middle = (low + high + 1) // 2
             probe.say(text[:middle], size)
             low, high = (middle, high) if probe.width() <= room else (low, middle - 1)
         space = text.rfind(" ", 0, low + 1)
-        # Rather in a long word than after the sign of a warning, alone in its line.
+        # Prefer a break in a long word to a line with only the sign of a warning.
         return space if low < len(text) and space > low // 3 else low
 
 
 def letter_size(width: int, height: int) -> float:
-    """Return how large letters are in a window, pixels: what is read well, and fits."""
+    """Return the font size for a window, in pixels."""
     return float(np.clip(min(height / 36.0, width / 48.0), 11.0, 26.0))

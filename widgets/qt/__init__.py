@@ -4,9 +4,9 @@ The files, in reading order:
 
     widget      `DeformWidget` and `deform_dock`
     panel       the panel beside the view
-    modes painting regions handles options foot log
-                its parts
-    controls    buttons and other pieces they are made of
+    toolbar painting regions handles options status log
+                the parts of the panel
+    controls    buttons, fields and layouts of the parts
 """
 
 from .widget import DeformWidget, deform_dock

@@ -1,7 +1,7 @@
-"""Buttons that do what keys do, and the few other pieces that the parts of the panel are made of.
+"""Buttons, fields and layouts of the panel.
 
-Colours and sizes are those of Qt's palette and font, so that dark palettes and large pixels need
-no care; a button takes the focus by Tab only, so that keys go on to the view after a click.
+Colours and sizes are those of Qt's palette and font, which covers dark palettes and high-resolution
+screens.  Buttons take the focus by Tab only, so that the view still receives keys after a click.
 """
 
 from __future__ import annotations
@@ -20,38 +20,38 @@ _GAP = 6
 
 
 def key_button(editor: DeformEditor, key: str, mode: Mode, text: str = "") -> Any:
-    """Return a button that does what *key* does in *mode*; named as there, or *text*."""
+    """Return a button for the action of *key* in *mode*, with its label or *text*."""
     binding = binding_of(key, mode)
     if binding is None or binding.action is None:
-        raise ValueError(f"{key!r} is no key of {mode}")
+        raise ValueError(f"{key!r} has no action in {mode}")
     action, while_busy = binding.action, binding.while_busy
-    button = push_button(text or binding.label.capitalize(), binding.label, key)
+    button = push_button(text or binding.label, binding.label, key)
     button.clicked.connect(lambda: editor.do(action, while_busy=while_busy))
     return button
 
 
 def choice_button(editor: DeformEditor, key: str, mode: Mode, text: str) -> Any:
-    """Return such a button that can stay down, and is then plain to see."""
+    """Return a `key_button` that stays down and is then highlighted."""
     button = key_button(editor, key, mode, text)
     button.setCheckable(True)
-    button.toggled.connect(lambda down: _light_up(button, down))
+    button.toggled.connect(lambda down: _highlight(button, down))
     return button
 
 
 def push_button(text: str, tip: str, key: str = "") -> Any:
-    """Return a button with a tooltip, of the *key* too that does the same."""
+    """Return a button with a tooltip that also names the *key* for the same action."""
     button = QtWidgets.QPushButton(text)
-    button.setToolTip(sentence(f"{tip} ({key_cap(key)})" if key else tip))
+    button.setToolTip(f"{tip} ({key_cap(key)})" if key else tip)
     button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-    button.setMinimumWidth(1)  # the row shares its width out, not the texts
+    button.setMinimumWidth(1)  # the row determines its width, not the text
     button.setSizePolicy(_policy("Preferred"), _policy("Fixed"))
     return button
 
 
 def number_box(box: Any, tip: str) -> Any:
-    """Return a spin box that reports what was typed only when it is entered."""
+    """Return a spin box that reports a typed number only when it is entered."""
     box.setKeyboardTracking(False)
-    box.setToolTip(sentence(tip))
+    box.setToolTip(tip)
     box.setMinimumWidth(box.fontMetrics().averageCharWidth() * 12)
     return box
 
@@ -59,23 +59,23 @@ def number_box(box: Any, tip: str) -> Any:
 def check_box(text: str, tip: str) -> Any:
     """Return a check box with a tooltip."""
     box = QtWidgets.QCheckBox(text)
-    box.setToolTip(sentence(tip))
+    box.setToolTip(tip)
     box.setFocusPolicy(Qt.FocusPolicy.TabFocus)
     return box
 
 
 def table(columns: list[str], tip: str, rows: int) -> Any:
-    """Return an empty table, at most *rows* rows high, or half of that; last columns narrow.
+    """Return an empty table, *rows* rows high or at least half of that, its last columns narrow.
 
-    Items that may be edited are renamed in the first column, by two clicks there or by F2.
+    Editable items are renamed in the first column, by a double click there or by F2.
     """
     tree = _Table()
     tree.setHeaderLabels(columns)
     tree.setRootIsDecorated(False)
     tree.setUniformRowHeights(True)
     tree.setAllColumnsShowFocus(True)
-    tree.setToolTip(sentence(tip))
-    tree.setTabKeyNavigation(False)  # Tab leads on to what comes after the table
+    tree.setToolTip(tip)
+    tree.setTabKeyNavigation(False)  # Tab leaves the table
     tree.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     header = tree.header()
     header.setStretchLastSection(False)
@@ -84,14 +84,14 @@ def table(columns: list[str], tip: str, rows: int) -> Any:
     for column in range(len(columns)):
         header.setSectionResizeMode(column, modes.ResizeToContents if column else modes.Stretch)
         tree.headerItem().setTextAlignment(column, RIGHT if column else _LEFT)
-    high = 1.3 * tree.fontMetrics().height()  # of a row
-    tree.setMinimumHeight(round((0.5 * rows + 1.5) * high))
-    tree.setMaximumHeight(round((rows + 1.5) * high))
+    height = 1.3 * tree.fontMetrics().height()  # of a row
+    tree.setMinimumHeight(round((0.5 * rows + 1.5) * height))
+    tree.setMaximumHeight(round((rows + 1.5) * height))
     return tree
 
 
 def row(*widgets: Any) -> Any:
-    """Return a layout with *widgets* side by side, as wide as one another."""
+    """Return a layout with *widgets* side by side, all of the same width."""
     layout = QtWidgets.QHBoxLayout()
     layout.setSpacing(_GAP)
     for widget in widgets:
@@ -100,7 +100,7 @@ def row(*widgets: Any) -> Any:
 
 
 def column(parent: Any, *pieces: Any) -> None:
-    """Put widgets and layouts below one another into *parent*."""
+    """Stack widgets and layouts in *parent*."""
     layout = QtWidgets.QVBoxLayout(parent)
     layout.setSpacing(_GAP)
     for piece in pieces:
@@ -111,7 +111,7 @@ def column(parent: Any, *pieces: Any) -> None:
 
 
 def form(*rows: tuple[str, Any]) -> Any:
-    """Return a layout of named fields."""
+    """Return a layout of labelled fields."""
     layout = QtWidgets.QFormLayout()
     layout.setSpacing(_GAP)
     layout.setFieldGrowthPolicy(QtWidgets.QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
@@ -122,30 +122,30 @@ def form(*rows: tuple[str, Any]) -> Any:
 
 
 def shortcut(keys: Any, parent: Any, do: Callable[[], object], *, alone: bool = False) -> None:
-    """Have *keys* do something where *parent* has the focus or, unless *alone*, what is in it."""
+    """Call *do* for *keys* if *parent* or, unless *alone*, one of its children has the focus."""
     # Qt 5 has it in QtWidgets, Qt 6 in QtGui.
-    made = getattr(QtWidgets, "QShortcut", None) or QtGui.QShortcut
+    shortcut_class = getattr(QtWidgets, "QShortcut", None) or QtGui.QShortcut
     contexts = Qt.ShortcutContext
-    key = made(QtGui.QKeySequence(keys), parent)
+    key = shortcut_class(QtGui.QKeySequence(keys), parent)
     key.setContext(contexts.WidgetShortcut if alone else contexts.WidgetWithChildrenShortcut)
     key.activated.connect(do)
 
 
 def put(widget: Any, value: Any) -> None:
-    """Show *value* in a button that stays down, a check box or a spin box, and tell nobody."""
+    """Show *value* in a checkable button, a check box or a spin box, without emitting signals."""
     if isinstance(widget, QtWidgets.QPushButton):
-        widget.setChecked(value)  # it does something when clicked only
+        widget.setChecked(value)  # only clicks trigger its action
         return
     quiet = QtCore.QSignalBlocker(widget)
     if isinstance(widget, QtWidgets.QCheckBox):
         widget.setChecked(value)
-    elif not widget.hasFocus() or not widget.lineEdit().isModified():  # else somebody types there
+    elif not widget.hasFocus() or not widget.lineEdit().isModified():  # else the user types
         widget.setValue(value)
     quiet.unblock()
 
 
 def swatch(colour: str, widget: Any) -> Any:
-    """Return an icon of a "#RRGGBB", as sharp as the pixels of *widget*."""
+    """Return an icon of a colour "#RRGGBB" at the resolution of *widget*."""
     size, ratio = widget.fontMetrics().height(), widget.devicePixelRatioF()
     picture = QtGui.QPixmap(round(size * ratio), round(size * ratio))
     picture.setDevicePixelRatio(ratio)
@@ -157,12 +157,12 @@ def swatch(colour: str, widget: Any) -> Any:
     painter.drawRoundedRect(QtCore.QRectF(1.0, 1.0, size - 2.0, size - 2.0), 3.0, 3.0)
     painter.end()
     icon = QtGui.QIcon(picture)
-    icon.addPixmap(picture, QtGui.QIcon.Mode.Selected)  # else tinted
+    icon.addPixmap(picture, QtGui.QIcon.Mode.Selected)  # otherwise tinted
     return icon
 
 
 def sentence(text: str) -> str:
-    """Begin *text* with a capital."""
+    """Return *text* with a capital first letter."""
     return text[:1].upper() + text[1:]
 
 
@@ -181,13 +181,13 @@ class _Table(QtWidgets.QTreeWidget):
         return super().edit(index, *how)
 
 
-def _light_up(button: Any, down: bool) -> None:
+def _highlight(button: Any, down: bool) -> None:
     roles, palette = QtGui.QPalette.ColorRole, QtGui.QPalette()
     if down:
         palette.setColor(roles.Button, palette.color(roles.Highlight))
         palette.setColor(roles.ButtonText, palette.color(roles.HighlightedText))
     button.setPalette(palette)
-    policies = Qt.FocusPolicy  # Tab leads to the one that is down, arrows to its neighbours
+    policies = Qt.FocusPolicy  # Tab selects the one that is down, arrows its neighbours
     button.setFocusPolicy(policies.TabFocus if down else policies.NoFocus)
 
 

@@ -1,8 +1,8 @@
-"""The panel's list of what stays and what is dragged."""
+"""The part of the panel with the fixed vertices and the handles."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from qtpy import QtCore, QtWidgets
 
@@ -13,83 +13,87 @@ from ..region_selector import Paint
 from .controls import RIGHT, column, key_button, row, swatch, table
 
 Qt = QtCore.Qt
-_STAYS = "what stays"
-_NEW = "new handle, to be painted"
-_TIP = "in mode 3 the one that is chosen is painted, in mode 4 dragged; F2 renames it"
+_TIP = "The selected row is painted in mode 3, a handle is dragged in mode 4. F2: rename"
+
+
+class _Row(NamedTuple):
+    paints: Paint
+    handle: str | None
+    """None for fixed vertices and for a new handle."""
+    text: str
+    n_vertices: int
 
 
 class HandlesPart(QtWidgets.QGroupBox):
-    """One row for what is fixed, and one for each handle.
+    """A list with a row for the fixed vertices and one for each handle.
 
     Parameters
     ----------
     editor : DeformEditor
-        Whose.
+        The editor to control.
     """
 
     def __init__(self, editor: DeformEditor) -> None:
         super().__init__("Handles")
         self._editor = editor
-        self._rows: list[tuple[str, int]] = []
+        self._rows: list[_Row] = []
         self.list = table(["Name", "Vertices"], _TIP, rows=6)
-        self.list.itemSelectionChanged.connect(self._selected)
-        self.list.itemChanged.connect(self._edited)
+        self.list.itemSelectionChanged.connect(self._selection_changed)
+        self.list.itemChanged.connect(self._item_edited)
         self.new = key_button(editor, "a", Mode.HANDLES, "New")
         self.remove = key_button(editor, "delete", Mode.HANDLES, "Remove")
         column(self, self.list, row(self.new, self.remove))
 
     def refresh(self) -> None:
-        """Show handles as they are, and which is the one in hand."""
-        session, stage, mode = self._editor.session, self._editor.stage, self._editor.mode
-        marking = mode is Mode.HANDLES
-        rows = [(_STAYS, len(session.fixed))] if marking or len(session.fixed) else []
-        rows += [(name, len(vertices)) for name, vertices in session.handles.items()]
-        selector = stage.selector
-        named = selector.handle if selector.handle in session.handles else None
-        if marking and selector.paints is Paint.HANDLE and named is None:
-            rows.append((_NEW, 0))
+        """Show the current handles, and which one is selected."""
+        session, widgets, mode = self._editor.session, self._editor.widgets, self._editor.mode
+        marking, selector = mode is Mode.HANDLES, widgets.selector
+        rows = [_Row(Paint.HANDLE, name, name, len(ids)) for name, ids in session.handles.items()]
+        if marking or len(session.fixed):
+            rows.insert(0, _Row(Paint.FIXED, None, "Fixed", len(session.fixed)))
+        painted = selector.handle if selector.handle in session.handles else None
+        if marking and selector.paints is Paint.HANDLE and painted is None:
+            rows.append(_Row(Paint.HANDLE, None, "New handle (not painted yet)", 0))
         if rows != self._rows:
             self._show(rows)
-        if marking:
-            chosen = _STAYS if selector.paints is Paint.FIXED else named or _NEW
-        else:
-            chosen = stage.dragger.handle or ""
-        self._choose(chosen)
+        paints = selector.paints if marking else Paint.HANDLE
+        handle = (None if paints is Paint.FIXED else painted) if marking else widgets.dragger.handle
+        self._select(paints, handle)
         self.new.setVisible(marking)
-        self.remove.setEnabled(chosen in session.handles)
+        self.remove.setEnabled(handle in session.handles)
 
-    def _show(self, rows: list[tuple[str, int]]) -> None:
+    def _show(self, rows: list[_Row]) -> None:
         self._rows = rows
         tree, quiet = self.list, QtCore.QSignalBlocker(self.list)
         tree.clear()
-        for name, count in rows:
-            item = QtWidgets.QTreeWidgetItem([name, f"{count}"])
-            item.setIcon(0, swatch(FIXED if name == _STAYS else HANDLE, tree))
+        for each in rows:
+            item = QtWidgets.QTreeWidgetItem([each.text, f"{each.n_vertices}"])
+            item.setIcon(0, swatch(FIXED if each.paints is Paint.FIXED else HANDLE, tree))
             item.setTextAlignment(1, RIGHT)
-            if name not in (_STAYS, _NEW):
+            if each.handle is not None:
                 item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable)
             tree.addTopLevelItem(item)
         quiet.unblock()
 
-    def _choose(self, name: str) -> None:
+    def _select(self, paints: Paint, handle: str | None) -> None:
         quiet = QtCore.QSignalBlocker(self.list)
-        names = [row_name for row_name, _ in self._rows]
-        if name in names:
-            self.list.setCurrentItem(self.list.topLevelItem(names.index(name)))
+        keys = [(each.paints, each.handle) for each in self._rows]
+        if (paints, handle) in keys:
+            self.list.setCurrentItem(self.list.topLevelItem(keys.index((paints, handle))))
         else:
             self.list.clearSelection()
         quiet.unblock()
 
-    def _selected(self) -> None:
+    def _selection_changed(self) -> None:
         for item in self.list.selectedItems():
-            name = self._rows[self.list.indexOfTopLevelItem(item)][0]
-            if name in self._editor.session.handles:
-                self._editor.do(choosing_handle(name))
-            elif name == _STAYS and self._editor.mode is Mode.HANDLES:
+            selected = self._rows[self.list.indexOfTopLevelItem(item)]
+            if selected.handle is not None:
+                self._editor.do(choosing_handle(selected.handle))
+            elif selected.paints is Paint.FIXED and self._editor.mode is Mode.HANDLES:
                 self._editor.do(painting(Paint.FIXED))
 
-    def _edited(self, item: Any, which: int) -> None:
-        name = self._rows[self.list.indexOfTopLevelItem(item)][0]
-        if which == 0 and item.text(0) != name:
-            self._rows = []  # to be shown anew, also where the name is refused
-            self._editor.do(renaming(name, item.text(0).strip()))
+    def _item_edited(self, item: Any, which: int) -> None:
+        handle = self._rows[self.list.indexOfTopLevelItem(item)].handle
+        if which == 0 and handle is not None and item.text(0) != handle:
+            self._rows = []  # refresh the row even if the name is refused
+            self._editor.do(renaming(handle, item.text(0).strip()))

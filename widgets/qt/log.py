@@ -1,4 +1,4 @@
-"""The log of steps at the foot of the panel: folded away until somebody wants to see it."""
+"""The history in the panel: drags and jobs, folded at first."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ _LINES = 8
 
 
 class LogPart(QtWidgets.QWidget):
-    """A button that unfolds a list of what was done, and what it took.
+    """A button that unfolds the list of drags and jobs.
 
     Parameters
     ----------
     editor : DeformEditor
-        Whose.
+        The editor whose log is shown.
     """
 
     def __init__(self, editor: DeformEditor) -> None:
@@ -25,16 +25,16 @@ class LogPart(QtWidgets.QWidget):
         self._editor = editor
         self._shown: list[Entry] = []
         self.fold = QtWidgets.QToolButton()
-        self.fold.setText("Log of steps")
-        self.fold.setToolTip("What each drag and each job took, and how it ended")
+        self.fold.setText("History")
+        self.fold.setToolTip("Drags and jobs: how long they took and how they ended")
         self.fold.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self.fold.setAutoRaise(True)
         self.fold.setCheckable(True)
         self.fold.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.fold.toggled.connect(self._unfold)
-        self.copy = push_button("Copy", "copy what is chosen in the log, or else all (Ctrl+C)")
+        self.copy = push_button("Copy", "Copy the selected entries, or all (Ctrl+C)")
         self.copy.clicked.connect(self._copy)
-        self.clear = push_button("Clear", "forget what is in the log")
+        self.clear = push_button("Clear", "Clear this list; undo is not affected")
         self.clear.clicked.connect(self._clear)
         self.list = QtWidgets.QListWidget()
         self.list.setToolTip(self.fold.toolTip())
@@ -57,9 +57,9 @@ class LogPart(QtWidgets.QWidget):
         self._unfold(False)
 
     def refresh(self) -> None:
-        """Show what is new in the log; nothing while it is folded."""
+        """Show new entries, unless the list is folded."""
         if self.fold.isChecked():
-            self._show(list(self._editor.desk.log.entries))
+            self._show(list(self._editor.controller.log.entries))
 
     def _show(self, entries: list[Entry]) -> None:
         bar = self.list.verticalScrollBar()
@@ -91,5 +91,5 @@ class LogPart(QtWidgets.QWidget):
         QtGui.QGuiApplication.clipboard().setText("\n\n".join(entry.text for entry in entries))
 
     def _clear(self) -> None:
-        self._editor.desk.log.clear()
+        self._editor.controller.log.clear()
         self.refresh()

@@ -1,4 +1,4 @@
-"""The panel's parts for cages and for deforming: how they are fitted, and poses solved for."""
+"""The parts of the panel with the options for fitting cages and for deforming."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 from qtpy import QtWidgets
 
-from ..editor import DeformEditor, Mode, ranging, setting, toggle_cages, toggle_overlay
+from ..editor import DeformEditor, Mode, setting, setting_colour_range, toggle_cages, toggle_overlay
 from ..volume_overlay import precise
 from .controls import check_box, column, form, key_button, number_box, put, row
 
@@ -14,54 +14,54 @@ _MOST = 100_000
 
 
 class CagesPart(QtWidgets.QGroupBox):
-    """How cages are fitted.
+    """Options for fitting cages.
 
     Parameters
     ----------
     editor : DeformEditor
-        Whose.
+        The editor to control.
     """
 
     def __init__(self, editor: DeformEditor) -> None:
         super().__init__("Cages")
         self._editor = editor
         self.total = number_box(
-            QtWidgets.QSpinBox(), "vertices of all cages together, the next time they are fitted"
+            QtWidgets.QSpinBox(), "Total vertices of all cages (used at next fit)"
         )
         self.total.setRange(8, _MOST)
         self.total.setSingleStep(10)
         self.total.valueChanged.connect(lambda n: editor.do(setting(n_cage_vertices=n)))
         self.offset = number_box(
-            QtWidgets.QDoubleSpinBox(), "how far cages stay from the skin, the next time"
+            QtWidgets.QDoubleSpinBox(), "Cage offset from the surface (used at next fit)"
         )
-        self.offset.setSpecialValueText("by itself")
+        self.offset.setSpecialValueText("Auto")
         self.offset.valueChanged.connect(lambda x: editor.do(setting(offset=x or None)))
         self.fit = key_button(editor, "f", Mode.CAGES, "Fit cages")
-        self.shown = check_box("show them in every mode", "show cages outside mode 2 as well (C)")
+        self.shown = check_box("Show cages in all modes", "Show cages outside mode 2 as well (C)")
         self.shown.clicked.connect(lambda: editor.do(toggle_cages))
-        fields = form(("Vertices in all", self.total), ("Offset", self.offset))
+        fields = form(("Total cage vertices", self.total), ("Offset", self.offset))
         column(self, fields, self.fit, self.shown)
 
     def refresh(self) -> None:
-        """Show the options as they are."""
-        session, stage = self._editor.session, self._editor.stage
+        """Show the current options."""
+        session, widgets = self._editor.session, self._editor.widgets
         options, diagonal = session.options, session.mesh.diagonal
         _fit(self.offset, 0.2 * diagonal)
         put(self.total, options.n_cage_vertices)
         put(self.offset, options.offset or 0.0)
-        self.fit.setText("Fit cages anew" if session.cages else "Fit cages")
+        self.fit.setText("Refit cages" if session.cages else "Fit cages")
         self.fit.setEnabled(session.regions is not None)
         self.shown.setEnabled(bool(session.cages))
-        put(self.shown, stage.cages_wanted)
+        put(self.shown, widgets.cages_wanted)
 
 
 class DeformPart(QtWidgets.QGroupBox):
-    """How poses are solved for, and what becomes of the volume.
+    """Options for deforming, and the volume change.
 
     Parameters
     ----------
     editor : DeformEditor
-        Whose.
+        The editor to control.
     """
 
     def __init__(self, editor: DeformEditor) -> None:
@@ -69,66 +69,68 @@ class DeformPart(QtWidgets.QGroupBox):
         self._editor = editor
         self.volume = QtWidgets.QLabel()
         self.volume.setToolTip("(V - V0) / V0 of the whole mesh")
-        self.overlay = check_box("colour what swells", "show the local volume change (O)")
+        self.overlay = check_box(
+            "Show local volume change", "Colour the mesh by its local volume change (O)"
+        )
         self.overlay.clicked.connect(lambda: editor.do(toggle_overlay))
         self.range = number_box(
-            QtWidgets.QDoubleSpinBox(), "the local volume change that the last colours stand for"
+            QtWidgets.QDoubleSpinBox(), "Local volume change at the ends of the colour scale"
         )
         self.range.setRange(0.0, 1000.0)
         self.range.setDecimals(1)
         self.range.setSingleStep(5.0)
-        self.range.setSpecialValueText("by itself")
+        self.range.setSpecialValueText("Auto")
         self.range.setPrefix("± ")
         self.range.setSuffix(" %")
-        self.range.valueChanged.connect(lambda x: editor.do(ranging(0.01 * x or None)))
-        self.hold = check_box("hold the volume", "keep the enclosed volume exactly (P)")
-        self.hold.clicked.connect(lambda on: editor.do(setting(preserve_volume=on)))
-        self.hold_each = check_box("of every region", "keep the volume of each region as well")
-        self.hold_each.clicked.connect(lambda on: editor.do(setting(preserve_region_volumes=on)))
+        self.range.valueChanged.connect(lambda x: editor.do(setting_colour_range(0.01 * x or None)))
+        self.preserve = check_box("Preserve volume", "Preserve the enclosed volume exactly (P)")
+        self.preserve.clicked.connect(lambda on: editor.do(setting(preserve_volume=on)))
+        self.per_region = check_box("Per region", "Preserve the volume of each region as well")
+        self.per_region.clicked.connect(lambda on: editor.do(setting(preserve_region_volumes=on)))
         self.stretch = number_box(
             QtWidgets.QDoubleSpinBox(),
-            "strength of the stretch term beside the detail term; 0 is the paper's energy",
+            "Weight of the stretch energy relative to the detail energy; 0 is the paper's energy",
         )
         self.stretch.setRange(0.0, 1e6)
         self.stretch.valueChanged.connect(lambda x: editor.do(setting(stretch=x)))
-        self.groups = number_box(
-            QtWidgets.QSpinBox(), "by how many rotations the detail turns; fewer are faster"
+        self.clusters = number_box(
+            QtWidgets.QSpinBox(), "Rotation clusters: fewer is faster, less accurate"
         )
-        self.groups.setRange(0, _MOST)
-        self.groups.setSingleStep(50)
-        self.groups.setSpecialValueText("one per vertex")
-        self.groups.valueChanged.connect(lambda n: editor.do(setting(rotation_groups=n or None)))
-        self.rest = key_button(editor, "0", Mode.DEFORM, "Back to rest")
+        self.clusters.setRange(0, _MOST)
+        self.clusters.setSingleStep(50)
+        self.clusters.setSpecialValueText("One per vertex")
+        self.clusters.valueChanged.connect(lambda n: editor.do(setting(rotation_groups=n or None)))
+        self.reset = key_button(editor, "0", Mode.DEFORM, "Reset pose")
         column(
             self,
             form(("Volume change", self.volume)),
-            row(self.hold, self.hold_each),
+            row(self.preserve, self.per_region),
             self.overlay,
             form(
-                ("Colours end at", self.range),
-                ("Stretch", self.stretch),
-                ("Rotation groups", self.groups),
+                ("Colour range", self.range),
+                ("Stretch resistance", self.stretch),
+                ("Rotation clusters", self.clusters),
             ),
-            self.rest,
+            self.reset,
         )
 
     def refresh(self) -> None:
-        """Show the options as they are, and the volume."""
-        session, stage = self._editor.session, self._editor.stage
+        """Show the current options and the volume change."""
+        session, widgets = self._editor.session, self._editor.widgets
         options = session.options
         self.volume.setText(precise(session.volume_change))
-        put(self.hold, options.preserve_volume)
-        put(self.hold_each, options.preserve_region_volumes)
-        put(self.overlay, stage.overlay_wanted)
-        put(self.range, 100.0 * (stage.overlay.wanted_range or 0.0))
-        self.range.setEnabled(stage.overlay_wanted)
+        put(self.preserve, options.preserve_volume)
+        put(self.per_region, options.preserve_region_volumes)
+        put(self.overlay, widgets.overlay_wanted)
+        put(self.range, 100.0 * (widgets.overlay.wanted_range or 0.0))
+        self.range.setEnabled(widgets.overlay_wanted)
         put(self.stretch, options.stretch)
-        put(self.groups, options.rotation_groups or 0)
-        self.rest.setEnabled(session.state.pose is not None)
+        put(self.clusters, options.rotation_groups or 0)
+        self.reset.setEnabled(session.state.pose is not None)
 
 
 def _fit(box: Any, largest: float) -> None:
-    """Give *box* a range from 0 up, and steps and digits that suit it."""
+    """Set the range of *box* to 0..*largest*, with suitable steps and digits."""
     if box.maximum() == largest:
         return
     digits = 0

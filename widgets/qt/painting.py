@@ -1,4 +1,4 @@
-"""The panel's part for painting: with which tool, how large, and how far it reaches."""
+"""The part of the panel with the painting tools and their settings."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from qtpy import QtWidgets
 
-from ..editor import DeformEditor, Mode, reaching, with_radius
+from ..editor import DeformEditor, Mode, selecting_through, with_radius
 from ..region_selector import Tool
 from .controls import check_box, choice_button, column, form, key_button, number_box, put, row
 
@@ -15,23 +15,23 @@ _TOOLS = {
     Tool.BRUSH: ("b", "Brush"),
     Tool.LASSO: ("l", "Lasso"),
     Tool.RECTANGLE: ("t", "Rectangle"),
-    Tool.COMPONENT: ("k", "Component"),
+    Tool.COMPONENT: ("k", "Connected part"),
 }
 
 
 class PaintingPart(QtWidgets.QGroupBox):
-    """Tools and their settings.
+    """Painting tools and their settings.
 
     Parameters
     ----------
     editor : DeformEditor
-        Whose.
+        The editor to control.
     """
 
     def __init__(self, editor: DeformEditor) -> None:
         super().__init__("Paint with")
         self._editor = editor
-        mode = Mode.REGIONS  # and in mode 3 the keys are the same
+        mode = Mode.REGIONS  # mode 3 has the same keys
         self.tools = {
             tool: choice_button(editor, key, mode, text) for tool, (key, text) in _TOOLS.items()
         }
@@ -40,11 +40,11 @@ class PaintingPart(QtWidgets.QGroupBox):
             group.addButton(button)
         self.radius = number_box(
             QtWidgets.QDoubleSpinBox(),
-            "how far the brush reaches along the surface, in the mesh's unit ([ ] or the wheel)",
+            "Brush radius along the surface, in mesh units ([ ] or the wheel)",
         )
         self.radius.valueChanged.connect(lambda radius: editor.do(with_radius(radius)))
-        self.through = check_box("through the body", "paint what is hidden, too (V)")
-        self.through.toggled.connect(lambda through: editor.do(reaching(through)))
+        self.through = check_box("Select through (X-ray)", "Paint hidden vertices as well (V)")
+        self.through.toggled.connect(lambda through: editor.do(selecting_through(through)))
         self.grow = key_button(editor, "plus", mode, "Grow")
         self.shrink = key_button(editor, "minus", mode, "Shrink")
         tools = list(self.tools.values())
@@ -59,8 +59,8 @@ class PaintingPart(QtWidgets.QGroupBox):
         self._fit_to: float | None = None
 
     def refresh(self) -> None:
-        """Show the tool and its settings."""
-        selector = self._editor.stage.selector
+        """Show the current tool and its settings."""
+        selector = self._editor.widgets.selector
         diagonal = self._editor.session.mesh.diagonal
         if diagonal != self._fit_to:
             self._fit_to = diagonal
@@ -72,7 +72,7 @@ class PaintingPart(QtWidgets.QGroupBox):
 
 
 def _fit(box: Any, diagonal: float) -> None:
-    """Give *box* range, steps and digits that suit a mesh of this size."""
+    """Set range, steps and digits of *box* for the size of the mesh."""
     box.blockSignals(True)
     box.setDecimals(max(0, 4 - math.floor(math.log10(diagonal))))
     box.setRange(1e-4 * diagonal, 2.0 * diagonal)

@@ -1,9 +1,9 @@
-"""Everything that is beside the view: a head, what belongs to the mode, and a foot.
+"""The panel beside the view: a toolbar, the parts of the current mode, status and history.
 
     DeformPanel(editor)
 
-It hears whenever the editor says something, which it does after every change of the session, the
-mode, a tool or a job; and then shows, a moment later and all at once, what has changed.
+The editor updates its messages after every change of the session, the mode, a tool or a job.  The
+panel subscribes to them and refreshes all its parts together, a moment later.
 """
 
 from __future__ import annotations
@@ -17,44 +17,44 @@ from vtk_segdeform.session import Change
 
 from ..editor import DeformEditor, Mode, binding_of
 from .controls import shortcut
-from .foot import Foot
 from .handles import HandlesPart
 from .log import LogPart
-from .modes import Head
 from .options import CagesPart, DeformPart
 from .painting import PaintingPart
 from .regions import RegionsPart
+from .status import StatusPart
+from .toolbar import Toolbar
 
 Qt = QtCore.Qt
-_PATIENCE = 30  # milliseconds; moves of a drag come faster
+_DELAY = 30  # milliseconds; longer than between two moves of a drag
 _WIDTH = 40  # letters
 _KEYS = {"Ctrl+Z": "ctrl+z", "Ctrl+Y": "ctrl+y", "Ctrl+Shift+Z": "ctrl+y", "Escape": "escape"}
 
 
 class DeformPanel(QtWidgets.QWidget):
-    """A panel over an editor; goes dim when the editor is removed.
+    """A panel for an editor; disabled when the editor is removed.
 
     Parameters
     ----------
     editor : DeformEditor
-        What it shows, and what it does things with.
+        The editor to show and control.
     parent : QWidget, optional
-        As ever in Qt.
+        The parent widget.
     """
 
     deformed = QtCore.Signal()
-    """The pose is another one; at every move of a drag."""
+    """The pose has changed; emitted at every move of a drag."""
     regions_changed = QtCore.Signal()
-    """`Session.regions` are others, or called otherwise."""
+    """`Session.regions` or their names have changed."""
     session_changed = QtCore.Signal(object)
-    """Another session was opened: this one."""
+    """Another session was opened; emits that session."""
     error = QtCore.Signal(str)
-    """Something went wrong, in words."""
+    """An error was shown; emits its message."""
 
     def __init__(self, editor: DeformEditor, parent: Any = None) -> None:
         super().__init__(parent)
         self.editor = editor
-        self.head, self.foot, self.log = Head(editor), Foot(editor), LogPart(editor)
+        self.toolbar, self.status, self.log = Toolbar(editor), StatusPart(editor), LogPart(editor)
         self.painting, self.regions = PaintingPart(editor), RegionsPart(editor)
         self.handles = HandlesPart(editor)
         self.cages, self.deform = CagesPart(editor), DeformPart(editor)
@@ -66,41 +66,46 @@ class DeformPanel(QtWidgets.QWidget):
             self.painting: {Mode.REGIONS, Mode.HANDLES},
         }
         self._build()
-        self._patience = QtCore.QTimer(self)
-        self._patience.setSingleShot(True)
-        self._patience.setInterval(_PATIENCE)
-        self._patience.timeout.connect(self.refresh)
+        self._delay = QtCore.QTimer(self)
+        self._delay.setSingleShot(True)
+        self._delay.setInterval(_DELAY)
+        self._delay.timeout.connect(self.refresh)
         self._stops: list[Callable[[], None]] = [
-            editor.desk.voice.on_word(self._heard),
-            editor.view.on_failure(lambda _: self.error.emit(editor.desk.voice.fault)),
+            editor.controller.messages.on_change(self._messages_changed),
+            editor.view.on_failure(lambda _: self.error.emit(editor.controller.messages.error)),
         ]
         self._stop_session: list[Callable[[], None]] = []
         self._follow()
-        # When Qt has deleted what is drawn here, nobody is to speak to it any more.
-        self.destroyed.connect(_ender(self._stops, self._stop_session))
+        # Unsubscribe before Qt deletes the widgets.
+        self.destroyed.connect(_stopper(self._stops, self._stop_session))
         self.refresh()
 
+    @property
+    def is_up_to_date(self) -> bool:
+        """Whether no refresh is due."""
+        return not self._delay.isActive()
+
     def refresh(self) -> None:
-        """Show how things are now."""
+        """Update all visible parts."""
         editor, busy = self.editor, self.editor.is_busy
         self.setEnabled(editor.GetEnabled())
         self._inside.setEnabled(not busy)
-        self.head.refresh()
-        self.foot.refresh()
+        self.toolbar.refresh()
+        self.status.refresh()
         self.log.refresh()
-        if busy:  # the session is the job's
+        if busy:  # the job owns the session
             return
         for part, modes in self._parts.items():
             part.setVisible(editor.mode in modes)
             if editor.mode in modes:
                 part.refresh()
-        if editor.stage.dragger.is_refining:  # which may end without another word
-            self._patience.start()
+        if editor.widgets.dragger.is_refining:  # refinement ends without a message
+            self._delay.start()
 
     def stop(self) -> None:
-        """Hear of nothing any more, for good."""
-        _ender(self._stops, self._stop_session)()
-        self._patience.stop()
+        """Unsubscribe from the editor and disable the panel, permanently."""
+        _stopper(self._stops, self._stop_session)()
+        self._delay.stop()
         self.setEnabled(False)
 
     def _build(self) -> None:
@@ -117,9 +122,9 @@ class DeformPanel(QtWidgets.QWidget):
         area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         layout = QtWidgets.QVBoxLayout(self)
-        layout.addWidget(self.head)
+        layout.addWidget(self.toolbar)
         layout.addWidget(area, 1)
-        layout.addWidget(self.foot)
+        layout.addWidget(self.status)
         layout.addWidget(self.log)
         self.setMinimumWidth(_WIDTH * self.fontMetrics().averageCharWidth())
         for keys, key in _KEYS.items():
@@ -128,43 +133,43 @@ class DeformPanel(QtWidgets.QWidget):
     def _add_shortcut(self, keys: str, key: str) -> None:
         binding = binding_of(key, Mode.REGIONS)
         if binding is None or binding.action is None:
-            raise ValueError(f"{key!r} is no key of every mode")
+            raise ValueError(f"{key!r} has no action in all modes")
         action, while_busy = binding.action, binding.while_busy
         shortcut(keys, self, lambda: self.editor.do(action, while_busy=while_busy))
 
-    # What is heard.
+    # Events.
 
-    def _heard(self) -> None:
+    def _messages_changed(self) -> None:
         if self.editor.session is not self._session:
             self._follow()
             self.session_changed.emit(self._session)
-        if not self._patience.isActive():
-            self._patience.start()
+        if not self._delay.isActive():
+            self._delay.start()
 
     def _follow(self) -> None:
-        """Listen to the session of now, and to nothing else."""
-        self._session, selector = self.editor.session, self.editor.stage.selector
+        """Subscribe to the current session, and to no other one."""
+        self._session, selector = self.editor.session, self.editor.widgets.selector
         for stop in self._stop_session:
             stop()
-        tag = selector.AddObserver("ModifiedEvent", lambda *_: self._heard())
+        tag = selector.AddObserver("ModifiedEvent", lambda *_: self._messages_changed())
         self._stop_session[:] = [
-            self._session.on_change(self._changed),
+            self._session.on_change(self._session_changed),
             lambda: selector.RemoveObserver(tag),
         ]
 
-    def _changed(self, change: Change) -> None:
+    def _session_changed(self, change: Change) -> None:
         if change & Change.POSE:
             self.deformed.emit()
         if change & (Change.REGIONS | Change.NAMES):
             self.regions_changed.emit()
 
 
-def _ender(*lists: list[Callable[[], None]]) -> Callable[..., None]:
-    """Return a callable that stops all that is in *lists* when it is called."""
+def _stopper(*lists: list[Callable[[], None]]) -> Callable[..., None]:
+    """Return a function that calls and removes all callbacks in *lists*."""
 
-    def end(*_: object) -> None:
+    def stop_all(*_: object) -> None:
         for stops in lists:
             while stops:
                 stops.pop()()
 
-    return end
+    return stop_all

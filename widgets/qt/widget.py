@@ -1,11 +1,12 @@
-"""The editor for Qt applications: a widget with a view and a panel, or a panel for a view of yours.
+"""The editor for Qt: a widget with a view and a panel, or a panel for an existing view.
 
-    widget = DeformWidget(mesh)                  # put it wherever a QWidget goes
+    widget = DeformWidget(mesh)                  # a QWidget
     widget.deformed.connect(...)
-    window.addDockWidget(area, deform_dock(plotter, mesh))   # plotter: a QtInteractor of yours
+    window.addDockWidget(area, deform_dock(plotter, mesh))   # plotter: an existing QtInteractor
 
-The application chooses Qt's binding, as QtPy tells: by what it imports first, or by ``QT_API``.
-Call `DeformWidget.close` in the ``closeEvent`` of your window, as with pyvistaqt's own widgets.
+The application chooses the Qt binding as described by QtPy: the one it imports first, or
+``QT_API``.  Call `DeformWidget.close` in the ``closeEvent`` of your window, as for pyvistaqt's own
+widgets.
 """
 
 from __future__ import annotations
@@ -19,32 +20,32 @@ from qtpy import QtWidgets
 from vtk_segdeform.checks import require
 from vtk_segdeform.session import Session
 
-from .. import plugin  # gives plotters `segdeform`, also where entry points do not work
+from .. import plugin  # registers `segdeform` on plotters even without entry points
 from ..editor import DeformEditor
 from ..scene import View
 from .panel import DeformPanel
 
 
 class DeformWidget(QtWidgets.QWidget):
-    """A view of a mesh with the editor in it, and a panel beside it.
+    """A view with the editor in it, and the panel beside it.
 
     Parameters
     ----------
     mesh : Mesh, pyvista.PolyData or Session
         What to edit.
     parent : QWidget, optional
-        As ever in Qt.
+        The parent widget.
 
     Attributes
     ----------
     plotter : pyvistaqt.QtInteractor
-        The view; whatever pyvista draws can be added to it.
+        The view; anything that pyvista draws can be added to it.
     editor : DeformEditor
-        What works in the view.
+        The editor in the view.
     panel : DeformPanel
-        What is beside it.
+        The panel beside it.
     deformed, regions_changed, session_changed, error : signals
-        Those of the panel.
+        The signals of the panel.
     """
 
     def __init__(self, mesh: Any, parent: Any = None) -> None:
@@ -52,17 +53,17 @@ class DeformWidget(QtWidgets.QWidget):
         super().__init__(_checked(parent))
         self._is_closed = False
         self.plotter = pyvistaqt.QtInteractor(self, auto_update=False, off_screen=False)
-        self.plotter.setAcceptDrops(False)  # it would add the mesh beside the one that is edited
+        self.plotter.setAcceptDrops(False)  # it would add a second mesh to the view
         self.editor: DeformEditor = self.plotter.segdeform.edit(session)
-        self.editor.desk.file.surface = plugin.surface_of(mesh)
-        self._aimed: tuple[float, ...] | None = tuple(self.plotter.camera.position)
+        self.editor.controller.file.surface = plugin.surface_of(mesh)
+        self._camera_position: tuple[float, ...] | None = tuple(self.plotter.camera.position)
         self.panel = DeformPanel(self.editor, self)
         self.deformed, self.regions_changed = self.panel.deformed, self.panel.regions_changed
         self.session_changed, self.error = self.panel.session_changed, self.panel.error
         halves = QtWidgets.QSplitter(self)
         halves.addWidget(self.plotter)
         halves.addWidget(self.panel)
-        halves.setStretchFactor(0, 1)  # what a wider window has is the view's
+        halves.setStretchFactor(0, 1)  # a wider window enlarges the view
         halves.setCollapsible(0, False)
         layout = QtWidgets.QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -74,25 +75,25 @@ class DeformWidget(QtWidgets.QWidget):
 
     @property
     def session(self) -> Session:
-        """What is edited; another one after `session_changed`."""
+        """The session being edited; another one after `session_changed`."""
         return self.editor.session
 
     def deformed_polydata(self) -> pyvista.PolyData:
-        """Return the mesh as it is now, with the arrays and polygons that it came with.
+        """Return the deformed mesh with the arrays and polygons of the original PolyData or file.
 
-        Those of the PolyData that was given, or of the file that was opened; normals anew.
+        Normals are recomputed.
         """
-        return self.editor.desk.file.deformed(self.session)
+        return self.editor.controller.file.deformed(self.session)
 
-    def showEvent(self, event: Any) -> None:  # noqa: N802 - Qt's word
-        """Aim the camera, once it is known how wide the view is, unless somebody has aimed it."""
+    def showEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
+        """Reset the camera once the size of the view is known, unless it has been moved."""
         super().showEvent(event)
-        if self._aimed == tuple(self.plotter.camera.position):
+        if self._camera_position == tuple(self.plotter.camera.position):
             self.plotter.reset_camera()
-        self._aimed = None
+        self._camera_position = None
 
     def closeEvent(self, event: Any) -> None:  # noqa: N802
-        """Free everything; the session stays as it is."""
+        """Release all resources; the session is unchanged."""
         if not self._is_closed:
             self._is_closed = True
             self.panel.stop()
@@ -101,21 +102,21 @@ class DeformWidget(QtWidgets.QWidget):
 
 
 class DeformDock(QtWidgets.QDockWidget):
-    """A panel for a view of somebody else's; see `deform_dock`.
+    """A dock with a panel for an existing view; see `deform_dock`.
 
-    Closing it hides it; ``dock.editor.remove()`` takes the editor out of the view.
+    Closing the dock hides it; ``dock.editor.remove()`` removes the editor from the view.
 
     Parameters
     ----------
     editor : DeformEditor
-        What works in the view.
+        The editor in the view.
     parent : QWidget, optional
-        As ever in Qt.
+        The parent widget.
 
     Attributes
     ----------
     deformed, regions_changed, session_changed, error : signals
-        Those of the panel.
+        The signals of the panel.
     """
 
     def __init__(self, editor: DeformEditor, parent: Any = None) -> None:
@@ -130,34 +131,34 @@ class DeformDock(QtWidgets.QDockWidget):
 
     @property
     def session(self) -> Session:
-        """What is edited; another one after `session_changed`."""
+        """The session being edited; another one after `session_changed`."""
         return self.editor.session
 
     def deformed_polydata(self) -> pyvista.PolyData:
-        """Return the mesh as it is now; see `DeformWidget.deformed_polydata`."""
-        return self.editor.desk.file.deformed(self.session)
+        """Return the deformed mesh; see `DeformWidget.deformed_polydata`."""
+        return self.editor.controller.file.deformed(self.session)
 
 
 def deform_dock(view: Any, mesh: Any, parent: Any = None) -> DeformDock:
-    """Put the editor into a view that is there, and return a dock with its panel.
+    """Add the editor to an existing view, and return a dock with its panel.
 
     Parameters
     ----------
     view : pyvistaqt.QtInteractor, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
-        Where to edit.  The editor goes when a plotter closes; else call ``dock.editor.remove()``
-        before its window does.
+        Where to edit.  A plotter removes the editor when it closes; for any other view call
+        ``dock.editor.remove()`` before its window closes.
     mesh : Mesh, pyvista.PolyData or Session
         What to edit.
     parent : QWidget, optional
-        As ever in Qt.
+        The parent widget.
     """
-    View.of(view)  # checks it, which a plotter's tools do not
+    View.of(view)  # checks the type, which a plotter's tools do not
     _checked(parent)
     if hasattr(view, "segdeform"):
         editor = view.segdeform.edit(mesh)
     else:
         editor = DeformEditor(view, plugin.session_of(mesh))
-        editor.desk.file.surface = plugin.surface_of(mesh)
+        editor.controller.file.surface = plugin.surface_of(mesh)
         editor.On()
     return DeformDock(editor, parent)
 

@@ -1,4 +1,4 @@
-"""Where unsaved work is kept: whose it is, what is left of a crash, and that nothing is halved."""
+"""Autosaves: their owner, recovery after a crash, and complete files."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ ABOUT = About("ball.ply", "/saved/ball.segdeform", "/meshes/ball.ply")
 
 
 def no_progress(fraction, text):
-    """Hear of progress."""
+    """Ignore progress."""
 
 
 def work(top=0.8):
-    """Return a session with something to lose."""
+    """Return a session with unsaved changes."""
     session = Session(BALL)
     session.add_handle(BALL.vertices[:, 2] > top)
     return session
@@ -42,16 +42,16 @@ def folder(tmp_path) -> Path:
 
 
 def crash(folder, session=None, about=ABOUT):
-    """Leave work behind, as a program does that is killed; return its folder."""
+    """Leave an autosave as a killed program does; return its folder."""
     slot = Autosaves(folder).new(about)
     slot.write(session or work())
     slot.release()
     return slot.path.parent
 
 
-def test_what_a_program_that_is_gone_has_left_is_found_as_it_was(folder):
+def test_the_autosave_of_a_crashed_program_is_found_unchanged(folder):
     crash(folder)
-    (slot,) = Autosaves(folder).left()
+    (slot,) = Autosaves(folder).abandoned()
     assert slot.about == ABOUT
     assert abs((slot.when - datetime.now()).total_seconds()) < 100
     session = slot.read(no_progress)
@@ -59,7 +59,7 @@ def test_what_a_program_that_is_gone_has_left_is_found_as_it_was(folder):
     assert_array_equal(session.handles["handle 1"], work().handles["handle 1"])
 
 
-def test_work_of_a_program_that_runs_is_nobody_elses(folder):
+def test_the_autosave_of_a_running_program_is_not_offered(folder):
     mine = Autosaves(folder).new(ABOUT)
     mine.write(work())
     theirs = subprocess.run(
@@ -67,9 +67,9 @@ def test_work_of_a_program_that_runs_is_nobody_elses(folder):
         capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert theirs.stdout.split() == ["None"]
-    assert Autosaves(folder).left() == []  # nor another window's of the same program
+    assert Autosaves(folder).abandoned() == []  # nor for another window of the same program
     mine.release()
-    assert len(Autosaves(folder).left()) == 1
+    assert len(Autosaves(folder).abandoned()) == 1
 
 
 _HOLD = """
@@ -78,14 +78,14 @@ print(runpy.run_path(sys.argv[1])["hold"](pathlib.Path(sys.argv[2])))
 """
 
 
-def test_of_two_that_ask_at_once_one_gets_it(folder):
+def test_of_two_simultaneous_programs_one_gets_the_autosave(folder):
     for _ in range(5):
         crash(folder)
     found, ready = [], threading.Barrier(4)
 
     def ask():
         ready.wait()
-        found.extend(Autosaves(folder).left())
+        found.extend(Autosaves(folder).abandoned())
 
     threads = [threading.Thread(target=ask) for _ in range(4)]
     for thread in threads:
@@ -95,25 +95,25 @@ def test_of_two_that_ask_at_once_one_gets_it(folder):
     assert len(found) == len({slot.path for slot in found}) == 5
 
 
-def test_what_is_left_is_offered_until_it_is_removed_and_the_latest_first(folder):
+def test_abandoned_autosaves_are_offered_until_removed_the_latest_first(folder):
     for name, seconds in (("old", 1000.0), ("new", 3000.0), ("older", 2000.0)):
         path = crash(folder, about=About(name)) / "session.segdeform"
         os.utime(path, (seconds, seconds))
     autosaves = Autosaves(folder)
     for _ in range(2):
-        left = autosaves.left()
+        left = autosaves.abandoned()
         assert [slot.about.name for slot in left] == ["new", "older", "old"]
         for slot in left:
             slot.release()
-    left = autosaves.left()
+    left = autosaves.abandoned()
     left[0].remove()
-    left[0].remove()  # nothing more happens
+    left[0].remove()  # a second call changes nothing
     for slot in left[1:]:
         slot.release()
-    assert [slot.about.name for slot in autosaves.left()] == ["older", "old"]
+    assert [slot.about.name for slot in autosaves.abandoned()] == ["older", "old"]
 
 
-def test_removing_leaves_nothing_and_what_a_killed_write_left_goes_too(folder):
+def test_removing_a_slot_also_removes_the_draft_of_a_killed_write(folder):
     slot = Autosaves(folder).new(ABOUT)
     slot.write(work())
     (slot.path.parent / ".segdeform-0123456789abcdef.part").write_bytes(b"half")
@@ -121,36 +121,36 @@ def test_removing_leaves_nothing_and_what_a_killed_write_left_goes_too(folder):
     assert list(folder.iterdir()) == []
 
 
-def test_a_slot_with_nothing_in_it_is_swept_away_but_not_one_that_is_held(folder):
+def test_an_empty_slot_is_deleted_unless_it_is_locked(folder):
     autosaves = Autosaves(folder)
     begun, gone = autosaves.new(ABOUT), autosaves.new(ABOUT)
     gone.release()
-    assert autosaves.left() == []
+    assert autosaves.abandoned() == []
     assert list(folder.iterdir()) == [begun.path.parent]
     begun.write(work())
 
 
-def test_work_without_a_word_of_what_it_is_on_is_work_all_the_same(folder):
+def test_work_without_a_description_is_recovered_too(folder):
     for damage in (None, "", "{", "[]", '{"name": 3}', json.dumps({"name": "x"})):
         about = crash(folder) / "about.json"
         if damage is None:
             about.unlink()
         else:
             about.write_text(damage)
-    assert {slot.about for slot in Autosaves(folder).left()} == {About()}
+    assert {slot.about for slot in Autosaves(folder).abandoned()} == {About()}
 
 
-def test_damaged_work_is_told_of_and_stays(folder):
+def test_damaged_work_is_reported_and_kept(folder):
     path = crash(folder) / "session.segdeform"
     path.write_bytes(path.read_bytes()[:-100])
-    (slot,) = Autosaves(folder).left()
+    (slot,) = Autosaves(folder).abandoned()
     with pytest.raises(SessionError, match="readable"):
         slot.read(no_progress)
     slot.release()
-    assert len(Autosaves(folder).left()) == 1
+    assert len(Autosaves(folder).abandoned()) == 1
 
 
-def test_a_write_that_fails_leaves_what_was_there(folder, monkeypatch):
+def test_a_failed_write_leaves_the_previous_autosave(folder, monkeypatch):
     slot = Autosaves(folder).new(ABOUT)
     slot.write(work(0.8))
     monkeypatch.setattr("os.replace", _full)
@@ -166,24 +166,24 @@ def _full(*_):
     raise OSError(28, "No space left on device")
 
 
-def test_where_nothing_can_be_kept_that_is_said(tmp_path, monkeypatch):
+def test_an_unwritable_folder_is_reported(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     with pytest.raises(SessionError, match="file"):
         Autosaves(tmp_path / "file" / "unsaved").new(ABOUT)
-    assert Autosaves(tmp_path / "nowhere").left() == []
+    assert Autosaves(tmp_path / "nowhere").abandoned() == []
     monkeypatch.setattr(autosave, "hold", lambda _: None)
     with pytest.raises(SessionError, match="locked"):
         Autosaves(tmp_path).new(ABOUT)
 
 
-def test_a_lock_is_held_once_and_not_on_a_file_that_went(tmp_path):
+def test_a_lock_is_acquired_once_and_not_on_a_deleted_file(tmp_path):
     path = tmp_path / "lock"
     first = hold(path)
     assert first is not None
     assert hold(path) is None
     if os.name == "posix":
         path.unlink()
-        second = hold(path)  # another file of that name
+        second = hold(path)  # another file of the same name
         assert second is not None
         os.close(second)
     os.close(first)
@@ -206,7 +206,7 @@ def test_the_folder_is_the_users_own(monkeypatch, tmp_path):
     assert user_folder() == tmp_path / "local" / "segdeform" / "unsaved"
 
 
-def test_a_session_can_be_kept_by_another_thread_while_it_is_changed(folder):
+def test_another_thread_can_save_a_session_while_it_changes(folder):
     session, slot = work(), Autosaves(folder).new(ABOUT)
     done = threading.Event()
     kept = []
@@ -245,7 +245,7 @@ def tree_of(folder):
 def ask(folder):
     """List the remaining slots twice, and release all of them."""
     for _ in range(2):
-        for slot in Autosaves(folder).left():
+        for slot in Autosaves(folder).abandoned():
             slot.release()
 
 
@@ -269,7 +269,7 @@ def test_links_are_never_followed(folder, tmp_path):
     outside = tmp_path / "outside"
     slot = crash(folder)
     (folder / "copy").mkdir()
-    slot.rename(outside)  # a whole slot, with its mark, but somewhere else
+    slot.rename(outside)  # a valid slot in another folder
     (folder / SLOT).symlink_to(outside)
     (folder / "fedcba9876543210").symlink_to("nowhere")
     (folder / "circle").symlink_to("circle")
@@ -282,7 +282,7 @@ def test_links_are_never_followed(folder, tmp_path):
     lock.unlink()
     lock.symlink_to(outside / "lock")
     before = tree_of(tmp_path)
-    assert Autosaves(folder).left() == []
+    assert Autosaves(folder).abandoned() == []
     ask(folder)
     assert tree_of(tmp_path) == before
 
@@ -292,7 +292,7 @@ def test_unsaved_work_is_not_written_through_a_link(folder, tmp_path):
     slot = Autosaves(folder).new(ABOUT)
     (tmp_path / "precious").write_text("mine")
     slot.path.symlink_to(tmp_path / "precious")
-    with pytest.raises(SessionError, match="is a link"):
+    with pytest.raises(SessionError, match="is a symbolic link"):
         slot.write(work())
     slot.remove()
     assert (tmp_path / "precious").read_text() == "mine"
@@ -315,7 +315,7 @@ def test_pipes_and_folders_with_our_names_neither_block_nor_are_deleted(folder):
         assert {f"{digit}{number:015d}/{name}" for digit in "ab"} <= left
 
 
-def test_a_foreign_file_in_a_slot_is_kept_and_so_is_the_folder(folder):
+def test_a_foreign_file_in_a_slot_and_the_folder_are_kept(folder):
     slot = Autosaves(folder).new(ABOUT)
     slot.write(work())
     mine = slot.path.with_name("precious.ply")
@@ -335,9 +335,9 @@ def test_slots_of_earlier_versions_are_found_and_removed_too(folder):
     path = crash(folder)
     begun = Autosaves(folder).new(ABOUT)
     begun.release()
-    for each in (path, begun.path.parent):  # they left the lock empty
+    for each in (path, begun.path.parent):  # an empty lock
         (each / "lock").write_bytes(b"")
-    (slot,) = Autosaves(folder).left()
+    (slot,) = Autosaves(folder).abandoned()
     assert slot.about == ABOUT
     slot.remove()
     assert list(folder.iterdir()) == []
@@ -348,8 +348,8 @@ def test_slots_of_earlier_versions_are_found_and_removed_too(folder):
 def test_files_of_another_user_are_unchanged(folder):
     path = crash(folder)
     os.chown(path, 12345, 12345)
-    assert Autosaves(folder).left() == []
+    assert Autosaves(folder).abandoned() == []
     os.chown(path, 0, 0)
     os.chown(path / "session.segdeform", 12345, 12345)
-    assert Autosaves(folder).left() == []
+    assert Autosaves(folder).abandoned() == []
     assert (path / "session.segdeform").exists()

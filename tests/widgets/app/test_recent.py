@@ -11,7 +11,7 @@ from app_hands import settings_in
 from vtk_segdeform.widgets.app.recent import Recent
 
 
-def test_names_are_kept_as_they_are(tmp_path):
+def test_names_are_stored_unchanged(tmp_path):
     paths = [tmp_path / name for name in ("a.ply", "Körper 身体.ply", 'a,b;"c\n.ply', "n" * 255)]
     for path in paths:
         Recent(settings_in(tmp_path)).add(path)
@@ -19,7 +19,7 @@ def test_names_are_kept_as_they_are(tmp_path):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="names of any bytes")
-def test_a_name_that_is_not_text_is_left_out_and_not_changed(tmp_path):
+def test_a_name_that_is_not_text_is_left_out(tmp_path):
     recent = Recent(settings_in(tmp_path))
     recent.add(tmp_path / "a.ply")
     recent.add(tmp_path / os.fsdecode(b"\xff\xfe.ply"))

@@ -1,4 +1,4 @@
-"""The desktop program as a person meets it: menus, files, drops, questions, and work not lost."""
+"""The desktop program for its users: menus, files, drops, dialogs and autosave."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ BALL = models.sphere(300)
 
 @pytest.fixture(scope="module", autouse=True)
 def in_haste():
-    """Spend no time on smooth edges, nor on garbage, which Qt has collected in its thread only."""
+    """Save time on antialiasing, and collect garbage in Qt's thread only."""
     smooth = pv.global_theme.anti_aliasing
     pv.global_theme.anti_aliasing = None
     gc.collect()
@@ -54,7 +54,7 @@ def in_haste():
 
 @pytest.fixture(scope="module")
 def arm():
-    """Return a session that lacks nothing but a pose; nobody changes it."""
+    """Return a session, complete except for a pose; tests do not change it."""
     return ready_session()
 
 
@@ -74,7 +74,7 @@ def arm_file(arm, tmp_path) -> Path:
 
 @pytest.fixture
 def boxes():
-    gc.collect()  # what a test that failed has left
+    gc.collect()  # objects of a failed test
     application()
     made = Boxes()
     yield made
@@ -84,7 +84,7 @@ def boxes():
 
 @pytest.fixture
 def start(tmp_path, boxes):
-    """Yield a callable that starts the program, which finds what was there when it ran before."""
+    """Yield a function that starts the program, with the settings and autosaves of earlier runs."""
     made = []
 
     def begin(path=None, **options) -> AppHand:
@@ -98,7 +98,7 @@ def start(tmp_path, boxes):
     yield begin
     for hand in made:
         if hand.window.has_mesh:
-            hand.window.editor.desk.file.keeps(hand.window.session)
+            hand.window.editor.controller.file.mark_saved(hand.window.session)
         delete(hand.window)
     made.clear()
     hand = None
@@ -111,50 +111,48 @@ def choose_file(monkeypatch, path):
 
 
 def change(hand):
-    """Do something that can be lost."""
+    """Make an unsaved change."""
     hand.window.session.add_handle([40, 41], "knob")
     hand.settle()
 
 
 def drop(hand, *paths):
-    """Hold files over the middle of the window, and drop them, as Qt is told by the system."""
+    """Drag files over the centre of the window and drop them, by system events."""
     mime, window = QtCore.QMimeData(), hand.window.windowHandle()
     mime.setUrls([QtCore.QUrl.fromLocalFile(str(path)) for path in paths])
     place = QtCore.QPoint(window.width() // 3, window.height() // 2)
     about = Qt.CopyAction, mime, Qt.LeftButton, Qt.NoModifier
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # where Qt would rather have a QPointF
+        warnings.simplefilter("ignore", DeprecationWarning)  # Qt prefers a QPointF
         enter = QtGui.QDragEnterEvent(place, *about)
     application().sendEvent(window, enter)
     if enter.isAccepted():
-        assert hand.window.pages.start.target._is_lit
+        assert hand.window.pages.start.target.is_highlighted
         application().sendEvent(window, QtGui.QDropEvent(QtCore.QPointF(place), *about))
     application().processEvents()
     return enter.isAccepted()
 
 
-# Beginning.
+# Starting.
 
 
-def test_it_starts_with_a_page_from_which_the_cactus_can_be_tried(start, monkeypatch, tmp_path):
+def test_the_start_page_opens_the_sample_model(start, monkeypatch, tmp_path):
     monkeypatch.setattr(models, "cactus", lambda: BALL)
     hand = start()
     assert hand.page is hand.window.pages.start
     assert hand.title == "segdeform"
     assert not any(can for text, (can, _) in hand.reads("File").items() if "Save" in text)
     number = int(hand.window.winId())
-    hand.click(hand.page.cactus)
+    hand.click(hand.page.sample)
     hand.settle()
     assert hand.page is hand.window.editor_widget
-    assert hand.title == "the cactus - segdeform"
-    assert int(hand.window.winId()) == number  # it did not flicker
+    assert hand.title == "cactus - segdeform"
+    assert int(hand.window.winId()) == number  # the window was not re-created
     assert hand.window.editor_widget.plotter.hasFocus()
     assert slots(tmp_path) == []
 
 
-def test_a_file_from_the_menu_is_opened_in_another_thread_while_the_window_goes_on(
-    start, ball_file, monkeypatch
-):
+def test_a_file_from_the_menu_is_opened_in_another_thread(start, ball_file, monkeypatch):
     hand, read, threads = start(), documents.read_polydata, []
     go_on = threading.Event()
 
@@ -199,16 +197,16 @@ def test_recent_files_are_there_after_a_restart_and_open_at_a_click(
     hand.settle()
     assert hand.title == "arm.segdeform - segdeform"
     hand.choose("File", "Open recent", "Clear")
-    hand.window.recent.add(tmp_path / ("x" * 300 + ".ply"))  # no file can have such a name
+    hand.window.recent.add(tmp_path / ("x" * 300 + ".ply"))  # too long for a file name
     hand = start()
     assert [button.isEnabled() for button in hand.page.recent] == [False]
     hand.choose("File", "Open recent", "Clear")
 
 
-# Saving, and being asked.
+# Saving and its dialogs.
 
 
-def test_the_title_has_a_star_exactly_while_something_could_be_lost(
+def test_the_title_has_a_star_exactly_while_changes_are_unsaved(
     start, ball_file, tmp_path, monkeypatch
 ):
     hand = start(ball_file)
@@ -232,21 +230,23 @@ def test_the_title_has_a_star_exactly_while_something_could_be_lost(
     hand.window.session.add_handle([50], "another")
     choose_file(monkeypatch, None)
     plotter = hand.window.editor_widget.plotter
-    QtTest.QTest.keyClick(plotter, Qt.Key_S, Qt.ControlModifier)  # now it has a file: no question
+    QtTest.QTest.keyClick(
+        plotter, Qt.Key_S, Qt.ControlModifier
+    )  # it has a file now, so no question
     hand.settle()
     assert len(load_session(tmp_path / "knob.segdeform").handles) == 2
 
 
-def test_closing_asks_and_does_what_it_is_told(start, ball_file, tmp_path, monkeypatch, boxes):
+def test_closing_asks_and_follows_the_answer(start, ball_file, tmp_path, monkeypatch, boxes):
     hand = start(ball_file)
     change(hand)
     for answer in ("Cancel", "Escape"):
         boxes.answers.append(answer)
         hand.choose("File", "Quit")
         assert hand.window.isVisible()
-        assert boxes.seen[-1].startswith("Save the changes to ball.vtp?")
+        assert boxes.seen[-1].startswith("Save changes to ball.vtp?")
     choose_file(monkeypatch, None)
-    boxes.answers.append("Save")  # but then no file is named
+    boxes.answers.append("Save")  # but no file is chosen
     assert not hand.window.close()
     choose_file(monkeypatch, tmp_path / "knob.segdeform")
     boxes.answers.append("Save")
@@ -258,10 +258,10 @@ def test_closing_asks_and_does_what_it_is_told(start, ball_file, tmp_path, monke
     again.choose("File", "Quit")
     assert not again.window.isVisible()
     assert slots(tmp_path) == []
-    assert start().page is not None  # nothing is offered
+    assert start().page is not None  # no recovery is offered
 
 
-def test_opening_another_asks_first_and_a_file_that_fails_costs_nothing(
+def test_opening_another_file_asks_first_and_an_unreadable_file_loses_nothing(
     start, ball_file, arm_file, tmp_path, boxes
 ):
     hand = start(ball_file)
@@ -283,7 +283,7 @@ def test_opening_another_asks_first_and_a_file_that_fails_costs_nothing(
     assert slots(tmp_path) == []
 
 
-def test_a_mesh_is_saved_with_all_that_was_in_its_file_and_not_over_it(
+def test_a_mesh_is_saved_with_all_its_arrays_and_not_over_the_original(
     start, ball_file, tmp_path, monkeypatch, boxes
 ):
     hand = start(ball_file)
@@ -296,14 +296,14 @@ def test_a_mesh_is_saved_with_all_that_was_in_its_file_and_not_over_it(
 
     monkeypatch.setattr(QtWidgets.QFileDialog, "getSaveFileName", name)
     hand.choose("File", "Save mesh")
-    assert proposed == ["ball-bent.vtp"]
+    assert proposed == ["ball-deformed.vtp"]
     bent = convert.read_polydata(tmp_path / "bent.vtp")
     assert_array_equal(bent.point_data["height"], BALL.vertices[:, 2])
     (tmp_path / "bent.vtp").unlink()
-    hand.choose("File", "Save mesh")  # now it is known where
+    hand.choose("File", "Save mesh")  # the file is known now
     assert (tmp_path / "bent.vtp").exists()
     boxes.answers.append("Cancel")
-    hand.choose("File", "Save mesh as")  # "bent" becomes bent.vtp, which is there
+    hand.choose("File", "Save mesh as")  # "bent" becomes bent.vtp, which exists
     assert boxes.seen[-1].startswith("Replace bent.vtp?")
     boxes.answers.append("Cancel")
     assert not hand.window.close()
@@ -316,9 +316,11 @@ def test_a_mesh_is_saved_with_all_that_was_in_its_file_and_not_over_it(
     assert "no folder" in boxes.seen[-1]
 
 
-def test_the_buttons_of_the_panel_do_what_the_menus_do(start, ball_file, tmp_path, monkeypatch):
+def test_the_buttons_of_the_panel_call_the_functions_of_the_menus(
+    start, ball_file, tmp_path, monkeypatch
+):
     hand = start(ball_file)
-    head = hand.window.editor_widget.panel.head
+    head = hand.window.editor_widget.panel.toolbar
     change(hand)
     choose_file(monkeypatch, tmp_path / "knob.segdeform")
     head.save.menu().actions()[1].trigger()
@@ -329,27 +331,27 @@ def test_the_buttons_of_the_panel_do_what_the_menus_do(start, ball_file, tmp_pat
     hand.settle()
     assert hand.title == "ball.vtp - segdeform"
     choose_file(monkeypatch, tmp_path / "again.vtp")
-    hand.window.editor_widget.panel.head.save.menu().actions()[2].trigger()
+    hand.window.editor_widget.panel.toolbar.save.menu().actions()[2].trigger()
     assert "height" in convert.read_polydata(tmp_path / "again.vtp").point_data
 
 
-# Drops, and bad files.
+# Drops and invalid files.
 
 
 def test_a_mesh_dropped_anywhere_on_the_window_is_opened(start, ball_file, arm_file):
     hand = start()
     assert drop(hand, ball_file)
-    assert not hand.window.pages.start.target._is_lit
+    assert not hand.window.pages.start.target.is_highlighted
     hand.settle()
     assert hand.title == "ball.vtp - segdeform"
-    assert drop(hand, arm_file, ball_file)  # on the view: not added beside the other
+    assert drop(hand, arm_file, ball_file)  # on the view, which must not add it to the scene
     hand.settle()
     assert hand.title == "arm.segdeform - segdeform"
     assert not drop(hand)
 
 
 def bad_files(tmp_path):
-    """Yield files that cannot be opened, and a word of what is said of each."""
+    """Yield invalid files, each with a word of its error message."""
     open_ball = convert.to_polydata(BALL).remove_cells([0, 1])
     convert.write_mesh(tmp_path / "open.ply", open_ball)
     save_session(tmp_path / "cut.segdeform", Session(BALL))
@@ -367,27 +369,27 @@ def bad_files(tmp_path):
     yield "x" * 300 + ".obj", "no such"
 
 
-def test_a_file_that_is_broken_is_told_of_in_words_and_the_window_stays(start, tmp_path, boxes):
+def test_an_invalid_file_is_reported_in_plain_words_and_the_window_stays(start, tmp_path, boxes):
     hand = start()
     for name, words in bad_files(tmp_path):
         boxes.answers.append("OK")
         assert drop(hand, tmp_path / name)
         until(lambda: not boxes.answers, f"words on {name}")
-        assert boxes.seen[-1].startswith(f"{name} could not be opened\n")
+        assert boxes.seen[-1].startswith(f"Could not open {name}\n")
         assert words in boxes.seen[-1]
-        assert "fault:" not in boxes.seen[-1]
+        assert "Internal error" not in boxes.seen[-1]
         assert hand.page is hand.window.pages.start
 
 
 # View and help.
 
 
-def test_the_view_menu_shows_and_hides_and_knows_what_is_shown(start, arm_file):
+def test_the_view_menu_shows_hides_and_ticks(start, arm_file):
     hand = start(arm_file)
     hand.view_hand()
     for name, is_shown in (
-        ("Cages", lambda: hand.window.editor.stage.cages.is_shown),
-        ("Volume change", lambda: hand.window.editor.stage.overlay.is_shown),
+        ("Cages", lambda: hand.window.editor.widgets.cages.is_shown),
+        ("Local volume change", lambda: hand.window.editor.widgets.overlay.is_shown),
     ):
         assert hand.reads("View")[name] == (True, False)
         hand.choose("View", name)
@@ -397,24 +399,26 @@ def test_the_view_menu_shows_and_hides_and_knows_what_is_shown(start, arm_file):
         hand.choose("View", name)
         hand.settle()
         assert not is_shown()
-    hand.choose("Help", "Keys")
-    assert hand.window.editor.desk.help.is_shown
+    hand.choose("Help", "Keyboard shortcuts")
+    assert hand.window.editor.controller.help.is_shown
     plotter = hand.window.editor_widget.plotter
     plotter.camera.zoom(5.0)
-    hand.choose("View", "Whole mesh")
+    hand.choose("View", "Fit to view")
     places = hand.window.editor.view.to_display(hand.window.session.vertices)[:, :2]
     assert (places > 0).all()
     assert (places < plotter.window_size).all()
 
 
-def test_about_says_what_it_is(start, boxes):
+def test_about_names_the_program(start, boxes):
     hand = start()
     boxes.answers.append("OK")
     hand.choose("Help", "About")
     assert "vtk_segdeform" in boxes.seen[-1]
 
 
-def test_a_picture_is_what_is_seen_without_words_and_gizmo(start, arm_file, tmp_path, monkeypatch):
+def test_a_picture_shows_the_view_without_status_line_and_gizmo(
+    start, arm_file, tmp_path, monkeypatch
+):
     hand = start(arm_file)
     hand.view_hand()
     choose_file(monkeypatch, tmp_path / "arm")
@@ -427,16 +431,14 @@ def test_a_picture_is_what_is_seen_without_words_and_gizmo(start, arm_file, tmp_
     places[:, 1] = len(picture) - 1 - places[:, 1]
     here = [columns.min(), rows.min()], [columns.max(), rows.max()]
     assert_allclose(here, [places.min(axis=0), places.max(axis=0)], atol=2.0)  # the mesh alone
-    assert "picture written" in hand.window.editor.status
-    assert hand.window.editor.stage.dragger.GetEnabled()
+    assert "Picture saved" in hand.window.editor.status
+    assert hand.window.editor.widgets.dragger.GetEnabled()
 
 
-# Work that is not lost.
+# Autosave.
 
 
-def test_after_a_drag_by_mouse_exactly_its_pose_is_kept_and_none_once_it_is_saved(
-    start, arm_file, tmp_path
-):
+def test_after_a_drag_its_pose_is_autosaved_until_the_session_is_saved(start, arm_file, tmp_path):
     hand = start(arm_file)
     mouse = hand.view_hand()
     mouse.drag(hand.way())
@@ -450,7 +452,7 @@ def test_after_a_drag_by_mouse_exactly_its_pose_is_kept_and_none_once_it_is_save
     assert digest(load_session(arm_file)) == digest(hand.window.session)
 
 
-def test_a_drag_that_goes_on_is_kept_too_and_by_another_thread(
+def test_an_ongoing_drag_is_autosaved_too_and_by_another_thread(
     start, arm_file, tmp_path, monkeypatch
 ):
     threads, write = [], Slot.write
@@ -475,7 +477,7 @@ def test_a_drag_that_goes_on_is_kept_too_and_by_another_thread(
     assert threading.main_thread() not in threads
 
 
-def test_work_that_was_left_is_offered_and_recovered(start, arm, arm_file, tmp_path, boxes):
+def test_abandoned_work_is_offered_and_recovered(start, arm, arm_file, tmp_path, boxes):
     left(tmp_path, bent(arm), About("arm.segdeform", str(arm_file)))
     boxes.answers.append("Recover")
     hand = start(arm_file)
@@ -483,15 +485,15 @@ def test_work_that_was_left_is_offered_and_recovered(start, arm, arm_file, tmp_p
     assert said.startswith("Recover unsaved work on arm.segdeform from ")
     assert said.splitlines()[0].endswith("?")
     assert digest(hand.window.session) == digest(bent(arm))
-    assert hand.title == "arm.segdeform* - segdeform"  # it is still not saved
-    assert len(slots(tmp_path)) == 1  # and would survive another crash
+    assert hand.title == "arm.segdeform* - segdeform"  # still unsaved
+    assert len(slots(tmp_path)) == 1  # it would survive another crash
     hand.choose("File", "Save session")
     hand.settle()
     assert digest(load_session(arm_file)) == digest(bent(arm))
     assert slots(tmp_path) == []
 
 
-def test_what_is_recovered_later_or_never(start, arm, ball_file, tmp_path, boxes):
+def test_recovering_work_later_or_never(start, arm, ball_file, tmp_path, boxes):
     slot = left(tmp_path, Session(BALL), About("ball.vtp", "", str(ball_file)))
     for answer, path in (("Escape", None), ("Later", ball_file)):
         boxes.answers.append(answer)
@@ -504,7 +506,7 @@ def test_what_is_recovered_later_or_never(start, arm, ball_file, tmp_path, boxes
     hand.settle()
     assert hand.window.document.surface.point_data["height"][7] == BALL.vertices[7, 2]
     assert hand.title == "ball.vtp* - segdeform"
-    assert "recovered" in hand.window.editor.status
+    assert "Recovered" in hand.window.editor.status
     assert hand.reads("File")["Recover unsaved work ..."] == (False, False)
     boxes.answers.append("Discard")
     assert hand.window.close()
@@ -514,7 +516,7 @@ def test_what_is_recovered_later_or_never(start, arm, ball_file, tmp_path, boxes
     assert slots(tmp_path) == []
 
 
-def test_of_several_that_were_left_the_others_stay(start, tmp_path, boxes):
+def test_recovering_one_of_several_autosaves_keeps_the_others(start, tmp_path, boxes):
     for name in "abc":
         left(tmp_path, Session(BALL), About(name))
     boxes.answers += ["Later", "Recover"]
@@ -523,11 +525,11 @@ def test_of_several_that_were_left_the_others_stay(start, tmp_path, boxes):
     assert hand.title == "b* - segdeform"
     assert len(slots(tmp_path)) == 3
     boxes.answers += ["Discard", "Discard"]
-    start()  # another program: what is being worked on is not offered to it
-    assert slots(tmp_path) == [hand.window.keeper._slot.path]
+    start()  # another program: locked autosaves are not offered
+    assert slots(tmp_path) == [hand.window.autosaver._slot.path]
 
 
-def test_work_that_cannot_be_read_is_told_of_and_left(start, tmp_path, boxes):
+def test_unreadable_work_is_reported_and_kept(start, tmp_path, boxes):
     path = left(tmp_path, Session(BALL), About("ball.vtp"))
     path.write_bytes(path.read_bytes()[:-50])
     boxes.answers += ["Recover", "OK"]
@@ -539,13 +541,13 @@ def test_work_that_cannot_be_read_is_told_of_and_left(start, tmp_path, boxes):
     assert slots(tmp_path) == []
 
 
-def test_where_nothing_can_be_kept_that_is_said_once_and_work_goes_on(start, ball_file, tmp_path):
+def test_a_failing_autosave_is_reported_once_and_work_continues(start, ball_file, tmp_path):
     (tmp_path / "unsaved").write_text("in the way")
     hand, told = start(ball_file, interval=0.05), []
-    hand.window.keeper.failed.connect(told.append)
+    hand.window.autosaver.failed.connect(told.append)
     change(hand)
     until(lambda: told, "the word")
-    assert "cannot be kept" in hand.window.editor.status
+    assert "Could not autosave" in hand.window.editor.status
     (tmp_path / "unsaved").unlink()
     until(lambda: slots(tmp_path), "another attempt")
     assert len(told) == 1
@@ -553,7 +555,7 @@ def test_where_nothing_can_be_kept_that_is_said_once_and_work_goes_on(start, bal
 
 
 def left(tmp_path, session, about):
-    """Leave unsaved work behind; return its file."""
+    """Leave an autosave; return its file."""
     slot = Autosaves(tmp_path / "unsaved").new(about)
     slot.write(session)
     slot.release()
@@ -562,7 +564,7 @@ def left(tmp_path, session, about):
 
 
 def bent(arm):
-    """Return the session in a pose."""
+    """Return the session with a pose."""
     session = Session(arm.mesh, state=arm.state)
     up = np.eye(4)
     up[2, 3] = 0.5
@@ -571,11 +573,11 @@ def bent(arm):
     return session
 
 
-# Ending.
+# Closing.
 
 
 @pytest.mark.parametrize("times", [1, pytest.param(30, marks=pytest.mark.campaign)])
-def test_nothing_is_left_of_windows_that_were_closed(ball_file, tmp_path, boxes, times):
+def test_closed_windows_leave_nothing_in_memory(ball_file, tmp_path, boxes, times):
     def open_and_close():
         window = Window(settings_in(tmp_path), Autosaves(tmp_path / "unsaved"))
         hand = AppHand(window)
@@ -599,7 +601,7 @@ def test_nothing_is_left_of_windows_that_were_closed(ball_file, tmp_path, boxes,
     assert application().topLevelWidgets() == []
 
 
-def test_a_window_that_is_deleted_without_a_word_is_spoken_to_no_more(tmp_path, ball_file, boxes):
+def test_a_window_deleted_by_qt_receives_no_more_calls(tmp_path, ball_file, boxes):
     hand = AppHand(Window(settings_in(tmp_path), Autosaves(tmp_path / "unsaved")))
     hand.window.open(ball_file)
     hand.settle()
@@ -608,7 +610,7 @@ def test_a_window_that_is_deleted_without_a_word_is_spoken_to_no_more(tmp_path, 
     application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
     application().processEvents()
     assert not editor.GetEnabled()
-    session.add_handle([40, 41], "knob")  # and nobody fails to hear
+    session.add_handle([40, 41], "knob")  # no error in a former listener
     application().processEvents()
 
 
@@ -631,6 +633,6 @@ def test_without_qt_one_sentence_says_how_to_get_it(missing, monkeypatch, capsys
     assert "pip install 'vtk-segdeform[app]'" in line
 
 
-def test_without_a_screen_that_is_said(capsys):
+def test_without_a_screen_one_sentence_says_so(capsys):
     assert main(["app", "horse.ply"]) == 1  # the tests draw off-screen
     assert "off-screen" in capsys.readouterr().err

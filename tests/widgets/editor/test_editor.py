@@ -1,4 +1,4 @@
-"""The whole editor, by real events: from a bare mesh to a pose, undone, saved and opened again."""
+"""The whole editor by real events: from a mesh to a pose, undone, saved and opened again."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from scenes import sausage
 from scipy.spatial.transform import Rotation
 
 from vtk_segdeform import Session, load_session, models, save_session
-from vtk_segdeform.errors import RegionError
+from vtk_segdeform.errors import CageError, RegionError
 from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.widgets.editor import actions
 from vtk_segdeform.widgets.editor.bindings import BINDINGS
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import Part, Way
@@ -30,8 +31,8 @@ from vtk_segdeform.widgets.volume_overlay.volume_overlay import VolumeOverlay
 ROOT = Path(__file__).resolve().parents[3]
 
 
-class Desk:
-    """An editor in a view, seen from the front with z up, and a hand."""
+class Bench:
+    """An editor in a view, seen from the front with z up, and a simulated hand."""
 
     def __init__(self, view: View, session):
         self.view = view
@@ -56,13 +57,13 @@ class Desk:
             self.hand.tick()
 
     def type(self, *keys):
-        """Type keys, "z" or "ctrl+z", and let what they begin be done."""
+        """Type keys such as "z" or "ctrl+z", and wait for the jobs that they start."""
         for key in keys:
             self.hand.key(key.split("+")[-1], control="ctrl+" in key, shift="shift+" in key)
             self.settle()
 
     def around(self, mask):
-        """Return the corners, in order, of a box around vertices as they are seen."""
+        """Return the corners, in order, of a box on the screen around vertices."""
         seen = self.view.to_display(self.session.vertices[mask])[:, :2]
         (x0, y0), (x1, y1) = seen.min(axis=0) - 4.0, seen.max(axis=0) + 4.0
         return [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
@@ -83,7 +84,7 @@ def any_view(request):
 
 @pytest.fixture(scope="module")
 def ready():
-    """Return the state of a small session with everything but a pose."""
+    """Return the state of a small session, complete except for a pose."""
     scene = sausage()
     session = Session(scene.mesh)
     session.set_regions(scene.regions)
@@ -94,10 +95,10 @@ def ready():
 
 
 @pytest.fixture
-def desk(ready):
+def bench(ready):
     """Yield an editor over a session that is ready, in a plain view."""
     mesh, state = ready
-    made = Desk(plain_view((500, 400)), Session(mesh, state=state))
+    made = Bench(plain_view((500, 400)), Session(mesh, state=state))
     yield made
     assert made.hand.failures == []
     made.editor.remove()
@@ -105,57 +106,57 @@ def desk(ready):
 
 @pytest.fixture
 def bare():
-    """Yield an editor over a mesh and nothing else."""
-    made = Desk(plain_view((500, 400)), sausage().mesh)
+    """Yield an editor over a mesh without regions."""
+    made = Bench(plain_view((500, 400)), sausage().mesh)
     yield made
     made.editor.remove()
 
 
-def pull_handle(desk, shift=(20, 30), moves=4):
-    """Grab the handle in the middle and drag it by as many pixels."""
-    name = next(iter(desk.session.handles))
-    middle = desk.session.vertices[desk.session.handles[name]].mean(axis=0)
-    start = np.array(desk.hand.at(middle))
-    desk.hand.drag([start + share * np.array(shift) for share in np.linspace(0.0, 1.0, moves + 1)])
+def pull_handle(bench, shift=(20, 30), moves=4):
+    """Drag the handle by its centre, *shift* pixels."""
+    name = next(iter(bench.session.handles))
+    middle = bench.session.vertices[bench.session.handles[name]].mean(axis=0)
+    start = np.array(bench.hand.at(middle))
+    bench.hand.drag([start + share * np.array(shift) for share in np.linspace(0.0, 1.0, moves + 1)])
 
 
 def test_the_whole_story(any_view, tmp_path, request):
     mesh = models.cactus(1500)
-    desk = Desk(any_view, mesh)
-    hand, z = desk.hand, mesh.vertices[:, 2]
+    bench = Bench(any_view, mesh)
+    hand, z = bench.hand, mesh.vertices[:, 2]
     volume = signed_volume(mesh.vertices, mesh.faces)
     drawn = []
 
     def check_frame(*_):
-        points = desk.editor.stage.surface.points
+        points = bench.editor.widgets.surface.points
         drawn.append(abs(signed_volume(points, mesh.faces) / volume - 1.0))
 
     any_view.renderer.AddObserver("EndEvent", check_frame)
 
-    desk.type("g")
-    assert desk.session.regions.n_regions >= 2
-    assert desk.editor.stage.selector.region == 1
-    before = desk.session.regions.membership[1].copy()
+    bench.type("g")
+    assert bench.session.regions.n_regions >= 2
+    assert bench.editor.widgets.selector.region == 1
+    before = bench.session.regions.membership[1].copy()
     hand.drag([hand.at([0.0, -0.1, height]) for height in (0.45, 0.5, 0.55)])
-    assert desk.session.undo_label == "paint region 2"
-    assert np.count_nonzero(desk.session.regions.membership[1]) > np.count_nonzero(before)
+    assert bench.session.undo_label == "paint region 2"
+    assert np.count_nonzero(bench.session.regions.membership[1]) > np.count_nonzero(before)
 
-    desk.type("f")
-    assert len(desk.session.cages) == desk.session.regions.n_regions
+    bench.type("f")
+    assert len(bench.session.cages) == bench.session.regions.n_regions
 
-    desk.type("3", "v", "t")
-    start, _, end, _ = desk.around(z < 0.08)
+    bench.type("3", "v", "t")
+    start, _, end, _ = bench.around(z < 0.08)
     hand.drag([start, (end[0], start[1]), end])
-    assert set(np.flatnonzero(z < 0.08)) <= set(desk.session.fixed)
-    assert z[desk.session.fixed].max() < 0.16
-    desk.type("d", "l")
-    hand.drag(desk.around(z > 0.9))
-    assert set(np.flatnonzero(z > 0.9)) <= set(desk.session.handles["handle 1"])
+    assert set(np.flatnonzero(z < 0.08)) <= set(bench.session.fixed)
+    assert z[bench.session.fixed].max() < 0.16
+    bench.type("d", "l")
+    hand.drag(bench.around(z > 0.9))
+    assert set(np.flatnonzero(z > 0.9)) <= set(bench.session.handles["handle 1"])
 
-    desk.type("4")
-    assert desk.session.is_bound
-    marked = desk.session.state
-    handle = desk.session.handles["handle 1"]
+    bench.type("4")
+    assert bench.session.is_bound
+    marked = bench.session.state
+    handle = bench.session.handles["handle 1"]
     middle = mesh.vertices[handle].mean(axis=0)
     pivot = np.array(hand.at([0.0, 0.0, 0.5]))
     arm = np.array(hand.at(middle)) - pivot
@@ -164,38 +165,38 @@ def test_the_whole_story(any_view, tmp_path, request):
         for a in np.radians(np.linspace(0.0, 60.0, 31))
     ]
     hand.drag(way)
-    assert desk.session.undo_label == "drag handle 1"
-    there = desk.session.vertices[handle].mean(axis=0)
+    assert bench.session.undo_label == "drag handle 1"
+    there = bench.session.vertices[handle].mean(axis=0)
     assert np.linalg.norm(np.array(hand.at(there)) - way[-1]) < 12.0
-    turn_by_a_ring(desk)
-    turned = desk.session.vertices
+    turn_by_a_ring(bench)
+    turned = bench.session.vertices
     assert len(drawn) > 35
     assert max(drawn) < 1e-12
 
     steps = 0
-    while desk.session.can_undo:
-        desk.type("z")
+    while bench.session.can_undo:
+        bench.type("z")
         steps += 1
     assert steps == 7  # regions, brush, cages, fixed, handle, drag, turn
-    assert desk.session.regions is None
-    assert_array_equal(desk.editor.stage.surface.points, mesh.vertices)
-    desk.type(*["ctrl+y", "ctrl+shift+z"] * 3, "y")
-    assert not desk.session.can_redo
-    assert_array_equal(desk.session.vertices, turned)
-    assert not desk.session.state.changes(replace(marked, pose=desk.session.state.pose))
+    assert bench.session.regions is None
+    assert_array_equal(bench.editor.widgets.surface.points, mesh.vertices)
+    bench.type(*["ctrl+y", "ctrl+shift+z"] * 3, "y")
+    assert not bench.session.can_redo
+    assert_array_equal(bench.session.vertices, turned)
+    assert not bench.session.state.changes(replace(marked, pose=bench.session.state.pose))
 
-    desk.editor.path = tmp_path / "cactus.segdeform"
-    desk.type("ctrl+s")
-    assert "cactus.segdeform" in desk.editor.status
-    assert_array_equal(load_session(desk.editor.path).vertices, turned)
-    if "plain" in request.node.name:  # and in another process; once is enough
+    bench.editor.path = tmp_path / "cactus.segdeform"
+    bench.type("ctrl+s")
+    assert "cactus.segdeform" in bench.editor.status
+    assert_array_equal(load_session(bench.editor.path).vertices, turned)
+    if "plain" in request.node.name:  # also in another process, once
         reopened = subprocess.run(
-            [sys.executable, "-c", REOPEN, str(desk.editor.path)], capture_output=True, cwd=ROOT
+            [sys.executable, "-c", REOPEN, str(bench.editor.path)], capture_output=True, cwd=ROOT
         )
         assert reopened.stdout == turned.tobytes(), reopened.stderr.decode()
     assert max(drawn) < 1e-12
     assert hand.failures == []
-    desk.editor.remove()
+    bench.editor.remove()
 
 
 REOPEN = """
@@ -205,92 +206,97 @@ sys.stdout.buffer.write(load_session(sys.argv[1]).vertices.tobytes())
 """
 
 
-def turn_by_a_ring(desk):
-    """Turn the handle about the line of sight, by a sixth of the outermost ring."""
-    dragger = desk.editor.stage.dragger
+def turn_by_a_ring(bench):
+    """Rotate the handle about the view direction, by a sixth of the outermost ring."""
+    dragger = bench.editor.widgets.dragger
     ring = dragger.gizmo.line(Part(Way.ABOUT))[:, :2]
-    before = desk.session.targets[dragger.handle]
-    desk.hand.drag(ring[: len(ring) // 6])
-    assert desk.session.undo_label == "turn handle 1"
-    a, b = (x - x.mean(axis=0) for x in (before, desk.session.targets[dragger.handle]))
+    before = bench.session.targets[dragger.handle]
+    bench.hand.drag(ring[: len(ring) // 6])
+    assert bench.session.undo_label == "turn handle 1"
+    a, b = (x - x.mean(axis=0) for x in (before, bench.session.targets[dragger.handle]))
     turn = Rotation.align_vectors(b, a)[0]
     assert np.degrees(turn.magnitude()) == pytest.approx(60.0, abs=8.0)
 
 
-# Modes, keys and words.
+# Modes, keys and messages.
 
 
-def test_every_mode_says_what_it_lacks_and_the_key_that_makes_it(bare):
+def test_each_mode_shows_what_is_missing_and_the_key_that_adds_it(bare):
     said = []
     for key in "1234":
         bare.type(key)
         said.append(bare.editor.status)
     assert bare.editor.mode is Mode.DEFORM
-    assert "G finds" in said[0]
-    assert "G finds" in said[1]
-    assert "what stays" in said[2]
-    assert "G finds" in said[3]
+    assert "Press G" in said[0]
+    assert "Press G" in said[1]
+    assert "paint fixed vertices" in said[2]
+    assert "Press G" in said[3]
     bare.type("g")
-    assert "F fits" in bare.editor.status
+    assert "Press F" in bare.editor.status
     bare.type("f")
-    assert "3 to mark a handle" in bare.editor.status
+    assert "No handle yet. Press 3 to paint one" in bare.editor.status
     assert not bare.session.is_bound
     x = bare.session.mesh.vertices[:, 0]
     bare.type("3", "t", "v", "d")
     corners = bare.around(x > 2.4)
     bare.hand.drag([corners[0], corners[2]])
-    assert "rectangle for handle 1" in bare.editor.status
+    assert "Rectangle: paint handle 1" in bare.editor.status
     bare.type("4")
     assert bare.session.is_bound
-    assert "drag or turn a handle" in bare.editor.status
+    assert "Move or rotate a handle" in bare.editor.status
     pull_handle(bare)
     assert bare.session.undo_label == "drag handle 1"
     assert bare.hand.failures == []
 
 
-def test_each_mode_has_its_own_widget_and_shows_what_belongs_to_it(desk):
-    stage = desk.editor.stage
-    owners = {"1": stage.selector, "2": stage.cages, "3": stage.selector, "4": stage.dragger}
+def test_each_mode_switches_on_its_own_widget_and_display(bench):
+    widgets = bench.editor.widgets
+    owners = {
+        "1": widgets.selector,
+        "2": widgets.cages,
+        "3": widgets.selector,
+        "4": widgets.dragger,
+    }
     for key, widget in owners.items():
-        desk.type(key)
-        assert [w for w in stage.widgets if w.GetEnabled()] == [widget]
-        assert stage.cages.is_shown == (key == "2")
-    desk.type("c")
-    assert stage.cages.is_shown
-    desk.type("1", "c")
-    assert not stage.cages.is_shown
-    desk.type("4", "o")
-    assert stage.overlay.is_shown
-    desk.type("1")
-    assert not stage.overlay.is_shown  # one paints on regions, not on volumes
-    desk.type("4")
-    assert stage.overlay.is_shown
+        bench.type(key)
+        assert [w for w in widgets.interactive if w.GetEnabled()] == [widget]
+        assert widgets.cages.is_shown == (key == "2")
+    bench.type("c")
+    assert widgets.cages.is_shown
+    bench.type("1", "c")
+    assert not widgets.cages.is_shown
+    bench.type("4", "o")
+    assert widgets.overlay.is_shown
+    bench.type("1")
+    assert not widgets.overlay.is_shown  # painting hides the overlay
+    bench.type("4")
+    assert widgets.overlay.is_shown
 
 
-def test_what_is_painted_is_chosen_by_keys(desk):
-    selector = desk.editor.stage.selector
+def test_keys_select_the_target_of_painting(bench):
+    selector = bench.editor.widgets.selector
     tools = {"l": Tool.LASSO, "t": Tool.RECTANGLE, "k": Tool.COMPONENT, "b": Tool.BRUSH}
     for key, tool in tools.items():
-        desk.type(key)
+        bench.type(key)
         assert selector.tool is tool
     assert selector.paints is Paint.REGION
-    desk.type("n")
-    assert "region 2" in desk.editor.status
-    desk.type("n", "a")
-    assert "region 3 (new)" in desk.editor.status
-    desk.type("3", "s")
+    bench.type("n")
+    assert "region 2" in bench.editor.status
+    bench.type("n", "a")
+    assert "region 3 (new)" in bench.editor.status
+    bench.type("3", "s")
     assert selector.paints is Paint.FIXED
-    desk.type("d", "n")
-    assert "handle 1" in desk.editor.status
-    desk.type("a")
-    assert "a new handle" in desk.editor.status
+    bench.type("d", "n")
+    assert "handle 1" in bench.editor.status
+    bench.type("a")
+    assert "paint new handle" in bench.editor.status
     radius = selector.radius
-    desk.hand.hover(desk.hand.at([0.0, -0.8, 0.0]))
-    desk.type("bracketright")
+    bench.hand.hover(bench.hand.at([0.0, -0.8, 0.0]))
+    bench.type("bracketright")
     assert selector.radius > radius
 
 
-def test_without_regions_one_paints_the_first_beside_all_the_rest(bare):
+def test_without_regions_painting_splits_the_mesh_into_the_stroke_and_the_rest(bare):
     bare.type("g", "n", "n", "z")
     assert bare.session.regions is None
     bare.hand.click(bare.hand.at([-2.0, 0.0, 0.0]))
@@ -298,8 +304,8 @@ def test_without_regions_one_paints_the_first_beside_all_the_rest(bare):
     assert everything.all()
     assert 0 < np.count_nonzero(painted) < len(painted)
     assert "region 2" in bare.editor.status
-    bare.type("g", "a", "z", "z")  # from a new region after many back to none
-    assert "no regions yet" in bare.editor.status
+    bare.type("g", "a", "z", "z")  # undo to a session without regions
+    assert "No regions yet" in bare.editor.status
     bare.hand.click(bare.hand.at([2.0, 0.0, 0.0]))
     assert bare.session.regions.n_regions == 2
     assert bare.hand.failures == []
@@ -308,138 +314,140 @@ def test_without_regions_one_paints_the_first_beside_all_the_rest(bare):
 @pytest.mark.parametrize(
     ("keys", "says"),
     [
-        ("m", "no regions to merge yet: G finds some"),
-        ("x", "no regions to cut yet: G finds some"),
-        ("c", "no cages to show yet: F fits them"),
-        ("f", "no regions to fit cages to"),
-        ("3n", "no handle yet"),
+        ("m", "No regions to merge yet. Press G"),
+        ("x", "No regions to split yet. Press G"),
+        ("c", "No cages to show yet. Press F"),
+        ("f", "No regions to fit cages to. Press G"),
+        ("3n", "No handle yet"),
     ],
 )
-def test_a_key_with_nothing_to_work_on_says_what_comes_first(bare, keys, says):
+def test_a_key_that_needs_something_else_first_names_it(bare, keys, says):
     bare.type(*keys)
     assert says in bare.editor.status
     bare.type("3", "Delete")
-    assert "there is no handle yet" in bare.editor.status
+    assert "No handle yet" in bare.editor.status
 
 
-def test_what_a_stroke_leaves_alone_is_told(desk):
-    hand, held = desk.hand, desk.session.regions.membership.sum(axis=0)
-    size = np.count_nonzero(desk.session.regions.membership[0])
-    desk.type("t", "v")  # all of it, through the body
+def test_the_status_line_reports_vertices_that_a_stroke_left_unchanged(bench):
+    hand, held = bench.hand, bench.session.regions.membership.sum(axis=0)
+    size = np.count_nonzero(bench.session.regions.membership[0])
+    bench.type("t", "v")  # a rectangle with X-ray
     hand.drag([(2, 40), (398, 398)], control=True)
-    left = np.count_nonzero(desk.session.regions.membership[0])
+    left = np.count_nonzero(bench.session.regions.membership[0])
     assert 0 < left < size
-    assert f"{left} vertices left as they were: no other region holds them" in desk.editor.status
-    assert left == np.count_nonzero(held[desk.session.regions.membership[0]] == 1)
+    assert f"{left} vertices left as they were: no other region holds them" in bench.editor.status
+    assert left == np.count_nonzero(held[bench.session.regions.membership[0]] == 1)
 
 
-def test_painting_over_a_pose_says_that_it_is_at_rest_again(desk):
-    desk.type("4")
-    pull_handle(desk)
-    desk.type("1", "plus")
-    assert desk.session.state.pose is None
-    assert "at rest again" in desk.editor.status
-    desk.type("z")
-    assert desk.session.state.pose is not None
-    assert "at rest again" not in desk.editor.status
+def test_painting_a_region_in_a_pose_resets_it_and_says_so(bench):
+    bench.type("4")
+    pull_handle(bench)
+    bench.type("1", "plus")
+    assert bench.session.state.pose is None
+    assert "Pose reset" in bench.editor.status
+    bench.type("z")
+    assert bench.session.state.pose is not None
+    assert "Pose reset" not in bench.editor.status
 
 
-def test_regions_are_merged_cut_grown_and_shrunk(desk):
-    hand, selector = desk.hand, desk.editor.stage.selector
-    size = np.count_nonzero(desk.session.regions.membership[0])
-    desk.type("plus")
-    assert np.count_nonzero(desk.session.regions.membership[0]) > size
-    desk.type("z", "minus")
-    assert np.count_nonzero(desk.session.regions.membership[0]) < size
-    desk.type("z")
+def test_regions_are_merged_split_grown_and_shrunk(bench):
+    hand, selector = bench.hand, bench.editor.widgets.selector
+    size = np.count_nonzero(bench.session.regions.membership[0])
+    bench.type("plus")
+    assert np.count_nonzero(bench.session.regions.membership[0]) > size
+    bench.type("z", "minus")
+    assert np.count_nonzero(bench.session.regions.membership[0]) < size
+    bench.type("z")
     hand.hover(hand.at([2.0, 0.0, 0.0]))  # on region 1
-    desk.type("m")
-    assert desk.session.regions.n_regions == 1
-    desk.type("x")
-    assert desk.session.regions.n_regions == 2
-    desk.type("n")
+    bench.type("m")
+    assert bench.session.regions.n_regions == 1
+    bench.type("x")
+    assert bench.session.regions.n_regions == 2
+    bench.type("n")
     assert selector.region == 1
-    desk.type("z")
-    desk.type("n")
-    assert selector.region == 0  # there is only one again
+    bench.type("z")
+    bench.type("n")
+    assert selector.region == 0  # only one region is left
 
 
-def test_handles_are_chosen_and_removed(desk):
-    desk.type("3", "d", "a", "t")
-    x = desk.session.mesh.vertices[:, 0]
-    corners = desk.around((x > 0.0) & (x < 0.4))
-    desk.hand.drag([corners[0], corners[2]])
-    assert list(desk.session.handles) == ["handle 1", "handle 2"]
-    desk.type("4", "n")
-    first = desk.editor.stage.dragger.handle
-    desk.type("Tab")
-    assert {first, desk.editor.stage.dragger.handle} == {"handle 1", "handle 2"}
-    gone = desk.editor.stage.dragger.handle
-    desk.type("Delete")
-    assert list(desk.session.handles) == [name for name in ("handle 1", "handle 2") if name != gone]
+def test_handles_are_selected_and_removed(bench):
+    bench.type("3", "d", "a", "t")
+    x = bench.session.mesh.vertices[:, 0]
+    corners = bench.around((x > 0.0) & (x < 0.4))
+    bench.hand.drag([corners[0], corners[2]])
+    assert list(bench.session.handles) == ["handle 1", "handle 2"]
+    bench.type("4", "n")
+    first = bench.editor.widgets.dragger.handle
+    bench.type("Tab")
+    assert {first, bench.editor.widgets.dragger.handle} == {"handle 1", "handle 2"}
+    gone = bench.editor.widgets.dragger.handle
+    bench.type("Delete")
+    assert list(bench.session.handles) == [
+        name for name in ("handle 1", "handle 2") if name != gone
+    ]
 
 
-def test_back_to_rest_and_the_volume_let_go(desk):
-    desk.type("4")
-    pull_handle(desk)
-    assert desk.session.state.pose is not None
-    desk.type("Home")
-    assert desk.session.state.pose is None
-    desk.type("p")
-    assert not desk.session.options.preserve_volume
-    assert desk.session.is_bound  # still
-    assert "volume let go" in desk.editor.status
-    assert "the volume is free" in desk.editor.status
-    pull_handle(desk)
-    assert abs(desk.session.volume_change) > 1e-6
+def test_resetting_the_pose_and_turning_volume_preservation_off(bench):
+    bench.type("4")
+    pull_handle(bench)
+    assert bench.session.state.pose is not None
+    bench.type("Home")
+    assert bench.session.state.pose is None
+    bench.type("p")
+    assert not bench.session.options.preserve_volume
+    assert bench.session.is_bound  # still
+    assert "Volume preservation off" in bench.editor.status
+    assert "(P to turn on)" in bench.editor.status
+    pull_handle(bench)
+    assert abs(bench.session.volume_change) > 1e-6
 
 
-def test_z_undoes_but_constrains_while_a_handle_is_dragged(desk):
-    desk.type("4")
-    before = desk.session.state
-    handle = desk.session.handles["handle 1"]
-    middle = desk.session.vertices[handle].mean(axis=0)
-    x, y = desk.hand.at(middle)
-    desk.hand.press((x, y))
-    desk.hand.move((x + 10, y + 10))
-    desk.hand.key("z")
-    desk.hand.move((x + 20, y + 30))
-    assert desk.session.is_dragging
-    moved = desk.session.targets["handle 1"] - desk.session.mesh.vertices[handle]
+def test_z_undoes_but_constrains_while_a_handle_is_dragged(bench):
+    bench.type("4")
+    before = bench.session.state
+    handle = bench.session.handles["handle 1"]
+    middle = bench.session.vertices[handle].mean(axis=0)
+    x, y = bench.hand.at(middle)
+    bench.hand.press((x, y))
+    bench.hand.move((x + 10, y + 10))
+    bench.hand.key("z")
+    bench.hand.move((x + 20, y + 30))
+    assert bench.session.is_dragging
+    moved = bench.session.targets["handle 1"] - bench.session.mesh.vertices[handle]
     assert np.abs(moved[:, :2]).max() < 1e-9 < moved[:, 2].min()
-    desk.hand.release((x + 20, y + 30))
-    desk.type("z")
-    assert not desk.session.state.changes(before)
+    bench.hand.release((x + 20, y + 30))
+    bench.type("z")
+    assert not bench.session.state.changes(before)
 
 
-def test_no_two_bindings_want_the_same_key_in_the_same_mode():
+def test_no_key_has_two_bindings_in_one_mode():
     taken = [(key, mode) for b in BINDINGS if b.action for key in b.keys for mode in b.modes]
     assert len(taken) == len(set(taken))
     assert "q" not in {key for key, _ in taken}
 
 
-def test_a_key_of_another_mode_is_kept_from_vtk_and_explained(desk):
+def test_a_key_of_another_mode_is_explained_and_withheld_from_vtk(bench):
     heard = []
-    desk.view.interactor.AddObserver("CharEvent", lambda *_: heard.append("char"), -1.0)
-    desk.type("s")  # surface, to VTK; what stays, in mode 3
+    bench.view.interactor.AddObserver("CharEvent", lambda *_: heard.append("char"), -1.0)
+    bench.type("s")  # surface, to VTK; fixed vertices, in mode 3
     assert heard == []
-    assert "S is a key of 3 (paint what stays)" in desk.editor.status
-    desk.type("w")
+    assert "S works in mode 3 (Paint fixed vertices)" in bench.editor.status
+    bench.type("w")
     assert heard == ["char"]
 
 
-def test_the_card_of_keys_comes_and_goes(desk):
-    without = picture(desk.view)
+def test_the_help_card_is_shown_and_hidden(bench):
+    without = picture(bench.view)
     for key in ("h", "question", "F1"):
-        desk.type(key)
-        assert (picture(desk.view) != without).any()
-        desk.type("Escape" if key == "F1" else key)
-        assert_array_equal(picture(desk.view), without)
+        bench.type(key)
+        assert (picture(bench.view) != without).any()
+        bench.type("Escape" if key == "F1" else key)
+        assert_array_equal(picture(bench.view), without)
 
 
 def test_without_numba_the_status_line_says_so_until_the_first_action(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "numba" else name)
-    made = Desk(plain_view((500, 400)), sausage().mesh)
+    made = Bench(plain_view((500, 400)), sausage().mesh)
     said = "numba is not installed: frames take 3 to 6 times as long. pip install numba"
     assert made.editor.status.startswith(said)
     made.type("1")
@@ -448,41 +456,67 @@ def test_without_numba_the_status_line_says_so_until_the_first_action(monkeypatc
     made.editor.remove()
 
 
-def test_what_goes_wrong_is_said_until_something_succeeds(desk):
-    desk.hand.click(desk.hand.at([-2.0, 0.0, 0.0]), control=True)  # out of the only region there
-    assert "in no region but region 1" in desk.editor.status
-    assert [type(failure).__name__ for failure in desk.hand.failures] == ["RegionError"]
-    desk.hand.failures.clear()
-    desk.hand.hover((5, 5))
-    assert "in no region but region 1" in desk.editor.status
-    desk.hand.click(desk.hand.at([1.0, -0.7, 0.0]))
-    assert desk.session.undo_label == "paint region 1"
-    assert desk.editor.status.startswith("brush for region 1")
-    desk.hand.hover((5, 5))
-    desk.type("m")  # with the pointer beside the mesh
-    assert "point at the region" in desk.editor.status
-    assert len(desk.hand.failures) == 1
-    desk.hand.failures.clear()
+def test_an_error_is_shown_until_an_action_succeeds(bench):
+    bench.hand.click(
+        bench.hand.at([-2.0, 0.0, 0.0]), control=True
+    )  # erase where there is only one region
+    assert "in no region but region 1" in bench.editor.status
+    assert [type(failure).__name__ for failure in bench.hand.failures] == ["RegionError"]
+    bench.hand.failures.clear()
+    bench.hand.hover((5, 5))
+    assert "in no region but region 1" in bench.editor.status
+    bench.hand.click(bench.hand.at([1.0, -0.7, 0.0]))
+    assert bench.session.undo_label == "paint region 1"
+    assert bench.editor.status.startswith("Brush: paint region 1.")
+    bench.hand.hover((5, 5))
+    bench.type("m")  # the pointer is beside the mesh
+    assert "Point at the region" in bench.editor.status
+    assert len(bench.hand.failures) == 1
+    bench.hand.failures.clear()
 
 
-def test_a_fault_of_our_own_is_said_too(desk):
-    desk.session.on_change(lambda change: 1 // 0)
-    desk.type("2", "z")
-    assert "nothing to undo" in desk.editor.status
-    desk.type("p")
-    assert "ZeroDivisionError" in desk.editor.status
-    assert desk.hand.failures
-    desk.hand.failures.clear()
+def test_an_internal_error_is_shown_too(bench):
+    bench.session.on_change(lambda change: 1 // 0)
+    bench.type("2", "z")
+    assert "Nothing to undo" in bench.editor.status
+    bench.type("p")
+    assert "ZeroDivisionError" in bench.editor.status
+    assert bench.hand.failures
+    bench.hand.failures.clear()
+
+
+def test_do_returns_the_error_of_an_action_or_none(bench):
+    def fail(controller):
+        raise CageError("no room for it")
+
+    assert bench.editor.do(actions.undo) is None
+    error = bench.editor.do(fail)
+    assert isinstance(error, CageError)
+    assert bench.hand.failures == [error]
+    assert bench.editor.status == "no room for it"
+    bench.editor.controller.start("Counting", lambda _: time.sleep(0.05), lambda _: None)
+    refusal = bench.editor.do(actions.undo)
+    assert str(refusal).startswith("Busy. Counting")
+    assert bench.editor.do(actions.toggle_help, while_busy=True) is None
+    bench.settle()
+    bench.hand.failures.clear()
+
+
+def test_the_status_line_does_not_repeat_a_result_that_the_hint_contains(bench):
+    bench.type("4", "p")
+    assert bench.editor.status.count("Volume preservation off") == 1
+    bench.type("1", "p", "p")
+    assert bench.editor.status.startswith("Volume preservation off · Brush")
 
 
 # Jobs.
 
 
-def test_while_a_job_runs_the_camera_works_and_nothing_else_does(bare):
+def test_during_a_job_only_the_camera_works(bare):
     bare.hand.key("g")
     assert bare.editor.is_busy
-    assert "finding regions" in bare.editor.status
-    assert "Esc cancels" in bare.editor.status
+    assert "Detecting regions" in bare.editor.status
+    assert "Esc to cancel" in bare.editor.status
     camera = bare.view.camera.GetPosition()
     middle = bare.hand.at([0.0, -0.8, 0.0])
     bare.hand.drag([middle, (middle[0] + 30, middle[1] + 20)])
@@ -490,11 +524,11 @@ def test_while_a_job_runs_the_camera_works_and_nothing_else_does(bare):
     bare.hand.key("f")
     bare.hand.key("3")
     assert bare.editor.mode is Mode.REGIONS
-    assert bare.editor.status.startswith("busy finding regions")
+    assert bare.editor.status.startswith("Busy. Detecting regions")
     assert bare.session.regions is None
     bare.settle()
     assert bare.session.regions is not None
-    assert "1 region found · brush for region 1," in bare.editor.status
+    assert "1 region found · Brush: paint region 1." in bare.editor.status
     assert bare.hand.failures == []
 
 
@@ -504,28 +538,28 @@ def test_escape_cancels_a_job_and_nothing_is_changed(bare):
     bare.settle()
     assert bare.session.regions is None
     assert not bare.session.can_undo
-    assert "cancelled" in bare.editor.status
+    assert "Cancelled" in bare.editor.status
     assert bare.hand.failures == []
-    bare.hand.click(bare.hand.at([0.0, -0.8, 0.0]))  # and the brush paints again
+    bare.hand.click(bare.hand.at([0.0, -0.8, 0.0]))  # the brush works again
     assert bare.session.undo_label == "paint region 2"
     bare.type("g")
     assert bare.session.regions is not None
 
 
-def test_a_second_escape_does_not_restart_a_cancelled_job(desk):
-    desk.hand.key("4")
-    assert desk.editor.is_busy
+def test_a_second_escape_does_not_restart_a_cancelled_job(bench):
+    bench.hand.key("4")
+    assert bench.editor.is_busy
     for _ in range(3):
-        desk.hand.key("Escape")
-        desk.settle()
-    desk.hand.key("h")
-    assert not desk.editor.is_busy
-    assert not desk.session.is_bound
-    desk.type("4")
-    assert desk.session.is_bound
+        bench.hand.key("Escape")
+        bench.settle()
+    bench.hand.key("h")
+    assert not bench.editor.is_busy
+    assert not bench.session.is_bound
+    bench.type("4")
+    assert bench.session.is_bound
 
 
-def test_cages_for_regions_that_another_window_has_changed_are_not_taken(bare):
+def test_cages_fitted_to_outdated_regions_are_rejected(bare):
     bare.type("g")
     bare.settle()
     bare.hand.key("f")
@@ -534,23 +568,23 @@ def test_cages_for_regions_that_another_window_has_changed_are_not_taken(bare):
     bare.settle()
     assert not bare.session.cages
     assert isinstance(bare.hand.failures.pop(), RegionError)
-    assert "regions changed while cages were fitted" in bare.editor.status
+    assert "regions changed while cages were being fitted" in bare.editor.status
     bare.type("f")
     bare.settle()
     assert len(bare.session.cages) == bare.session.regions.n_regions
 
 
-def test_a_job_that_fails_says_so_and_the_editor_goes_on(desk):
-    desk.session.change_options(n_cage_vertices=8, offset=1e-9)
-    desk.type("f")
-    assert len(desk.hand.failures) == 1
-    assert desk.editor.status == " ".join(str(desk.hand.failures.pop()).split())
-    desk.type("4")
-    pull_handle(desk)
-    assert desk.session.undo_label == "drag handle 1"
+def test_a_failed_job_shows_its_error_and_the_editor_continues(bench):
+    bench.session.change_options(n_cage_vertices=8, offset=1e-9)
+    bench.type("f")
+    assert len(bench.hand.failures) == 1
+    assert bench.editor.status == " ".join(str(bench.hand.failures.pop()).split())
+    bench.type("4")
+    pull_handle(bench)
+    assert bench.session.undo_label == "drag handle 1"
 
 
-def test_switched_off_or_removed_in_the_middle_of_a_job_it_lets_go(bare):
+def test_switching_off_or_removing_the_editor_cancels_its_job(bare):
     bare.hand.key("g")
     bare.editor.Off()
     assert not bare.editor.is_busy
@@ -568,61 +602,61 @@ def test_switched_off_or_removed_in_the_middle_of_a_job_it_lets_go(bare):
 
 
 @pytest.mark.parametrize("end", ["Off", "remove"])
-def test_it_can_be_left_while_a_job_is_about_to_fail(bare, tmp_path, end):
+def test_the_editor_can_be_left_while_a_job_is_about_to_fail(bare, tmp_path, end):
     bare.editor.path = tmp_path / "none.segdeform"
     bare.hand.key("o", control=True)
-    time.sleep(0.1)  # the job has failed, and nobody was told yet
+    time.sleep(0.1)  # the job has failed but has not been delivered
     getattr(bare.editor, end)()
     assert not bare.editor.is_busy
     assert not bare.editor.GetEnabled()
     assert bare.hand.failures == []
 
 
-def test_opening_another_session_shows_it_and_goes_on_with_it(desk, tmp_path):
-    desk.type("4")
-    pull_handle(desk)
-    posed = desk.session.vertices
+def test_another_session_can_be_opened_and_edited(bench, tmp_path):
+    bench.type("4")
+    pull_handle(bench)
+    posed = bench.session.vertices
     path = tmp_path / "posed.segdeform"
-    desk.editor.save(path)
-    desk.type("0")
-    first = desk.session
-    desk.type("ctrl+o")
-    assert "not saved: again" in desk.editor.status
-    assert desk.session is first
-    shown = desk.view.renderer.GetViewProps().GetNumberOfItems()
-    desk.type("ctrl+o")
-    assert desk.view.renderer.GetViewProps().GetNumberOfItems() == shown
-    assert desk.session is not first
-    assert "opened" in desk.editor.status
-    assert_array_equal(desk.editor.stage.surface.points, posed)
-    assert not desk.session.can_undo
-    first.set_fixed([])  # nobody listens to it any more
-    assert "opened" in desk.editor.status
-    pull_handle(desk, (0, -20))
-    assert desk.session.can_undo
+    bench.editor.save(path)
+    bench.type("0")
+    first = bench.session
+    bench.type("ctrl+o")
+    assert "Unsaved changes will be lost. Open again" in bench.editor.status
+    assert bench.session is first
+    shown = bench.view.renderer.GetViewProps().GetNumberOfItems()
+    bench.type("ctrl+o")
+    assert bench.view.renderer.GetViewProps().GetNumberOfItems() == shown
+    assert bench.session is not first
+    assert "Opened" in bench.editor.status
+    assert_array_equal(bench.editor.widgets.surface.points, posed)
+    assert not bench.session.can_undo
+    first.set_fixed([])  # no longer observed
+    assert "Opened" in bench.editor.status
+    pull_handle(bench, (0, -20))
+    assert bench.session.can_undo
     assert not first.is_dragging
 
 
-def test_what_was_chosen_stays_chosen_when_another_session_is_opened(desk, tmp_path):
+def test_tools_and_display_options_survive_opening_another_session(bench, tmp_path):
     half = sausage().transformed(scale=0.5).mesh
     path = tmp_path / "half.segdeform"
     save_session(path, Session(half))
-    desk.type("3", "t", "v", "c", "4", "o", "3")
-    desk.editor.stage.selector.radius = 0.07 * desk.session.mesh.diagonal
-    before = desk.editor.stage
-    desk.editor.path = path
-    desk.type("ctrl+o", "ctrl+o")
-    stage = desk.editor.stage
-    assert stage is not before
-    assert desk.editor.mode is Mode.HANDLES
-    assert (stage.selector.tool, stage.selector.through) == (Tool.RECTANGLE, True)
-    assert stage.selector.radius == pytest.approx(0.07 * half.diagonal)
-    assert stage.cages.is_shown
-    desk.type("4")
-    assert stage.overlay.is_shown
+    bench.type("3", "t", "v", "c", "4", "o", "3")
+    bench.editor.widgets.selector.radius = 0.07 * bench.session.mesh.diagonal
+    before = bench.editor.widgets
+    bench.editor.path = path
+    bench.type("ctrl+o", "ctrl+o")
+    widgets = bench.editor.widgets
+    assert widgets is not before
+    assert bench.editor.mode is Mode.HANDLES
+    assert (widgets.selector.tool, widgets.selector.through) == (Tool.RECTANGLE, True)
+    assert widgets.selector.radius == pytest.approx(0.07 * half.diagonal)
+    assert widgets.cages.is_shown
+    bench.type("4")
+    assert widgets.overlay.is_shown
 
 
-def test_volumes_are_prepared_beside_the_event_loop_in_the_mode_of_cages_too(desk, monkeypatch):
+def test_local_volumes_are_measured_in_a_job_in_cage_mode_too(bench, monkeypatch):
     threads = []
 
     def prepare(overlay):
@@ -631,111 +665,111 @@ def test_volumes_are_prepared_beside_the_event_loop_in_the_mode_of_cages_too(des
 
     own = VolumeOverlay.prepare
     monkeypatch.setattr(VolumeOverlay, "prepare", prepare)
-    desk.type("2")
-    desk.hand.key("o")
-    assert desk.editor.is_busy
-    assert "measuring local volumes" in desk.editor.status
-    assert not desk.editor.stage.overlay.is_shown
-    desk.settle()
-    assert desk.editor.stage.overlay.is_shown
-    assert desk.editor.stage.cages.GetEnabled()
+    bench.type("2")
+    bench.hand.key("o")
+    assert bench.editor.is_busy
+    assert "Measuring local volume change" in bench.editor.status
+    assert not bench.editor.widgets.overlay.is_shown
+    bench.settle()
+    assert bench.editor.widgets.overlay.is_shown
+    assert bench.editor.widgets.cages.GetEnabled()
     assert threads != []
     assert threading.main_thread() not in threads
 
 
-def test_opening_asks_again_when_something_was_done_in_between(desk, tmp_path):
-    desk.editor.save(tmp_path / "one.segdeform")
-    first = desk.session
-    desk.type("x", "ctrl+o", "n", "ctrl+o")
-    assert desk.session is first
-    desk.type("z", "ctrl+o")  # as it was saved: nothing to lose
-    assert desk.session is not first
+def test_opening_asks_again_after_another_action(bench, tmp_path):
+    bench.editor.save(tmp_path / "one.segdeform")
+    first = bench.session
+    bench.type("x", "ctrl+o", "n", "ctrl+o")
+    assert bench.session is first
+    bench.type("z", "ctrl+o")  # the saved state: no unsaved changes
+    assert bench.session is not first
 
 
-def test_a_file_of_somebody_else_is_replaced_only_when_asked_twice(desk, tmp_path):
+def test_another_existing_file_is_replaced_only_if_confirmed(bench, tmp_path):
     path = tmp_path / "other.segdeform"
     path.write_text("something dear")
-    desk.editor.path = path
-    desk.type("ctrl+s")
+    bench.editor.path = path
+    bench.type("ctrl+s")
     assert path.read_text() == "something dear"
-    assert "again to replace it" in desk.editor.status
-    desk.type("ctrl+s")
-    assert_array_equal(load_session(path).fixed, desk.session.fixed)
-    assert "saved to" in desk.editor.status
-    desk.type("n", "ctrl+s")
-    assert "saved to" in desk.editor.status
+    assert "again to replace it" in bench.editor.status
+    bench.type("ctrl+s")
+    assert_array_equal(load_session(path).fixed, bench.session.fixed)
+    assert "Saved to" in bench.editor.status
+    bench.type("n", "ctrl+s")
+    assert "Saved to" in bench.editor.status
 
 
-def test_a_file_that_is_no_session_leaves_everything_as_it_was(desk, tmp_path):
+def test_opening_an_invalid_file_changes_nothing(bench, tmp_path):
     path = tmp_path / "noise.segdeform"
     path.write_bytes(b"noise")
-    first = desk.session
-    desk.editor.path = path
-    desk.type("ctrl+o")
-    assert desk.session is first
-    assert "no readable session" in desk.editor.status
-    assert len(desk.hand.failures) == 1
-    desk.hand.failures.clear()
+    first = bench.session
+    bench.editor.path = path
+    bench.type("ctrl+o")
+    assert bench.session is first
+    assert "no readable session" in bench.editor.status
+    assert len(bench.hand.failures) == 1
+    bench.hand.failures.clear()
     with pytest.raises(Exception, match="no readable session"):
-        desk.editor.load(path)
-    assert desk.session is first
-    desk.type("4")
-    pull_handle(desk)
+        bench.editor.load(path)
+    assert bench.session is first
+    bench.type("4")
+    pull_handle(bench)
 
 
-def test_a_session_of_another_mesh_is_shown_whole(desk, tmp_path):
+def test_a_session_of_another_mesh_is_framed_by_the_camera(bench, tmp_path):
     path = tmp_path / "sphere.segdeform"
     sphere = models.sphere(200)
     save_session(path, Session(sphere.with_vertices(20.0 * sphere.vertices + [50.0, 0.0, 0.0])))
-    desk.editor.load(path)
-    assert desk.editor.stage.surface.points.shape == desk.session.mesh.vertices.shape
-    seen = desk.view.to_display(desk.session.mesh.vertices)[:, :2]
+    bench.editor.load(path)
+    assert bench.editor.widgets.surface.points.shape == bench.session.mesh.vertices.shape
+    seen = bench.view.to_display(bench.session.mesh.vertices)[:, :2]
     assert ((seen > 0) & (seen < [500, 400])).all()
 
 
-# Coming and going.
+# Removing and switching off.
 
 
-def test_when_it_is_gone_everything_is_as_before(any_view):
+def test_removing_the_editor_restores_the_view(any_view):
     heard = []
     interactor, style = any_view.interactor, any_view.interactor.GetInteractorStyle()
     interactor.AddObserver("KeyPressEvent", lambda *_: heard.append(interactor.GetKeySym()), 0.5)
     blank = picture(any_view)
     layers = any_view.window.GetNumberOfLayers()
-    desk = Desk(any_view, models.sphere(200))
-    desk.type("n")
+    bench = Bench(any_view, models.sphere(200))
+    bench.type("n")
     assert heard == []
     assert (picture(any_view) != blank).any()
-    desk.editor.remove()
+    bench.editor.remove()
     assert_array_equal(picture(any_view), blank)
     assert any_view.window.GetNumberOfLayers() == layers
     assert interactor.GetInteractorStyle() is style
-    desk.hand.key("n")
+    bench.hand.key("n")
     assert heard == ["n"]
-    session = desk.editor.session
-    session.segment(2)  # nobody listens any more
+    session = bench.editor.session
+    session.segment(2)  # no longer observed
     assert_array_equal(picture(any_view), blank)
-    assert desk.hand.failures == []
+    assert bench.hand.failures == []
 
 
-def test_off_hears_nothing_and_on_goes_on(desk):
-    desk.type("2")
-    desk.editor.Off()
-    assert desk.editor.status == ""
-    desk.type("4")
-    assert desk.editor.mode is Mode.CAGES
-    assert not any(widget.GetEnabled() for widget in desk.editor.stage.widgets)
-    desk.editor.SetEnabled(True)
-    assert desk.editor.GetEnabled()
-    assert desk.editor.stage.cages.GetEnabled()
+def test_off_ignores_keys_and_on_responds_again(bench):
+    bench.type("2")
+    bench.editor.Off()
+    assert bench.editor.status == ""
+    bench.type("4")
+    assert bench.editor.mode is Mode.CAGES
+    assert not any(widget.GetEnabled() for widget in bench.editor.widgets.interactive)
+    bench.editor.SetEnabled(True)
+    assert bench.editor.GetEnabled()
+    assert bench.editor.widgets.cages.GetEnabled()
 
 
 @pytest.mark.parametrize("mode", ["deform", 4, None])
-def test_only_a_mode_can_be_entered(desk, mode):
+def test_only_a_mode_is_accepted(bench, mode):
     with pytest.raises(ValueError, match="mode must be one of"):
-        desk.editor.mode = mode
-    desk.type("3")
-    assert desk.editor.mode is Mode.HANDLES
+        bench.editor.mode = mode
+    bench.type("3")
+    assert bench.editor.mode is Mode.HANDLES
 
 
 def test_only_a_session_or_a_mesh_can_be_edited():
@@ -743,9 +777,9 @@ def test_only_a_session_or_a_mesh_can_be_edited():
         DeformEditor(plain_view(), "cactus.obj")
 
 
-def test_a_window_of_one_pixel_is_drawn_without_complaint(desk, capfd):
-    desk.type("4", "o", "h")
+def test_a_window_of_one_pixel_is_drawn_without_warnings(bench, capfd):
+    bench.type("4", "o", "h")
     for size in ((1, 300), (300, 1), (1, 1), (300, 300)):
-        desk.view.window.SetSize(*size)
-        desk.view.render()
+        bench.view.window.SetSize(*size)
+        bench.view.render()
     assert capfd.readouterr() == ("", "")

@@ -62,10 +62,10 @@ def test_during_a_job_in_a_plotter(plotter, mode, key):
 
 
 @pytest.mark.parametrize("during", [True, False])
-def test_the_first_look_at_volumes(plain, during):
+def test_showing_local_volumes_for_the_first_time(plain, during):
     plain.first_overlay(during=during)
 
 
 @pytest.mark.parametrize("during", [True, False])
-def test_the_end_of_a_film(plain, during):
+def test_stopping_a_video(plain, during):
     plain.film_that_ends(during=during)

@@ -1,4 +1,4 @@
-"""The log of steps: what drags and jobs took, each written down once."""
+"""The log: one entry for each drag and each job."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def written():
     return session, log
 
 
-def test_a_drag_is_one_entry_with_all_its_steps_and_its_end(written):
+def test_a_drag_is_one_entry_with_all_its_steps_and_its_outcome(written):
     session, log = written
     steps = [session.move_handle("tip", up(z), max_steps=2).steps for z in (0.1, 0.2, 0.3)]
     assert log.entries == ()
     session.commit()
     (entry,) = log.entries
-    assert (entry.what, entry.steps) == ("drag tip", sum(steps))
+    assert (entry.title, entry.steps) == ("drag tip", sum(steps))
     assert entry.outcome == str(Status.STEP_LIMIT)
     assert entry.handle_error == session.solution.handle_error
     assert entry.volume_change == session.volume_change
@@ -55,7 +55,7 @@ def test_a_drag_is_one_entry_with_all_its_steps_and_its_end(written):
 
 
 @pytest.mark.parametrize("at_once", [1, 5])
-def test_refining_goes_on_with_the_entry_until_something_else_is_done(written, at_once):
+def test_refinement_updates_the_entry_until_the_next_change(written, at_once):
     session, log = written
     steps = session.move_handle("tip", up(0.3), max_steps=2).steps
     session.commit()
@@ -70,7 +70,7 @@ def test_refining_goes_on_with_the_entry_until_something_else_is_done(written, a
     assert log.entries == (entry,)
 
 
-def test_what_was_taken_back_leaves_no_entry_and_undo_during_a_drag_leaves_one(written):
+def test_a_cancelled_drag_leaves_no_entry_and_undo_during_a_drag_leaves_one(written):
     session, log = written
     session.move_handle("tip", up(0.1), max_steps=1)
     session.revert()
@@ -80,19 +80,21 @@ def test_what_was_taken_back_leaves_no_entry_and_undo_during_a_drag_leaves_one(w
     session.move_handle("tip", up(0.1), max_steps=1)
     error = session.solution.handle_error
     session.undo()
-    assert [(each.what, each.handle_error) for each in log.entries] == [("drag tip", error)]
+    assert [(each.title, each.handle_error) for each in log.entries] == [("drag tip", error)]
 
 
-def test_a_cage_moved_by_hand_is_solved_for_by_nobody(written):
+def test_editing_a_cage_is_logged_without_solver_steps(written):
     session, log = written
     session.move_cage(1, session.cage_vertices[1] + [0.0, 0.0, 0.02])
     session.commit()
     (entry,) = log.entries
-    assert (entry.what, entry.steps) == ("drag the cage of region 2", None)
-    assert entry.text.endswith("moved freely\nvolume " + entry.text.rpartition(" ")[2])
+    assert (entry.title, entry.steps) == ("drag the cage of region 2", None)
+    assert entry.text.endswith(
+        "  drag the cage of region 2\nCage edited\nvolume " + entry.text.rpartition(" ")[2]
+    )
 
 
-def test_the_oldest_is_forgotten_first_and_others_are_not_listened_to(written):
+def test_the_oldest_entries_are_dropped_and_other_sessions_are_not_logged(written):
     session, log = written
     for k in range(5):
         session.move_handle("tip", up(0.01 * (k + 1)), max_steps=1)
@@ -107,11 +109,11 @@ def test_the_oldest_is_forgotten_first_and_others_are_not_listened_to(written):
     other.move_handle("tip", up(0.1), max_steps=1)
     other.commit()
     assert [entry.number for entry in log.entries] == [6]
-    log.rest()
+    log.unfollow()
     assert not other._listeners._listeners
 
 
-def test_a_job_is_written_down_with_what_was_said_of_it():
+def test_a_job_is_logged_with_its_outcome():
     window, renderer = vtkRenderWindow(), vtkRenderer()
     window.AddRenderer(renderer)
     editor = DeformEditor((renderer, vtkGenericRenderWindowInteractor()), ready())
@@ -125,22 +127,22 @@ def test_a_job_is_written_down_with_what_was_said_of_it():
         raise Cancelled("stopped")
 
     jobs = [
-        ("talking", lambda _: 7, lambda seven: editor.desk.say(f"{seven} found")),
-        ("being silent", lambda _: 7, lambda _: None),  # what was said before is not of it
-        ("failing", fail, None),
-        ("failing late", lambda _: 7, fail),
-        ("stopping", cancel, None),
+        ("Counting", lambda _: 7, lambda seven: f"{seven} found"),
+        ("Being silent", lambda _: 7, lambda _: None),  # not the outcome of the job before
+        ("Failing", fail, None),
+        ("Failing late", lambda _: 7, fail),
+        ("Stopping", cancel, None),
     ]
     for doing, work, done in jobs:
-        editor.desk.start(doing, work, done)
+        editor.controller.start(doing, work, done)
         with editor.view.guarded():
             editor.wait()
-    assert [(entry.what, entry.outcome) for entry in editor.desk.log.entries] == [
-        ("talking", "7 found"),
-        ("being silent", "done"),
-        ("failing", "no room for it"),
-        ("failing late", "failed"),
-        ("stopping", "cancelled"),
+    assert [(entry.title, entry.outcome) for entry in editor.controller.log.entries] == [
+        ("Counting", "7 found"),
+        ("Being silent", "Done"),
+        ("Failing", "no room for it"),
+        ("Failing late", "Failed"),
+        ("Stopping", "Cancelled"),
     ]
     editor.remove()
 
@@ -148,14 +150,14 @@ def test_a_job_is_written_down_with_what_was_said_of_it():
 @pytest.mark.parametrize(
     ("entry", "lines"),
     [
-        (Entry(1, 0.0, "fitting cages", 2.04, "done"), ["2.0 s: done"]),
+        (Entry(1, 0.0, "Fitting cages", 2.04, "Done"), ["2.0 s: Done"]),
         (
             Entry(1, 0.0, "drag tip", 0.0314, "converged", 1, 1.234e-4, -2e-16),
-            ["1 step, 31 ms: converged", "volume -2.0e-16, handle off by 1.2e-04 of the diagonal"],
+            ["1 step, 31 ms: converged", "volume -2.0e-16, handle error 0.012 % of model size"],
         ),
     ],
 )
-def test_an_entry_is_read_in_two_or_three_lines(entry, lines):
+def test_an_entry_is_two_or_three_lines_of_text(entry, lines):
     first, *rest = entry.text.splitlines()
-    assert first.endswith(f":00  {entry.what}")
+    assert first.endswith(f":00  {entry.title}")
     assert rest == lines

@@ -1,4 +1,4 @@
-"""Two editors side by side in one window: each hears what is meant for it, alone."""
+"""Two editors side by side in one window: each receives only its own events."""
 
 from __future__ import annotations
 
@@ -45,34 +45,34 @@ def test_keys_go_to_the_one_under_the_pointer(halves):
     assert (left.mode, right.mode) == (Mode.CAGES, Mode.HANDLES)
 
 
-def test_a_widgets_keys_too(halves):
+def test_keys_of_widgets_too(halves):
     (left, right), hand = halves
-    before = left.stage.selector.radius, right.stage.selector.radius
+    before = left.widgets.selector.radius, right.widgets.selector.radius
     hand.move(RIGHT)
     hand.key("bracketright")
-    assert left.stage.selector.radius == before[0]
-    assert right.stage.selector.radius > before[1]
+    assert left.widgets.selector.radius == before[0]
+    assert right.widgets.selector.radius > before[1]
 
 
-def test_removing_one_leaves_the_other_as_it_is_drawn(halves, capfd):
+def test_removing_one_editor_leaves_the_display_of_the_other(halves, capfd):
     (left, right), _ = halves
     before = picture(right.view)[:, 400:]
     left.remove()
     assert np.array_equal(picture(right.view)[:, 400:], before)
-    assert (before[-20:] < 128).mean() > 0.5  # the status line is there
+    assert (before[-20:] < 128).mean() > 0.5  # the status line is shown
     assert capfd.readouterr().err == ""
     right.remove()
     assert right.view.window.GetNumberOfLayers() == 1
 
 
-def test_one_that_was_removed_cannot_be_woken(halves):
+def test_a_removed_editor_cannot_be_switched_on(halves):
     (left, _), _ = halves
     left.remove()
-    with pytest.raises(RuntimeError, match="make another one"):
+    with pytest.raises(RuntimeError, match="create another one"):
         left.On()
 
 
-def test_an_editor_alone_hears_keys_wherever_the_pointer_is(halves):
+def test_a_single_editor_receives_keys_wherever_the_pointer_is(halves):
     (left, right), hand = halves
     right.remove()
     hand.move(RIGHT)

@@ -1,9 +1,9 @@
-"""Opened, used by a real mouse and closed, again and again: nothing is left of it.
+"""Cycles of opening, using and closing the editor release everything.
 
-Threads, timers, files, windows of VTK and memory return to where they were, whichever host the
-editor is in: a `DeformWidget`, a dock over a pyvistaqt view of somebody's, a dock over a window
-of plain VTK.  The last draws by itself into a window of X, which a process that draws by EGL
-cannot: it is tested in a process of its own.
+Threads, timers, files, VTK windows and memory return to their earlier values in every host: a
+`DeformWidget`, a dock over an existing pyvistaqt view, a dock over a window of plain VTK.  The last
+one draws into an X window, which is impossible in a process that uses EGL, so it is tested in a
+separate process.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ from vtk_segdeform.session.session import Session
 from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.qt.widget import DeformWidget, deform_dock
 
-WARM = 2  # cycles until caches, fonts and shaders are there
-# Memory is settled after a dozen cycles.  Of what could stay behind from then on, each time, a
-# bound session takes 0.45 MiB, what draws the mesh 0.8, an editor 4; allocators come and go with
-# a few in all.  A window of plain VTK by itself, with a sphere in it, takes 0.3 that never return.
+WARM = 2  # cycles until caches, fonts and shaders are loaded
+# Memory is stable after a dozen cycles.  A leak per cycle would be 0.45 MiB for a bound session,
+# 0.8 for the actors of the mesh, 4 for an editor; allocators vary by a few MiB in all.  A window of
+# plain VTK with a sphere loses 0.3 by itself.
 SETTLED, MORE, SLACK, OF_PLAIN_VTK = 12, 0.2, 4.0, 0.35  # cycles; MiB a cycle, in all, a cycle
 
 
 class Widget:
-    """A `DeformWidget` in a window of its own."""
+    """A `DeformWidget` in a separate window."""
 
     def __init__(self, session):
         self.window = DeformWidget(session)
@@ -58,7 +58,7 @@ class Widget:
 
 
 class Dock:
-    """A dock over a `QtInteractor` that is somebody else's."""
+    """A dock over an existing `QtInteractor`."""
 
     def __init__(self, session):
         self.window = QtWidgets.QMainWindow()
@@ -74,7 +74,7 @@ class Dock:
 
 
 class PlainDock:
-    """A dock over a window of plain VTK, which knows nothing of pyvista."""
+    """A dock over a window of plain VTK, without pyvista."""
 
     def __init__(self, session):
         from vtkmodules.qt.QVTKRenderWindowInteractor import QVTKRenderWindowInteractor
@@ -85,17 +85,17 @@ class PlainDock:
         self.drawn_on = QVTKRenderWindowInteractor(self.window)
         self.window.setCentralWidget(self.drawn_on)
         renderer, window = vtkRenderer(), self.drawn_on.GetRenderWindow()
-        window.SetMultiSamples(0)  # as of the others, by conftest
+        window.SetMultiSamples(0)  # as conftest does for the other windows
         window.AddRenderer(renderer)
         interactor = window.GetInteractor()
         interactor.SetInteractorStyle(vtkInteractorStyleTrackballCamera())
-        show(self.window)  # drawn while it is empty, as in many an application
+        show(self.window)  # drawn while empty, as many applications do
         interactor.Initialize()
         dock = deform_dock((renderer, interactor), session, self.window)
         self.window.addDockWidget(Qt.RightDockWidgetArea, dock)
         self.editor, self.panel = dock.editor, dock.panel
         seen = self.editor.view.to_display(session.mesh.vertices)[:, :2] / renderer.GetSize()
-        assert 0.0 < seen.min() < seen.max() < 1.0  # nobody had aimed the camera yet
+        assert 0.0 < seen.min() < seen.max() < 1.0  # the editor has set the camera
 
     def end(self):
         self.editor.remove()
@@ -103,7 +103,7 @@ class PlainDock:
 
 
 class Forgetful(PlainDock):
-    """The same, by an application that closes its window and forgets about the editor."""
+    """The same for an application that closes its window without removing the editor."""
 
     def end(self):
         self.drawn_on.Finalize()
@@ -111,12 +111,12 @@ class Forgetful(PlainDock):
 
 
 def fifty(kind):
-    """Return the parameters of a test that sees what leaks a little, and takes long."""
+    """Return the parameters of a long test that detects small leaks."""
     return pytest.param(kind, 50, marks=pytest.mark.campaign)
 
 
 def ready():
-    """Return a session that lacks nothing but a pose."""
+    """Return a session, complete except for a pose."""
     mesh, state = small()
     return Session(mesh, state=state)
 
@@ -138,40 +138,40 @@ def dragged(host):
     hand, changes = QtHand(host.drawn_on, editor.view), []
     session = editor.session
     stop = session.on_change(lambda _: changes.append(session.volume_change))
-    start = np.array(hand.at(editor.stage.dragger.gizmo.centre))
+    start = np.array(hand.at(editor.widgets.dragger.gizmo.centre))
     hand.drag(start + t * np.array([5.0, 25.0]) for t in np.linspace(0.0, 1.0, 4))
     stop()
-    moved = np.array(hand.at(editor.stage.dragger.gizmo.centre)) - start
+    moved = np.array(hand.at(editor.widgets.dragger.gizmo.centre)) - start
     assert moved == pytest.approx([5.0, 25.0], abs=3.0)
     assert hand.failures == []
     return changes
 
 
 def timers():
-    """Return how many timers of Qt there are, and how many of them run."""
+    """Return the number of Qt timers, and of active ones."""
     tops = [application(), *application().topLevelWidgets()]
     every = {id(each): each for top in tops for each in top.findChildren(QtCore.QTimer)}
     every |= {id(each): each for each in gc.get_objects() if issubclass(type(each), QtCore.QTimer)}
     running = []
     for each in every.values():
-        with contextlib.suppress(RuntimeError):  # Qt has deleted what Python still has a name for
+        with contextlib.suppress(RuntimeError):  # Qt has deleted the object of a Python wrapper
             running.append(each.isActive())
     return len(running), sum(running)
 
 
 def one_cycle(kind, *, in_a_job):
-    """Open, drag, close, and return what should be gone by then, as weak references."""
+    """Open, drag and close; return weak references to objects that should be released."""
     session = ready()
     host = kind(session)
     show(host.window)
-    changes = dragged(host)  # and close it while the pose is being refined
+    changes = dragged(host)  # close the window during refinement
     assert max(map(abs, changes)) < 1e-12
-    assert host.window.findChildren(QtCore.QTimer)  # they are seen while there are some
+    assert host.window.findChildren(QtCore.QTimer)  # timers can be found while they exist
     if in_a_job:
         host.editor.mode = Mode.REGIONS
         application().processEvents()
         host.panel.refresh()
-        QtTest.QTest.mouseClick(host.panel.regions.find, Qt.LeftButton)
+        QtTest.QTest.mouseClick(host.panel.regions.segment, Qt.LeftButton)
         assert host.editor.is_busy
     window = host.editor.view.window
     drawn = [vtkWeakReference() for _ in range(3)]
@@ -179,7 +179,7 @@ def one_cycle(kind, *, in_a_job):
         drawn, (window, window.GetInteractor(), host.editor.view.renderer), strict=True
     ):
         reference.Set(each)
-    parts = host.window, host.editor, host.panel, host.drawn_on, host.editor.stage.dragger, host
+    parts = host.window, host.editor, host.panel, host.drawn_on, host.editor.widgets.dragger, host
     gone = [*map(weakref.ref, parts), *(reference.Get for reference in drawn)]
     del window, each, parts
     host.end()
@@ -187,26 +187,26 @@ def one_cycle(kind, *, in_a_job):
     assert kind is Forgetful or not host.editor.is_busy
     del host
     delete_now()
-    nobody = session._listeners._listeners  # who would be spoken to by a change of the session
-    assert kind is Forgetful or nobody == {}
+    listeners = session._listeners._listeners  # of the session
+    assert kind is Forgetful or listeners == {}
     return [*gone, weakref.ref(session)]
 
 
 def delete_now():
-    """Let Qt delete what is to be deleted later, and then what PyQt has for that."""
+    """Let Qt process deferred deletes, and then collect the wrappers of PyQt."""
     for _ in range(2):
         application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
         application().processEvents()
 
 
 def mebibytes():
-    """Return how much memory the process has now."""
+    """Return the memory of the process."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 2.0**20
 
 
 def watch_cycles(kind, times):
-    """Go through some cycles; nothing may be left of any."""
+    """Run some cycles and check that each releases everything."""
     application()
     memory = []
 
@@ -226,7 +226,7 @@ def watch_cycles(kind, times):
     assert threading.active_count() == threads
     assert len(os.listdir("/proc/self/task")) <= tasks
     assert len(os.listdir("/proc/self/fd")) <= files
-    assert all(np.less_equal(timers(), ticking))  # what an earlier test left may go meanwhile
+    assert all(np.less_equal(timers(), ticking))  # timers of an earlier test may end meanwhile
     assert application().topLevelWidgets() == []
     if times > SETTLED:
         grown = min(memory[-3:]) - min(memory[SETTLED - 3 : SETTLED])

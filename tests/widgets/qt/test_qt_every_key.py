@@ -40,10 +40,10 @@ def test_during_a_job(stand, mode, key):
 
 
 @pytest.mark.parametrize("during", [True, False])
-def test_the_first_look_at_volumes(stand, during):
+def test_showing_local_volumes_for_the_first_time(stand, during):
     stand.first_overlay(during=during)
 
 
 @pytest.mark.parametrize("during", [True, False])
-def test_the_end_of_a_film(stand, during):
+def test_stopping_a_video(stand, during):
     stand.film_that_ends(during=during)

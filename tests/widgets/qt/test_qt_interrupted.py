@@ -48,7 +48,7 @@ def dragged(stand: Stand, *, during: bool):
     place = stand.drag(Mode.DEFORM)
     if not during:
         stand.hand.release(place)
-        assert stand.editor.stage.dragger.is_refining
+        assert stand.editor.widgets.dragger.is_refining
     return place
 
 
@@ -68,7 +68,7 @@ def settings(panel) -> list:
     """Return all widgets that can be clicked or set in mode 4, except files and modes."""
     kinds = QtWidgets.QAbstractButton, QtWidgets.QAbstractSpinBox
     found = [each for kind in kinds for each in panel.findChildren(kind) if each.isVisible()]
-    asking = panel.head.open, panel.head.save  # a dialog
+    asking = panel.toolbar.open, panel.toolbar.save  # a dialog
     return [each for each in found if each.isEnabled() and each not in asking]
 
 
@@ -77,7 +77,7 @@ def settings(panel) -> list:
     [pytest.param(True, id="in mid-drag", marks=pytest.mark.campaign),
      pytest.param(False, id="converging")],
 )  # fmt: skip
-def test_any_action_in_the_panel_keeps_the_drag(stand, during):
+def test_any_action_in_the_panel_finishes_the_drag(stand, during):
     panel = stand.widget.panel
     panel.log.fold.setChecked(True)
     dragged(stand, during=False)
@@ -101,12 +101,12 @@ def test_any_action_in_the_panel_keeps_the_drag(stand, during):
 @MOMENTS
 def test_undo_in_the_panel_reverts_the_drag_and_redo_restores_it(stand, during):
     panel, place = stand.widget.panel, dragged(stand, during=during)
-    stand.editor.desk.refresh()
+    stand.editor.controller.refresh()
     panel.refresh()
-    QtTest.QTest.mouseClick(panel.head.undo, Qt.LeftButton)
+    QtTest.QTest.mouseClick(panel.toolbar.undo, Qt.LeftButton)
     assert is_kept(stand, place).done == 0
     assert stand.session.state is stand.start
-    QtTest.QTest.mouseClick(panel.head.redo, Qt.LeftButton)
+    QtTest.QTest.mouseClick(panel.toolbar.redo, Qt.LeftButton)
     stand.settle()
     assert stand.session.undo_label == DRAG
 
@@ -126,18 +126,18 @@ def test_a_job_started_by_the_host_finishes_the_drag_first(stand, during):
 
 def test_cancelling_twice_and_a_second_job_are_harmless(stand):
     stand.begin(Mode.DEFORM)
-    cancel = stand.widget.panel.foot.cancel
+    cancel = stand.widget.panel.status.cancel
     with stand.job() as delivered:
-        with pytest.raises(SessionError, match="busy counting"):
-            stand.editor.desk.start("more", lambda _: "more", delivered.append)
-        stand.editor.do(lambda desk: desk.start("more", lambda _: "more", delivered.append))
+        with pytest.raises(SessionError, match=r"Busy\. counting"):
+            stand.editor.controller.start("more", lambda _: "more", delivered.append)
+        stand.editor.do(lambda c: c.start("more", lambda _: "more", delivered.append))
         stand.until(cancel.isVisible, "the button")
         for _ in range(2):
             QtTest.QTest.mouseClick(cancel, Qt.LeftButton)
             stand.hand.types("escape")
-        assert "stopping" in stand.editor.status
+        assert "Stopping" in stand.editor.status
     assert delivered == []
-    assert "cancelled" in stand.editor.status
+    assert "Cancelled" in stand.editor.status
     with stand.job() as delivered:
         pass
     assert delivered == ["counted"]
@@ -164,14 +164,14 @@ def test_two_editors_in_one_view_do_not_block_each_other(stand):
     other = DeformEditor(view, ready())
     other.On()
     try:
-        dragged(stand, during=False)  # the first refines, and the other begins and ends a job
+        dragged(stand, during=False)  # one editor refines while the other runs a job
         done = []
-        other.do(lambda desk: desk.start("counting", lambda _: "counted", done.append))
+        other.do(lambda c: c.start("counting", lambda _: "counted", done.append))
         stand.until(lambda: done, "the other one's job")
         stand.settle()
         dragged(stand, during=False)
         with stand.job() as delivered:
-            other.do(lambda desk: desk.start("counting", lambda _: "counted", done.append))
+            other.do(lambda c: c.start("counting", lambda _: "counted", done.append))
             stand.until(lambda: len(done) == 2, "the other one's job")
         assert delivered == ["counted"]
     finally:
@@ -180,14 +180,14 @@ def test_two_editors_in_one_view_do_not_block_each_other(stand):
 
 
 @pytest.mark.parametrize("what", ["focus", "release"])
-def test_a_drag_that_loses_the_focus_or_its_release_is_kept(stand, what):
+def test_a_drag_that_loses_the_focus_or_its_release_is_finished(stand, what):
     place = dragged(stand, during=True)
     if what == "focus":
         stand.widget.panel.deform.stretch.setFocus()
         event = QtCore.QEvent(QtCore.QEvent.WindowDeactivate)
         application().sendEvent(stand.widget, event)
         assert stand.session.is_dragging
-    else:  # in a dialog that came between: the next press, here beside the mesh, ends the drag
+    else:  # released in a dialog: the next press, beside the mesh, ends the drag
         stand.hand.press((5.0, 5.0))
         assert not stand.session.is_dragging
         stand.hand.release((5.0, 5.0))
@@ -224,7 +224,7 @@ def test_a_slot_that_processes_events_loses_no_drag(stand):
 def test_closing_a_widget_is_immediate_and_keeps_the_drag(another, moment):
     dragged(another, during=moment == "in mid-drag")
     if moment == "in a job":
-        another.editor.do(lambda desk: desk.start("counting", lambda _: "counted", print))
+        another.editor.do(lambda c: c.start("counting", lambda _: "counted", print))
     session = another.session
     another.widget.close()
     assert not another.editor.is_busy

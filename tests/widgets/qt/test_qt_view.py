@@ -1,4 +1,4 @@
-"""The editor in pyvistaqt's views: real Qt events, its jobs beside Qt's event loop, and the end."""
+"""The editor in pyvistaqt's views: real Qt events, background jobs, and closing."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 from qt_hands import Qt, QtHand, QtWidgets, application, until
 
 import pyvistaqt  # isort: skip
-import vtk_segdeform.widgets.plugin  # noqa: F401 - pyvistaqt does not ask pyvista's entry points
+import vtk_segdeform.widgets.plugin  # noqa: F401 - pyvistaqt ignores pyvista's entry points
 from vtk_segdeform import Regions, models
 from vtk_segdeform.widgets.editor import actions
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
@@ -24,7 +24,7 @@ MESH = models.cactus(700)
 
 
 def in_a_window():
-    """Return a QtInteractor in a window of an application, and the window."""
+    """Return a QtInteractor in a window of an application, and that window."""
     window = QtWidgets.QMainWindow()
     plotter = pyvistaqt.QtInteractor(window, auto_update=False, off_screen=False)
     window.setCentralWidget(plotter)
@@ -63,7 +63,7 @@ def qt(request):
 
 
 def around(editor, mask):
-    """Return two corners of a rectangle around some vertices, as they are seen."""
+    """Return two corners of a rectangle on the screen around some vertices."""
     seen = editor.view.to_display(editor.session.vertices[mask])[:, :2]
     return seen.min(axis=0) - 4.0, seen.max(axis=0) + 4.0
 
@@ -82,7 +82,7 @@ def test_the_whole_story_in_qt(qt):
     until(lambda: is_done() and session.regions is not None, "regions")
     hand.key("f")
     until(lambda: is_done() and session.cages, "cages")
-    assert sum("%" in text for text in said) > 2  # it told how far it was, meanwhile
+    assert sum("%" in text for text in said) > 2  # it reported its progress
     assert len(session.cages) == session.regions.n_regions
 
     for key in "3tvs":
@@ -98,12 +98,12 @@ def test_the_whole_story_in_qt(qt):
     hand.key("4")
     until(is_done, "binding")
     assert editor.mode is Mode.DEFORM
-    start = np.array(hand.at(editor.stage.dragger.gizmo.centre))
+    start = np.array(hand.at(editor.widgets.dragger.gizmo.centre))
     changes.clear()
     hand.drag(start + t * np.array([80.0, -25.0]) for t in np.linspace(0.0, 1.0, 12))
-    moved = np.array(hand.at(editor.stage.dragger.gizmo.centre)) - start
-    assert moved == pytest.approx([80.0, -25.0], abs=3.0)  # y is up, and a pixel is a pixel
-    until(lambda: not editor.stage.dragger.is_refining, "refinement, by timers of Qt")
+    moved = np.array(hand.at(editor.widgets.dragger.gizmo.centre)) - start
+    assert moved == pytest.approx([80.0, -25.0], abs=3.0)  # y is up, in pixels
+    until(lambda: not editor.widgets.dragger.is_refining, "refinement, by timers of Qt")
     assert len(changes) >= 12
     assert max(map(abs, changes)) < 1e-12
     bent = session.vertices
@@ -118,22 +118,22 @@ def test_a_job_is_stopped_by_escape_while_qt_runs(qt, monkeypatch):
     _, editor, hand, _ = qt
     end = time.monotonic() + 60.0
 
-    def endless(mesh, *, progress):  # the real one may be done before the key is down
+    def endless(mesh, *, progress):  # the real one may end before the key is pressed
         while time.monotonic() < end:
             progress(0.5, "looking everywhere")
             time.sleep(0.001)
         return Regions.single(mesh)
 
-    monkeypatch.setattr(actions, "segmented", endless)
+    monkeypatch.setattr(actions, "segment_mesh", endless)
     hand.key("g")
     until(lambda: "looking everywhere" in editor.status, "the job")
     hand.key("Escape")
     until(lambda: not editor.is_busy, "the end")
     assert editor.session.regions is None
-    assert "cancelled" in editor.status
+    assert "Cancelled" in editor.status
 
 
-def test_the_camera_is_turned_beside_the_mesh_and_ctrl_takes_away(qt):
+def test_the_camera_rotates_beside_the_mesh_and_ctrl_erases(qt):
     _, editor, hand, _ = qt
     before = editor.view.camera.GetPosition()
     hand.drag([(30, 400), (60, 380), (90, 380)])
@@ -145,9 +145,9 @@ def test_the_camera_is_turned_beside_the_mesh_and_ctrl_takes_away(qt):
     assert len(editor.session.fixed) == 0
 
 
-def test_a_window_that_is_closed_lets_the_editor_go(qt):
+def test_closing_a_window_removes_the_editor(qt):
     plotter, editor, hand, window = qt
-    hand.key("g")  # in the middle of a job
+    hand.key("g")  # during a job
     plotter.close()
     window.close()
     assert not editor.is_busy
@@ -167,7 +167,7 @@ def test_an_editor_that_was_removed_leaves_nothing_alive(qt):
 
 
 @pytest.mark.campaign
-def test_the_story_on_a_screen_with_larger_pixels():
+def test_the_story_on_a_high_resolution_screen():
     application()  # or skip
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", __file__, "-k", "whole_story and QtInteractor"],

@@ -40,12 +40,12 @@ MESH = models.cactus(500)
 
 @pytest.fixture
 def state():
-    """Return the mesh and the state of a session that lacks nothing but a pose."""
+    """Return the mesh and the state of a session, complete except for a pose."""
     return small()
 
 
 class Seen:
-    """A widget on the screen, what it told of, and a hand on it."""
+    """A widget on the screen, its signals, and a simulated hand."""
 
     def __init__(self, widget, window=None):
         window = window or widget
@@ -66,7 +66,7 @@ class Seen:
         return self.editor.session
 
     def view_hand(self):
-        """Return a hand on the view, which looks from the front."""
+        """Return a hand on the view, seen from the front."""
         plotter = self.widget.plotter
         plotter.camera_position = "xz"
         plotter.render()
@@ -74,13 +74,13 @@ class Seen:
         return QtHand(plotter.interactor, self.editor.view)
 
     def settle(self):
-        """Let Qt work until no job is running and the panel shows how things are."""
+        """Let Qt run until no job is running and the panel is up to date."""
         application().processEvents()
         until(lambda: not self.editor.is_busy, "the job")
-        until(lambda: not self.panel._patience.isActive(), "the panel")
+        until(lambda: self.panel.is_up_to_date, "the panel")
 
     def click(self, button):
-        """Click in the middle of a button, or on the box of a check box."""
+        """Click on a button, or on the box of a check box."""
         assert button.isVisible()
         assert button.isEnabled()
         check = isinstance(button, QtWidgets.QCheckBox)
@@ -89,7 +89,7 @@ class Seen:
         self.settle()
 
     def click_row(self, tree, row, column=0, held=Qt.NoModifier):
-        """Click on a row of a list; in a column with a tick on the tick."""
+        """Click on a row of a list; in a column with a tick, on the tick."""
         box = tree.visualItemRect(tree.topLevelItem(row))
         box = tree.visualRect(tree.indexFromItem(tree.topLevelItem(row), column)) if column else box
         place = QtCore.QPoint(box.left() + 10, box.center().y())
@@ -105,12 +105,12 @@ class Seen:
         self.settle()
 
     def mode(self, mode):
-        self.click(self.panel.head.modes[mode])
+        self.click(self.panel.toolbar.modes[mode])
 
 
 @pytest.fixture
 def make():
-    """Yield a callable that puts a widget over a session on the screen."""
+    """Yield a function that shows a widget over a session."""
     application()
     made = []
 
@@ -133,7 +133,7 @@ def seen(make, state):
 
 
 def delete_now():
-    """Let Qt delete what is to be deleted later, and then what PyQt has for that."""
+    """Let Qt process deferred deletes, and then collect the wrappers of PyQt."""
     for _ in range(2):
         application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
         application().processEvents()
@@ -147,7 +147,7 @@ def rows(tree):
 
 
 def around(seen, mask):
-    """Return two corners of a rectangle around some vertices, as they are seen."""
+    """Return two corners of a rectangle on the screen around some vertices."""
     places = seen.editor.view.to_display(seen.session.vertices[mask])[:, :2]
     return places.min(axis=0) - 4.0, places.max(axis=0) + 4.0
 
@@ -155,7 +155,7 @@ def around(seen, mask):
 def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
     seen = make(MESH)
     panel, hand, height = seen.panel, seen.view_hand(), MESH.vertices[:, 2]
-    seen.click(panel.regions.find)
+    seen.click(panel.regions.segment)
     assert seen.session.regions.n_regions == len(rows(panel.regions.list)) > 1
     seen.mode(Mode.CAGES)
     seen.click(panel.cages.fit)
@@ -166,7 +166,7 @@ def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
     seen.mode(Mode.HANDLES)
     seen.click(panel.painting.tools[Tool.RECTANGLE])
     seen.click(panel.painting.through)
-    seen.click_row(panel.handles.list, 0)  # what stays
+    seen.click_row(panel.handles.list, 0)  # fixed vertices
     hand.drag(around(seen, height < 0.08))
     seen.click(panel.handles.new)
     hand.drag(around(seen, height > 0.92))
@@ -178,28 +178,28 @@ def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
     assert min(counts) > 5
 
     seen.mode(Mode.DEFORM)
-    start = np.array(hand.at(seen.editor.stage.dragger.gizmo.centre))
+    start = np.array(hand.at(seen.editor.widgets.dragger.gizmo.centre))
     seen.deformed.clear()
     hand.drag(start + t * np.array([80.0, -25.0]) for t in np.linspace(0.0, 1.0, 12))
-    moved = np.array(hand.at(seen.editor.stage.dragger.gizmo.centre)) - start
+    moved = np.array(hand.at(seen.editor.widgets.dragger.gizmo.centre)) - start
     assert moved == pytest.approx([80.0, -25.0], abs=3.0)
-    until(lambda: not seen.editor.stage.dragger.is_refining, "refinement")
+    until(lambda: not seen.editor.widgets.dragger.is_refining, "refinement")
     assert len(seen.deformed) >= 12
     assert max(map(abs, seen.deformed)) < 1e-12
     bent = seen.session.vertices
     seen.settle()
     volumes = [text for _, _, text in rows(panel.regions.list)]
     assert any(text not in ("", "0 %") for text in volumes)
-    seen.click(panel.head.undo)
+    seen.click(panel.toolbar.undo)
     assert_array_equal(seen.session.vertices, MESH.vertices)
-    seen.click(panel.head.redo)
+    seen.click(panel.toolbar.redo)
     assert_array_equal(seen.session.vertices, bent)
-    seen.click(panel.deform.rest)
+    seen.click(panel.deform.reset)
     assert seen.session.state.pose is None
     assert seen.errors == hand.failures == []
 
 
-def test_the_whole_mesh_is_seen_at_first(seen):
+def test_the_whole_mesh_is_visible_at_first(seen):
     view = seen.editor.view
     view.render()
     places = view.to_display(seen.session.vertices)[:, :2] / view.renderer.GetSize()
@@ -208,33 +208,33 @@ def test_the_whole_mesh_is_seen_at_first(seen):
     assert np.ptp(places, axis=0).max() > 0.4
 
 
-def test_regions_are_chosen_merged_and_cut_in_the_list(seen):
+def test_regions_are_selected_merged_and_split_in_the_list(seen):
     panel, session = seen.panel, seen.session
     seen.click_row(panel.regions.list, 1)
-    assert seen.editor.stage.selector.region == 1
+    assert seen.editor.widgets.selector.region == 1
     assert not panel.regions.merge.isEnabled()
     seen.click_row(panel.regions.list, 0, held=Qt.ControlModifier)
     seen.click(panel.regions.merge)
     assert session.regions.n_regions == 1
-    assert "are one" in panel.foot.words.text()
+    assert "Merged" in panel.status.words.text()
     seen.click(panel.regions.split)
     assert session.regions.n_regions == 2
     seen.click(panel.regions.new)
-    assert rows(panel.regions.list)[2][0] == "region 3, to be painted"
-    assert seen.editor.stage.selector.region == 2
+    assert rows(panel.regions.list)[2][0] == "region 3 (new)"
+    assert seen.editor.widgets.selector.region == 2
     assert not panel.regions.split.isEnabled()
 
 
 def rename(tree, name):
-    """Type another name for the row that is chosen."""
+    """Type another name for the selected row."""
     tree.setFocus()
     QtTest.QTest.keyClick(tree, Qt.Key_F2)
     field = tree.viewport().findChild(QtWidgets.QLineEdit)
-    field.setText(name)  # a keyboard has no keys for all of them
+    field.setText(name)  # a keyboard lacks some of its letters
     QtTest.QTest.keyClick(field, Qt.Key_Return)
 
 
-def test_regions_are_renamed_in_the_list_and_names_are_told_everywhere(seen):
+def test_regions_are_renamed_in_the_list_and_shown_by_name_everywhere(seen):
     tree, session = seen.panel.regions.list, seen.session
     assert [name for name, *_ in rows(tree)] == ["region 1", "region 2"]
     seen.click_row(tree, 1, column=2)  # beside the name
@@ -242,7 +242,7 @@ def test_regions_are_renamed_in_the_list_and_names_are_told_everywhere(seen):
     seen.settle()
     assert session.region_names == ("region 1", "the left arm\N{WHITE SMILING FACE}")
     assert rows(tree)[1][0] == session.region_names[1]
-    assert seen.panel.foot.words.text().startswith("Region 2 is now the left arm")
+    assert seen.panel.status.words.text().startswith("Renamed region 2 to the left arm")
     assert len(seen.regions) == 1
     rename(tree, "region 1")
     seen.settle()
@@ -250,12 +250,12 @@ def test_regions_are_renamed_in_the_list_and_names_are_told_everywhere(seen):
     assert rows(tree)[1][0] == session.region_names[1]
     rename(tree, "arm")
     seen.settle()
-    assert "brush for arm," in seen.editor.status
+    assert "Brush: paint arm." in seen.editor.status
     seen.click(seen.panel.regions.split)
     assert [name for name, *_ in rows(tree)] == ["region 1", "arm", "arm 2"]
     seen.click_row(tree, 2, held=Qt.ControlModifier)
     seen.click(seen.panel.regions.merge)
-    assert "Arm and arm 2 are one" in seen.panel.foot.words.text()
+    assert "Merged arm and arm 2" in seen.panel.status.words.text()
     box = tree.visualItemRect(tree.topLevelItem(0))
     QtTest.QTest.mouseDClick(tree.viewport(), Qt.LeftButton, Qt.NoModifier, box.center())
     QtTest.QTest.keyClick(tree.viewport().findChild(QtWidgets.QLineEdit), Qt.Key_Escape)
@@ -266,7 +266,7 @@ def test_regions_are_renamed_in_the_list_and_names_are_told_everywhere(seen):
 
 def test_a_tick_shows_one_cage_and_hides_it(seen):
     seen.mode(Mode.CAGES)
-    cages = seen.editor.stage.cages
+    cages = seen.editor.widgets.cages
     assert cages.is_shown
     seen.click_row(seen.panel.regions.list, 1, column=1)
     assert [cages.is_visible(region) for region in (0, 1)] == [True, False]
@@ -274,7 +274,7 @@ def test_a_tick_shows_one_cage_and_hides_it(seen):
     assert cages.is_visible(1)
 
 
-def test_handles_are_renamed_chosen_and_removed_in_the_list(seen):
+def test_handles_are_renamed_selected_and_removed_in_the_list(seen):
     seen.mode(Mode.HANDLES)
     tree = seen.panel.handles.list
     seen.click_row(tree, 1)
@@ -282,14 +282,28 @@ def test_handles_are_renamed_chosen_and_removed_in_the_list(seen):
     seen.settle()
     assert list(seen.session.handles) == ["tail"]
     assert rows(tree)[1][0] == "tail"
-    assert seen.editor.stage.selector.handle == "tail"
+    assert seen.editor.widgets.selector.handle == "tail"
     seen.click_row(tree, 0)
-    assert seen.editor.stage.selector.paints is Paint.FIXED
+    assert seen.editor.widgets.selector.paints is Paint.FIXED
     seen.click_row(tree, 1)
-    assert seen.editor.stage.selector.paints is Paint.HANDLE
+    assert seen.editor.widgets.selector.paints is Paint.HANDLE
     seen.click(seen.panel.handles.remove)
     assert not seen.session.handles
-    assert [name for name, _ in rows(tree)] == ["what stays", "new handle, to be painted"]
+    assert [name for name, _ in rows(tree)] == ["Fixed", "New handle (not painted yet)"]
+
+
+def test_a_handle_called_fixed_is_not_mistaken_for_the_fixed_vertices(seen):
+    seen.session.rename_handle(next(iter(seen.session.handles)), "Fixed")
+    seen.mode(Mode.HANDLES)
+    tree, selector = seen.panel.handles.list, seen.editor.widgets.selector
+    assert [name for name, _ in rows(tree)][:2] == ["Fixed", "Fixed"]
+    seen.click_row(tree, 0)
+    assert selector.paints is Paint.FIXED
+    assert not seen.panel.handles.remove.isEnabled()
+    seen.click_row(tree, 1)
+    assert (selector.paints, selector.handle) == (Paint.HANDLE, "Fixed")
+    seen.click(seen.panel.handles.remove)
+    assert not seen.session.handles
 
 
 def test_options_are_steps_and_are_shown_when_they_are_undone(make):
@@ -300,25 +314,25 @@ def test_options_are_steps_and_are_shown_when_they_are_undone(make):
     seen.mode(Mode.DEFORM)
     part, options = seen.panel.deform, lambda: seen.session.options
     seen.type_number(part.stretch, 3.0)
-    seen.type_number(part.groups, 0)
-    seen.click(part.hold)
-    seen.click(part.hold_each)
+    seen.type_number(part.clusters, 0)
+    seen.click(part.preserve)
+    seen.click(part.per_region)
     assert (options().n_cage_vertices, options().offset) == (90, 0.5)
     assert (options().stretch, options().rotation_groups) == (3.0, None)
     assert (options().preserve_volume, options().preserve_region_volumes) == (False, True)
     for _ in range(6):
-        seen.click(seen.panel.head.undo)
+        seen.click(seen.panel.toolbar.undo)
     assert seen.panel.deform.stretch.value() == 10.0
-    assert seen.panel.deform.groups.value() == 300
-    assert seen.panel.deform.hold.isChecked()
-    assert not seen.panel.deform.hold_each.isChecked()
+    assert seen.panel.deform.clusters.value() == 300
+    assert seen.panel.deform.preserve.isChecked()
+    assert not seen.panel.deform.per_region.isChecked()
     seen.mode(Mode.CAGES)
     assert seen.panel.cages.total.value() == 155
-    assert seen.panel.cages.offset.text() == "by itself"
-    assert seen.panel.head.undo.toolTip() == "Nothing to undo"
+    assert seen.panel.cages.offset.text() == "Auto"
+    assert seen.panel.toolbar.undo.toolTip() == "Nothing to undo"
 
 
-def test_what_keys_and_the_wheel_do_is_shown_in_the_panel(seen):
+def test_the_panel_follows_keys_and_the_wheel(seen):
     hand, part = seen.view_hand(), seen.panel.painting
     hand.key("l")
     seen.settle()
@@ -333,14 +347,14 @@ def test_what_keys_and_the_wheel_do_is_shown_in_the_panel(seen):
     seen.settle()
     assert part.radius.value() == pytest.approx(1.2 * before, rel=1e-3)
     seen.type_number(part.radius, 0.25)
-    assert seen.editor.stage.selector.radius == pytest.approx(0.25)
-    for key in "qe4":  # the first two would end a window of pyvista's, or VTK's
+    assert seen.editor.widgets.selector.radius == pytest.approx(0.25)
+    for key in "qe4":  # Q and E would close a window of pyvista or VTK
         hand.key(key)
     seen.settle()
-    assert seen.panel.head.modes[Mode.DEFORM].isChecked()
+    assert seen.panel.toolbar.modes[Mode.DEFORM].isChecked()
     assert part.isHidden()
     seen.click(seen.panel.deform.overlay)
-    assert seen.editor.stage.overlay.is_shown
+    assert seen.editor.widgets.overlay.is_shown
 
 
 def test_a_click_on_a_button_leaves_the_keys_to_the_view(seen):
@@ -348,10 +362,10 @@ def test_a_click_on_a_button_leaves_the_keys_to_the_view(seen):
     seen.click(seen.panel.painting.tools[Tool.LASSO])
     assert seen.widget.plotter.hasFocus()
     hand.key("b")
-    assert seen.editor.stage.selector.tool is Tool.BRUSH
+    assert seen.editor.widgets.selector.tool is Tool.BRUSH
 
 
-def test_a_job_shows_how_far_it_is_and_is_cancelled(seen):
+def test_a_job_shows_its_progress_and_is_cancelled(seen):
     go_on, delivered = threading.Event(), []
 
     def work(progress):
@@ -359,48 +373,48 @@ def test_a_job_shows_how_far_it_is_and_is_cancelled(seen):
         assert go_on.wait(30.0)
         progress(0.5, "by foot")
 
-    seen.editor.do(lambda desk: desk.start("counting", work, delivered.append))
-    foot = seen.panel.foot
+    seen.editor.do(lambda controller: controller.start("counting", work, delivered.append))
+    foot = seen.panel.status
     until(lambda: foot.bar.isVisible() and foot.bar.value() == 400, "the bar")
-    assert foot.words.text() == "Counting: by hand · 40 % · Esc cancels"
-    assert not seen.panel.regions.find.isEnabled()  # nothing else is done meanwhile
-    assert not seen.panel.head.modes[Mode.DEFORM].isEnabled()
+    assert foot.words.text() == "Counting: by hand · 40 % · Esc to cancel"
+    assert not seen.panel.regions.segment.isEnabled()  # nothing else is possible meanwhile
+    assert not seen.panel.toolbar.modes[Mode.DEFORM].isEnabled()
     QtTest.QTest.mouseClick(foot.cancel, Qt.LeftButton)
-    until(lambda: "stopping" in foot.words.text(), "the answer")
+    until(lambda: "Stopping" in foot.words.text(), "the answer")
     go_on.set()
     seen.settle()
     assert delivered == []
     assert "cancelled" in foot.words.text().lower()
     assert not foot.bar.isVisible()
-    assert seen.panel.regions.find.isEnabled()
+    assert seen.panel.regions.segment.isEnabled()
 
 
 def bend(seen, height=0.4):
-    """Lift the handle, by a script."""
+    """Move the handle upwards by a script."""
     shift = np.eye(4)
     shift[2, 3] = height
     seen.session.move_handle("handle 1", shift)
     seen.session.commit()
 
 
-def test_the_log_unfolds_is_copied_and_cleared(seen):
+def test_the_history_unfolds_is_copied_and_cleared(seen):
     part, clipboard = seen.panel.log, application().clipboard()
     bend(seen)
     seen.click(part.fold)
-    texts = [entry.text for entry in seen.editor.desk.log.entries]
+    texts = [entry.text for entry in seen.editor.controller.log.entries]
     assert [part.list.item(k).text() for k in range(part.list.count())] == texts
     assert "drag handle 1" in texts[-1]
     bend(seen, 0.3)
     until(lambda: part.list.count() == len(texts) + 1, "the second drag")
     seen.click(part.copy)
-    assert clipboard.text() == "\n\n".join(e.text for e in seen.editor.desk.log.entries)
+    assert clipboard.text() == "\n\n".join(e.text for e in seen.editor.controller.log.entries)
     part.list.setCurrentRow(part.list.count() - 2)
     part.list.setFocus()
     QtTest.QTest.keyClick(part.list, Qt.Key_C, Qt.ControlModifier)
     assert clipboard.text() == texts[-1]
-    for _ in range(2):  # more than the log holds
+    for _ in range(2):  # more than the limit of the log
         for k in range(150):
-            seen.editor.desk.log.add_job(f"job {k}", 1.0, "done")
+            seen.editor.controller.log.add_job(f"job {k}", 1.0, "done")
         part.refresh()
     assert part.list.count() == 200
     assert "job 149" in part.list.item(199).text()
@@ -411,37 +425,37 @@ def test_the_log_unfolds_is_copied_and_cleared(seen):
     assert not part.list.isVisible()
 
 
-def test_the_range_of_the_colours_is_typed_and_kept_for_the_next_session(seen, tmp_path):
+def test_the_colour_range_is_typed_and_kept_for_the_next_session(seen, tmp_path):
     seen.mode(Mode.DEFORM)
-    part, overlay = seen.panel.deform, lambda: seen.editor.stage.overlay
+    part, overlay = seen.panel.deform, lambda: seen.editor.widgets.overlay
     assert not part.range.isEnabled()
     seen.click(part.overlay)
     bend(seen)
     chosen = overlay().half_range
     seen.type_number(part.range, 37.5)
     assert overlay().half_range == 0.375 != chosen
-    assert seen.session.undo_label == "drag handle 1"  # it is no step
+    assert seen.session.undo_label == "drag handle 1"  # the range is not an undo step
     seen.editor.save(tmp_path / "a.segdeform")
     seen.editor.load(tmp_path / "a.segdeform")
     seen.settle()
     assert overlay().half_range == 0.375
     assert part.range.value() == 37.5
     seen.type_number(part.range, 0)
-    assert part.range.text() == "by itself"
+    assert part.range.text() == "Auto"
     assert overlay().half_range == chosen
 
 
-def test_what_goes_wrong_is_said_told_and_then_forgotten(seen):
+def test_an_error_is_shown_emitted_and_then_cleared(seen):
     seen.mode(Mode.HANDLES)
-    seen.panel.handles.list.topLevelItem(1).setText(0, "")  # no name for a handle
+    seen.panel.handles.list.topLevelItem(1).setText(0, "")  # not a valid name
     seen.settle()
     (error,) = seen.errors
     assert "name" in error
-    assert seen.panel.foot.words.text().lower() == error.lower()
-    assert seen.panel.foot.sign.isVisible()
+    assert seen.panel.status.words.text().lower() == error.lower()
+    assert seen.panel.status.sign.isVisible()
     assert rows(seen.panel.handles.list)[1][0] == "handle 1"
     seen.mode(Mode.DEFORM)
-    assert not seen.panel.foot.sign.isVisible()
+    assert not seen.panel.status.sign.isVisible()
 
 
 # Files.
@@ -455,15 +469,15 @@ def answer(monkeypatch, path):
 def test_a_session_is_saved_and_opened_again(seen, tmp_path, monkeypatch):
     path = tmp_path / "arm.segdeform"
     answer(monkeypatch, tmp_path / "arm")
-    seen.panel.head.ask_and_save()
+    seen.panel.toolbar.ask_and_save()
     assert list(load_session(path).handles) == ["handle 1"]
     before = seen.session
     answer(monkeypatch, path)
-    seen.click(seen.panel.head.open)  # saved: no question
+    seen.click(seen.panel.toolbar.open)  # saved, so no question
     assert seen.sessions == [seen.session]
     assert seen.session is not before
     assert seen.session.regions.n_regions == len(rows(seen.panel.regions.list)) == 2
-    before.merge_regions([0, 1])  # the one that went is nobody's business any more
+    before.merge_regions([0, 1])  # the previous session is no longer observed
     assert seen.regions == []
     seen.session.merge_regions([0, 1])
     assert seen.regions == [seen.session.regions]
@@ -472,7 +486,7 @@ def test_a_session_is_saved_and_opened_again(seen, tmp_path, monkeypatch):
     assert len(seen.session.fixed) == int(rows(seen.panel.handles.list)[0][1]) > 0
 
 
-def test_what_is_not_saved_is_given_up_only_when_asked(seen, tmp_path, monkeypatch):
+def test_unsaved_changes_are_discarded_only_if_confirmed(seen, tmp_path, monkeypatch):
     path = tmp_path / "ball.ply"
     from vtk_segdeform.io.convert import write_mesh
 
@@ -482,24 +496,24 @@ def test_what_is_not_saved_is_given_up_only_when_asked(seen, tmp_path, monkeypat
     before, buttons = seen.session, QtWidgets.QMessageBox.StandardButton
     for button, goes in ((buttons.Cancel, False), (buttons.Discard, True)):
         monkeypatch.setattr(QtWidgets.QMessageBox, "question", lambda *_, b=button: b)
-        seen.click(seen.panel.head.open)
+        seen.click(seen.panel.toolbar.open)
         assert (seen.session is not before) is goes
     assert seen.session.mesh.n_vertices == models.sphere(300).n_vertices
-    assert seen.editor.path == tmp_path / "ball.segdeform"  # a mesh is not written over
+    assert seen.editor.path == tmp_path / "ball.segdeform"  # a mesh is never overwritten
 
 
-def test_the_mesh_is_written_as_it_is_now(seen, tmp_path, monkeypatch):
+def test_the_deformed_mesh_is_written(seen, tmp_path, monkeypatch):
     bend(seen)
     answer(monkeypatch, tmp_path / "bent.ply")
-    seen.panel.head.ask_and_export()
+    seen.panel.toolbar.ask_and_export()
     assert_array_equal(read_mesh(tmp_path / "bent.ply").vertices, seen.session.vertices)
     answer(monkeypatch, tmp_path / "nowhere" / "bent.ply")
-    seen.panel.head.ask_and_export()
+    seen.panel.toolbar.ask_and_export()
     assert len(seen.errors) == 1
 
 
 def with_arrays():
-    """Return an ellipsoid with something of everything that a surface can have."""
+    """Return an ellipsoid with every kind of data that a surface can have."""
     mesh, _ = small()
     surface = to_polydata(mesh)
     rng = np.random.default_rng(1)
@@ -513,7 +527,7 @@ def with_arrays():
     return surface
 
 
-def test_a_surface_is_given_and_written_back_with_all_that_it_has(make, tmp_path, monkeypatch):
+def test_a_surface_is_written_back_with_all_its_arrays(make, tmp_path, monkeypatch):
     surface, (mesh, state) = with_arrays(), small()
     seen = make(surface)
     seen.session.set_regions(state.regions)
@@ -523,13 +537,13 @@ def test_a_surface_is_given_and_written_back_with_all_that_it_has(make, tmp_path
     now = seen.widget.deformed_polydata()
     assert_array_equal(now.points, seen.session.vertices)
     assert_array_equal(surface.points, mesh.vertices)
-    surface.point_data.clear()  # ours is as it was when it was given
+    surface.point_data.clear()  # the widget has its own copy
     everything = {"heat", "RGB", "flow", "uv"}
     for name, holds in {
         "a.vtp": everything, "a.vtk": everything, "a.vtkhdf": everything, "a.ply": {"heat", "RGB"},
     }.items():  # fmt: skip
         answer(monkeypatch, tmp_path / name)
-        seen.panel.head.ask_and_export()
+        seen.panel.toolbar.ask_and_export()
         read = read_polydata(tmp_path / name)
         assert_array_equal(read.points, seen.session.vertices)
         assert holds <= set(read.point_data.keys())
@@ -539,17 +553,17 @@ def test_a_surface_is_given_and_written_back_with_all_that_it_has(make, tmp_path
         assert_array_equal(read.active_texture_coordinates, now.point_data["uv"])
     assert seen.errors == []
 
-    # The same from a file, of which a session file remembers the mesh alone.
+    # The same from a file; a session file stores its mesh only.
     answer(monkeypatch, tmp_path / "a.vtp")
     seen.editor.save(tmp_path / "a.segdeform")
-    seen.click(seen.panel.head.open)
+    seen.click(seen.panel.toolbar.open)
     assert_array_equal(seen.session.mesh.vertices, now.points)
     again = seen.widget.deformed_polydata()
     assert set(again.point_data.keys()) == everything
     seen.editor.save(tmp_path / "b.segdeform")
     seen.editor.load(tmp_path / "b.segdeform")
     assert set(seen.widget.deformed_polydata().point_data.keys()) == everything
-    seen.editor.load(tmp_path / "a.segdeform")  # of another mesh
+    seen.editor.load(tmp_path / "a.segdeform")  # with another mesh
     assert seen.widget.deformed_polydata().point_data.keys() == []
     assert_array_equal(seen.widget.deformed_polydata().points, seen.session.vertices)
 
@@ -557,7 +571,7 @@ def test_a_surface_is_given_and_written_back_with_all_that_it_has(make, tmp_path
 # Hosts.
 
 
-def test_two_widgets_in_one_window_and_a_dock_mind_their_own_business(state):
+def test_two_widgets_and_a_dock_in_one_window_are_independent(state):
     app, (mesh, now) = application(), state
     window = QtWidgets.QMainWindow()
     tabs = QtWidgets.QSplitter(window)
@@ -580,11 +594,11 @@ def test_two_widgets_in_one_window_and_a_dock_mind_their_own_business(state):
     hands[1].click_row(second.panel.regions.list, 1)
     hands[1].click(second.panel.regions.split)
     assert [seen.session.regions.n_regions for seen in hands] == [2, 3, 2]
-    first.close()  # one goes, the others stay
+    first.close()  # the others stay
     hands[2].mode(Mode.DEFORM)
     assert not first.editor.GetEnabled()
     assert second.editor.GetEnabled()
-    plotter.close()  # the dock's editor goes with the view it is in
+    plotter.close()  # this removes the dock's editor
     assert not dock.editor.GetEnabled()
     until(lambda: not dock.panel.isEnabled(), "the panel")
     second.close()
@@ -593,7 +607,7 @@ def test_two_widgets_in_one_window_and_a_dock_mind_their_own_business(state):
     delete_now()
 
 
-def test_a_window_that_is_deleted_without_a_word_takes_all_with_it(state):
+def test_a_window_deleted_by_qt_releases_everything(state):
     application()
     mesh, now = state
     session, window = Session(mesh, state=now), QtWidgets.QMainWindow()
@@ -604,11 +618,11 @@ def test_a_window_that_is_deleted_without_a_word_takes_all_with_it(state):
     window.deleteLater()
     delete_now()
     assert not editor.GetEnabled()
-    session.merge_regions([0, 1])  # and nobody listens any more, nor fails to
+    session.merge_regions([0, 1])  # no longer observed, and no error
     application().processEvents()
 
 
-def test_a_dock_that_is_deleted_leaves_the_editor_as_it_is(state):
+def test_deleting_a_dock_leaves_the_editor_unchanged(state):
     application()
     mesh, now = state
     window = QtWidgets.QMainWindow()
@@ -631,11 +645,11 @@ def test_a_dock_that_is_deleted_leaves_the_editor_as_it_is(state):
     delete_now()
 
 
-# For everybody.
+# Accessibility.
 
 
 @pytest.mark.parametrize("mode", list(Mode))
-def test_everything_is_reached_by_tab_and_tells_what_it_is(seen, mode):
+def test_every_control_is_reached_by_tab_and_has_a_tooltip(seen, mode):
     seen.mode(mode)
     kinds = (QtWidgets.QAbstractButton, QtWidgets.QAbstractSpinBox, QtWidgets.QTreeWidget)
     wanted = {
@@ -647,8 +661,8 @@ def test_everything_is_reached_by_tab_and_tells_what_it_is(seen, mode):
     assert len(wanted) > 8
     assert [each for each in wanted if not each.toolTip()] == []
     reached, heights = set(), []
-    seen.panel.head.open.setFocus()
-    until(seen.panel.head.open.hasFocus, "the focus")
+    seen.panel.toolbar.open.setFocus()
+    until(seen.panel.toolbar.open.hasFocus, "the focus")
     for _ in range(60):
         here = application().focusWidget()
         if here in wanted and here not in reached:
@@ -658,14 +672,14 @@ def test_everything_is_reached_by_tab_and_tells_what_it_is(seen, mode):
     assert heights == sorted(heights)  # from the top down
     assert {each for each in wanted if each.focusPolicy() != Qt.NoFocus} <= reached
     exclusive = {each for each in wanted - reached if each.group() is not None}
-    assert wanted - reached == exclusive  # where arrows lead
-    here = seen.panel.head.modes[mode]
+    assert wanted - reached == exclusive  # reached by the arrow keys
+    here = seen.panel.toolbar.modes[mode]
     here.setFocus()
     QtTest.QTest.keyClick(here, Qt.Key_Left if mode is Mode.DEFORM else Qt.Key_Right)
     assert seen.editor.mode is not mode
 
 
-def test_in_a_dark_palette_the_panel_is_dark_and_its_words_are_light(seen, tmp_path):
+def test_in_a_dark_palette_the_panel_is_dark_and_its_text_is_light(seen, tmp_path):
     before = application().palette()
     application().setPalette(QtGui.QPalette(QtGui.QColor("#3a3a3a"), QtGui.QColor("#2b2b2b")))
     try:
@@ -702,7 +716,7 @@ def test_the_example_of_an_application_runs(tmp_path):
     )  # fmt: skip
     colours = np.array(Image.open(tmp_path / "window.png").convert("RGB")).astype(int)
     body = (np.ptp(colours, axis=2) > 10) & (colours.mean(axis=2) < 220)
-    assert 0.04 < body.mean() < 0.5  # the cactus, the mode that is on, the status line
+    assert 0.04 < body.mean() < 0.5  # the cactus, the current mode, the status line
 
 
 def test_a_bad_argument_is_one_of_our_errors_before_anything_is_created():

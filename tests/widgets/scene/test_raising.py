@@ -43,8 +43,8 @@ class Bench:
         self.session = session_of(slender())
         self.view = plain_view((200, 160))
         self.editor = DeformEditor(self.view, self.session)
-        self.stage = self.editor.stage
-        self.dragger = self.stage.dragger
+        self.widgets = self.editor.widgets
+        self.dragger = self.widgets.dragger
         self.view.camera.SetPosition(0.0, -9.0, 2.0)
         self.view.renderer.ResetCamera()
         self.view.render()
@@ -67,7 +67,7 @@ class Bench:
         session, before = self.session, self.session.vertices
         step, camera = session.undo_label, self.view.camera.GetPosition()
         assert not session.is_dragging
-        assert not any(widget.is_grabbing for widget in self.stage.widgets)
+        assert not any(widget.is_grabbing for widget in self.widgets.interactive)
         self.hand.failures.clear()
         self.drags()
         assert session.undo_label == f"drag {NAME}"
@@ -88,7 +88,7 @@ class Bench:
         """Assert that what is drawn is the pose, and the gizmo at the handle."""
         self.view.render()
         x = self.session.vertices
-        assert np.array_equal(self.stage.surface.points, x)
+        assert np.array_equal(self.widgets.surface.points, x)
         assert np.allclose(self.dragger.gizmo.centre, x[self.session.handles[NAME]].mean(axis=0))
 
     def told(self) -> bool:
@@ -127,7 +127,9 @@ PLACES = {
         "LeftButtonPressEvent", call, 2.0
     ),
     "a callback of a timer": lambda bench, call: bench.view.pulse(call),
-    "a listener of what is said": lambda bench, call: bench.editor.desk.voice.on_word(call),
+    "a listener of what is said": lambda bench, call: bench.editor.controller.messages.on_change(
+        call
+    ),
 }
 
 
@@ -216,7 +218,7 @@ def test_work_of_a_user_that_raises_ends_and_the_next_drag_works(bench, part):
         for k in range(10):
             progress(Raiser()() if part == "report" and k == 5 else k / 10, "working")
 
-    bench.editor.desk.start("my work", work, Raiser())
+    bench.editor.controller.start("my work", work, Raiser())
     with bench.view.guarded():
         bench.editor.wait()
     assert bench.told()

@@ -1,12 +1,11 @@
-"""Everything that shows and changes one session in one view, and which of it is on in which mode.
+"""The widgets that show and change one session, and which of them are on in each mode.
 
-The mesh is one actor that all widgets share.  What is shown besides, cages and volumes, is as the
-user wants it: `cages_wanted`, `overlay_wanted`.
+All widgets share one actor for the mesh.  The user decides whether cages and volume changes are
+shown as well: `cages_wanted`, `overlay_wanted`.
 """
 
 from __future__ import annotations
 
-import enum
 from contextlib import ExitStack
 
 import numpy as np
@@ -19,30 +18,18 @@ from ..handle_dragger import HandleDragger
 from ..region_selector import Paint, RegionColours, RegionSelector
 from ..scene import SurfaceDisplay, View, Widget
 from ..volume_overlay import VolumeOverlay
+from .mode import Mode
 
 
-class Mode(enum.Enum):
-    """What the mouse does on the mesh."""
-
-    REGIONS = 1
-    """Paint regions."""
-    CAGES = 2
-    """Drag vertices of cages."""
-    HANDLES = 3
-    """Paint what stays fixed and what is dragged."""
-    DEFORM = 4
-    """Drag and turn handles."""
-
-
-class Stage:
-    """The widgets over one session; all of them off and hidden until `enter`.
+class WidgetSet:
+    """The widgets over one session, all of them off and hidden until `enter`.
 
     Parameters
     ----------
     view : View
-        Where they live.
+        Where they are drawn.
     session : Session
-        What they show and change.
+        The session that they show and change.
     """
 
     def __init__(self, view: View, session: Session) -> None:
@@ -58,25 +45,25 @@ class Stage:
         self.choose_region(0)
 
     @property
-    def widgets(self) -> tuple[Widget, ...]:
-        """Those that take events: in each mode one of them."""
+    def interactive(self) -> tuple[Widget, ...]:
+        """The widgets that respond to events; one of them is on in each mode."""
         return self.selector, self.cages, self.dragger
 
     @property
     def n_regions(self) -> int:
-        """How many regions there are."""
+        """Number of regions."""
         regions = self.session.regions
         return 0 if regions is None else regions.n_regions
 
     def choose_region(self, region: int) -> None:
-        """Paint *region* from now on; one beyond the last is a new one.
+        """Select *region* for painting; an index after the last one adds a region.
 
-        Where there are none yet, region 0 is to hold everything, and the first to paint is 1.
+        Without regions, 1 is selected: region 0 will be the rest of the mesh.
         """
         self.selector.region = min(region, self.n_regions) if self.n_regions else 1
 
     def enter(self, mode: Mode) -> None:
-        """Switch on what belongs to *mode*, and show what goes with it."""
+        """Switch on the widget of *mode*, and show what belongs to that mode."""
         if mode is Mode.REGIONS:
             self.selector.paints = Paint.REGION
         elif mode is Mode.HANDLES and self.selector.paints is Paint.REGION:
@@ -87,7 +74,7 @@ class Stage:
         self.dragger.SetEnabled(mode is Mode.DEFORM)
 
     def show(self, mode: Mode) -> None:
-        """Show what goes with *mode* and is wanted: painting needs to see what it paints."""
+        """Show cages and volume changes if they are wanted in *mode*."""
         if mode is Mode.CAGES or self.cages_wanted:
             self.cages.show()
         else:
@@ -98,11 +85,11 @@ class Stage:
             self.overlay.hide()
 
     def wants_overlay(self, mode: Mode) -> bool:
-        """Tell whether volumes are to be seen in *mode*: where something is deformed."""
+        """Return whether volume changes are shown in *mode*; painting hides them."""
         return self.overlay_wanted and mode in (Mode.CAGES, Mode.DEFORM)
 
-    def follow(self, before: Stage) -> None:
-        """Go on with the tools of the stage *before*, and show what it did."""
+    def copy_settings(self, before: WidgetSet) -> None:
+        """Use the same tools, sizes and display options as the widgets *before*."""
         mine, its = self.selector, before.selector
         mine.tool, mine.through = its.tool, its.through
         share = its.radius / before.session.mesh.diagonal
@@ -111,42 +98,42 @@ class Stage:
         self.overlay.wanted_range = before.overlay.wanted_range
         self.cages_wanted, self.overlay_wanted = before.cages_wanted, before.overlay_wanted
 
-    def succeeded_by(self, session: Session) -> Stage:
-        """Take everything out of the view, and return a stage for another session in its place."""
-        after = Stage(self.selector.view, session)
-        after.follow(self)
+    def replaced_by(self, session: Session) -> WidgetSet:
+        """Remove these widgets from the view, and return others over another session."""
+        after = WidgetSet(self.selector.view, session)
+        after.copy_settings(self)
         self.remove()
         if not np.array_equal(session.mesh.vertices, self.session.mesh.vertices):
             after.selector.view.renderer.ResetCamera()
         return after
 
     def bind(self, progress: Progress) -> None:
-        """Do what the first drag would have to wait for; in any thread, while nothing is on."""
+        """Compute what the first drag would wait for; in any thread, while all widgets are off."""
         self.session.bind(part(progress, 0.0, 0.9))
         self.overlay.prepare()
 
     def measure(self, progress: Progress) -> None:
-        """Do what a look at volumes would have to wait for; as `bind`."""
+        """Compute what the overlay would wait for; in any thread, as `bind`."""
         progress(0.0, "")
         self.overlay.prepare()
 
     def finish(self) -> None:
         """Finish the ongoing drag or stroke as if the button had been released."""
-        for widget in self.widgets:
+        for widget in self.interactive:
             widget.finish()
 
     def cancel(self) -> bool:
         """Cancel the ongoing drag or stroke; False if there was none."""
-        return any(widget.cancel() for widget in self.widgets)
+        return any(widget.cancel() for widget in self.interactive)
 
-    def rest(self) -> None:
+    def switch_off(self) -> None:
         """Switch all widgets off; an ongoing drag is finished, and the display is unchanged."""
-        with ExitStack() as all_of_them:  # continues if one of them raises
-            for widget in self.widgets:
-                all_of_them.callback(widget.Off)
+        with ExitStack() as stack:  # continues if one of them raises
+            for widget in self.interactive:
+                stack.callback(widget.Off)
 
     def remove(self) -> None:
-        """Take everything out of the view, for good."""
+        """Remove everything from the view, permanently."""
         for each in (self.overlay, self.dragger, self.cages, self.selector, self.colours):
             each.remove()
         self.surface.remove()

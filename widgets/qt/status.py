@@ -1,4 +1,4 @@
-"""The foot of the panel: what was done or went wrong, and how far a job is."""
+"""The status part of the panel: the last result or error, and the progress of a job."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from .controls import column, key_button, sentence
 _LINES = 3
 
 
-class Foot(QtWidgets.QWidget):
-    """A few words, a bar and a button that cancels.
+class StatusPart(QtWidgets.QWidget):
+    """The last message, a progress bar and a Cancel button.
 
     Parameters
     ----------
     editor : DeformEditor
-        Whose.
+        The editor whose status is shown.
     """
 
     def __init__(self, editor: DeformEditor) -> None:
@@ -34,28 +34,28 @@ class Foot(QtWidgets.QWidget):
         self.bar = QtWidgets.QProgressBar()
         self.bar.setRange(0, 1000)
         self.cancel = key_button(editor, "escape", Mode.REGIONS, "Cancel")
-        self.cancel.setToolTip("Stop what is being done; nothing is then changed (Esc)")
+        self.cancel.setToolTip("Cancel the job; nothing is changed (Esc)")
         for each in (self.bar, self.cancel):
             policy = each.sizePolicy()
-            policy.setRetainSizeWhenHidden(True)  # else all would jump when a job begins
+            policy.setRetainSizeWhenHidden(True)  # keep the layout when a job starts
             each.setSizePolicy(policy)
-        said, job = QtWidgets.QHBoxLayout(), QtWidgets.QHBoxLayout()
-        said.addWidget(self.sign, 0, QtCore.Qt.AlignmentFlag.AlignTop)
-        said.addWidget(self.words, 1)
+        message, job = QtWidgets.QHBoxLayout(), QtWidgets.QHBoxLayout()
+        message.addWidget(self.sign, 0, QtCore.Qt.AlignmentFlag.AlignTop)
+        message.addWidget(self.words, 1)
         job.addWidget(self.bar, 3)
         job.addWidget(self.cancel, 1)
-        column(self, said, job)
+        column(self, message, job)
         self.layout().setContentsMargins(0, 0, 0, 0)
 
     def refresh(self) -> None:
-        """Show what is said now."""
-        voice, busy = self._editor.desk.voice, self._editor.is_busy
-        # What to do next is said in the view, where the eyes are.
-        text = sentence(voice.text if busy else voice.fault or voice.noted)
+        """Show the current message and progress."""
+        messages, busy = self._editor.controller.messages, self._editor.is_busy
+        # The hint for the next step is shown in the view only.
+        text = sentence(messages.text if busy else messages.error or messages.last_note)
         if self.words.text() != text:
             self.words.setText(text)
-        self.sign.setVisible(bool(voice.fault) and not busy)
+        self.sign.setVisible(bool(messages.error) and not busy)
         self.bar.setVisible(busy)
         self.cancel.setVisible(busy)
         if busy:
-            self.bar.setValue(round(1000.0 * (voice.fraction or 0.0)))
+            self.bar.setValue(round(1000.0 * (messages.fraction or 0.0)))

@@ -1,4 +1,4 @@
-"""What the window asks and tells in boxes of its own."""
+"""The dialogs of the window."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _READ = f"Meshes and sessions (*.segdeform {MESHES} *.vtu *.glb *.gltf);;All fil
 
 
 class Answer(enum.Enum):
-    """What to do with work that is not saved."""
+    """Answers of the user to a dialog."""
 
     SAVE = enum.auto()
     DISCARD = enum.auto()
@@ -28,32 +28,34 @@ class Answer(enum.Enum):
 
 
 def ask_file(parent: Any, folder: Path) -> Path | None:
-    """Ask for a mesh or a session that is there; begin to look in *folder*."""
+    """Ask for a mesh or a session to open, starting in *folder*."""
     name, _ = QtWidgets.QFileDialog.getOpenFileName(parent, "Open", str(folder), _READ)
     return Path(name) if name else None
 
 
 def ask_save(parent: Any, name: str, *, mesh_is_saved: bool) -> Answer:
-    """Ask what to do with changes of what is called *name*."""
-    what = "Its regions, cages and handles are" if mesh_is_saved else "What was done is"
+    """Ask whether to save the changes to the document *name*."""
+    warning = "Unsaved changes will be lost."
+    if mesh_is_saved:
+        warning = "The mesh is saved, but its regions, cages and handles are not."
     return _ask(
         parent,
-        f"Save the changes to {name}?",
-        f"{what} lost otherwise. A session keeps everything; open it to go on.",
+        f"Save changes to {name}?",
+        warning,
         {Answer.SAVE: "Save", Answer.DISCARD: "Discard", Answer.CANCEL: "Cancel"},
     )
 
 
 def choose_work(parent: Any, autosaves: Autosaves) -> Slot | None:
-    """Return the unsaved work that somebody wants to go on with, of all that crashes have left.
+    """Ask about each abandoned autosave; return the one to recover, or None.
 
-    What nobody wants is deleted; what is wanted later stays, and so does what is after the first.
+    Discarded autosaves are deleted.  The others are kept, and so are all after the chosen one.
     """
-    chosen, left = None, autosaves.left()
-    for number, slot in enumerate(left, 1):
+    chosen, slots = None, autosaves.abandoned()
+    for number, slot in enumerate(slots, 1):
         answer = Answer.LATER
         if chosen is None:
-            answer = ask_recover(parent, slot, datetime.now(), others=len(left) - number)
+            answer = ask_recover(parent, slot, datetime.now(), others=len(slots) - number)
         if answer is Answer.RECOVER:
             chosen = slot
         elif answer is Answer.DISCARD:
@@ -64,46 +66,46 @@ def choose_work(parent: Any, autosaves: Autosaves) -> Slot | None:
 
 
 def ask_recover(parent: Any, slot: Slot, now: datetime, *, others: int = 0) -> Answer:
-    """Ask what to do with work that a crash has left; *others* are asked about afterwards."""
-    more = f" There is more after this: {others}." if others else ""
+    """Ask whether to recover an autosave; *others* are asked about afterwards."""
+    more = f" {others} more to review." if others else ""
     return _ask(
         parent,
         f"Recover unsaved work on {slot.about.name} from {moment(slot.when, now)}?",
-        f"The program ended before it was saved.{more}",
+        f"segdeform closed unexpectedly.{more}",
         {Answer.RECOVER: "Recover", Answer.DISCARD: "Discard", Answer.LATER: "Later"},
     )
 
 
 def ask_replace(parent: Any, name: str) -> bool:
-    """Ask whether a file may be replaced."""
+    """Ask whether to replace a file."""
     answers = {Answer.SAVE: "Replace", Answer.CANCEL: "Cancel"}
     text = f"Replace {name}?"
-    return _ask(parent, text, "There is such a file already.", answers) is Answer.SAVE
+    return _ask(parent, text, "A file with this name already exists.", answers) is Answer.SAVE
 
 
-def tell_failure(parent: Any, title: str, text: str) -> None:
-    """Tell what went wrong, until it is read."""
+def show_error(parent: Any, title: str, text: str) -> None:
+    """Show an error until it is dismissed."""
     box = _box(parent, QtWidgets.QMessageBox.Icon.Warning, title, text)
     box.addButton(QtWidgets.QMessageBox.StandardButton.Ok)
     _run(box)
 
 
-def tell_about(parent: Any, version: str) -> None:
-    """Tell what this program is."""
+def show_about(parent: Any, version: str) -> None:
+    """Show the About dialog."""
     box = _box(
         parent,
         QtWidgets.QMessageBox.Icon.NoIcon,
         f"vtk_segdeform {version}",
-        "Bends a dense closed mesh by a few of its vertices; its detail turns along, and its "
-        "volume stays exactly what it was.\n\nAfter K. Doba and H. Masuda, Rapid Mesh Deformation "
-        "with Non-linear Constraints Using Segmentation.\n\nBSD-3-Clause.",
+        "Deforms a dense closed mesh by moving a few of its vertices. Fine detail rotates with the "
+        "surface, and the volume is preserved exactly.\n\nAfter K. Doba and H. Masuda, Rapid Mesh "
+        "Deformation with Non-linear Constraints Using Segmentation.\n\nBSD-3-Clause.",
     )
     box.addButton(QtWidgets.QMessageBox.StandardButton.Ok)
     _run(box)
 
 
 def moment(when: datetime, now: datetime) -> str:
-    """Return *when* as people say it: the time, and the day if it is another.
+    """Return *when* for users: the time, and the date if it is another day.
 
     >>> moment(datetime(2026, 3, 1, 11, 42), datetime(2026, 3, 1, 18, 0))
     '11:42'
@@ -126,7 +128,7 @@ _ROLES = {
 
 
 def _ask(parent: Any, text: str, more: str, answers: Mapping[Answer, str]) -> Answer:
-    """Return the answer; the first is Enter's, the last is Escape's, and that of closing."""
+    """Return the answer; Enter gives the first one, Escape and closing give the last one."""
     box = _box(parent, QtWidgets.QMessageBox.Icon.Question, text, more)
     roles = QtWidgets.QMessageBox.ButtonRole
     buttons = {
@@ -143,7 +145,7 @@ def _box(parent: Any, icon: Any, text: str, more: str) -> Any:
     box = QtWidgets.QMessageBox(parent)
     box.setIcon(icon)
     box.setWindowTitle("segdeform")
-    box.setTextFormat(Qt.TextFormat.PlainText)  # names of files are no mark-up
+    box.setTextFormat(Qt.TextFormat.PlainText)  # a file name may look like HTML
     box.setText(text)
     box.setInformativeText(more)
     return box

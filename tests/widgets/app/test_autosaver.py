@@ -1,8 +1,8 @@
-"""The desktop program is killed, as by ``kill -9``, and nothing is lost but what is told here.
+"""The desktop program is killed, as by ``kill -9``, and its last autosave is recovered.
 
-A program in another process drags, or saves, and tells of every pose it had and of every one it
-kept.  After it is killed at some moment, a new window is asked to recover; what it then has is one
-of those poses to the last bit, no older than the last that was kept.
+A program in another process drags or saves, and reports every pose and every autosave.  It is
+killed at some moment; a new window then recovers one of those poses to the last bit, no older
+than the last autosave.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ MANY = pytest.mark.campaign
 
 
 class Program:
-    """The program that works in a folder, and what it told until it was killed."""
+    """The program that works in a folder, and its reports until it is killed."""
 
     def __init__(self, folder: Path):
         self._path = folder / "told"
@@ -44,12 +44,12 @@ class Program:
 
     @property
     def told(self) -> list[list[str]]:
-        """All lines that are whole, in words."""
+        """All complete lines, split into words."""
         lines = self._path.read_text().split("\n")[:-1] if self._path.exists() else []
         return [line.split() for line in lines]
 
     def wait_for(self, word: str, times: int = 1) -> list[list[str]]:
-        """Wait until it told of *word* so many times more than now, or at all if it is once."""
+        """Wait for *times* more reports of *word*, or for the first one if *times* is 1."""
         before = len(self.all(word)) if times > 1 else 0
         until(lambda: len(self.all(word)) >= before + times, word, 120.0)
         return self.all(word)
@@ -59,11 +59,11 @@ class Program:
 
     @property
     def poses(self) -> list[str]:
-        """The poses it had, in their order."""
+        """Its poses, in order."""
         return [pose for _, pose in self.all("pose")]
 
     def kill(self) -> None:
-        """Kill it as nothing can be killed more."""
+        """Kill it with SIGKILL."""
         os.kill(self._number, signal.SIGKILL)
         until(lambda: not is_alive(self._number), "its end")
 
@@ -78,7 +78,7 @@ def is_alive(number: int) -> bool:
 
 @pytest.fixture(scope="module")
 def programs():
-    """Return a callable that starts the program in a folder."""
+    """Return a function that starts the program in a folder."""
     application()  # or skip
     root = Path(__file__).resolve().parents[3]
     forks = subprocess.Popen(
@@ -92,7 +92,7 @@ def programs():
         return Program(folder)
 
     yield start
-    os.killpg(forks.pid, signal.SIGKILL)  # and all it started, also what was too late to be told
+    os.killpg(forks.pid, signal.SIGKILL)  # with all its children
     forks.stdin.close()
     forks.wait()
 
@@ -104,7 +104,7 @@ def folder(tmp_path) -> Path:
 
 
 def recovered(folder: Path) -> str | None:
-    """Start the program anew and recover what is offered; return its pose, None if nothing is."""
+    """Start the program again and recover; return the pose, or None if nothing is offered."""
     boxes = Boxes()
     boxes.answers.append("Recover")
     hand = AppHand(Window(settings_in(folder), Autosaves(folder / "unsaved")))
@@ -123,18 +123,16 @@ def recovered(folder: Path) -> str | None:
 
 
 def later(poses: list[str], pose: str) -> list[str]:
-    """Return a pose, and those that came after it."""
+    """Return a pose and all later ones."""
     return poses[poses.index(pose) :]
 
 
 @pytest.mark.parametrize("seed", [3, 4, *(pytest.param(k, marks=MANY) for k in range(5, 54))])
-def test_killed_in_a_drag_it_offers_the_last_pose_that_was_kept_or_a_later_one(
-    programs, folder, seed
-):
+def test_killed_in_a_drag_it_offers_the_last_saved_pose_or_a_later_one(programs, folder, seed):
     rests = seed % 4 == 0  # after a drag that was finished
     program = programs("rest" if rests else "drag", folder)
     ((_, finished),) = program.wait_for("finished")
-    assert Autosaves(folder / "unsaved").left() == []  # as long as it runs, it is its own
+    assert Autosaves(folder / "unsaved").abandoned() == []  # locked while the program runs
     if rests:
         time.sleep(random.Random(seed).uniform(0.0, 0.4))
         program.kill()
@@ -149,9 +147,9 @@ def test_killed_in_a_drag_it_offers_the_last_pose_that_was_kept_or_a_later_one(
 
 
 @pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=MANY) for k in range(2, 52))])
-def test_killed_while_it_saves_every_file_is_whole_and_old_or_new(programs, folder, seed):
+def test_killed_while_saving_every_file_is_complete_and_old_or_new(programs, folder, seed):
     program = programs("save", folder)
-    program.wait_for("saving", times=2)  # and one is saved
+    program.wait_for("saving", times=2)  # so that one has been saved
     time.sleep(random.Random(seed).uniform(0.0, 0.06))
     program.kill()
     saved = program.all("saved")[-1][1]

@@ -1,4 +1,4 @@
-"""The head of the panel: files, undo and redo, and the four modes."""
+"""The toolbar of the panel: files, undo and redo, and the four modes."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from typing import Any
 from qtpy import QtWidgets
 
 from ..editor import DeformEditor, Mode, exporting, opening, save, saving
-from .controls import choice_button, column, key_button, push_button, put, row, sentence
+from .controls import choice_button, column, key_button, push_button, put, row
 
 _SESSIONS = "Sessions (*.segdeform)"
 _MESHES = "*.obj *.off *.ply *.stl *.vtk *.vtp *.vtkhdf"
 _READ = f"Meshes and sessions (*.segdeform {_MESHES} *.vtu *.glb *.gltf);;All files (*)"
 
 
-class Head(QtWidgets.QWidget):
-    """Buttons over everything else; they are there in every mode.
+class Toolbar(QtWidgets.QWidget):
+    """The buttons at the top of the panel, the same in every mode.
 
     Parameters
     ----------
     editor : DeformEditor
-        Whose.
+        The editor to control.
     """
 
     def __init__(self, editor: DeformEditor) -> None:
         super().__init__()
         self._editor = editor
-        self.open = push_button("Open ...", "open a mesh or a session", "ctrl+o")
-        self.save = push_button("Save", "save the session, or the mesh as it is now", "ctrl+s")
+        self.open = push_button("Open ...", "Open a mesh or a session", "ctrl+o")
+        self.save = push_button("Save", "Save the session or the deformed mesh", "ctrl+s")
         self.open.clicked.connect(self.ask_and_open)
         menu = QtWidgets.QMenu(self.save)
         for text, do in (
@@ -51,16 +51,15 @@ class Head(QtWidgets.QWidget):
         self.layout().setContentsMargins(0, 0, 0, 0)
 
     def refresh(self) -> None:
-        """Show what can be undone, and the mode."""
+        """Show the steps to undo and redo, and the mode."""
         session, busy = self._editor.session, self._editor.is_busy
-        for button, label, what, key in (
-            (self.undo, session.undo_label, "undo", "Z"),
-            (self.redo, session.redo_label, "redo", "Y"),
+        for button, label, verb, key in (
+            (self.undo, session.undo_label, "Undo", "Z"),
+            (self.redo, session.redo_label, "Redo", "Y"),
         ):
             button.setEnabled(label is not None and not busy)
-            button.setToolTip(
-                sentence(f"{what} {label} ({key})" if label else f"nothing to {what}")
-            )
+            text = f"{verb}: {label} ({key})" if label else f"Nothing to {verb.lower()}"
+            button.setToolTip(text)
         for each in (self.open, self.save, *self.modes.values()):
             each.setEnabled(not busy)
         put(self.modes[self._editor.mode], True)
@@ -68,26 +67,26 @@ class Head(QtWidgets.QWidget):
     # Files.
 
     def ask_and_open(self) -> None:
-        """Ask for a file and go on with what is in it."""
+        """Ask for a file and open it."""
         path, _ = QtWidgets.QFileDialog.getOpenFileName(self, "Open", self._folder(), _READ)
-        if path and self.may_be_given_up():
+        if path and self.may_discard():
             self._editor.do(opening(Path(path)))
 
-    def may_be_given_up(self) -> bool:
-        """Tell whether what is there is saved; if it is not, ask."""
-        desk = self._editor.desk
-        if not desk.file.is_behind(desk.session):
+    def may_discard(self) -> bool:
+        """Return whether the session may be closed; ask if it has unsaved changes."""
+        controller = self._editor.controller
+        if not controller.file.is_modified(controller.session):
             return True
         buttons = QtWidgets.QMessageBox.StandardButton
         answer = QtWidgets.QMessageBox.question(
-            self, "Not saved", "What was done is not saved. Give it up?",
+            self, "Unsaved changes", "Discard unsaved changes?",
             buttons.Discard | buttons.Cancel, buttons.Cancel,
         )  # fmt: skip
         return bool(answer == buttons.Discard)
 
     def save_session(self) -> None:
-        """Save to the session's file; one that is somebody else's only after asking."""
-        if self._editor.desk.file.is_ours:
+        """Save to the session's file; ask before another existing file is replaced."""
+        if self._editor.controller.file.may_overwrite:
             self._editor.do(save)
         else:
             self.ask_and_save()
@@ -99,7 +98,7 @@ class Head(QtWidgets.QWidget):
             self._editor.do(saving(path if path.suffix else path.with_suffix(".segdeform")))
 
     def ask_and_export(self) -> None:
-        """Ask for a file and write the mesh there, as it is in this pose."""
+        """Ask for a file and write the posed mesh there."""
         proposed = str(self._editor.path.with_suffix(".ply"))
         path = self._path_to_write("Save mesh", proposed, f"Meshes ({_MESHES})")
         if path is not None:

@@ -1,7 +1,7 @@
-"""What hands do in the editor, kept as a text file; and what its deform mode shows, as a film.
+"""Recordings of the editor's input, as text files, and videos of its deform mode.
 
-A recording is to be replayed by somebody else.  So the session it begins with is written beside
-it, and its first lines are the keys that lead to the mode and the tool of that moment.
+A recording can be replayed on another machine: the session at its start is saved beside it, and
+its first lines are the keys that select the mode and the tool at that moment.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from vtk_segdeform.session import Session, save_session
 from ..recording import Film, Input, Recorder, require_film
 from ..scene import Stop, View
 
-_MOST_PICTURES = 1200  # a minute of film; larger ones fill the memory
+_MOST_FRAMES = 1200  # one minute of video; longer ones would fill the memory
 
 
-class Takes:
-    """At most one recording and one film of a view that are going on.
+class Recordings:
+    """At most one recording of the input and one video of a view at a time.
 
     Parameters
     ----------
     view : View
-        What is recorded and filmed.
+        The view to record.
     """
 
     def __init__(self, view: View) -> None:
@@ -39,71 +39,71 @@ class Takes:
 
     @property
     def is_recording(self) -> bool:
-        """Whether a recording is going on."""
+        """Whether the input is being recorded."""
         return self._recorder is not None
 
     @property
     def is_filming(self) -> bool:
-        """Whether a film is being taken."""
+        """Whether a video is being recorded."""
         return self._film is not None
 
     @property
-    def words(self) -> list[str]:
-        """What is going on, for people."""
-        return ["recording"] * self.is_recording + ["filming"] * self.is_filming
+    def labels(self) -> list[str]:
+        """Labels of the current recordings, for the status line."""
+        return ["recording input"] * self.is_recording + ["recording video"] * self.is_filming
 
-    def record(self, beside: Path, session: Session, keys: str) -> Path:
-        """Begin a recording; return the file.  *keys* lead to the mode and the tool of now.
+    def start_recording(self, beside: Path, session: Session, keys: str) -> Path:
+        """Start recording the input; return the file.  *keys* select the current mode and tool.
 
         Raises
         ------
         SessionError
-            If it, or the session it begins with, cannot be written; or in the midst of a drag.
+            If the file or its session cannot be written, or during a drag.
         """
         path = free_place(beside, ".recording.txt")
         if session.is_dragging:
-            raise SessionError("let go of what is dragged before a recording begins")
+            raise SessionError("Finish the drag before recording the input")
         save_session(path.with_suffix(".segdeform"), session)
-        session.start_afresh()  # as the session does that the replay loads
-        self._recorder = Recorder(self._view, path, keys=keys, skips=_is_ours)
+        session.start_afresh()  # as the session that the replay loads
+        self._recorder = Recorder(self._view, path, keys=keys, skips=_is_recording_key)
         self._path = path
         return path
 
     def end_recording(self) -> Path:
-        """Write no more; return the file."""
+        """Stop recording the input; return the file."""
         if self._recorder is not None:
             self._recorder.stop()
             self._recorder = None
         return self._path
 
-    def take(self, when: Callable[[], bool]) -> None:
-        """Begin a film of whatever is drawn *when* that is True."""
+    def start_film(self, when: Callable[[], bool]) -> None:
+        """Start a video of every frame drawn while *when* returns True."""
         film = Film(self._view)
-        self._stop_film = film.watch(lambda: len(film) < _MOST_PICTURES and when())
+        self._stop_film = film.watch(lambda: len(film) < _MOST_FRAMES and when())
         self._film = film
 
     def end_film(self) -> Film:
-        """Take no more pictures; return those there are."""
+        """Stop the video and return its frames."""
         if self._film is None or self._stop_film is None:
-            raise SessionError("no film is being taken")
+            raise SessionError("No video is being recorded")
         self._stop_film()
         film, self._film = self._film, None
         return film
 
     def remove(self) -> None:
-        """End all; a film that was not ended is given up."""
+        """Stop all recordings; a video that was not ended is discarded."""
         self.end_recording()
         if self.is_filming:
             self.end_film()
 
 
 def film_place(beside: Path) -> Path:
-    """Return where to write a film: an MP4 where that can be written, or else a GIF.
+    """Return the path of a new video: an MP4 file if possible, otherwise a GIF.
 
     Raises
     ------
     SessionError, MissingDependencyError
-        If none can be written there.
+        If neither can be written there.
     """
     path = free_place(beside, ".film.mp4")
     try:
@@ -115,16 +115,16 @@ def film_place(beside: Path) -> Path:
 
 
 def free_place(beside: Path, ending: str) -> Path:
-    """Return a path beside a session's file, of its name and *ending*, that is not taken."""
+    """Return an unused path beside a session's file, with its name and *ending*."""
     first, suffix = ending.rsplit(".", 1)
     for number in itertools.count(1):
         count = f"-{number}" if number > 1 else ""
         path = beside.with_name(f"{beside.stem}{first}{count}.{suffix}")
         if not os.path.lexists(path):
             return path
-    raise AssertionError  # there is always another number
+    raise AssertionError  # unreachable: `count` never ends
 
 
-def _is_ours(event: Any) -> bool:
-    """Tell whether an event is of the keys that begin and end takes, which no replay is to type."""
+def _is_recording_key(event: Any) -> bool:
+    """Return whether an event is of a key that starts or stops recordings; replays omit those."""
     return isinstance(event, Input) and event.control and (event.key or "").lower() in ("r", "m")

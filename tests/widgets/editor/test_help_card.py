@@ -1,0 +1,58 @@
+"""The help card: it fits into every window and is legible on every background."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hands import picture, plain_view
+
+from vtk_segdeform.widgets.editor.help_card import HelpCard
+
+SECTIONS = [
+    ("Everywhere", [("Ctrl+Z", "undo"), ("H", "this card"), ("Esc", "cancel")]),
+    ("Painting", [("B", "brush"), ("L", "lasso"), ("[  ]", "smaller, larger brush")]),
+]
+
+
+@pytest.mark.parametrize("size", [(300, 220), (800, 600), (600, 1000)])
+@pytest.mark.parametrize("background", [0.0, 1.0])
+def test_the_card_fits_into_the_window_and_is_legible_on_any_background(size, background):
+    view = plain_view(size)
+    view.renderer.SetBackground(background, background, background)
+    blank = picture(view)
+    card = HelpCard(view, SECTIONS)
+    assert (picture(view) == blank).all()
+    card.show()
+    seen = picture(view)
+    rows = np.flatnonzero((seen != blank).any(axis=(1, 2)))
+    columns = np.flatnonzero((seen != blank).any(axis=(0, 2)))
+    assert 0 < rows[0] < rows[-1] < size[1] - 1
+    assert 0 < columns[0] < columns[-1] < size[0] - 1
+    inside = seen[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].astype(int).sum(axis=2) / 3
+    assert (inside > 240).mean() > 0.5  # background of the card
+    assert (inside < 100).mean() > 0.01  # text
+    # The text keeps clear of the border: nothing is clipped.
+    edge = inside[4:-4, 4:-4]
+    assert (edge[:, [0, -1]] > 240).all()
+    assert (edge[[0, -1]] > 240).all()
+    card.hide()
+    assert (picture(view) == blank).all()
+    view.remove_front()
+
+
+def test_the_card_is_laid_out_again_when_the_window_grows():
+    view = plain_view((300, 220))
+    card = HelpCard(view, SECTIONS)
+    card.toggle()
+    assert card.is_shown
+    view.render()
+    view.window.SetSize(900, 700)
+    view.render()
+    seen = picture(view)
+    wide = np.flatnonzero((seen != 255).any(axis=(0, 2)))
+    assert abs((wide[0] + wide[-1]) / 2 - 450) < 3  # centred again
+    assert wide[-1] - wide[0] > 300
+    card.toggle()
+    assert not card.is_shown
+    card.remove()
+    view.remove_front()

@@ -1,0 +1,283 @@
+"""The controller of the editor: one session, its widgets, the mode, the running job and the file.
+
+One job runs at a time, and the widgets are off meanwhile: a session must not be used while another
+thread binds it.  Every error, in a callback or in a job, is shown in the status line until the
+next action succeeds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+from vtk_segdeform.kernels import advice
+from vtk_segdeform.progress import Progress
+from vtk_segdeform.session import Change, Session
+
+from ..recording import place_of
+from ..scene import View, Widget
+from .help_card import HelpCard, Section
+from .hints import hint
+from .job import Worker, view_timer
+from .log import Log
+from .messages import Messages
+from .mode import Mode
+from .recordings import Recordings
+from .session_file import SessionFile, read_all
+from .widget_set import WidgetSet
+
+T = TypeVar("T")
+
+
+class Controller:
+    """The object that every action of the editor receives.
+
+    Parameters
+    ----------
+    view : View
+        Where everything is drawn.
+    session : Session
+        The first session to edit.
+    keys : sequence of sections
+        The content of the help card.
+
+    Attributes
+    ----------
+    file : SessionFile
+        The file to save to and open from.
+    widgets : WidgetSet
+        The widgets over `session`; replaced when another session is opened.
+    help : HelpCard
+        The card with the keys.
+    messages : Messages
+        The status line.
+    log : Log
+        The drags and jobs so far, and how they ended.
+    recordings : Recordings
+        The current recording of input and of video.
+    """
+
+    def __init__(self, view: View, session: Session, keys: list[Section]) -> None:
+        self.view = view
+        self.help = HelpCard(view, keys)
+        self.messages = Messages(view)
+        self.messages.note(advice())
+        self.recordings = Recordings(view)
+        self._mode = Mode.REGIONS
+        self._is_on = False
+        self.log = Log()
+        self._worker = Worker(view_timer(view), self.log, self._job_changed)
+        self.widgets = WidgetSet(view, session)
+        self._listen()
+        self.file = SessionFile(Path("session.segdeform"), session)
+        self._stop_failures = view.on_failure(self._show_error)
+
+    @property
+    def session(self) -> Session:
+        """The session being edited; another one after `open`."""
+        return self.widgets.session
+
+    @property
+    def mode(self) -> Mode:
+        """The current mode; may be set even if the session is not ready for it."""
+        return self._mode
+
+    @mode.setter
+    def mode(self, mode: Mode) -> None:
+        self.widgets.finish()
+        self._mode = mode
+        self.messages.clear()
+        self._apply_mode()
+
+    @property
+    def is_on(self) -> bool:
+        """Whether the widgets respond to events, except while a job is running."""
+        return self._is_on
+
+    @is_on.setter
+    def is_on(self, on: bool) -> None:
+        self._is_on = on
+        try:
+            if not on:
+                self.help.hide()
+                self._worker.cancel()
+                self.wait()
+        finally:
+            self._apply_mode()
+
+    def remove(self) -> None:
+        """Remove everything from the view, permanently."""
+        self.is_on = False
+        self._stop_listening()
+        self._stop_failures()
+        self.log.unfollow()
+        self.recordings.remove()
+        self.widgets.remove()
+        self.help.remove()
+        self.messages.remove()
+        self.view.remove_front()
+
+    # Messages.
+
+    @property
+    def status(self) -> str:
+        """Text of the status line."""
+        return self.messages.text
+
+    def say(self, text: str) -> None:
+        """Show the result of an action, before the hint for the next step."""
+        self.messages.note(text)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Update the status line."""
+        mode = " · ".join([f"{self._mode.value} {self._mode.name}", *self.recordings.labels])
+        job = self._worker.job
+        if job is not None:
+            self.messages.show_progress(
+                mode, self._worker.text, job.fraction, is_cancelled=job.is_cancelled
+            )
+        elif self._is_on:
+            self.messages.show(mode, hint(self.widgets, self._mode))
+        else:
+            self.messages.hide()
+
+    @contextmanager
+    def clean_view(self) -> Iterator[None]:
+        """Draw the view without status line and gizmos inside a ``with`` block."""
+        self.widgets.switch_off()
+        self.messages.hide()
+        self.view.render()
+        try:
+            yield
+        finally:
+            self._apply_mode()
+
+    def _show_error(self, error: Exception) -> None:
+        self.messages.report_error(error)
+        self.refresh()
+
+    def _listen(self) -> None:
+        self.log.follow(self.session)
+        self._stop_listening = self.session.on_change(self._session_changed)
+        for widget in self.widgets.interactive:
+            widget.AddObserver("EndInteractionEvent", self._gesture_ended)
+
+    def _gesture_ended(self, widget: Widget, _: str) -> None:
+        if widget.remark:
+            self.messages.note(widget.remark)
+        self.refresh()
+
+    def _session_changed(self, change: Change) -> None:
+        if change & Change.HISTORY:
+            self.messages.clear()
+        replaced = change & Change.POSE and change & (Change.REGIONS | Change.CAGES)
+        if replaced and self.session.state.pose is None:
+            self.messages.note("Pose reset: the regions or cages have changed")
+        if change & Change.REGIONS:
+            self.widgets.choose_region(self.widgets.selector.region)
+        self.refresh()
+
+    # Jobs.
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a job is running."""
+        return self._worker.job is not None
+
+    @property
+    def refusal(self) -> str:
+        """Why an action is refused while a job is running."""
+        return self._worker.refusal
+
+    def start(
+        self, name: str, work: Callable[[Progress], T], done: Callable[[T], str | None]
+    ) -> None:
+        """Run *work* in another thread, then *done* here; show and log the outcome it returns.
+
+        An ongoing drag or stroke is finished before the work starts.  See `Worker.start`.
+        """
+
+        def deliver(result: T) -> str | None:
+            outcome = done(result)
+            if outcome:
+                self.messages.note(outcome)
+            self._apply_mode()
+            return outcome
+
+        self.widgets.finish()  # before the job starts, because it may fail
+        self._worker.start(name, work, deliver)
+        self.widgets.switch_off()
+        self.refresh()
+
+    def wait(self) -> None:
+        """Block until no job is running; for scripts."""
+        self._worker.wait()
+
+    def cancel(self) -> None:
+        """Cancel the job, or else the ongoing drag or stroke, or else close the help card."""
+        if self.is_busy:
+            self._worker.cancel()
+            self.refresh()
+        elif not self.widgets.cancel():
+            self.help.hide()
+
+    def refuse(self) -> None:
+        """Show that the running job must end, or be cancelled, before anything else."""
+        self._worker.refuse()
+        self.refresh()
+
+    def prepare(self) -> None:
+        """Start in the background what the first drag, or the overlay, would wait for."""
+        widgets, session = self.widgets, self.session
+        if not self._is_on or self.is_busy:
+            return
+        if self._mode is Mode.DEFORM and session.is_ready and not session.is_bound:
+            self.start("Binding mesh to cages", widgets.bind, lambda _: None)
+        elif widgets.wants_overlay(self._mode) and not widgets.overlay.is_prepared:
+            self.start("Measuring local volume change", widgets.measure, lambda _: None)
+
+    def _job_changed(self) -> None:
+        if not self.is_busy:
+            self._switch_widgets()
+        self.refresh()
+
+    def _apply_mode(self) -> None:
+        """Apply the current mode."""
+        self._switch_widgets()
+        self.prepare()
+        self.refresh()
+
+    def _switch_widgets(self) -> None:
+        if self._is_on and not self.is_busy:
+            self.widgets.enter(self._mode)
+        else:
+            self.widgets.switch_off()
+
+    # Files.
+
+    @property
+    def place(self) -> Path:
+        """The path of `file`, or its counterpart in a replay; see `place_of`."""
+        return place_of(self.view.interactor, self.file.path)
+
+    def save(self) -> None:
+        """Write the session to the file."""
+        place = self.place
+        self.file.write(self.session, place)
+        self.say(f"Saved to {place}")
+
+    def open(self, path: Path) -> None:
+        """Read the session or the mesh in *path* as a job, and then edit that."""
+
+        def replace(opened: tuple[Session, Any]) -> str:
+            session, surface = opened
+            self.widgets = self.widgets.replaced_by(session)
+            self._stop_listening()
+            self._listen()
+            self.file.opened(path, session, surface)
+            return f"Opened {path}"
+
+        self.start(f"Opening {path}", lambda progress: read_all(path, progress), replace)

@@ -1,0 +1,121 @@
+"""The messages in the status line: the last result and the next step, or an error.
+
+A result stays until the next action; so does an error, which replaces everything else.  Other
+views of the messages, such as a panel, subscribe with `Messages.on_change`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from vtk_segdeform.errors import SegDeformError
+
+from ..scene import Stop, View
+from .status_line import StatusLine
+
+
+def error_text(error: BaseException) -> str:
+    """Return the message of an error, preceded by its type if it is an internal error.
+
+    >>> error_text(ValueError("too far")), error_text(KeyError())
+    ('too far', 'Internal error: KeyError')
+    """
+    if isinstance(error, SegDeformError | ValueError) and str(error):
+        return str(error)
+    return f"Internal error: {', '.join(filter(None, (type(error).__name__, str(error))))}"
+
+
+class Messages:
+    """The messages of an editor, shown in the status line of its view.
+
+    Parameters
+    ----------
+    view : View
+        Where the line is drawn.
+    """
+
+    def __init__(self, view: View) -> None:
+        self._line = StatusLine(view)
+        self._note = self._error = self._question = self._last_question = ""
+        self._listeners: dict[int, Callable[[], object]] = {}
+
+    @property
+    def text(self) -> str:
+        """Text of the status line."""
+        return self._line.text
+
+    @property
+    def last_note(self) -> str:
+        """Result of the last action, or ""."""
+        return self._note
+
+    @property
+    def error(self) -> str:
+        """The error that is shown, or ""."""
+        return self._error
+
+    @property
+    def fraction(self) -> float | None:
+        """Completed fraction of the job that is shown, 0..1; None if there is none."""
+        return self._line.fraction
+
+    def on_change(self, listener: Callable[[], object]) -> Stop:
+        """Call *listener* whenever messages are shown, even if unchanged, until stopped."""
+        key = max(self._listeners, default=0) + 1
+        self._listeners[key] = listener
+
+        def stop() -> None:
+            self._listeners.pop(key, None)
+
+        return stop
+
+    def note(self, text: str) -> None:
+        """Set the result of the last action; this clears an error."""
+        self._note, self._error = text, ""
+
+    def report_error(self, error: Exception) -> None:
+        """Set the error."""
+        self._error = error_text(error)
+
+    def clear(self) -> None:
+        """Clear the result, the error and any question asked before the last one."""
+        self._last_question, self._question = self._question, ""
+        self._note = self._error = ""
+
+    def confirms(self, question: str) -> bool:
+        """Return whether *question* was asked just before; otherwise ask it."""
+        if self._last_question == question:
+            return True
+        self._question = question
+        self.note(question)
+        return False
+
+    def show(self, mode: str, hint: str) -> None:
+        """Show the error, or else the result and *hint*, the next step in *mode*."""
+        if self._error:
+            self._line.warn(self._error, mode)
+        else:
+            note = "" if self._note in hint else self._note  # the hint may contain it
+            self._line.say(" · ".join(filter(None, (note, hint))), mode)
+        self._notify()
+
+    def show_progress(self, mode: str, text: str, fraction: float, *, is_cancelled: bool) -> None:
+        """Show the progress of a job and how to cancel it."""
+        if is_cancelled:
+            self.note("Cancelled. Nothing was changed")  # shown once the job has ended
+        key = "Stopping ..." if is_cancelled else "Esc to cancel"
+        self._line.progress(fraction, f"{text} · {100.0 * fraction:.0f} % · {key}", mode)
+        self._notify()
+
+    def hide(self) -> None:
+        """Hide the line until something is shown again."""
+        self._line.say("")
+        self._notify()
+
+    def remove(self) -> None:
+        """Remove the line from the view, permanently."""
+        self._line.remove()
+
+    def _notify(self) -> None:
+        for listener in list(self._listeners.values()):
+            listener()
