@@ -32,8 +32,8 @@ from .cages import Cage, fit_cages, mean_value_coordinates
 from .deformer import Deformer, deform
 from .geometry import local_volume_change
 from .mesh import Mesh, find_faults
+from .mesh_repair import repair
 from .regions import Regions, segment
-from .repair import repair
 from .session import Change, Options, Session, load_session, save_session
 from .solver import Solution, Status
 from .version import __version__ as __version__
