@@ -16,7 +16,7 @@ import pytest
 
 import vtk_segdeform as sd
 from vtk_segdeform import widgets
-from vtk_segdeform.cli.main import _parser, _with_signed_vectors
+from vtk_segdeform.cli.main import _parser, _with_signed_vectors, command
 from vtk_segdeform.errors import MissingDependencyError
 from vtk_segdeform.io import meshlab
 from vtk_segdeform.io.convert import is_mesh_file
@@ -176,7 +176,7 @@ def test_the_tables_of_keys_are_made_of_the_editors_own():
 )
 def test_every_command_that_a_page_tells_of_is_understood(line):
     words = _with_signed_vectors(shlex.split(line))
-    assert callable(_parser().parse_args(words).run)
+    assert callable(command(_parser().parse_args(words).command))
 
 
 def test_files_that_are_said_to_be_read_are():

@@ -47,6 +47,11 @@ class Ratio:
     at_most: bool = True
 
     @property
+    def bound(self) -> str:
+        """The limit as text: "at most 1"."""
+        return f"at {'most' if self.at_most else 'least'} {self.limit:.3g}"
+
+    @property
     def verdict(self) -> str:
         """Whether it holds, in one word."""
         if math.isnan(self.value):
