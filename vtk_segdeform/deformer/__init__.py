@@ -8,12 +8,10 @@ The files, in reading order:
     binding_cache    bindings kept on disk
 """
 
-from .binding_cache import cache_folder
 from .deform import deform
 from .deformer import Deformer
 
 __all__ = [
     "Deformer",
-    "cache_folder",
     "deform",
 ]

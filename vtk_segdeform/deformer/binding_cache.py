@@ -15,7 +15,6 @@ import functools
 import logging
 import os
 import re
-import sys
 from contextlib import suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -110,20 +109,6 @@ class Binding:
             _make_room(path.parent)
         except OSError as fault:  # full disk or read-only folder: go without the file
             _warn_once(path, f"not written, {fault.strerror or fault}")
-
-
-def cache_folder() -> Path | None:
-    """Return where this user's programs keep bindings; None if ``SEGDEFORM_CACHE`` is 0."""
-    chosen = os.environ.get("SEGDEFORM_CACHE", "")
-    if chosen:
-        return None if chosen == "0" else Path(chosen)
-    if sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "segdeform" / "bound"
 
 
 def _read(path: Path) -> dict[str, Any]:

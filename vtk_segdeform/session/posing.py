@@ -19,8 +19,9 @@ from types import MappingProxyType
 import numpy as np
 
 from ..arrays import FloatArray, frozen
-from ..deformer import Deformer, cache_folder
+from ..deformer import Deformer
 from ..errors import CageError, ConstraintError
+from ..files import cache_folder
 from ..geometry import signed_volume, volume_gradient
 from ..mesh import Mesh
 from ..progress import Progress, part, tell
