@@ -13,7 +13,7 @@ from scenes import sausage
 from vtk_segdeform import Deformer, Mesh, Regions, Session
 from vtk_segdeform.deformer import binding, binding_cache
 from vtk_segdeform.errors import Cancelled
-from vtk_segdeform.session import posing
+from vtk_segdeform.session import pose_solver
 from vtk_segdeform.solver import coarse_volume
 
 SCENE = sausage(2)
@@ -147,7 +147,7 @@ def test_what_was_not_used_for_longest_goes_first(tmp_path, monkeypatch):
 
 def test_a_session_over_a_large_mesh_keeps_its_binding(tmp_path, counted, monkeypatch):
     monkeypatch.setenv("SEGDEFORM_CACHE", str(tmp_path))
-    monkeypatch.setattr(posing, "_DEAR", 100)
+    monkeypatch.setattr(pose_solver, "_CACHED_SIZE", 100)
     for _ in range(2):
         session = Session(SCENE.mesh)
         session.set_regions(SCENE.regions)

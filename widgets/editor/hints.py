@@ -6,7 +6,7 @@ made from where one stands.
 
 from __future__ import annotations
 
-from vtk_segdeform.session import Session, called
+from vtk_segdeform.session import Session, region_name
 from vtk_segdeform.solver import Status
 
 from ..region_selector import Paint, Tool
@@ -51,7 +51,7 @@ def _of_painting(stage: Stage) -> str:
     if selector.paints is Paint.REGION:
         new = selector.region >= stage.n_regions
         name = stage.session.region_name(selector.region)
-        what = brief(name, called((), selector.region)) + (" (new)" if new else "")
+        what = brief(name, region_name((), selector.region)) + (" (new)" if new else "")
     elif selector.paints is Paint.FIXED:
         what = "what stays fixed"
     else:

@@ -450,11 +450,11 @@ def test_without_numba_the_status_line_says_so_until_the_first_action(monkeypatc
 
 def test_what_goes_wrong_is_said_until_something_succeeds(desk):
     desk.hand.click(desk.hand.at([-2.0, 0.0, 0.0]), control=True)  # out of the only region there
-    assert "in no region but region 1" in desk.editor.status
+    assert "are only in region 1" in desk.editor.status
     assert [type(failure).__name__ for failure in desk.hand.failures] == ["RegionError"]
     desk.hand.failures.clear()
     desk.hand.hover((5, 5))
-    assert "in no region but region 1" in desk.editor.status
+    assert "are only in region 1" in desk.editor.status
     desk.hand.click(desk.hand.at([1.0, -0.7, 0.0]))
     assert desk.session.undo_label == "paint region 1"
     assert desk.editor.status.startswith("brush for region 1")
@@ -673,10 +673,10 @@ def test_a_file_that_is_no_session_leaves_everything_as_it_was(desk, tmp_path):
     desk.editor.path = path
     desk.type("ctrl+o")
     assert desk.session is first
-    assert "no readable session" in desk.editor.status
+    assert "not a readable session" in desk.editor.status
     assert len(desk.hand.failures) == 1
     desk.hand.failures.clear()
-    with pytest.raises(Exception, match="no readable session"):
+    with pytest.raises(Exception, match="not a readable session"):
         desk.editor.load(path)
     assert desk.session is first
     desk.type("4")

@@ -491,7 +491,7 @@ def test_a_handle_that_goes_in_mid_drag_ends_the_drag(bench):
         bench.hand.move(place + [30.0, 0.0])
         assert not bench.dragger.is_grabbing
         bench.hand.release(place)
-        while bench.session.undo_label != "mark handle 2":
+        while bench.session.undo_label != "set handle 2":
             bench.session.undo()
     bench.hand.press(place)
     bench.session.remove_handle(bench.dragger.handle)
