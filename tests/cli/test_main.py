@@ -213,7 +213,7 @@ def test_the_interactive_bench_drags_in_a_window_and_splits_the_time_of_an_event
     assert int(cells[" steps "]) >= 1
 
 
-def test_bench_leaves_a_report_and_says_what_does_not_hold(tmp_path, capsys):
+def test_bench_writes_a_report_and_prints_the_ratios(tmp_path, capsys):
     size = ["--quick", "--size", "800", "--cage-vertices", "60"]
     assert main(["bench", *size, "--only", "table1", "-o", str(tmp_path / "out")]) == 0
     written = (tmp_path / "out" / "report.md").read_text()
@@ -221,7 +221,7 @@ def test_bench_leaves_a_report_and_says_what_does_not_hold(tmp_path, capsys):
     assert "800 vertices, 60 cage vertices" in written
     told = capsys.readouterr().out.splitlines()
     assert told[-1].endswith("report.md")
-    assert sum("gain of the products with W" in line for line in told) == 2
+    assert sum("speed-up of products with W" in line for line in told) == 2
 
 
 def test_bench_records_a_run_and_plots_the_history(tmp_path, capsys, monkeypatch):

@@ -217,7 +217,7 @@ def test_a_region_cannot_be_emptied(desk):
     desk.hand.drag([(2, 2), (398, 398)], control=True)
     error = desk.hand.failures.pop()
     assert isinstance(error, RegionError)
-    assert "region 1 would be empty; merge it" in str(error)
+    assert "region 1 would become empty; merge it" in str(error)
     assert desk.session.regions is regions
 
 
