@@ -1,4 +1,4 @@
-"""The experiments of `segdeform bench` at tiny sizes: what they hand over, not how fast it was."""
+"""Experiments of `segdeform bench` at tiny sizes: their results, not their times."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def deformer(task):
 
 @pytest.fixture(autouse=True)
 def without_peers(monkeypatch):
-    """Hide what may or may not be installed; and the benchmark's poses."""
+    """Hide optional programs and the benchmark poses."""
     for name in ("igl", "open3d", "bpy", "gpytoolbox", "gpytoolbox.copyleft", "igl.copyleft"):
         monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.delenv("SEGDEFORM_DATA", raising=False)
@@ -64,7 +64,7 @@ def without_peers(monkeypatch):
 
 @pytest.fixture
 def steady(monkeypatch):
-    """Let no other work of the machine into the cost of a step, which may then be unknown."""
+    """Replace the measured time of a step, which is NaN on a busy machine, by a constant."""
     for module in (segmentation_study, table_one, frame_profile):
         monkeypatch.setattr(module, "seconds_per_step", lambda cases, *_, **__: [1e-3] * len(cases))
 

@@ -1,4 +1,4 @@
-"""The command line as a person meets it: what it prints, writes and returns."""
+"""Commands: printed lines, written files and exit codes."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def bar_file(bar, tmp_path_factory) -> str:
 
 
 def lines(text: str) -> dict[str, str]:
-    """Return the lines of a report by their first word."""
+    """Return the printed lines by their first word."""
     return {line.split()[0]: line for line in text.splitlines() if line.strip()}
 
 
@@ -341,10 +341,10 @@ def test_python_m_is_the_same_program():
 
 
 class Terminal(io.StringIO):
-    """A stream that a person watches."""
+    """A stream that is a terminal."""
 
     def isatty(self) -> bool:
-        """Say so."""
+        """Return True."""
         return True
 
 

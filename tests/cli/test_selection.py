@@ -1,4 +1,4 @@
-"""Selections told in words are the vertices they say, and nonsense is refused with the grammar."""
+"""Selections parsed from text; errors of invalid text contain the grammar."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vtk_segdeform.mesh.mesh import Mesh
 
 @pytest.fixture(scope="module")
 def ball() -> Mesh:
-    """Return a turned, shifted and stretched sphere: tidy coordinates hide faults."""
+    """Return a rotated, translated and stretched sphere; simple coordinates could hide faults."""
     vertices, faces = icosphere(2)
     turned = vertices @ rotation([1.0, 2.0, 3.0], 0.7).T
     return Mesh(turned * [1.0, 2.0, 3.0] + [10.0, -5.0, 0.5], faces)

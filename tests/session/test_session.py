@@ -1,4 +1,4 @@
-"""A session: every step can be undone, the volume is exact at every move, nobody is forgotten."""
+"""Sessions: undo, exact volume at every move, and notification of every listener."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def ready(**options) -> Session:
 
 
 def snapshot(session: Session) -> list[bytes]:
-    """Return everything that is to be seen of a session, to the last bit."""
+    """Return the visible state of a session, as bytes."""
     regions = session.regions
     seen = [b"none" if regions is None else regions.membership.tobytes()]
     seen += [cage.vertices.tobytes() + cage.faces.tobytes() for cage in session.cages]
@@ -64,7 +64,7 @@ def up(z: float) -> np.ndarray:
 
 
 def one_action(session: Session, rng: np.random.Generator) -> None:
-    """Do something at random; some of it is not possible, which must change nothing."""
+    """Perform a random action; an invalid one must change nothing."""
     some = rng.choice(len(X), 40, replace=False)
     region, subtract = int(rng.integers(3)), bool(rng.integers(2))
     free = np.setdiff1d(some, np.concatenate([session.fixed, session.state.handle]))

@@ -1,4 +1,4 @@
-"""A session in a file: the same again bit for bit, and nothing but an error from a damaged one."""
+"""Session files: bitwise identical after loading; damaged files raise a SessionError."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SCENE = sausage(2)
 
 
 def posed() -> Session:
-    """Return a session with something of everything."""
+    """Return a session with regions, cages, fixed vertices, handles and a pose."""
     options = Options(n_cage_vertices=77, offset=0.25, stretch=2.5, rotation_groups=None)
     session = Session(SCENE.mesh, state=State(options=options))
     session.set_regions(Regions(SCENE.mesh, SCENE.regions.membership, smoothness=1.5))
@@ -46,7 +46,7 @@ def posed() -> Session:
 
 
 def tiny(pose: bool = True) -> Session:
-    """Return a session of six vertices, so that a file of it can be broken in every place."""
+    """Return a session of six vertices, small enough to damage its file at every byte."""
     session = Session(Mesh(*OCTAHEDRON))
     session.set_regions(Regions.single(session.mesh))
     session.set_cages([Cage(4.0 * TETRAHEDRON[0], TETRAHEDRON[1])])
@@ -62,7 +62,7 @@ TINY = tiny()
 
 
 def same(a: Session, b: Session) -> bool:
-    """Tell whether two sessions cannot be told apart."""
+    """Return whether two sessions are equal."""
     one, other = a.state, b.state
     arrays = [(a.mesh.vertices, b.mesh.vertices), (a.mesh.faces, b.mesh.faces)]
     arrays += [(a.vertices, b.vertices), (one.fixed, other.fixed)]
@@ -220,7 +220,7 @@ def test_a_replaced_file_keeps_its_mode_and_a_link_stays_a_link(tmp_path):
 
 
 def refuse(content: bytes, folder: Path) -> str:
-    """Return what is said of a file with *content*, which must be refused."""
+    """Return the message of the error for a file with *content*."""
     (folder / "broken.npz").write_bytes(content)
     with pytest.raises(SegDeformError, match=r"broken\.npz: is not a readable session") as caught:
         load_session(folder / "broken.npz")
@@ -286,7 +286,7 @@ def test_an_impossible_name_is_told(name, tmp_path):
 
 
 def rewritten(content: bytes, *, compress: bool = False, **changes) -> bytes:
-    """Return the archive with some members as they are in *changes*; header ones as a dict."""
+    """Return the archive with the members in *changes* replaced; header entries are a dict."""
     written = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(written, "w") as new:
         for name in old.namelist():
@@ -418,7 +418,7 @@ def test_the_size_is_that_of_the_open_file(tmp_path, monkeypatch):
 
 
 def sparse(path, size, n):
-    """Write a session of *n* vertices whose arrays are a hole of *size* bytes in a sparse file."""
+    """Write a session of *n* vertices to a sparse file of *size* bytes without array data."""
     save_session(path, TINY)
     with zipfile.ZipFile(path) as archive:
         header = json.loads(archive.read("header.json"))

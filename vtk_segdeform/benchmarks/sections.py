@@ -56,7 +56,7 @@ class Ratio:
     at_most: bool = True
 
     @property
-    def prepare(self) -> str:
+    def limit_text(self) -> str:
         """The limit as text: "at most 1"."""
         return f"at {'most' if self.at_most else 'least'} {self.limit:.3g}"
 

@@ -44,9 +44,9 @@ def bench(options: Namespace, say: Say, progress: Progress) -> bool:
     sections = write_report(options.output, scale, options.only, progress)
     ratios = [ratio for section in sections for ratio in section.ratios]
     for ratio in ratios:
-        say(f"{ratio.verdict.strip('*'):15} {ratio.what}: {ratio.value:.3g} ({ratio.bound})")
+        say(f"{ratio.verdict.strip('*'):15} {ratio.what}: {ratio.value:.3g} ({ratio.limit_text})")
     for section in sections:
-        for line in section.absent:
+        for line in section.skipped:
             say(f"not measured    {line}")
     if options.record:
         record(options.record, scale.name, ratios)
