@@ -138,7 +138,7 @@ def _ratios(profiles: list[Profile]) -> list[Ratio]:
         allowed = max(_MAX_FRAME, _MAX_READS * largest.read)
         ratios.append(Ratio("peak memory of set-up at 1,000,000 vertices, GB", largest.memory, 2.0))
         ratios.append(Ratio("frame at 1,000,000 vertices, ms", largest.frame, allowed))
-        what = f"time per solver step, 1,000,000 / {profiles[0].vertices:,} vertices, by turns"
+        what = f"time per solver step, 1,000,000 / {profiles[0].vertices:,} vertices"
         ratios.append(Ratio(what, largest.step / largest.smallest_step, 1.5))
     worst = max(p.volume_change for p in profiles)
     return [*ratios, Ratio("largest volume change of all frames", worst, 1e-12)]

@@ -67,7 +67,7 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
             poses[case] = solution.vertices
             rows.append(row_of(case, task.mesh, solution))
         section.tables.append(Table(COLUMNS, rows, f"{name}: {task.name}"))
-        caption = f"{name.capitalize()}: {', '.join(poses)}; coloured by distortion."
+        caption = f"{name.capitalize()}: {'; '.join(poses)}. Coloured by distortion."
         draw = partial(_draw, mesh=task.mesh, poses=poses)
         section.figures.append(Figure(f"{name.replace(' ', '-')}.png", caption, draw))
     return section

@@ -85,8 +85,8 @@ def profiled(size: int, scale: Scale) -> Profile:
         prepared = prepare(task, 3, scale.n_cage_vertices, cache=cache)
         memory = peak_memory()
         deformer = prepared.deformer
-        subspace = deformer.regions, deformer.cages
-        reopen = timed(lambda: make_deformer(task, *subspace, cache=cache))[1]
+        regions, cages = deformer.regions, deformer.cages
+        reopen = timed(lambda: make_deformer(task, regions, cages, cache=cache))[1]
         smallest_task = bent_cactus(scale.drag_sizes[0])
         smallest = prepare(smallest_task, 3, scale.n_cage_vertices).deformer, smallest_task
     time.sleep(_PAUSE)
@@ -94,7 +94,7 @@ def profiled(size: int, scale: Scale) -> Profile:
     drag = list(frames(deformer, drag_path(task, scale.frames)))[1:]
     reads += [timed(lambda: _read(deformer.subspace))[1] for _ in range(scale.repeats)]
     pose = drag[-1].solution.vertices
-    cages = drag[-1].solution.cage_vertices
+    cage_vertices = drag[-1].solution.cage_vertices
     whole = total_volume(task.mesh)
     steps = seconds_per_step([smallest, (deformer, task)], scale.repeats)
     try:
@@ -112,7 +112,7 @@ def profiled(size: int, scale: Scale) -> Profile:
         steps=int(median(frame.steps for frame in drag)),
         step=1e3 * steps[1],
         smallest_step=1e3 * steps[0],
-        map=1e3 * median_seconds(lambda: deformer.surface(cages), scale.repeats),
+        map=1e3 * median_seconds(lambda: deformer.surface(cage_vertices), scale.repeats),
         volume=1e3 * median_seconds(lambda: whole.violation(pose), scale.repeats),
         normals=1e3 * normals,
         render=1e3 * render,

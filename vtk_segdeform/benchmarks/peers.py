@@ -84,7 +84,7 @@ def methods(n_vertices: int) -> dict[str, Callable[[Task, int], Answer]]:
 
 
 def ours(task: Task, most: int, *, n_regions: int, n_vertices: int) -> Answer:
-    """Solve *task* by a `Deformer` to its own tolerance, in at least 500 iterations if needed."""
+    """Solve *task* by a `Deformer` to its own tolerance, which takes fewer than 500 steps."""
     warm_up()
     prepared = prepare(task, n_regions, n_vertices, max_steps=max(most, 500))
     solution, seconds = timed(lambda: prepared.deformer.solve(task.targets))

@@ -61,20 +61,20 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
     task, n = bent_cactus(scale.paper_size), scale.n_cage_vertices
     tables, ratios, text, changes = [], [], [], []
     for k, (name, options) in enumerate({"paper": PAPER, "ours": {}}.items()):
-        prepared = []
+        cases = []
         for n_regions in (1, 3):
             if progress:
                 progress(0.5 * k + 0.25 * (n_regions == 3), f"table 1, {name}, {n_regions} regions")
             extra = {**options, "as_printed": bool(options) and n_regions > 1}
-            prepared.append(prepare(task, n_regions, n, **extra))
-        products = [_products(prepared, plain=bool(options)) for prepared in prepared]
+            cases.append(prepare(task, n_regions, n, **extra))
+        products = [_products(case, plain=bool(options)) for case in cases]
         product_times = by_turns(products, _ROUNDS * scale.repeats)
-        drags = [(prepared.deformer, task) for prepared in prepared]
+        drags = [(case.deformer, task) for case in cases]
         many = {"many": MANY_PAPER_STEPS} if options else {}
         steps = seconds_per_step(drags, scale.repeats, **many)
         one, three = (
-            case_of(prepared, task, scale, plain=bool(options), taken=(step, seconds / _STEPS))
-            for prepared, step, seconds in zip(prepared, steps, product_times, strict=True)
+            measured(case, task, scale, plain=bool(options), taken=(step, seconds / _STEPS))
+            for case, step, seconds in zip(cases, steps, product_times, strict=True)
         )
         tables.append(_table(name, one, three))
         changes.append((name, one.volume_change, three.volume_change))
@@ -97,7 +97,7 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
     return Section("Table 1: one cage and three regions", text, tables, ratios=ratios)
 
 
-def case_of(
+def measured(
     prepared: Prepared, task: Task, scale: Scale, *, plain: bool, taken: tuple[float, float]
 ) -> Case:
     """Return the measurements of a deformer; *plain* is the paper's formulation.

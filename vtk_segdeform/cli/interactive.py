@@ -103,13 +103,13 @@ def _row(size: int, n_cage_vertices: int, moves: int, progress: Progress | None)
             began = time.perf_counter()
             _send(view.interactor, "MouseMoveEvent", start + [across, 0.0])
             ended = time.perf_counter()
-            solved, mapped, told = stamps[:3]
+            solved, mapped, overlaid = stamps[:3]
             # The event updates the normals as part of the map: time them by a second update.
             again = time.perf_counter()
             surface.update_normals()
             normals = time.perf_counter() - again
             shown = max(mapped - solved - normals, 0.0)
-            spent = (solved - began, shown, told - mapped, normals, ended - told)
+            spent = (solved - began, shown, overlaid - mapped, normals, ended - overlaid)
             for stage, seconds in zip(_STAGES, spent, strict=True):
                 times[stage].append(1e3 * seconds)
             times["event"].append(1e3 * (ended - began))
