@@ -33,7 +33,24 @@ del _Path, _root
 from .version import __version__ as __version__
 
 if _TYPE_CHECKING:
-    from . import errors, models
+    from . import (  # noqa: F401
+        cages,
+        deformer,
+        energy,
+        errors,
+        filters,
+        geometry,
+        io,
+        mesh,
+        mesh_repair,
+        models,
+        pictures,
+        regions,
+        session,
+        solver,
+        subspace,
+        widgets,
+    )
     from .cages import Cage, fit_cages, mean_value_coordinates
     from .deformer import Deformer, deform
     from .geometry import local_volume_change
@@ -45,7 +62,7 @@ if _TYPE_CHECKING:
     from .solver import Solution, Status
     from .widgets.plugin import edit
 
-# The module that each public name is imported from.
+# The module from which each public name is imported.
 _MODULE_OF = {
     "Cage": "cages",
     "Change": "session",

@@ -650,7 +650,7 @@ def test_what_is_handed_in_can_be_written_to_afterwards():
 
 NEAR = VERTICES[SCENE.handle]
 WRONG = [
-    (lambda s: s.drag({"nose": NEAR}), ConstraintError, "no handle 'nose'; handles: 'tip'"),
+    (lambda s: s.drag({"nose": NEAR}), ConstraintError, "no handle 'nose'; the handles are 'tip'"),
     (lambda s: s.drag(NEAR[:-1]), ConstraintError, "targets of all handles must be"),
     (lambda s: s.drag(NEAR * np.nan), ConstraintError, "NaN or infinite"),
     (lambda s: s.drag(NEAR + 1e9), ConstraintError, "mesh diagonals away"),

@@ -45,7 +45,7 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
                 progress(k / len(scale.cage_sizes), f"{name}: cage of {size} vertices")
             try:
                 surface, seconds = run_in(
-                    scale.own_process, made, make, mesh, scale.n_cage_vertices
+                    scale.own_process, timed_cage, make, mesh, scale.n_cage_vertices
                 )
             except (SegDeformError, RuntimeError, ValueError, IndexError) as fault:
                 section.skipped.append(f"{name}, {size} vertices: {fault}")
@@ -102,7 +102,7 @@ MAKERS: dict[str, Callable[[Mesh, int], Surface]] = {
 }
 
 
-def made(make: Callable[[Mesh, int], Surface], mesh: Mesh, n: int) -> tuple[Surface, float]:
+def timed_cage(make: Callable[[Mesh, int], Surface], mesh: Mesh, n: int) -> tuple[Surface, float]:
     """Return a cage and its seconds, excluding imports."""
     make(cactus(500), 60)
     return timed(lambda: make(mesh, n))

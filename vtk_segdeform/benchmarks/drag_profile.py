@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import MissingDependencyError
 from ..progress import Progress, part
 from . import charts
-from .frame_profile import Profile, profiled
+from .frame_profile import Profile, profile_of
 from .measuring import run_in
 from .programs import arap_iteration_seconds
 from .scale import Scale
@@ -32,7 +32,7 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
         step = part(progress, k / len(scale.drag_sizes), (k + 1) / len(scale.drag_sizes))
         if step:
             step(0.0, f"drag of {size} vertices")
-        found = run_in(scale.own_process, profiled, size, scale)
+        found = run_in(scale.own_process, profile_of, size, scale)
         if step:
             step(0.8, f"ARAP iteration of {size} vertices")
         try:

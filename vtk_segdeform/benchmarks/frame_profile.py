@@ -76,7 +76,7 @@ class Profile:
         return max(self.frame - self.stepping - self.map - self.volume, 0.0)
 
 
-def profiled(size: int, scale: Scale) -> Profile:
+def profile_of(size: int, scale: Scale) -> Profile:
     """Return the profile for one mesh size, without ARAP; run it in its own process."""
     task = bent_cactus(size)
     warm_up()

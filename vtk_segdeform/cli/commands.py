@@ -32,10 +32,10 @@ from .outputs import (
     Say,
     coloured_cages,
     coloured_regions,
-    tell_cages,
-    tell_regions,
-    tell_solution,
-    tell_volume,
+    report_cages,
+    report_regions,
+    report_solution,
+    report_volume,
 )
 from .selection import parse_selection
 
@@ -51,8 +51,8 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     fixed = parse_selection(options.fixed, mesh, point_arrays=surface.point_data, role="fixed")
     handle, targets = _handles(options.handles, surface, mesh, fixed)
     regions, cages = _subspace(options, surface, mesh, part(progress, 0.0, 0.6))
-    tell_regions(regions, say)
-    tell_cages(cages, say)
+    report_regions(regions, say)
+    report_cages(cages, say)
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, progress=part(progress, 0.6, 0.9),
         **_settings(options),
@@ -60,7 +60,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     progress(0.9, "solving")
     start = time.perf_counter()
     solution = deformer.solve(targets, progress=part(progress, 0.9, 1.0))
-    tell_solution(solution, time.perf_counter() - start, say)
+    report_solution(solution, time.perf_counter() - start, say)
     deformed = io.with_vertices(surface, solution.vertices)
     io.write_mesh(options.output, deformed)
     say(f"written         {options.output}")
@@ -85,7 +85,7 @@ def edit(options: Namespace, say: Say, progress: Progress) -> bool:
     session = plugin.edit(
         session, path=options.input.with_suffix(SESSION), title=f"segdeform {options.input.name}"
     )
-    tell_volume(session.volume_change, say)
+    report_volume(session.volume_change, say)
     if options.output is not None:
         io.write_mesh(options.output, plugin.deformed(surface, session))
         say(f"written         {options.output}")
@@ -127,7 +127,7 @@ def regions(options: Namespace, say: Say, progress: Progress) -> bool:
         io.require_writable(options.output, arrays=True)
     surface, mesh = _read(options.input)
     found = _regions(options, surface, mesh, progress)
-    tell_regions(found, say)
+    report_regions(found, say)
     if options.output is not None:
         io.write_mesh(options.output, coloured_regions(surface, found))
         say(f"written         {options.output}")
@@ -140,8 +140,8 @@ def cages(options: Namespace, say: Say, progress: Progress) -> bool:
         io.require_writable(options.output, arrays=True)
     surface, mesh = _read(options.input)
     found, made = _subspace(options, surface, mesh, progress)
-    tell_regions(found, say)
-    tell_cages(made, say)
+    report_regions(found, say)
+    report_cages(made, say)
     if options.output is not None:
         io.write_mesh(options.output, coloured_cages(made))
         say(f"written         {options.output}")

@@ -32,9 +32,9 @@ from .outputs import (
     Say,
     coloured_cages,
     coloured_regions,
-    tell_cages,
-    tell_regions,
-    tell_solution,
+    report_cages,
+    report_regions,
+    report_solution,
 )
 from .selection import parse_selection
 
@@ -85,9 +85,9 @@ def demo(options: Namespace, say: Say, progress: Progress) -> bool:
     say(f"cactus          {mesh.n_vertices} vertices, {mesh.n_faces} triangles")
     start = time.perf_counter()
     regions = segment(mesh, n_regions=3, progress=part(progress, 0.0, 0.2))
-    tell_regions(regions, say)
+    report_regions(regions, say)
     cages = fit_cages(mesh, regions, n_vertices=155, progress=part(progress, 0.2, 0.5))
-    tell_cages(cages, say)
+    report_cages(cages, say)
     pose = bent_top(mesh, math.radians(60.0))
     deformer = Deformer(
         mesh, regions, cages, fixed=pose.fixed, handle=pose.handle,
@@ -96,7 +96,7 @@ def demo(options: Namespace, say: Say, progress: Progress) -> bool:
     say(f"set-up          {time.perf_counter() - start:.1f} s")
     start = time.perf_counter()
     solution = deformer.solve(pose.targets)
-    tell_solution(solution, time.perf_counter() - start, say)
+    report_solution(solution, time.perf_counter() - start, say)
     change = local_volume_change(mesh, solution.vertices)
     say(f"local volume    {1 + change.min():.2f} to {1 + change.max():.2f} times the original")
 

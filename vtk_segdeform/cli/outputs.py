@@ -22,29 +22,29 @@ HANDLE_TOLERANCE = 1e-3  # handle error, in mesh diagonals, above which a comman
 _PALETTE = np.array([rgb(colour) for colour in COLOURS])
 
 
-def tell_regions(regions: Regions, say: Say) -> None:
+def report_regions(regions: Regions, say: Say) -> None:
     """Print the number of vertices of each region, and how many are in several regions."""
     shared = int(np.count_nonzero(regions.membership.sum(axis=0) > 1))
     sizes = " + ".join(str(size) for size in regions.membership.sum(axis=1))
     say(f"regions         {regions.n_regions}: {sizes} vertices, {shared} in overlaps")
 
 
-def tell_cages(cages: Sequence[Cage], say: Say) -> None:
+def report_cages(cages: Sequence[Cage], say: Say) -> None:
     """Print the number of vertices of each cage."""
     counts = [cage.n_vertices for cage in cages]
     say(f"cages           {' + '.join(map(str, counts))} = {sum(counts)} vertices")
 
 
-def tell_solution(solution: Solution, seconds: float, say: Say) -> None:
+def report_solution(solution: Solution, seconds: float, say: Say) -> None:
     """Print the volume change, the handle error, the time and the status of a solution."""
     each = 1e3 * seconds / max(solution.steps, 1)
-    tell_volume(solution.volume_change, say)
+    report_volume(solution.volume_change, say)
     say(f"handle error    {solution.handle_error:.1e} of the mesh diagonal")
     say(f"solve           {solution.steps} steps, {1e3 * seconds:.0f} ms, {each:.1f} ms per step")
     say(f"status          {solution.status}")
 
 
-def tell_volume(change: float, say: Say) -> None:
+def report_volume(change: float, say: Say) -> None:
     """Print the relative change of the volume."""
     say(f"volume change   {change:+.1e} of the original volume")
 

@@ -19,7 +19,7 @@ from ..progress import Progress
 from ..session import Session
 from ..widgets import plugin
 from .commands import opened
-from .outputs import Say, tell_volume
+from .outputs import Say, report_volume
 
 if TYPE_CHECKING:
     from ..widgets.recording import ReplayLimits
@@ -44,7 +44,7 @@ def replay(options: Namespace, say: Say, progress: Progress) -> bool:
     for fault in faults:
         say(f"message         {fault}")
     say(f"replayed        {options.recording}")
-    tell_volume(session.volume_change, say)
+    report_volume(session.volume_change, say)
     if options.film is not None:
         say(f"written         {options.film}, {pictures} frames")
     if options.output is not None:

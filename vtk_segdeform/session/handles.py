@@ -86,8 +86,9 @@ def new_name(handles: Handles) -> str:
 def require_handle(handles: Handles, name: str) -> None:
     """Raise a ConstraintError that lists the handles, unless *name* is one of them."""
     if not isinstance(name, str) or name not in handles:
-        known = f"handles: {', '.join(map(repr, handles))}" if handles else "add a handle first"
-        raise ConstraintError(f"there is no handle {shown(name)}; {known}")
+        names = ", ".join(map(repr, handles))
+        advice = f"the handles are {names}" if handles else "add a handle first"
+        raise ConstraintError(f"there is no handle {shown(name)}; {advice}")
 
 
 def targets_at(handles: Handles, vertices: FloatArray) -> Targets:

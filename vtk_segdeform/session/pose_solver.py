@@ -224,7 +224,6 @@ def _same_binding(a: State, b: State) -> bool:
 
 def _same_constraints(a: State, b: State) -> bool:
     """Return whether both have the same fixed vertices, handles and volume options."""
-    alike = all(
-        getattr(a.options, name) == getattr(b.options, name) for name in _CONSTRAINT_OPTIONS
-    )
-    return alike and not a.changes(b) & Change.CONSTRAINTS
+    names = _CONSTRAINT_OPTIONS
+    same = all(getattr(a.options, name) == getattr(b.options, name) for name in names)
+    return same and not a.changes(b) & Change.CONSTRAINTS
