@@ -513,7 +513,7 @@ def test_a_cage_vertex_can_be_moved_freely_and_the_volume_stays():
     assert volume_error(session) < 1e-13
     moved = np.abs(session.vertices - VERTICES).max(axis=1)
     assert moved.max() > 0.01
-    assert session.commit() == "drag cage of region 1"
+    assert session.commit() == "drag the cage of region 1"
     assert_array_equal(session.targets["tip"], session.vertices[SCENE.handle])
     session.undo()
     assert_array_equal(session.vertices, VERTICES)

@@ -447,7 +447,7 @@ class Session(Timeline):
         places[region] = points
         pose = self._pose_solver.free_form(self._state, places)
         self._placed = pose, places
-        self._move(replace(self._state, pose=pose), f"cage of {self.region_name(region)}")
+        self._move(replace(self._state, pose=pose), f"the cage of {self.region_name(region)}")
 
     def carry(self, points: ArrayLike) -> FloatArray:
         """Return *points* (k, 3), given at rest, moved along with the mesh to the current pose."""

@@ -184,11 +184,11 @@ def test_a_dragged_vertex_is_where_the_pointer_is_and_as_far_away_as_before(cage
     assert np.abs(session.vertices - rest).max() > 0.01
     hand.release()
     assert view.camera.GetPosition() == camera
-    assert session.undo_label == "drag cage of region 2"
+    assert session.undo_label == "drag the cage of region 2"
     assert not session.is_dragging
     session.undo()
     assert np.array_equal(session.vertices, rest)
-    assert session.undo_label != "drag cage of region 2"
+    assert session.undo_label != "drag the cage of region 2"
     assert not hand.failures
 
 
@@ -319,7 +319,7 @@ def test_a_move_that_is_refused_is_told_and_takes_everything_back(cages, hand):
     assert not cages.is_grabbing
     hand.release((x, y))
     hand.drag([(x, y), (x + 10, y)])
-    assert session.undo_label == "drag cage of region 2"
+    assert session.undo_label == "drag the cage of region 2"
     assert len(hand.failures) == 1
 
 

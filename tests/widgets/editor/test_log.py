@@ -88,7 +88,7 @@ def test_a_cage_moved_by_hand_is_solved_for_by_nobody(written):
     session.move_cage(1, session.cage_vertices[1] + [0.0, 0.0, 0.02])
     session.commit()
     (entry,) = log.entries
-    assert (entry.what, entry.steps) == ("drag cage of region 2", None)
+    assert (entry.what, entry.steps) == ("drag the cage of region 2", None)
     assert entry.text.endswith("moved freely\nvolume " + entry.text.rpartition(" ")[2])
 
 
