@@ -1,4 +1,4 @@
-"""Bend a dense closed mesh by hand while its detail and its volume stay.
+"""Deform dense closed meshes by dragging handles, with fine detail and exact volume preserved.
 
     import vtk_segdeform as sd
 
@@ -11,6 +11,9 @@
 The folders follow the paper: `mesh`, `geometry`, `regions`, `cages`, `subspace`, `energy`,
 `solver`, `deformer`.  The main algorithm is `Deformer.solve` in `deformer/deformer.py` and
 `GaussNewton` in `solver/gauss_newton.py`.
+
+Every name is imported on first use, so that ``import vtk_segdeform`` takes no time and loads
+neither SciPy nor VTK.
 """
 
 from __future__ import annotations
@@ -27,23 +30,66 @@ if not (_root / "vtk_segdeform" / "widgets").exists() and (_root / "setup.cfg").
     __path__.append(str(_root))
 del _Path, _root
 
-from . import errors, models
-from .cages import Cage, fit_cages, mean_value_coordinates
-from .deformer import Deformer, deform
-from .geometry import local_volume_change
-from .mesh import Mesh, find_faults
-from .regions import Regions, segment
-from .repair import repair
-from .session import Change, Options, Session, load_session, save_session
-from .solver import Solution, Status
 from .version import __version__ as __version__
 
 if _TYPE_CHECKING:
+    from . import (  # noqa: F401
+        cages,
+        deformer,
+        energy,
+        errors,
+        filters,
+        geometry,
+        io,
+        mesh,
+        mesh_repair,
+        models,
+        pictures,
+        regions,
+        session,
+        solver,
+        subspace,
+        widgets,
+    )
+    from .cages import Cage, fit_cages, mean_value_coordinates
+    from .deformer import Deformer, deform
+    from .geometry import local_volume_change
     from .io import read_mesh, write_mesh
+    from .mesh import Mesh, find_faults
+    from .mesh_repair import repair
+    from .regions import Regions, segment
+    from .session import Change, Options, Session, load_session, save_session
+    from .solver import Solution, Status
     from .widgets.plugin import edit
 
-# pyvista is imported when something that needs it is first asked for.
-_NEED_PYVISTA = {"edit": "widgets.plugin", "read_mesh": "io", "write_mesh": "io"}
+# The module from which each public name is imported.
+_MODULE_OF = {
+    "Cage": "cages",
+    "Change": "session",
+    "Deformer": "deformer",
+    "Mesh": "mesh",
+    "Options": "session",
+    "Regions": "regions",
+    "Session": "session",
+    "Solution": "solver",
+    "Status": "solver",
+    "deform": "deformer",
+    "edit": "widgets.plugin",
+    "find_faults": "mesh",
+    "fit_cages": "cages",
+    "load_session": "session",
+    "local_volume_change": "geometry",
+    "mean_value_coordinates": "cages",
+    "read_mesh": "io",
+    "repair": "mesh_repair",
+    "save_session": "session",
+    "segment": "regions",
+    "write_mesh": "io",
+}
+_SUBPACKAGES = {
+    "cages", "deformer", "energy", "errors", "filters", "geometry", "io", "mesh", "mesh_repair",
+    "models", "pictures", "regions", "session", "solver", "subspace", "widgets",
+}  # fmt: skip
 
 __all__ = [
     "Cage",
@@ -73,11 +119,19 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    if name in _NEED_PYVISTA:
-        module = _import_module(f"{__name__}.{_NEED_PYVISTA[name]}")
-        return getattr(module, name)
+    if name in _SUBPACKAGES:
+        return _import_module(f"{__name__}.{name}")
+    if name in _MODULE_OF:
+        value = getattr(_import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
+        globals()[name] = value  # found without this function from now on
+        return value
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__, *_SUBPACKAGES})
+
+
+# Entry points do not reach the plotters of pyvistaqt; importing this package after pyvista does.
 if hasattr(_sys.modules.get("pyvista"), "register_plotter_component"):
     from .widgets import plugin as _plugin  # noqa: F401 - gives plotters and meshes their .segdeform

@@ -1,4 +1,4 @@
-"""The command line as a person meets it: what it prints, writes and returns."""
+"""Commands: printed lines, written files and exit codes."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def bar_file(bar, tmp_path_factory) -> str:
 
 
 def lines(text: str) -> dict[str, str]:
-    """Return the lines of a report by their first word."""
+    """Return the printed lines by their first word."""
     return {line.split()[0]: line for line in text.splitlines() if line.strip()}
 
 
@@ -55,8 +55,8 @@ def test_deform_moves_the_handle_keeps_the_volume_and_all_that_came_along(
     )  # fmt: skip
     report = lines(capsys.readouterr().out)
     assert code == 0
-    assert {"volume", "handles", "solved", "status", "written"} <= set(report)
-    assert "ms a step" in report["solved"]
+    assert {"volume", "handle", "solve", "status", "written"} <= set(report)
+    assert "ms per step" in report["solve"]
     bent = convert.read_polydata(out)
     mesh = convert.from_polydata(bent)
     assert_array_equal(mesh.faces, bar.faces)
@@ -186,7 +186,7 @@ def test_the_demo_leaves_meshes_whose_volume_is_the_same(tmp_path, capsys):
     folder = tmp_path / "deep" / "demo"
     assert main(["demo", "-o", str(folder), "--size", "1500", "--no-pictures"]) == 0
     report = lines(capsys.readouterr().out)
-    assert {"cactus", "regions", "cages", "volume", "solved"} <= set(report)
+    assert {"cactus", "regions", "cages", "volume", "solve"} <= set(report)
     assert "= 155 vertices" in report["cages"]
     rest = models.cactus(1500)
     bent = convert.read_mesh(folder / "cactus-bent.vtp")
@@ -213,7 +213,7 @@ def test_the_interactive_bench_drags_in_a_window_and_splits_the_time_of_an_event
     assert int(cells[" steps "]) >= 1
 
 
-def test_bench_leaves_a_report_and_says_what_does_not_hold(tmp_path, capsys):
+def test_bench_writes_a_report_and_prints_the_ratios(tmp_path, capsys):
     size = ["--quick", "--size", "800", "--cage-vertices", "60"]
     assert main(["bench", *size, "--only", "table1", "-o", str(tmp_path / "out")]) == 0
     written = (tmp_path / "out" / "report.md").read_text()
@@ -221,7 +221,7 @@ def test_bench_leaves_a_report_and_says_what_does_not_hold(tmp_path, capsys):
     assert "800 vertices, 60 cage vertices" in written
     told = capsys.readouterr().out.splitlines()
     assert told[-1].endswith("report.md")
-    assert sum("gain of the products with W" in line for line in told) == 2
+    assert sum("speed-up of products with W" in line for line in told) == 2
 
 
 def test_bench_records_a_run_and_plots_the_history(tmp_path, capsys, monkeypatch):
@@ -253,7 +253,7 @@ def test_bench_refuses_a_history_that_it_cannot_append_to_before_it_measures(tmp
         (["dance"], 2, "dance"),
         (["check"], 2, "IN"),
         (["deform", "BAR", "-o", "x.ply", "--fixed", "z<1%"], 2, "--handle"),
-        (["deform", "BAR", "-o", "x.ply", "--fixed", "z<1%", "--rotate", "z,1"], 2, "after its"),
+        (["deform", "BAR", "-o", "x.ply", "--fixed", "z<1%", "--rotate", "z,1"], 2, "come after"),
         (["deform", "BAR", "-o", "x.ply", "--fixed", "z<9%", "--handle", "z>9%"], 2, "not move"),
         (["deform", "BAR", "-o", "x.ply", "--fixed", "up", "--handle", "z>9%"], 2, "z>80%"),
         (["deform", "BAR", "-o", "x.ply", "--fixed", "z<9%", "--handle", "z>9%", "--rotate", "q,1"],
@@ -341,10 +341,10 @@ def test_python_m_is_the_same_program():
 
 
 class Terminal(io.StringIO):
-    """A stream that a person watches."""
+    """A stream that is a terminal."""
 
     def isatty(self) -> bool:
-        """Say so."""
+        """Return True."""
         return True
 
 

@@ -1,4 +1,4 @@
-"""Motions told in words are the rigid motions they name."""
+"""Motions parsed from options are rigid and have the given axis, angle and pivot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files and names that a command is given: long ones, odd ones, and those it cannot write."""
+"""File names of commands: long names, unusual characters and unwritable files."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def fill_the_disk(path):
 
 
 def names(folder):
-    """Return the names of all that is in a folder."""
+    """Return the names of all files in a folder."""
     return sorted(os.listdir(folder))
 
 

@@ -12,7 +12,7 @@ def test_a_listener_removed_by_an_earlier_one_is_not_called_any_more():
     removers = []
     listeners.add(lambda change: [remove() for remove in removers])
     removers.append(listeners.add(heard.append))
-    listeners.tell(Change.POSE)
+    listeners.notify(Change.POSE)
     assert heard == []
 
 
@@ -24,8 +24,8 @@ def test_a_listener_may_remove_itself():
         remove()
 
     remove = listeners.add(once)
-    listeners.tell(Change.POSE)
-    listeners.tell(Change.POSE)
+    listeners.notify(Change.POSE)
+    listeners.notify(Change.POSE)
     assert heard == [Change.POSE]
 
 
@@ -34,18 +34,18 @@ def test_a_change_caused_by_a_listener_is_notified_after_the_present_one():
 
     def cause(change):
         if change == Change.POSE:
-            listeners.tell(Change.HISTORY)
+            listeners.notify(Change.HISTORY)
 
     listeners.add(cause)
     listeners.add(heard.append)
-    listeners.tell(Change.POSE)
+    listeners.notify(Change.POSE)
     assert heard == [Change.POSE, Change.HISTORY]
 
 
 def test_no_change_is_not_notified():
     listeners, heard = Listeners(), []
     listeners.add(heard.append)
-    listeners.tell(Change(0))
+    listeners.notify(Change(0))
     assert heard == []
 
 
@@ -58,7 +58,7 @@ def test_after_an_exception_the_others_have_heard_and_the_next_change_is_notifie
     remove = listeners.add(fail)
     listeners.add(heard.append)
     with pytest.raises(ZeroDivisionError):
-        listeners.tell(Change.POSE)
+        listeners.notify(Change.POSE)
     remove()
-    listeners.tell(Change.HISTORY)
+    listeners.notify(Change.HISTORY)
     assert heard == [Change.POSE, Change.HISTORY]

@@ -1,4 +1,4 @@
-"""A session in a file: the same again bit for bit, and nothing but an error from a damaged one."""
+"""Session files: bitwise identical after loading; damaged files raise a SessionError."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SCENE = sausage(2)
 
 
 def posed() -> Session:
-    """Return a session with something of everything."""
+    """Return a session with regions, cages, fixed vertices, handles and a pose."""
     options = Options(n_cage_vertices=77, offset=0.25, stretch=2.5, rotation_groups=None)
     session = Session(SCENE.mesh, state=State(options=options))
     session.set_regions(Regions(SCENE.mesh, SCENE.regions.membership, smoothness=1.5))
@@ -46,7 +46,7 @@ def posed() -> Session:
 
 
 def tiny(pose: bool = True) -> Session:
-    """Return a session of six vertices, so that a file of it can be broken in every place."""
+    """Return a session of six vertices, small enough to damage its file at every byte."""
     session = Session(Mesh(*OCTAHEDRON))
     session.set_regions(Regions.single(session.mesh))
     session.set_cages([Cage(4.0 * TETRAHEDRON[0], TETRAHEDRON[1])])
@@ -62,7 +62,7 @@ TINY = tiny()
 
 
 def same(a: Session, b: Session) -> bool:
-    """Tell whether two sessions cannot be told apart."""
+    """Return whether two sessions are equal."""
     one, other = a.state, b.state
     arrays = [(a.mesh.vertices, b.mesh.vertices), (a.mesh.faces, b.mesh.faces)]
     arrays += [(a.vertices, b.vertices), (one.fixed, other.fixed)]
@@ -220,9 +220,9 @@ def test_a_replaced_file_keeps_its_mode_and_a_link_stays_a_link(tmp_path):
 
 
 def refuse(content: bytes, folder: Path) -> str:
-    """Return what is said of a file with *content*, which must be refused."""
+    """Return the message of the error for a file with *content*."""
     (folder / "broken.npz").write_bytes(content)
-    with pytest.raises(SegDeformError, match=r"broken\.npz: is no readable session") as caught:
+    with pytest.raises(SegDeformError, match=r"broken\.npz: is not a readable session") as caught:
         load_session(folder / "broken.npz")
     return str(caught.value)
 
@@ -286,7 +286,7 @@ def test_an_impossible_name_is_told(name, tmp_path):
 
 
 def rewritten(content: bytes, *, compress: bool = False, **changes) -> bytes:
-    """Return the archive with some members as they are in *changes*; header ones as a dict."""
+    """Return the archive with the members in *changes* replaced; header entries are a dict."""
     written = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(written, "w") as new:
         for name in old.namelist():
@@ -305,10 +305,10 @@ def rewritten(content: bytes, *, compress: bool = False, **changes) -> bytes:
 
 HUGE = 1 << 61
 WRONG = [
-    ({"header": {"version": 2}}, "it has version 2, newer than 1; update vtk_segdeform"),
-    ({"header": {"version": 0}}, "never was a version 0"),
+    ({"header": {"version": 2}}, "version 2 is newer than 1; update vtk_segdeform"),
+    ({"header": {"version": 0}}, "version must be at least 1; got 0"),
     ({"header": {"version": "1"}}, "version must be a whole number"),
-    ({"header": {"format": "something else"}}, "does not say that it is"),
+    ({"header": {"format": "something else"}}, "does not contain the format"),
     ({"header": {"n_vertices": HUGE}}, "mesh_vertices must be float64 of shape"),
     ({"header": {"n_vertices": 10**30}}, "mesh_vertices must be float64 of shape"),
     ({"header": {"n_vertices": -6}}, "n_vertices must be a whole number"),
@@ -319,10 +319,10 @@ WRONG = [
     ({"header": {"cages": {}}}, "cages must be a list"),
     ({"header": {"handles": [["h", 2]]}}, "handle must be int64 of shape"),
     ({"header": {"handles": [["h", 1], ["h", 0]]}}, "two handles have the same name"),
-    ({"header": {"handles": [["h", 1], ["i", 0]]}}, "each handle must have a vertex"),
+    ({"header": {"handles": [["h", 1], ["i", 0]]}}, "each handle must have at least one vertex"),
     ({"header": {"smoothness": "much"}}, "smoothness must be a number"),
     ({"header": {"smoothness": -1}}, "smoothness must be a number above 0"),
-    ({"header": {"options": {"stretch": -1.0}}}, "stretch must be a number from 0 up"),
+    ({"header": {"options": {"stretch": -1.0}}}, "stretch must be a number of at least 0"),
     ({"header": {"options": {"colour": 1}}}, "colour"),
     ({"header": {"options": 3}}, "mapping"),
     ({"mesh_vertices": np.full((6, 3), np.nan)}, "NaN|non-finite|not finite"),
@@ -336,14 +336,14 @@ WRONG = [
     ({"fixed": np.array([99])}, "fixed must index"),
     ({"fixed": np.array([0])}, "both fixed and handle"),
     ({"pose": np.full((4, 3), np.inf)}, "NaN or infinite"),
-    ({"pose": np.full((4, 3), 1e300)}, "the pose reaches .* is damaged"),
-    ({"targets": np.full((1, 3), 1e9)}, "is damaged"),
+    ({"pose": np.full((4, 3), 1e300)}, "the pose is damaged: it is .* away"),
+    ({"targets": np.full((1, 3), 1e9)}, "the pose is damaged"),
     ({"header": {"region_names": "arm"}}, "region_names must be a list"),
     ({"header": {"region_names": ["arm", "leg"]}}, "2 names for 1 regions"),
     ({"header": {"region_names": [7]}}, "name must be printable text; got 7"),
     ({"header": {"region_names": ["a\0b"]}}, "name must be printable text"),
-    ({"header": {"region_names": ["a" * 81]}}, "80 letters"),
-    ({"header": {"region_names": ["region 2"]}}, "while it has no name"),
+    ({"header": {"region_names": ["a" * 81]}}, "80 characters"),
+    ({"header": {"region_names": ["region 2"]}}, "reserved for a region of this number"),
     ({"header": {"posed": "yes"}}, "posed must be true or false"),
     ({"targets": np.zeros((2, 3))}, "targets must be"),
     ({"compress": True}, "header.json is compressed"),
@@ -418,7 +418,7 @@ def test_the_size_is_that_of_the_open_file(tmp_path, monkeypatch):
 
 
 def sparse(path, size, n):
-    """Write a session of *n* vertices whose arrays are a hole of *size* bytes in a sparse file."""
+    """Write a session of *n* vertices to a sparse file of *size* bytes without array data."""
     save_session(path, TINY)
     with zipfile.ZipFile(path) as archive:
         header = json.loads(archive.read("header.json"))
@@ -436,7 +436,7 @@ def sparse(path, size, n):
 def test_a_sparse_file_of_gigabytes_is_refused_before_it_is_read(tmp_path, monkeypatch, size):
     sparse(tmp_path / "saved.npz", size, size // 48)
     monkeypatch.setattr(zipfile, "ZipFile", None)
-    with pytest.raises(SessionError, match=r"saved\.npz: .*it has .*e\+\d\d bytes; the limit is"):
+    with pytest.raises(SessionError, match=r"saved\.npz: .*has .*e\+\d\d bytes; the limit is"):
         load_session(tmp_path / "saved.npz")
 
 

@@ -22,8 +22,8 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 # In the order of imports; the second row is the method, in the order of the paper.
 ROOMS = [
     "version", "errors", "sizes", "checks", "arrays", "progress", "freezing", "files", "kernels",
-    "mesh", "repair", "geometry", "regions", "cages", "subspace", "energy", "solver", "deformer",
-    "session", "models", "io", "pictures", "filters",
+    "mesh", "mesh_repair", "geometry", "regions", "cages", "subspace", "energy", "solver",
+    "deformer", "session", "models", "io", "pictures", "filters",
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
     "widgets.handle_dragger", "widgets.volume_overlay", "widgets.recording", "widgets.editor",
     "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "benchmarks", "cli", "__main__",

@@ -16,7 +16,7 @@ import pytest
 
 import vtk_segdeform as sd
 from vtk_segdeform import widgets
-from vtk_segdeform.cli.main import _parser, _with_signed_vectors
+from vtk_segdeform.cli.main import _parser, _with_signed_vectors, command
 from vtk_segdeform.errors import MissingDependencyError
 from vtk_segdeform.io import meshlab
 from vtk_segdeform.io.convert import is_mesh_file
@@ -192,7 +192,7 @@ def test_the_tables_of_keys_are_generated():
 )
 def test_every_command_on_a_page_is_valid(line):
     words = _with_signed_vectors(shlex.split(line))
-    assert callable(_parser().parse_args(words).run)
+    assert callable(command(_parser().parse_args(words).command))
 
 
 def test_the_formats_on_the_page_of_files_are_readable():

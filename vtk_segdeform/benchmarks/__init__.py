@@ -1,17 +1,17 @@
-"""Measurements: the experiments of the paper, and other programs, each in one file.
+"""Benchmarks: the experiments of the paper and comparisons with other programs.
 
 The files, in reading order:
 
-    report                runs the experiments and writes the report
-    sections              text, tables, plots and ratios of an experiment
-    scale                 how much is measured: quick, usual or full
-    history               ratios of many runs, recorded and plotted
-    tasks                 meshes, handles and poses
+    report                run the experiments and write the report
+    sections              text, tables, figures and ratios of an experiment
+    scale                 problem sizes: quick, usual and full
+    history               record and plot the ratios of many runs
+    tasks                 meshes, handles and targets
     drags                 drags, frame by frame
-    measuring             clocks, memory and child processes
-    drag_profile          drags from 5 thousand to a million vertices
-    frame_profile         one drag, part by part
-    drawing               drawing time of a frame
+    measuring             time, memory and child processes
+    drag_profile          drags of 5 thousand to a million vertices
+    frame_profile         the parts of one drag
+    drawing               rendering time of a frame
     table_one             table 1 of the paper
     experiments           figures 7, 8 and 9 of the paper
     segmentation_study    1 to 24 regions

@@ -1,10 +1,10 @@
-"""Making cages, and binding to them, beside other programs that do one of the two.
+"""Cages and mean value coordinates, compared with other programs.
 
     cages         `fit_cages`, libigl's progressive hulls, gpytoolbox's lazy_cage
     coordinates   `mean_value_coordinates`, VTK's interpolator and its vtkDeformPointSet
 
-A cage is valid if it is closed, two-manifold, does not cross itself, and has the whole mesh inside.
-It is the tighter, the less volume it has beside the mesh's.
+A cage is valid if it is closed, two-manifold, free of self-intersections, and encloses the mesh.
+The ratio of its volume to that of the mesh measures how tight it is.
 """
 
 from __future__ import annotations
@@ -25,39 +25,40 @@ from ..mesh import Mesh, winding_number
 from ..models import cactus
 from ..progress import Progress
 from ..regions import Regions
-from .measuring import called, timed
+from .measuring import run_in, timed
 from .scale import Scale
 from .sections import Cell, Section, Table
 
 CAGE_COLUMNS = ("program", "vertices", "seconds", "volume / mesh", "valid", "outside")
 WEIGHT_COLUMNS = ("program", "seconds", "us per point", "largest difference")
-_SAMPLE = 2000  # points that VTK's interpolator is asked for, one call from Python each
+_SAMPLE = 2000  # points for VTK's interpolator, which takes one call from Python for each
 Surface = tuple[FloatArray, IntArray]
 
 
 def run(scale: Scale, progress: Progress | None = None) -> Section:
     """Return a table of cages and one of coordinates for each size."""
-    section = Section("Making cages, and binding to them")
+    section = Section("Cages and mean value coordinates")
     for k, size in enumerate(scale.cage_sizes):
         mesh, rows = cactus(size), list[tuple[Cell, ...]]()
         for name, make in MAKERS.items():
             if progress:
-                progress(k / len(scale.cage_sizes), f"{name}: a cage of {size} vertices")
+                progress(k / len(scale.cage_sizes), f"{name}: cage of {size} vertices")
             try:
-                surface, seconds = called(
-                    scale.own_process, made, make, mesh, scale.n_cage_vertices
+                surface, seconds = run_in(
+                    scale.own_process, timed_cage, make, mesh, scale.n_cage_vertices
                 )
             except (SegDeformError, RuntimeError, ValueError, IndexError) as fault:
-                section.absent.append(f"{name}, {size} vertices: {fault}")
+                section.skipped.append(f"{name}, {size} vertices: {fault}")
                 continue
             rows.append(cage_row(name, mesh, surface, seconds))
         title = f"one cage of {scale.n_cage_vertices} vertices around {size}"
         section.tables.append(Table(CAGE_COLUMNS, rows, title))
         section.tables.append(_coordinates(mesh, scale.n_cage_vertices))
-    section.words.append(
-        "*Outside* counts mesh vertices. vtkMeanValueCoordinatesInterpolator gives the weights of "
-        "one point a call, so part of its time is Python's; vtkDeformPointSet keeps no weights, so "
-        "it takes its time again for every pose."
+    section.text.append(
+        "*Outside* is the number of mesh vertices outside the cage. "
+        "vtkMeanValueCoordinatesInterpolator computes the weights of one point per call, so its "
+        "time includes that of Python. vtkDeformPointSet does not store weights, so its time is "
+        "spent again for every pose."
     )
     return section
 
@@ -69,11 +70,13 @@ def ours(mesh: Mesh, n_vertices: int) -> Surface:
 
 
 def progressive_hulls(mesh: Mesh, n_vertices: int) -> Surface:
-    """Return libigl's cage; n vertices close with 2 n - 4 faces."""
+    """Return libigl's cage; a closed surface of n vertices has 2 n - 4 faces."""
     try:
         from igl.copyleft import progressive_hulls as simplified
     except ImportError as fault:
-        raise MissingDependencyError(f"libigl with copyleft parts is not there ({fault})") from None
+        raise MissingDependencyError(
+            f"libigl with its copyleft modules is not installed ({fault})"
+        ) from None
     faces = np.asfortranarray(mesh.faces.astype(np.int32))
     vertices, triangles, *_ = simplified(
         np.asfortranarray(mesh.vertices), faces, 2 * n_vertices - 4
@@ -86,7 +89,7 @@ def lazy_cage(mesh: Mesh, n_vertices: int) -> Surface:
     try:
         from gpytoolbox.copyleft import lazy_cage as caged
     except ImportError as fault:
-        raise MissingDependencyError(f"gpytoolbox is not there ({fault})") from None
+        raise MissingDependencyError(f"gpytoolbox is not installed ({fault})") from None
     faces = mesh.faces.astype(np.int32)
     vertices, triangles = caged(np.array(mesh.vertices), faces, num_faces=2 * n_vertices - 4)
     return np.asarray(vertices), np.asarray(triangles, dtype=np.int64)
@@ -99,8 +102,8 @@ MAKERS: dict[str, Callable[[Mesh, int], Surface]] = {
 }
 
 
-def made(make: Callable[[Mesh, int], Surface], mesh: Mesh, n: int) -> tuple[Surface, float]:
-    """Return a cage and its seconds; imports of the program are not counted."""
+def timed_cage(make: Callable[[Mesh, int], Surface], mesh: Mesh, n: int) -> tuple[Surface, float]:
+    """Return a cage and its seconds, excluding imports."""
     make(cactus(500), 60)
     return timed(lambda: make(mesh, n))
 
@@ -112,9 +115,9 @@ def cage_row(name: str, mesh: Mesh, surface: Surface, seconds: float) -> tuple[C
     vertices, faces = vertices[used], np.searchsorted(used, faces)
     faults = cage_faults(vertices, faces)
     outside = int((winding_number(mesh.vertices, vertices, faces) < 0.5).sum())
-    share = signed_volume(vertices, faces) / signed_volume(mesh.vertices, mesh.faces)
-    words = "; ".join(faults) or ("yes" if not outside else "closed, but not around the mesh")
-    return name, len(vertices), seconds, share, words, outside
+    ratio = signed_volume(vertices, faces) / signed_volume(mesh.vertices, mesh.faces)
+    valid = "; ".join(faults) or ("does not enclose the mesh" if outside else "yes")
+    return name, len(vertices), seconds, ratio, valid, outside
 
 
 def _coordinates(mesh: Mesh, n_vertices: int) -> Table:
@@ -122,15 +125,15 @@ def _coordinates(mesh: Mesh, n_vertices: int) -> Table:
     x, n = np.array(mesh.vertices), mesh.n_vertices
     weights, seconds = timed(lambda: mean_value_coordinates(x, cage.vertices, cage.faces))
     sample = x[:: max(1, n // _SAMPLE)]
-    asked, t_vtk = timed(lambda: _interpolated(sample, cage))
-    off = float(np.abs(asked - weights[:: max(1, n // _SAMPLE)]).max())
+    by_vtk, t_vtk = timed(lambda: _interpolated(sample, cage))
+    error = float(np.abs(by_vtk - weights[:: max(1, n // _SAMPLE)]).max())
     moved = cage.vertices * [1.0, 1.2, 0.9] + 0.1 * cage.vertices[:, [2, 0, 1]]
     pose, t_deform = timed(lambda: _deformed(x, cage, moved))
-    off_posed, each = float(np.abs(pose - weights @ moved).max()), t_vtk / len(sample)
+    pose_error, each = float(np.abs(pose - weights @ moved).max()), t_vtk / len(sample)
     rows: list[tuple[Cell, ...]] = [
         ("mean_value_coordinates", seconds, 1e6 * seconds / n, 0.0),
-        ("vtkMeanValueCoordinatesInterpolator", n * each, 1e6 * each, off),
-        ("vtkDeformPointSet", t_deform, 1e6 * t_deform / n, off_posed),
+        ("vtkMeanValueCoordinatesInterpolator", n * each, 1e6 * each, error),
+        ("vtkDeformPointSet", t_deform, 1e6 * t_deform / n, pose_error),
     ]
     title = f"mean value coordinates of {n} points in a cage of {cage.n_vertices} vertices"
     return Table(WEIGHT_COLUMNS, rows, title)
@@ -147,7 +150,7 @@ def _interpolated(points: FloatArray, cage: Cage) -> FloatArray:
 
 
 def _deformed(points: FloatArray, cage: Cage, moved: FloatArray) -> FloatArray:
-    """Return *points* as vtkDeformPointSet moves them with the cage."""
+    """Return *points* deformed by vtkDeformPointSet."""
     sides = np.full(cage.n_faces, 3)
     control = polydata_of(cage.vertices.copy(), sides, cage.faces.ravel())
     deform = vtkDeformPointSet()

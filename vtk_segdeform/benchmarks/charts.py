@@ -1,6 +1,6 @@
-"""Plots of the report, by matplotlib, without a window and without pyplot's global state.
+"""Plots of the report, by matplotlib without pyplot's global state.
 
-Colours are those of `palette`, and every line has a marker of its own: a plot reads in print.
+Colours are those of `palette`.  Every line has its own marker, for printing in grey.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..files import replacing
 from ..pictures import COLOURS, INK
 
 _MARKERS = "osD^vP*"
-_ORDER = (5, 0, 2, 3, 1, 6, 4)  # of the colours: those that print darkest first
+_ORDER = (5, 0, 2, 3, 1, 6, 4)  # indices of colours, dark ones first
 
 
 def line_plot(
@@ -26,7 +26,7 @@ def line_plot(
     across: str,
     logarithmic: bool = False,
 ) -> None:
-    """Write panels side by side: {what goes up: {name of a line: values over x}}.
+    """Plot lines in panels side by side.
 
     Parameters
     ----------
@@ -35,11 +35,11 @@ def line_plot(
     x : (k,) float
         Shared by all lines.
     panels : mapping
-        A panel for each quantity, with a line for each name.
+        For each panel, by the label of its y axis: the values (k,) of each line by its name.
     across : str
-        What *x* is.
+        Label of the x axis.
     logarithmic : bool
-        Draw both axes by powers of ten.
+        Use logarithmic axes.
     """
     figure, axes = _figure(len(panels))
     for axis, (label, lines) in zip(axes, panels.items(), strict=True):
@@ -57,7 +57,7 @@ def line_plot(
         else:
             axis.set_ylim(0.0, 1.1 * max(max(values) for values in lines.values()))
             axis.set_xticks(list(x))
-        # Beside a panel or over it, where no line is hidden.
+        # The legend is beside or above the panel, where it hides no line.
         if len(panels) == 1:
             axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
         elif len(lines) > 1:
@@ -67,7 +67,7 @@ def line_plot(
 
 
 def _short(size: float) -> str:
-    """Return *size* in a few letters, so that neighbours on an axis do not meet."""
+    """Return *size* abbreviated, so that tick labels do not overlap."""
     unit, letter = (1e6, "M") if size >= 1e6 else (1e3, "k") if size >= 1e3 else (1.0, "")
     return f"{size / unit:.3g}{letter}"
 
@@ -75,7 +75,7 @@ def _short(size: float) -> str:
 def stack_plot(
     path: Path, names: Sequence[str], parts: Mapping[str, Sequence[float]], *, across: str
 ) -> None:
-    """Write a bar for each of *names*, as shares of its whole: {part: value under each name}."""
+    """Plot a bar for each of *names*, divided into shares; *parts* has the values by part."""
     figure, (axis,) = _figure(1)
     axis.grid(visible=False)
     wholes = [sum(values) for values in zip(*parts.values(), strict=True)]
@@ -103,7 +103,7 @@ def stack_plot(
 def small_multiples(
     path: Path, labels: Sequence[str], panels: Mapping[str, Mapping[str, Sequence[float]]]
 ) -> None:
-    """Write a panel for each quantity, all over the same *labels*; NaN is left out."""
+    """Plot each quantity in a panel over the same *labels*; NaN is omitted."""
     figure, axes = _figure(min(len(panels), 3), -(-len(panels) // 3))
     for axis in axes[len(panels) :]:
         axis.set_visible(False)

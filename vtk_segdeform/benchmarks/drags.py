@@ -1,8 +1,8 @@
-"""A drag, frame by frame, each solved as far as an eye can tell.
+"""Drags, frame by frame, each solved to visual convergence.
 
-A frame has *converged* when the next step moves no vertex by more than 1e-4 of the diagonal.  How
-many steps that takes is found by a copy that goes ahead; the frame itself is one call of so many
-steps, and that is what is timed.
+A frame has *converged* when the next step moves no vertex by more than 1e-4 of the mesh diagonal.
+The number of steps is found with a copy of the deformer; the frame itself is one call with this
+number of steps, which is timed.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from ..arrays import FloatArray
 from ..deformer import Deformer
 from ..solver import GaussNewton, Solution, Status
 from .measuring import clocked, timed
-from .tasks import NEAR, Task
+from .tasks import CONVERGED, Task
 
 _MOST_STEPS = 300
-_FEW, _MANY = 1, 4  # steps between which the cost of one is measured
-AS_PRINTED = 16  # the same for frames of the paper's own iteration, which takes 20 and more
-_WARM, _TURNS = 2, 2  # frames before that; how often each is taken
+_FEW, _MANY = 1, 4  # the cost of a step is the slope between frames of few and of many steps
+MANY_PAPER_STEPS = 16  # many steps for the paper's iteration, whose frames take 20 and more
+_WARM_UP, _TURNS = 2, 2  # frames that are not measured; measurements of each frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,12 +35,12 @@ class Frame:
     solution: Solution
     steps: int
     seconds: float
-    processors: float  # seconds of all of them
+    processors: float  # processor time, seconds
 
 
-def steps_to_rest(deformer: Deformer, targets: FloatArray) -> tuple[int, Solution]:
-    """Return after how many steps the next moves nothing by more than NEAR, and the pose there."""
-    near = NEAR * deformer.mesh.diagonal
+def steps_to_convergence(deformer: Deformer, targets: FloatArray) -> tuple[int, Solution]:
+    """Return the number of steps until convergence, and the solution."""
+    near = CONVERGED * deformer.mesh.diagonal
     here = deformer.solve(targets, max_steps=1)
     for steps in range(1, _MOST_STEPS):
         ahead = deformer.solve(targets, max_steps=1)
@@ -50,18 +50,18 @@ def steps_to_rest(deformer: Deformer, targets: FloatArray) -> tuple[int, Solutio
     return _MOST_STEPS, here
 
 
-def frames(deformer: Deformer, way: Sequence[FloatArray]) -> Iterator[Frame]:
-    """Drag the handles along *way*, (k, 3) each, from where the deformer is at rest."""
+def frames(deformer: Deformer, path: Sequence[FloatArray]) -> Iterator[Frame]:
+    """Drag the handles along a *path* of targets (k, 3), starting at rest."""
     deformer.reset()
-    for goal in way:
-        steps, _ = steps_to_rest(deformer.copy(), goal)
-        spent = time.process_time()
-        solution, seconds = timed(partial(deformer.solve, goal, max_steps=steps))
-        yield Frame(solution, steps, seconds, time.process_time() - spent)
+    for targets in path:
+        steps, _ = steps_to_convergence(deformer.copy(), targets)
+        start = time.process_time()
+        solution, seconds = timed(partial(deformer.solve, targets, max_steps=steps))
+        yield Frame(solution, steps, seconds, time.process_time() - start)
 
 
-def way_of(task: Task, moves: int) -> list[FloatArray]:
-    """Return targets that move on by 1 % of the diagonal, from rest."""
+def drag_path(task: Task, moves: int) -> list[FloatArray]:
+    """Return targets that move by 1 % of the mesh diagonal per frame, starting at rest."""
     rest = task.mesh.vertices[task.handle]
     aside = task.shifted(0.01).targets - task.targets
     return [rest + (k + 1) * aside for k in range(moves)]
@@ -70,21 +70,20 @@ def way_of(task: Task, moves: int) -> list[FloatArray]:
 def seconds_per_step(
     cases: Sequence[tuple[Deformer, Task]], repeats: int, many: int = _MANY
 ) -> list[float]:
-    """Return what one more step of a drag's frame costs in each of *cases*.
+    """Return the time of one step of the solver in each of *cases*.
 
-    It is the slope between frames of one step and of *many*, as the solver alone takes them.  The
-    cases drag by turns, so that all meet the same load, and the same caches: each has just seen
-    another's mesh go through them.  NaN where no frame takes that many steps, or the machine is
-    too busy to tell.
+    This is the slope between the times of frames of one step and of *many*.  The cases alternate,
+    so that the load of the machine and the state of processor caches are the same for all of them.
+    NaN if no frame takes that many steps, or if the machine is too busy.
     """
     slopes: list[list[float]] = [[] for _ in cases]
-    ways = []
+    paths = []
     for deformer, task in cases:
         deformer.reset()
-        way = way_of(task, _WARM + 3 * repeats)
-        ways.append([*way, *way[-2::-1]])  # there and back
+        path = drag_path(task, _WARM_UP + 3 * repeats)
+        paths.append([*path, *path[-2::-1]])  # there and back
     with clocked(GaussNewton, "minimise") as spent:
-        for goals in zip(*ways, strict=True):
+        for goals in zip(*paths, strict=True):
             times = [{_FEW: math.inf, many: math.inf} for _ in cases]
             for steps in _TURNS * [_FEW, many]:
                 for (deformer, _), goal, quickest in zip(cases, goals, times, strict=True):
@@ -98,5 +97,5 @@ def seconds_per_step(
                 if math.isfinite(slope):
                     own.append(slope)
                 deformer.solve(goal, max_steps=many)
-    found = [median(own[_WARM:] or [math.nan]) for own in slopes]
+    found = [median(own[_WARM_UP:] or [math.nan]) for own in slopes]
     return [slope if slope > 0.0 else math.nan for slope in found]

@@ -1,4 +1,4 @@
-"""What a frame costs after the pose is known: normals, and drawing off the screen."""
+"""Time to render a pose: normals and off-screen drawing."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _SIZE = (800, 600)  # pixels
 
 
 def drawing_seconds(mesh: Mesh, pose: FloatArray, repeats: int) -> tuple[float, float]:
-    """Return the seconds for the normals of *pose* (n, 3), and for drawing it with new normals.
+    """Return the seconds to compute the normals of *pose* (n, 3), and to render it.
 
     Raises
     ------
     MissingDependencyError
-        If nothing can be rendered here.
+        If off-screen rendering fails.
     """
     require_offscreen()
     surface = polydata_of(pose.copy(), np.full(mesh.n_faces, 3), mesh.faces.ravel())

@@ -1,10 +1,11 @@
-"""Speed over commits: each run appends its ratios to a file, one JSON object a line.
+"""History of benchmarks: each recorded run appends its ratios to a file, one JSON object per line.
 
     {"date": "2026-11-22T15:04:05+00:00", "commit": "0b2583d1c9aa", "version": "0.1.0",
      "processor": "...", "scale": "quick", "ratios": {"what was measured": 0.42}}
 
 A commit ends in ``-dirty`` if there were uncommitted changes, and is null for an installed package.
-A ratio is null if it was not measured.  Only runs of one processor and one scale are comparable.
+A ratio is null if it was not measured.  Runs are comparable only on the same processor and at the
+same scale.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def read_history(path: Path) -> list[dict[str, Any]]:
     ArgumentError
         If a line is not a recorded run.
     OSError
-        If the file can neither be read nor, later, be replaced.
+        If the file cannot be read, or could not be replaced later.
     """
     require_place(path)
     if not path.exists():
@@ -54,14 +55,14 @@ def read_history(path: Path) -> list[dict[str, Any]]:
         ):
             raise ArgumentError(
                 f"line {number} of {path} is not a run recorded by 'segdeform bench --record'; "
-                "delete the line or name another file"
+                "delete the line or choose another file"
             )
         runs.append(run)
     return runs
 
 
 def record(path: Path, scale: str, ratios: Iterable[Ratio]) -> None:
-    """Append one run to a file; a file that is not a history is refused and left unchanged."""
+    """Append one run to a file; a file with other content is not changed."""
     run = {
         "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         "commit": commit_of(_SOURCE),
@@ -76,23 +77,23 @@ def record(path: Path, scale: str, ratios: Iterable[Ratio]) -> None:
 
 
 def commit_of(source: Path) -> str | None:
-    """Return the commit of a checkout, with "-dirty" if it has changes; None if it is no checkout.
+    """Return the commit of a checkout, with "-dirty" if it has changes; None for other folders.
 
-    An installed package may lie within a repository that is not its own, so a folder counts only if
-    it has our ``setup.cfg`` and is a repository itself.
+    An installed package may be inside another repository, so a checkout must contain ``setup.cfg``
+    and be the root of a repository.
     """
     if not (source / "setup.cfg").is_file() or not (source / ".git").exists():
         return None
     words = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
     try:
         done = subprocess.run(words, cwd=source, capture_output=True, text=True, check=False)
-    except OSError:  # no git
+    except OSError:  # git is not installed
         return None
     return done.stdout.strip() or None
 
 
 def plot_history(runs: Sequence[dict[str, Any]], path: Path) -> None:
-    """Write a PNG with a panel for each ratio, and in it a line for each processor and scale."""
+    """Write a PNG file with a panel for each ratio and a line for each processor and scale."""
     names = list(dict.fromkeys(name for run in runs for name in run["ratios"]))
     if not names:
         raise ArgumentError("the history has no runs yet; record one by 'segdeform bench --record'")

@@ -1,7 +1,7 @@
-"""Clocks, memory, and a process of one's own to measure in.
+"""Measuring time and memory, and running in a child process.
 
-A time is the median of several; peak memory is that of a whole process, so that what is measured
-for it, and what may crash or fight over threads with what is there already, runs `apart`.
+Times are medians.  Peak memory is that of a whole process, so work that is measured for memory, and
+programs that may crash or compete for threads, run in a child process, by `in_own_process`.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from ..version import __version__
 
 _T = TypeVar("_T")
 _P = ParamSpec("_P")
-_LONG_ENOUGH, _MOST = 0.02, 20  # seconds and runs, for each that is asked for
+_LONG_ENOUGH, _MOST = 0.02, 20  # mean seconds per run, and maximum runs per repeat
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 def timed(work: Callable[[], _T]) -> tuple[_T, float]:
-    """Return what *work* returns, and how many seconds it took."""
+    """Return the result of *work* and its seconds."""
     start = time.perf_counter()
     result = work()
     return result, time.perf_counter() - start
@@ -41,7 +41,7 @@ def timed(work: Callable[[], _T]) -> tuple[_T, float]:
 
 @contextlib.contextmanager
 def clocked(owner: type, method: str) -> Iterator[list[float]]:
-    """Let it be known how many seconds every call of a method takes in this context."""
+    """Record the seconds of every call of a method within this context."""
     untimed, spent = getattr(owner, method), list[float]()
 
     def clocking(*args: Any, **kwargs: Any) -> Any:
@@ -57,7 +57,7 @@ def clocked(owner: type, method: str) -> Iterator[list[float]]:
 
 
 def median_seconds(work: Callable[[], object], repeats: int) -> float:
-    """Return the median of *repeats* runs of *work*, or more if short; a first does not count."""
+    """Return the median of *repeats* runs of *work*, or of more if short, after a first run."""
     work()
     times = [timed(work)[1] for _ in range(repeats)]
     while sum(times) < _LONG_ENOUGH * repeats and len(times) < _MOST * repeats:
@@ -66,7 +66,7 @@ def median_seconds(work: Callable[[], object], repeats: int) -> float:
 
 
 def by_turns(works: Sequence[Callable[[], object]], repeats: int) -> list[float]:
-    """Return the median seconds of each of *works*, run in turn so that all meet the same load."""
+    """Return the median seconds of each of *works*, run alternately under the same load."""
     for work in works:
         work()
     rounds = [[timed(work)[1] for work in works] for _ in range(repeats)]
@@ -74,7 +74,7 @@ def by_turns(works: Sequence[Callable[[], object]], repeats: int) -> list[float]
 
 
 def processor_seconds(work: Callable[[], object], repeats: int) -> float:
-    """Return what one run of *work* costs all processors; others on the machine do not count."""
+    """Return the processor time of one run of *work*, over all cores."""
     work()
     start = time.process_time()
     for _ in range(repeats):
@@ -83,13 +83,13 @@ def processor_seconds(work: Callable[[], object], repeats: int) -> float:
 
 
 def forget_peak() -> None:
-    """Let `peak_memory` count from here on, where the system can (Linux)."""
+    """Reset `peak_memory`, where the system can (Linux)."""
     with contextlib.suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
 
 
 def peak_memory() -> float:
-    """Return the most memory this process has had, in gigabytes; NaN where nobody tells."""
+    """Return the peak memory of this process in gigabytes; NaN if unknown."""
     status = Path("/proc/self/status")
     if status.is_file():
         for line in status.read_text().splitlines():
@@ -103,47 +103,46 @@ def peak_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
 
-def apart(work: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> _T:
-    """Return what *work*, a function of a module, returns in a new process.
+def in_own_process(work: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> _T:
+    """Return the result of *work*, a function of a module, run in a new process.
 
     Raises
     ------
     MissingDependencyError
-        If the process died.
+        If the process crashed.
     """
     try:
         with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
             return pool.submit(work, *args, **kwargs).result()
     except BrokenProcessPool:
-        raise MissingDependencyError("the process that ran it died") from None
+        raise MissingDependencyError("its process crashed") from None
 
 
-def called(own_process: bool, work: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> _T:
-    """Return what *work* returns, run `apart` or here."""
-    return apart(work, *args, **kwargs) if own_process else work(*args, **kwargs)
+def run_in(own_process: bool, work: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> _T:
+    """Return the result of *work*, run in a new process or in this one."""
+    return in_own_process(work, *args, **kwargs) if own_process else work(*args, **kwargs)
 
 
 def conditions() -> list[str]:
-    """Return what a reader has to know of the machine, one line each."""
+    """Describe the machine and the software, one line each."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     limits = ", ".join(f"{name}={os.environ[name]}" for name in _THREADS if name in os.environ)
     return [
         f"{processor()}; {cores} cores for this process; {platform.system()}{_load()}",
         f"Python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}, "
         f"vtk_segdeform {__version__}",
-        f"{n_threads()} threads of our own, "
-        f"with{'' if compiled_kernels() else 'out'} compiled kernels; "
-        f"other libraries: {limits or 'as many as they like'}",
+        f"{n_threads()} threads, with{'' if compiled_kernels() else 'out'} compiled kernels; "
+        f"threads of other libraries: {limits or 'not limited'}",
     ]
 
 
 def _load() -> str:
-    """Return how busy the machine is, if it tells; and a warning if that spoils what is timed."""
+    """Return the load of the machine, with a warning if it is too high to measure time."""
     if not hasattr(os, "getloadavg"):
         return ""
-    wanting, cores = os.getloadavg()[0], os.cpu_count() or 1
-    warning = "; **busy with other work: do not trust the clock**" if wanting > cores + 0.5 else ""
-    return f"; {wanting:.1f} processes wanted to run in the last minute{warning}"
+    load, cores = os.getloadavg()[0], os.cpu_count() or 1
+    warning = "; **the machine is busy: times are unreliable**" if load > cores + 0.5 else ""
+    return f"; load {load:.1f} in the last minute{warning}"
 
 
 def processor() -> str:

@@ -1,8 +1,8 @@
-"""Other programs that deform the same task, each called as its own documentation says.
+"""Deformation by other programs, called as documented by each of them.
 
-All are optional and imported inside the call.  A program runs until its next iteration moves
-nothing by more than 1e-4 of the diagonal, or as many iterations as it may; one that cannot be
-asked (Open3D, Blender) runs as many as it is told.
+All are optional and imported inside the call.  A program runs until an iteration moves no vertex
+by more than 1e-4 of the mesh diagonal, up to a maximum number of iterations.  Open3D and Blender
+do not report movement and run a given number of iterations.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ import numpy as np
 from ..arrays import FloatArray
 from ..errors import MissingDependencyError
 from .measuring import median_seconds, processor_seconds, timed
-from .tasks import NEAR, Task
+from .tasks import CONVERGED, Task
 
 _OPEN3D_ITERATIONS = 50
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """The pose (n, 3) that a program found, its seconds, and how often it went round."""
+    """The pose (n, 3), the seconds and the iterations of a program."""
 
     vertices: FloatArray
     set_up: float
@@ -31,10 +31,10 @@ class Answer:
     iterations: int
 
 
-def until_rest(
+def iterate_to_convergence(
     start: FloatArray, near: float, most: int, iterate: Callable[[FloatArray], FloatArray]
 ) -> tuple[FloatArray, int]:
-    """Return where *iterate* comes to rest from *start*, and after how many iterations."""
+    """Iterate from *start* to convergence; return the result and the number of iterations."""
     here = start
     for count in range(1, most + 1):
         ahead = iterate(here)
@@ -45,53 +45,57 @@ def until_rest(
 
 
 def libigl_arap(task: Task, most: int) -> Answer:
-    """As-rigid-as-possible by libigl (spokes and rims)."""
-    (data, places), set_up = timed(lambda: _arap_data(task))
+    """Solve by libigl's as-rigid-as-possible deformation (spokes and rims)."""
+    (data, positions), set_up = timed(lambda: _arap_data(task))
     data.max_iter = 1
-    igl, near = _igl(), NEAR * task.mesh.diagonal
+    igl, near = _igl(), CONVERGED * task.mesh.diagonal
     start = np.array(task.mesh.vertices)
     (pose, count), solve = timed(
-        lambda: until_rest(start, near, most, lambda x: igl.arap_solve(places, data, x))
+        lambda: iterate_to_convergence(
+            start, near, most, lambda x: igl.arap_solve(positions, data, x)
+        )
     )
     return Answer(np.asarray(pose), set_up, solve, count)
 
 
 def arap_iteration_seconds(task: Task, repeats: int) -> tuple[float, float]:
-    """Return what one iteration of libigl's ARAP takes, on the clock and of processors."""
-    data, places = _arap_data(task.shifted(0.0))
+    """Return the elapsed time and the processor time of one iteration of libigl's ARAP."""
+    data, positions = _arap_data(task.shifted(0.0))
     data.max_iter = 1
     igl, start = _igl(), np.array(task.mesh.vertices)
 
     def iterate() -> None:
-        igl.arap_solve(places, data, start)
+        igl.arap_solve(positions, data, start)
 
     return median_seconds(iterate, repeats), processor_seconds(iterate, repeats)
 
 
 def open3d_arap(task: Task, most: int) -> Answer:
-    """As-rigid-as-possible by Open3D, set-up and solve in one call."""
+    """Solve by Open3D's as-rigid-as-possible deformation, including set-up."""
     try:
         import open3d
     except (ImportError, OSError) as fault:
-        raise MissingDependencyError(f"open3d is not there ({fault})") from None
+        raise MissingDependencyError(f"open3d is not installed ({fault})") from None
     mesh = open3d.geometry.TriangleMesh(
         open3d.utility.Vector3dVector(np.array(task.mesh.vertices)),
         open3d.utility.Vector3iVector(task.mesh.faces.astype(np.int32)),
     )
-    held = open3d.utility.IntVector(_held(task).astype(np.int32))
-    places = open3d.utility.Vector3dVector(_places(task))
+    constrained = open3d.utility.IntVector(_constrained(task).astype(np.int32))
+    positions = open3d.utility.Vector3dVector(_positions(task))
     count = min(most, _OPEN3D_ITERATIONS)
     with open3d.utility.VerbosityContextManager(open3d.utility.VerbosityLevel.Error):
-        bent, solve = timed(lambda: mesh.deform_as_rigid_as_possible(held, places, max_iter=count))
+        bent, solve = timed(
+            lambda: mesh.deform_as_rigid_as_possible(constrained, positions, max_iter=count)
+        )
     return Answer(np.asarray(bent.vertices).copy(), 0.0, solve, count)
 
 
 def blender_laplacian(task: Task, most: int) -> Answer:
-    """Blender's Laplacian Deform modifier; every vertex that is held is an anchor."""
+    """Solve by Blender's Laplacian Deform modifier; fixed and handle vertices are anchors."""
     try:
         import bpy
     except (ImportError, OSError) as fault:
-        raise MissingDependencyError(f"bpy is not there ({fault})") from None
+        raise MissingDependencyError(f"bpy is not installed ({fault})") from None
     bpy.ops.wm.read_factory_settings(use_empty=True)
     data = bpy.data.meshes.new("task")
     data.from_pydata(task.mesh.vertices.tolist(), [], task.mesh.faces.tolist())
@@ -99,7 +103,7 @@ def blender_laplacian(task: Task, most: int) -> Answer:
     bpy.context.collection.objects.link(body)
     bpy.context.view_layer.objects.active = body
     anchors = body.vertex_groups.new(name="anchors")
-    anchors.add(_held(task).tolist(), 1.0, "REPLACE")
+    anchors.add(_constrained(task).tolist(), 1.0, "REPLACE")
     modifier: Any = body.modifiers.new("bend", "LAPLACIANDEFORM")
     modifier.vertex_group, modifier.iterations = "anchors", min(most, _OPEN3D_ITERATIONS)
     _, set_up = timed(lambda: bpy.ops.object.laplaciandeform_bind(modifier="bend"))
@@ -124,21 +128,21 @@ def _igl() -> Any:
     try:
         import igl
     except ImportError as fault:
-        raise MissingDependencyError(f"libigl is not there ({fault})") from None
+        raise MissingDependencyError(f"libigl is not installed ({fault})") from None
     return igl
 
 
 def _arap_data(task: Task) -> tuple[Any, FloatArray]:
     igl = _igl()
     data = igl.ARAPData()
-    held = _held(task).astype(np.int32)
-    igl.arap_precomputation(task.mesh.vertices, task.mesh.faces, 3, held, data)
-    return data, _places(task)
+    constrained = _constrained(task).astype(np.int32)
+    igl.arap_precomputation(task.mesh.vertices, task.mesh.faces, 3, constrained, data)
+    return data, _positions(task)
 
 
-def _held(task: Task) -> np.ndarray[Any, np.dtype[np.int64]]:
+def _constrained(task: Task) -> np.ndarray[Any, np.dtype[np.int64]]:
     return np.concatenate([task.fixed, task.handle])
 
 
-def _places(task: Task) -> FloatArray:
+def _positions(task: Task) -> FloatArray:
     return np.concatenate([task.mesh.vertices[task.fixed], task.targets])

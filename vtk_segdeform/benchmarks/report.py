@@ -1,7 +1,8 @@
-"""One run of all experiments, as a Markdown file with its plots beside it.
+"""Run experiments and write a report: a Markdown file with its figures in the same folder.
 
-What must hold comes first, whoever wins; then what was not measured, and why; then each experiment.
-The file is written anew after every experiment, so that a run that is stopped leaves what it had.
+The report begins with the ratios and their limits and with skipped measurements, followed by a
+section for each experiment.  It is written after every experiment, so that an interrupted run
+leaves a report as well.
 """
 
 from __future__ import annotations
@@ -34,23 +35,23 @@ NAME = "report.md"
 def write_report(
     folder: Path, scale: Scale, only: Sequence[str] = (), progress: Progress | None = None
 ) -> list[Section]:
-    """Run the experiments into *folder*, made if it is not there, and return what they found.
+    """Run experiments, write the report to *folder*, and return its sections.
 
     Parameters
     ----------
     folder : Path
-        Gets ``report.md`` and the pictures it shows.
+        Folder for ``report.md`` and its figures; created if necessary.
     scale : Scale
-        How much to measure.
+        Problem sizes.
     only : sequence of str
-        Names of `EXPERIMENTS`; none means all.
+        Names of `EXPERIMENTS`; by default all.
     progress : Progress, optional
-        Called between the parts; may cancel.
+        Callback; it can cancel.
 
     Raises
     ------
     KeyError
-        If *only* names something else.
+        If *only* contains an unknown name.
     """
     folder.mkdir(parents=True, exist_ok=True)
     names = list(only) or list(EXPERIMENTS)
@@ -64,14 +65,13 @@ def write_report(
         except Cancelled:
             raise
         except SegDeformError as fault:
-            section = Section(name, absent=[f"all of {name}: {fault}"])
-        shown = [figure for figure in section.figures if _drawn(folder, figure, section)]
-        section.figures[:] = shown
+            section = Section(name, skipped=[f"all of {name}: {fault}"])
+        section.figures[:] = [f for f in section.figures if _drawn(folder, f, section)]
         sections.append(section)
         head = [
             *conditions(),
-            f"scale *{scale.name}*; {time.perf_counter() - began:.0f} s so far; loading, and at "
-            f"the first run compiling, kernels took {kernels:.1f} s and counts nowhere",
+            f"scale *{scale.name}*; {time.perf_counter() - began:.0f} s so far, of which "
+            f"{kernels:.1f} s to load or compile kernels, which is not part of any measurement",
         ]
         with replacing(folder / NAME) as draft:
             draft.write_text(markdown(sections, head), encoding="utf-8")
@@ -79,24 +79,25 @@ def write_report(
 
 
 def markdown(sections: Sequence[Section], head: Sequence[str]) -> str:
-    """Return the report; *head* says what it was measured on."""
+    """Return the report as Markdown; *head* describes the machine and the run."""
     ratios = [ratio for section in sections for ratio in section.ratios]
-    absent = [line for section in sections for line in section.absent]
-    parts = ["# vtk_segdeform, measured", "\n".join(f"- {line}" for line in head)]
-    parts.append("Times are medians of one run: read the ratios, not the digits.")
+    skipped = [line for section in sections for line in section.skipped]
+    parts = ["# Benchmarks of vtk_segdeform", "\n".join(f"- {line}" for line in head)]
+    parts.append("Times are medians within one run; compare ratios rather than absolute times.")
     if ratios:
         rows = [
             (r.what, r.value, f"{'≤' if r.at_most else '≥'} {r.limit:.3g}", r.verdict)
             for r in ratios
         ]
-        broken = sum(r.verdict.startswith("**") for r in ratios)
-        known = sum(not math.isnan(r.value) for r in ratios)
-        parts += ["## What must hold", f"{known - broken} of {known} that were measured hold."]
-        parts.append(Table(("", "measured", "wanted", ""), rows).markdown())
-    if absent:
-        parts += ["## Not measured", "\n".join(f"- {line}" for line in absent)]
+        met = sum(r.verdict == "met" for r in ratios)
+        measured = sum(not math.isnan(r.value) for r in ratios)
+        parts += ["## Limits", f"{met} of {measured} measured limits are met."]
+        table = Table(("quantity", "measured", "limit", "verdict"), rows, mixed=True)
+        parts.append(table.markdown())
+    if skipped:
+        parts += ["## Not measured", "\n".join(f"- {line}" for line in skipped)]
     for section in sections:
-        parts += [f"## {section.title}", *section.words]
+        parts += [f"## {section.title}", *section.text]
         parts += [table.markdown() for table in section.tables]
         parts += [f"![{f.caption}]({f.name})\n\n*{f.caption}*" for f in section.figures]
     return "\n\n".join(parts) + "\n"
@@ -106,6 +107,6 @@ def _drawn(folder: Path, figure: Figure, section: Section) -> bool:
     try:
         figure.draw(folder / figure.name)
     except MissingDependencyError as missing:
-        section.absent.append(f"{figure.name} is not drawn: {missing}")
+        section.skipped.append(f"{figure.name} was not drawn: {missing}")
         return False
     return True

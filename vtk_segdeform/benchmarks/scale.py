@@ -1,4 +1,4 @@
-"""How much is measured: in a minute or two, in a quarter of an hour, or all that was promised."""
+"""Problem sizes of a run: a few minutes, a quarter of an hour, or an hour."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Scale:
-    """Sizes of the experiments; `QUICK`, `USUAL` and `FULL` are those of the command."""
+    """Sizes and repetitions of the experiments."""
 
     name: str
     paper_size: int = 5430  # vertices of the cactus, as in the paper
     n_cage_vertices: int = 155
     drag_sizes: tuple[int, ...] = (5430, 50_000)
     frames: int = 5  # of a drag
-    repeats: int = 5  # of what is timed
+    repeats: int = 5  # of each measurement
     regions: tuple[int, ...] = (1, 2, 3, 4, 6, 8, 12, 16, 24)
-    study_vertices: int = 288  # of all cages, where their total is the same
-    study_each: int = 40  # of each cage, where that is the same
+    study_vertices: int = 288  # total cage vertices, for a constant total
+    study_each: int = 40  # vertices of each cage, for a constant number per cage
     peer_sizes: tuple[int, ...] = (5430,)
     most_iterations: int = 200  # of a peer
     cage_sizes: tuple[int, ...] = (5430,)
-    own_process: bool = True  # for each size and each peer
+    own_process: bool = True  # run each size and each peer in a process of its own
 
 
 QUICK = Scale("quick", frames=3, repeats=3, regions=(1, 3, 6, 12, 24), most_iterations=100)

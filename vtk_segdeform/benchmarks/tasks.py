@@ -1,8 +1,8 @@
-"""What every experiment bends: a mesh, what is held and what is moved, and what binds it.
+"""Tasks of the experiments: meshes with fixed vertices, handles and targets.
 
-bent_cactus      the trunk's top turned over, the pose of `segdeform demo`
-raised_neck      the dinosaur's head and neck, its feet held
-benchmark_pose   a pose of Botsch and Sorkine's benchmark, from the folder SEGDEFORM_DATA
+bent_cactus      the trunk is bent, as in `segdeform demo`
+raised_neck      the dinosaur's head is turned back, its feet are fixed
+benchmark_pose   a pose of Botsch and Sorkine's benchmark, in the folder SEGDEFORM_DATA
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from ..models import cactus, dinosaur
 from ..regions import Regions, cage_distance_weights, segment
 from .measuring import timed
 
-# The paper's own formulation: one rotation a vertex, detail only, volume linearised, plain steps.
+# The paper's formulation: one rotation per vertex, detail only, linearised volume, plain steps.
 PAPER: dict[str, Any] = {
     "rotation_groups": None, "stretch": 0.0, "exact_volume": False,
     "acceleration": 0, "exact_hessian": False,
 }  # fmt: skip
-NEAR = 1e-4  # diagonals: converged is when the next step moves nothing by more
+CONVERGED = 1e-4  # mesh diagonals: largest movement of a step that counts as converged
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A mesh to deform: (f,) fixed and (k,) handle vertices, and where the latter go (k, 3)."""
+    """A mesh with fixed vertices (f,), handle vertices (k,) and targets (k, 3)."""
 
     name: str
     mesh: Mesh
@@ -43,14 +43,14 @@ class Task:
     targets: FloatArray
 
     def shifted(self, share: float) -> Task:
-        """Return the task with its targets moved on by *share* of the diagonal, sideways."""
-        way = share * self.mesh.diagonal * np.array([0.6, 0.8, 0.0])
-        return replace(self, targets=self.targets + way)
+        """Return the task with targets moved sideways by *share* of the mesh diagonal."""
+        shift = share * self.mesh.diagonal * np.array([0.6, 0.8, 0.0])
+        return replace(self, targets=self.targets + shift)
 
 
 @dataclass(frozen=True, eq=False)
-class Bound:
-    """A deformer that is ready, and the seconds it took to get there, part by part."""
+class Prepared:
+    """A bound deformer, and the seconds of each part of the set-up."""
 
     deformer: Deformer
     segment: float
@@ -59,36 +59,37 @@ class Bound:
 
     @property
     def seconds(self) -> float:
-        """All of it."""
+        """Total of the set-up."""
         return self.segment + self.cages + self.bind
 
 
-def bound(task: Task, n_regions: int | None, n_vertices: int, **options: Any) -> Bound:
-    """Return a deformer for *task* with so many regions and cage vertices; *options* are its own.
+def prepare(task: Task, n_regions: int | None, n_vertices: int, **options: Any) -> Prepared:
+    """Return a deformer for *task* with given numbers of regions and cage vertices.
 
-    ``as_printed=True`` also takes the paper's blend weights, eq. (4).
+    *options* are those of `Deformer`; ``as_printed=True`` also selects the paper's blend weights,
+    eq. (4).
     """
     mesh, as_printed = task.mesh, options.pop("as_printed", False)
-    regions, t_segment = timed(lambda: divided(mesh, n_regions))
+    regions, t_segment = timed(lambda: make_regions(mesh, n_regions))
     cages, t_cages = timed(lambda: fit_cages(mesh, regions, n_vertices))
     if as_printed:
         options["blend"] = cage_distance_weights(regions, cages)
-    deformer, t_bind = timed(lambda: deformer_of(task, regions, cages, **options))
-    return Bound(deformer, t_segment, t_cages, t_bind)
+    deformer, t_bind = timed(lambda: make_deformer(task, regions, cages, **options))
+    return Prepared(deformer, t_segment, t_cages, t_bind)
 
 
-def divided(mesh: Mesh, n_regions: int | None) -> Regions:
-    """Return so many regions; None leaves the number to `segment`."""
+def make_regions(mesh: Mesh, n_regions: int | None) -> Regions:
+    """Return *n_regions* regions; if None, `segment` chooses the number."""
     return Regions.single(mesh) if n_regions == 1 else segment(mesh, n_regions)
 
 
-def deformer_of(task: Task, regions: Regions, cages: Sequence[Cage], **options: Any) -> Deformer:
-    """Return a deformer that holds what *task* holds."""
+def make_deformer(task: Task, regions: Regions, cages: Sequence[Cage], **options: Any) -> Deformer:
+    """Return a deformer with the fixed vertices and the handle of *task*."""
     return Deformer(task.mesh, regions, cages, fixed=task.fixed, handle=task.handle, **options)
 
 
 def bent_cactus(n_vertices: int, degrees: float = 60.0) -> Task:
-    """Return the cactus with its top turned over by *degrees*."""
+    """Return the cactus with its trunk bent by *degrees*."""
     mesh = cactus(n_vertices)
     height = _shares(mesh.vertices)[:, 2]
     middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
@@ -106,13 +107,13 @@ def raised_neck(n_vertices: int, degrees: float = 50.0) -> Task:
 
 
 def warm_up() -> None:
-    """Load the compiled kernels, and compile them at their first use ever: that counts nowhere."""
+    """Load the compiled kernels, or compile them, so that no measurement includes this."""
     task = bent_cactus(2500)
-    bound(task, 1, 40).deformer.solve(task.targets, max_steps=2)
+    prepare(task, 1, 40).deformer.solve(task.targets, max_steps=2)
 
 
 def benchmark_folder() -> Path | None:
-    """Return the folder of the benchmark, if SEGDEFORM_DATA names one that has it."""
+    """Return the folder of the benchmark, or None if SEGDEFORM_DATA does not contain it."""
     folder = Path(os.environ.get("SEGDEFORM_DATA", "")) / "botsch-sorkine"
     return folder if "SEGDEFORM_DATA" in os.environ and folder.is_dir() else None
 
@@ -128,13 +129,16 @@ def benchmark_pose(folder: Path, name: str) -> Task:
 
 
 def _turned(
-    name: str, mesh: Mesh, held: tuple[BoolArray, BoolArray], turn: tuple[FloatArray, float]
+    name: str, mesh: Mesh, masks: tuple[BoolArray, BoolArray], turn: tuple[FloatArray, float]
 ) -> Task:
-    """Return the task that turns held[1] about the y direction, at a pivot by some degrees."""
+    """Return the task with *masks* of fixed and handle vertices; *turn* is a pivot and degrees.
+
+    The handle is rotated about the y direction.
+    """
     pivot, angle = turn[0], np.radians(turn[1])
     c, s = np.cos(angle), np.sin(angle)
     matrix = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-    fixed, handle = (np.flatnonzero(each) for each in held)
+    fixed, handle = (np.flatnonzero(mask) for mask in masks)
     targets = (mesh.vertices[handle] - pivot) @ matrix.T + pivot
     return Task(name, mesh, fixed, handle, targets)
 

@@ -2,9 +2,9 @@
 
 The files, in reading order:
 
-    main            the parser, and exit codes
-    commands        one function for each command
-    selection       vertex sets such as ``z>80%``
+    main            options, help and exit codes
+    commands        ``segdeform deform``, ``edit``, ``check``, ``regions`` and ``cages``
+    selection       vertex selections such as ``z>80%``
     motion          motions such as ``--rotate z,60``
     outputs         printed lines and written surfaces
     demo            ``segdeform demo``
@@ -12,7 +12,7 @@ The files, in reading order:
     application     ``segdeform app``
     interactive     ``segdeform bench --interactive``
     replaying       ``segdeform replay``
-    progress_bar    progress in the terminal
+    progress_bar    progress bar in the terminal
 """
 
 from .main import main

@@ -1,4 +1,4 @@
-"""The command that opens the desktop program."""
+"""``segdeform app``: open the desktop program."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from ..pictures import require_screen
 from ..progress import Progress
 from .outputs import Say
 
-_NEEDED = "pip install 'vtk-segdeform[app]'"
+_INSTALL = "pip install 'vtk-segdeform[app]'"
 
 
-def application(options: Namespace, say: Say, progress: Progress) -> bool:
-    """Open a window for one file, or for none yet, and stay until it is closed.
+def app(options: Namespace, say: Say, progress: Progress) -> bool:
+    """Open the main window, with a file if one is given; return when it is closed.
 
     Raises
     ------
     MissingDependencyError
-        If there is no Qt, or no screen.
+        If Qt is not installed or there is no display.
     """
-    del say, progress  # the window has its own
+    del say, progress  # the window shows messages and progress itself
     try:
         from qtpy import QtCore, QtWidgets
 
@@ -30,7 +30,7 @@ def application(options: Namespace, say: Say, progress: Progress) -> bool:
     except ImportError as missing:
         reason = str(missing).strip().rstrip(".")
         raise MissingDependencyError(
-            f"the desktop program needs Qt, which is not here ({reason}); install it by {_NEEDED}"
+            f"the desktop program requires Qt ({reason}); install it with {_INSTALL}"
         ) from missing
     require_screen()
     QtWidgets.QApplication.setApplicationName("segdeform")
@@ -39,7 +39,8 @@ def application(options: Namespace, say: Say, progress: Progress) -> bool:
     window.show()
     path: Path | None = options.input
     QtCore.QTimer.singleShot(0, lambda: window.begin(path))
-    # Qt's loop would hear of Ctrl+C in the terminal at the next event only; unsaved work is kept.
+    # With Python's own handler, Ctrl+C in the terminal would take effect at the next Qt event only.
+    # Unsaved work is in the autosave.
     before = signal.signal(signal.SIGINT, signal.SIG_DFL)
     try:
         program.exec()

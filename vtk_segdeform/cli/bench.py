@@ -1,4 +1,4 @@
-"""``segdeform bench``: the experiments of `benchmarks`, as a report in a folder."""
+"""``segdeform bench``: run experiments and write a report."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .outputs import Say
 
 
 def bench(options: Namespace, say: Say, progress: Progress) -> bool:
-    """Measure, leave a report, and say what does not hold; or plot earlier runs, or time a drag."""
+    """Run experiments and print their ratios; or plot recorded runs, or time a drag."""
     if options.history:
         plot = options.output / "history.png"
         runs = read_history(options.history)
@@ -30,7 +30,7 @@ def bench(options: Namespace, say: Say, progress: Progress) -> bool:
         say(f"written         {plot}")
         return True
     if options.record:
-        read_history(options.record)  # refused now rather than after the measurements
+        read_history(options.record)  # report errors before the measurements
     if options.interactive:
         say(interactive_table(n_cage_vertices=options.cage_vertices, progress=progress))
         return True
@@ -44,10 +44,9 @@ def bench(options: Namespace, say: Say, progress: Progress) -> bool:
     sections = write_report(options.output, scale, options.only, progress)
     ratios = [ratio for section in sections for ratio in section.ratios]
     for ratio in ratios:
-        verdict = ratio.verdict.strip("*").lower()
-        say(f"{verdict:15} {ratio.what}: {ratio.value:.3g}, wanted {ratio.limit:.3g}")
+        say(f"{ratio.verdict.strip('*'):15} {ratio.what}: {ratio.value:.3g} ({ratio.limit_text})")
     for section in sections:
-        for line in section.absent:
+        for line in section.skipped:
             say(f"not measured    {line}")
     if options.record:
         record(options.record, scale.name, ratios)

@@ -1,8 +1,8 @@
-"""What each command does: read, work, write, and tell it line by line.
+"""The commands ``deform``, ``edit``, ``check``, ``regions`` and ``cages``.
 
-A command takes the options of its command line, `say` for each line of its report and `progress`
-for what takes long.  It returns whether all is well, and raises what went wrong; printing and
-exit codes are the business of `cli`.
+A command takes its parsed options, a function `say` that prints one line of its report, and a
+progress callback.  It returns True, or False if it found faults; errors are raised.  `main` sets
+the exit code.
 """
 
 from __future__ import annotations
@@ -27,30 +27,23 @@ from ..regions import Regions, segment
 from ..session import Session, load_session
 from ..widgets import plugin
 from . import motion
-from .demo import HANDLE_MET
-from .demo import run as run_demo
-from .outputs import (  # fmt: skip
+from .outputs import (
+    HANDLE_TOLERANCE,
     Say,
     coloured_cages,
     coloured_regions,
-    tell_cages,
-    tell_regions,
-    tell_solution,
+    report_cages,
+    report_regions,
+    report_solution,
+    report_volume,
 )
 from .selection import parse_selection
 
-SESSION = ".segdeform"  # how the name of a session's file ends
-
-
-def demo(options: Namespace, say: Say, progress: Progress) -> bool:
-    """Bend the cactus; write meshes and pictures."""
-    return run_demo(
-        options.output, say, progress, n_vertices=options.size, draw=not options.no_pictures
-    )
+SESSION = ".segdeform"  # suffix of session files
 
 
 def deform(options: Namespace, say: Say, progress: Progress) -> bool:
-    """Move the handles of a mesh and write it, all its arrays and texture coordinates kept."""
+    """Move the handles of a mesh and write it with all its arrays and texture coordinates."""
     io.require_writable(options.output)
     if options.picture is not None:
         require_picture(options.picture)
@@ -58,8 +51,8 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     fixed = parse_selection(options.fixed, mesh, point_arrays=surface.point_data, role="fixed")
     handle, targets = _handles(options.handles, surface, mesh, fixed)
     regions, cages = _subspace(options, surface, mesh, part(progress, 0.0, 0.6))
-    tell_regions(regions, say)
-    tell_cages(cages, say)
+    report_regions(regions, say)
+    report_cages(cages, say)
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, progress=part(progress, 0.6, 0.9),
         **_settings(options),
@@ -67,24 +60,24 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     progress(0.9, "solving")
     start = time.perf_counter()
     solution = deformer.solve(targets, progress=part(progress, 0.9, 1.0))
-    tell_solution(solution, time.perf_counter() - start, say)
+    report_solution(solution, time.perf_counter() - start, say)
     deformed = io.with_vertices(surface, solution.vertices)
     io.write_mesh(options.output, deformed)
     say(f"written         {options.output}")
     if options.picture is not None:
         picture_before_after(options.picture, mesh, solution.vertices, fixed=fixed, handle=handle)
         say(f"written         {options.picture}")
-    if solution.handle_error > HANDLE_MET:
+    if solution.handle_error > HANDLE_TOLERANCE:
         raise MeshError(
-            f"{options.output} is written, but a handle misses its target by "
-            f"{solution.handle_error:.1e} of the diagonal: {solution.status}"
+            f"{options.output} was written, but a handle misses its target by "
+            f"{solution.handle_error:.1e} of the mesh diagonal: {solution.status}"
         )
     return True
 
 
 def edit(options: Namespace, say: Say, progress: Progress) -> bool:
-    """Open a window to deform a mesh in, or to go on with a saved session; write what it became."""
-    del progress  # the window has its own
+    """Edit a mesh or a saved session in a window; write the deformed mesh."""
+    del progress  # the window shows progress itself
     if options.output is not None:
         io.require_writable(options.output)
     surface, session = opened(options.input)
@@ -92,7 +85,7 @@ def edit(options: Namespace, say: Say, progress: Progress) -> bool:
     session = plugin.edit(
         session, path=options.input.with_suffix(SESSION), title=f"segdeform {options.input.name}"
     )
-    say(f"volume          changed by {session.volume_change:+.1e} of itself")
+    report_volume(session.volume_change, say)
     if options.output is not None:
         io.write_mesh(options.output, plugin.deformed(surface, session))
         say(f"written         {options.output}")
@@ -100,41 +93,41 @@ def edit(options: Namespace, say: Say, progress: Progress) -> bool:
 
 
 def check(options: Namespace, say: Say, progress: Progress) -> bool:
-    """Report the faults of a file and what a repair does; write the repaired mesh if asked to."""
+    """Report the faults of a mesh and the steps of a repair; with --repair, write the result."""
     if options.repair != (options.output is not None):
-        raise ConstraintError("--repair and -o OUT go together: -o names the repaired mesh")
+        raise ConstraintError("--repair and -o OUT require each other: -o is the repaired mesh")
     surface = io.read_polydata(options.input)
     vertices, faces = np.asarray(surface.points, dtype=float), triangles_of(surface)
-    progress(0.1, "looking for faults")
+    progress(0.1, "checking mesh")
     report = find_faults(vertices, faces)
     say(f"{options.input}: {report}")
     if report.ok and not options.repair:
         return True
-    progress(0.4, "repairing")
-    closed, mended = repair_surface(surface, largest_hole=options.largest_hole)
+    progress(0.4, "repairing mesh")
+    closed, repair = repair_surface(surface, largest_hole=options.largest_hole)
     progress(1.0, "done")
-    did, then = ("repaired", "result") if options.repair else ("--repair would", "it would be")
-    for step in mended.steps:
+    did, then = ("repaired", "result") if options.repair else ("--repair would", "result")
+    for step in repair.steps:
         say(f"{did}: {step}")
-    if not mended.steps:
+    if not repair.steps:
         say("nothing to repair")
-    say(f"{then}: {mended.report}")
-    if mended.advice:
-        say(mended.advice)
+    say(f"{then}: {repair.report}")
+    if repair.advice:
+        say(repair.advice)
     if not options.repair:
         return False
     io.write_mesh(options.output, closed)
-    say(f"written {options.output}")
-    return mended.report.ok
+    say(f"written: {options.output}")
+    return repair.report.ok
 
 
 def regions(options: Namespace, say: Say, progress: Progress) -> bool:
-    """Cut a mesh into regions; say how large they are, write them as point array "region"."""
+    """Divide a mesh into regions; print their sizes and write them as a point array "region"."""
     if options.output is not None:
         io.require_writable(options.output, arrays=True)
     surface, mesh = _read(options.input)
     found = _regions(options, surface, mesh, progress)
-    tell_regions(found, say)
+    report_regions(found, say)
     if options.output is not None:
         io.write_mesh(options.output, coloured_regions(surface, found))
         say(f"written         {options.output}")
@@ -142,13 +135,13 @@ def regions(options: Namespace, say: Say, progress: Progress) -> bool:
 
 
 def cages(options: Namespace, say: Say, progress: Progress) -> bool:
-    """Make the cages of a mesh; say how large they are, write all as one coloured surface."""
+    """Fit cages to a mesh; print their sizes and write them as one coloured surface."""
     if options.output is not None:
         io.require_writable(options.output, arrays=True)
     surface, mesh = _read(options.input)
     found, made = _subspace(options, surface, mesh, progress)
-    tell_regions(found, say)
-    tell_cages(made, say)
+    report_regions(found, say)
+    report_cages(made, say)
     if options.output is not None:
         io.write_mesh(options.output, coloured_cages(made))
         say(f"written         {options.output}")
@@ -156,7 +149,7 @@ def cages(options: Namespace, say: Say, progress: Progress) -> bool:
 
 
 def opened(path: Path) -> tuple[Any, Session]:
-    """Return a surface with all its arrays and a session of it, or the saved one."""
+    """Return the surface in a file, with all its arrays, and its session, new or saved."""
     if path.suffix == SESSION:
         session = load_session(path)
         return io.to_polydata(session.mesh), session
@@ -165,7 +158,7 @@ def opened(path: Path) -> tuple[Any, Session]:
 
 
 def _read(path: Path) -> tuple[Any, Mesh]:
-    """Return the surface with all its arrays, and the closed mesh that it is."""
+    """Return a surface with all its arrays, and the same surface as a closed mesh."""
     surface = io.read_polydata(path)
     try:
         return surface, io.from_polydata(surface)
@@ -181,8 +174,8 @@ def _regions(options: Namespace, surface: Any, mesh: Mesh, progress: Progress | 
         return Regions.single(mesh)
     if wanted != "auto" and not (wanted.isdecimal() and int(wanted) > 0):
         raise ConstraintError(
-            f"--regions must be a number from 1, auto, or one of the point arrays "
-            f"({', '.join(surface.point_data.keys()) or 'there are none'}); got {wanted!r}"
+            f"--regions must be a number from 1, 'auto' or a point array of the mesh "
+            f"({', '.join(surface.point_data.keys()) or 'it has none'}); got {wanted!r}"
         )
     number = None if wanted == "auto" else int(wanted)
     return segment(mesh, n_regions=number, progress=progress)
@@ -197,7 +190,7 @@ def _subspace(
 
 
 def _settings(options: Namespace) -> dict[str, Any]:
-    """Return the deformer's options that the command line names; the rest stay as they are."""
+    """Return the options of `Deformer` that are given on the command line."""
     settings: dict[str, Any] = {"preserve_volume": not options.no_volume}
     if options.stretch is not None:
         settings["stretch"] = options.stretch
@@ -211,33 +204,33 @@ def _handles(
 ) -> tuple[IntArray, FloatArray]:
     """Return the vertices (k,) of all handles and their targets (k, 3)."""
     ids, targets = [], []
-    foot = mesh.vertices[fixed].mean(axis=0)
+    fixed_centre = mesh.vertices[fixed].mean(axis=0)
     for handle in handles:
         if len(handle) == 1:
             raise ConstraintError(
-                f"handle {handle['select']!r} does not move; follow it with --translate, --rotate "
-                "or --matrix"
+                f"handle {handle['select']!r} does not move; add --translate, --rotate or --matrix "
+                "after it"
             )
         arrays = surface.point_data
         ids.append(parse_selection(handle["select"], mesh, point_arrays=arrays, role="handle"))
-        targets.append(_moved(mesh.vertices[ids[-1]], handle, foot))
+        targets.append(_moved(mesh.vertices[ids[-1]], handle, fixed_centre))
     together = np.concatenate(ids)
     if len(np.unique(together)) < len(together):
-        raise ConstraintError("two handles share vertices; each vertex can follow only one")
+        raise ConstraintError("two handles share vertices; each vertex can be in only one handle")
     return together, np.concatenate(targets)
 
 
-def _moved(points: FloatArray, handle: dict[str, str], foot: FloatArray) -> FloatArray:
-    """Return the handle's *points* after its matrix, its turn and its shift, in this order.
+def _moved(points: FloatArray, handle: dict[str, str], fixed_centre: FloatArray) -> FloatArray:
+    """Apply the matrix, the rotation and the translation of a handle, in this order.
 
-    *foot* (3,) is the centre of the fixed vertices.
+    *fixed_centre* (3,) is the mean of the fixed vertices.
     """
     if "matrix" in handle:
         points = motion.transform(points, motion.read_matrix(handle["matrix"]))
     if "rotate" in handle:
         axis, angle = motion.parse_rotation(handle["rotate"])
         pivot = handle.get("pivot", "handle")
-        centres = {"handle": points.mean(axis=0), "fixed": foot}
+        centres = {"handle": points.mean(axis=0), "fixed": fixed_centre}
         centre = centres[pivot] if pivot in centres else motion.parse_vector(pivot, "pivot")
         points = motion.transform(points, motion.rotation(axis, angle, centre))
     if "translate" in handle:

@@ -1,15 +1,15 @@
-"""The demonstration: the cactus, its trunk bent over by 60 degrees, from nothing to pictures.
+"""``segdeform demo``: bend the trunk of the sample cactus by 60 degrees.
 
-The bottom stands still and the tip of the trunk is the handle.  It turns about a horizontal line
-through the trunk, below the arm on its inner side, so that the arm swings out of the way.
+The bottom is fixed and the tip of the trunk is the handle.  The axis of rotation is horizontal and
+passes through the trunk below the arm on the inner side, so that this arm swings out of the way.
 """
 
 from __future__ import annotations
 
 import math
 import time
+from argparse import Namespace
 from dataclasses import dataclass
-from pathlib import Path
 
 from .. import io
 from ..arrays import FloatArray, IntArray
@@ -27,41 +27,48 @@ from ..pictures import (
 from ..progress import Progress, part
 from ..regions import segment
 from . import motion
-from .outputs import Say, coloured_cages, coloured_regions, tell_cages, tell_regions, tell_solution
+from .outputs import (
+    HANDLE_TOLERANCE,
+    Say,
+    coloured_cages,
+    coloured_regions,
+    report_cages,
+    report_regions,
+    report_solution,
+)
 from .selection import parse_selection
 
 FIXED, HANDLE = "z<8%", "z>92%"
-_PIVOT_HEIGHT = 0.4  # of the height
-HANDLE_MET = 1e-3  # of the diagonal: what a deformation promises
+_PIVOT_HEIGHT = 0.4  # as a fraction of the height
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """What is held, what is moved, and where to."""
+    """Fixed vertices, handle and targets."""
 
-    fixed: IntArray  # (f,) vertex numbers
-    handle: IntArray  # (k,) vertex numbers
+    fixed: IntArray  # (f,) vertex ids
+    handle: IntArray  # (k,) vertex ids
     targets: FloatArray  # (k, 3)
 
 
 def bent_top(mesh: Mesh, angle: float, *, pivot_height: float = _PIVOT_HEIGHT) -> Pose:
-    """Return the pose that turns the top of a standing *mesh* over towards +x.
+    """Return the pose that bends the top of *mesh* towards +x.
 
     Parameters
     ----------
     mesh : Mesh
-        Standing along z.
+        Upright along z.
     angle : float
         In radians, about the y direction.
     pivot_height : float
-        Where the axis passes, as a share of the mesh's height.
+        Height of the axis, as a fraction of the height of the mesh.
 
     Examples
     --------
     >>> import math
     >>> from vtk_segdeform.models import bar
     >>> pose = bent_top(bar(), math.radians(90), pivot_height=0.0)
-    >>> float(pose.targets[:, 0].max().round(12))  # what stood 1 high now lies 1 wide
+    >>> float(pose.targets[:, 0].max().round(12))  # the height is now the width
     1.0
     """
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
@@ -72,28 +79,26 @@ def bent_top(mesh: Mesh, angle: float, *, pivot_height: float = _PIVOT_HEIGHT) -
     return Pose(parse_selection(FIXED, mesh), handle, turned)
 
 
-def run(
-    folder: Path, say: Say, progress: Progress, *, n_vertices: int = 5430, draw: bool = True
-) -> bool:
-    """Bend the cactus and leave meshes and pictures in *folder*; return whether all went well."""
-    mesh = cactus(n_vertices)
+def demo(options: Namespace, say: Say, progress: Progress) -> bool:
+    """Bend the cactus; write meshes and pictures.  Return whether the handle met its targets."""
+    folder, mesh = options.output, cactus(options.size)
     say(f"cactus          {mesh.n_vertices} vertices, {mesh.n_faces} triangles")
     start = time.perf_counter()
     regions = segment(mesh, n_regions=3, progress=part(progress, 0.0, 0.2))
-    tell_regions(regions, say)
+    report_regions(regions, say)
     cages = fit_cages(mesh, regions, n_vertices=155, progress=part(progress, 0.2, 0.5))
-    tell_cages(cages, say)
+    report_cages(cages, say)
     pose = bent_top(mesh, math.radians(60.0))
     deformer = Deformer(
         mesh, regions, cages, fixed=pose.fixed, handle=pose.handle,
         progress=part(progress, 0.5, 0.7),
     )  # fmt: skip
-    say(f"set up          {time.perf_counter() - start:.1f} s, once")
+    say(f"set-up          {time.perf_counter() - start:.1f} s")
     start = time.perf_counter()
     solution = deformer.solve(pose.targets)
-    tell_solution(solution, time.perf_counter() - start, say)
+    report_solution(solution, time.perf_counter() - start, say)
     change = local_volume_change(mesh, solution.vertices)
-    say(f"local volume    {100 * change.min():+.0f} % to {100 * change.max():+.0f} %")
+    say(f"local volume    {1 + change.min():.2f} to {1 + change.max():.2f} times the original")
 
     folder.mkdir(parents=True, exist_ok=True)
     after = mesh.with_vertices(solution.vertices)
@@ -102,8 +107,8 @@ def run(
     io.write_mesh(folder / "cactus-bent.vtp", bent)
     io.write_mesh(folder / "cages-bent.vtp", coloured_cages(cages, solution.cage_vertices))
     say(f"written         {folder / 'cactus-bent.vtp'}, {folder / 'cages-bent.vtp'}")
-    if draw:
-        progress(0.8, "drawing")
+    if not options.no_pictures:
+        progress(0.8, "drawing pictures")
         names = ("regions-and-cages.png", "before-after.png", "cages-bent.png", "volume-change.png")
         at_rest, before_after, cages_bent, volume = (folder / name for name in names)
         moved = [Mesh(p, cage.faces) for p, cage in zip(solution.cage_vertices, cages, strict=True)]
@@ -114,7 +119,7 @@ def run(
             )
             picture_regions_and_cages(cages_bent, after, regions.membership, moved)
             picture_volume_change(volume, mesh, after.vertices, change)
-            say(f"drawn           {', '.join(names)}")
+            say(f"written         {', '.join(names)}")
         except MissingDependencyError as missing:
-            say(f"not drawn       {missing}")
-    return solution.handle_error <= HANDLE_MET
+            say(f"no pictures     {missing}")
+    return solution.handle_error <= HANDLE_TOLERANCE

@@ -1,13 +1,14 @@
-"""Where the milliseconds of a drag go: a real drag by events in a window that nobody sees.
+"""``segdeform bench --interactive``: time the parts of a drag by mouse events, off-screen.
 
-    solve       from the event to the new pose; x = W~ p is part of every step of the solver
-    map         the positions of the vertices into the memory that is drawn
-    overlay     the local volume change, its colours and its words
-    normals     of the deformed mesh
-    render      drawing, by whatever OpenGL there is
+    solve       from the mouse event to the new pose; each step of the solver includes x = W~ p
+    map         copying the vertex positions into the rendered mesh
+    overlay     local volume change, its colours and label
+    normals     normals of the deformed mesh
+    render      drawing by OpenGL
 
-A session tells its listeners of a change in the order in which they came.  So do the clocks here:
-one before the mesh is shown, one after it, one after the overlay.
+A session notifies listeners in the order in which they were added, so that the parts are separated
+by listeners that record the time: one added before the mesh display, one after it, and one after
+the overlay.
 """
 
 from __future__ import annotations
@@ -28,10 +29,10 @@ from ..widgets.scene import Phase
 from ..widgets.volume_overlay import VolumeOverlay
 from .demo import bent_top
 
-_SIZE = (800, 600)  # of the window, pixels
+_SIZE = (800, 600)  # window size in pixels
 _STAGES = ("solve", "map", "overlay", "normals", "render")
 _HEAD = "| vertices | event ms | solve | map | overlay | normals | render | steps | solve + map |"
-_SWING = 0.15  # of the window's height: how far the hand goes
+_SWING = 0.15  # length of the drag, as a fraction of the window height
 
 
 def interactive_table(
@@ -41,23 +42,23 @@ def interactive_table(
     moves: int = 30,
     progress: Progress | None = None,
 ) -> str:
-    """Return the medians over a drag as a Markdown table, a row for each mesh.
+    """Return the median times over a drag as a Markdown table with a row for each mesh.
 
     Parameters
     ----------
     sizes : tuple of int
-        Vertices of the cactus.
+        Numbers of vertices of the cactus.
     n_cage_vertices : int
-        Of its three cages together.
+        Total of its three cages.
     moves : int
-        Events of the drag.
+        Number of mouse moves.
     progress : Progress, optional
-        Called between the parts; may cancel.
+        Callback; it can cancel.
 
     Raises
     ------
     MissingDependencyError
-        If nothing can be rendered here.
+        If off-screen rendering fails.
     """
     lines = [
         f"cactus, 3 regions, {n_cage_vertices} cage vertices, {moves} moves of a drag in a window "
@@ -102,13 +103,13 @@ def _row(size: int, n_cage_vertices: int, moves: int, progress: Progress | None)
             began = time.perf_counter()
             _send(view.interactor, "MouseMoveEvent", start + [across, 0.0])
             ended = time.perf_counter()
-            solved, mapped, told = stamps[:3]
-            # The event has computed normals, too; once more, to know how long that took.
+            solved, mapped, overlaid = stamps[:3]
+            # The event updates the normals as part of the map: time them by a second update.
             again = time.perf_counter()
             surface.update_normals()
             normals = time.perf_counter() - again
             shown = max(mapped - solved - normals, 0.0)
-            spent = (solved - began, shown, told - mapped, normals, ended - told)
+            spent = (solved - began, shown, overlaid - mapped, normals, ended - overlaid)
             for stage, seconds in zip(_STAGES, spent, strict=True):
                 times[stage].append(1e3 * seconds)
             times["event"].append(1e3 * (ended - began))
@@ -126,7 +127,7 @@ def _row(size: int, n_cage_vertices: int, moves: int, progress: Progress | None)
 
 
 def _ready(size: int, n_cage_vertices: int, progress: Progress | None) -> Session:
-    """Return a session over a cactus that can be dragged."""
+    """Return a session of a cactus with cages and a handle, bound."""
     mesh = cactus(size)
     pose = bent_top(mesh, np.radians(60.0))
     session = Session(mesh)

@@ -1,10 +1,12 @@
-"""The command line, ``segdeform``: the only place that prints, and that decides an exit code.
+"""The ``segdeform`` command: options, help and exit codes.
 
-    0   done
-    1   a fault was found, or the work could not be done: the line on stderr says why
-    2   the command was not understood: unknown option, bad selection, bad motion
+    0   success
+    1   the mesh has faults, or the command failed; stderr gives the reason
+    2   usage error: unknown option, invalid selection or motion
+    130 interrupted by Ctrl+C
 
-What the commands do is told in `commands`; here is how they are called.
+The module of a command is imported when the command runs, so that ``segdeform --help`` takes a
+tenth of a second and loads neither numpy nor VTK.  This is the only module that prints.
 """
 
 from __future__ import annotations
@@ -14,37 +16,47 @@ import logging
 import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from ctypes.util import find_library
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ..benchmarks import EXPERIMENTS
 from ..errors import ConstraintError, SegDeformError
-from ..kernels import advice
 from ..version import __version__
-from . import commands
-from .application import application
-from .bench import bench
 from .progress_bar import ProgressBar
-from .replaying import replay_command
 
-_TAKE_VECTORS = ("--rotate", "--pivot", "--translate")
+_VECTOR_OPTIONS = ("--rotate", "--pivot", "--translate")
 DONE, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
+
+# Command -> module of this folder; the function has the name of the command.
+COMMANDS = {
+    "demo": "demo",
+    "deform": "commands",
+    "edit": "commands",
+    "app": "application",
+    "replay": "replaying",
+    "check": "commands",
+    "regions": "commands",
+    "cages": "commands",
+    "bench": "bench",
+}
+# The keys of `benchmarks.EXPERIMENTS`, which is not imported for the help.
+EXPERIMENTS = ("drag", "table1", "segmentation", "figures", "peers", "cages")
 
 _SELECTION = """\
 selections (SEL):
-  z>80%, x<=0.25   half-space; per cent of the bounding box, or in the mesh's own unit
-  ids.txt          a file of vertex numbers, from 0
-  pose.sel         one number per vertex: 0 fixed, 1 free, 2 handle
-  name, name=2     a point array: not zero, or equal to 2
-  z>80%&x<10%      both
+  z>80%, x<=0.25   half-space: percentage of the bounding box, or model units
+  ids.txt          text file of vertex ids, counted from 0
+  pose.sel         text file with one number per vertex: 0 fixed, 1 free, 2 handle
+  name, name=2     point array: non-zero values, or values equal to 2
+  z>80%&x<10%      vertices in both selections
 """
 
 _REPLAYS = """\
-A recording may come from an untrusted source. Its keys read and write files only in --folder. The
-replay is refused or stopped with exit code 1 if it exceeds --events, --seconds or a window of
-16 million pixels.
+Recordings may come from untrusted sources: recorded keys read and write files only in --folder,
+and a replay that exceeds --events, --seconds or a window of 16 million pixels stops with exit
+code 1.
 """
 
 _EXAMPLES = """\
@@ -61,7 +73,7 @@ examples:
   segdeform regions horse.ply -o regions.vtp --regions 6
   segdeform cages horse.ply -o cages.vtp --regions 6 --cage-vertices 300
 
-exit codes: 0 done; 1 a fault was found or the work failed; 2 the command was not understood
+exit codes: 0 success; 1 the mesh has faults or the command failed; 2 usage error
 """
 
 
@@ -72,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = _parser().parse_args(_with_signed_vectors(words))
     except SystemExit as end:  # argparse has printed its usage, help or version
         return int(end.code or 0)
-    _draw_without_a_screen()
+    _render_without_display()
     bar = ProgressBar(sys.stderr)
 
     def say(line: str) -> None:
@@ -82,51 +94,56 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings = _Warnings(options.command, bar)
     logging.getLogger("vtk_segdeform").addHandler(warnings)
     try:
-        return DONE if options.run(options, say, bar) else FAILED
+        return DONE if command(options.command)(options, say, bar) else FAILED
     except KeyboardInterrupt:
         bar.clear()
         return INTERRUPTED
-    except BrokenPipeError:  # the reader, head or less, has seen enough
+    except BrokenPipeError:  # the reader, such as head or less, has quit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
     except (SegDeformError, OSError, ValueError, RuntimeError, MemoryError) as error:
         bar.clear()
         if options.debug:
             raise
-        told = _printable(_told(error))
-        print(f"segdeform {options.command}: {told}", file=sys.stderr)
+        print(f"segdeform {options.command}: {_printable(_one_line(error))}", file=sys.stderr)
         return MISUSED if isinstance(error, ConstraintError) else FAILED
     finally:
         logging.getLogger("vtk_segdeform").removeHandler(warnings)
 
 
+def command(name: str) -> Callable[..., bool]:
+    """Import the module of a command and return the function that runs it."""
+    run: Callable[..., bool] = getattr(import_module(f".{COMMANDS[name]}", __package__), name)
+    return run
+
+
 class _Warnings(logging.Handler):
-    """Prints the package's warnings, for example of arrays that a file format cannot store."""
+    """Prints the package's warnings, for example about arrays that a file format cannot store."""
 
     def __init__(self, command: str, bar: ProgressBar) -> None:
         super().__init__(logging.WARNING)
         self._command, self._bar = command, bar
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print a record as a line of its own."""
+        """Print a record on its own line."""
         self._bar.clear()
         print(f"segdeform {self._command}: {record.getMessage()}", file=sys.stderr)
 
 
-def _draw_without_a_screen() -> None:
-    """Lead VTK to EGL where there is no X server: it would warn of that with every picture."""
+def _render_without_display() -> None:
+    """Select EGL where there is no X server; VTK would otherwise warn at every picture."""
     if sys.platform == "linux" and not os.environ.get("DISPLAY") and find_library("EGL"):
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 
 def _printable(line: str) -> str:
-    """Return *line* with unprintable characters escaped: file names may be any bytes."""
+    """Return *line* with unprintable characters escaped; file names may contain any bytes."""
     encoding = sys.stdout.encoding or "utf-8"
     return line.encode(encoding, "backslashreplace").decode(encoding)
 
 
-def _told(error: Exception) -> str:
-    """Return the error in one line."""
+def _one_line(error: Exception) -> str:
+    """Return the message of an error on one line."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
     if isinstance(error, MemoryError):
@@ -135,18 +152,18 @@ def _told(error: Exception) -> str:
 
 
 def _with_signed_vectors(words: Sequence[str]) -> list[str]:
-    """Return *words* with "--pivot -1,0,0" joined by "=": argparse takes -1,0,0 for an option."""
+    """Join "--pivot -1,0,0" by "=", because argparse would parse -1,0,0 as an option."""
     joined: list[str] = []
     for word in words:
-        if joined and joined[-1] in _TAKE_VECTORS and re.match(r"-[\d.]", word):
+        if joined and joined[-1] in _VECTOR_OPTIONS and re.match(r"-[\d.]", word):
             joined[-1] += f"={word}"
         else:
             joined.append(word)
     return joined
 
 
-class _OfHandle(argparse.Action):
-    """--handle begins a handle; a motion option after it belongs to that handle."""
+class _HandleOption(argparse.Action):
+    """--handle starts a handle; the motion options that follow belong to it."""
 
     def __call__(
         self,
@@ -159,136 +176,160 @@ class _OfHandle(argparse.Action):
         if self.dest == "handle":
             handles.append({"select": values})
         elif not handles:
-            parser.error(f"{option_string} says how a handle moves; write it after its --handle")
+            parser.error(f"{option_string} must come after the --handle it applies to")
         elif self.dest in handles[-1]:
-            parser.error(f"{option_string} is given twice for one handle")
+            parser.error(f"{option_string} was given twice for the same handle")
         else:
             handles[-1] = {**handles[-1], self.dest: values}
         namespace.handles = handles
+
+
+class _Version(argparse.Action):
+    """--version also names missing libraries that affect speed."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from ..kernels import advice
+
+        print("\n".join(filter(None, (f"segdeform {__version__}", advice()))))
+        parser.exit()
 
 
 def _parser() -> argparse.ArgumentParser:
     form = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(
         prog="segdeform",
-        description="Bend a dense closed mesh while its detail and its exact volume stay.",
+        description="Deform closed meshes by moving handles, with detail and volume preserved.",
         epilog=_EXAMPLES,
         formatter_class=form,
     )
-    version = "\n".join(filter(None, (f"segdeform {__version__}", advice())))
-    parser.add_argument("--version", action="version", version=version)
-    parser.add_argument("--debug", action="store_true", help="show where an error came from")
-    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
+    parser.add_argument("--debug", action="store_true", help="show the traceback of errors")
+    subparsers = parser.add_subparsers(
+        title="commands", dest="command", metavar="COMMAND", required=True
+    )
 
-    def command(name: str, run: Any, text: str, epilog: str = "") -> argparse.ArgumentParser:
-        sub = subparsers.add_parser(
+    def add_command(name: str, text: str, epilog: str = "") -> argparse.ArgumentParser:
+        return subparsers.add_parser(
             name, help=text, description=f"{text[0].upper()}{text[1:]}.", epilog=epilog,
             formatter_class=form, allow_abbrev=False,
         )  # fmt: skip
-        sub.set_defaults(run=run)
-        return sub
 
-    sub = command("demo", commands.demo, "bend the cactus over; write meshes and pictures")
-    sub.add_argument("-o", "--output", type=Path, default=Path("demo-output"), metavar="FOLDER")
-    sub.add_argument("--size", type=_count, default=5430, metavar="N", help="mesh vertices (5430)")
-    sub.add_argument("--no-pictures", action="store_true", help="only meshes and numbers")
+    sub = add_command("demo", "bend the sample cactus; write meshes and pictures")
+    _output_folder(sub, "demo-output")
+    text = "number of mesh vertices (default: 5430)"
+    sub.add_argument("--size", type=_count, default=5430, metavar="N", help=text)
+    sub.add_argument("--no-pictures", action="store_true", help="write no pictures")
 
-    sub = command("deform", commands.deform, "move handles of a mesh", _SELECTION)
-    _input_output(sub, required=True)
-    _subspace(sub)
-    _motion(sub)
+    sub = add_command("deform", "move handles of a mesh and write the result", _SELECTION)
+    _input_output(sub, "the deformed mesh", required=True)
+    _cages(sub)
+    _handles(sub)
 
-    sub = command("edit", commands.edit, "open a window to deform a mesh, or a saved session, in")
-    _input_output(sub, required=False)
+    sub = add_command("edit", "deform a mesh or a saved session in a window")
+    text = "the deformed mesh, written when the window is closed"
+    _input_output(sub, text, session=True)
 
-    sub = command("app", application, "open the desktop program, with a mesh, a session or nothing")
-    sub.add_argument("input", type=Path, nargs="?", metavar="FILE", help="a mesh or a session")
+    sub = add_command("app", "open the desktop program")
+    sub.add_argument("input", type=Path, nargs="?", metavar="FILE", help="mesh or session file")
 
-    text = "replay a recording made with Ctrl+R"
-    sub = command("replay", replay_command, text, _REPLAYS)
+    sub = add_command("replay", "replay a recording made with Ctrl+R", _REPLAYS)
     sub.add_argument("recording", type=Path, metavar="RECORDING", help="NAME.recording.txt")
-    _input_output(sub, required=False)
-    sub.add_argument("--film", type=Path, metavar="OUT", help="off-screen, to a .gif or an .mp4")
-    text = "folder for files that the recorded keys save; without it, saving fails"
+    _input_output(sub, "the deformed mesh at the end", session=True)
+    text = "render off-screen to a .gif or .mp4 file"
+    sub.add_argument("--film", type=Path, metavar="OUT", help=text)
+    text = "folder for files that recorded keys save; by default, saving fails"
     sub.add_argument("--folder", type=Path, metavar="FOLDER", help=text)
-    text = "limit on events plus timer ticks (200000)"
+    text = "limit on events and timer ticks (default: 200000)"
     sub.add_argument("--events", type=_count, default=200_000, metavar="N", help=text)
-    text = "time limit in seconds (300)"
+    text = "time limit in seconds (default: 300)"
     sub.add_argument("--seconds", type=_count, default=300, metavar="S", help=text)
 
-    sub = command("check", commands.check, "report the faults of a mesh, and repair them")
-    _input_output(sub, required=False)
-    sub.add_argument("--repair", action="store_true", help="write the repaired mesh to -o OUT")
-    text = "fill holes of up to this many edges (100)"
+    sub = add_command("check", "report the faults of a mesh; optionally repair them")
+    _input_output(sub, "the repaired mesh; requires --repair")
+    sub.add_argument("--repair", action="store_true", help="repair the mesh; requires -o OUT")
+    text = "fill holes of at most this many edges (default: 100)"
     sub.add_argument("--largest-hole", type=_count, default=100, metavar="EDGES", help=text)
 
-    sub = command("regions", commands.regions, "cut a mesh into regions; write them as an array")
-    _input_output(sub, required=False)
-    _number_of_regions(sub)
+    sub = add_command("regions", "divide a mesh into regions")
+    _input_output(sub, 'the mesh with point arrays "region" and "regions_here", and colours')
+    _regions(sub)
 
-    sub = command("cages", commands.cages, "make the cages of a mesh; write them coloured")
-    _input_output(sub, required=False)
-    _subspace(sub)
+    sub = add_command("cages", "fit cages to a mesh")
+    _input_output(sub, "all cages as one coloured surface")
+    _cages(sub)
 
-    sub = command("bench", bench, "measure against the paper and its peers; write a report")
-    sub.add_argument("-o", "--output", type=Path, default=Path("bench-output"), metavar="FOLDER")
-    much = sub.add_mutually_exclusive_group()
-    much.add_argument("--quick", action="store_true", help="small sizes, a few minutes")
-    much.add_argument("--full", action="store_true", help="up to a million vertices, an hour")
-    sub.add_argument(
-        "--only", action="append", default=[], choices=list(EXPERIMENTS), help="may be given again"
-    )
-    sub.add_argument(
-        "--size", type=_count, default=None, metavar="N", help="mesh vertices, one size"
-    )
-    sub.add_argument("--cage-vertices", type=_count, default=155, metavar="N", help="in all (155)")
-    what = sub.add_mutually_exclusive_group()
-    what.add_argument("--interactive", action="store_true", help="time a drag in a window instead")
-    text = "append the ratios, with date and commit, to a file of JSON lines"
-    what.add_argument("--record", type=Path, metavar="FILE", help=text)
-    text = "measure nothing; plot the runs recorded in a file"
-    what.add_argument("--history", type=Path, metavar="FILE", help=text)
+    _bench(add_command("bench", "run the benchmarks and write a report"))
     return parser
 
 
-def _input_output(parser: argparse.ArgumentParser, *, required: bool) -> None:
-    parser.add_argument("input", type=Path, metavar="IN", help="ply, obj, off, stl, vtp, ...")
-    parser.add_argument("-o", "--output", type=Path, metavar="OUT", required=required)
+def _bench(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    _output_folder(parser, "bench-output")
+    scale = parser.add_mutually_exclusive_group()
+    scale.add_argument("--quick", action="store_true", help="small meshes; a few minutes")
+    scale.add_argument("--full", action="store_true", help="up to a million vertices; an hour")
+    text = f"run one experiment: {', '.join(EXPERIMENTS)}; may be repeated"
+    add("--only", action="append", default=[], choices=EXPERIMENTS, metavar="NAME", help=text)
+    add("--size", type=_count, default=None, metavar="N", help="one mesh size, in vertices")
+    text = "total cage vertices (default: 155)"
+    add("--cage-vertices", type=_count, default=155, metavar="N", help=text)
+    task = parser.add_mutually_exclusive_group()
+    text = "only time a drag in a window"
+    task.add_argument("--interactive", action="store_true", help=text)
+    text = "append the ratios, date and commit to a JSON lines file"
+    task.add_argument("--record", type=Path, metavar="FILE", help=text)
+    text = "only plot the runs recorded in FILE"
+    task.add_argument("--history", type=Path, metavar="FILE", help=text)
 
 
-def _number_of_regions(parser: argparse.ArgumentParser) -> None:
-    text = "how many regions: a number (3), auto, or the name of a point array of labels"
+def _input_output(
+    parser: argparse.ArgumentParser, text: str, *, required: bool = False, session: bool = False
+) -> None:
+    formats = f"mesh file (ply, obj, off, stl, vtp, ...){' or session file' if session else ''}"
+    parser.add_argument("input", type=Path, metavar="IN", help=formats)
+    parser.add_argument("-o", "--output", type=Path, metavar="OUT", required=required, help=text)
+
+
+def _output_folder(parser: argparse.ArgumentParser, name: str) -> None:
+    text = f"output folder (default: {name})"
+    parser.add_argument("-o", "--output", type=Path, default=name, metavar="FOLDER", help=text)
+
+
+def _regions(parser: argparse.ArgumentParser) -> None:
+    text = "number of regions, 'auto', or a point array of region numbers (default: 3)"
     parser.add_argument("--regions", default="3", metavar="N", help=text)
-    text = "edge rings that regions from an array grow into each other (4)"
+    text = "overlap of regions from a point array, in edge rings (default: 4)"
     parser.add_argument("--overlap", type=_count, default=4, metavar="RINGS", help=text)
 
 
-def _subspace(parser: argparse.ArgumentParser) -> None:
-    _number_of_regions(parser)
-    parser.add_argument(
-        "--cage-vertices", type=_count, default=155, metavar="N", help="of all cages together (155)"
-    )
+def _cages(parser: argparse.ArgumentParser) -> None:
+    _regions(parser)
+    text = "total cage vertices (default: 155)"
+    parser.add_argument("--cage-vertices", type=_count, default=155, metavar="N", help=text)
 
 
-def _motion(parser: argparse.ArgumentParser) -> None:
+def _handles(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("--fixed", required=True, metavar="SEL", help="vertices held in place")
-    one = parser.add_argument_group("for each handle, after its --handle")
+    add("--fixed", required=True, metavar="SEL", help="fixed vertices")
+    handle = parser.add_argument_group("handles (motion options follow the handle they apply to)")
     for name, metavar, text in [
-        ("handle", "SEL", "vertices that move; give it again for another handle"),
+        ("handle", "SEL", "handle vertices; may be repeated"),
         ("matrix", "FILE", "4x4 matrix, applied first"),
-        ("rotate", "AXIS,DEGREES", "then a turn: z,60 or 1,0,1,60"),
-        ("pivot", "X,Y,Z", "of the turn; 'fixed' or 'handle' for a centre (handle)"),
-        ("translate", "X,Y,Z", "then a shift"),
-    ]:
+        ("rotate", "AXIS,DEGREES", "rotation, applied second: z,60 or 1,0,1,60"),
+        ("pivot", "X,Y,Z", "pivot of the rotation: a point, or the centre of 'fixed' or 'handle' "
+         "(default: handle)"),
+        ("translate", "X,Y,Z", "translation, applied last"),
+    ]:  # fmt: skip
         required = name == "handle"
-        one.add_argument(
-            f"--{name}", action=_OfHandle, metavar=metavar, help=text, required=required
+        handle.add_argument(
+            f"--{name}", action=_HandleOption, metavar=metavar, help=text, required=required
         )
-    add("--no-volume", action="store_true", help="let the volume change")
-    add("--stretch", type=float, default=None, metavar="S", help="resistance to stretching")
-    add("--rotation-groups", type=_count, default=None, metavar="N", help="0: one per vertex")
-    add("--picture", type=Path, metavar="PNG", help="write before and after as a picture")
+    add("--no-volume", action="store_true", help="do not preserve the volume")
+    text = "stretch resistance relative to detail preservation (default: 10)"
+    add("--stretch", type=float, default=None, metavar="S", help=text)
+    text = "number of rotation clusters; 0: one rotation per vertex (default: 300)"
+    add("--rotation-groups", type=_count, default=None, metavar="N", help=text)
+    add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
 
 
 def _count(text: str) -> int:

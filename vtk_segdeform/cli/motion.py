@@ -1,16 +1,16 @@
-"""How a handle moves, told in a few characters: ``--rotate z,60 --translate 0,0,1``.
+"""Motions of handles as options: ``--rotate z,60 --translate 0,0,1``.
 
-A motion is a (4, 4) matrix M that takes a rest position x to its target, in homogeneous
-coordinates.  It is put together in a fixed order, whatever order it was written in:
+A motion is a (4, 4) matrix M that maps rest positions x to targets, in homogeneous coordinates.
+The order of its parts is fixed, independent of the order of the options:
 
     M = T(translation) T(pivot) R(axis, angle) T(-pivot) M_file
 
-a matrix from a file first, then a turn about the pivot, then a shift.  R is Rodrigues' formula,
-with K the cross-product matrix of the unit axis:
+that is, a matrix from a file first, then a rotation about the pivot, then a translation.  R is
+Rodrigues' formula, where K is the cross-product matrix of the unit axis:
 
     R = 1 + sin(angle) K + (1 - cos(angle)) K^2
 
-Degrees are for people and end here; everything behind this door is in radians.
+Angles are in degrees in the options, and in radians everywhere else.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def parse_vector(text: str, name: str) -> FloatArray:
-    """Return "1,2,3" as (3,) float.
+    """Parse "1,2,3"; return (3,) float.
 
     Raises
     ------
     ConstraintError
-        If it is not three finite numbers between commas; *name* is what to call it.
+        If *text* is not three finite numbers separated by commas; the message begins with *name*.
     """
     numbers = _numbers(text, name, "x,y,z")
     if len(numbers) != 3:
@@ -43,7 +43,7 @@ def parse_vector(text: str, name: str) -> FloatArray:
 
 
 def parse_rotation(text: str) -> tuple[FloatArray, float]:
-    """Return the unit axis (3,) and the angle in radians of "z,60" or "1,0,1,60".
+    """Parse "z,60" or "1,0,1,60"; return the unit axis (3,) and the angle in radians.
 
     Examples
     --------
@@ -66,39 +66,40 @@ def parse_rotation(text: str) -> tuple[FloatArray, float]:
 
 
 def read_matrix(path: str | Path) -> FloatArray:
-    """Return the (4, 4) matrix in a text file of 16 numbers, row by row; # begins a comment."""
-    if not os.path.isfile(path):  # reading a device may never end
-        raise ConstraintError(f"matrix {path}: there is no such file; give one of 16 numbers")
+    """Return the (4, 4) matrix in a text file of 16 numbers, row by row; # starts a comment."""
+    if not os.path.isfile(path):  # reading from a device may never end
+        raise ConstraintError(f"matrix {path}: no such file; it must contain 16 numbers")
     try:
         matrix = np.loadtxt(path, ndmin=2)
     except (ValueError, OSError) as error:
-        raise ConstraintError(f"matrix {path} must hold 16 numbers: {error}") from None
+        raise ConstraintError(f"matrix {path} must contain 16 numbers: {error}") from None
     if matrix.size != 16 or not np.isfinite(matrix).all():
-        raise ConstraintError(f"matrix {path} must hold 16 finite numbers; got {matrix.size}")
+        raise ConstraintError(f"matrix {path} must contain 16 finite numbers; got {matrix.size}")
     matrix = matrix.reshape(4, 4)
     if not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0)):
-        raise ConstraintError(f"matrix {path} must end in the row 0 0 0 1; got {matrix[3]}")
+        raise ConstraintError(f"the last row of matrix {path} must be 0 0 0 1; got {matrix[3]}")
     return matrix
 
 
 def translation(shift: ArrayLike) -> FloatArray:
-    """Return the (4, 4) matrix of a shift by (3,) *shift*."""
+    """Return the (4, 4) matrix of a translation by *shift* (3,)."""
     matrix = np.eye(4)
     matrix[:3, 3] = shift
     return matrix
 
 
 def rotation(axis: ArrayLike, angle: float, pivot: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
-    """Return the (4, 4) matrix of a turn by *angle* radians about the line along *axis*.
+    """Return the (4, 4) matrix of a rotation.
 
     Parameters
     ----------
     axis : (3,) float
-        Of any length but zero; the turn is counter-clockwise seen against it.
+        Direction of the axis, of any non-zero length; the rotation is counter-clockwise for a
+        viewer towards whom it points.
     angle : float
         In radians.
     pivot : (3,) float
-        A point of the line.
+        A point on the axis.
 
     Examples
     --------
@@ -114,7 +115,7 @@ def rotation(axis: ArrayLike, angle: float, pivot: ArrayLike = (0.0, 0.0, 0.0)) 
 
 
 def transform(points: ArrayLike, matrix: FloatArray) -> FloatArray:
-    """Return (n, 3) *points* moved by a (4, 4) *matrix*."""
+    """Return *points* (n, 3) transformed by a (4, 4) *matrix*."""
     return as_points(points, "points") @ matrix[:3, :3].T + matrix[:3, 3]
 
 

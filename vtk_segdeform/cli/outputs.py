@@ -1,4 +1,4 @@
-"""What the commands tell and hand out: lines for people, surfaces with colours and arrays."""
+"""Printed lines and written surfaces of the commands."""
 
 from __future__ import annotations
 
@@ -16,36 +16,43 @@ from ..regions import Regions
 from ..solver import Solution
 
 Say = Callable[[str], None]
+"""Prints one line."""
 
+HANDLE_TOLERANCE = 1e-3  # handle error, in mesh diagonals, above which a command fails
 _PALETTE = np.array([rgb(colour) for colour in COLOURS])
 
 
-def tell_regions(regions: Regions, say: Say) -> None:
-    """Say how many vertices each region has, and how many lie in more than one."""
+def report_regions(regions: Regions, say: Say) -> None:
+    """Print the number of vertices of each region, and how many are in several regions."""
     shared = int(np.count_nonzero(regions.membership.sum(axis=0) > 1))
     sizes = " + ".join(str(size) for size in regions.membership.sum(axis=1))
-    say(f"regions         {regions.n_regions}: {sizes} vertices, {shared} of them shared")
+    say(f"regions         {regions.n_regions}: {sizes} vertices, {shared} in overlaps")
 
 
-def tell_cages(cages: Sequence[Cage], say: Say) -> None:
-    """Say how many vertices each cage has."""
+def report_cages(cages: Sequence[Cage], say: Say) -> None:
+    """Print the number of vertices of each cage."""
     counts = [cage.n_vertices for cage in cages]
     say(f"cages           {' + '.join(map(str, counts))} = {sum(counts)} vertices")
 
 
-def tell_solution(solution: Solution, seconds: float, say: Say) -> None:
-    """Say how the volume fared, how well the handles were met, and what it took."""
+def report_solution(solution: Solution, seconds: float, say: Say) -> None:
+    """Print the volume change, the handle error, the time and the status of a solution."""
     each = 1e3 * seconds / max(solution.steps, 1)
-    say(f"volume          changed by {solution.volume_change:+.1e} of itself")
-    say(f"handles         met to {solution.handle_error:.1e} of the mesh's diagonal")
-    say(f"solved          {solution.steps} steps, {1e3 * seconds:.0f} ms, {each:.1f} ms a step")
+    report_volume(solution.volume_change, say)
+    say(f"handle error    {solution.handle_error:.1e} of the mesh diagonal")
+    say(f"solve           {solution.steps} steps, {1e3 * seconds:.0f} ms, {each:.1f} ms per step")
     say(f"status          {solution.status}")
+
+
+def report_volume(change: float, say: Say) -> None:
+    """Print the relative change of the volume."""
+    say(f"volume change   {change:+.1e} of the original volume")
 
 
 def coloured_regions(surface: pv.PolyData, regions: Regions) -> pv.PolyData:
     """Return a copy of *surface* with point arrays ``region`` (n,), ``regions_here`` and ``RGB``.
 
-    The colours are blended by the regions' weights, so that overlaps show.
+    Colours are mixed by the blend weights, so that overlaps are visible.
     """
     coloured = surface.copy()
     colours = regions.weights.T @ _colours(np.arange(regions.n_regions)).astype(float)
@@ -63,7 +70,7 @@ def coloured_cages(cages: Sequence[Cage], poses: Sequence[FloatArray] | None = N
     cages : sequence of Cage
         One per region.
     poses : sequence of (m_r, 3) float, optional
-        Where their vertices are; without it, where the cages were made.
+        Vertices of the deformed cages; by default, the cages at rest.
     """
     vertices = [cage.vertices for cage in cages] if poses is None else list(poses)
     starts = np.cumsum([0, *(cage.n_vertices for cage in cages)])

@@ -1,4 +1,4 @@
-"""How far the work is, for who waits at a terminal."""
+"""A progress bar for the terminal."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from typing import TextIO
 
 
 class ProgressBar:
-    """One line, rewritten in place, when a person is watching and has waited for a second."""
+    """A progress callback that rewrites one line of a terminal, from the first second on.
+
+    Nothing is written if *stream* is not a terminal.
+    """
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -15,7 +18,7 @@ class ProgressBar:
         self._shown = False
 
     def __call__(self, fraction: float, message: str) -> None:
-        """Show that *fraction* of the work is done, and what is going on."""
+        """Show the *fraction* of the work that is done, and the current step."""
         if self._stream.isatty() and time.monotonic() - self._start > 1.0:
             filled = "#" * round(30 * min(max(fraction, 0.0), 1.0))
             self._stream.write(f"\r[{filled:.<30}] {fraction:4.0%} {message:<40.40}")
@@ -23,7 +26,7 @@ class ProgressBar:
             self._shown = True
 
     def clear(self) -> None:
-        """Wipe the line, so that text can be written there."""
+        """Erase the bar, so that text can be printed."""
         if self._shown:
             self._stream.write("\r\x1b[K")
             self._stream.flush()

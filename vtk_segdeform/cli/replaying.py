@@ -1,7 +1,7 @@
-"""The command that replays a recording: in a window, or off-screen as a film.
+"""``segdeform replay``: replay a recording in a window, or off-screen into a film.
 
-The recording may come from an untrusted source: its keys write files in ``--folder`` or not at all,
-and its length is limited.
+Recordings may come from untrusted sources: recorded keys access files only in ``--folder``, and
+events, time and window size are limited.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from ..progress import Progress
 from ..session import Session
 from ..widgets import plugin
 from .commands import opened
-from .outputs import Say
+from .outputs import Say, report_volume
 
 if TYPE_CHECKING:
     from ..widgets.recording import ReplayLimits
 
 
-def replay_command(options: Namespace, say: Say, progress: Progress) -> bool:
-    """Replay a recording over the session or mesh that it began with; tell what became of it."""
+def replay(options: Namespace, say: Say, progress: Progress) -> bool:
+    """Replay a recording on the mesh or session it started from, and write the results."""
     from ..widgets.recording import ReplayLimits, require_film
 
     limits = ReplayLimits(events=options.events, seconds=options.seconds)
@@ -42,11 +42,11 @@ def replay_command(options: Namespace, say: Say, progress: Progress) -> bool:
         options.recording, session, film=options.film, folder=options.folder, limits=limits
     )
     for fault in faults:
-        say(f"said            {fault}")
+        say(f"message         {fault}")
     say(f"replayed        {options.recording}")
-    say(f"volume          changed by {session.volume_change:+.1e} of itself")
+    report_volume(session.volume_change, say)
     if options.film is not None:
-        say(f"written         {options.film}, {pictures} pictures")
+        say(f"written         {options.film}, {pictures} frames")
     if options.output is not None:
         io.write_mesh(options.output, plugin.deformed(surface, session))
         say(f"written         {options.output}")
@@ -61,26 +61,26 @@ def replayed(
     folder: Path | None = None,
     limits: ReplayLimits | None = None,
 ) -> tuple[Session, list[Exception], int]:
-    """Do again what *recording* tells, over *session*.
+    """Replay a recording in an editor of *session*.
 
     Parameters
     ----------
     recording : Path
-        What a `Recorder` wrote in an editor.
+        A file written by a `Recorder`.
     session : Session
-        What it began with.
+        The session at the start of the recording.
     film : Path, optional
-        Off-screen, with all that is drawn written to this file.  Else in a window, as fast as it
-        was recorded; it stays open for whoever wants to go on.
+        Replay off-screen and write all frames to this file.  By default, replay in a window at the
+        recorded speed; the window then stays open for editing.
     folder : Path, optional
-        For files that the recorded keys save; without one, saving fails.
+        Folder for files that recorded keys save; by default, saving fails.
     limits : ReplayLimits, optional
         Limits on events, time and window size.
 
     Returns
     -------
     session, faults, pictures : Session, list of Exception, int
-        The session in the end, what the editor complained of, and how many pictures there are.
+        The session at the end, the errors shown by the editor, and the number of frames.
 
     Raises
     ------
@@ -88,42 +88,43 @@ def replayed(
         If the recording is damaged or exceeds the limits, or the film cannot be written; the text
         gives the line or the limit.
     MissingDependencyError
-        If there is no screen, or nothing can be rendered.
+        If there is no display, or off-screen rendering fails.
     """
     from ..widgets.editor import DeformEditor
-    from ..widgets.recording import Clock, Film, ReplayLimits, read_recording, replay
+    from ..widgets.recording import Clock, Film, ReplayLimits, read_recording
+    from ..widgets.recording import replay as replay_events
 
     limits = limits or ReplayLimits()
-    read_recording(recording, limits)  # before a window opens
+    read_recording(recording, limits)  # report errors before a window opens
 
-    unseen = film is not None or pv.OFF_SCREEN
-    if unseen:
+    off_screen = film is not None or pv.OFF_SCREEN
+    if off_screen:
         require_offscreen()
     else:
         require_screen()
-    plotter = pv.Plotter(off_screen=unseen, title=f"segdeform {recording.name}", notebook=False)
+    plotter = pv.Plotter(off_screen=off_screen, title=f"segdeform {recording.name}", notebook=False)
     faults: list[Exception] = []
     with ExitStack() as stack:
         stack.callback(plotter.close)
         editor = DeformEditor(plotter, session)
-        stack.callback(editor.remove)  # also cancels a job, if the replay was stopped
+        stack.callback(editor.remove)  # also cancels background work if the replay was stopped
         editor.view.on_failure(faults.append)
         editor.On()
-        plotter.show(auto_close=False, interactive=False, interactive_update=not unseen)
-        taken = Film(editor.view)
-        stop = taken.watch() if film is not None else None
-        clock, pace = Clock(limits.seconds), 0.0 if unseen else 1.0
-        replay(
+        plotter.show(auto_close=False, interactive=False, interactive_update=not off_screen)
+        frames = Film(editor.view)
+        stop = frames.watch() if film is not None else None
+        clock, pace = Clock(limits.seconds), 0.0 if off_screen else 1.0
+        replay_events(
             plotter, recording, folder=folder, limits=limits, pace=pace,
             busy=lambda: editor.is_busy,
         )  # fmt: skip
-        hands = editor.view.interactor
-        clock.wait_while(lambda: editor.is_busy, lambda: hands.InvokeEvent("TimerEvent"))
+        interactor = editor.view.interactor
+        clock.wait_while(lambda: editor.is_busy, lambda: interactor.InvokeEvent("TimerEvent"))
         editor.wait()
         if film is not None and stop is not None:
             stop()
-            taken.save(film)
-        elif not unseen and editor.view.window is not None:
+            frames.save(film)
+        elif not off_screen and editor.view.window is not None:
             plotter.iren.start()
         session = editor.session
-    return session, faults, len(taken)
+    return session, faults, len(frames)

@@ -1,16 +1,16 @@
-"""A set of vertices, told in a few characters: ``z>80%``, ``handle.sel``, a file of numbers.
+"""Vertex selections as text: ``z>80%``, ``handle.sel``, a file of vertex ids.
 
-    selection   =  term { "&" term }                 vertices that are in every term
+    selection   =  term { "&" term }             vertices in all terms
     term        =  half-space | array | file
     half-space  =  axis ("<" | "<=" | ">" | ">=") number ["%"]
-    axis        =  "x" | "y" | "z"               per cent: of the bounding box along that axis
-    array       =  name ["=" number]             point array: not zero, or equal to the number
-    file        =  path ["=" number]             vertex numbers from 0, between blanks or commas;
-                                                 a path.sel has one number per vertex instead
+    axis        =  "x" | "y" | "z"               %: percentage of the bounding box along this axis
+    array       =  name ["=" number]             point array: non-zero, or equal to the number
+    file        =  path ["=" number]             vertex ids from 0, separated by blanks or commas;
+                                                 a .sel file has one number per vertex instead
 
-In a ``.sel`` file 0 means fixed, 1 free and 2 handle, the convention of the benchmark poses of
-[BS08]; which of them is wanted follows from the role the selection is for, or from "=".  Text is
-only ever parsed, never evaluated.
+In a ``.sel`` file 0 means fixed, 1 free and 2 handle, as in the benchmark poses of [BS08].  The
+selected number follows from the role of the selection, or from "=".  Text is parsed, never
+evaluated.
 
 Source
 ------
@@ -38,8 +38,8 @@ from ..mesh import Mesh
 Role = Literal["fixed", "handle"]
 
 GRAMMAR = (
-    "write a half-space (z>80%, x<=0.25), a point array (name or name=2), a file of vertex "
-    "numbers or a .sel file; join with & what must hold together"
+    "use a half-space (z>80%, x<=0.25), a point array (name or name=2), a file of vertex ids "
+    "or a .sel file, joined by & to intersect"
 )
 _ROLE_NUMBER = {"fixed": 0, "handle": 2}
 _LARGEST_FILE = 1 << 28  # bytes
@@ -56,28 +56,28 @@ def parse_selection(
     point_arrays: Mapping[str, ArrayLike] | None = None,
     role: Role | None = None,
 ) -> IntArray:
-    """Return the numbers of the vertices that *text* describes.
+    """Return the ids of the vertices selected by *text*.
 
     Parameters
     ----------
     text : str
-        In the grammar of this module's header.
+        In the grammar above.
     mesh : Mesh
-        Whose vertices are meant.
+        n vertices.
     point_arrays : mapping of str to (n,) numbers, optional
         The arrays that *text* may name.
     role : "fixed" or "handle", optional
-        What the selection is for: picks the 0s or the 2s of a ``.sel`` file.
+        Selects the zeros or the twos of a ``.sel`` file.
 
     Returns
     -------
     ids : (k,) int
-        Ascending, each once, at least one.
+        Sorted and unique; at least one.
 
     Raises
     ------
     ConstraintError
-        If the text does not follow the grammar, or selects nothing.
+        If the text does not follow the grammar, or selects no vertex.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def parse_selection(
     array([1])
     """
     chosen = np.ones(mesh.n_vertices, dtype=bool)
-    whole_is_a_file = os.path.isfile(text.strip())  # accepts text of any length
+    whole_is_a_file = os.path.isfile(text.strip())  # False for text of any length
     for term in [text] if whole_is_a_file else text.split("&"):
         chosen &= _term(term.strip(), mesh, dict(point_arrays or {}), role)
     if not chosen.any():
@@ -125,7 +125,7 @@ def _array(name: str, values: ArrayLike, wanted: float | None, n: int) -> BoolAr
     array = np.asarray(values)
     if array.shape != (n,) or array.dtype.kind not in "biuf":
         raise ConstraintError(
-            f"point array {name!r} must hold one number per vertex, ({n},); "
+            f"point array {name!r} must have one number per vertex, shape ({n},); "
             f"got {array.shape} {array.dtype}"
         )
     return np.asarray(array != 0 if wanted is None else array == wanted)
@@ -136,27 +136,27 @@ def _file(path: Path, wanted: float | None, n: int, role: Role | None) -> BoolAr
     if path.suffix == ".sel":
         if len(numbers) != n:
             raise ConstraintError(
-                f"{path} has {len(numbers)} entries; the mesh has {n} vertices, one entry each"
+                f"{path} must have one number per vertex, {n} numbers; got {len(numbers)}"
             )
         if wanted is None:
             if role is None:
-                raise ConstraintError(f"say which entries of {path} are meant: {path}=2")
+                raise ConstraintError(f"select one of the numbers in {path}, for example {path}=2")
             wanted = _ROLE_NUMBER[role]
         return np.asarray(numbers == wanted)
     if wanted is not None:
-        raise ConstraintError(f"{path}={wanted:g}: only a .sel file has values to choose from")
+        raise ConstraintError(f"{path}={wanted:g}: '=' applies to .sel files only")
     if not np.array_equal(numbers, np.rint(numbers)):  # NaN is unequal to itself
-        raise ConstraintError(f"{path} must hold vertex numbers, which are whole")
+        raise ConstraintError(f"{path} must contain vertex ids, which are whole numbers")
     if len(numbers) and (numbers.min() < 0 or numbers.max() >= n):
         low, high = numbers.min(), numbers.max()
-        raise ConstraintError(f"{path} must hold 0..{n - 1}; got {low:g}..{high:g}")
+        raise ConstraintError(f"vertex ids in {path} must be 0..{n - 1}; got {low:g}..{high:g}")
     chosen = np.zeros(n, dtype=bool)
     chosen[numbers.astype(np.int64)] = True
     return chosen
 
 
 def _numbers(path: Path) -> FloatArray:
-    """Return all numbers of a text file; from a # to the end of its line is a comment."""
+    """Return all numbers of a text file; # starts a comment."""
     try:
         with open_regular(path) as file:
             content = file.read(_LARGEST_FILE + 1)
@@ -165,8 +165,8 @@ def _numbers(path: Path) -> FloatArray:
         lines = content.decode("utf-8").splitlines()
         words = " ".join(line.partition("#")[0] for line in lines).replace(",", " ").split()
         return np.array([float(word) for word in words])
-    except ValueError as error:  # a word that is no number, or bytes that are no text
-        raise ConstraintError(f"{path} must hold numbers and nothing else: {error}") from None
+    except ValueError as error:  # not a number, or not text
+        raise ConstraintError(f"{path} must contain only numbers: {error}") from None
 
 
 def _short(text: str) -> str:

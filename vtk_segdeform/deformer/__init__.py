@@ -11,14 +11,12 @@ The files, in reading order:
 """
 
 from .arguments import FARTHEST_APART, checked_constraints, checked_targets
-from .binding_cache import cache_folder
 from .deform import deform
 from .deformer import Deformer
 
 __all__ = [
     "FARTHEST_APART",
     "Deformer",
-    "cache_folder",
     "checked_constraints",
     "checked_targets",
     "deform",

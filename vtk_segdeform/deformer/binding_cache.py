@@ -15,7 +15,6 @@ import functools
 import logging
 import os
 import re
-import sys
 from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
@@ -116,20 +115,6 @@ def write_binding(path: Path, binding: Binding) -> None:
         _make_room(path.parent)
     except OSError as fault:  # full disk or read-only folder: continue without the file
         _warn_once(path, f"not written, {fault.strerror or fault}")
-
-
-def cache_folder() -> Path | None:
-    """Return the folder of this user's bindings; None if ``SEGDEFORM_CACHE`` is 0."""
-    chosen = os.environ.get("SEGDEFORM_CACHE", "")
-    if chosen:
-        return None if chosen == "0" else Path(chosen)
-    if sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "segdeform" / "bindings"
 
 
 def _read(path: Path) -> dict[str, Any]:

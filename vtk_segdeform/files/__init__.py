@@ -1,17 +1,21 @@
-"""Files on disk: atomic replacement, locks between processes, and safe opening.
+"""Files on disk: folders, atomic replacement, locks between processes, and safe opening.
 
 The files, in reading order:
 
+    folders         folders of the current user for caches and unsaved work
     atomic          write a draft, then rename it over the old file
     lock            lock files, released when their process ends
     regular_file    open regular files only: no pipes, no devices
 """
 
 from .atomic import is_draft, replacing, require_place
+from .folders import autosave_folder, cache_folder
 from .lock import hold
 from .regular_file import fault_of, is_ours, open_regular
 
 __all__ = [
+    "autosave_folder",
+    "cache_folder",
     "fault_of",
     "hold",
     "is_draft",

@@ -63,7 +63,7 @@ def replacing(
     target = require_place(path, follow=follow)
     _sweep(target.parent)
     mode = _mode_of(target)
-    draft, handle = _begun(target, folder, 0o666 if mode is None else 0o600)
+    draft, handle = _create_draft(target, folder, 0o666 if mode is None else 0o600)
     try:
         yield draft
         if durable and not folder:
@@ -110,7 +110,7 @@ def is_draft(name: str) -> bool:
     return _DRAFT.fullmatch(name) is not None
 
 
-def _begun(target: Path, folder: bool, mode: int) -> tuple[Path, int | None]:
+def _create_draft(target: Path, folder: bool, mode: int) -> tuple[Path, int | None]:
     """Return a new draft and the handle that locks it; None where locks do not work."""
     suffix = target.suffix if re.fullmatch(r"\.\w{1,8}", target.suffix) else ""
     for last in (*[False] * (_TRIES - 1), True):
@@ -122,7 +122,7 @@ def _begun(target: Path, folder: bool, mode: int) -> tuple[Path, int | None]:
             draft.mkdir()
             if _LOCKS:
                 with suppress(FileNotFoundError):  # swept already
-                    handle = _opened(draft, os.O_RDONLY)
+                    handle = _open(draft, os.O_RDONLY)
         if handle is not None and _LOCKS and holds(handle, draft):
             return draft, handle
         if handle is not None:
@@ -150,7 +150,7 @@ def _sweep_one(draft: Path) -> None:
         if time.time() - status.st_mtime > _A_DAY:
             _delete(draft)
         return
-    handle = _opened(draft, os.O_RDONLY if stat.S_ISDIR(status.st_mode) else os.O_RDWR)
+    handle = _open(draft, os.O_RDONLY if stat.S_ISDIR(status.st_mode) else os.O_RDWR)
     try:
         if holds(handle, draft):
             _delete(draft)  # while the lock is held
@@ -158,7 +158,7 @@ def _sweep_one(draft: Path) -> None:
         os.close(handle)
 
 
-def _opened(draft: Path, how: int) -> int:
+def _open(draft: Path, how: int) -> int:
     return os.open(draft, how | os.O_NONBLOCK | os.O_NOFOLLOW)
 
 

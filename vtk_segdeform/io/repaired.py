@@ -26,7 +26,7 @@ import pyvista as pv
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..checks import require
 from ..mesh import counted, normals
-from ..repair import Repair, repair
+from ..mesh_repair import Repair, repair
 from .polygons import cells_of, cut_into_triangles, polydata_of, polygons_of
 
 _CORNERS = "TextureCorners"

@@ -1,22 +1,22 @@
-"""The editing session: one mesh, its regions, cages, handles and pose, every step undoable.
+"""The editing session: one mesh with its regions, cages, handles and pose; all edits undoable.
 
 The files, in reading order:
 
-    session      `Session`: what widgets and scripts talk to
-    state        the state at one moment, immutable
-    history      undo and redo
-    handles      named handles
-    painting     edits of regions
-    posing       poses from states, with their solvers kept
-    listeners    notification of changes
-    naming       names of regions and handles
-    store        sessions in files
-    archive      the file format
+    session        `Session`: the interface for widgets and scripts
+    state          immutable states
+    history        undo and redo
+    handles        named handles and their targets
+    painting       painting, merging and splitting regions
+    pose_solver    poses of states, with cached solvers
+    listeners      notification of changes
+    naming         names of regions and handles
+    store          saving and loading sessions
+    archive        the file format
 """
 
 from .handles import require_handle
 from .listeners import Change
-from .naming import called
+from .naming import region_name
 from .session import Effort, Session
 from .state import Options, State
 from .store import load_session, save_session
@@ -27,8 +27,8 @@ __all__ = [
     "Options",
     "Session",
     "State",
-    "called",
     "load_session",
+    "region_name",
     "require_handle",
     "save_session",
 ]

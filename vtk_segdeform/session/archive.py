@@ -1,8 +1,8 @@
-"""Arrays and a header in one file, an uncompressed zip that ``numpy.load`` reads as any .npz.
+"""Archives: arrays and a header in one uncompressed zip file, which ``numpy.load`` can read.
 
-Nothing in a file is believed.  An array is read only once its shape and type are those that the
-caller expects, and not before its bytes are known to be in the file, which for all arrays together
-are two gigabytes at most; checksums are compared.  Nothing in a file is run either: no pickle.
+Files may be damaged or malicious.  An array is read only if it has the shape and type that the
+caller expects and its bytes are in the file; all arrays together have at most two gigabytes.
+Checksums are verified, and nothing is unpickled.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from numpy.lib import format as npy
 
 _HEADER = "header.json"
 _LONGEST_HEADER = 1 << 20  # bytes
-_LONGEST_NPY_HEADER = 1 << 12  # bytes, more than any array needs
-_LONGEST_LIST = 1 << 16  # bytes of the directory
-_LARGEST = 2 << 30  # bytes of a file; a million vertices take some eighty million
-_END = b"PK\5\6"  # begins the last 22 bytes of a zip file without a comment, ...
-_END_64 = b"PK\6\7"  # ... and this the 20 before them, of one too large for us
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # what is the same is the same file
+_LONGEST_NPY_HEADER = 1 << 12  # bytes
+_LONGEST_DIRECTORY = 1 << 16  # bytes
+_LARGEST = 2 << 30  # bytes of a file; a million vertices take about 80 million
+_END = b"PK\5\6"  # start of the last 22 bytes of a zip file without a comment
+_END_64 = b"PK\6\7"  # start of the 20 bytes before them in a zip64 file, which is too large
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # a constant date makes equal sessions equal files
 _TYPES = {"f": np.dtype("<f8"), "i": np.dtype("<i8"), "b": np.dtype("|b1")}
 
 
 def write_archive(file: IO[bytes], header: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
-    """Write a *header*, plain enough for JSON, and *arrays* of float64, int64 or bool.
+    """Write a *header* for JSON and *arrays* of float64, int64 or bool.
 
     Raises
     ------
     OSError
-        If it cannot be written, or exceeds the size that can be read.
+        If the file cannot be written, or would be too large to be read.
     """
     total = sum(array.nbytes for array in arrays.values())
     if total + _LONGEST_HEADER > _LARGEST:
@@ -48,7 +48,7 @@ def write_archive(file: IO[bytes], header: Mapping[str, Any], arrays: Mapping[st
 
 
 class Archive:
-    """The header and the arrays of an open file, each read only if it is what is expected.
+    """An archive that is open for reading.
 
     Parameters
     ----------
@@ -58,49 +58,47 @@ class Archive:
     Raises
     ------
     ValueError, OSError, zipfile.BadZipFile
-        If it is not an archive, or exceeds the largest size.
+        If the file is not an archive or is too large.
     """
 
     def __init__(self, file: IO[bytes]) -> None:
-        size = os.fstat(
-            file.fileno()
-        ).st_size  # of the open file: its name may refer to another one by now
-        _require_short_list(file, size)
+        size = os.fstat(file.fileno()).st_size  # not by name: another file may have replaced it
+        _require_short_directory(file, size)
         self._archive = zipfile.ZipFile(file)
-        self._left = size  # bytes: members may not overlap to make more of the file than it is
+        self._unread = size  # bytes; overlapping members could otherwise exceed the file
 
     def header(self) -> Any:
-        """Return what ``header.json`` says."""
+        """Return the content of ``header.json``."""
         with self._open(_HEADER, _LONGEST_HEADER) as content:
             return json.loads(content.read())
 
     def array(self, name: str, kind: str, shape: tuple[int, ...]) -> Any:
-        """Return the array *name*, of *kind* "f", "i" or "b", if it has the *shape*.
+        """Return the array *name*, of *kind* "f", "i" or "b" and of the given *shape*.
 
         Raises
         ------
         ValueError, OSError, zipfile.BadZipFile
-            If there is no such array, it is another, or its bytes are not those written.
+            If there is no such array, its type or shape differs, or it is damaged.
         """
         dtype = _TYPES[kind]
         size = dtype.itemsize
-        for count in shape:  # plain integers, which do not overflow
+        for count in shape:  # Python integers do not overflow
             size *= count
         with self._open(f"{name}.npy", size + _LONGEST_NPY_HEADER) as content:
             if npy.read_magic(content) != (1, 0):
-                raise ValueError(f"{name} has a layout that this program does not write")
-            found, fortran, kept = npy.read_array_header_1_0(
+                raise ValueError(f"{name} has an unsupported version of the npy format")
+            found_shape, fortran, found_dtype = npy.read_array_header_1_0(
                 content, max_header_size=_LONGEST_NPY_HEADER
             )
-            if (found, kept) != (shape, dtype):
+            if (found_shape, found_dtype) != (shape, dtype):
                 raise ValueError(
-                    f"{name} must be {dtype} of shape {shape}; it is {kept} of {found}"
+                    f"{name} must be {dtype} of shape {shape}; got {found_dtype} of {found_shape}"
                 )
-            data = content.read()  # to the end, where the checksum is compared
+            data = content.read()  # to the end, where zipfile verifies the checksum
         if len(data) != size:
-            raise ValueError(f"{name} must hold {size} bytes; it holds {len(data)}")
+            raise ValueError(f"{name} must have {size} bytes; got {len(data)}")
         if kind == "b" and (np.frombuffer(data, np.uint8) > 1).any():
-            raise ValueError(f"{name} holds bytes that are neither true nor false")
+            raise ValueError(f"{name} contains bytes that are neither true nor false")
         array = np.frombuffer(data, dtype).reshape(shape, order="F" if fortran else "C")
         return array.astype(dtype.newbyteorder("="))
 
@@ -109,20 +107,20 @@ class Archive:
             raise ValueError(f"{name} is missing")
         info = self._archive.getinfo(name)
         if info.compress_type != zipfile.ZIP_STORED:
-            raise ValueError(f"{name} is compressed, which this program never does")
+            raise ValueError(f"{name} is compressed, which is not supported")
         size = max(info.file_size, info.compress_size)
-        if size > min(limit, self._left):
-            raise ValueError(f"{name} is larger than it can be: {size} bytes")
-        self._left -= size
+        if size > min(limit, self._unread):
+            raise ValueError(f"{name} is too large: {size} bytes")
+        self._unread -= size
         return self._archive.open(info)
 
 
-def _require_short_list(file: IO[bytes], size: int) -> None:
+def _require_short_directory(file: IO[bytes], size: int) -> None:
     """Raise ValueError if the file, or the directory that zipfile reads at once, is too large."""
     if size > _LARGEST:
-        raise ValueError(f"it has {size:.3g} bytes; the limit is {_LARGEST:.3g}")
+        raise ValueError(f"the file has {size:.3g} bytes; the limit is {_LARGEST:.3g}")
     file.seek(max(size - 42, 0))
     more, end = file.read(20), file.read(22)
     is_plain = end.startswith(_END) and end.endswith(b"\0\0") and not more.startswith(_END_64)
-    if not is_plain or int.from_bytes(end[12:16], "little") > _LONGEST_LIST:
+    if not is_plain or int.from_bytes(end[12:16], "little") > _LONGEST_DIRECTORY:
         raise ValueError("the directory of the archive is damaged; the file may be truncated")

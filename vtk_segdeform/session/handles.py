@@ -1,7 +1,7 @@
-"""Named handles: sets of vertices that are moved by hand, and where they are to go.
+"""Named handles and their targets.
 
-Handles are a mapping from names to vertex numbers (k,), targets one from the same names to
-points (k, 3).  Both are read-only: functions return new ones.
+Handles are a mapping from names to vertex ids (k,), and targets a mapping from the same names to
+points (k, 3).  Both are read-only; the functions return new mappings.
 """
 
 from __future__ import annotations
@@ -19,33 +19,34 @@ from ..deformer import FARTHEST_APART, checked_constraints
 from ..errors import ConstraintError
 from ..mesh import Mesh
 from .naming import fault_of
-from .state import Pose, State, pieces
+from .state import Pose, State, split_rows
 
 Handles = Mapping[str, IntArray]
 Targets = Mapping[str, FloatArray]
 
-_FARTHEST = FARTHEST_APART / 2.0  # diagonals of the mesh from its centre
+_FARTHEST = FARTHEST_APART / 2.0  # mesh diagonals from the centre
 
 
 def with_handle(mesh: Mesh, state: State, name: str, vertices: ArrayLike) -> Handles:
-    """Return the handles of *state* and *name*, in the place of what had that name before.
+    """Return the handles of *state* with handle *name* added or replaced.
 
     Raises
     ------
     ConstraintError
-        If *name* is no name, or *vertices* are none of the mesh, fixed or of another handle.
+        If *name* is invalid, or *vertices* are not vertices of the mesh, fixed, or in another
+        handle.
     """
     _check_name(name)
     others = {other: ids for other, ids in state.handles.items() if other != name}
     _, ids = checked_constraints(mesh, state.fixed, vertices)
     if not len(ids):
-        raise ConstraintError("a handle needs one vertex or more; got none: mark some")
+        raise ConstraintError("a handle requires at least one vertex; got none")
     for other, taken in others.items():
         both = np.intersect1d(ids, taken)
         if len(both):
             raise ConstraintError(
-                f"{len(both)} vertices (the first is {both[0]}) are in {other!r} already; "
-                "take them out of one of the two"
+                f"{len(both)} vertices (the first is {both[0]}) are already in {other!r}; "
+                "remove them from one of the two handles"
             )
     own = ids.copy()
     own.flags.writeable = False
@@ -53,54 +54,56 @@ def with_handle(mesh: Mesh, state: State, name: str, vertices: ArrayLike) -> Han
 
 
 def without_handle(handles: Handles, name: str) -> Handles:
-    """Return all *handles* but one; ConstraintError if there is no such."""
+    """Return *handles* without *name*; ConstraintError if there is no such handle."""
     require_handle(handles, name)
     return MappingProxyType({other: ids for other, ids in handles.items() if other != name})
 
 
 def renamed(state: State, name: str, new_name: str) -> State:
-    """Return *state* with a handle called *new_name*; nothing else changes, not even the order."""
+    """Return *state* with handle *name* renamed; the order of handles does not change."""
     require_handle(state.handles, name)
     _check_name(new_name)
     if new_name in state.handles and new_name != name:
-        raise ConstraintError(f"there is a handle {new_name!r} already; choose another name")
+        raise ConstraintError(f"there is already a handle {new_name!r}; choose another name")
 
-    def call(other: str) -> str:
+    def name_after(other: str) -> str:
         return new_name if other == name else other
 
-    handles = MappingProxyType({call(other): ids for other, ids in state.handles.items()})
+    handles = MappingProxyType({name_after(other): ids for other, ids in state.handles.items()})
     if state.pose is None:
         return replace(state, handles=handles)
-    targets = {call(other): points for other, points in state.pose.targets.items()}
+    targets = {name_after(other): points for other, points in state.pose.targets.items()}
     pose = Pose(state.pose.cage_vertices, MappingProxyType(targets))
     return replace(state, handles=handles, pose=pose)
 
 
 def new_name(handles: Handles) -> str:
-    """Return the first of "handle 1", "handle 2", ... that is free."""
+    """Return the first unused name of "handle 1", "handle 2", ..."""
     numbers = range(1, len(handles) + 2)
     return next(name for n in numbers if (name := f"handle {n}") not in handles)
 
 
 def require_handle(handles: Handles, name: str) -> None:
-    """Raise a ConstraintError that lists the names there are, unless *name* is one."""
+    """Raise a ConstraintError that lists the handles, unless *name* is one of them."""
     if not isinstance(name, str) or name not in handles:
-        there = ", ".join(map(repr, handles)) or "none yet; add one first"
-        raise ConstraintError(f"there is no handle {shown(name)}; there are {there}")
+        names = ", ".join(map(repr, handles))
+        advice = f"the handles are {names}" if handles else "add a handle first"
+        raise ConstraintError(f"there is no handle {shown(name)}; {advice}")
 
 
 def targets_at(handles: Handles, vertices: FloatArray) -> Targets:
-    """Return where the handles are among *vertices* (n, 3)."""
+    """Return the positions of the handles among *vertices* (n, 3)."""
     places = {name: vertices[ids] for name, ids in handles.items()}
     for points in places.values():
         frozen(points)
     return MappingProxyType(places)
 
 
-def carried(pose: Pose, before: Handles, after: Handles, vertices: FloatArray) -> Pose:
+def with_handles(pose: Pose, before: Handles, after: Handles, vertices: FloatArray) -> Pose:
     """Return *pose* with targets for the handles *after*.
 
-    Those that were there *before* keep theirs; new ones stay where *vertices* (n, 3) has them.
+    Unchanged handles keep their targets; the targets of new handles are their positions among
+    *vertices* (n, 3).
     """
     here = targets_at(after, vertices)
     kept = {
@@ -113,16 +116,16 @@ def carried(pose: Pose, before: Handles, after: Handles, vertices: FloatArray) -
 def checked_targets(
     mesh: Mesh, handles: Handles, targets: Mapping[str, ArrayLike] | ArrayLike
 ) -> dict[str, FloatArray]:
-    """Return *targets* by name, read-only arrays of their own.
+    """Return *targets* by name, as read-only copies.
 
     Parameters
     ----------
     mesh : Mesh
-        What is deformed.
+        The mesh at rest.
     handles : mapping of str to (k,) int
-        All there are.
+        All handles.
     targets : mapping of str to (k, 3) float, or (k, 3) float
-        By name, or for the vertices of all handles, one handle after the other.
+        Targets by name, or the targets of all handles, concatenated.
 
     Raises
     ------
@@ -130,46 +133,46 @@ def checked_targets(
         If there is no such handle, a shape is wrong, or a target is not finite or too far away.
     """
     if not handles:
-        raise ConstraintError("there is no handle to move; add one first")
+        raise ConstraintError("there is no handle to move; add a handle first")
     if not isinstance(targets, Mapping):
         lengths = [len(ids) for ids in handles.values()]
         points = _checked_points(mesh, targets, sum(lengths), "all handles")
-        pairs = zip(handles, pieces(points, lengths), strict=True)
-        return {name: _own(piece) for name, piece in pairs}
+        pairs = zip(handles, split_rows(points, lengths), strict=True)
+        return {name: _frozen_copy(piece) for name, piece in pairs}
     for name in targets:
         require_handle(handles, name)
     return {
-        name: _own(_checked_points(mesh, points, len(handles[name]), name))
+        name: _frozen_copy(_checked_points(mesh, points, len(handles[name]), name))
         for name, points in targets.items()
     }
 
 
 def require_near(mesh: Mesh, points: FloatArray, name: str) -> None:
-    """Raise a ConstraintError if some of *points* are senselessly far from *mesh*."""
+    """Raise a ConstraintError if *points* are unreasonably far from *mesh*."""
     if _farthest(points, mesh.vertices[0]) / mesh.diagonal <= _FARTHEST - 1.0:
-        return  # surely, without the middle of many vertices: none is a diagonal away from it
+        return  # sufficient, and faster: the centre is within a diagonal of every vertex
     away = _farthest(points, mesh.vertices.mean(axis=0)) / mesh.diagonal
     if not away <= _FARTHEST:
         raise ConstraintError(
-            f"{name} are {away:.3g} diagonals of the mesh away; "
+            f"{name} are {away:.3g} mesh diagonals away from the mesh; "
             f"at most {_FARTHEST:.0f} are allowed: move less"
         )
 
 
 def _farthest(points: FloatArray, place: FloatArray) -> float:
-    """Return how far points are from a *place* (3,), along x, y or z."""
+    """Return the largest distance of *points* from *place* (3,) along x, y or z."""
     return float(np.abs(points - place).max(initial=0.0))
 
 
 def moved(points: FloatArray, matrix: ArrayLike) -> FloatArray:
-    """Return (k, 3) *points* under an affine (4, 4) *matrix*; ConstraintError if it is none."""
+    """Return *points* (k, 3) transformed by an affine (4, 4) *matrix*, which is checked."""
     M = plain(matrix, "motion")
     if M.dtype.kind not in "iuf":
-        raise ConstraintError(f"motion must hold real numbers; got {M.dtype}")
+        raise ConstraintError(f"motion must contain real numbers; got {M.dtype}")
     if not np.array_equal(M[3], [0.0, 0.0, 0.0, 1.0]):
         raise ConstraintError(f"the last row of motion must be 0 0 0 1; got {M[3]}")
     if not np.isfinite(M).all():
-        raise ConstraintError("motion holds NaN or infinite numbers; all must be finite")
+        raise ConstraintError("motion must be finite; it contains NaN or infinite numbers")
     return np.asarray(points @ M[:3, :3].T + M[:3, 3])
 
 
@@ -179,7 +182,9 @@ def _checked_points(mesh: Mesh, targets: ArrayLike, count: int, name: str) -> Fl
     except ValueError as fault:
         raise ConstraintError(str(fault)) from None
     if len(points) != count:
-        raise ConstraintError(f"targets of {name} must be {count} points; got {len(points)}")
+        raise ConstraintError(
+            f"targets of {name} must be {count} points, one per vertex; got {len(points)}"
+        )
     require_near(mesh, points, f"targets of {name}")
     return points
 
@@ -190,7 +195,7 @@ def _check_name(name: str) -> None:
         raise ConstraintError(f"a handle{fault}")
 
 
-def _own(points: FloatArray) -> FloatArray:
+def _frozen_copy(points: FloatArray) -> FloatArray:
     own = points.copy()
     own.flags.writeable = False
     return own

@@ -1,8 +1,8 @@
-"""The states a session went through, and the way back to them.
+"""Undo and redo.
 
-A *step* leads from one committed state to the next and has a label.  A *drag* is many moves that
-become one step: it is begun by the first move, and ended by `Timeline.commit`, or taken back by
-`Timeline.revert`.  A step, undo or redo during a drag commits it first.
+A *step* leads from one committed state to the next and has a label.  A *drag* consists of many
+moves that become one step: the first move starts it, `Timeline.commit` ends it and
+`Timeline.revert` cancels it.  A step, undo or redo during a drag commits the drag first.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from .state import State
 
 @final
 class History:
-    """The states before this one and after it, each under the name of the step between.
+    """The states before and after the current one, each with the label of its step.
 
     Parameters
     ----------
     limit : int
-        Steps kept; the oldest go first.
+        Maximum number of undo steps; the oldest are discarded.
     """
 
     def __init__(self, limit: int) -> None:
@@ -44,160 +44,160 @@ class History:
 
     @property
     def undo_label(self) -> str | None:
-        """The step that `undo` takes back, or None."""
+        """The label of the step that `undo` reverts, or None."""
         return self._past[-1][0] if self._past else None
 
     @property
     def redo_label(self) -> str | None:
-        """The step that `redo` does again, or None."""
+        """The label of the step that `redo` repeats, or None."""
         return self._future[-1][0] if self._future else None
 
     def record(self, label: str, before: State, after: State) -> None:
-        """Remember the step *label*, which led from *before* to *after*; redo forgets."""
+        """Add the step *label* from *before* to *after*, and clear the steps to redo."""
         self._past.append((label, before))
         self._future.clear()
-        _lighten(before, after)
+        _drop_weights(before, after)
 
     def undo(self, now: State) -> State:
-        """Return the state before the last step."""
+        """Return the state before the last step; *now* is the current state."""
         label, state = self._past.pop()
         self._future.append((label, now))
-        _lighten(now, state)
+        _drop_weights(now, state)
         return state
 
     def redo(self, now: State) -> State:
-        """Return the state after the step that was undone last."""
+        """Return the state after the last step undone; *now* is the current state."""
         label, state = self._future.pop()
         self._past.append((label, now))
-        _lighten(now, state)
+        _drop_weights(now, state)
         return state
 
 
-def _lighten(stored: State, shown: State) -> None:
-    """Drop the weights that *stored* regions keep; they are eight times as large as the masks."""
-    if stored.regions is not None and stored.regions is not shown.regions:
-        for name in ("weights", "border_distance"):  # cached properties, found again when asked for
+def _drop_weights(stored: State, current: State) -> None:
+    """Delete cached blend weights of *stored* regions: eight times the memory of the masks."""
+    if stored.regions is not None and stored.regions is not current.regions:
+        for name in ("weights", "border_distance"):  # cached properties, computed again on access
             vars(stored.regions).pop(name, None)
 
 
 class Timeline:
-    """The present state, the way to it, and who is told when it changes.
+    """The current state with its history, its ongoing drag and its listeners.
 
     Parameters
     ----------
     state : State
-        Where to begin.
+        Initial state.
     limit : int
-        Steps that can be undone; older ones are forgotten.
+        Maximum number of undo steps; the oldest are discarded.
     """
 
     def __init__(self, state: State, limit: int) -> None:
         self._state = state
-        self._before: State | None = None  # the drag in hand; None if there is none
-        self._dragged: dict[str, None] = {}  # what it moved, in order
+        self._drag_start: State | None = None  # state before the drag; None if there is no drag
+        self._dragged: dict[str, None] = {}  # names of the moved handles and cages, in order
         self._history = History(limit)
         self._listeners = Listeners()
 
     @property
     def state(self) -> State:
-        """All there is besides the mesh, frozen; a drag in hand included."""
+        """The current state, including an ongoing drag; immutable."""
         return self._state
 
     @property
     def is_dragging(self) -> bool:
-        """Whether there were moves since the last step, for `commit` or `revert`."""
-        return self._before is not None
+        """Whether there is an ongoing drag, to be ended by `commit` or `revert`."""
+        return self._drag_start is not None
 
     @property
     def undo_label(self) -> str | None:
-        """The step that `undo` would take back."""
+        """The label of the step that `undo` would revert, or None."""
         return self._drag_label() if self.is_dragging else self._history.undo_label
 
     @property
     def redo_label(self) -> str | None:
-        """The step that `redo` would do again."""
+        """The label of the step that `redo` would repeat, or None."""
         return None if self.is_dragging else self._history.redo_label
 
     @property
     def can_undo(self) -> bool:
-        """Whether there is a step to take back."""
+        """Whether there is a step to undo."""
         return self.undo_label is not None
 
     @property
     def can_redo(self) -> bool:
-        """Whether there is a step to do again."""
+        """Whether there is a step to redo."""
         return self.redo_label is not None
 
     def undo(self) -> str | None:
-        """Take back the last step; return its label, None if there is none."""
+        """Undo the last step; return its label, or None if there is none."""
         self._end_drag(None)
         label = self._history.undo_label
         if label is not None:
-            self._go(self._history.undo(self._state), Change.HISTORY)
+            self._set_state(self._history.undo(self._state), Change.HISTORY)
         return label
 
     def redo(self) -> str | None:
-        """Do the step again that was taken back last; return its label, None if there is none."""
+        """Redo the last step undone; return its label, or None if there is none."""
         label = self.redo_label
         if label is not None:
-            self._go(self._history.redo(self._state), Change.HISTORY)
+            self._set_state(self._history.redo(self._state), Change.HISTORY)
         return label
 
     def commit(self, label: str | None = None) -> str | None:
-        """End the drag in hand: it becomes one step, "drag handle 1" unless *label* is given.
+        """End the drag and record it as one step, by default labelled "drag handle 1".
 
         Returns
         -------
         label : str or None
-            None if there was no drag, and nothing was done.
+            The label of the step; None if there was no drag.
         """
         label = self._end_drag(None if label is None else require(label, str, "label"))
         if label is not None:
-            self._listeners.tell(Change.HISTORY)
+            self._listeners.notify(Change.HISTORY)
         return label
 
     def revert(self) -> None:
-        """Give up the drag in hand: everything is again what it was before."""
-        if self._before is not None:
-            before, self._before = self._before, None
+        """Cancel the drag and restore the state before it."""
+        if self._drag_start is not None:
+            start, self._drag_start = self._drag_start, None
             self._dragged.clear()
-            self._go(before, Change(0))
+            self._set_state(start, Change(0))
 
     def on_change(self, listener: Listener) -> Callable[[], None]:
-        """Call *listener* with a `Change` after every change; return a callable that ends that.
+        """Call *listener* with a `Change` after every change; return a function that removes it.
 
-        What a listener raises comes out of the method that made the change, which is done all the
-        same, and the other listeners hear of it; see `Listeners`.
+        An exception in a listener is raised by the method that made the change.  The change remains
+        in effect, and the other listeners are called; see `Listeners`.
         """
         return self._listeners.add(as_callable(listener, "listener"))
 
     def _step(self, label: str, after: State) -> None:
-        """Go to *after*, as a step, unless that is where we are."""
+        """Record a step to *after*, unless nothing changes."""
         if self._state.changes(after):
             self._end_drag(None)
             self._history.record(label, self._state, after)
-            self._go(after, Change.HISTORY)
+            self._set_state(after, Change.HISTORY)
 
     def _move(self, after: State, *moved: str) -> None:
-        """Go to *after*, as part of a drag of what is *moved*."""
-        if self._before is None:
-            self._before = self._state
+        """Change to *after* as part of a drag of the handles or cages *moved*."""
+        if self._drag_start is None:
+            self._drag_start = self._state
         self._dragged.update(dict.fromkeys(moved))
-        self._go(after, Change(0))
+        self._set_state(after, Change(0))
 
-    def _go(self, state: State, change: Change) -> None:
+    def _set_state(self, state: State, change: Change) -> None:
         change |= self._state.changes(state)
         self._state = state
-        self._listeners.tell(change)
+        self._listeners.notify(change)
 
     def _drag_label(self) -> str:
         return "drag " + ", ".join(self._dragged)
 
     def _end_drag(self, label: str | None) -> str | None:
-        if self._before is None:
+        if self._drag_start is None:
             return None
         label = label or self._drag_label()
-        self._history.record(label, self._before, self._state)
-        self._before = None
+        self._history.record(label, self._drag_start, self._state)
+        self._drag_start = None
         self._dragged.clear()
         return label

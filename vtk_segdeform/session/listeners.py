@@ -1,7 +1,7 @@
-"""What changed in a session, and who is told.
+"""Notification of changes.
 
-Listeners are told after the change, in the order they came, of one change after the other: a
-change made by a listener waits until everybody has heard of the one before.
+Listeners are called after a change, in the order in which they were added.  If a listener makes
+another change, the listeners are notified of it after all of them have been notified of the first.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from contextlib import ExitStack
 
 
 class Change(enum.Flag):
-    """What is not as it was; several at once are joined by ``|``."""
+    """The parts of a session that changed; several are combined by ``|``."""
 
     REGIONS = enum.auto()
     """`Session.regions`."""
     NAMES = enum.auto()
-    """`Session.region_names`; where regions are others as well, names may be as they were."""
+    """`Session.region_names`."""
     CAGES = enum.auto()
     """`Session.cages`, at rest."""
     CONSTRAINTS = enum.auto()
@@ -29,68 +29,68 @@ class Change(enum.Flag):
     OPTIONS = enum.auto()
     """`Session.options`."""
     HISTORY = enum.auto()
-    """What `Session.undo` and `Session.redo` would do."""
+    """The steps to undo or redo."""
 
 
 Listener = Callable[[Change], None]
 
 
 class Listeners:
-    """Callables to tell of changes.
+    """Callables that are notified of changes.
 
-    One that raises neither keeps the others from hearing, nor undoes anything: once all were
-    told, its exception reaches whoever made the change.  Of several the last comes out, the ones
-    before are its ``__context__``.
+    An exception in a listener is raised after all listeners were called; it does not revert the
+    change.  If several listeners raise, the last exception is raised and the earlier ones are its
+    ``__context__``.
 
     Examples
     --------
     >>> listeners = Listeners()
-    >>> silence = listeners.add(lambda change: print("changed:", change.name))
-    >>> listeners.tell(Change.POSE)
+    >>> remove = listeners.add(lambda change: print("changed:", change.name))
+    >>> listeners.notify(Change.POSE)
     changed: POSE
-    >>> silence()
-    >>> listeners.tell(Change.POSE)
+    >>> remove()
+    >>> listeners.notify(Change.POSE)
     """
 
     def __init__(self) -> None:
         self._listeners: dict[int, Listener] = {}
         self._numbers = itertools.count()
-        self._news: deque[Change] = deque()
-        self._telling = False
+        self._pending: deque[Change] = deque()
+        self._notifying = False
 
     def add(self, listener: Listener) -> Callable[[], None]:
-        """Tell *listener* from now on; return a callable that stops it, at once and for good."""
+        """Add a listener; return a function that removes it, also during a notification."""
         number = next(self._numbers)
         self._listeners[number] = listener
 
-        def stop() -> None:
+        def remove() -> None:
             self._listeners.pop(number, None)
 
-        return stop
+        return remove
 
-    def tell(self, change: Change) -> None:
-        """Tell everybody of *change*, unless it is nothing."""
+    def notify(self, change: Change) -> None:
+        """Notify all listeners of *change*, unless it is empty."""
         if not change:
             return
-        self._news.append(change)
-        if self._telling:
+        self._pending.append(change)
+        if self._notifying:
             return
-        self._telling = True
+        self._notifying = True
         try:
-            self._tell_news()
+            self._notify_pending()
         finally:
-            self._telling = False
+            self._notifying = False
 
-    def _tell_news(self) -> None:
-        while self._news:
-            change = self._news.popleft()
-            # The stack is unwound from its end, to its beginning even where some of it raises.
+    def _notify_pending(self) -> None:
+        while self._pending:
+            change = self._pending.popleft()
+            # ExitStack runs the callbacks in reverse order, and all of them even if some raise.
             with ExitStack() as calls:
-                calls.callback(self._tell_news)
+                calls.callback(self._notify_pending)
                 for number in reversed(self._listeners):
-                    calls.callback(self._tell_one, number, change)
+                    calls.callback(self._notify_one, number, change)
 
-    def _tell_one(self, number: int, change: Change) -> None:
-        listener = self._listeners.get(number)  # it may have been stopped by one before it
+    def _notify_one(self, number: int, change: Change) -> None:
+        listener = self._listeners.get(number)  # None if an earlier listener has removed it
         if listener is not None:
             listener(change)

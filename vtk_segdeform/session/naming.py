@@ -1,11 +1,11 @@
-"""Names that people give: what may be one, and what becomes of those of regions.
+"""Names of regions and handles.
 
-A name is text in any script, to be shown on one line: no control characters, no line breaks,
-none that turn the direction of what follows, and at most 80 letters.
+A name is text in any script that can be shown on one line: at most 80 characters, without control
+characters, line breaks and characters that change the writing direction.
 
-Regions are numbered, and a name is only what they are called.  One without a name is called by
-its place, "region 1" for the first; so these words are no other region's to take.  Names are
-kept as a tuple, "" for none, without those at its end: a region that comes last needs no care.
+Regions are identified by number.  A region without a name is shown as "region 1", "region 2", ...
+by its number, and no other region can have this name.  Names are stored as a tuple with "" for
+regions without a name; regions at the end without a name are left out.
 """
 
 from __future__ import annotations
@@ -20,44 +20,44 @@ from ..errors import RegionError
 LONGEST = 80
 Names = tuple[str, ...]
 
-_CONTROL = {"Cc", "Cs", "Zl", "Zp"}  # surrogates among them, which no file can hold
-_TURNING = {"LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI"}
-_PLACE = re.compile(r"region \d+")
+_CONTROL = {"Cc", "Cs", "Zl", "Zp"}  # with surrogates, which cannot be written to a file
+_BIDIRECTIONAL = {"LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI"}
+_DEFAULT = re.compile(r"region \d+")
 
 
 def fault_of(name: object) -> str:
-    """Return what is wrong with a *name*, to be read after what it is of; "" if nothing is.
+    """Return why *name* is invalid, to follow "a region" or "a handle"; "" if it is valid.
 
     >>> fault_of("Arm, left"), fault_of("a" * 90)
-    ('', "'s name may have 80 letters; got 90")
+    ('', "'s name must have at most 80 characters; got 90")
     """
     if not isinstance(name, str) or not name.strip():
         return f"'s name must be printable text; got {shown(name)}"
     if len(name) > LONGEST:
-        return f"'s name may have {LONGEST} letters; got {len(name)}"
+        return f"'s name must have at most {LONGEST} characters; got {len(name)}"
     for letter in name:
-        turns = unicodedata.bidirectional(letter) in _TURNING
+        turns = unicodedata.bidirectional(letter) in _BIDIRECTIONAL
         if turns or unicodedata.category(letter) in _CONTROL:
             return f"'s name must be printable text; got {shown(name)}"
     return ""
 
 
-def called(names: Names, region: int) -> str:
-    """Return what a *region* is called; also one that is still to come.
+def region_name(names: Names, region: int) -> str:
+    """Return the name of a *region*, also of one that does not exist yet.
 
-    >>> called(("", "arm"), 0), called(("", "arm"), 1)
+    >>> region_name(("", "arm"), 0), region_name(("", "arm"), 1)
     ('region 1', 'arm')
     """
     return (names[region] if region < len(names) else "") or f"region {region + 1}"
 
 
 def renamed(names: Names, region: int, name: str) -> Names:
-    """Return *names* with another one for *region*; with "" it is called by its place again.
+    """Return *names* with *name* for *region*; "" removes its name.
 
     Raises
     ------
     RegionError
-        If *name* cannot be one, or is another region's.
+        If *name* is invalid or the name of another region.
     """
     if not isinstance(name, str):
         raise RegionError(f"a region{fault_of(name)}")
@@ -73,7 +73,7 @@ def renamed(names: Names, region: int, name: str) -> Names:
 
 
 def merged(names: Names, which: Sequence[int]) -> Names:
-    """Return *names* where regions became one, in the place of the first: it takes their first.
+    """Return *names* after regions were merged into the first, which gets the first of their names.
 
     >>> merged(("arm", "", "leg"), [1, 2])
     ('arm', 'leg')
@@ -86,7 +86,7 @@ def merged(names: Names, which: Sequence[int]) -> Names:
 
 
 def split(names: Names, region: int, count: int) -> Names:
-    """Return *names* where one of *count* regions was cut, its second part the last.
+    """Return *names* after one of *count* regions was split; the new region comes last.
 
     >>> split(("", "arm"), 1, 3)
     ('', 'arm', '', 'arm 2')
@@ -99,13 +99,13 @@ def split(names: Names, region: int, count: int) -> Names:
         stem, number = found[1], int(found[2]) + 1
     while (second := f"{stem[: LONGEST - 6]} {number}") in names:
         number += 1
-    if _PLACE.fullmatch(second):  # of somebody's "region"
+    if _DEFAULT.fullmatch(second):  # if a region is named "region"
         return names
     return (*names, *[""] * (count - len(names)), second)
 
 
 def checked_names(names: Sequence[object], count: int) -> Names:
-    """Return the *names* of *count* regions, or a RegionError that says what is wrong with them."""
+    """Return *names* of *count* regions without redundant ones; RegionError if one is invalid."""
     require_sequence(names, "region_names")
     if len(names) > count:
         raise RegionError(f"there are {len(names)} names for {count} regions")
@@ -124,11 +124,10 @@ def _require_free(name: str, others: Sequence[str]) -> None:
     if fault:
         raise RegionError(f"a region{fault}")
     if name in others:
-        raise RegionError(f"there is a region {name!r} already; choose another name")
-    if _PLACE.fullmatch(name):
+        raise RegionError(f"there is already a region {name!r}; choose another name")
+    if _DEFAULT.fullmatch(name):
         raise RegionError(
-            f"{name!r} is what a region in that place is called while it has no name; "
-            "choose another name"
+            f"{name!r} is reserved for a region of this number without a name; choose another name"
         )
 
 

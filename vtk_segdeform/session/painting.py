@@ -1,7 +1,7 @@
-"""Regions made from other regions: a few vertices more or less, two made one, one made two.
+"""Painting, merging and splitting of regions.
 
-Every vertex stays in some region all the way, and no region is ever empty: what would break
-that is refused, with what to do instead.
+Every vertex remains in at least one region, and no region becomes empty: an edit that would
+violate this raises an error that says what to do instead.
 """
 
 from __future__ import annotations
@@ -18,31 +18,31 @@ from ..errors import RegionError
 from ..mesh import Mesh
 from ..regions import Regions, require_region
 
-_OVERLAP = 0.1  # of a new region's width, counted in edges
+_OVERLAP = 0.1  # edge rings, as a fraction of the width of a new region in edges
 
 
 def painted(
     regions: Regions, region: int, vertices: ArrayLike, *, subtract: bool, name: str = ""
 ) -> Regions:
-    """Return *regions* with *vertices* added to one of them, or taken out of it.
+    """Return *regions* with *vertices* added to or removed from one of them.
 
     Parameters
     ----------
     regions : Regions
         r regions of n vertices.
     region : int
-        Which, in 0..r; r is a new one.
+        In 0..r; r adds a new region.
     vertices : (k,) int or (n,) bool
-        Those of them that are in it already, or not in it, do no harm.
+        May include vertices that are already in the region, or not in it.
     subtract : bool
-        Take them out.
+        Remove the vertices.
     name : str, optional
-        What errors call the region.
+        The name of the region in error messages.
 
     Raises
     ------
     RegionError
-        If there is no such region, it would be empty, or a vertex would be in no region.
+        If there is no such region, it would become empty, or a vertex would be in no region.
     """
     mesh, count = regions.mesh, regions.n_regions
     mask = _mask(mesh, vertices)
@@ -51,30 +51,30 @@ def painted(
     region = _checked(regions, region)
     membership = regions.membership.copy()
     membership[region] = membership[region] & ~mask if subtract else membership[region] | mask
-    bare = np.flatnonzero(~membership.any(axis=0))
+    uncovered = np.flatnonzero(~membership.any(axis=0))
     name = name or f"region {region}"
-    if len(bare):
+    if len(uncovered):
         raise RegionError(
-            f"{len(bare)} of these vertices (the first is {bare[0]}) are in no region but "
-            f"{name}; add them to another one first"
+            f"{len(uncovered)} of these vertices (the first is {uncovered[0]}) are only in {name}; "
+            "add them to another region first"
         )
     if not membership[region].any():
-        raise RegionError(f"{name} would be empty; merge it with another one instead")
+        raise RegionError(f"{name} would become empty; merge it with another region instead")
     return Regions(mesh, membership, regions.smoothness)
 
 
 def merged(regions: Regions, which: Sequence[int]) -> Regions:
-    """Return *regions* with those in *which* made one, in the place of the first of them.
+    """Return *regions* with the regions *which* merged into the first of them.
 
     Raises
     ------
     RegionError
-        If there is no such region, or fewer than two are named.
+        If there is no such region, or *which* has fewer than two.
     """
     require_sequence(which, "which")
     numbers = sorted({_checked(regions, region) for region in which})
     if len(numbers) < 2:
-        raise RegionError(f"name two regions or more to merge; got {shown(which)}")
+        raise RegionError(f"merging requires two or more regions; got {shown(which)}")
     membership = regions.membership.copy()
     membership[numbers[0]] = membership[numbers].any(axis=0)
     return Regions(regions.mesh, np.delete(membership, numbers[1:], axis=0), regions.smoothness)
@@ -88,22 +88,22 @@ def split(
     overlap: int | None = None,
     name: str = "",
 ) -> Regions:
-    """Return *regions* with one of them cut in two; the second part comes last.
+    """Return *regions* with one of them split in two; the second part comes last.
 
     Parameters
     ----------
     regions : Regions
         r regions of n vertices.
     region : int
-        Which, in 0..r-1.
+        In 0..r-1.
     vertices : (k,) int or (n,) bool, optional
-        What becomes the second part; those outside the region do not count.  By default the
-        region is cut across its length, half way along the surface between its ends.
+        The second part; vertices outside the region are ignored.  By default the region is split
+        half way between its two ends, measured along the surface.
     overlap : int, optional
-        Rings of edges by which both parts grow over the cut, inside the region.  None takes a
-        tenth of their width, as `segment` does, at least 2.
+        Edge rings by which both parts grow across the border, within the region.  By default a
+        tenth of their width, as in `segment`, and at least 2.
     name : str, optional
-        What errors call the region.
+        The name of the region in error messages.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def split(
     if not first.any() or not second.any():
         raise RegionError(
             f"{name or f'region {region}'} cannot be split: {'all' if second.any() else 'none'} "
-            "of its vertices would be in the second part; name some of them"
+            "of its vertices would be in the second part; choose some of them"
         )
     if overlap is None:
         overlap = max(2, round(_OVERLAP * np.sqrt(np.count_nonzero(whole) / 2)))
@@ -130,25 +130,26 @@ def split(
 
 
 def _far_half(mesh: Mesh, whole: BoolArray) -> BoolArray:
-    """Return the vertices of *whole* nearer to its one end than to its other, as the ant walks."""
+    """Return the vertices of *whole* that are closer to one of its ends, along the surface."""
     ids = np.flatnonzero(whole)
     graph = mesh.adjacency[ids][:, ids]
     second = np.zeros(len(whole), dtype=bool)
 
-    def walk(end: int) -> FloatArray:
-        return np.asarray(csgraph.dijkstra(graph, indices=np.array([end]))[0])
+    def distance_from(start: int) -> FloatArray:
+        return np.asarray(csgraph.dijkstra(graph, indices=np.array([start]))[0])
 
-    start = walk(0)
-    if np.isinf(start).any():  # not in one piece: cut nothing, part the pieces
-        second[ids[np.isinf(start)]] = True
+    from_any = distance_from(0)
+    if np.isinf(from_any).any():  # several connected parts: separate them
+        second[ids[np.isinf(from_any)]] = True
         return second
-    from_end = walk(int(np.argmax(start)))
-    from_other = walk(int(np.argmax(from_end)))
-    second[ids[from_other < from_end]] = True
+    from_one_end = distance_from(int(np.argmax(from_any)))
+    from_other_end = distance_from(int(np.argmax(from_one_end)))
+    second[ids[from_other_end < from_one_end]] = True
     return second
 
 
 def _grown(mesh: Mesh, mask: BoolArray, rings: int) -> BoolArray:
+    """Return *mask* extended by a number of edge rings."""
     mask = mask.copy()
     i, j = mesh.edges.T
     for _ in range(int(rings)):

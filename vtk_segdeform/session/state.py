@@ -1,9 +1,9 @@
-"""What a session is at one moment.
+"""Immutable states of a session.
 
-A `State` is frozen and its arrays are never written to, so that states share whatever did not
-change between them.  A step of history costs what it changed: a painted region one mask per
-region, a drag the vertices of the cages (m, 3) and the targets of the handles (k, 3).  The mesh,
-and the vertices of a pose, are in no state.
+A `State` is frozen and its arrays are read-only, so that successive states share unchanged parts.
+An undo step therefore stores only its changes: one mask per region for painting, the cage vertices
+(m, 3) and handle targets (k, 3) for a drag.  States contain neither the mesh nor the vertices of a
+pose.
 """
 
 from __future__ import annotations
@@ -25,33 +25,34 @@ from ..freezing import Frozen
 from ..mesh import Mesh
 from ..regions import Regions
 from .listeners import Change
-from .naming import Names, called, checked_names, fault_of
+from .naming import Names, checked_names, fault_of, region_name
 
 _TINY = float(np.finfo(np.float64).tiny)
-_WRECKED = 1e6  # diagonals from the mesh that no drag gets to
+_FARTHEST = 1e6  # mesh diagonals; poses farther away are damaged, since no drag reaches so far
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """How cages are fitted and poses solved for.
+    """Options for fitting cages and solving.
 
     Parameters
     ----------
     n_cage_vertices : int
-        Of all cages together, for the next time they are fitted.
+        Total cage vertices, used at the next fit.
     offset : float, optional
-        How far cages stay from the skin, in the mesh's unit; None chooses.  Likewise.
+        Cage offset from the surface, in the unit of the mesh, used at the next fit; by default
+        chosen automatically.
     preserve_volume, preserve_region_volumes : bool
-        Hold the enclosed volume exactly; hold that of every region as well.
+        Preserve the enclosed volume exactly; preserve the volume of every region as well.
     stretch : float
-        Strength of the stretch term relative to the detail term; 0 is the paper's energy.
+        Stretch resistance relative to detail preservation; 0 is the paper's energy.
     rotation_groups : int, optional
-        How many rotations the detail turns by; None is one per vertex.
+        Number of rotation clusters; None for one rotation per vertex.
 
     Raises
     ------
     SessionError
-        If a value is of the wrong kind or out of range.
+        If a value has the wrong type or is out of range.
     """
 
     n_cage_vertices: int = 155
@@ -76,42 +77,42 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Pose(Frozen):
-    """Where the cages are, from which all else follows, and what for; read-only arrays."""
+    """A deformation of the cages, and the targets it was solved for; read-only arrays."""
 
     cage_vertices: tuple[FloatArray, ...]
     """One (m_r, 3) float per region."""
     targets: Mapping[str, FloatArray]
-    """For each handle (k, 3) float: where its vertices were to go."""
+    """For each handle by name, (k, 3) float: the targets of its vertices."""
 
 
 @dataclass(frozen=True, eq=False)
 class State(Frozen):
-    """All that a session holds besides its mesh of n vertices; shared, never changed in place."""
+    """Everything in a session except its mesh; immutable."""
 
     regions: Regions | None = None
     cages: tuple[Cage, ...] = ()
-    """At rest, one for each region, or none."""
+    """At rest; one for each region, or none."""
     fixed: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     """(f,) int."""
     handles: Mapping[str, IntArray] = field(default_factory=lambda: MappingProxyType({}))
     """(k,) int by name."""
     pose: Pose | None = None
-    """None is rest."""
+    """None at rest."""
     options: Options = field(default_factory=Options)
     region_names: Names = ()
-    """What `naming` makes of the names that regions were given."""
+    """Names of the regions, as in `naming`."""
 
     @property
     def handle(self) -> IntArray:
-        """(k,) int: the vertices of all handles, one handle after the other."""
+        """(k,) int: the vertices of all handles, concatenated."""
         return np.concatenate([np.empty(0, dtype=np.int64), *self.handles.values()])
 
     def changes(self, other: State) -> Change:
-        """Tell in what *other* is another state."""
+        """Return the parts in which *other* differs."""
         pairs = (
             (Change.REGIONS, self.regions is other.regions),
             (Change.NAMES, self.region_names == other.region_names),
-            (Change.CAGES, self.cages == other.cages),  # the very same ones
+            (Change.CAGES, self.cages == other.cages),  # cages are equal only if identical
             (Change.CONSTRAINTS, self.fixed is other.fixed and self.handles is other.handles),
             (Change.POSE, self.pose is other.pose),
             (Change.OPTIONS, self.options == other.options),
@@ -123,18 +124,18 @@ class State(Frozen):
 
 
 def checked_state(mesh: Mesh, state: State) -> State:
-    """Return *state* with arrays of its own, or raise an error that says what does not fit.
+    """Return a checked copy of *state*.
 
     Raises
     ------
     RegionError
-        If the regions are of another mesh, or a name cannot be one or is there twice.
+        If the regions belong to another mesh, or a name is invalid or used twice.
     CageError
-        If there is not one cage per region, a cage leaves out part of its region, or the pose has
-        other cages or numbers beyond all sense.
+        If there is not one cage per region, a cage does not enclose its region, or the pose has
+        other cages or unreasonable coordinates.
     ConstraintError
-        If fixed vertices or handles are no vertices of *mesh* or share one, or the targets of the
-        pose are not theirs.
+        If fixed vertices or handles are not vertices of *mesh* or overlap, or the targets of the
+        pose do not match the handles.
     """
     require(state, State, "state")
     require(state.handles, Mapping, "state.handles")
@@ -152,45 +153,45 @@ def checked_state(mesh: Mesh, state: State) -> State:
     fixed, _ = checked_constraints(mesh, state.fixed, every)
     lengths = [len(ids) for ids in handles.values()]
     if not all(lengths):
-        raise ConstraintError("each handle must have a vertex or more; leave out empty ones")
+        raise ConstraintError("each handle must have at least one vertex; remove empty handles")
     pose = None
     if state.pose is not None:
         pose = _checked_pose(cages, lengths, list(handles), require(state.pose, Pose, "state.pose"))
-        _require_no_wreck(mesh, pose)
-    owned = MappingProxyType({name: _own(ids) for name, ids in handles.items()})
-    return State(regions, cages, _own(fixed), owned, pose, state.options, names)
+        _require_plausible(mesh, pose)
+    owned = MappingProxyType({name: _frozen_copy(ids) for name, ids in handles.items()})
+    return State(regions, cages, _frozen_copy(fixed), owned, pose, state.options, names)
 
 
 def of_mesh(mesh: Mesh, regions: Regions) -> Regions:
-    """Return *regions*, or a RegionError if they are of another mesh."""
+    """Return *regions* as regions of *mesh*; RegionError if they belong to another mesh."""
     if require(regions, Regions, "regions").mesh is mesh:
         return regions
     for mine, theirs in ((mesh.vertices, regions.mesh.vertices), (mesh.faces, regions.mesh.faces)):
         if not np.array_equal(mine, theirs):
-            raise RegionError("these regions are of another mesh; make them anew on this one")
+            raise RegionError("these regions belong to another mesh; create them on this mesh")
     return Regions(mesh, regions.membership, regions.smoothness)
 
 
 def fitting_cages(
     regions: Regions | None, cages: Sequence[Cage], names: Names = ()
 ) -> tuple[Cage, ...]:
-    """Return *cages* as a tuple, or a CageError unless there is one around each region.
+    """Return *cages* as a tuple; CageError unless there is one around each region.
 
-    The error calls regions by their *names*.
+    The message contains the *names* of regions.
     """
     if regions is None:
-        raise CageError("there are no regions to put cages around; make regions first")
+        raise CageError("cages require regions; create regions first")
     cages = all_of(cages, Cage, "cages")
     if len(cages) != regions.n_regions:
         raise CageError(f"{regions.n_regions} regions need as many cages; got {len(cages)}")
     for r, cage in enumerate(cages):
         members = regions.mesh.vertices[regions.membership[r]]
-        cage.require_encloses(members, f"vertices of {called(names, r)}")
+        cage.require_encloses(members, f"vertices of {region_name(names, r)}")
     return cages
 
 
-def pieces(array: Any, lengths: Sequence[int]) -> list[Any]:
-    """Return *array* in pieces of as many rows, one after the other."""
+def split_rows(array: Any, lengths: Sequence[int]) -> list[Any]:
+    """Split *array* into consecutive parts with the given numbers of rows."""
     ends = np.cumsum([0, *lengths])
     return [array[a:b] for a, b in itertools.pairwise(ends)]
 
@@ -198,7 +199,7 @@ def pieces(array: Any, lengths: Sequence[int]) -> list[Any]:
 def _require_number(name: str, value: float, least: float, *, whole: bool = False) -> None:
     if not is_number(value, least) or (whole and not isinstance(value, int | np.integer)):
         kind = "a whole number" if whole else "a number"
-        bound = "above 0" if least == _TINY else f"from {least:g} up"
+        bound = "above 0" if least == _TINY else f"of at least {least:g}"
         raise SessionError(f"{name} must be {kind} {bound}; got {shown(value)}")
 
 
@@ -210,23 +211,25 @@ def _checked_pose(
     places = [as_points(points, "cage_vertices") for points in pose.cage_vertices]
     expected, got = [cage.n_vertices for cage in cages], [len(points) for points in places]
     if not cages or got != expected:
-        raise CageError(f"the pose must hold {expected} points, cage by cage; got {got}")
+        raise CageError(f"the cages of the pose must have {expected} vertices; got {got}")
     if list(pose.targets) != list(names):
-        raise ConstraintError(f"the pose has targets for {list(pose.targets)}, not {list(names)}")
+        raise ConstraintError(
+            f"the pose must have targets for {list(names)}; got {list(pose.targets)}"
+        )
     targets = {name: as_points(points, "targets") for name, points in pose.targets.items()}
     if [len(points) for points in targets.values()] != list(lengths):
         raise ConstraintError("the pose must have one target for each vertex of each handle")
-    owned = MappingProxyType({name: _own(points) for name, points in targets.items()})
-    return Pose(tuple(_own(points) for points in places), owned)
+    owned = MappingProxyType({name: _frozen_copy(points) for name, points in targets.items()})
+    return Pose(tuple(_frozen_copy(points) for points in places), owned)
 
 
-def _require_no_wreck(mesh: Mesh, pose: Pose) -> None:
-    """Raise a CageError if numbers of *pose* are so far off that vertices could overflow."""
+def _require_plausible(mesh: Mesh, pose: Pose) -> None:
+    """Raise a CageError if *pose* is so far away that vertices could overflow."""
     every = np.concatenate([*pose.cage_vertices, *pose.targets.values()])
     away = np.abs(every - mesh.vertices.mean(axis=0)).max(initial=0.0) / mesh.diagonal
-    if not away <= _WRECKED:
-        raise CageError(f"the pose reaches {away:.0e} diagonals of the mesh away; it is damaged")
+    if not away <= _FARTHEST:
+        raise CageError(f"the pose is damaged: it is {away:.0e} mesh diagonals away from the mesh")
 
 
-def _own(array: Any) -> Any:
+def _frozen_copy(array: Any) -> Any:
     return frozen(array.copy())

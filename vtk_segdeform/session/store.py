@@ -1,6 +1,6 @@
-"""A session to and from one file: plain arrays and a header, nothing that could be run.
+"""Saving and loading sessions: one file of arrays and a header, without executable content.
 
-The file is an `archive`, which ``numpy.load`` reads as any .npz:
+The file is an `archive`, which ``numpy.load`` reads as an .npz file:
 
     header.json           format, version, counts, names, options
     mesh_vertices.npy     (n, 3) float     mesh_faces.npy   (m, 3) int
@@ -9,11 +9,11 @@ The file is an `archive`, which ``numpy.load`` reads as any .npz:
     fixed.npy             (f,) int         handle.npy       (h,) int
     pose.npy              (c, 3) float     targets.npy      (h, 3) float           if not at rest
 
-Cages, and the handles, follow one another; the header has their counts.  Loading gives the same
-session to the last bit of its vertices, but without its history: a file is a state.
+The arrays of cages and of handles are concatenated; the header has their counts.  A loaded session
+is bitwise identical to the saved one, but has no history.
 
-Nothing in a file is believed: see `archive`, and mesh, regions, cages, handles and pose are then
-checked as if they had come from a caller.
+Files may be damaged or malicious: `archive` checks the arrays, and the mesh, regions, cages,
+handles and pose are checked like arguments of a caller.
 """
 
 from __future__ import annotations
@@ -35,31 +35,31 @@ from ..mesh import Mesh
 from ..regions import Regions
 from .archive import Archive, write_archive
 from .session import Session
-from .state import Options, Pose, State, pieces
+from .state import Options, Pose, State, split_rows
 
 FORMAT = "vtk_segdeform session"
 VERSION = 1
 
-# What zipfile, numpy and json raise on bytes they cannot make sense of.
-_FAULTS = (zipfile.BadZipFile, ValueError, KeyError, TypeError, EOFError, OverflowError,
+# Errors of zipfile, numpy and json on invalid content.
+_ERRORS = (zipfile.BadZipFile, ValueError, KeyError, TypeError, EOFError, OverflowError,
            RuntimeError, NotImplementedError, struct.error, OSError)  # fmt: skip
 
 
 def save_session(path: str | os.PathLike[str], session: Session) -> None:
-    """Write *session* to a file; it appears whole or, if anything fails, what was there stays.
+    """Save *session*; if writing fails, an existing file remains unchanged.
 
     Parameters
     ----------
     path : path
-        Any name; a file of that name is replaced.  Its folder must be there.
+        An existing file is replaced.  The folder must exist.
     session : Session
-        A drag in hand is saved as it is; the history is not saved.
+        The current state, including an ongoing drag, is saved; the history is not.
 
     Raises
     ------
     SessionError
-        If the file cannot be written: no such folder, no permission, no space, or what has that
-        name is a folder or a device.
+        If the file cannot be written: no such folder, no permission, no space, or *path* is a
+        folder or a device.
     """
     path = as_path(path)
     require(session, Session, "session")
@@ -71,16 +71,16 @@ def save_session(path: str | os.PathLike[str], session: Session) -> None:
 
 
 def load_session(path: str | os.PathLike[str]) -> Session:
-    """Return the session in a file that `save_session` wrote.
+    """Load a session from a file written by `save_session`.
 
-    Its vertices, regions, cages, fixed vertices, handles, targets and options are those that were
-    saved, bit for bit; there is nothing to undo.
+    The vertices, regions, cages, fixed vertices, handles, targets and options are bitwise identical
+    to the saved ones.  The history is empty.
 
     Raises
     ------
     SessionError
-        If there is no such file, it is no session, is damaged, or is of a newer version; the text
-        names the file and the fault.
+        If the file does not exist, is not a session, is damaged, or was written by a newer version;
+        the message names the file and the reason.
     """
     path = as_path(path)
     try:
@@ -91,9 +91,9 @@ def load_session(path: str | os.PathLike[str]) -> Session:
         with file:
             mesh, state = _read(Archive(file))
         return Session(mesh, state=state)
-    except _FAULTS as fault:
+    except _ERRORS as fault:
         reason = str(fault) or type(fault).__name__
-        raise SessionError(f"{path}: is no readable session file: {reason}") from fault
+        raise SessionError(f"{path}: is not a readable session file: {reason}") from fault
 
 
 def _write(file: Any, session: Session) -> None:
@@ -112,7 +112,7 @@ def _write(file: Any, session: Session) -> None:
         "posed": pose is not None,
         "options": {name: _plain(value) for name, value in asdict(state.options).items()},
     }
-    if state.region_names:  # programs that know of none read the file all the same
+    if state.region_names:  # optional: earlier versions ignore it
         header["region_names"] = list(state.region_names)
     arrays: dict[str, Any] = {"mesh_vertices": mesh.vertices, "mesh_faces": mesh.faces}
     arrays |= {"fixed": state.fixed, "handle": state.handle}
@@ -139,25 +139,25 @@ def _read(archive: Archive) -> tuple[Mesh, State]:
         membership = archive.array("membership", "b", (r, n))
         regions = Regions(mesh, membership, _number(header, "smoothness"))
     counts = [(_whole(m, "cages"), _whole(k, "cages")) for m, k in _list(header, "cages")]
-    total = sum(m for m, _ in counts)
+    n_vertices, n_faces = [m for m, _ in counts], [k for _, k in counts]
+    total = sum(n_vertices)
     cages: tuple[Cage, ...] = ()
     if counts:
-        vertices = pieces(archive.array("cage_vertices", "f", (total, 3)), [m for m, _ in counts])
-        n_faces = [k for _, k in counts]
-        faces = pieces(archive.array("cage_faces", "i", (sum(n_faces), 3)), n_faces)
+        vertices = split_rows(archive.array("cage_vertices", "f", (total, 3)), n_vertices)
+        faces = split_rows(archive.array("cage_faces", "i", (sum(n_faces), 3)), n_faces)
         cages = tuple(Cage(*pair) for pair in zip(vertices, faces, strict=True))
 
     sizes = {str(name): _whole(k, "handles") for name, k in _list(header, "handles")}
     if len(sizes) != len(_list(header, "handles")):
         raise SessionError("two handles have the same name")
-    lengths, held = list(sizes.values()), sum(sizes.values())
-    ids = pieces(archive.array("handle", "i", (held,)), lengths)
+    lengths, n_handle = list(sizes.values()), sum(sizes.values())
+    ids = split_rows(archive.array("handle", "i", (n_handle,)), lengths)
     pose = None
     if not isinstance(header["posed"], bool):
         raise SessionError(f"posed must be true or false in the header; got {header['posed']!r}")
     if header["posed"]:
-        places = pieces(archive.array("pose", "f", (total, 3)), [m for m, _ in counts])
-        targets = pieces(archive.array("targets", "f", (held, 3)), lengths)
+        places = split_rows(archive.array("pose", "f", (total, 3)), n_vertices)
+        targets = split_rows(archive.array("targets", "f", (n_handle, 3)), lengths)
         pose = Pose(tuple(places), dict(zip(sizes, targets, strict=True)))
     fixed = archive.array("fixed", "i", (_count(header, "n_fixed"),))
     options = Options(**header["options"])
@@ -168,12 +168,12 @@ def _read(archive: Archive) -> tuple[Mesh, State]:
 
 def _checked_header(header: Any) -> Mapping[str, Any]:
     if not isinstance(header, dict) or header.get("format") != FORMAT:
-        raise SessionError(f"it does not say that it is a {FORMAT}")
+        raise SessionError(f"the header does not contain the format {FORMAT!r}")
     version = _count(header, "version")
     if version > VERSION:
-        raise SessionError(f"it has version {version}, newer than {VERSION}; update vtk_segdeform")
+        raise SessionError(f"version {version} is newer than {VERSION}; update vtk_segdeform")
     if version < 1:
-        raise SessionError(f"there never was a version {version}")
+        raise SessionError(f"version must be at least 1; got {version}")
     return header
 
 

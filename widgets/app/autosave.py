@@ -20,7 +20,6 @@ import os
 import re
 import secrets
 import stat
-import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -28,7 +27,15 @@ from datetime import datetime
 from pathlib import Path
 
 from vtk_segdeform.errors import SessionError
-from vtk_segdeform.files import fault_of, hold, is_draft, is_ours, open_regular, replacing
+from vtk_segdeform.files import (
+    autosave_folder,
+    fault_of,
+    hold,
+    is_draft,
+    is_ours,
+    open_regular,
+    replacing,
+)
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session, save_session
 
@@ -39,17 +46,6 @@ _NAME = re.compile(r"[0-9a-f]{16}")
 _MARK = b"vtk_segdeform: unsaved work, held while the program runs\n"
 _LONGEST_ABOUT = 1 << 20  # bytes
 _ATTEMPTS = 5
-
-
-def user_folder() -> Path:
-    """Return the folder for autosaves in the user's data folder of this system."""
-    if sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Application Support"
-    else:
-        base = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
-    return Path(base) / "segdeform" / "unsaved"
 
 
 @dataclass(frozen=True)
@@ -128,7 +124,7 @@ class Autosaves:
     Parameters
     ----------
     folder : Path, optional
-        By default `user_folder`; created when needed.
+        By default `autosave_folder`; created when needed.
 
     Examples
     --------
@@ -146,7 +142,7 @@ class Autosaves:
     """
 
     def __init__(self, folder: Path | None = None) -> None:
-        self.folder = user_folder() if folder is None else folder
+        self.folder = autosave_folder() if folder is None else folder
 
     def new(self, about: About) -> Slot:
         """Return a new slot, locked by this program.

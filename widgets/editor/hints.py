@@ -5,7 +5,7 @@ A hint names the key for that step, so that the user can reach every mode from e
 
 from __future__ import annotations
 
-from vtk_segdeform.session import Session, called
+from vtk_segdeform.session import Session, region_name
 from vtk_segdeform.solver import Status
 
 from ..region_selector import Paint, Tool
@@ -51,7 +51,7 @@ def _painting_hint(widgets: WidgetSet) -> str:
     if selector.paints is Paint.REGION:
         new = selector.region >= widgets.n_regions
         name = widgets.session.region_name(selector.region)
-        target = brief(name, called((), selector.region)) + (" (new)" if new else "")
+        target = brief(name, region_name((), selector.region)) + (" (new)" if new else "")
     elif selector.paints is Paint.FIXED:
         target = "fixed vertices"
     else:

@@ -31,7 +31,7 @@ from vtk_segdeform.checks import require, shown
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.freezing import read_only
 from vtk_segdeform.geometry import LocalVolume
-from vtk_segdeform.session import Change, Session, called
+from vtk_segdeform.session import Change, Session, region_name
 
 from ..scene import Stop, SurfaceDisplay, View
 from .diverging import colours_of, half_range_for
@@ -195,7 +195,7 @@ class VolumeOverlay:
         return lines + [(", ".join(work), None)] if work else lines
 
     def _name(self, region: int) -> str:
-        return brief(self.session.region_name(region), called((), region))
+        return brief(self.session.region_name(region), region_name((), region))
 
 
 class _FrameClock:

@@ -19,7 +19,7 @@ from vtk_segdeform.errors import SessionError
 from vtk_segdeform.files import lock
 from vtk_segdeform.files.lock import hold
 from vtk_segdeform.widgets.app import autosave
-from vtk_segdeform.widgets.app.autosave import About, Autosaves, user_folder
+from vtk_segdeform.widgets.app.autosave import About, Autosaves
 
 BALL = models.sphere(300)
 ABOUT = About("ball.ply", "/saved/ball.segdeform", "/meshes/ball.ply")
@@ -190,20 +190,6 @@ def test_a_lock_is_acquired_once_and_not_on_a_deleted_file(tmp_path):
     third = hold(path)
     assert third is not None
     os.close(third)
-
-
-def test_the_folder_is_the_users_own(monkeypatch, tmp_path):
-    monkeypatch.setattr(sys, "platform", "linux")
-    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
-    assert user_folder() == tmp_path / "segdeform" / "unsaved"
-    monkeypatch.setenv("HOME", str(tmp_path))
-    monkeypatch.delenv("XDG_DATA_HOME")
-    assert user_folder() == tmp_path / ".local" / "share" / "segdeform" / "unsaved"
-    monkeypatch.setattr(sys, "platform", "darwin")
-    assert "Library" in user_folder().parts
-    monkeypatch.setattr(sys, "platform", "win32")
-    monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "local"))
-    assert user_folder() == tmp_path / "local" / "segdeform" / "unsaved"
 
 
 def test_another_thread_can_save_a_session_while_it_changes(folder):

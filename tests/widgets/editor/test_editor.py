@@ -460,11 +460,11 @@ def test_an_error_is_shown_until_an_action_succeeds(bench):
     bench.hand.click(
         bench.hand.at([-2.0, 0.0, 0.0]), control=True
     )  # erase where there is only one region
-    assert "in no region but region 1" in bench.editor.status
+    assert "are only in region 1" in bench.editor.status
     assert [type(failure).__name__ for failure in bench.hand.failures] == ["RegionError"]
     bench.hand.failures.clear()
     bench.hand.hover((5, 5))
-    assert "in no region but region 1" in bench.editor.status
+    assert "are only in region 1" in bench.editor.status
     bench.hand.click(bench.hand.at([1.0, -0.7, 0.0]))
     assert bench.session.undo_label == "paint region 1"
     assert bench.editor.status.startswith("Brush: paint region 1.")
@@ -707,10 +707,10 @@ def test_opening_an_invalid_file_changes_nothing(bench, tmp_path):
     bench.editor.path = path
     bench.type("ctrl+o")
     assert bench.session is first
-    assert "no readable session" in bench.editor.status
+    assert "not a readable session" in bench.editor.status
     assert len(bench.hand.failures) == 1
     bench.hand.failures.clear()
-    with pytest.raises(Exception, match="no readable session"):
+    with pytest.raises(Exception, match="not a readable session"):
         bench.editor.load(path)
     assert bench.session is first
     bench.type("4")

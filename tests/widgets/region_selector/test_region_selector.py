@@ -206,7 +206,7 @@ def test_what_no_other_region_holds_stays_and_where_that_is_all_of_it_one_is_tol
     desk.hand.drag([(2, 2), (398, 398)], control=True)
     error = desk.hand.failures.pop()
     assert isinstance(error, RegionError)
-    assert "are in no region but region 1; add them to another one first" in str(error)
+    assert "are only in region 1; add them to another region first" in str(error)
     assert desk.session.regions is regions
 
 
@@ -217,7 +217,7 @@ def test_a_region_cannot_be_emptied(desk):
     desk.hand.drag([(2, 2), (398, 398)], control=True)
     error = desk.hand.failures.pop()
     assert isinstance(error, RegionError)
-    assert "region 1 would be empty; merge it" in str(error)
+    assert "region 1 would become empty; merge it" in str(error)
     assert desk.session.regions is regions
 
 

@@ -14,8 +14,8 @@ from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.faults import find_faults
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.mesh.report import Kind
-from vtk_segdeform.repair.lids import triangulate_loop
-from vtk_segdeform.repair.repair import repair
+from vtk_segdeform.mesh_repair.lids import triangulate_loop
+from vtk_segdeform.mesh_repair.repair import repair
 
 SPHERE = icosphere(2)
 N, M = len(SPHERE[0]), len(SPHERE[1])

@@ -11,9 +11,9 @@ from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.intersections import intersections_of, self_intersections
 from vtk_segdeform.mesh.topology import HalfEdges
 from vtk_segdeform.mesh.triangles import least_angle
-from vtk_segdeform.repair.hole_borders import border_loops
-from vtk_segdeform.repair.lids import clip_ears
-from vtk_segdeform.repair.repair import repair
+from vtk_segdeform.mesh_repair.hole_borders import border_loops
+from vtk_segdeform.mesh_repair.lids import clip_ears
+from vtk_segdeform.mesh_repair.repair import repair
 
 
 def tube(loop, height=1.0, rows=6):
