@@ -132,15 +132,15 @@ def test_dragging(ready):
     dragger.remove()
 
 
-@pytest.mark.parametrize("held", [True, False])
-def test_volume(ready, held):
-    scene = Scene(ready, preserve_volume=held)
+@pytest.mark.parametrize("preserved", [True, False])
+def test_volume(ready, preserved):
+    scene = Scene(ready, preserve_volume=preserved)
     overlay = VolumeOverlay(scene.view, scene.session, scene.surface)
     overlay.show()
-    if held:
+    if preserved:
         scene.looks("volume-rest")
     scene.session.drag(scene.scene.turned(50.0))
-    scene.looks("volume-held" if held else "volume-free")
+    scene.looks("volume-preserved" if preserved else "volume-not-preserved")
     overlay.remove()
 
 

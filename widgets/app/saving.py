@@ -117,8 +117,7 @@ def _draw(window: Any, desk: Desk, path: Path) -> None:
     desk.view.render()
     picture = window.editor_widget.plotter.grabFramebuffer()
     desk.mode = mode
-    dragger = desk.stage.dragger
-    dragger.refine_while_resting = dragger.refine_while_resting  # go on, if that was so
+    desk.stage.dragger.resume_refining()
     content = QtCore.QBuffer()
     content.open(QtCore.QIODevice.OpenModeFlag.WriteOnly)
     if path.suffix.lower() not in _PICTURE or not picture.save(content, path.suffix[1:].upper()):

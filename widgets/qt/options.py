@@ -7,7 +7,7 @@ from typing import Any
 from qtpy import QtWidgets
 
 from ..editor import DeformEditor, Mode, ranging, setting, toggle_cages, toggle_overlay
-from ..volume_overlay import precise
+from ..volume_overlay import percent
 from .controls import check_box, column, form, key_button, number_box, put, row
 
 _MOST = 100_000
@@ -116,7 +116,7 @@ class DeformPart(QtWidgets.QGroupBox):
         """Show the options as they are, and the volume."""
         session, stage = self._editor.session, self._editor.stage
         options = session.options
-        self.volume.setText(precise(session.volume_change))
+        self.volume.setText(percent(session.volume_change))
         put(self.hold, options.preserve_volume)
         put(self.hold_each, options.preserve_region_volumes)
         put(self.overlay, stage.overlay_wanted)

@@ -177,7 +177,7 @@ def test_a_dragged_vertex_is_where_the_pointer_is_and_as_far_away_as_before(cage
         now = session.cage_vertices[1]
         seen = view.to_display(now[k : k + 1])[0]
         assert np.abs(seen[:2] - [x + 8 * step, y + 6 * step]).max() <= 1.0  # events have pixels
-        assert (now[k] - start) @ view.towards_scene == pytest.approx(0.0, abs=1e-9)
+        assert (now[k] - start) @ view.view_direction == pytest.approx(0.0, abs=1e-9)
         assert near(cages, now[k], rgb(HANDLE))
     others = np.delete(np.arange(len(now)), k)
     assert np.array_equal(now[others], session.cages[1].vertices[others])
@@ -366,7 +366,9 @@ def test_what_a_cage_leaves_out_is_marked(cages):
     facing = outside[outside[:, 1] < -0.2]
     assert len(facing)
     assert all(near(cages, point, WARNING) for point in facing[::5])
-    shown = [p.GetInput() for p in cages.view.front.GetViewProps() if isinstance(p, vtkTextActor)]
+    shown = [
+        p.GetInput() for p in cages.view.foreground.GetViewProps() if isinstance(p, vtkTextActor)
+    ]
     assert [" ".join(text.split()) for text in shown] == [words]
 
 
@@ -405,9 +407,9 @@ def test_words_stay_inside_the_window_and_off_the_marks(cages, zoom):
     view.camera.Zoom(zoom)
     cages.show_faults(cage.vertices, cage.faces[:-1], 2)
     picture(view)
-    words = next(p for p in view.front.GetViewProps() if isinstance(p, vtkTextActor))
+    words = next(p for p in view.foreground.GetViewProps() if isinstance(p, vtkTextActor))
     low, size = np.array(words.GetPosition()), np.zeros(2)
-    words.GetSize(view.front, size)
+    words.GetSize(view.foreground, size)
     assert (low >= 0).all()
     assert (low + size <= view.renderer.GetSize()).all()
     marks = view.to_display(cage.vertices[cage.faces[-1]])[:, :2]
@@ -430,6 +432,6 @@ def test_removed_it_leaves_nothing_behind(cages, hand):
     hand.hover(hand.at(cages.session.cage_vertices[1][top_of(cages, 1)]))
     cages.remove()
     assert view.renderer.GetViewProps().GetNumberOfItems() == 1  # the surface
-    assert view.front.GetViewProps().GetNumberOfItems() == 0
+    assert view.foreground.GetViewProps().GetNumberOfItems() == 0
     cages.session.move_cage(1, cages.session.cage_vertices[1] * 1.1)
     assert not hand.failures

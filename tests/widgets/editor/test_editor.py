@@ -22,7 +22,7 @@ from vtk_segdeform.errors import RegionError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.widgets.editor.bindings import BINDINGS
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
-from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import Part, Way
+from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import Kind, Part
 from vtk_segdeform.widgets.region_selector.region_selector import Paint, Tool
 from vtk_segdeform.widgets.scene.view import View
 from vtk_segdeform.widgets.volume_overlay.volume_overlay import VolumeOverlay
@@ -208,10 +208,10 @@ sys.stdout.buffer.write(load_session(sys.argv[1]).vertices.tobytes())
 def turn_by_a_ring(desk):
     """Turn the handle about the line of sight, by a sixth of the outermost ring."""
     dragger = desk.editor.stage.dragger
-    ring = dragger.gizmo.line(Part(Way.ABOUT))[:, :2]
+    ring = dragger.gizmo.line(Part(Kind.ROTATION))[:, :2]
     before = desk.session.targets[dragger.handle]
     desk.hand.drag(ring[: len(ring) // 6])
-    assert desk.session.undo_label == "turn handle 1"
+    assert desk.session.undo_label == "rotate handle 1"
     a, b = (x - x.mean(axis=0) for x in (before, desk.session.targets[dragger.handle]))
     turn = Rotation.align_vectors(b, a)[0]
     assert np.degrees(turn.magnitude()) == pytest.approx(60.0, abs=8.0)
@@ -329,7 +329,7 @@ def test_what_a_stroke_leaves_alone_is_told(desk):
     hand.drag([(2, 40), (398, 398)], control=True)
     left = np.count_nonzero(desk.session.regions.membership[0])
     assert 0 < left < size
-    assert f"{left} vertices left as they were: no other region holds them" in desk.editor.status
+    assert f"{left} vertices skipped: in no other region" in desk.editor.status
     assert left == np.count_nonzero(held[desk.session.regions.membership[0]] == 1)
 
 

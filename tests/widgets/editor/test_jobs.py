@@ -221,7 +221,7 @@ def line():
     view.render()
     yield line
     line.remove()
-    view.remove_front()
+    view.remove_foreground()
 
 
 def strip_height(view) -> int:
@@ -340,7 +340,7 @@ def test_the_card_lies_inside_the_window_and_is_read_on_any_background(size, bac
     assert (edge[[0, -1]] > 240).all()
     card.hide()
     assert (picture(view) == blank).all()
-    view.remove_front()
+    view.remove_foreground()
 
 
 def test_the_card_is_laid_out_anew_when_the_window_grows():
@@ -358,4 +358,4 @@ def test_the_card_is_laid_out_anew_when_the_window_grows():
     card.toggle()
     assert not card.is_shown
     card.remove()
-    view.remove_front()
+    view.remove_foreground()

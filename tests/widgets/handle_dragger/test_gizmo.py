@@ -10,14 +10,14 @@ from solids import rotation
 from vtk_segdeform import Session, models
 from vtk_segdeform.pictures.palette import COLOURS, INK, rgb
 from vtk_segdeform.widgets.handle_dragger.gizmo import AXIS_COLOURS, Gizmo
-from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import FREE, PARTS, Part, Way
+from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import FREE, PARTS, Kind, Part
 from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 
 CENTRE = np.array([0.2, 0.1, -0.1])  # within the ball that is in the view
 TURNED = rotation([1.0, 2.0, 3.0], 0.7)
 LOOKS = [(4.0, -9.0, 5.0), (-6.0, 5.0, 3.0), (3.0, 4.0, -8.0)]
-VIEW_RING = Part(Way.ABOUT)
+VIEW_RING = Part(Kind.ROTATION)
 
 
 @pytest.fixture
@@ -42,9 +42,9 @@ def pointer(place):
 def seen_lines(gizmo, part):
     """Return the points where a part is drawn, (k, 2), none for one that points at the viewer."""
     line = gizmo.line(part)[:, :2]
-    if part.way is Way.ALONG:
+    if part.kind is Kind.AXIS:
         line = line[0] + np.linspace(0.3, 0.9, 7)[:, None] * (line[1] - line[0])
-    elif part.way is Way.WITHIN:
+    elif part.kind is Kind.PLANE:
         line = line[:4].mean(axis=0)[None]
     else:
         line = line[np.isfinite(line).all(axis=1)][::3]
@@ -111,21 +111,21 @@ def test_what_is_drawn_is_what_is_hit(view, place, axes):
     image = picture(view)
     for part in PARTS:
         places = seen_lines(gizmo, part)
-        found = [gizmo.under(pointer(p)) for p in places]
+        found = [gizmo.part_at(pointer(p)) for p in places]
         own = INK if part.axis is None else AXIS_COLOURS[part.axis]
         drawn = [is_painted(image, p, own) for p in places]
-        if part in found or part.way in (Way.FREE, Way.ABOUT):
+        if part in found or part.kind in (Kind.FREE, Kind.ROTATION):
             assert found.count(part) > 0.4 * len(found), part  # the rest is crossed by others
             assert np.mean(drawn) > 0.4, part
         else:  # it is seen from its side, or end on: neither drawn nor hit
-            edge = abs(axes[part.axis] @ view.towards_scene)
-            assert edge > 0.9 if part.way is Way.ALONG else edge < 0.4
+            edge = abs(axes[part.axis] @ view.view_direction)
+            assert edge > 0.9 if part.kind is Kind.AXIS else edge < 0.4
 
 
 def test_the_far_half_of_a_ring_is_not_there(view):
     gizmo = Gizmo(view)
     gizmo.place(CENTRE)
-    ring = Part(Way.ABOUT, 2)
+    ring = Part(Kind.ROTATION, 2)
     turn = np.linspace(0.0, 2.0 * np.pi, 90, endpoint=False)
     around = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(90)])
     hidden = around[around @ np.array(LOOKS[0]) < -3.0]
@@ -133,7 +133,7 @@ def test_the_far_half_of_a_ring_is_not_there(view):
 
     def hits(points):
         places = view.to_display(CENTRE + gizmo.radius * points)
-        return [gizmo.under(pointer(place)) for place in places]
+        return [gizmo.part_at(pointer(place)) for place in places]
 
     def drawn(points):
         image, places = picture(view), view.to_display(CENTRE + gizmo.radius * points)[:, :2]
@@ -158,33 +158,33 @@ def test_what_is_seen_end_on_is_not_there(view, axis):
     gizmo.place(np.zeros(3))
     x, y = view.to_display(np.zeros((1, 3)))[0, :2]
     grid = [(x + i, y + j) for i in range(-99, 100, 11) for j in range(-99, 100, 11)]
-    found = {gizmo.under(pointer(p)) for p in grid}
+    found = {gizmo.part_at(pointer(p)) for p in grid}
     others = [a for a in range(3) if a != axis]
     assert found == {
-        None, FREE, VIEW_RING, *(Part(Way.ABOUT, a) for a in range(3)),
-        Part(Way.WITHIN, axis), *(Part(Way.ALONG, a) for a in others),
+        None, FREE, VIEW_RING, *(Part(Kind.ROTATION, a) for a in range(3)),
+        Part(Kind.PLANE, axis), *(Part(Kind.AXIS, a) for a in others),
     }  # fmt: skip
 
 
 def test_beside_it_and_while_it_is_hidden_nothing_is_hit(view):
     gizmo = Gizmo(view)
     middle = view.to_display(CENTRE[None])[0]
-    assert gizmo.under(pointer(middle)) is None
+    assert gizmo.part_at(pointer(middle)) is None
     gizmo.place(CENTRE)
-    assert gizmo.under(pointer(middle)) == FREE
+    assert gizmo.part_at(pointer(middle)) == FREE
     outer = 1.14 * gizmo.radius / view.pixel_at(CENTRE)
-    assert gizmo.under(pointer(middle[:2] + [0.0, outer + 2.0])) == VIEW_RING
-    assert gizmo.under(pointer(middle[:2] + [0.0, outer + 12.0])) is None
+    assert gizmo.part_at(pointer(middle[:2] + [0.0, outer + 2.0])) == VIEW_RING
+    assert gizmo.part_at(pointer(middle[:2] + [0.0, outer + 12.0])) is None
     gizmo.place(None)
-    assert gizmo.under(pointer(middle)) is None
+    assert gizmo.part_at(pointer(middle)) is None
 
 
 def test_the_part_that_is_pointed_at_is_yellow_and_the_one_in_hand_is_alone(view):
     gizmo = Gizmo(view)
     gizmo.place(CENTRE)
-    arrow, ring = Part(Way.ALONG, 0), Part(Way.ABOUT, 2)
+    arrow, ring = Part(Kind.AXIS, 0), Part(Kind.ROTATION, 2)
     there, other = seen_lines(gizmo, arrow)[3], seen_lines(gizmo, ring)
-    gizmo.point_at(arrow)
+    gizmo.highlight(arrow)
     image = picture(view)
     assert is_painted(image, there, COLOURS[4])
     assert any(is_painted(image, place, AXIS_COLOURS[2]) for place in other)
@@ -193,7 +193,7 @@ def test_the_part_that_is_pointed_at_is_yellow_and_the_one_in_hand_is_alone(view
     assert is_painted(image, there, COLOURS[4])
     assert not any(is_painted(image, place, AXIS_COLOURS[2]) for place in other)
     gizmo.show_only(None)
-    gizmo.point_at(None)
+    gizmo.highlight(None)
     assert is_painted(picture(view), there, AXIS_COLOURS[0])
 
 
@@ -201,7 +201,7 @@ def test_after_a_step_of_the_camera_the_first_picture_is_right():
     view = plain_view()
     SurfaceDisplay(view, Session(models.sphere(300)))
     look_from(view, LOOKS[0])
-    assert view.front.GetLayer() == 1  # somebody else was there first
+    assert view.foreground.GetLayer() == 1  # somebody else was there first
     gizmo = Gizmo(view)
     gizmo.place(np.array([0.0, -0.9, 0.4]))
     for zoom in (0.2, 0.3, 4.0):
@@ -214,8 +214,8 @@ def test_removed_it_leaves_nothing(view):
     before = picture(view)
     gizmo = Gizmo(view)
     gizmo.place(CENTRE)
-    gizmo.say("30.0°")
+    gizmo.set_caption("30.0°")
     assert (picture(view) != before).any()
     gizmo.remove()
     assert np.array_equal(picture(view), before)
-    assert view.front.GetViewProps().GetNumberOfItems() == 0
+    assert view.foreground.GetViewProps().GetNumberOfItems() == 0

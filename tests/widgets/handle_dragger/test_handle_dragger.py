@@ -14,7 +14,7 @@ from vtk_segdeform import Session
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.geometry.rotations import rigid_fit
 from vtk_segdeform.solver.solution import Status
-from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import FREE, PARTS, Part, Way
+from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import FREE, PARTS, Kind, Part
 from vtk_segdeform.widgets.handle_dragger.handle_dragger import HandleDragger
 from vtk_segdeform.widgets.handle_dragger.handle_motion import Grip, Motion
 from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
@@ -22,7 +22,7 @@ from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
 SCENE = sausage()
 TIP, TOP = "handle 1", "handle 2"
 LOOKS = [(10.0, -8.0, 6.0), (9.0, 7.0, 4.0), (-5.0, 6.0, -8.0)]
-VIEW_RING = Part(Way.ABOUT)
+VIEW_RING = Part(Kind.ROTATION)
 
 
 class Bench:
@@ -62,13 +62,13 @@ class Bench:
     def aim(self, part):
         """Return a pixel at which a press takes *part*."""
         line = self.gizmo.line(part)[:, :2]
-        if part.way is Way.WITHIN:
+        if part.kind is Kind.PLANE:
             line = np.concatenate([line[:4].mean(axis=0)[None], 0.5 * (line[:4] + line[1:])])
-        elif part.way is Way.ALONG:
+        elif part.kind is Kind.AXIS:
             line = line[0] + np.linspace(0.2, 0.9, 15)[:, None] * (line[1] - line[0])
         places = np.round(line[np.isfinite(line).all(axis=1)])
         places = places[:: 1 + len(places) // 10]
-        taken = [p for p in places if self.gizmo.under(Pointer(Phase.HOVER, *p)) == part]
+        taken = [p for p in places if self.gizmo.part_at(Pointer(Phase.HOVER, *p)) == part]
         assert taken, f"{part} is not to be seen"
         place = taken[len(taken) // 2]
         assert 20.0 < place.min() <= place.max() < 380.0
@@ -131,18 +131,18 @@ def test_every_part_moves_as_it_says(look, parallel, local):
     axes = turned(bench) if local else np.eye(3)
     assert np.allclose(bench.gizmo.axes, axes, atol=1e-9)
     hand = bench.hand
-    for way in (Way.ALONG, Way.WITHIN, Way.ABOUT):
+    for way in (Kind.AXIS, Kind.PLANE, Kind.ROTATION):
         for axis in range(3):
             place = bench.aim(Part(way, axis))
             start, centre = bench.targets(), bench.gizmo.centre
             step = np.array([9.0, 7.0])
-            if way is Way.ALONG:
+            if way is Kind.AXIS:
                 step = np.diff(bench.gizmo.line(Part(way, axis))[:, :2], axis=0)[0]
                 step *= 12.0 / np.linalg.norm(step)
             hand.press(place)
             hand.move(place + step)
             after = bench.targets()
-            if way is Way.ABOUT:
+            if way is Kind.ROTATION:
                 R, shift = rigid_fit(start, after)
                 assert np.allclose(R @ axes[axis], axes[axis], atol=1e-9)
                 assert np.allclose(start @ R.T + shift, after, atol=1e-9)
@@ -151,7 +151,7 @@ def test_every_part_moves_as_it_says(look, parallel, local):
             else:
                 away = (after - start) @ axes.T
                 assert np.ptp(away, axis=0).max() < 1e-12
-                still = np.arange(3) != axis if way is Way.ALONG else np.arange(3) == axis
+                still = np.arange(3) != axis if way is Kind.AXIS else np.arange(3) == axis
                 assert np.abs(away[:, still]).max() < 1e-12
                 assert 0.02 < np.linalg.norm(away[0]) < 3.0
             hand.key("Escape")
@@ -163,7 +163,7 @@ def test_every_part_moves_as_it_says(look, parallel, local):
 def test_what_is_grabbed_stays_under_the_pointer(look, parallel):
     bench = Bench(look, parallel=parallel)
     hand, view, centre = bench.hand, bench.view, bench.gizmo.centre
-    for part, normal in ((FREE, view.towards_scene), (Part(Way.WITHIN, 1), np.eye(3)[1])):
+    for part, normal in ((FREE, view.view_direction), (Part(Kind.PLANE, 1), np.eye(3)[1])):
         place = bench.aim(part)
         near, far = view.ray(Pointer(Phase.PRESS, *place))
         grabbed = near + ((centre - near) @ normal) / ((far - near) @ normal) * (far - near)
@@ -172,7 +172,7 @@ def test_what_is_grabbed_stays_under_the_pointer(look, parallel):
         assert np.allclose(hand.at(grabbed + bench.shift()), place + [-25.0, 31.0], atol=1e-6)
         assert abs(bench.shift() @ normal) < 1e-12
         hand.key("Escape")
-    arrow = Part(Way.ALONG, 2)
+    arrow = Part(Kind.AXIS, 2)
     start, end = bench.gizmo.line(arrow)[:, :2]
     place, along = bench.aim(arrow), (end - start) / np.linalg.norm(end - start)
     hand.press(place)
@@ -182,7 +182,7 @@ def test_what_is_grabbed_stays_under_the_pointer(look, parallel):
     assert not hand.failures
 
 
-@pytest.mark.parametrize(("ring", "parallel"), [(VIEW_RING, False), (Part(Way.ABOUT, 1), True)])
+@pytest.mark.parametrize(("ring", "parallel"), [(VIEW_RING, False), (Part(Kind.ROTATION, 1), True)])
 def test_a_ring_turns_by_the_very_angle_seen_on_the_screen(ring, parallel):
     bench = Bench((0.0, -12.0, 0.0), parallel=parallel)
     hand, start, centre = bench.hand, bench.targets(), bench.gizmo.centre
@@ -203,7 +203,7 @@ def test_a_ring_turns_by_the_very_angle_seen_on_the_screen(ring, parallel):
         R = rotation([0.0, -1.0, 0.0], angle)  # towards the viewer, counterclockwise
         assert np.allclose(bench.targets(), centre + (start - centre) @ R.T, atol=1e-9)
     hand.release(there)
-    assert bench.session.undo_label == "turn handle 1"
+    assert bench.session.undo_label == "rotate handle 1"
     assert not hand.failures
 
 
@@ -211,7 +211,7 @@ def test_there_and_back_the_targets_are_where_they_were(bench):
     bench.session.drag({TIP: bench.targets() + [0.1, 0.2, 0.0]})
     bench.session.commit()
     before, pose = bench.targets(), bench.session.vertices
-    for part in (FREE, Part(Way.ALONG, 0), VIEW_RING):
+    for part in (FREE, Part(Kind.AXIS, 0), VIEW_RING):
         place = bench.aim(part)
         bench.hand.press(place)
         for step in (10.0, 25.0, 10.0, 0.0):
@@ -250,7 +250,7 @@ def test_seen_from_its_side_nothing_flies_away(axis, parallel):
     hand, centre = bench.hand, bench.gizmo.centre
     bench.dragger.refine_while_resting = False
     window = 400.0 * bench.view.pixel_at(centre)
-    for first in (FREE, Part(Way.ABOUT, (axis - 1) % 3)):
+    for first in (FREE, Part(Kind.ROTATION, (axis - 1) % 3)):
         place = bench.aim(first)
         hand.press(place)
         hand.move(place + [2.0, 3.0])
@@ -288,18 +288,18 @@ def test_whatever_the_pointer_does_a_motion_is_rigid_and_near(parallel, tilt):
                 matrix = motion.matrix(Pointer(Phase.MOVE, x, y))
                 assert np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-12)
                 assert np.linalg.det(matrix) == pytest.approx(1.0)
-                if part.way is not Way.ABOUT:
-                    farthest = {Way.FREE: 1.0, Way.ALONG: 5.0, Way.WITHIN: 5.0}[part.way]
+                if part.kind is not Kind.ROTATION:
+                    farthest = {Kind.FREE: 1.0, Kind.AXIS: 5.0, Kind.PLANE: 5.0}[part.kind]
                     assert np.linalg.norm(matrix[:3, 3]) < farthest * window
             back = motion.matrix(Pointer(Phase.MOVE, 220.0, 190.0))
-            if part.way is not Way.ABOUT:
+            if part.kind is not Kind.ROTATION:
                 assert np.allclose(back, np.eye(4), atol=1e-12)
 
 
 @pytest.mark.parametrize("axis", range(3))
 def test_a_ring_seen_edge_on_turns_with_what_is_in_front(axis):
     bench = Bench(12.0 * np.eye(3)[axis - 1], parallel=True, up=np.eye(3)[axis])
-    ring = Part(Way.ABOUT, axis)
+    ring = Part(Kind.ROTATION, axis)
     middle, place = np.array(bench.hand.at(bench.gizmo.centre)), bench.aim(ring)
     centre, start = bench.gizmo.centre, bench.targets()
     across = np.array([1.0, 0.0])  # the ring is level
@@ -367,7 +367,7 @@ def test_keys_are_left_to_others_while_nothing_is_dragged(bench):
 
 
 def test_shift_moves_a_fifth_and_without_it_goes_on_from_there(bench):
-    hand, place = bench.hand, bench.aim(Part(Way.ALONG, 0))
+    hand, place = bench.hand, bench.aim(Part(Kind.AXIS, 0))
     hand.press(place)
     hand.move(place + [40.0, 0.0])
     whole = bench.shift()
@@ -424,7 +424,7 @@ def test_a_press_on_a_patch_takes_that_handle_by_the_point_of_the_surface(bench)
     hand.move(place + [30.0, 20.0])
     seen = hand.at(point + bench.shift(TOP))
     assert np.abs(seen - (place + [30.0, 20.0])).max() < 1.5
-    assert abs(bench.shift(TOP) @ view.towards_scene) < 1e-12
+    assert abs(bench.shift(TOP) @ view.view_direction) < 1e-12
     hand.release(place + [30.0, 20.0])
     assert bench.session.undo_label == "drag handle 2"
     assert np.array_equal(bench.targets(TIP), SCENE.mesh.vertices[SCENE.handle])
@@ -720,7 +720,7 @@ def test_idle_hover_and_active_look_different_and_off_shows_nothing(bench):
     off = picture(view)
     bench.dragger.On()
     idle = picture(view)
-    place = bench.aim(Part(Way.ABOUT, 2))
+    place = bench.aim(Part(Kind.ROTATION, 2))
     hand.hover(place)
     hover = picture(view)
     hand.hover(hand.at(SCENE.mesh.vertices[bench.session.handles[TOP]].mean(axis=0)))

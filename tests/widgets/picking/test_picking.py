@@ -12,7 +12,7 @@ from solids import icosphere, two_components
 from vtk_segdeform import Mesh, Session, models
 from vtk_segdeform.widgets.picking.picking import Picker
 from vtk_segdeform.widgets.picking.surface_distance import SurfaceDistance
-from vtk_segdeform.widgets.picking.visibility import seen_vertices
+from vtk_segdeform.widgets.picking.visibility import visible_vertices
 from vtk_segdeform.widgets.region_selector.strokes import Lasso
 from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
@@ -206,7 +206,7 @@ def test_what_is_seen_is_what_no_triangle_hides():
     mesh = models.cactus(1500)
     view, _, surface, _ = over(mesh, (500, 500))
     display = view.to_display(surface.points)
-    seen = seen_vertices(display, mesh.faces)
+    seen = visible_vertices(display, mesh.faces)
     eye = np.array(view.camera.GetPosition())
     exact = np.zeros(len(seen), dtype=bool)
     sample = RNG.choice(mesh.n_vertices, 400, replace=False)
@@ -224,7 +224,7 @@ def test_few_large_triangles_hide_as_well_as_many_small_ones():
               [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]  # fmt: skip
     mesh = Mesh(cube, np.array(square))
     view, *_ = over(mesh)
-    seen = seen_vertices(view.to_display(cube), mesh.faces)
+    seen = visible_vertices(view.to_display(cube), mesh.faces)
     assert np.count_nonzero(~seen) == 1  # of a cube's corners one is behind
     far = np.linalg.norm(cube - view.camera.GetPosition(), axis=1)
     assert not seen[far.argmax()]
@@ -232,9 +232,9 @@ def test_few_large_triangles_hide_as_well_as_many_small_ones():
 
 def test_what_is_behind_the_camera_is_not_seen():
     display = np.array([[10.0, 10, 0.5], [20, 10, 0.5], [10, 20, 0.5], [np.nan] * 3])
-    seen = seen_vertices(display, np.array([[0, 1, 2], [1, 3, 2]]))
+    seen = visible_vertices(display, np.array([[0, 1, 2], [1, 3, 2]]))
     assert seen.tolist() == [True, True, True, False]
-    assert not seen_vertices(np.full((3, 3), np.nan), np.array([[0, 1, 2]])).any()
+    assert not visible_vertices(np.full((3, 3), np.nan), np.array([[0, 1, 2]])).any()
 
 
 def crossings_above(point, corners):
@@ -253,7 +253,7 @@ def test_a_lasso_goes_round_what_is_crossed_an_odd_number_of_times():
     for corner in corners[1:]:
         lasso.extend(Pointer(Phase.MOVE, *corner))
         so_far = lasso.outline.tolist()
-        odd = [crossings_above(p, so_far) % 2 == 1 for p in picker.places()]
+        odd = [crossings_above(p, so_far) % 2 == 1 for p in picker.display_points()]
         assert lasso.mask.tolist() == (odd if len(so_far) > 2 else [False] * len(odd))
     assert 20 < lasso.mask.sum() < 780
 
@@ -267,19 +267,19 @@ def test_what_is_seen_is_looked_at_again_when_the_camera_or_the_pose_has_changed
     session.add_handle(scene.handle)
 
     def now():
-        return seen_vertices(view.to_display(surface.points), scene.mesh.faces)
+        return visible_vertices(view.to_display(surface.points), scene.mesh.faces)
 
-    first = picker.seen()
+    first = picker.visible()
     assert np.array_equal(first, now())
     view.renderer.ResetCameraClippingRange(-9, 9, -9, 9, -9, 9)
-    assert picker.seen() is first  # no need to look
+    assert picker.visible() is first  # no need to look
     view.camera.Azimuth(50)
-    assert not np.array_equal(picker.seen(), first)
-    assert np.array_equal(picker.seen(), now())
-    second = picker.seen()
+    assert not np.array_equal(picker.visible(), first)
+    assert np.array_equal(picker.visible(), now())
+    second = picker.visible()
     session.drag(scene.turned(60.0), max_steps=5)
-    assert not np.array_equal(picker.seen(), second)
-    assert np.array_equal(picker.seen(), now())
+    assert not np.array_equal(picker.visible(), second)
+    assert np.array_equal(picker.visible(), now())
 
 
 @pytest.mark.parametrize("parallel", [False, True])
@@ -287,23 +287,23 @@ def test_asked_about_some_vertices_it_tells_of_them_what_it_would_tell_of_all(pa
     mesh = models.cactus(1500)
     view, _, surface, picker = over(mesh, parallel=parallel)
     view.camera.Zoom(3.0)  # some are beside the window
-    everything = seen_vertices(view.to_display(surface.points), mesh.faces)
+    everything = visible_vertices(view.to_display(surface.points), mesh.faces)
     assert 0.2 < everything.mean() < 0.8
     nowhere = np.zeros(mesh.n_vertices, dtype=bool)
-    assert not picker.seen(nowhere).any()
+    assert not picker.visible(nowhere).any()
     for share in (0.002, 0.1, 0.5):
         some = RNG.random(mesh.n_vertices) < share
-        assert np.array_equal(picker.seen(some), everything & some)
+        assert np.array_equal(picker.visible(some), everything & some)
     near = view.to_display(surface.points)
     near = np.hypot(*(near - near[7])[:, :2].T) < 25.0
-    assert np.array_equal(Picker(surface).seen(near), everything & near)
-    assert np.array_equal(picker.seen(), everything)
+    assert np.array_equal(Picker(surface).visible(near), everything & near)
+    assert np.array_equal(picker.visible(), everything)
 
 
 def test_what_is_drawn_in_front_of_the_mesh_hides_none_of_it():
     view, session, surface, picker = over(models.sphere(300))
-    before = picker.seen()
+    before = picker.visible()
     other = SurfaceDisplay(view, Session(Mesh(1.5 * surface.points, session.mesh.faces)))
     view.render()
-    assert np.array_equal(Picker(surface).seen(), before)
+    assert np.array_equal(Picker(surface).visible(), before)
     other.remove()

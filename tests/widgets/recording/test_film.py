@@ -182,7 +182,7 @@ def test_what_cannot_be_written_is_refused_before_anything_is_done(tmp_path, bal
     done = []
     for path, says in [
         ("a.avi", "a film is a .gif, an .mp4 or"),
-        ("there", "is there already"),
+        ("there", "already exists"),
         ("no/a.gif", "there is no folder"),
     ]:
         with pytest.raises(SessionError, match=says):

@@ -16,7 +16,7 @@ from vtk_segdeform.errors import SessionError
 from vtk_segdeform.widgets.handle_dragger.handle_dragger import HandleDragger
 from vtk_segdeform.widgets.recording.recording import Recorder, replay
 from vtk_segdeform.widgets.scene.gestures import Gesture, Phase, Pointer
-from vtk_segdeform.widgets.scene.pace import Pace, order_steps
+from vtk_segdeform.widgets.scene.step_budget import StepBudget, prescribe_steps
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 from vtk_segdeform.widgets.scene.view import View
 from vtk_segdeform.widgets.scene.widget import Widget
@@ -30,12 +30,12 @@ class Puller(Widget):
 
     ticks = 0
 
-    def begins(self, press: Pointer) -> Gesture | None:
+    def on_press(self, press: Pointer) -> Gesture | None:
         middle = self.session.vertices[SCENE.handle].mean(axis=0)
         there = self.view.to_display(middle[None])[0]
         return self._pull(there) if np.linalg.norm(there[:2] - press.position) < 25 else None
 
-    def types(self, key, pointer):
+    def on_key(self, key, pointer):
         return key == "z" and pointer.control and self.session.undo() is not None
 
     def tick(self):
@@ -268,14 +268,14 @@ def test_a_drag_is_replayed_bit_for_bit_where_solving_is_much_slower(monkeypatch
 
 def test_two_who_drag_in_one_window_share_the_orders_of_a_replay():
     view = plain_view((50, 50))
-    one, other = Pace(view.interactor), Pace(view.interactor)
-    order_steps(view.interactor, (3, 4))
+    one, other = StepBudget(view.interactor), StepBudget(view.interactor)
+    prescribe_steps(view.interactor, (3, 4))
     assert [one.steps(8), other.steps(8), one.steps(8)] == [3, 4, 8]
-    order_steps(view.interactor, (3, 4))
-    order_steps(view.interactor, ())
+    prescribe_steps(view.interactor, (3, 4))
+    prescribe_steps(view.interactor, ())
     assert other.steps(7) == 7
     other.stop()
-    order_steps(view.interactor, (2,))
+    prescribe_steps(view.interactor, (2,))
     assert [other.steps(7), one.steps(7)] == [7, 7]
 
 
@@ -309,19 +309,19 @@ GOOD_CAMERA = "0 Camera position 0 0 5 focus 0 0 0 up 0 1 0 angle 30 parallel 0 
         ("0.1 LeftButtonPress 10", "expected 2 words"),
         ("0.1 LeftButtonPress ten 10", "expected a whole number"),
         ("0.1 LeftButtonPress 10 9999999", "expected a whole number from -100000 to 100000"),
-        ("0.1 LeftButtonPress 10 10 __import__('os')", "nothing that can be held down"),
+        ("0.1 LeftButtonPress 10 10 __import__('os')", "is not shift, control, alt, key=NAME"),
         ("0.1 KeyPress 10 10 key=z code=-1", "from 0 to 127"),
-        ("0.1 DeleteEvent 1 1", "'DeleteEvent' is no event of a recording"),
-        ("0.1 ExitEvent", "no event"),
+        ("0.1 DeleteEvent 1 1", "'DeleteEvent' is not an event of a recording"),
+        ("0.1 ExitEvent", "not an event"),
         ("soon MouseMove 1 1", "expected a number; got 'soon'"),
         ("nan MouseMove 1 1", "expected a number"),
         ("0.1", "expected a time and an event"),
         ("0.1 Timer 99999999", "whole number from 1 to 100000"),
         ("0.1 Steps 0", "whole number from 1 to 100"),
         ("0.1 Window 99999 99999", "whole number from 1 to 16384"),
-        (GOOD_CAMERA.replace("focus 0 0 0", "focus 0 0 5"), "no camera can stand like this"),
+        (GOOD_CAMERA.replace("focus 0 0 0", "focus 0 0 5"), "position and focus must differ"),
         (GOOD_CAMERA.replace("angle 30", "angle inf"), "expected a number"),
-        (GOOD_CAMERA.replace("up 0 1 0", "0 1 0"), "a camera needs 'up'"),
+        (GOOD_CAMERA.replace("up 0 1 0", "0 1 0"), "expected 'up' and 3 numbers; got '0 1 0 angle"),
         (GOOD_CAMERA + " more", "expected 0 words"),
     ],
 )

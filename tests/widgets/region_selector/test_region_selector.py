@@ -331,7 +331,7 @@ def test_control_takes_vertices_out_of_a_chosen_handle_and_the_last_one_ends_it(
     assert 0 < len(desk.session.handles["handle 1"]) < count
     desk.selector.handle = None
     desk.hand.drag([(2, 200), (398, 398)], control=True)
-    assert "choose the handle" in str(desk.hand.failures.pop())
+    assert "select the handle" in str(desk.hand.failures.pop())
     desk.selector.handle = "handle 1"
     desk.hand.drag([(2, 200), (398, 398)], control=True)
     assert not desk.session.handles

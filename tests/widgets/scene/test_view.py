@@ -32,10 +32,10 @@ class Scribble(Widget):
         self.strokes, self.keys = [], []
         self.fail_on = None
 
-    def begins(self, press: Pointer) -> Gesture | None:
+    def on_press(self, press: Pointer) -> Gesture | None:
         return self._stroke(press) if press.x < 200 else None
 
-    def types(self, key, pointer):
+    def on_key(self, key, pointer):
         self.keys.append(key)
         return key == "w"
 
@@ -164,7 +164,7 @@ def test_a_gesture_that_fails_when_it_is_finished_does_not_keep_a_widget_on(scri
         yield
         raise RuntimeError("a pen without ink")
 
-    scribble.begins = stroke
+    scribble.on_press = stroke
     hand.press((50, 50))
     with pytest.raises(RuntimeError, match="without ink"):
         scribble.Off()
@@ -208,7 +208,7 @@ def test_an_event_within_an_event_waits_for_its_turn(scribble):
                 assert scribble.is_grabbing
         seen.append(pointer.phase)
 
-    scribble.begins = stroke
+    scribble.on_press = stroke
     hand.press((10, 50))
     hand.move((20, 50))
     assert seen == [20, 30]
@@ -268,7 +268,7 @@ def test_a_closed_window_is_none_and_drawing_in_it_does_nothing():
     plotter.close()
     assert view.window is None
     view.render()
-    view.touch()
+    view.request_render()
 
 
 def test_off_hears_nothing(scribble):
@@ -299,16 +299,16 @@ def test_the_surface_follows_the_pose_in_place():
 def test_one_event_draws_once_whatever_it_changes(scribble):
     drawn = []
     scribble.view.renderer.AddObserver("EndEvent", lambda *_: drawn.append("once"))
-    scribble.view.touch()  # outside of any event: now
+    scribble.view.request_render()  # outside of any event: now
     assert len(drawn) == 1
 
-    def types(key, pointer):
+    def on_key(key, pointer):
         for _ in range(3):
-            scribble.view.touch()
+            scribble.view.request_render()
         return True
 
-    scribble.types = types
-    scribble.view.before_render(scribble.view.touch)  # must not go on for ever
+    scribble.on_key = on_key
+    scribble.view.before_render(scribble.view.request_render)  # must not go on for ever
     Hand(scribble.view).event("KeyPressEvent", key="a")
     assert len(drawn) == 2
 
@@ -338,13 +338,13 @@ def test_what_is_in_front_is_hidden_by_nothing():
     surface = SurfaceDisplay(view, session)
     view.renderer.ResetCamera()
     inner = SurfaceDisplay(
-        View(view.front, view.interactor),
+        View(view.foreground, view.interactor),
         Session(Mesh(0.2 * session.mesh.vertices, session.mesh.faces)),
     )
     inner.set_colours("all", np.tile(np.uint8([200, 0, 0]), (session.mesh.n_vertices, 1)))
     pixel = picture(view)[30, 30].astype(int)
     assert pixel[0] > 3 * pixel[1]
-    view.remove_front()
+    view.remove_foreground()
     pixel = picture(view)[30, 30].astype(int)
     assert pixel[0] < 2 * pixel[1]
     surface.remove()
