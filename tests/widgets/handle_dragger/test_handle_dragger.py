@@ -430,6 +430,23 @@ def test_a_press_on_a_patch_takes_that_handle_by_the_point_of_the_surface(bench)
     assert np.array_equal(bench.targets(TIP), SCENE.mesh.vertices[SCENE.handle])
 
 
+@pytest.mark.parametrize("direction", [(1, 0), (0, -1), (-0.6, 0.8)])
+def test_a_press_on_a_handle_moves_it_from_more_than_three_pixels_on(bench, direction):
+    ids = bench.session.handles[TOP]
+    vertex = ids[np.abs(SCENE.mesh.vertices[ids] - [0.0, -0.4, 0.7]).sum(axis=1).argmin()]
+    place = np.round(bench.hand.at(SCENE.mesh.vertices[vertex]))
+    bench.hand.press(place)
+    assert bench.dragger.handle == TOP
+    bench.hand.move(place + 3.0 * np.array(direction))
+    assert not bench.session.is_dragging
+    bench.hand.move(place + 5.0 * np.array(direction))
+    assert bench.session.is_dragging
+    bench.hand.move(place + 1.0 * np.array(direction))  # a drag remains one near the press
+    assert bench.session.is_dragging
+    bench.hand.release(place)
+    assert bench.session.undo_label == "drag handle 2"
+
+
 def test_the_other_handle_keeps_its_targets(bench):
     hand = bench.hand
     hand.drag([bench.aim(FREE), bench.aim(FREE) + [-20.0, 30.0]])

@@ -237,6 +237,15 @@ def test_what_is_behind_the_camera_is_not_seen():
     assert not visible_vertices(np.full((3, 3), np.nan), np.array([[0, 1, 2]])).any()
 
 
+def test_the_depth_tolerance_separates_rounding_errors_from_hidden_vertices():
+    x, y = np.array([[0.0, 30.0, 0.0, 7.0, 8.0, 9.0], [0.0, 0.0, 30.0, 5.0, 6.0, 7.0]])
+    depth = 0.4 + 0.002 * x + 0.001 * y  # the plane of the triangle
+    depth[3:] += [-1e-10, 5e-10, 2e-9]  # in front of it, behind within the tolerance, behind it
+    display = np.stack([x, y, depth], axis=1)
+    visible = visible_vertices(display, np.array([[0, 1, 2]]))
+    assert visible.tolist() == [True, True, True, True, True, False]
+
+
 def crossings_above(point, corners):
     """Return how often a ray straight up crosses a closed line; side by side, in plain Python."""
     count = 0

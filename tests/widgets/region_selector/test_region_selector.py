@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from hands import Hand, picture, plain_view
 from scenes import sausage
+from solids import icosphere, rotation
 
-from vtk_segdeform import Regions, Session, models
+from vtk_segdeform import Mesh, Regions, Session, models
 from vtk_segdeform.errors import ConstraintError, RegionError, SegDeformError
 from vtk_segdeform.pictures.palette import FIXED, HANDLE, rgb
 from vtk_segdeform.widgets.region_selector.region_selector import Paint, RegionSelector, Tool
@@ -123,6 +124,27 @@ def test_a_rectangle_takes_what_is_in_it_seen_or_all(desk, through):
     taken = np.isin(np.flatnonzero(lower), desk.session.fixed)
     assert taken.all() if through else 0.2 < taken.mean() < 0.8
     assert x1 > x0
+
+
+def test_a_rectangle_selects_one_side_of_a_sheet_2e_8_thick():
+    vertices, faces = icosphere(3)
+    flat = vertices * [1.0, 1.0, 2e-8]
+    session = Session(Mesh(flat @ rotation([1.0, 0.0, 0.0], 0.5).T, faces))
+    view = plain_view()
+    selector, hand = RegionSelector(view, session), Hand(view)
+    view.camera.ParallelProjectionOn()
+    view.camera.SetParallelScale(1.2)
+    view.camera.SetPosition(0.0, 0.0, 10.0)
+    view.camera.SetFocalPoint(0.0, 0.0, 0.0)
+    view.camera.SetClippingRange(5.0, 15.0)
+    selector.On()
+    selector.tool, selector.paints = Tool.RECTANGLE, Paint.FIXED
+    hand.drag([(2, 2), (200, 200), (398, 398)])
+    assert hand.failures == []
+    selected = np.isin(np.arange(len(vertices)), session.fixed)
+    assert selected[vertices[:, 2] > 0.5].all()
+    assert not selected[vertices[:, 2] < -0.5].any()  # 2e-9 of the depth range or more behind
+    selector.remove()
 
 
 def test_a_lasso_takes_what_it_goes_around(desk):

@@ -313,6 +313,37 @@ def test_one_event_draws_once_whatever_it_changes(scribble):
     assert len(drawn) == 2
 
 
+def test_an_event_inside_an_event_does_not_draw_on_its_own(scribble):
+    """For example, the callback of a move runs the event loop, which fires a timer."""
+    view, drawn = scribble.view, []
+    hand = Hand(view)
+    view.renderer.AddObserver("EndEvent", lambda *_: drawn.append(len(calls)))
+    calls = []
+
+    def timer():
+        calls.append("timer")
+        view.request_render()
+
+    def move():
+        calls.append("move")
+        view.request_render()
+        hand.tick()
+        calls.append("end of move")
+        view.request_render()
+
+    stops = [view.every(20, timer), view.observe("MouseMoveEvent", move)]
+    hand.hover((300, 50))
+    assert calls == ["move", "timer", "end of move"]
+    assert drawn == [3]  # once, after all of it
+    stops[1]()
+    hand.hover((310, 50))
+    assert drawn == [3]  # nothing more was requested
+    hand.tick()
+    assert drawn == [3, 4]
+    stops[0]()
+    assert hand.failures == []
+
+
 def test_the_newest_layer_of_colours_is_seen():
     view = plain_view((60, 60))
     session = Session(models.sphere(200))
