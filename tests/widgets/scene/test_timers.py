@@ -35,7 +35,7 @@ def test_stopping_one_callback_leaves_the_others_running(view, host):
     host.tick()
     assert heard == [0, 1, 2]
     stops[1]()
-    stops[1]()  # once is enough, twice is no harm
+    stops[1]()  # the second call does nothing
     host.tick()
     assert heard == [0, 1, 2, 0, 2]
     stops[0]()
