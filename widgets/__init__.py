@@ -1,16 +1,18 @@
-"""Interactive pieces over a plain VTK renderer or a pyvista plotter.
+"""Interactive widgets over a plain VTK renderer, a pyvista plotter or a Qt view.
 
     from vtk_segdeform.widgets import DeformEditor
 
     editor = DeformEditor(plotter, mesh)          # or ((renderer, interactor), session)
     editor.On()
 
-`RegionSelector` paints regions, fixed vertices and handles, `CageDisplay` shows cages and lets
-their vertices be dragged, `HandleDragger` moves and turns handles, `VolumeOverlay` shows where
-the body swells; `DeformEditor` is the four over one `Session`, with modes and keys.  Each works
-alone as well.  `Recorder` and `replay` keep what hands do, `film` what a session does.
+`RegionSelector` paints regions, fixed vertices and handles.  `CageDisplay` shows cages and lets
+their vertices be dragged.  `HandleDragger` moves and rotates handles.  `VolumeOverlay` shows the
+local volume change in colours.  `DeformEditor` combines the four over one `Session`, with modes and
+keys; each widget also works alone.  `Recorder` and `replay` record and repeat user input, and
+`film` writes the deformation of a session as a film.
 
-Widgets turn events into our words and ask a session; they never compute.
+Widgets translate input events into calls of a `Session` and display its state; the session does the
+computing.
 """
 
 from .cage_display import CageDisplay

@@ -63,8 +63,8 @@ class RegionSelector(Widget):
     region : int
         The region to paint; the number of regions stands for a new one.
     handle : str or None
-        The handle to paint, which need not exist yet.  None creates a new one, whose name it then
-        is.
+        The handle to paint, which need not exist yet.  With None, the next stroke creates a handle
+        and sets its name here.
     through : bool
         Whether hidden vertices are painted too (X-ray).
     """

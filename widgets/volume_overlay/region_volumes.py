@@ -44,7 +44,7 @@ class RegionVolumes:
         return list(zip(owners, shares, strict=True))
 
     def prepare(self) -> None:
-        """Compute what the first call of `changes` needs."""
+        """Compute in advance everything the first call of `changes` needs."""
         self._owned()
 
     def _owned(self) -> list[tuple[int, VolumeConstraint]]:

@@ -117,7 +117,7 @@ class VolumeOverlay:
         return self._local is not None
 
     def prepare(self) -> None:
-        """Compute what the first `show` needs.
+        """Compute in advance everything the first `show` needs.
 
         The result depends on the mesh and its regions only, and nothing is drawn, so this may be
         called in another thread.
