@@ -72,7 +72,7 @@ def ends_the_drag(key: str, mode: Mode) -> bool:
 
 def slow_down(monkeypatch) -> None:
     """Limit every move and every tick to one step, so that converging takes a while."""
-    for name in ("_MOST_STEPS", "_FEWEST_AT_REST"):
+    for name in ("_MOST_STEPS", "_LEAST_REFINE_STEPS"):
         monkeypatch.setattr(live_solve, name, 1)
 
 

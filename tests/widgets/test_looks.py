@@ -1,7 +1,7 @@
-"""What each widget looks like, idle, hovered and in use, beside small pictures kept for it.
+"""Pictures of each widget, idle, hovered and in use, compared with reference pictures.
 
-A picture may differ in a few pixels, as renderers do.  After a change of looks that is meant:
-SEGDEFORM_NEW_LOOKS=1 python -m pytest tests/widgets/test_looks.py, then check the pictures in
+Pictures may differ in a few pixels, as renderers do.  After an intended change run
+SEGDEFORM_NEW_LOOKS=1 python -m pytest tests/widgets/test_looks.py and check the pictures in
 tests/widgets/looks.
 """
 
@@ -24,8 +24,8 @@ from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 
 LOOKS = Path(__file__).resolve().parent / "looks"
 SIZE = (240, 160)
-NEAR = 40  # of 255: shades of one colour on two renderers
-MOST = 0.02  # share of pixels that may be further off; text and thin lines never agree to the pixel
+NEAR = 40  # of 255: shades may differ between renderers
+MOST = 0.02  # of the pixels may differ more: text and thin lines
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ class Scene:
         self.hand = Hand(self.view)
 
     def looks(self, name):
-        """Compare what is seen with the picture kept under *name*."""
+        """Compare the view with the reference picture *name*."""
         assert self.hand.failures == []
         seen, path = picture(self.view), LOOKS / f"{name}.png"
         if os.environ.get("SEGDEFORM_NEW_LOOKS"):
@@ -123,7 +123,7 @@ def test_dragging(ready):
     scene.hand.hover(centre)
     scene.looks("dragging-hover")
     scene.hand.press(centre)
-    for share in np.linspace(0.1, 1.0, 10):  # few steps a move: many moves, and it arrives
+    for share in np.linspace(0.1, 1.0, 10):  # each move solves a few steps only
         scene.hand.move(np.add(centre, share * np.array([-20.0, 40.0])))
     for _ in range(10):
         scene.session.refine(max_steps=20)
@@ -132,19 +132,19 @@ def test_dragging(ready):
     dragger.remove()
 
 
-@pytest.mark.parametrize("held", [True, False])
-def test_volume(ready, held):
-    scene = Scene(ready, preserve_volume=held)
+@pytest.mark.parametrize("preserved", [True, False])
+def test_volume(ready, preserved):
+    scene = Scene(ready, preserve_volume=preserved)
     overlay = VolumeOverlay(scene.view, scene.session, scene.surface)
     overlay.show()
-    if held:
+    if preserved:
         scene.looks("volume-rest")
     scene.session.drag(scene.scene.turned(50.0))
-    scene.looks("volume-held" if held else "volume-free")
+    scene.looks("volume-preserved" if preserved else "volume-not-preserved")
     overlay.remove()
 
 
-def test_the_pictures_tell_one_state_from_another():
+def test_no_two_pictures_are_alike():
     kept = {path.stem: np.asarray(pv.read(path).active_scalars) for path in LOOKS.glob("*.png")}
     assert len(kept) == 13
     names = sorted(kept)

@@ -1,4 +1,4 @@
-"""A real window under Xvfb, worked in by xdotool: the events come from an X server, not from us."""
+"""A real window under Xvfb, operated by xdotool: events come from an X server."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ pytestmark = [
     ),
 ]
 
-# What is worked in, over pyvista or VTK alone.  It writes where the gizmo is whenever that may be
-# grabbed, and the volume of each pose that is drawn; the rest is what any user would write.
+# The program under test, with pyvista or with VTK alone.  At each frame it writes the mode, the
+# status and the position of the gizmo, and in the end the largest volume change.
 WINDOW = """
 import json, sys
 import vtk_segdeform as sd
@@ -87,7 +87,7 @@ def show():
 
 
 class Person:
-    """Hands on the mouse and the keyboard of an X server, and eyes on what a window tells."""
+    """Operates mouse and keyboard of an X server, and reads the state the program writes."""
 
     def __init__(self, place: Path, display: str, process: subprocess.Popen) -> None:
         self.place, self.process = place, process
@@ -104,7 +104,7 @@ class Person:
     def sees(self):
         try:
             return json.loads(self.place.read_text())
-        except (OSError, ValueError):  # not there yet, or being written
+        except (OSError, ValueError):  # not written yet, or being written
             return None
 
     def waits_for(self, seen, what: str, seconds: float = 60.0) -> list:
@@ -131,7 +131,7 @@ class Person:
         time.sleep(0.3)
 
     def gets(self, key: str, seen, what: str) -> list:
-        """Press a key until something is seen; a loaded machine may lose what xdotool sends."""
+        """Press a key until *seen* is true; a loaded machine may lose events of xdotool."""
         for _ in range(5):
             self.presses(key)
             try:
@@ -182,18 +182,18 @@ def test_a_cactus_is_bent_undone_and_saved_in_a_real_window(person, tmp_path):
     person.do("windowfocus", person.window)
     person.gets("g", lambda now: not now[1] and "F" in now[2], "regions")
     person.gets("f", lambda now: not now[1] and "4" in now[2], "cages")
-    for _ in range(20):  # binding begins by itself, and no key works meanwhile
+    for _ in range(20):  # binding starts automatically and blocks the keys
         person.presses("4")
         if person.sees()[0] == "DEFORM":
             break
     *_, at, _ = person.waits_for(lambda now: now[0] == "DEFORM" and not now[1] and now[3], "gizmo")
-    time.sleep(2.0)  # binding may be about to begin, and no key works meanwhile
+    time.sleep(2.0)  # binding may be about to start, which blocks the keys
     person.waits_for(lambda now: not now[1], "binding")
     person.presses("ctrl+r")
     person.waits_for(lambda now: any(tmp_path.glob("*.recording.txt")), "the recording")
     person.drags(at, np.add(at, [120, -30]), moves=20)
     person.waits_for(lambda now: now[3] and abs(now[3][0] - at[0] - 120) < 12, "a drag")
-    time.sleep(1.0)  # a busy machine is behind the pointer
+    time.sleep(1.0)  # a busy machine lags behind the pointer
     moved = person.waits_for(lambda now: now[3], "the pose")
     assert moved[3][0] == pytest.approx(at[0] + 120, abs=12)
     person.presses("z")

@@ -1,11 +1,11 @@
-"""The widget that shows cages and moves their vertices.
+"""The widget that shows cages and lets their vertices be dragged.
 
 The files, in reading order:
 
-    cage_display     `CageDisplay`
-    cage_drag        dragging a cage vertex
-    reach            which vertex is under the pointer
-    rejected_cage    display of a cage that was refused
+    cage_display      `CageDisplay`
+    cage_drag         dragging a cage vertex
+    vertex_picking    the cage vertex under the pointer
+    rejected_cage     display of a rejected cage and its faults
 """
 
 from .cage_display import CageDisplay

@@ -1,10 +1,10 @@
-"""The cages of a session as wires in the colours of their regions, to be dragged by the vertex.
+"""The cages of a session as wireframes in the colours of their regions, with vertices to drag.
 
-Cages move with the pose.  While the widget is on, the vertex under the pointer is marked; press
-and drag moves it in the plane of the view, and the mesh follows at every move, x = W~ p.  Release
-makes one undo step of it, Escape takes it back.
+Cages follow the pose.  While the widget is on, the vertex under the pointer is highlighted.
+Dragging moves it in the view plane, and the mesh follows at every move, x = W~ p.  The release
+records one undo step; Escape cancels the drag.
 
-A vertex that the body hides is not under the pointer, unless `CageDisplay.through` says so.
+Vertices hidden by the mesh can only be dragged if `CageDisplay.through` is set.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ from vtk_segdeform.mesh import face_edges
 from vtk_segdeform.pictures import HANDLE, of_region, rgb
 from vtk_segdeform.session import Change, Session
 
-from ..scene import Gesture, Pointer, Widget, Wires
-from .cage_drag import Grip, drag_vertex
-from .reach import under_pointer
+from ..scene import Gesture, Pointer, Widget, Wireframe
+from .cage_drag import CageVertex, drag_vertex
 from .rejected_cage import RejectedCage
+from .vertex_picking import vertex_at_pointer
 
-_DESIGNED_FOR = 600  # pixels of height; wires are thicker in a higher window
+_DESIGN_HEIGHT = 600  # pixels; lines are thicker in a higher window
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)
 
 
 class CageDisplay(Widget):
-    """One wireframe for each region; shown from the beginning, to be dragged once it is on.
+    """One wireframe per region, visible at once; `On` lets vertices be dragged.
 
     Parameters
     ----------
     view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
-        Where it lives.  Call `remove` before its window closes.
+        The view to work in.  Call `remove` before its window closes.
     session : Session
-        Whose cages.
+        The session whose cages are shown and edited.
 
     Attributes
     ----------
     through : bool
-        Whether vertices behind the body can be dragged too, as where it is drawn see-through.
+        Whether vertices hidden by the mesh can be dragged too (X-ray).
     """
 
     def __init__(self, view: Any, session: Session) -> None:
@@ -51,51 +51,50 @@ class CageDisplay(Widget):
         self.through = False
         self._opacity = 1.0
         self._hidden: set[int] = set()
-        self._wires: list[Wires] = []
+        self._wireframes: list[Wireframe] = []
         self._rejected: RejectedCage | None = None
-        self._replaced: int | None = None  # the region it was refused for
-        self._grip: Grip | None = None
-        self._mark = Wires(np.zeros((1, 3)), _NO_EDGES, np.zeros(1, dtype=np.int64))
-        self._front: Any = None  # where the mark is
+        self._replaced: int | None = None  # the region whose cage was rejected
+        self._highlighted: CageVertex | None = None
+        self._marker = Wireframe(np.zeros((1, 3)), _NO_EDGES, np.zeros(1, dtype=np.int64))
+        self._foreground: Any = None  # the renderer of the marker
         self._is_shown = False
         self._stops_showing = [
             session.on_change(self._changed),
-            self.view.before_render(self._size),
+            self.view.before_render(self._set_sizes),
         ]
         self.show()
 
-    # What is shown.
-
+    # Showing.
     @property
     def is_shown(self) -> bool:
-        """Whether cages are to be seen."""
+        """Whether cages are shown."""
         return self._is_shown
 
     def show(self) -> None:
-        """Show the cages, but for those of single regions that are not visible."""
+        """Show the cages of all regions except those hidden by `set_visible`."""
         if not self._is_shown:
             self._is_shown = True
             self._rebuild()
 
     def hide(self) -> None:
-        """Hide all cages; an ongoing drag is finished."""
+        """Hide all cages; finish an ongoing drag."""
         self.finish()
-        self._is_shown, self._grip = False, None
+        self._is_shown, self._highlighted = False, None
         self._rebuild()
 
     def is_visible(self, region: int) -> bool:
-        """Tell whether the cage of *region* is seen while cages are shown."""
+        """Return whether the cage of *region* is visible while cages are shown."""
         return _checked_region(region) not in self._hidden
 
     def set_visible(self, region: int, visible: bool) -> None:
-        """Show or hide the cage of one region, also one that is still to come."""
-        place = _checked_region(region)
-        (self._hidden.discard if as_flag(visible, "visible") else self._hidden.add)(place)
+        """Show or hide the cage of one region, which need not exist yet."""
+        number = _checked_region(region)
+        (self._hidden.discard if as_flag(visible, "visible") else self._hidden.add)(number)
         self._refresh()
 
     @property
     def opacity(self) -> float:
-        """How opaque the wires are, above 0 up to 1."""
+        """The opacity of the wireframes, above 0 and at most 1."""
         return self._opacity
 
     @opacity.setter
@@ -113,25 +112,26 @@ class CageDisplay(Widget):
         *,
         message: str | None = None,
     ) -> str:
-        """Show a surface that was refused as a cage, marked where it fails.
+        """Show a surface that was rejected as a cage, with its faults marked.
 
-        It stays, instead of the cage of *region*, until `clear_faults` or other cages come.
+        It replaces the cage of *region* until `clear_faults` is called or the cages change.
 
         Parameters
         ----------
         vertices : (m, 3) float
-            At rest.
+            Of the rejected surface, at rest.
         faces : (k, 3) int
             Triangles.
         region : int, optional
-            The region it should enclose; what of it is outside is marked.
+            The region to enclose; its vertices outside the surface are marked.
         message : str, optional
-            The words beside the marks, such as the text of the `CageError`.
+            The text beside the marks, such as that of the `CageError`; by default a description of
+            the faults found.
 
         Returns
         -------
         message : str
-            What is shown: the words given, or what is found to be wrong; "" if nothing is.
+            The text shown; "" if there is no fault.
         """
         mesh, regions = self.session.mesh, self.session.regions
         enclosed = mesh.vertices[:0]
@@ -150,105 +150,107 @@ class CageDisplay(Widget):
         return self._rejected.message
 
     def clear_faults(self) -> None:
-        """Take away what `show_faults` has shown."""
+        """Remove the surface shown by `show_faults`."""
         if self._rejected is not None:
             self._rejected.remove()
             self._rejected = self._replaced = None
             self._refresh()
 
     def remove(self) -> None:
-        """Take everything out of the view, for good."""
+        """Remove the widget from the view permanently."""
         self.Off()
         for stop in self._stops_showing:
             stop()
         self.clear_faults()
         self.hide()
-        if self._front is not None:
-            self._front.RemoveActor(self._mark.actor)
+        if self._foreground is not None:
+            self._foreground.RemoveActor(self._marker.actor)
 
     # Dragging.
 
     def Off(self) -> None:  # noqa: N802 - VTK's word
-        """Stop listening; an ongoing drag is finished, and nothing is highlighted."""
+        """Stop handling events; finish an ongoing drag and remove the highlight."""
         super().Off()
-        self._point_at(None)
+        self._highlight(None)
 
-    def begins(self, press: Pointer) -> Gesture | None:
+    def on_press(self, press: Pointer) -> Gesture | None:
         """Drag the vertex under the pointer, if there is one."""
-        grip = self._under(press)
-        self._point_at(grip)
-        return None if grip is None else drag_vertex(self.view, self.session, grip, press)
+        vertex = self._vertex_at(press)
+        self._highlight(vertex)
+        return None if vertex is None else drag_vertex(self.view, self.session, vertex, press)
 
-    def hovers(self, pointer: Pointer) -> None:
-        """Mark the vertex under the pointer."""
-        self._point_at(self._under(pointer))
+    def on_hover(self, pointer: Pointer) -> None:
+        """Highlight the vertex under the pointer."""
+        self._highlight(self._vertex_at(pointer))
 
-    def _under(self, pointer: Pointer) -> Grip | None:
-        """Return the vertex that is seen at the pointer."""
-        session, places = self.session, self.session.cage_vertices
-        seen = [r for r, wires in enumerate(self._wires) if wires.actor.GetVisibility()]
-        if not seen:
+    def _vertex_at(self, pointer: Pointer) -> CageVertex | None:
+        """Return the visible cage vertex under the pointer."""
+        session, vertices = self.session, self.session.cage_vertices
+        visible = [r for r, each in enumerate(self._wireframes) if each.actor.GetVisibility()]
+        if not visible:
             return None
-        body = None if self.through else (session.vertices, session.mesh.faces)
-        points = np.concatenate([places[r] for r in seen])
-        k = under_pointer(self.view, pointer, points, body=body)
+        occluder = None if self.through else (session.vertices, session.mesh.faces)
+        points = np.concatenate([vertices[r] for r in visible])
+        k = vertex_at_pointer(self.view, pointer, points, occluder=occluder)
         if k is None:
             return None
-        grips = [(r, v) for r in seen for v in range(len(places[r]))]
-        return grips[k]
+        numbers = [(r, v) for r in visible for v in range(len(vertices[r]))]
+        return numbers[k]
 
     # Drawing.
 
     def _changed(self, change: Change) -> None:
         if change & (Change.CAGES | Change.REGIONS):
             self.cancel()
-            self._grip = None
+            self._highlighted = None
             self.clear_faults()
             self._rebuild()
         elif change & Change.POSE:
-            for wires, vertices in zip(self._wires, self.session.cage_vertices, strict=False):
-                wires.move(vertices)
+            pairs = zip(self._wireframes, self.session.cage_vertices, strict=False)
+            for wireframe, vertices in pairs:
+                wireframe.move(vertices)
             self._refresh()
 
     def _rebuild(self) -> None:
-        for wires in self._wires:
-            self.view.renderer.RemoveActor(wires.actor)
-        self._wires = []
+        for wireframe in self._wireframes:
+            self.view.renderer.RemoveActor(wireframe.actor)
+        self._wireframes = []
         if self._is_shown:
             for vertices, cage in zip(self.session.cage_vertices, self.session.cages, strict=True):
                 edges, _ = face_edges(cage.faces)
-                self._wires.append(Wires(vertices, edges, np.arange(cage.n_vertices)))
-                self.view.renderer.AddActor(self._wires[-1].actor)
+                self._wireframes.append(Wireframe(vertices, edges, np.arange(cage.n_vertices)))
+                self.view.renderer.AddActor(self._wireframes[-1].actor)
         self._refresh()
 
-    def _point_at(self, grip: Grip | None) -> None:
-        if grip != self._grip:
-            self._grip = grip
+    def _highlight(self, vertex: CageVertex | None) -> None:
+        if vertex != self._highlighted:
+            self._highlighted = vertex
             self._refresh()
 
     def _refresh(self) -> None:
-        """Show what is to be seen, and mark what is pointed at."""
-        seen = False
-        for region, wires in enumerate(self._wires):
-            wires.actor.SetVisibility(self.is_visible(region) and region != self._replaced)
-            wires.actor.GetProperty().SetOpacity(self._opacity)
-        if self._grip is not None:
-            region, vertex = self._grip
-            self._mark.move(self.session.cage_vertices[region][vertex : vertex + 1])
-            self._front = self.view.front
-            self._front.AddActor(self._mark.actor)  # once, however often
-            seen = self._wires[region].actor.GetVisibility()
-        self._mark.actor.SetVisibility(seen)
-        self.view.touch()
+        """Update visibility, opacity and the highlight."""
+        marker_visible = False
+        for region, wireframe in enumerate(self._wireframes):
+            wireframe.actor.SetVisibility(self.is_visible(region) and region != self._replaced)
+            wireframe.actor.GetProperty().SetOpacity(self._opacity)
+        if self._highlighted is not None:
+            region, vertex = self._highlighted
+            self._marker.move(self.session.cage_vertices[region][vertex : vertex + 1])
+            self._foreground = self.view.foreground
+            self._foreground.AddActor(self._marker.actor)  # VTK adds an actor only once
+            marker_visible = self._wireframes[region].actor.GetVisibility()
+        self._marker.actor.SetVisibility(marker_visible)
+        self.view.request_render()
 
-    def _size(self) -> None:
-        """Let wires and balls follow the size of the window."""
-        scale = float(np.clip(self.view.renderer.GetSize()[1] / _DESIGNED_FOR, 0.7, 3.0))
-        for region, wires in enumerate(self._wires):
-            wires.draw(of_region(region), line_width=1.8 * scale, ball_size=8.0 * scale)
-        self._mark.draw(rgb(HANDLE), line_width=1.0, ball_size=13.0 * scale)
+    def _set_sizes(self) -> None:
+        """Scale lines and spheres with the window."""
+        scale = float(np.clip(self.view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.7, 3.0))
+        for region, wireframe in enumerate(self._wireframes):
+            colour = of_region(region)
+            wireframe.set_style(colour, line_width=1.8 * scale, sphere_size=8.0 * scale)
+        self._marker.set_style(rgb(HANDLE), line_width=1.0, sphere_size=13.0 * scale)
         if self._rejected is not None:
-            self._rejected.draw(scale)
+            self._rejected.lay_out(scale)
 
 
 def _checked_region(region: int) -> int:

@@ -1,4 +1,4 @@
-"""A vertex of a cage follows the pointer in the plane of the view, and the mesh follows it."""
+"""The gesture that drags a cage vertex in the view plane; the mesh follows."""
 
 from __future__ import annotations
 
@@ -6,41 +6,45 @@ import numpy as np
 
 from vtk_segdeform.session import Session
 
-from ..scene import Gesture, Phase, Pointer, Sight
+from ..scene import Gesture, Phase, Pointer, Projection
 
-Grip = tuple[int, int]
+CageVertex = tuple[int, int]
 """A region, and a vertex of its cage."""
 
 
-def drag_vertex(sight: Sight, session: Session, grip: Grip, press: Pointer) -> Gesture:
-    """Move a vertex of a cage until release, which makes one undo step of it.
+def drag_vertex(
+    projection: Projection, session: Session, cage_vertex: CageVertex, press: Pointer
+) -> Gesture:
+    """Move a cage vertex until the release, which records one undo step.
 
     Parameters
     ----------
-    sight : Sight
-        How it is seen; its plane may turn on the way.
+    projection : Projection
+        The camera may move during the drag.
     session : Session
-        Whose cage.  Where the gesture is cancelled or a move fails, it is as before the press.
-    grip : (region, vertex)
-        What is held.
+        The session to edit.  If the gesture is cancelled or a move fails, its state is as before
+        the press.
+    cage_vertex : (region, vertex)
+        The vertex to drag.
     press : Pointer
-        Where; the vertex keeps its distance from the pointer.
+        The vertex keeps its offset from the pointer.
     """
-    session.commit()  # what somebody else has left in hand is not ours to take back
-    region, vertex = grip
+    session.commit()  # keeps an unfinished drag from elsewhere out of our undo step
+    region, vertex = cage_vertex
     start = session.cage_vertices[region]
-    held = start[vertex : vertex + 1]
-    aside = sight.to_display(held)[0, :2] - press.position
-    kept = False
+    position = start[vertex : vertex + 1]
+    offset = projection.to_display(position)[0, :2] - press.position
+    committed = False
     try:
         while (pointer := (yield)).phase is Phase.MOVE:
-            depth = sight.to_display(held)[0, 2]
+            depth = projection.to_display(position)[0, 2]
+            target = np.array([[*(pointer.position + offset), depth]])
             moved = start.copy()
-            moved[vertex] = sight.to_world(np.array([[*(pointer.position + aside), depth]]))[0]
+            moved[vertex] = projection.to_world(target)[0]
             session.move_cage(region, moved)
         if pointer.phase is Phase.RELEASE:
             session.commit()
-            kept = True
+            committed = True
     finally:
-        if not kept:
+        if not committed:
             session.revert()

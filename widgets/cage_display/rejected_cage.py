@@ -1,12 +1,12 @@
-"""A surface that was refused as a cage, and where it fails: grey wires, marks and a sentence.
+"""A surface that was rejected as a cage: a grey wireframe, marked faults and a message.
 
-Marked are, and each kind only where there is nothing of the ones before:
+Only the first kind of fault that occurs is marked:
 
-    connectivity   edges that are open, have three faces or more, or faces that face opposite
-                   sides; vertices in no face, and those where several fans touch
-    geometry       the edges of faces without area, or else of faces that cross; of all faces
-                   where a part is inside-out
-    enclosure      what should be inside and is not
+    connectivity   boundary edges, edges with three faces or more, edges between faces of opposite
+                   orientation; unused vertices, and vertices where several fans of faces meet
+    geometry       the edges of faces without area, or else of intersecting faces, or else of all
+                   faces if a part is inside-out
+    enclosure      vertices of the region outside the cage
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import textwrap
 from typing import Any
 
 import numpy as np
-import vtkmodules.vtkRenderingFreeType  # noqa: F401 - without it text is not drawn
+import vtkmodules.vtkRenderingFreeType  # noqa: F401 - required to draw text
 from numpy.typing import ArrayLike
 from vtkmodules.vtkRenderingCore import vtkTextActor
 
@@ -25,36 +25,36 @@ from vtk_segdeform.errors import CageError
 from vtk_segdeform.mesh import HalfEdges, face_edges, flat_faces, repeats_vertex, self_intersections
 from vtk_segdeform.pictures import PAPER, rgb
 
-from ..scene import View, Wires
+from ..scene import View, Wireframe
 
-WARNING = rgb("#C2006B")  # neither a region's colour nor the red of what is dragged
+WARNING = rgb("#C2006B")  # differs from the region colours and from the red of handles
 _PLAIN = rgb("#8C8C8C")
 _NO_IDS = np.empty(0, dtype=np.int64)
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)
-_LINE = 44  # letters
-_MARGIN = 16  # pixels around the words
+_LINE_LENGTH = 44  # characters
+_MARGIN = 16  # pixels around the message
 
 
 class RejectedCage:
-    """Wires with warnings on them, in a view until `remove`.
+    """A wireframe with marked faults, in a view until `remove`.
 
     Parameters
     ----------
     view : View
-        Where to draw.
+        The view to draw in.
     vertices : (m, 3) float
-        Of what should have been a cage.
+        Of the rejected surface.
     faces : (k, 3) int
-        Its triangles.
+        Triangles.
     enclosed : (n, 3) float
-        What it should have inside; may be empty.
+        The points that should be inside; may be empty.
     message : str, optional
-        What stands beside the marks; None for what is found to be wrong.
+        The text beside the marks; by default a description of the faults found.
 
     Attributes
     ----------
     message : str
-        What stands beside the marks; empty if nothing is wrong.
+        The text beside the marks; "" if there is no fault.
     """
 
     def __init__(
@@ -82,47 +82,47 @@ class RejectedCage:
         self.message = found if message is None else message
         marked = np.union1d(edges, corners)
         self._view = view
-        self._plain = Wires(points, face_edges(triangles)[0], _NO_IDS)
-        self._marks = Wires(points, edges, marked)
-        self._outside = Wires(outside, _NO_EDGES, np.arange(len(outside)))
+        self._plain = Wireframe(points, face_edges(triangles)[0], _NO_IDS)
+        self._marks = Wireframe(points, edges, marked)
+        self._outside = Wireframe(outside, _NO_EDGES, np.arange(len(outside)))
         self._marked = np.concatenate([points[marked], outside])
         self._caption = _caption()
-        self._front = view.front  # to be taken out of this very one
-        self._marked_by = self._marks.actor, self._outside.actor, self._caption
+        self._foreground = view.foreground  # kept: the view's own may be another one by then
+        self._warnings = self._marks.actor, self._outside.actor, self._caption
         view.renderer.AddActor(self._plain.actor)
-        for actor in self._marked_by:
-            self._front.AddActor(actor)
+        for actor in self._warnings:
+            self._foreground.AddActor(actor)
 
-    def draw(self, scale: float) -> None:
-        """Draw with sizes times *scale*, and the words where there is room for them now."""
-        self._plain.draw(_PLAIN, line_width=1.5 * scale, ball_size=1.0)
-        self._marks.draw(WARNING, line_width=4.0 * scale, ball_size=11.0 * scale)
-        self._outside.draw(WARNING, line_width=1.0, ball_size=6.0 * scale)
-        self._caption.SetInput("\n".join(textwrap.wrap(self.message, _LINE)))
+    def lay_out(self, scale: float) -> None:
+        """Scale all sizes by *scale* and place the message where there is room."""
+        self._plain.set_style(_PLAIN, line_width=1.5 * scale, sphere_size=1.0)
+        self._marks.set_style(WARNING, line_width=4.0 * scale, sphere_size=11.0 * scale)
+        self._outside.set_style(WARNING, line_width=1.0, sphere_size=6.0 * scale)
+        self._caption.SetInput("\n".join(textwrap.wrap(self.message, _LINE_LENGTH)))
         self._caption.GetTextProperty().SetFontSize(round(14 * scale))
         self._caption.SetVisibility(bool(self.message) and len(self._marked) > 0)
         if self._caption.GetVisibility():
-            self._caption.SetPosition(*self._place())
+            self._caption.SetPosition(*self._caption_position())
 
     def remove(self) -> None:
-        """Take it out of the view."""
+        """Remove it from the view."""
         self._view.renderer.RemoveActor(self._plain.actor)
-        for actor in self._marked_by:
-            self._front.RemoveActor(actor)
+        for actor in self._warnings:
+            self._foreground.RemoveActor(actor)
 
-    def _place(self) -> FloatArray:
-        """Return where the words are beside what is marked, and inside the window, in pixels."""
+    def _caption_position(self) -> FloatArray:
+        """Return a position of the message, in pixels, beside the marks and inside the window."""
         size = np.zeros(2)
-        self._caption.GetSize(self._front, size)
-        room = np.array(self._view.renderer.GetSize()) - size - _MARGIN
-        seen = self._view.to_display(self._marked)[:, :2] - self._view.renderer.GetOrigin()
-        low, high = seen.min(axis=0), seen.max(axis=0)
+        self._caption.GetSize(self._foreground, size)
+        largest = np.array(self._view.renderer.GetSize()) - size - _MARGIN
+        marked = self._view.to_display(self._marked)[:, :2] - self._view.renderer.GetOrigin()
+        low, high = marked.min(axis=0), marked.max(axis=0)
         above = high[1] + _MARGIN
-        place = [
+        position = [
             0.5 * (low[0] + high[0] - size[0]),
-            above if above < room[1] else low[1] - size[1] - _MARGIN,
+            above if above < largest[1] else low[1] - size[1] - _MARGIN,
         ]
-        return np.asarray(np.clip(place, _MARGIN, np.maximum(room, _MARGIN)))
+        return np.asarray(np.clip(position, _MARGIN, np.maximum(largest, _MARGIN)))
 
 
 def _failing(points: FloatArray, faces: IntArray) -> tuple[IntArray, IntArray]:
@@ -142,11 +142,11 @@ def _failing(points: FloatArray, faces: IntArray) -> tuple[IntArray, IntArray]:
 
 def _caption() -> Any:
     caption = vtkTextActor()
-    words = caption.GetTextProperty()
-    words.SetColor(*(rgb(PAPER) / 255.0))
-    words.SetBackgroundColor(*(WARNING / 255.0))
-    words.SetBackgroundOpacity(1.0)
-    words.FrameOn()
-    words.SetFrameColor(*(WARNING / 255.0))
-    words.SetFrameWidth(4)
+    style = caption.GetTextProperty()
+    style.SetColor(*(rgb(PAPER) / 255.0))
+    style.SetBackgroundColor(*(WARNING / 255.0))
+    style.SetBackgroundOpacity(1.0)
+    style.FrameOn()
+    style.SetFrameColor(*(WARNING / 255.0))
+    style.SetFrameWidth(4)
     return caption

@@ -16,7 +16,7 @@ from vtk_segdeform.kernels import advice
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Change, Session
 
-from ..recording import place_of
+from ..recording import confined_path
 from ..scene import View, Widget
 from .help_card import HelpCard, Section
 from .hints import hint
@@ -117,7 +117,7 @@ class Controller:
         self.widgets.remove()
         self.help.remove()
         self.messages.remove()
-        self.view.remove_front()
+        self.view.remove_foreground()
 
     # Messages.
 
@@ -260,8 +260,8 @@ class Controller:
 
     @property
     def place(self) -> Path:
-        """The path of `file`, or its counterpart in a replay; see `place_of`."""
-        return place_of(self.view.interactor, self.file.path)
+        """The path of `file`, or its counterpart in a replay; see `confined_path`."""
+        return confined_path(self.view.interactor, self.file.path)
 
     def save(self) -> None:
         """Write the session to the file."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from vtk_segdeform.pictures import INK, PAPER
 
-from ..scene import Panel, Stop, View, Words
+from ..scene import Panel, Stop, Text, View
 
 Section = tuple[str, Sequence[tuple[str, str]]]
 """A heading, and pairs (key, action)."""
@@ -39,7 +39,7 @@ class HelpCard:
     def __init__(self, view: Any, sections: Sequence[Section]) -> None:
         self.view = View.of(view)
         self.sections = tuple(sections)
-        self._parts: list[Panel | Words] = []
+        self._parts: list[Panel | Text] = []
         self._laid_out = 0, 0
         self._stop: Stop | None = None
 
@@ -52,7 +52,7 @@ class HelpCard:
         """Show it."""
         if self._stop is None:
             self._stop = self.view.before_render(self._lay_out)
-            self.view.touch()
+            self.view.request_render()
 
     def hide(self) -> None:
         """Hide it."""
@@ -60,7 +60,7 @@ class HelpCard:
             self._stop()
             self._stop = None
             self._clear()
-            self.view.touch()
+            self.view.request_render()
 
     def toggle(self) -> None:
         """Show or hide it."""
@@ -98,7 +98,7 @@ class HelpCard:
         x = 0.5 * (window[0] - wide * size)
         y = 0.5 * ((1.0 + _FOOT) * window[1] - high * size)
         for rim, colour, layer in ((2.0, INK, 5), (0.0, PAPER, 6)):
-            panel = Panel(self.view.front, colour, layer=layer)
+            panel = Panel(self.view.foreground, colour, layer=layer)
             panel.place(x - rim, y - rim, wide * size + 2 * rim, high * size + 2 * rim)
             self._parts.append(panel)
         for k, sections in enumerate(columns):
@@ -122,9 +122,9 @@ class HelpCard:
     def _put(
         self, text: str, colour: str, at: tuple[float, float], size: float,
         *, bold: bool = False, key: bool = False,
-    ) -> Words:  # fmt: skip
-        words = Words(self.view.front, colour, bold=bold or key, typed=key, layer=7)
-        words.say(text, size)
+    ) -> Text:  # fmt: skip
+        words = Text(self.view.foreground, colour, bold=bold or key, monospace=key, layer=7)
+        words.set_text(text, size)
         words.place(*at)
         self._parts.append(words)
         return words

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from vtk_segdeform.session import Change, Effort, Session
 from vtk_segdeform.solver import Solution
 
-from ..volume_overlay import precise
+from ..volume_overlay import percent
 
 LIMIT = 200
 
@@ -51,7 +51,7 @@ class Entry:
         lines = [f"{time.strftime('%H:%M:%S', time.localtime(self.time))}  {self.title}"]
         lines.append(f"{took}: {self.outcome}" if self.seconds else self.outcome)
         if self.volume_change is not None:
-            lines.append(f"volume {precise(self.volume_change)}")
+            lines.append(f"volume {percent(self.volume_change)}")
         if self.handle_error is not None:
             lines[-1] += f", handle error {_percent(self.handle_error)} of model size"
         return "\n".join(lines)

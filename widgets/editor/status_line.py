@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..scene import Panel, View, Words
+from ..scene import Panel, Text, View
 
 _CALM, _WARNING = "#2B2F36", "#8A2B06"  # white on them has a contrast above 7 to 1
 _LETTERS, _TAG, _BAR = "#FFFFFF", "#FFD27F", "#4FA3D9"
@@ -29,11 +29,11 @@ class StatusLine:
 
     def __init__(self, view: Any) -> None:
         self.view = View.of(view)
-        front = self.view.front
+        front = self.view.foreground
         self._strip = Panel(front, _CALM, opacity=0.88, layer=2)
         self._bar = Panel(front, _BAR, layer=3)
-        self._tag = Words(front, _TAG, bold=True, layer=4)
-        self._lines = [Words(front, _LETTERS, layer=4) for _ in range(_LINES_OF_WARNING)]
+        self._tag = Text(front, _TAG, bold=True, layer=4)
+        self._lines = [Text(front, _LETTERS, layer=4) for _ in range(_LINES_OF_WARNING)]
         self._content: tuple[str, str, bool, float | None] = "", "", False, None
         self._laid_out: tuple[Any, ...] = ()
         self._stop = self.view.before_render(self._lay_out)
@@ -68,7 +68,7 @@ class StatusLine:
     def remove(self) -> None:
         """Remove it from the view, permanently."""
         self._stop()
-        parts: list[Panel | Words] = [self._strip, self._bar, self._tag, *self._lines]
+        parts: list[Panel | Text] = [self._strip, self._bar, self._tag, *self._lines]
         for part in parts:
             part.remove()
 
@@ -76,7 +76,7 @@ class StatusLine:
         content = tag, " ".join(text.split()), warning, fraction
         if content != self._content:
             self._content = content
-            self.view.touch()
+            self.view.request_render()
 
     def _lay_out(self) -> None:
         width, height = self.view.renderer.GetSize()
@@ -86,17 +86,17 @@ class StatusLine:
         tag, text, warning, fraction = self._content
         size = letter_size(width, height)
         margin, leading = 0.7 * size, 1.45 * size
-        self._tag.say(tag, size)
+        self._tag.set_text(tag, size)
         left = margin + (self._tag.width() + size if tag else 0.0)
         room, most = width - margin - left, _LINES_OF_WARNING if warning else _LINES
         lines = self._wrapped(f"! {text}" if warning else text, size, room, most)
         foot = 0.35 * size if fraction is None else 0.8 * size  # room for the bar
         high = foot + leading * len(lines) + 0.35 * size
         for k, words in enumerate(self._lines):
-            words.say(lines[k] if k < len(lines) else "", size)
+            words.set_text(lines[k] if k < len(lines) else "", size)
             words.place(left, high - 0.35 * size - (k + 0.5) * leading)
         self._tag.place(margin, high - 0.35 * size - 0.5 * leading)
-        self._strip.colour(_WARNING if warning else _CALM)
+        self._strip.set_colour(_WARNING if warning else _CALM)
         self._strip.show(bool(tag or text))
         self._strip.place(0.0, 0.0, width, high)
         self._bar.show(fraction is not None)
@@ -120,7 +120,7 @@ class StatusLine:
         low, high = 1, len(text)  # the first `low` letters fit, or none
         while low < high:
             middle = (low + high + 1) // 2
-            probe.say(text[:middle], size)
+            probe.set_text(text[:middle], size)
             low, high = (middle, high) if probe.width() <= room else (low, middle - 1)
         space = text.rfind(" ", 0, low + 1)
         # Prefer a break in a long word to a line with only the sign of a warning.

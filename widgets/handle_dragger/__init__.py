@@ -3,12 +3,13 @@
 The files, in reading order:
 
     handle_dragger    `HandleDragger`
-    handle_motion     pointer position to rigid motion
-    live_solve        solving between events
+    handle_motion     from pointer positions to a rigid motion
+    live_solve        solving within the time of an event, refining between events
     handle_marks      the vertices of handles as dots
-    gizmo             arrows, squares, rings and a ball
-    gizmo_shapes gizmo_solids gizmo_label
-                      its parts
+    gizmo             the gizmo: arrows, squares, rings and a ball
+    gizmo_shapes      the lines of its parts
+    gizmo_solids      its parts as solids
+    gizmo_label       its labels
 """
 
 from .handle_dragger import HandleDragger

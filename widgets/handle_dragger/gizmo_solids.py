@@ -1,6 +1,6 @@
-"""The parts of a gizmo as solids, each with an outline that sets it off from what is behind it.
+"""The parts of a gizmo as solids, each with an outline that separates it from the background.
 
-The outline is the same solid, a little swollen, of which only the inside is drawn.
+The outline is a slightly thicker copy of the solid, of which only the back faces are drawn.
 """
 
 from __future__ import annotations
@@ -19,90 +19,90 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.pictures import rgb
 
-from .gizmo_shapes import BALL, Part, Way, line_of
+from .gizmo_shapes import BALL, Kind, Part, line_of
 
-_OUTLINE = 0.018  # its thickness
+_OUTLINE = 0.018  # thickness
 _SHAFT, _BORDER, _RING, _OUTER_RING = 0.020, 0.014, 0.017, 0.013  # radii of tubes
 _HEAD_LENGTH, _HEAD_RADIUS = 0.16, 0.065
 
 
 class Solid:
-    """One part, drawn.
+    """The actors of one part.
 
     Parameters
     ----------
     renderer : vtkRenderer
-        Where.
+        The renderer to draw in.
     part : Part
-        Which.
+        The part to draw.
     """
 
     def __init__(self, renderer: Any, part: Part) -> None:
         self._renderer = renderer
         self._matrix = vtkMatrix4x4()
         self._actors = []
-        for swollen in (0.0, _OUTLINE):
+        for thickness in (0.0, _OUTLINE):
             mapper, actor = vtkPolyDataMapper(), vtkActor()
-            mapper.SetInputData(solid_of(part, swollen=swollen))
+            mapper.SetInputData(solid_of(part, outline=thickness))
             actor.SetMapper(mapper)
             actor.SetUserMatrix(self._matrix)
             actor.PickableOff()
             actor.GetProperty().LightingOff()
-            actor.GetProperty().SetFrontfaceCulling(swollen > 0.0)
+            actor.GetProperty().SetFrontfaceCulling(thickness > 0.0)
             renderer.AddActor(actor)
             self._actors.append(actor)
 
     def place(self, centre: FloatArray, axes: FloatArray) -> None:
-        """Be at *centre* (3,), with *axes* (3, 3) for x, y and z, as rows; their length counts."""
+        """Set the *centre* (3,) and the *axes* (3, 3), as rows whose length is the size."""
         affine = np.column_stack([axes.T, centre])
         self._matrix.DeepCopy([*affine.ravel(), 0.0, 0.0, 0.0, 1.0])
 
-    def draw(self, colour: str, outline: str) -> None:
-        """Have these colours, "#RRGGBB"."""
-        for actor, its in zip(self._actors, (colour, outline), strict=True):
-            actor.GetProperty().SetColor(*(rgb(its) / 255.0))
+    def set_colours(self, colour: str, outline: str) -> None:
+        """Set the colours of the solid and its outline, "#RRGGBB"."""
+        for actor, each in zip(self._actors, (colour, outline), strict=True):
+            actor.GetProperty().SetColor(*(rgb(each) / 255.0))
 
     def show(self, shown: bool) -> None:
-        """Be seen or not."""
+        """Show or hide the part."""
         for actor in self._actors:
             actor.SetVisibility(shown)
 
-    def cut(self, plane: Any | None) -> None:
-        """Lose what is behind a vtkPlane; or, with None, be whole."""
+    def clip(self, plane: Any | None) -> None:
+        """Clip everything behind a vtkPlane; with None, show the whole solid."""
         for actor in self._actors:
             actor.GetMapper().RemoveAllClippingPlanes()
             if plane is not None:
                 actor.GetMapper().AddClippingPlane(plane)
 
     def remove(self) -> None:
-        """Go out of the renderer, for good."""
+        """Remove the part from the renderer permanently."""
         for actor in self._actors:
             self._renderer.RemoveActor(actor)
 
 
-def solid_of(part: Part, *, swollen: float = 0.0) -> Any:
-    """Return a part as vtkPolyData; *swollen* is how much thicker than it is."""
+def solid_of(part: Part, *, outline: float = 0.0) -> Any:
+    """Return a part as vtkPolyData, thicker by the thickness of an *outline*."""
     line = line_of(part)
-    if part.way is Way.FREE:
+    if part.kind is Kind.FREE:
         ball = vtkSphereSource()
-        ball.SetRadius(BALL + swollen)
+        ball.SetRadius(BALL + outline)
         ball.SetThetaResolution(20)
         ball.SetPhiResolution(14)
         return _output(ball)
-    if part.way is Way.ALONG:
+    if part.kind is Kind.AXIS:
         tip, axis = line[-1], np.eye(3)[part.axis]
         head = vtkConeSource()
-        head.SetHeight(_HEAD_LENGTH + 3.0 * swollen)
-        head.SetRadius(_HEAD_RADIUS + 1.3 * swollen)
-        head.SetCenter(*(tip - 0.5 * (_HEAD_LENGTH - swollen) * axis))
+        head.SetHeight(_HEAD_LENGTH + 3.0 * outline)
+        head.SetRadius(_HEAD_RADIUS + 1.3 * outline)
+        head.SetCenter(*(tip - 0.5 * (_HEAD_LENGTH - outline) * axis))
         head.SetDirection(*axis)
         head.SetResolution(24)
         shaft = np.stack([line[0], tip - 0.5 * _HEAD_LENGTH * axis])
-        return _joined(_tube(shaft, _SHAFT + swollen), _output(head))
-    if part.way is Way.WITHIN:
-        border = _tube(line, _BORDER + swollen)
-        return border if swollen else _joined(border, _cell(line[:-1], closed_area=True))
-    return _tube(line, (_OUTER_RING if part.axis is None else _RING) + swollen)
+        return _joined(_tube(shaft, _SHAFT + outline), _output(head))
+    if part.kind is Kind.PLANE:
+        border = _tube(line, _BORDER + outline)
+        return border if outline else _joined(border, _cell(line[:-1], closed_area=True))
+    return _tube(line, (_OUTER_RING if part.axis is None else _RING) + outline)
 
 
 def _tube(line: FloatArray, radius: float) -> Any:

@@ -1,17 +1,18 @@
-"""Handles dragged and turned by the mouse; the mesh follows at every move.
+"""Moving and rotating handles with the mouse; the mesh follows at every move.
 
-The active handle has a gizmo at its middle.  Its ball drags in the plane of the view, its arrows
-along an axis, its squares in a plane, its rings turn, the outermost about the line of sight.  A
-press on the vertices of any handle makes that one active, and drags it in the plane of the view.
+The active handle has a gizmo at its centre.  The ball moves it in the view plane, an arrow along an
+axis, a square in a plane; a ring rotates it, the outer one about the line of sight.  A press on the
+vertices of any handle activates that handle and moves it in the view plane.
 
-    x, y, z     while dragging: along that axis; again: across it; again: as before
-                while turning: about that axis; again: as before
-    shift       slowly
-    control     turns by 15 degrees at a time
-    escape, right button        back to the pose before the press
+    x, y, z     while moving: constrain to the axis; again: to the plane perpendicular to it;
+                again: no constraint.  While rotating: about the axis; again: no constraint
+    shift       move slowly
+    control     rotate in steps of 15 degrees
+    escape, right button        cancel
 
-One move is one solve, for where the pointer is now, of about 20 ms.  While the pointer rests, and
-after the release, a timer goes on until the pose has converged: it belongs to the same undo step.
+Each move solves once, for about 20 ms, for the current position of the pointer.  While the pointer
+rests, and after the release, a timer refines the pose until it has converged; this is part of the
+same undo step.
 """
 
 from __future__ import annotations
@@ -29,30 +30,30 @@ from vtk_segdeform.session import Change, Session, require_handle
 from ..picking import Picker
 from ..scene import Gesture, Phase, Pointer, SurfaceDisplay, Widget
 from .gizmo import Gizmo
-from .gizmo_shapes import FREE, Part, Way
+from .gizmo_shapes import FREE, Kind, Part
 from .handle_marks import HandleMarks
 from .handle_motion import Grip, Motion, next_constraint
 from .live_solve import LiveSolve
 
-_SLACK = 3.0  # pixels that a hand may tremble when it clicks on a handle
+_CLICK_TOLERANCE = 3.0  # pixels; smaller movements of a press on a handle do not move it
 
 
 class HandleDragger(Widget):
-    """Drags and turns the handles of a session; there is nothing to see until it is on.
+    """Moves and rotates the handles of a session; invisible until it is on.
 
     Parameters
     ----------
     view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
-        Where it lives.  Call `remove` before its window closes.
+        The view to work in.  Call `remove` before its window closes.
     session : Session
-        Whose handles.  Bind it ahead, or the first move has to wait for that.
+        The session to edit.  Call `Session.bind` beforehand; otherwise the first move does.
     surface : SurfaceDisplay, optional
-        The mesh, of the same session; without it there is one of its own.
+        The displayed mesh of the session; by default the widget adds its own.
 
     Attributes
     ----------
     gizmo : Gizmo
-        What is grabbed.
+        The gizmo of the active handle.
     """
 
     def __init__(self, view: Any, session: Session, surface: SurfaceDisplay | None = None) -> None:
@@ -66,11 +67,11 @@ class HandleDragger(Widget):
         self.gizmo = Gizmo(self.view)
         self._local = False
         self._handle: str | None = None
-        self._held: Part | None = None  # what the gesture in hand has grabbed
-        self._constraint: Part | None = None  # what keys have made of it
+        self._grabbed: Part | None = None  # the part of the running gesture
+        self._constraint: Part | None = None  # set by keys during the gesture
         self._live = LiveSolve(self.view, session, self.cancel)
-        self._names = session.handles  # as last seen, to know one that is renamed
-        self._choose()
+        self._last_handles = session.handles  # to recognise a renamed handle
+        self._update_handle()
         self._stop_listening = session.on_change(self._changed)
 
     @property
@@ -85,52 +86,56 @@ class HandleDragger(Widget):
         if name != self._handle:
             self.finish()
             self._handle = name
-            self._place()
+            self._update_gizmo()
 
     @property
     def local(self) -> bool:
-        """Whether the axes are turned with the handle; else they are those of the world."""
+        """Whether the axes rotate with the handle; otherwise they are those of the world."""
         return self._local
 
     @local.setter
     def local(self, local: bool) -> None:
         self._local = as_flag(local, "local")
-        self._place()
+        self._update_gizmo()
 
     @property
     def refine_while_resting(self) -> bool:
-        """Whether a timer goes on solving while the pointer rests, and after the release."""
-        return self._live.refines
+        """Whether a timer refines the pose while the pointer rests, and after the release."""
+        return self._live.is_enabled
 
     @refine_while_resting.setter
     def refine_while_resting(self, refines: bool) -> None:
-        self._live.refines = as_flag(refines, "refine_while_resting")
-        if self.GetEnabled():
-            self._live.go_on()
+        self._live.is_enabled = as_flag(refines, "refine_while_resting")
+        self.resume_refining()
 
     @property
     def is_refining(self) -> bool:
         """Whether that timer is running."""
         return self._live.is_refining
 
+    def resume_refining(self) -> None:
+        """Refine the current pose if it has not converged, the widget is on and it may refine."""
+        if self.GetEnabled():
+            self._live.resume()
+
     def On(self) -> None:  # noqa: N802 - VTK's word
-        """Listen to the view and show the handles; refine a pose that has not converged."""
+        """Start handling events, show the handles, and refine a pose that has not converged."""
         super().On()
         self._marks.show(self.session.is_ready)
-        self._place()
-        self._live.go_on()
+        self._update_gizmo()
+        self.resume_refining()
 
     def Off(self) -> None:  # noqa: N802
-        """Stop listening and solving; an ongoing gesture is finished."""
+        """Stop handling events and refining; finish an ongoing gesture."""
         try:
             super().Off()
         finally:
-            self._live.rest()
+            self._live.pause()
             self._marks.show(False)
-            self._place()
+            self._update_gizmo()
 
     def remove(self) -> None:
-        """Take everything out of the view, for good."""
+        """Remove the widget from the view permanently."""
         self.Off()
         self._stop_listening()
         self._live.remove()
@@ -139,79 +144,78 @@ class HandleDragger(Widget):
         if self._own_surface:
             self._surface.remove()
 
-    # What the mouse and the keyboard do.
+    # Events.
+    def on_hover(self, pointer: Pointer) -> None:
+        """Highlight the part of the gizmo, or else the handle, under the pointer."""
+        part = self.gizmo.part_at(pointer)
+        found = None if part is not None else self._handle_at(pointer)
+        self.gizmo.highlight(part)
+        self._marks.highlight(None if found is None else found[0])
 
-    def hovers(self, pointer: Pointer) -> None:
-        """Show what a press would take."""
-        part = self.gizmo.under(pointer)
-        found = None if part is not None else self._handle_under(pointer)
-        self.gizmo.point_at(part)
-        self._marks.point_at(None if found is None else found[0])
-
-    def begins(self, press: Pointer) -> Gesture | None:
-        """Drag the part of the gizmo, or else the handle, that is under the pointer."""
-        part = self.gizmo.under(press)
+    def on_press(self, press: Pointer) -> Gesture | None:
+        """Drag the part of the gizmo, or else the handle, under the pointer."""
+        part = self.gizmo.part_at(press)
         if part is not None:
             return self._drag(part, None, press)
-        found = self._handle_under(press)
+        found = self._handle_at(press)
         if found is None:
             return None
         self.handle, point = found
         return self._drag(FREE, point, press)
 
-    def types(self, key: str, pointer: Pointer) -> bool:
-        """Bind the drag in hand to an axis, to the plane across it, or to nothing."""
+    def on_key(self, key: str, pointer: Pointer) -> bool:
+        """Change the axis or plane constraint of the running drag."""
         axis = "xyz".find(key.lower()) if len(key) == 1 else -1
-        if self._held is None or axis < 0 or pointer.control:
+        if self._grabbed is None or axis < 0 or pointer.control:
             return False
-        self._constraint = next_constraint(self._held, self._constraint, axis)
+        self._constraint = next_constraint(self._grabbed, self._constraint, axis)
         self._send(Phase.MOVE, "InteractionEvent")
         return True
 
     def _drag(self, part: Part, point: FloatArray | None, press: Pointer) -> Gesture:
-        """Move the active handle by *part* of the gizmo, or by a *point* of itself."""
+        """Move the active handle by *part* of the gizmo, or by a *point* of its surface."""
         session, name, gizmo = self.session, str(self._handle), self.gizmo
-        session.commit()  # what somebody else has left in hand is not ours to take back
-        self._live.rest()
-        assert gizmo.centre is not None  # there is something to grab
-        slack = 0.0 if point is None else _SLACK
+        session.commit()  # keeps an unfinished drag from elsewhere out of our undo step
+        self._live.pause()
+        assert gizmo.centre is not None  # the press was on the gizmo or on a visible handle
+        tolerance = 0.0 if point is None else _CLICK_TOLERANCE
         point = gizmo.centre if point is None else point
         grip = Grip(point, gizmo.centre, gizmo.axes, gizmo.radius)
-        motion = self._take(part, grip, press)
-        self._held, self._constraint = part, None
-        has_moved = kept = False
+        motion = self._motion_of(part, grip, press)
+        self._grabbed, self._constraint = part, None
+        has_moved = committed = False
         try:
             while (pointer := (yield)).phase is Phase.MOVE:
                 if name not in session.handles or (has_moved and not session.is_dragging):
-                    return  # a step, undo or redo has ended the drag
+                    return  # a commit, undo or redo from elsewhere has ended the drag
                 if motion.part != (self._constraint or part):
-                    motion = self._take(self._constraint or part, grip, press)
+                    motion = self._motion_of(self._constraint or part, grip, press)
                 matrix = motion.matrix(pointer)
-                away = float(np.linalg.norm(pointer.position - press.position))
-                if has_moved or (away > slack and (matrix != np.eye(4)).any()):
+                distance = float(np.linalg.norm(pointer.position - press.position))
+                if has_moved or (distance > tolerance and (matrix != np.eye(4)).any()):
                     has_moved = True
                     self._live.solve(partial(session.move_handle, name, matrix))
-                    gizmo.say(motion.words)
+                    gizmo.set_caption(motion.amount)
             if pointer.phase is Phase.RELEASE:
-                session.commit(f"{'turn' if part.way is Way.ABOUT else 'drag'} {name}")
-                kept = True
+                session.commit(f"{'rotate' if part.kind is Kind.ROTATION else 'drag'} {name}")
+                committed = True
         finally:
-            self._held = None
-            gizmo.say("")
+            self._grabbed = None
+            gizmo.set_caption("")
             gizmo.show_only(None)
-            if not kept:  # after all that, as listeners of the session may raise
+            if not committed:  # last, as listeners of the session may raise
                 session.revert()
-            self._live.go_on()
+            self._live.resume()
 
-    def _take(self, part: Part, grip: Grip, press: Pointer) -> Motion:
-        """Go on with *part*, as if it had been grabbed at the press."""
-        self._marks.point_at(None)
-        self.gizmo.point_at(part)
+    def _motion_of(self, part: Part, grip: Grip, press: Pointer) -> Motion:
+        """Return the motion by *part* since the press, and show only that part."""
+        self._marks.highlight(None)
+        self.gizmo.highlight(part)
         self.gizmo.show_only(part)
         return Motion(self.view, part, grip, press)
 
-    def _handle_under(self, pointer: Pointer) -> tuple[str, FloatArray] | None:
-        """Return the handle that is seen at *pointer*, and the point of it."""
+    def _handle_at(self, pointer: Pointer) -> tuple[str, FloatArray] | None:
+        """Return the visible handle at *pointer* and the point of its surface there."""
         hit = self._picker.hit(pointer) if self.session.is_ready else None
         if hit is None:
             return None
@@ -219,28 +223,28 @@ class HandleDragger(Widget):
         name = next(owners, None)
         return None if name is None else (name, hit.point)
 
-    # What is seen.
+    # Display.
 
     def _changed(self, change: Change) -> None:
         if change & Change.CONSTRAINTS:
-            self._choose()
+            self._update_handle()
         if self.GetEnabled():
             if change & (Change.CONSTRAINTS | Change.CAGES):
                 self._marks.show(self.session.is_ready)
             elif change & Change.POSE:
                 self._marks.follow()
-            self._place()
+            self._update_gizmo()
 
-    def _choose(self) -> None:
-        """Keep the active handle, also under another name; or else take the first, or none."""
-        before, now = self._names.get(self._handle or ""), self.session.handles
-        self._names = now
+    def _update_handle(self) -> None:
+        """Keep the active handle, even if renamed; otherwise activate the first one, if any."""
+        before, now = self._last_handles.get(self._handle or ""), self.session.handles
+        self._last_handles = now
         if self._handle not in now:
-            same = (name for name, ids in now.items() if ids is before)
-            self._handle = next(same, next(iter(now), None))
+            renamed = (name for name, ids in now.items() if ids is before)
+            self._handle = next(renamed, next(iter(now), None))
 
-    def _place(self) -> None:
-        """Put the gizmo where the active handle is."""
+    def _update_gizmo(self) -> None:
+        """Place the gizmo at the active handle, or hide it."""
         session, name = self.session, self._handle
         if name is None or not session.is_ready or not self.GetEnabled():
             self.gizmo.place(None)

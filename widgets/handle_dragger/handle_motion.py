@@ -1,16 +1,16 @@
-"""From where the pointer is to the matrix that moves what was grabbed.
+"""From the pointer to the rigid motion of the dragged handle.
 
-    FREE     in the plane that faces the viewer
-    ALONG    an axis: where it is met by the plane through it that faces the viewer most
-    WITHIN   the plane across an axis
-    ABOUT    an axis: the angle around the centre, in the plane across it
+    FREE        moves in the plane that faces the viewer
+    AXIS        moves along the axis, tracked in the plane through it that faces the viewer most
+    PLANE       moves in the plane perpendicular to the axis
+    ROTATION    rotates by the angle about the centre in the plane perpendicular to the axis
 
-Each asks where the line of sight meets a plane.  One that was seen nearly edge-on at the press is
-met nowhere in particular: there pixels are counted instead.  And a line of sight that later runs
-along the plane, or misses it beyond the horizon, is tilted towards it.  So whatever the pointer
-does, nothing flies away.
+Each intersects the line of sight with a plane.  If that plane is seen nearly edge-on at the press,
+the intersection is ill-conditioned, and pixels are counted instead.  If the line of sight later
+becomes nearly parallel to the plane, or misses it, it is tilted towards the plane.  The handle
+therefore never jumps far away.
 
-The way is measured from the press: a pointer that goes back there takes everything back.
+Motions are measured from the press: when the pointer returns there, so does the handle.
 """
 
 from __future__ import annotations
@@ -23,180 +23,194 @@ from scipy.spatial.transform import Rotation
 
 from vtk_segdeform.arrays import FloatArray
 
-from ..scene import Pointer, Sight
-from .gizmo_shapes import Part, Way
+from ..scene import Pointer, Projection
+from .gizmo_shapes import Kind, Part
 
-_EDGE_ON = 0.2  # sine of the angle at which a plane is seen, below which pixels are counted
-_SHALLOW = 0.1  # and to which a line of sight is tilted, later
-_SLOW = 0.2  # with shift
-_SNAP = np.radians(15.0)  # with control
+_EDGE_ON = 0.2  # sine of the angle of a plane to the line of sight below which pixels are counted
+_LEAST_SLOPE = 0.1  # sine of the angle to which a line of sight is tilted during the drag
+_SLOW_FACTOR = 0.2  # with Shift
+_SNAP = np.radians(15.0)  # with Control
 
-Place = Callable[[Pointer], FloatArray]
+Tracker = Callable[[Pointer], FloatArray]
+"""Returns the displacement (3,) of the grip, or an angle (1,), for a position of the pointer."""
 
 
-def next_constraint(held: Part, constraint: Part | None, axis: int) -> Part | None:
-    """Return what a key for *axis* makes of a *constraint*, while *held* is dragged; None is free.
+def next_constraint(grabbed: Part, constraint: Part | None, axis: int) -> Part | None:
+    """Return the constraint after a key for *axis* is pressed while *grabbed* is dragged.
 
-    A move goes along the axis, then across it, then free; a turn about it, then free.
+    A translation is constrained to the axis, then to the plane perpendicular to it, then not at
+    all (None); a rotation to the axis, then not at all.
     """
-    ways = (Way.ABOUT,) if held.way is Way.ABOUT else (Way.ALONG, Way.WITHIN)
-    choices = [Part(way, axis) for way in ways]
-    here = choices.index(constraint) + 1 if constraint in choices else 0
-    return choices[here] if here < len(choices) else None
+    kinds = (Kind.ROTATION,) if grabbed.kind is Kind.ROTATION else (Kind.AXIS, Kind.PLANE)
+    choices = [Part(kind, axis) for kind in kinds]
+    following = choices.index(constraint) + 1 if constraint in choices else 0
+    return choices[following] if following < len(choices) else None
 
 
 @dataclass(frozen=True, eq=False)
 class Grip:
-    """What is grabbed, and where."""
+    """The grabbed point, and the gizmo, at the press."""
 
     point: FloatArray
-    """(3,) float: the point of the world that stays under the pointer."""
+    """(3,) float: the world point that stays under the pointer."""
     centre: FloatArray
-    """(3,) float: what is turned about."""
+    """(3,) float: the centre of rotation."""
     axes: FloatArray
     """(3, 3) float: x, y and z as rows, each of length 1."""
     radius: float
-    """Of a ring: where it is seen edge-on, as long a way is one radian."""
+    """Of a ring; if it is seen edge-on, a pointer motion of this length rotates by one radian."""
 
 
 class Motion:
-    """One way of moving what is gripped, from the press on.
+    """The motion by one part of the gizmo since the press.
 
     Parameters
     ----------
-    sight : Sight
-        Its camera may change on the way.
+    projection : Projection
+        The camera may move during the drag.
     part : Part
-        What is dragged.
+        The dragged part.
     grip : Grip
-        As it was at the press.
+        The grabbed point and the gizmo at the press.
     press : Pointer
-        Where it was.
+        The position of the press.
     """
 
-    def __init__(self, sight: Sight, part: Part, grip: Grip, press: Pointer) -> None:
+    def __init__(self, projection: Projection, part: Part, grip: Grip, press: Pointer) -> None:
         self.part = part
         self._centre = grip.centre
         self._axis = (
-            -_line_of_sight(sight, grip.centre) if part.axis is None else grip.axes[part.axis]
+            -_line_of_sight(projection, grip.centre) if part.axis is None else grip.axes[part.axis]
         )
-        self._place = _PLACES[part.way](sight, self._axis, grip, press)
-        self._last = self._since = self._place(press)
-        self._before = self._amount = np.zeros_like(self._last)
+        self._track = _TRACKERS[part.kind](projection, self._axis, grip, press)
+        # The displacement is *_base* plus the pointer's motion since *_start*, slowed by Shift.
+        self._last = self._start = self._track(press)
+        self._base = self._applied = np.zeros_like(self._last)
         self._is_slow = False
 
     @property
-    def words(self) -> str:
-        """How far it has gone: "30.0°", or a length in the mesh's unit."""
-        if self.part.way is Way.ABOUT:
-            return f"{np.degrees(self._amount[0]):.1f}°"
-        return f"{np.linalg.norm(self._amount):.3g}"
-
-    def _follow(self, pointer: Pointer) -> FloatArray:
-        """Return the way from the press to *pointer*, (3,), or for a turn the angle, (1,)."""
-        if pointer.shift != self._is_slow:  # what was done slowly and what was not add up
-            self._before, self._since = self._so_far(), self._last
-            self._is_slow = pointer.shift
-        place = self._place(pointer)
-        if self.part.way is Way.ABOUT:  # the angle nearest to the last one
-            place = place + 2.0 * np.pi * np.round((self._last - place) / (2.0 * np.pi))
-        if np.isfinite(place).all():
-            self._last = place
-        if self.part.way is Way.ABOUT and pointer.control:
-            return np.asarray(np.round(self._so_far() / _SNAP) * _SNAP)
-        return self._so_far()
+    def amount(self) -> str:
+        """The size of the motion as text: "30.0°", or a length in the mesh's unit."""
+        if self.part.kind is Kind.ROTATION:
+            return f"{np.degrees(self._applied[0]):.1f}°"
+        return f"{np.linalg.norm(self._applied):.3g}"
 
     def matrix(self, pointer: Pointer) -> FloatArray:
-        """Return the (4, 4) motion from the press to *pointer*: a shift or a turn."""
-        amount = self._amount = self._follow(pointer)
+        """Return the translation or rotation from the press to *pointer* as a (4, 4) matrix."""
+        displacement = self._applied = self._follow(pointer)
         motion = np.eye(4)
-        if self.part.way is not Way.ABOUT:
-            motion[:3, 3] = amount
+        if self.part.kind is not Kind.ROTATION:
+            motion[:3, 3] = displacement
             return motion
-        R = Rotation.from_rotvec(amount * self._axis).as_matrix()
+        R = Rotation.from_rotvec(displacement * self._axis).as_matrix()
         motion[:3, :3] = R
         motion[:3, 3] = self._centre - R @ self._centre
         return motion
 
-    def _so_far(self) -> FloatArray:
-        share = _SLOW if self._is_slow else 1.0
-        return np.asarray(self._before + share * (self._last - self._since))
+    def _follow(self, pointer: Pointer) -> FloatArray:
+        """Return the displacement (3,) from the press to *pointer*, or the angle (1,)."""
+        if pointer.shift != self._is_slow:  # the slow and the fast parts of the path add up
+            self._base, self._start = self._displacement(), self._last
+            self._is_slow = pointer.shift
+        tracked = self._track(pointer)
+        if self.part.kind is Kind.ROTATION:  # the equivalent angle nearest to the last one
+            tracked = tracked + 2.0 * np.pi * np.round((self._last - tracked) / (2.0 * np.pi))
+        if np.isfinite(tracked).all():
+            self._last = tracked
+        if self.part.kind is Kind.ROTATION and pointer.control:
+            return np.asarray(np.round(self._displacement() / _SNAP) * _SNAP)
+        return self._displacement()
+
+    def _displacement(self) -> FloatArray:
+        factor = _SLOW_FACTOR if self._is_slow else 1.0
+        return np.asarray(self._base + factor * (self._last - self._start))
 
 
-# Where the pointer has a part, by its way: (3,) away from the grip, or (1,) an angle.
+# One tracker for each kind of motion.
 
 
-def _free(sight: Sight, axis: FloatArray, grip: Grip, press: Pointer) -> Place:
+def _track_view_plane(
+    projection: Projection, axis: FloatArray, grip: Grip, press: Pointer
+) -> Tracker:
     del axis, press
-    normal = sight.towards_scene
-    return lambda pointer: _met(sight, pointer, grip.point, normal) - grip.point
+    normal = projection.view_direction
+    return lambda pointer: _intersection(projection, pointer, grip.point, normal) - grip.point
 
 
-def _along(sight: Sight, axis: FloatArray, grip: Grip, press: Pointer) -> Place:
-    line = _line_of_sight(sight, grip.point)
+def _track_axis(projection: Projection, axis: FloatArray, grip: Grip, press: Pointer) -> Tracker:
+    line = _line_of_sight(projection, grip.point)
     normal = line - (line @ axis) * axis
     sine = float(np.linalg.norm(normal))
-    if sine < _EDGE_ON:  # it points at the viewer: up is away
-        away = np.copysign(sight.pixel_at(grip.point), line @ axis) * axis
-        return lambda pointer: (pointer.y - press.y) * away
+    if sine < _EDGE_ON:  # the axis is along the line of sight: up moves away from the viewer
+        per_pixel = np.copysign(projection.pixel_at(grip.point), line @ axis) * axis
+        return lambda pointer: (pointer.y - press.y) * per_pixel
     normal = normal / sine
-    return lambda pointer: ((_met(sight, pointer, grip.point, normal) - grip.point) @ axis) * axis
+
+    def track(pointer: Pointer) -> FloatArray:
+        offset = _intersection(projection, pointer, grip.point, normal) - grip.point
+        return np.asarray((offset @ axis) * axis)
+
+    return track
 
 
-def _within(sight: Sight, axis: FloatArray, grip: Grip, press: Pointer) -> Place:
-    if abs(_line_of_sight(sight, grip.point) @ axis) >= _EDGE_ON:
-        return lambda pointer: _met(sight, pointer, grip.point, axis) - grip.point
-    free = _free(sight, axis, grip, press)
-    flat = np.eye(3) - np.outer(axis, axis)
-    return lambda pointer: np.asarray(flat @ free(pointer))
+def _track_plane(projection: Projection, axis: FloatArray, grip: Grip, press: Pointer) -> Tracker:
+    if abs(_line_of_sight(projection, grip.point) @ axis) >= _EDGE_ON:
+        return lambda pointer: _intersection(projection, pointer, grip.point, axis) - grip.point
+    in_view = _track_view_plane(projection, axis, grip, press)
+    to_plane = np.eye(3) - np.outer(axis, axis)
+    return lambda pointer: np.asarray(to_plane @ in_view(pointer))
 
 
-def _about(sight: Sight, axis: FloatArray, grip: Grip, press: Pointer) -> Place:
-    line = _line_of_sight(sight, grip.centre)
-    if abs(line @ axis) < _EDGE_ON:  # what is in front goes with the pointer
+def _track_angle(projection: Projection, axis: FloatArray, grip: Grip, press: Pointer) -> Tracker:
+    line = _line_of_sight(projection, grip.centre)
+    if abs(line @ axis) < _EDGE_ON:  # edge-on: the front of the ring follows the pointer
         front = np.stack([grip.centre, grip.centre + 0.01 * grip.radius * np.cross(line, axis)])
-        here, there = sight.to_display(front)[:, :2]
-        onward = (there - here) / np.linalg.norm(there - here)
-        angle = sight.pixel_at(grip.centre) / grip.radius  # of one pixel
-        return lambda pointer: np.array([(pointer.position - press.position) @ onward * angle])
+        start, end = projection.to_display(front)[:, :2]
+        direction = (end - start) / np.linalg.norm(end - start)
+        per_pixel = projection.pixel_at(grip.centre) / grip.radius
+        return lambda pointer: np.array(
+            [(pointer.position - press.position) @ direction * per_pixel]
+        )
     first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     second = np.cross(axis, first)
 
-    def angle_at(pointer: Pointer) -> FloatArray:
-        arm = _met(sight, pointer, grip.centre, axis) - grip.centre
+    def track(pointer: Pointer) -> FloatArray:
+        arm = _intersection(projection, pointer, grip.centre, axis) - grip.centre
         return np.array([np.arctan2(arm @ second, arm @ first)])
 
-    return angle_at
+    return track
 
 
-_PLACES: dict[Way, Callable[[Sight, FloatArray, Grip, Pointer], Place]] = {
-    Way.FREE: _free,
-    Way.ALONG: _along,
-    Way.WITHIN: _within,
-    Way.ABOUT: _about,
+_TRACKERS: dict[Kind, Callable[[Projection, FloatArray, Grip, Pointer], Tracker]] = {
+    Kind.FREE: _track_view_plane,
+    Kind.AXIS: _track_axis,
+    Kind.PLANE: _track_plane,
+    Kind.ROTATION: _track_angle,
 }
 
 
-def _met(sight: Sight, pointer: Pointer, point: FloatArray, normal: FloatArray) -> FloatArray:
-    """Return where the line of sight of *pointer* meets the plane through *point*, (3,)."""
-    near, far = sight.ray(pointer)
-    parallel = sight.camera.GetParallelProjection()
-    eye = near if parallel else np.array(sight.camera.GetPosition())
+def _intersection(
+    projection: Projection, pointer: Pointer, point: FloatArray, normal: FloatArray
+) -> FloatArray:
+    """Return the intersection (3,) of the line of sight with the plane through *point*."""
+    near, far = projection.ray(pointer)
+    parallel = projection.camera.GetParallelProjection()
+    eye = near if parallel else np.array(projection.camera.GetPosition())
     direction = (far - near) / np.linalg.norm(far - near)
-    towards = np.copysign(1.0, _line_of_sight(sight, point) @ normal) * normal
+    towards = np.copysign(1.0, _line_of_sight(projection, point) @ normal) * normal
     slope = float(direction @ towards)
-    if slope < _SHALLOW:
+    if slope < _LEAST_SLOPE:
         along = direction - slope * towards
         along = along / np.linalg.norm(along)
-        slope = _SHALLOW
+        slope = _LEAST_SLOPE
         direction = np.sqrt(1.0 - slope**2) * along + slope * towards
     return np.asarray(eye + ((point - eye) @ towards) / slope * direction)
 
 
-def _line_of_sight(sight: Sight, point: FloatArray) -> FloatArray:
-    """Return the direction in which *point* is seen, (3,) of length 1."""
-    away = np.asarray(point - sight.camera.GetPosition())
-    length = float(np.linalg.norm(away))
-    if sight.camera.GetParallelProjection() or not length:
-        return sight.towards_scene
-    return away / length
+def _line_of_sight(projection: Projection, point: FloatArray) -> FloatArray:
+    """Return the direction from the camera to *point*, (3,) of length 1."""
+    offset = np.asarray(point - projection.camera.GetPosition())
+    length = float(np.linalg.norm(offset))
+    if projection.camera.GetParallelProjection() or not length:
+        return projection.view_direction
+    return offset / length

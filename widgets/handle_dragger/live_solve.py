@@ -1,8 +1,8 @@
-"""Solving in the time there is: a few steps at each event, and the rest while nothing happens.
+"""Solving during a drag: a few steps at each event, more from a timer between events.
 
-How many steps an event has time for is learned from how long the last ones took.  A solve that
-stopped for that is gone on with by a timer, until it has converged or can get no farther.
-A replay gives each event as many as it was given before; see `pace`.
+The number of steps per event follows from the measured time of the last steps.  If a solve stops at
+its step limit, a timer refines the pose until it has converged or makes no more progress.  A replay
+uses the recorded numbers of steps; see `StepBudget`.
 """
 
 from __future__ import annotations
@@ -15,44 +15,44 @@ from statistics import median
 from vtk_segdeform.session import Session
 from vtk_segdeform.solver import Solution, Status
 
-from ..scene import Pace, Stop, View
+from ..scene import StepBudget, Stop, View
 
-_BUDGET = 0.020  # seconds of an event: about half of what drawing takes without a graphics card
-_AT_REST = 0.080  # seconds of a refinement, when no pointer waits to be followed
-_MOST_STEPS = 8  # a drag is to follow the pointer rather than to arrive
-_FEWEST_AT_REST = 3  # with one at a time acceleration learns nothing, and it takes for ever
+_EVENT_TIME = 0.020  # seconds per event, about half the time of software rendering
+_REFINE_TIME = 0.080  # seconds per refinement, when no event is pending
+_MOST_STEPS = 8  # per event: following the pointer matters more than converging
+_LEAST_REFINE_STEPS = 3  # with fewer per call, Anderson acceleration has no effect
 _PERIOD = 40  # milliseconds between two refinements
 
 
 class LiveSolve:
-    """The solver of a session, as fast as events come.
+    """Solves for a session within the time between events.
 
     Parameters
     ----------
     view : View
-        Whose timer refines.
+        Provides the timer.
     session : Session
-        What is solved for.
+        The session to solve for.
     failed : callable
-        Called when a refinement raises, before the exception goes on.
+        Called when a refinement raises, before the exception propagates.
 
     Attributes
     ----------
-    refines : bool
-        Whether to refine at all.
+    is_enabled : bool
+        Whether the timer refines.
     """
 
     def __init__(self, view: View, session: Session, failed: Callable[[], object]) -> None:
-        self.refines = True
+        self.is_enabled = True
         self._view, self._session, self._failed = view, session, failed
-        self._seconds: deque[float] = deque(maxlen=5)  # of one step; the median forgets hiccups
+        self._seconds: deque[float] = deque(maxlen=5)  # per step; their median is used
         self._stop: Stop | None = None
-        self._pace = Pace(view.interactor)
+        self._budget = StepBudget(view.interactor)
 
     @property
     def steps(self) -> int:
-        """How many steps the next event has time for: 1 to 8, and 1 before anything is known."""
-        return self._steps_in(_BUDGET, 1)
+        """The number of steps of the next event: 1 to 8, and 1 before the first measurement."""
+        return self._steps_in(_EVENT_TIME, 1)
 
     @property
     def is_refining(self) -> bool:
@@ -60,55 +60,57 @@ class LiveSolve:
         return self._stop is not None
 
     def solve(self, solve: Callable[..., Solution]) -> None:
-        """Do ``solve(max_steps=...)``, and see to it that the rest is done later."""
+        """Call ``solve(max_steps=...)``, and refine its result later."""
         if not self._session.is_bound:
-            self._session.bind()  # seconds that say nothing of how long a step takes
-        self._spend(solve, self.steps)
-        self.go_on()
+            self._session.bind()  # beforehand, so that it is not measured as part of a step
+        self._measure(solve, self.steps)
+        self.resume()
 
-    def go_on(self) -> None:
-        """Refine the current pose if it was stopped early; otherwise stop refining.
+    def resume(self) -> None:
+        """Refine the current pose if it stopped at the step limit; otherwise stop refining.
 
-        Also stop where changed options or cages would have to be bound first, which takes long.
+        Also stop if changed options or cages need a new binding, which may take long.
         """
         solution = self._session.solution
         is_final = solution is None or solution.status is not Status.STEP_LIMIT
-        if is_final or not self.refines or not self._session.is_bound:
-            self.rest()
+        if is_final or not self.is_enabled or not self._session.is_bound:
+            self.pause()
         elif self._stop is None:
             self._stop = self._view.every(_PERIOD, self._tick)
 
-    def rest(self) -> None:
-        """Stop the timer."""
+    def pause(self) -> None:
+        """Stop refining until `resume`."""
         if self._stop is not None:
             self._stop()
             self._stop = None
 
     def remove(self) -> None:
-        """Stop for good."""
-        self.rest()
-        self._pace.stop()
+        """Stop permanently."""
+        self.pause()
+        self._budget.stop()
 
     def _tick(self) -> None:
-        self.go_on()  # something else may have changed the pose
+        self.resume()  # the pose may have changed since the last tick
         if self._stop is None:
             return
         is_done = False
         try:
-            self._spend(self._session.refine, self._steps_in(_AT_REST, _FEWEST_AT_REST))
+            steps = self._steps_in(_REFINE_TIME, _LEAST_REFINE_STEPS)
+            self._measure(self._session.refine, steps)
             is_done = True
         finally:
             if not is_done:
-                self.rest()
+                self.pause()
                 self._failed()
-        self.go_on()
+        self.resume()
 
     def _steps_in(self, seconds: float, fewest: int) -> int:
         if not self._seconds:
             return fewest
         return max(fewest, min(_MOST_STEPS, int(seconds / max(median(self._seconds), 1e-6))))
 
-    def _spend(self, solve: Callable[..., Solution], steps: int) -> None:
+    def _measure(self, solve: Callable[..., Solution], steps: int) -> None:
+        """Solve and record the time per step."""
         began = time.perf_counter()
-        solution = solve(max_steps=self._pace.steps(steps))
+        solution = solve(max_steps=self._budget.steps(steps))
         self._seconds.append((time.perf_counter() - began) / max(1, solution.steps))

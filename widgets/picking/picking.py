@@ -1,7 +1,7 @@
-"""From the window to the mesh: what is under the pointer, near it along the surface, or seen.
+"""Queries on the displayed pose: hits of the pointer, distances from it, visible vertices.
 
-Always in the pose that is drawn.  What a look-up needs is made when it is first asked for, and
-again only after the pose has changed, or for what is seen the camera.
+Search structures are built on first use and rebuilt only after the pose has changed; the visible
+vertices are recomputed after the camera has changed, too.
 """
 
 from __future__ import annotations
@@ -17,82 +17,86 @@ from vtk_segdeform.arrays import BoolArray, FloatArray
 
 from ..scene import Pointer, SurfaceDisplay
 from .surface_distance import SurfaceDistance
-from .visibility import seen_vertices
+from .visibility import visible_vertices
 
-_SLACK = 1e-7  # of the diagonal: a line through an edge must not slip between its two faces
+# A ray through an edge must not pass between its two faces.
+_INTERSECTION_TOLERANCE = 1e-7  # of the diagonal
 
 
 @dataclass(frozen=True, eq=False)
 class Hit:
-    """Where a line of sight meets the surface."""
+    """An intersection of the line of sight with the surface."""
 
     point: FloatArray
-    """(3,) float: in the pose."""
+    """(3,) float: the position in the displayed pose."""
     face: int
     vertex: int
     """The corner of the face that is nearest to the point."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Look:
-    """What is known of one pose, seen in one way."""
+class _Visibility:
+    """The visible vertices of one pose and one camera, computed on demand."""
 
-    posed: int
-    marks: FloatArray  # where the corners of the mesh's box are seen
-    places: FloatArray  # (n, 3) of each vertex in the display
-    known: BoolArray  # (n,) the vertices that were looked at, filled in bit by bit
-    seen: BoolArray  # (n,) those of them that are seen
+    modified: int  # VTK's modification time of the points
+    box: FloatArray  # (8, 2) display positions of the corners of the mesh's bounding box
+    display: FloatArray  # (n, 3) display coordinates of the vertices
+    is_tested: BoolArray  # (n,) the vertices tested so far
+    is_visible: BoolArray  # (n,) the visible vertices among them
 
 
 class Picker:
-    """Look-ups in the mesh of a surface.
+    """Queries on the mesh of a surface.
 
     Parameters
     ----------
     surface : SurfaceDisplay
-        The mesh, as it is drawn in its view.
+        The mesh as displayed in its view.
     """
 
     def __init__(self, surface: SurfaceDisplay) -> None:
         self._surface = surface
         self._view = surface.view
         self._mesh = surface.session.mesh
-        # Not the data that is drawn: those are modified by every change of colour.
+        # A separate object: a change of colour would modify the displayed one.
         self._data = vtkPolyData()
         self._data.SetPoints(surface.polydata.GetPoints())
         self._data.SetPolys(surface.polydata.GetPolys())
         self._locator = vtkStaticCellLocator()
         self._locator.SetDataSet(self._data)
         self._distance: SurfaceDistance | None = None
-        self._look: _Look | None = None
-        # Where these are seen tells where the camera is; not how far it sees, which changes
-        # whenever something else is drawn.
+        self._visibility: _Visibility | None = None
+        # Their display positions identify the camera.  The clipping range would not: it changes
+        # whenever other actors are drawn.
         ends = np.stack([self._mesh.vertices.min(axis=0), self._mesh.vertices.max(axis=0)])
-        self._landmarks = ends[np.indices((2, 2, 2)).reshape(3, -1).T, np.arange(3)]
+        self._box_corners = ends[np.indices((2, 2, 2)).reshape(3, -1).T, np.arange(3)]
 
     def hits(self, pointer: Pointer) -> list[Hit]:
-        """Return all that *pointer* is over, front and back, the nearest first."""
+        """Return all intersections of the line of sight at *pointer*, the nearest first."""
         near, far = self._view.ray(pointer)
         if not (np.isfinite(near).all() and np.isfinite(far).all()):
             return []
         self._locator.BuildLocator()  # does nothing unless the pose has changed
         points, faces = vtkPoints(), vtkIdList()
-        slack = _SLACK * self._mesh.diagonal
-        self._locator.IntersectWithLine(near, far, slack, points, faces)
+        tolerance = _INTERSECTION_TOLERANCE * self._mesh.diagonal
+        self._locator.IntersectWithLine(near, far, tolerance, points, faces)
         return [
             self._hit(np.array(points.GetPoint(k)), faces.GetId(k))
             for k in range(faces.GetNumberOfIds())
         ]
 
     def hit(self, pointer: Pointer) -> Hit | None:
-        """Return what is seen at *pointer*, or None beside the mesh."""
+        """Return the visible point of the surface at *pointer*, or None beside the mesh."""
         return next(iter(self.hits(pointer)), None)
 
     def distances(self, hits: Sequence[Hit], radius: float) -> FloatArray:
-        """Return how far each vertex is along the surface from the nearest of *hits*, (n,) float.
+        """Return the distance along the surface of each vertex to the nearest of *hits*.
 
-        Infinitely far, but for the vertices within *radius*, in the mesh's unit, and their
-        neighbours.
+        Returns
+        -------
+        distances : (n,) float
+            Infinite except for the vertices within *radius*, in the mesh's unit, and their
+            neighbours.
         """
         if self._distance is None:
             self._distance = SurfaceDistance(self._mesh.n_vertices, self._mesh.faces)
@@ -101,44 +105,45 @@ class Picker:
         return self._distance.within(self._surface.points, points, faces, radius)
 
     def component(self, vertex: int) -> BoolArray:
-        """Return the vertices that are connected with *vertex*, (n,) bool."""
+        """Return the connected part of the mesh that contains *vertex*, (n,) bool."""
         return np.asarray(self._mesh.components == self._mesh.components[vertex])
 
     def pixel_at(self, hit: Hit) -> float:
-        """Return how long one pixel is at a *hit*, in the mesh's unit."""
+        """Return the length of one pixel at a *hit*, in the mesh's unit."""
         return self._view.pixel_at(hit.point)
 
-    def places(self) -> FloatArray:
-        """Return where each vertex is in the display, (n, 3) float, as `Sight.to_display`."""
+    def display_points(self) -> FloatArray:
+        """Return the display coordinates of the vertices, (n, 3); see `Projection.to_display`."""
         return self._view.to_display(self._surface.points)
 
-    def seen(self, among: BoolArray | None = None) -> BoolArray:
+    def visible(self, among: BoolArray | None = None) -> BoolArray:
         """Return the vertices that the mesh does not hide from the camera, (n,) bool.
 
-        Asked for those *among* some, (n,) bool, it looks at no others, and at each only once.
+        With *among*, (n,) bool, only these vertices are tested, and none of the others is True.
+        Results are cached until the pose or the camera changes.
         """
-        look = self._look_now()
-        asked = ~look.known if among is None else among & ~look.known
-        if asked.any():
-            look.seen[seen_vertices(look.places, self._mesh.faces, asked)] = True
-            look.known[asked] = True
-        return look.seen if among is None else look.seen & among
+        cache = self._current_visibility()
+        untested = ~cache.is_tested if among is None else among & ~cache.is_tested
+        if untested.any():
+            cache.is_visible[visible_vertices(cache.display, self._mesh.faces, untested)] = True
+            cache.is_tested[untested] = True
+        return cache.is_visible if among is None else cache.is_visible & among
 
-    def _look_now(self) -> _Look:
-        posed = self._data.GetPoints().GetMTime()
-        marks = self._view.to_display(self._landmarks)[:, :2]
-        look = self._look
+    def _current_visibility(self) -> _Visibility:
+        modified = self._data.GetPoints().GetMTime()
+        box = self._view.to_display(self._box_corners)[:, :2]
+        cache = self._visibility
         if (
-            look is None
-            or look.posed != posed
-            or not np.array_equal(look.marks, marks, equal_nan=True)
+            cache is None
+            or cache.modified != modified
+            or not np.array_equal(cache.box, box, equal_nan=True)
         ):
-            nothing = np.zeros(self._mesh.n_vertices, dtype=bool)
-            look = _Look(posed, marks, self.places(), nothing, nothing.copy())
-            self._look = look
-        return look
+            none = np.zeros(self._mesh.n_vertices, dtype=bool)
+            cache = _Visibility(modified, box, self.display_points(), none, none.copy())
+            self._visibility = cache
+        return cache
 
     def _hit(self, point: FloatArray, face: int) -> Hit:
         corners = self._mesh.faces[face]
-        away = np.linalg.norm(self._surface.points[corners] - point, axis=1)
-        return Hit(point, face, int(corners[away.argmin()]))
+        distances = np.linalg.norm(self._surface.points[corners] - point, axis=1)
+        return Hit(point, face, int(corners[distances.argmin()]))

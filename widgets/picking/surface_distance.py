@@ -1,11 +1,12 @@
-"""How far it is along a surface from points on it, as far as a brush reaches.
+"""Distance along a surface from points on it, up to the radius of a brush.
 
-A wave: distance is handed from two corners of a triangle to its third, as if all that the wave
-has crossed so far lay flat.  On a flat surface the distances are exact, so what a brush paints
-is round whatever the triangles; along edges alone it would have corners, 15 % or more off.  What
-is near in space but far along the surface is far.
+A front propagates over the mesh: the distances of two corners of a triangle give that of the
+third, as if the triangles between the source and the front lay in one plane.  On a flat surface the
+distances are exact, so a brush stroke is round for any triangulation; distances along edges alone
+are up to 15 % or more too long.  Two sheets that are close in space can be far apart along the
+surface.
 
-A simple relative of P. Trettner, D. Bommes, L. Kobbelt, "Geodesic distance computation via
+A simplified variant of P. Trettner, D. Bommes, L. Kobbelt, "Geodesic distance computation via
 virtual source propagation", Computer Graphics Forum 40(5), 247-260, 2021.
 """
 
@@ -16,17 +17,17 @@ from scipy import sparse
 
 from vtk_segdeform.arrays import FloatArray, IntArray
 
-_BETTER = 1e-6  # of the radius; less is not worth another step
-_STRIDES = 40  # to the radius, about, at most
+_LEAST_GAIN = 1e-6  # of the radius; smaller improvements are not propagated
+_MOST_STEPS = 40  # about, from the source to the radius
 
 
 class SurfaceDistance:
-    """Distances over the triangles of one mesh, whatever its pose.
+    """Distances over the triangles of one mesh, in any pose.
 
     Parameters
     ----------
     n_vertices : int
-        n, each in some triangle.
+        n; each vertex must be in a triangle.
     faces : (m, 3) int
         Triangles.
     """
@@ -43,7 +44,7 @@ class SurfaceDistance:
     def within(
         self, vertices: FloatArray, points: FloatArray, triangles: IntArray, radius: float
     ) -> FloatArray:
-        """Return (n,) float: how far each vertex is from the nearest of some points.
+        """Return (n,) float: the distance of each vertex to the nearest of *points*.
 
         Parameters
         ----------
@@ -52,10 +53,10 @@ class SurfaceDistance:
         points : (k, 3) float
             On the surface.
         triangles : (k,) int
-            The triangle in which each of them lies.
+            The triangle that contains each point.
         radius : float
-            How far the wave goes.  It reaches the neighbours of whatever is within; others are
-            infinitely far.
+            Distances are computed for the vertices within this radius and their neighbours; all
+            others are infinite.
         """
         distance = np.full(len(vertices), np.inf)
         if not len(points):
@@ -63,19 +64,20 @@ class SurfaceDistance:
         start = self._faces[triangles]
         direct = _length(vertices[start] - points[:, None])
         np.minimum.at(distance, start, direct)
-        # Nearest first, a few at once: what goes on too early goes on again.
+        # The nearest vertices propagate first, many at once.  A vertex whose distance shrinks
+        # later propagates again.
         sides = _length(vertices[start] - vertices[start[:, [1, 2, 0]]])
-        stride = max(2.0 * float(sides.mean()), radius / _STRIDES)
-        waiting = np.unique(start)
-        while len(waiting):
-            due = distance[waiting] <= distance[waiting].min() + stride
-            front, waiting = waiting[due], waiting[~due]
+        step = max(2.0 * float(sides.mean()), radius / _MOST_STEPS)
+        queue = np.unique(start)
+        while len(queue):
+            due = distance[queue] <= distance[queue].min() + step
+            front, queue = queue[due], queue[~due]
             faces = self._faces[self._triangles_at(front)]
             v, a, b = np.concatenate([faces, faces[:, [1, 2, 0]], faces[:, [2, 0, 1]]]).T
-            found = _handed_on(vertices[np.stack([v, a, b])], distance[a], distance[b])
-            nearer = found < distance[v] - _BETTER * radius
+            found = _propagated(vertices[np.stack([v, a, b])], distance[a], distance[b])
+            nearer = found < distance[v] - _LEAST_GAIN * radius
             np.minimum.at(distance, v[nearer], found[nearer])
-            waiting = np.union1d(waiting, v[nearer & (found <= radius)])
+            queue = np.union1d(queue, v[nearer & (found <= radius)])
         return distance
 
     def _triangles_at(self, vertices: IntArray) -> IntArray:
@@ -84,20 +86,20 @@ class SurfaceDistance:
         return np.unique(self._around[np.repeat(self._first[vertices], count) + place])
 
 
-def _length(ways: FloatArray) -> FloatArray:
-    return np.asarray(np.sqrt(np.einsum("...j,...j->...", ways, ways)))
+def _length(vectors: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.einsum("...j,...j->...", vectors, vectors)))
 
 
-def _handed_on(corners: FloatArray, from_a: FloatArray, from_b: FloatArray) -> FloatArray:
-    """Return how far v is, given how far a and b are, for k triangles with *corners* v, a, b."""
+def _propagated(corners: FloatArray, from_a: FloatArray, from_b: FloatArray) -> FloatArray:
+    """Return the distances of v from those of a and b, for k triangles with *corners* v, a, b."""
     v, a, b = corners
     to_a, to_b = _length(v - a), _length(v - b)
-    found = np.minimum(from_a + to_a, from_b + to_b)  # round a corner
+    found = np.minimum(from_a + to_a, from_b + to_b)  # along the sides
     side = _length(b - a)
     flat = np.flatnonzero(np.isfinite(from_a + from_b) & (side > 0.0))
     side, along_a, along_b, to_a = side[flat], from_a[flat], from_b[flat], to_a[flat]
 
-    # With a at 0 and b at (side, 0), v is above and the point that the wave comes from below.
+    # In the plane with a at 0 and b at (side, 0), v lies above and the source of the front below.
     x = np.einsum("ij,ij->i", (v - a)[flat], (b - a)[flat]) / side
     y = np.sqrt(np.maximum(to_a**2 - x**2, 0.0))
     source_x = (along_a**2 - along_b**2 + side**2) / (2.0 * side)

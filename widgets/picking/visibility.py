@@ -1,13 +1,14 @@
-"""Which vertices of a mesh are seen, and which it hides itself, found without drawing.
+"""Visible vertices of a mesh, computed without rendering.
 
-A vertex is hidden where a triangle covers it and is nearer; one that ends at it is not.  That is
-exact at silhouettes, whatever else is drawn in front and however many pixels there are; a depth
-buffer would be neither.  Display coordinates are projective, so a triangle is flat in them, and
-its depth linear.
+A vertex is hidden if a triangle covers it and is nearer to the camera; the triangles around the
+vertex itself do not hide it.  The test is exact at silhouettes and independent of other actors and
+of the number of pixels, unlike a test with the depth buffer.  Display coordinates are projective,
+so a triangle is flat in them, and its depth linear.
 
-To compare few pairs, the display is cut into square cells about as large as a triangle; a vertex
-is compared with the triangles whose bounding box touches its cell.  Those that face the camera
-come first: they hide nearly all there is to hide, and what is hidden is compared no more.
+To keep the number of pairs small, the display is divided into square cells of about the size of a
+triangle, and a vertex is compared with the triangles whose bounding box touches its cell.
+Triangles that face the camera are tested first: they hide most of the hidden vertices, which then
+need no further tests.
 """
 
 from __future__ import annotations
@@ -16,14 +17,14 @@ import numpy as np
 
 from vtk_segdeform.arrays import BoolArray, FloatArray, IntArray
 
-_NEARER = 1e-9  # of the depth that the camera sees; less is rounding
-_CELLS = 16  # for each triangle, at most, on average
-_FINEST = 4096  # cells across
-_MOST = 4  # cells in all, for each triangle and vertex
-_AT_ONCE = 300_000  # pairs, to bound the memory
+_DEPTH_TOLERANCE = 1e-9  # of the camera's depth range; smaller differences are rounding errors
+_MOST_CELLS_TOUCHED = 16  # by a triangle, on average
+_MOST_CELLS_ACROSS = 4096
+_CELLS_PER_ELEMENT = 4  # at most, for each triangle and vertex
+_BATCH = 300_000  # pairs tested at once, to bound the memory
 
 
-def seen_vertices(
+def visible_vertices(
     display: FloatArray, faces: IntArray, among: BoolArray | None = None
 ) -> BoolArray:
     """Return (n,) bool: the vertices that no triangle hides.
@@ -31,57 +32,59 @@ def seen_vertices(
     Parameters
     ----------
     display : (n, 3) float
-        Display coordinates as of `Sight.to_display`.  What is behind the camera, NaN, is not seen
-        and hides nothing; what is beside the window counts as seen.
+        Display coordinates as of `Projection.to_display`.  Vertices behind the camera, NaN, are
+        not visible and hide nothing; vertices outside the window count as visible.
     faces : (m, 3) int
         Triangles; both sides hide.
     among : (n,) bool, optional
-        The vertices that are asked for; none of the others is called seen.
+        The vertices to test; the others are False in the result.
     """
-    there = np.asarray(np.isfinite(display).all(axis=1))
-    seen = there if among is None else there & among
-    if not seen.any():
-        return seen
-    low, high = display[seen, :2].min(axis=0), display[seen, :2].max(axis=0)
-    triangles = faces[touching(display[:, :2], faces, low, high)]
-    if not there.all():
-        triangles = triangles[there[triangles].all(axis=1)]
+    finite = np.asarray(np.isfinite(display).all(axis=1))
+    visible = finite if among is None else finite & among
+    if not visible.any():
+        return visible
+    low, high = display[visible, :2].min(axis=0), display[visible, :2].max(axis=0)
+    triangles = faces[may_overlap(display[:, :2], faces, low, high)]
+    if not finite.all():
+        triangles = triangles[finite[triangles].all(axis=1)]
     (ax, ay), (bx, by), (cx, cy) = (display[k, :2].T for k in triangles.T)
-    to_camera = (bx - ax) * (cy - ay) > (by - ay) * (cx - ax)
-    for some in (triangles[to_camera], triangles[~to_camera]):
-        if len(some) and seen.any():
-            _hide(display, some, seen)
-    return seen
+    faces_camera = (bx - ax) * (cy - ay) > (by - ay) * (cx - ax)
+    for some in (triangles[faces_camera], triangles[~faces_camera]):
+        if len(some) and visible.any():
+            _remove_hidden(display, some, visible)
+    return visible
 
 
-def touching(places: FloatArray, faces: IntArray, low: FloatArray, high: FloatArray) -> BoolArray:
-    """Tell which triangles are not plainly beside a box: all on one side of it.
+def may_overlap(
+    points: FloatArray, faces: IntArray, low: FloatArray, high: FloatArray
+) -> BoolArray:
+    """Return (m,) bool: the triangles that may overlap a box, as no side of it separates them.
 
     Parameters
     ----------
-    places : (n, 2) float
-        Of the vertices.
+    points : (n, 2) float
+        The vertices.
     faces : (m, 3) int
         Triangles.
     low, high : (2,) float
         The box, which may be a point.
     """
-    beside = np.zeros(len(places), dtype=np.uint8)  # a bit for each side that a vertex is on
-    for k, coordinate in enumerate(places.T):
-        beside |= (coordinate < low[k]).view(np.uint8) << (2 * k)
-        beside |= (coordinate > high[k]).view(np.uint8) << (2 * k + 1)
-    a, b, c = (beside[corner] for corner in faces.T)
+    outside = np.zeros(len(points), dtype=np.uint8)  # one bit for each side of the box
+    for k, coordinate in enumerate(points.T):
+        outside |= (coordinate < low[k]).view(np.uint8) << (2 * k)
+        outside |= (coordinate > high[k]).view(np.uint8) << (2 * k + 1)
+    a, b, c = (outside[corner] for corner in faces.T)
     return np.asarray((a & b & c) == 0)
 
 
-def _hide(display: FloatArray, triangles: IntArray, seen: BoolArray) -> None:
-    """Take out of *seen* what the triangles hide."""
-    vertices = np.flatnonzero(seen)
-    places = display[vertices, :2]
-    origin = places.min(axis=0)
+def _remove_hidden(display: FloatArray, triangles: IntArray, visible: BoolArray) -> None:
+    """Remove from *visible*, in place, the vertices that the triangles hide."""
+    vertices = np.flatnonzero(visible)
+    points = display[vertices, :2]
+    origin = points.min(axis=0)
     low, high = _boxes(display, triangles)
-    size = _cell_size(low, high, places)
-    row, column = ((places - origin) // size).astype(np.int64).T
+    size = _cell_size(low, high, points)
+    row, column = ((points - origin) // size).astype(np.int64).T
     n_rows, n_columns = row.max() + 1, column.max() + 1
     home = row * n_columns + column
     order = np.argsort(home, kind="stable")
@@ -92,7 +95,7 @@ def _hide(display: FloatArray, triangles: IntArray, seen: BoolArray) -> None:
     used = np.flatnonzero(count_at)
     farthest_at[used] = np.maximum.reduceat(display[vertices, 2], first_at[used])
 
-    # One entry for each cell that a triangle may touch, unless all there is nearer than it.
+    # One entry for each cell that a triangle may touch, unless all vertices there are nearer.
     last = [n_rows - 1, n_columns - 1]
     first = np.clip((low[:, :2] - origin) // size, 0, last).astype(np.int64)
     wide = np.clip((high[:, :2] - origin) // size, 0, last).astype(np.int64) - first + 1
@@ -102,29 +105,30 @@ def _hide(display: FloatArray, triangles: IntArray, seen: BoolArray) -> None:
     some = np.flatnonzero(farthest_at[cell] > low[triangle, 2])
     triangle, begin, count = triangle[some], first_at[cell[some]], count_at[cell[some]]
 
-    batches = np.flatnonzero(np.diff(np.cumsum(count) // _AT_ONCE)) + 1
+    batches = np.flatnonzero(np.diff(np.cumsum(count) // _BATCH)) + 1
     for batch in np.split(np.arange(len(count)), batches):
         entry, step = _spread(count[batch])
         vertex, over = vertices[begin[batch][entry] + step], triangle[batch][entry]
-        behind = np.flatnonzero(seen[vertex] & (display[vertex, 2] > low[over, 2]))
+        behind = np.flatnonzero(visible[vertex] & (display[vertex, 2] > low[over, 2]))
         vertex, corners = vertex[behind], triangles[over[behind]]
-        seen[vertex[_hides(display, corners, vertex)]] = False
+        visible[vertex[_hides(display, corners, vertex)]] = False
 
 
-def _cell_size(low: FloatArray, high: FloatArray, places: FloatArray) -> float:
-    """Return a side such that triangles touch a few cells each, and not too many in all."""
+def _cell_size(low: FloatArray, high: FloatArray, points: FloatArray) -> float:
+    """Return a cell side for which triangles touch few cells, and the grid is not too large."""
     wide = (high - low)[:, :2]
-    across = np.ptp(places, axis=0)
-    least = float(np.sqrt(across.prod() / (_MOST * (len(low) + len(places)))))
-    size = max(float(np.median(wide.max(axis=1))), float(across.max()) / _FINEST, least, 1e-9)
-    while (wide // size + 1.0).prod(axis=1).sum() > _CELLS * len(low):
+    across = np.ptp(points, axis=0)
+    least = float(np.sqrt(across.prod() / (_CELLS_PER_ELEMENT * (len(low) + len(points)))))
+    finest = float(across.max()) / _MOST_CELLS_ACROSS
+    size = max(float(np.median(wide.max(axis=1))), finest, least, 1e-9)
+    while (wide // size + 1.0).prod(axis=1).sum() > _MOST_CELLS_TOUCHED * len(low):
         size *= 2.0
     return size
 
 
-def _boxes(places: FloatArray, triangles: IntArray) -> tuple[FloatArray, FloatArray]:
+def _boxes(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, FloatArray]:
     """Return the least and the greatest coordinates of each triangle, (m, 3)."""
-    a, b, c = (places[k] for k in triangles.T)
+    a, b, c = (points[k] for k in triangles.T)
     return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
@@ -135,16 +139,16 @@ def _spread(count: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def _hides(display: FloatArray, corners: IntArray, vertex: IntArray) -> BoolArray:
-    """Tell for each pair whether the triangle with *corners* (p, 3) hides *vertex* (p,)."""
+    """Return (p,) bool: whether each triangle with *corners* (p, 3) hides its *vertex* (p,)."""
     x, y, depth = display.T
     px, py = x[vertex], y[vertex]
     (ax, ay), (bx, by), (cx, cy) = ((x[k] - px, y[k] - py) for k in corners.T)
-    # Twice the areas of the triangles that the vertex makes with each side.
+    # Twice the signed areas of the triangles formed by the vertex and each side.
     u, v, w = bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx
     around = ((u >= 0) & (v >= 0) & (w >= 0)) | ((u <= 0) & (v <= 0) & (w <= 0))
     hides = np.flatnonzero(around)
     u, v, w = u[hides], v[hides], w[hides]
     za, zb, zc = (depth[k] - depth[vertex[hides]] for k in corners[hides].T)
     total = u + v + w
-    around[hides] = (u * za + v * zb + w * zc) * total < -_NEARER * total**2
+    around[hides] = (u * za + v * zb + w * zc) * total < -_DEPTH_TOLERANCE * total**2
     return np.asarray(around)

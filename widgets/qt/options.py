@@ -7,7 +7,7 @@ from typing import Any
 from qtpy import QtWidgets
 
 from ..editor import DeformEditor, Mode, setting, setting_colour_range, toggle_cages, toggle_overlay
-from ..volume_overlay import precise
+from ..volume_overlay import percent
 from .controls import check_box, column, form, key_button, number_box, put, row
 
 _MOST = 100_000
@@ -118,7 +118,7 @@ class DeformPart(QtWidgets.QGroupBox):
         """Show the current options and the volume change."""
         session, widgets = self._editor.session, self._editor.widgets
         options = session.options
-        self.volume.setText(precise(session.volume_change))
+        self.volume.setText(percent(session.volume_change))
         put(self.preserve, options.preserve_volume)
         put(self.per_region, options.preserve_region_volumes)
         put(self.overlay, widgets.overlay_wanted)

@@ -4,16 +4,16 @@ The files, in reading order:
 
     recording       `Recorder` and `replay`
     transcript      the lines of a recording
-    reading         parsing a recording
-    words           parsing numbers
+    reading         reading and checking a recording
+    parsing         parsing the numbers in a line
     limits          limits of a replay
-    confinement     files a replay may touch
+    confinement     the folder a replay may access
     film            `film` and `Film`
     film_files      GIF, MP4 and PNG files
-    off_screen      a session in a window that is never shown
+    off_screen      a session in an off-screen window
 """
 
-from .confinement import place_of
+from .confinement import confined_path
 from .film import Film, film
 from .film_files import require_film
 from .limits import Clock, ReplayLimits
@@ -29,8 +29,8 @@ __all__ = [
     "OffScreen",
     "Recorder",
     "ReplayLimits",
+    "confined_path",
     "film",
-    "place_of",
     "read_recording",
     "replay",
     "require_film",

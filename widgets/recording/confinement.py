@@ -1,4 +1,4 @@
-"""Confine a replay: its keys read and write files only below a given folder, or not at all.
+"""Confinement of a replay: its keys read and write files only below a given folder, or not at all.
 
 The recording may come from an untrusted source, and its Ctrl+S must not overwrite any other file.
 """
@@ -30,7 +30,7 @@ def confined(interactor: Any, folder: Path | None) -> Iterator[None]:
             del _folders[interactor]
 
 
-def place_of(interactor: Any, path: Path) -> Path:
+def confined_path(interactor: Any, path: Path) -> Path:
     """Return *path* or, during a replay, the path of the same name in the folder of the replay.
 
     Raises
@@ -46,9 +46,9 @@ def place_of(interactor: Any, path: Path) -> Path:
             f"{path.name}: not accessed; a replay reads and writes files only in the folder passed "
             "to it"
         )
-    place = folder / path.name
-    if not place.resolve().is_relative_to(folder.resolve()):
+    target = folder / path.name
+    if not target.resolve().is_relative_to(folder.resolve()):
         raise SessionError(
-            f"{place}: is a link that leads out of the folder of the replay; remove it"
+            f"{target}: is a link that leads out of the folder of the replay; remove it"
         )
-    return place
+    return target

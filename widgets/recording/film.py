@@ -1,11 +1,11 @@
-"""A deformation as a moving picture: a GIF, an MP4, or a folder of PNG pictures.
+"""Films of a deformation: a GIF, an MP4, or a folder of PNG pictures.
 
-    film("bend.gif", session, targets)             a drag, a picture for each of its targets
-    film("turn.mp4", view, [turn_camera] * 90)     whatever is done before each picture
-    film = Film(view); stop = film.watch()         everything that is drawn from now on,
-    ...; stop(); film.save("work.gif")             say by hand, or by a replay
+    film("bend.gif", session, targets)             a drag, one picture for each of its targets
+    film("turn.mp4", view, [turn_camera] * 90)     one picture after each call
+    film = Film(view); stop = film.watch()         every picture drawn from now on,
+    ...; stop(); film.save("work.gif")             by the user or by a replay
 
-Pictures are kept compressed until the film is saved; see `film_files` for what it is saved as.
+Pictures are kept compressed in memory until the film is saved; see `film_files` for the formats.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from ..scene import Stop, View
 from .film_files import Picture, require_film, write_film
 from .off_screen import OffScreen
 
-_LARGEST = 16_384  # pixels, of a width or height
+_LARGEST = 16_384  # pixels, width or height
 
 Targets = Mapping[str, ArrayLike] | ArrayLike
 Frame = Callable[[], object] | Targets | None
@@ -42,7 +42,7 @@ class Film:
     Parameters
     ----------
     view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
-        All its window is seen.
+        The pictures show its whole window.
     """
 
     def __init__(self, view: Any) -> None:
@@ -64,9 +64,9 @@ class Film:
         self._take()
 
     def watch(self, when: Callable[[], bool] | None = None) -> Stop:
-        """Take a picture whenever the window was drawn, until what is returned is called.
+        """Take a picture after each rendering of the window, until the returned function is called.
 
-        With *when*, only of what is drawn while it returns True.
+        With *when*, only if ``when()`` returns True.
         """
         if when is not None:
             as_callable(when, "when")
@@ -87,25 +87,25 @@ class Film:
         fps: float = 20.0,
         progress: Progress | None = None,
     ) -> None:
-        """Write the pictures; a file that is there is replaced, a folder is not.
+        """Write the pictures; an existing file is replaced, an existing folder is not.
 
         Parameters
         ----------
         path : path
             A .gif, an .mp4, or without a suffix a new folder for 0000.png, 0001.png, ...
         fps : float
-            Pictures in a second.
+            Pictures per second.
         progress : Progress, optional
             Called before every picture; may cancel, in which case nothing is written.
 
         Raises
         ------
         SessionError
-            If there are no pictures, or the film cannot be written there.
+            If there are no pictures, or the file cannot be written.
         MissingDependencyError
-            If the library for such a film is absent.
+            If the library for the format is not installed.
         """
-        write_film(path, _Told(self, progress), fps)
+        write_film(path, _ReportingPictures(self, progress), fps)
 
     def _take(self) -> None:
         window = self.view.window
@@ -113,7 +113,7 @@ class Film:
         pixels = vtkUnsignedCharArray()
         window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
         picture = vtk_to_numpy(pixels).reshape(height, width, 3)[::-1]
-        if not self._pictures:  # the first says how large; videos want even numbers
+        if not self._pictures:  # the first picture sets the size; videos require even numbers
             self._shape = (height - height % 2, width - width % 2, 3)
         whole = np.full(self._shape, 255, dtype=np.uint8)
         h, w = min(height, self._shape[0]), min(width, self._shape[1])
@@ -121,8 +121,8 @@ class Film:
         self._pictures.append(zlib.compress(whole.tobytes(), 1))
 
 
-class _Told:
-    """The pictures of a film; accessing one reports progress."""
+class _ReportingPictures:
+    """The pictures of a film; each access reports progress."""
 
     def __init__(self, film: Film, progress: Progress | None) -> None:
         self._film, self._progress, self._count = film, progress, 0
@@ -151,23 +151,23 @@ def film(
     path : path
         A .gif, an .mp4, or without a suffix a new folder of PNG pictures.
     scene : Session, View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
-        A view as it is; or a session, whose mesh is then shown with fixed vertices in grey and
+        A view is filmed as it is.  The mesh of a session is shown with fixed vertices in grey and
         handles in red.
     frames : sequence or iterator of callable, targets or None
-        Before each picture a callable is called, a session dragged to targets, (k, 3) or by the
-        name of the handle, as in `Session.drag`; None does nothing.  All targets together are one
-        step of the session, and none at all if something fails.
+        One item per picture.  A callable is called.  Targets, (k, 3) or by the name of the handle,
+        are passed to `Session.drag`.  None changes nothing.  All targets together are one undo step
+        of the session; if an error occurs the pose is restored.
     fps : float
-        Pictures in a second.
+        Pictures per second.
     size : (width, height)
-        Pixels; of a session's film, a view has its own.
+        Size in pixels of the film of a session; the film of a view has the size of its window.
 
     Raises
     ------
     SessionError
-        If the film cannot be written there; before anything is done.
+        If the file cannot be written; checked before the first frame.
     MissingDependencyError
-        If the library for such a film is absent, or nothing can be rendered here.
+        If the library for the format is not installed, or off-screen rendering is unavailable.
     """
     require_film(path, fps)
     require_sequence(size, "size")
@@ -176,16 +176,16 @@ def film(
             f"size must be (width, height), 2 to {_LARGEST} pixels each; got {shown(size)}"
         )
     session = scene if isinstance(scene, Session) else None
-    room: Sequence[Frame] = []
+    known: Sequence[Frame] = []  # an iterator's frames are not known in advance
     if not isinstance(frames, Iterator):
         require_sequence(frames, "frames")
-        room = frames
+        known = frames
     if session is None:
         made = Film(scene)
         _shoot(made, None, frames)
     else:
-        with OffScreen(session, size, room=_places(room)) as stage:
-            made = Film(stage.view)
+        with OffScreen(session, size, in_view=_targets(known)) as window:
+            made = Film(window.view)
             try:
                 _shoot(made, session, frames)
             except BaseException:
@@ -206,12 +206,12 @@ def _shoot(made: Film, session: Session | None, frames: Iterable[Frame]) -> None
         made.snap()
 
 
-def _places(frames: Sequence[Frame]) -> list[NDArray[np.float64]]:
+def _targets(frames: Sequence[Frame]) -> list[NDArray[np.float64]]:
     """Return the targets among *frames*, each (k, 3)."""
-    places: list[NDArray[np.float64]] = []
+    found: list[NDArray[np.float64]] = []
     for frame in frames:
         if isinstance(frame, Mapping):
-            places += [as_points(place, "frames") for place in frame.values()]
+            found += [as_points(targets, "frames") for targets in frame.values()]
         elif frame is not None and not callable(frame):
-            places.append(as_points(frame, "frames"))
-    return places
+            found.append(as_points(frame, "frames"))
+    return found

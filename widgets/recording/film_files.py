@@ -1,7 +1,7 @@
-"""Films as files: GIF, MP4, or a folder of PNG pictures; each appears whole or not at all.
+"""Film files, written atomically: GIF, MP4, or a folder of PNG pictures.
 
-GIFs have 256 colours, the same for all pictures so that nothing flickers; Pillow writes them,
-which pyvista brings along.  MP4s need imageio[ffmpeg].
+GIFs have 256 colours, the same for all pictures to avoid flicker.  They are written by Pillow, a
+dependency of pyvista.  MP4s require imageio[ffmpeg].
 """
 
 from __future__ import annotations
@@ -22,29 +22,29 @@ from vtk_segdeform.pictures import png_of
 
 Picture = NDArray[np.uint8]  # (h, w, 3), upper row first, all of one size
 
-_SAMPLES = 12  # pictures that the colours of a GIF are taken from
-_NEEDS = {".gif": ("PIL.Image", "pillow"), ".mp4": ("imageio_ffmpeg", "'imageio[ffmpeg]'")}
+_SAMPLES = 12  # pictures that determine the colours of a GIF
+_LIBRARIES = {".gif": ("PIL.Image", "pillow"), ".mp4": ("imageio_ffmpeg", "'imageio[ffmpeg]'")}
 
 
 class Pictures(Protocol):
-    """A sequence of them."""
+    """A sequence of pictures."""
 
     def __len__(self) -> int: ...
     def __getitem__(self, number: int, /) -> Picture: ...
 
 
 def write_film(path: str | os.PathLike[str], pictures: Pictures, fps: float) -> None:
-    """Write *pictures*, *fps* in a second, as the suffix of *path* says.
+    """Write *pictures*, *fps* per second, in the format of the suffix of *path*.
 
     Raises
     ------
     SessionError, MissingDependencyError
-        As `require_film`; or if there are no pictures.
+        As `require_film`, or if there are no pictures.
     """
     path = as_path(path)
     require_film(path, fps)
     if not len(pictures):
-        raise SessionError("there is nothing to see in a film without pictures")
+        raise SessionError(f"{path}: a film without pictures cannot be written")
     write = {".gif": _write_gif, ".mp4": _write_mp4}.get(path.suffix.lower(), _write_folder)
     try:
         with replacing(path, folder=not path.suffix) as draft:
@@ -54,20 +54,20 @@ def write_film(path: str | os.PathLike[str], pictures: Pictures, fps: float) -> 
 
 
 def require_film(path: str | os.PathLike[str], fps: float = 20.0) -> None:
-    """Raise what `Film.save` would, before the work that is to be filmed."""
+    """Raise the errors of `Film.save` in advance, before the film is made."""
     path = as_path(path)
     suffix = path.suffix.lower()
     if suffix not in (".gif", ".mp4", ""):
         raise SessionError(f"{path}: a film is a .gif, an .mp4 or, without a suffix, a folder")
     if not (is_number(fps, 0.1) and fps <= 100.0):
-        raise SessionError(f"fps must be 0.1 to 100 pictures in a second; got {shown(fps)}")
+        raise SessionError(f"fps must be 0.1 to 100 pictures per second; got {shown(fps)}")
     if os.path.isdir(path) or (not suffix and os.path.lexists(path)):
-        raise SessionError(f"{path}: is there already; name another")
+        raise SessionError(f"{path}: already exists; choose another name")
     try:
         require_place(path)
     except OSError as fault:
         raise SessionError(f"{path}: {fault.strerror or fault}") from fault
-    if suffix in _NEEDS:
+    if suffix in _LIBRARIES:
         _library(suffix)
 
 
@@ -75,11 +75,11 @@ def _write_gif(path: Path, pictures: Pictures, fps: float) -> None:
     image = _library(".gif")
     some = np.unique(np.linspace(0, len(pictures) - 1, _SAMPLES).round().astype(int))
     sheet = image.fromarray(np.concatenate([pictures[int(k)] for k in some]))
-    # By coverage: counted by their number, a white ground would leave few colours for shades.
+    # Maximum coverage: by frequency, a white background would leave few colours for shades.
     colours = sheet.quantize(256, method=image.Quantize.MAXCOVERAGE)
-    shades = image.Dither.FLOYDSTEINBERG
+    dither = image.Dither.FLOYDSTEINBERG
     first, *rest = (
-        image.fromarray(pictures[k]).quantize(palette=colours, dither=shades)
+        image.fromarray(pictures[k]).quantize(palette=colours, dither=dither)
         for k in range(len(pictures))
     )
     first.save(path, format="GIF", save_all=True, append_images=rest, duration=1000.0 / fps, loop=0)
@@ -89,7 +89,7 @@ def _write_mp4(path: Path, pictures: Pictures, fps: float) -> None:
     height, width, _ = pictures[0].shape
     writer = _library(".mp4").write_frames(str(path), (width, height), fps=fps, macro_block_size=2)
     try:
-        writer.send(None)  # ready
+        writer.send(None)  # starts the generator
         for k in range(len(pictures)):
             writer.send(pictures[k].tobytes())
     finally:
@@ -103,11 +103,11 @@ def _write_folder(path: Path, pictures: Pictures, fps: float) -> None:
 
 
 def _library(suffix: str) -> Any:
-    name, package = _NEEDS[suffix]
+    name, package = _LIBRARIES[suffix]
     try:
         return importlib.import_module(name)
     except ImportError as fault:
         raise MissingDependencyError(
-            f"to write {suffix} files, pip install {package}; or name a film without a suffix, "
-            "a folder of pictures"
+            f"writing {suffix} files requires a library: pip install {package}.  Or give a name "
+            "without a suffix to write a folder of pictures"
         ) from fault

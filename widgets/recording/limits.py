@@ -1,4 +1,4 @@
-"""Limits of a replay: an untrusted recording could otherwise run for years."""
+"""Limits of a replay, as an untrusted recording could otherwise run for years."""
 
 from __future__ import annotations
 

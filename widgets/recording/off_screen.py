@@ -1,7 +1,7 @@
-"""A window that nobody sees, with a session's mesh in it: what a film of a session is taken of.
+"""An off-screen window with the mesh of a session, for films.
 
-Fixed vertices are grey and handles red.  The camera is that of the package's pictures: it looks
-along the direction in which the model extends least, and projects in parallel.
+Fixed vertices are grey and handles red.  As in the package's pictures, the projection is parallel,
+and the camera looks along the shortest extent of the model.
 """
 
 from __future__ import annotations
@@ -21,30 +21,30 @@ from vtk_segdeform.session import Session
 
 from ..scene import SurfaceDisplay, View
 
-_MARGIN = 1.15  # more than what has to be seen: a body bends out of the way of its handles
-_SAMPLES = 8  # for smooth edges
+_MARGIN = 1.15  # of the view, as a bent mesh may reach beyond its handles
+_SAMPLES = 8  # per pixel, for smooth edges
 
 
 class OffScreen:
-    """An off-screen view of a session, to be used in a ``with``.
+    """An off-screen view of a session, as a context manager.
 
     Parameters
     ----------
     session : Session
-        Its mesh is shown in its pose.
+        The session whose current pose is shown.
     size : (width, height)
-        Pixels.
-    room : sequence of (k, 3) float
-        Places besides the mesh that the camera has to see.
+        In pixels.
+    in_view : sequence of (k, 3) float
+        Points besides the mesh that must be in view.
 
     Raises
     ------
     MissingDependencyError
-        If nothing can be rendered here.
+        If off-screen rendering is unavailable.
     """
 
     def __init__(
-        self, session: Session, size: tuple[int, int], *, room: Sequence[FloatArray] = ()
+        self, session: Session, size: tuple[int, int], *, in_view: Sequence[FloatArray] = ()
     ) -> None:
         require_offscreen()
         self._window = vtkRenderWindow()
@@ -61,7 +61,8 @@ class OffScreen:
         self.surface = SurfaceDisplay(self.view, session)
         self.surface.set_colours("film", _colours(session))
         rest = session.mesh.vertices
-        self._look(view_of(rest, session.vertices), np.concatenate([rest, session.vertices, *room]))
+        points = np.concatenate([rest, session.vertices, *in_view])
+        self._place_camera(view_of(rest, session.vertices), points)
 
     def __enter__(self) -> OffScreen:
         return self
@@ -75,19 +76,19 @@ class OffScreen:
         self.surface.remove()
         self._window.Finalize()
 
-    def _look(self, axes: FloatArray, points: FloatArray) -> None:
-        """Let the camera see all *points*; *axes* are rows to the right, up and towards it."""
-        seen = points @ axes.T
-        low, high = seen.min(axis=0), seen.max(axis=0)
-        width, height, _ = np.maximum(high - low, 1e-9 * np.ptp(seen))
-        across, along = self._window.GetSize()
+    def _place_camera(self, axes: FloatArray, points: FloatArray) -> None:
+        """Fit all *points* into the view; the rows of *axes* point right, up and to the camera."""
+        aligned = points @ axes.T
+        low, high = aligned.min(axis=0), aligned.max(axis=0)
+        width, height, _ = np.maximum(high - low, 1e-9 * np.ptp(aligned))
+        columns, rows = self._window.GetSize()
         centre = 0.5 * (low + high) @ axes
         camera = self.view.camera
         camera.SetFocalPoint(*centre)
         camera.SetPosition(*(centre + 3.0 * np.linalg.norm(high - low) * axes[2]))
         camera.SetViewUp(*axes[1])
         camera.ParallelProjectionOn()
-        camera.SetParallelScale(0.5 * _MARGIN * max(height, width * along / across))
+        camera.SetParallelScale(0.5 * _MARGIN * max(height, width * rows / columns))
         self.view.before_render(self.view.renderer.ResetCameraClippingRange)
 
 

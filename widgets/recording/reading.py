@@ -1,4 +1,4 @@
-"""A recording read whole, and checked, before anything of it is done."""
+"""Reading a recording: the whole file is checked before the first event is replayed."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from .limits import LARGEST_FILE, ReplayLimits
 from .transcript import TITLE, Entry, Steps, Ticks, Window, read_entry
 
 Moment = tuple[float, Entry, tuple[int, ...]]
-"""When, in seconds; what; and how many steps each solve was given at it."""
+"""A time in seconds, an entry, and the number of solver steps of each solve it caused."""
 
 
 def read_recording(
     source: str | os.PathLike[str] | Iterable[str], limits: ReplayLimits | None = None
 ) -> list[Moment]:
-    """Return what happened, line by line, for those that say something.
+    """Return the entries of a recording; empty lines and comments are skipped.
 
     Parameters
     ----------
@@ -31,8 +31,8 @@ def read_recording(
     Raises
     ------
     SessionError
-        If there is no such file, or a line is invalid or exceeds the limits; the text gives its
-        number.
+        If the file cannot be read, or a line is invalid or exceeds the limits; the message has
+        the number of the line.
     """
     limits = limits or ReplayLimits()
     name = "recording"
@@ -98,7 +98,7 @@ def _is_title(text: str) -> bool:
 
 
 def _with_steps(entries: list[tuple[float, Entry]]) -> list[Moment]:
-    """Return *entries*, each with the steps that are told after it."""
+    """Return *entries*, each with the numbers of steps recorded after it."""
     found: list[Moment] = []
     for moment, entry in entries:
         if not isinstance(entry, Steps):

@@ -1,9 +1,9 @@
-"""What hands did in a window, as plain text that does it again: for tests and for bug reports.
+"""Recordings of user input as plain text that can be replayed, for tests and for bug reports.
 
-One line is one event: when, in seconds; what; where, in pixels from the lower left corner; and
-what was held down.  `Timer` is one tick of the event loop or several.  A recording begins with
-the window and the camera, and has them again before a press if they changed, so that a replay is
-exact also where a program moved the camera.
+Each line is one event: the time in seconds, the name, the position in pixels from the lower left
+corner, and the modifier keys.  `Timer` stands for one or several ticks of the event loop.  A
+recording begins with the window and the camera.  It repeats them before a press if they have
+changed, so a replay is exact even if a program moved the camera.
 
     vtk_segdeform recording 1
     0.000 Window 800 600
@@ -14,13 +14,14 @@ exact also where a program moved the camera.
     2.310 Timer 3
     2.310 Steps 5
 
-Lines that are empty or begin with # say nothing.  `Steps` is how many steps of the solver there was
-time for: a replay gives it as many, and ends in the same pose also on a slower machine, to the
-last bit where numpy adds alike.  For the rest it tells only what the hands did: to replay it, begin
-with the session and the view that it began with.
+Empty lines and lines that begin with # are ignored.  `Steps` is the number of solver steps of one
+solve.  A replay uses the same number and ends in the same pose on any machine, bit by bit if numpy
+sums in the same order.  A recording holds input only: replay it with the session and the view it
+began with.
 
-A camera style that drags keeps all events from other observers, as a widget does by its abort
-flag; not from VTK's passive ones, which are called before everybody else.  The recorder is one.
+During a camera drag VTK's interactor style withholds all events from other observers, and a widget
+does so by its abort flag.  Neither affects VTK's passive observers, which are called first.  The
+recorder uses passive observers.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ from vtk_segdeform.errors import ArgumentError, SessionError
 from vtk_segdeform.files import replacing, require_place
 from vtk_segdeform.version import __version__
 
-from ..scene import View, on_steps, order_steps
+from ..scene import View, observe_steps, prescribe_steps
 from .confinement import confined
 from .limits import Clock, ReplayLimits
 from .reading import Moment, read_recording
@@ -51,18 +52,18 @@ _MOST_KEYS = 1000
 
 
 class Recorder:
-    """Writes down every event of a view, from when it is made until `stop`.
+    """Records every event of a view, from its construction until `stop`.
 
     Parameters
     ----------
     view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
-        Whose events.
+        The view to record.
     path : path, optional
-        A text file that each event is added to at once, so that it is there after a crash.
+        A text file to which each event is written at once, so that it survives a crash.
     keys : str
-        Letters and digits that a replay is to type first.
+        Letters and digits that a replay types first.
     skips : callable, optional
-        Tells of an `Input` whether to leave it out.
+        ``skips(input)`` returns whether to leave out an `Input`.
 
     Raises
     ------
@@ -84,7 +85,7 @@ class Recorder:
         self._skips = None if skips is None else as_callable(skips, "skips")
         self.lines: list[str] = []
         self._start = time.monotonic()
-        self._told: dict[type, Entry] = {}
+        self._last: dict[type, Entry] = {}  # the last recorded window and camera
         self._ticks = 0
         self._file: TextIO | None = None
         if path is not None:
@@ -92,28 +93,28 @@ class Recorder:
         self._write(TITLE)
         vtk = vtkVersion.GetVTKVersion()
         self._write(f"# vtk_segdeform {__version__}, VTK {vtk}, {sys.platform}")
-        self._tell_scene()
+        self._record_scene()
         x, y = self.view.interactor.GetEventPosition()
         for key, name in itertools.product(keys, ("KeyPress", "Char", "KeyRelease")):
-            self._tell(Input(name, x, y, key=key, code=ord(key)))
-        self._tags = [self._watch(name) for name in (*EVENTS, "Timer")]
-        self._stop_steps = on_steps(self.view.interactor, self._solves)
+            self._record(Input(name, x, y, key=key, code=ord(key)))
+        self._tags = [self._observe(name) for name in (*EVENTS, "Timer")]
+        self._stop_steps = observe_steps(self.view.interactor, self._on_steps)
 
     def stop(self) -> None:
-        """Write no more; the file is closed."""
+        """Stop recording and close the file."""
         if not self._tags:
             return
         for tag in self._tags:
             self.view.interactor.RemoveObserver(tag)
         self._tags = []
         self._stop_steps()
-        self._tell_ticks()
-        self._tell_scene()
+        self._record_ticks()
+        self._record_scene()
         if self._file is not None:
             self._file.close()
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write what was recorded so far to a text file; SessionError if that cannot be."""
+        """Write the recording so far to a text file; SessionError if that fails."""
         path = as_path(path)
         try:
             with replacing(path) as draft:
@@ -121,47 +122,47 @@ class Recorder:
         except OSError as fault:
             raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
 
-    def _watch(self, name: str) -> int:
+    def _observe(self, name: str) -> int:
         def called(*_: object) -> None:
             with self.view.guarded():
-                self._hear(name)
+                self._on_event(name)
 
         interactor = self.view.interactor
         tag: int = interactor.AddObserver(f"{name}Event", called)
         interactor.GetCommand(tag).SetPassiveObserver(True)
         return tag
 
-    def _hear(self, name: str) -> None:
+    def _on_event(self, name: str) -> None:
         if name == "Timer":
             self._ticks += 1
             return
         entry = Input.of(name, self.view.interactor)
         if self._skips is not None and self._skips(entry):
             return
-        self._tell_ticks()
-        if name.endswith("Press"):  # what follows depends on where the camera is
-            self._tell_scene()
-        self._tell(entry)
+        self._record_ticks()
+        if name.endswith("Press"):  # the effect of a drag depends on the camera
+            self._record_scene()
+        self._record(entry)
 
-    def _solves(self, steps: int) -> None:
+    def _on_steps(self, steps: int) -> None:
         with self.view.guarded():
-            self._tell_ticks()  # the last of them made it solve
-            self._tell(Steps(steps))
+            self._record_ticks()  # the last tick caused the solve
+            self._record(Steps(steps))
 
-    def _tell_ticks(self) -> None:
+    def _record_ticks(self) -> None:
         if self._ticks:
-            self._tell(Ticks(self._ticks))
+            self._record(Ticks(self._ticks))
             self._ticks = 0
 
-    def _tell_scene(self) -> None:
+    def _record_scene(self) -> None:
         if _is_closed(self.view.window):
             return
         for entry in (Window.of(self.view), Camera.of(self.view)):
-            if self._told.get(type(entry)) != entry:
-                self._told[type(entry)] = entry
-                self._tell(entry)
+            if self._last.get(type(entry)) != entry:
+                self._last[type(entry)] = entry
+                self._record(entry)
 
-    def _tell(self, entry: Entry) -> None:
+    def _record(self, entry: Entry) -> None:
         self._write(f"{time.monotonic() - self._start:.3f} {entry}")
 
     def _write(self, line: str) -> None:
@@ -179,10 +180,10 @@ def replay(
     pace: float = 0.0,
     busy: Callable[[], bool] | None = None,
 ) -> None:
-    """Do again in *view* what a `Recorder` wrote down.
+    """Replay in *view* a recording of a `Recorder`.
 
-    The whole of it is read and checked before the first event is sent.  It ends early if one of
-    the events closes the window.
+    The whole recording is checked before the first event is sent.  The replay ends early if an
+    event closes the window.
 
     A recording may come from an untrusted source.  Its keys therefore read and write files only in
     *folder*, whatever `DeformEditor.path` is, and *limits* bound the duration.
@@ -190,7 +191,7 @@ def replay(
     Parameters
     ----------
     view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
-        Where; with the same session as when it was recorded.
+        The view, with the session that the recording began with.
     source : path or iterable of str
         The file, or its lines.
     folder : path, optional
@@ -199,16 +200,17 @@ def replay(
     limits : ReplayLimits, optional
         By default 200,000 events, 300 seconds and windows of 16 million pixels.
     pace : float
-        1 for as fast as it was, 0.5 for twice as fast, long pauses cut short; 0 waits for nothing.
+        Factor of the recorded pauses: 1 is the original speed, 0.5 twice as fast, 0 without
+        pauses.  Pauses of more than 2 seconds are shortened.
     busy : callable, optional
-        Tells whether work goes on in the background; the next event then waits for its end, while
-        timers tick.
+        ``busy()`` returns whether a background job is running; the next event then waits for its
+        end, while timers tick.
 
     Raises
     ------
     SessionError
-        If there is no such file or folder, a line is invalid, or a limit is exceeded; the text
-        gives the number of the line and the limit.
+        If there is no such file or folder, a line is invalid, or a limit is exceeded; the message
+        has the number of the line and the limit.
     """
     view = View.of(view)
     limits = ReplayLimits() if limits is None else require(limits, ReplayLimits, "limits")
@@ -216,20 +218,20 @@ def replay(
         raise ArgumentError(f"pace must be a number, 0 or more; got {shown(pace)}")
     if busy is not None:
         as_callable(busy, "busy")
-    place = None if folder is None else as_path(folder, "folder")
-    if place is not None and not os.path.isdir(place):
-        raise SessionError(f"{place}: there is no such folder to replay into")
+    directory = None if folder is None else as_path(folder, "folder")
+    if directory is not None and not os.path.isdir(directory):
+        raise SessionError(f"{directory}: no such folder; create it, or pass another one")
     moments = read_recording(source, limits)
     _require_short(moments, pace, limits.seconds)
     clock, tick = Clock(limits.seconds), Ticks(1)
     before = 0.0
-    with confined(view.interactor, place):
+    with confined(view.interactor, directory):
         for moment, entry, steps in moments:
             if busy is not None:
                 clock.wait_while(busy, lambda: tick.send(view))
             time.sleep(_pause(before, moment) * pace)
             before = moment
-            order_steps(view.interactor, steps)
+            prescribe_steps(view.interactor, steps)
             try:
                 for each in [tick] * entry.times if isinstance(entry, Ticks) else [entry]:
                     clock.check()
@@ -237,7 +239,7 @@ def replay(
                         return
                     each.send(view)
             finally:
-                order_steps(view.interactor, ())
+                prescribe_steps(view.interactor, ())
 
 
 def _require_short(moments: list[Moment], pace: float, seconds: float) -> None:
@@ -256,7 +258,7 @@ def _pause(before: float, moment: float) -> float:
 
 
 def _is_closed(window: Any) -> bool:
-    """Tell whether a window is gone; one that somebody still holds has lost what it drew with."""
+    """Return whether a window is gone or finalised."""
     return window is None or not (window.GetNeverRendered() or window.GetInitialized())
 
 

@@ -1,13 +1,13 @@
-"""The lines of a recording: what each kind says, how it is read, and how it is done again.
+"""The lines of a recording: writing, parsing and replaying each kind of entry.
 
     Window WIDTH HEIGHT
     Camera position X Y Z focus X Y Z up X Y Z angle A parallel 0|1 scale S range NEAR FAR
     MouseMove X Y [shift] [control] [alt] [key=NAME] [code=NUMBER]      and all other `EVENTS`
     Timer TIMES
-    Steps NUMBER                    the solver was given so many at the event before, or last tick
+    Steps NUMBER                    solver steps of a solve caused by the last event or tick
 
-A line is believed in nothing: names are those listed here, numbers finite and of a size that
-makes sense.  What can be read can be sent; nothing else is ever done.
+Lines are not trusted: only the names above are accepted, and numbers must be finite and within
+limits.  A replay does nothing but send these events.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any, Protocol
 from vtk_segdeform.errors import SessionError
 
 from ..scene import View
-from .words import finite, so_many, whole
+from .parsing import parse_float, parse_int, require_count
 
 TITLE = "vtk_segdeform recording 1"
 EVENTS = (
@@ -29,40 +29,41 @@ EVENTS = (
     "KeyPress", "Char", "KeyRelease", "Enter", "Leave",
 )  # fmt: skip
 
-_FARTHEST, _LARGEST, _MOST = 100_000, 16_384, 100_000  # pixels away, of a window; ticks
-_MOST_STEPS = 100
+_FARTHEST = 100_000  # pixels, of the pointer from the window's corner
+_LARGEST = 16_384  # pixels, width or height of the window
+_MOST_TICKS, _MOST_STEPS = 100_000, 100
 
 
 class Entry(Protocol):
     """One line, without its time."""
 
     def send(self, view: View) -> None:
-        """Do in *view* what the line says."""
+        """Replay the line in *view*."""
 
 
 @dataclass(frozen=True)
 class Window:
-    """How large the window is, in pixels."""
+    """The size of the window in pixels."""
 
     width: int
     height: int
 
     @classmethod
     def of(cls, view: View) -> Window:
-        """Return that of *view*."""
+        """Return the size of the window of *view*."""
         return cls(*view.window.GetSize())
 
     @classmethod
     def read(cls, words: list[str]) -> Window:
-        """Return what the *words* after the name say."""
-        width, height = (whole(word, 1, _LARGEST) for word in so_many(words, 2))
+        """Parse the *words* after the name."""
+        width, height = (parse_int(word, 1, _LARGEST) for word in require_count(words, 2))
         return cls(width, height)
 
     def __str__(self) -> str:
         return f"Window {self.width} {self.height}"
 
     def send(self, view: View) -> None:
-        """Make the window this large; SessionError if it cannot be."""
+        """Resize the window; SessionError if it keeps another size."""
         wanted = self.width, self.height
         if tuple(view.window.GetSize()) == wanted:
             return
@@ -71,14 +72,14 @@ class Window:
         found = tuple(view.window.GetSize())
         if found != wanted:
             raise SessionError(
-                f"the recorded window has {wanted[0]} x {wanted[1]} pixels, and this one stays at "
-                f"{found[0]} x {found[1]}; replay it in a window of that size"
+                f"the recorded window has {wanted[0]} x {wanted[1]} pixels, but this window stays "
+                f"at {found[0]} x {found[1]}; replay in a window of the recorded size"
             )
 
 
 @dataclass(frozen=True)
 class Camera:
-    """Where it stands and how it looks."""
+    """The state of the camera."""
 
     position: tuple[float, ...]
     focus: tuple[float, ...]
@@ -90,54 +91,59 @@ class Camera:
 
     @classmethod
     def of(cls, view: View) -> Camera:
-        """Return that of *view*."""
-        eye = view.camera
-        one = eye.GetViewAngle(), eye.GetParallelProjection(), eye.GetParallelScale()
-        angle, parallel, scale = ((float(value),) for value in one)
-        places = eye.GetPosition(), eye.GetFocalPoint(), eye.GetViewUp()
-        return cls(*places, angle, parallel, scale, eye.GetClippingRange())
+        """Return the camera of *view*."""
+        camera = view.camera
+        values = camera.GetViewAngle(), camera.GetParallelProjection(), camera.GetParallelScale()
+        angle, parallel, scale = ((float(value),) for value in values)
+        vectors = camera.GetPosition(), camera.GetFocalPoint(), camera.GetViewUp()
+        return cls(*vectors, angle, parallel, scale, camera.GetClippingRange())
 
     @classmethod
     def read(cls, words: list[str]) -> Camera:
-        """Return what the *words* after the name say."""
+        """Parse the *words* after the name."""
         found = {}
         for field, n in zip(fields(cls), (3, 3, 3, 1, 1, 1, 2), strict=True):
             if words[:1] != [field.name] or len(words) <= n:
-                raise ValueError(f"a camera needs {field.name!r} and {n} numbers here")
-            found[field.name] = tuple(finite(word) for word in words[1 : n + 1])
+                raise ValueError(
+                    f"expected {field.name!r} and {n} numbers; got {' '.join(words)[:60]!r}"
+                )
+            found[field.name] = tuple(parse_float(word) for word in words[1 : n + 1])
             words = words[n + 1 :]
-        so_many(words, 0)
+        require_count(words, 0)
         camera = cls(**found)
         near, far = camera.range
         sound = camera.position != camera.focus and any(camera.up) and camera.scale[0] > 0.0
         if not (sound and 0.0 < near < far and 0.0 < camera.angle[0] < 180.0):
-            raise ValueError("no camera can stand like this")
+            raise ValueError(
+                "invalid camera: position and focus must differ, up and scale must not be 0, angle "
+                "must be between 0 and 180, and range must be positive and increasing"
+            )
         return camera
 
     def __str__(self) -> str:
-        told = (
+        parts = (
             f"{field.name} {' '.join(repr(float(x)) for x in getattr(self, field.name))}"
             for field in fields(self)
         )
-        return f"Camera {' '.join(told)}"
+        return f"Camera {' '.join(parts)}"
 
     def send(self, view: View) -> None:
-        """Put the camera there."""
-        eye, now = view.camera, Camera.of(view)
-        # Only what differs: VTK makes `up` a unit vector anew, and another in its last digit.
-        for name, put in (
-            ("position", eye.SetPosition), ("focus", eye.SetFocalPoint), ("up", eye.SetViewUp),
-            ("angle", eye.SetViewAngle), ("parallel", lambda on: eye.SetParallelProjection(on > 0)),
-            ("scale", eye.SetParallelScale), ("range", eye.SetClippingRange),
+        """Set the camera of *view*."""
+        to, now = view.camera, Camera.of(view)
+        # Only changed values: VTK normalises `up` whenever it is set, which changes its last digit.
+        for name, set_value in (
+            ("position", to.SetPosition), ("focus", to.SetFocalPoint), ("up", to.SetViewUp),
+            ("angle", to.SetViewAngle), ("parallel", lambda on: to.SetParallelProjection(on > 0)),
+            ("scale", to.SetParallelScale), ("range", to.SetClippingRange),
         ):  # fmt: skip
             if getattr(now, name) != getattr(self, name):
-                put(*getattr(self, name))
-        view.touch()
+                set_value(*getattr(self, name))
+        view.request_render()
 
 
 @dataclass(frozen=True)
 class Input:
-    """Something that the mouse or the keyboard did."""
+    """An event of the mouse or the keyboard."""
 
     name: str
     x: int
@@ -146,37 +152,37 @@ class Input:
     control: bool = False
     alt: bool = False
     key: str | None = None
-    code: int = 0  # of the character that the key writes
+    code: int = 0  # of the character of the key
 
     @classmethod
     def of(cls, name: str, interactor: Any) -> Input:
-        """Return the event that *interactor* is telling its observers."""
+        """Return the current event of *interactor*."""
         x, y = interactor.GetEventPosition()
-        asked = interactor.GetShiftKey, interactor.GetControlKey, interactor.GetAltKey
-        shift, control, alt = (bool(held()) for held in asked)
+        modifiers = interactor.GetShiftKey(), interactor.GetControlKey(), interactor.GetAltKey()
+        shift, control, alt = map(bool, modifiers)
         key, code = None, 0
         if "Key" in name or name == "Char":
             symbol, code = interactor.GetKeySym() or "", ord(interactor.GetKeyCode() or "\0")
             key = symbol if symbol.split() == [symbol] else None
-            code = code if code < 128 else 0  # the symbol says it
+            code = code if code < 128 else 0  # the key symbol suffices
         return cls(name, x, y, shift, control, alt, key, code)
 
     @classmethod
     def read(cls, name: str, words: list[str]) -> Input:
-        """Return what the *words* after the name say."""
-        x, y = (whole(word, -_FARTHEST, _FARTHEST) for word in so_many(words[:2], 2))
-        held: dict[str, Any] = {}
+        """Parse the *words* after the name."""
+        x, y = (parse_int(word, -_FARTHEST, _FARTHEST) for word in require_count(words[:2], 2))
+        keys: dict[str, Any] = {}
         for word in words[2:]:
-            what, _, value = word.partition("=")
+            option, _, value = word.partition("=")
             if word in ("shift", "control", "alt"):
-                held[word] = True
-            elif what == "key" and value:
-                held["key"] = value
-            elif what == "code":
-                held["code"] = whole(value, 0, 127)
+                keys[word] = True
+            elif option == "key" and value:
+                keys["key"] = value
+            elif option == "code":
+                keys["code"] = parse_int(value, 0, 127)
             else:
-                raise ValueError(f"{word!r} is nothing that can be held down")
-        return cls(name, x, y, **held)
+                raise ValueError(f"{word!r} is not shift, control, alt, key=NAME or code=NUMBER")
+        return cls(name, x, y, **keys)
 
     def __str__(self) -> str:
         words = [self.name, str(self.x), str(self.y)]
@@ -185,7 +191,7 @@ class Input:
         return " ".join(words)
 
     def send(self, view: View) -> None:
-        """Have it happen again."""
+        """Send the event again."""
         to = view.interactor
         to.SetEventInformation(
             self.x, self.y, self.control, self.shift, chr(self.code), 0, self.key
@@ -196,7 +202,7 @@ class Input:
 
 @dataclass(frozen=True)
 class Ticks:
-    """Timers that went off, one after the other."""
+    """Consecutive timer events."""
 
     times: int
 
@@ -204,14 +210,14 @@ class Ticks:
         return f"Timer {self.times}"
 
     def send(self, view: View) -> None:
-        """Let them go off again."""
+        """Send the timer events again."""
         for _ in range(self.times):
             view.interactor.InvokeEvent("TimerEvent")
 
 
 @dataclass(frozen=True)
 class Steps:
-    """How many the solver was given at the event before; a replay orders them before it."""
+    """The number of solver steps of a solve during the last event; prescribed before the event."""
 
     number: int
 
@@ -219,15 +225,15 @@ class Steps:
         return f"Steps {self.number}"
 
     def send(self, view: View) -> None:
-        """Do nothing by itself."""
+        """Do nothing; see `step_budget.prescribe_steps`."""
 
 
 def read_entry(text: str) -> tuple[float, Entry]:
-    """Return the time and the meaning of a line; ValueError says what is wrong with it."""
+    """Parse a line into its time and its entry; a ValueError describes the fault."""
     moment, *words = text.split()
     if not words:
         raise ValueError(f"expected a time and an event; got {text[:60]!r}")
-    time, name, rest = finite(moment), words[0], words[1:]
+    time, name, rest = parse_float(moment), words[0], words[1:]
     if name in EVENTS:
         return time, Input.read(name, rest)
     if name == "Window":
@@ -235,7 +241,7 @@ def read_entry(text: str) -> tuple[float, Entry]:
     if name == "Camera":
         return time, Camera.read(rest)
     if name == "Timer":
-        return time, Ticks(whole(so_many(rest, 1)[0], 1, _MOST))
+        return time, Ticks(parse_int(require_count(rest, 1)[0], 1, _MOST_TICKS))
     if name == "Steps":
-        return time, Steps(whole(so_many(rest, 1)[0], 1, _MOST_STEPS))
-    raise ValueError(f"{name[:40]!r} is no event of a recording")
+        return time, Steps(parse_int(require_count(rest, 1)[0], 1, _MOST_STEPS))
+    raise ValueError(f"{name[:40]!r} is not an event of a recording")

@@ -3,11 +3,11 @@
 The files, in reading order:
 
     region_selector    `RegionSelector`
-    strokes            brush, lasso, box and other tools
-    roles              what a stroke makes of the selected vertices
-    region_colours     their colours on the mesh
-    brush_ring         the ring of the brush on the surface
-    outline            the outline of a lasso or box
+    strokes            brush, lasso, rectangle and connected part
+    paint_target       the region, fixed vertices or handle to which a stroke adds vertices
+    region_colours     the colours of regions, fixed vertices and handles on the mesh
+    brush_ring         the radius of the brush as a ring on the surface
+    outline            the outline of a lasso or a rectangle
 """
 
 from .region_colours import RegionColours

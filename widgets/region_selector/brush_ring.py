@@ -1,4 +1,4 @@
-"""How far a brush reaches, as a ring that lies on the surface, hidden where the surface is."""
+"""The radius of the brush as a ring on the surface."""
 
 from __future__ import annotations
 
@@ -16,14 +16,16 @@ from vtk_segdeform.pictures import INK, rgb
 
 from ..scene import SurfaceDisplay
 
-_DESIGNED_FOR = 600  # pixels of height; lines are wider in a higher window
-_RIM, _LINE = 5.5, 2.5  # pixels
-_STEEP = 4.0  # pixels: half a line must not sink into a surface that rises beside it
-_IN_FRONT = (10.0, 40.0)  # units of depth: the rim of the surface, and the line of its rim
+_DESIGN_HEIGHT = 600  # pixels; lines are wider in a higher window
+_RIM_WIDTH, _LINE_WIDTH = 5.5, 2.5  # pixels
+# Polygon offsets towards the camera.  By slope: half the width of the line must stay in front of a
+# steep surface.  In units of depth: the rim is drawn over the surface, the line over the rim.
+_SLOPE_OFFSET = 4.0
+_UNIT_OFFSETS = (10.0, 40.0)
 
 
 class BrushRing:
-    """The line on which some distance along the surface is reached; nothing until `draw`.
+    """The line of constant distance along the surface; invisible until `draw`.
 
     Parameters
     ----------
@@ -34,15 +36,15 @@ class BrushRing:
     def __init__(self, surface: SurfaceDisplay) -> None:
         self._surface = surface
         self._ring = vtkPolyData()
-        self._actors = [self._actor(nearer) for nearer in _IN_FRONT]
+        self._actors = [self._actor(offset) for offset in _UNIT_OFFSETS]
 
     def draw(self, distance: FloatArray, radius: float, colour: NDArray[np.uint8]) -> None:
-        """Draw the ring with a dark rim, seen on any ground.
+        """Draw the ring with a dark rim, visible on any background.
 
         Parameters
         ----------
         distance : (n,) float
-            Of each vertex, known for those within *radius* and their neighbours.
+            Of each vertex; finite at least within *radius* and at the neighbours.
         radius : float
             In the mesh's unit.
         colour : (3,) uint8
@@ -58,46 +60,46 @@ class BrushRing:
         )
         self._ring.SetPoints(points)
         self._ring.SetLines(lines)
-        scale = np.clip(self._surface.view.renderer.GetSize()[1] / _DESIGNED_FOR, 0.7, 3.0)
-        shades, widths = (rgb(INK), colour), (_RIM, _LINE)
+        scale = np.clip(self._surface.view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.7, 3.0)
+        shades, widths = (rgb(INK), colour), (_RIM_WIDTH, _LINE_WIDTH)
         for actor, shade, width in zip(self._actors, shades, widths, strict=True):
             actor.GetProperty().SetColor(*(shade / 255.0))
             actor.GetProperty().SetLineWidth(float(scale * width))
         self._show(True)
 
     def hide(self) -> None:
-        """Show nothing."""
+        """Hide the ring."""
         if self._actors[0].GetVisibility():
             self._show(False)
 
     def remove(self) -> None:
-        """Take the ring out of the view, for good."""
+        """Remove the ring from the view permanently."""
         for actor in self._actors:
             self._surface.view.renderer.RemoveActor(actor)
 
     def _show(self, visible: bool) -> None:
         for actor in self._actors:
             actor.SetVisibility(visible)
-        self._surface.view.touch()
+        self._surface.view.request_render()
 
-    def _actor(self, nearer: float) -> Any:
+    def _actor(self, offset: float) -> Any:
         mapper = vtkPolyDataMapper()
         mapper.SetInputData(self._ring)
-        mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-_STEEP, -nearer)
+        mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-_SLOPE_OFFSET, -offset)
         actor = vtkActor()
         actor.SetMapper(mapper)
         actor.GetProperty().LightingOff()
         actor.PickableOff()
-        actor.UseBoundsOff()  # the mesh has them already
+        actor.UseBoundsOff()  # the mesh has the same bounds
         actor.VisibilityOff()
         self._surface.view.renderer.AddActor(actor)
         return actor
 
 
 def contour(vertices: FloatArray, faces: IntArray, values: FloatArray, level: float) -> FloatArray:
-    """Return the pieces (k, 2, 3) of the line on which *values* (n,), linear between, are *level*.
+    """Return the segments (k, 2, 3) of the contour line at *level* of *values* (n,).
 
-    Each triangle with corners both up to *level* and above it has one of them.
+    Values are interpolated linearly.  Each triangle with corners on both sides has one segment.
     """
     below = values <= level
     a, b, c = (below[corner] for corner in faces.T)
@@ -105,6 +107,6 @@ def contour(vertices: FloatArray, faces: IntArray, values: FloatArray, level: fl
     i, j = faces, faces[:, [1, 2, 0]]
     crossed = (values[i] <= level) != (values[j] <= level)  # two sides of each triangle
     i, j = i[crossed], j[crossed]
-    share = (level - values[i]) / (values[j] - values[i])
-    places = vertices[i] + share[:, None] * (vertices[j] - vertices[i])
-    return np.asarray(places.reshape(-1, 2, 3))
+    fraction = (level - values[i]) / (values[j] - values[i])
+    points = vertices[i] + fraction[:, None] * (vertices[j] - vertices[i])
+    return np.asarray(points.reshape(-1, 2, 3))

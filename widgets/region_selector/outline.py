@@ -1,4 +1,4 @@
-"""A closed line over the picture, dark with a light rim, so that it is seen on any ground."""
+"""The outline of a lasso or a rectangle: dark with a light rim, visible on any background."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from vtk_segdeform.pictures import INK, PAPER, rgb
 
 from ..scene import View
 
-_DESIGNED_FOR = 600  # pixels of height; lines are wider in a higher window
+_DESIGN_HEIGHT = 600  # pixels; lines are wider in a higher window
 _WIDTHS = ((PAPER, 4.0), (INK, 1.5))  # pixels
 
 
 class Outline:
-    """A lasso or a rectangle being drawn; nothing until `draw`.
+    """A closed line in the display; invisible until `draw`.
 
     Parameters
     ----------
     view : View
-        Over which it lies.
+        The view to draw in.
     """
 
     def __init__(self, view: View) -> None:
@@ -43,14 +43,14 @@ class Outline:
     def draw(self, corners: FloatArray) -> None:
         """Draw the closed line through *corners* (k, 2), pixels of the window."""
         origin = np.array(self._view.renderer.GetOrigin(), dtype=float)
-        places = np.column_stack([corners - origin, np.zeros(len(corners))])
+        positions = np.column_stack([corners - origin, np.zeros(len(corners))])
         points = vtkPoints()
-        points.SetData(numpy_to_vtk(places, deep=True))
+        points.SetData(numpy_to_vtk(positions, deep=True))
         cells = vtkCellArray()
         cells.InsertNextCell(len(corners) + 1)
         for k in [*range(len(corners)), 0]:
             cells.InsertCellPoint(k)
-        scale = float(np.clip(self._view.renderer.GetSize()[1] / _DESIGNED_FOR, 0.7, 3.0))
+        scale = float(np.clip(self._view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.7, 3.0))
         for actor, (_, width) in zip(self._actors, _WIDTHS, strict=True):
             actor.GetProperty().SetLineWidth(scale * width)
         self._line.SetPoints(points)
@@ -58,15 +58,15 @@ class Outline:
         self._show(True)
 
     def hide(self) -> None:
-        """Show nothing."""
+        """Hide the line."""
         self._show(False)
 
     def remove(self) -> None:
-        """Take the line out of the view, for good."""
+        """Remove the line from the view permanently."""
         for actor in self._actors:
             self._view.renderer.RemoveViewProp(actor)
 
     def _show(self, visible: bool) -> None:
         for actor in self._actors:
             actor.SetVisibility(visible)
-        self._view.touch()
+        self._view.request_render()

@@ -1,8 +1,8 @@
-"""Regions, fixed vertices and handles as colours of the mesh.
+"""Regions, fixed vertices and handles as vertex colours.
 
-Regions have the colours of the palette, in equal shares where they overlap, so that a stroke is
-seen as far as it went; blend weights fade towards its border.  On top lie fixed vertices, grey,
-and handles, red; and on top of all the preview of a stroke.
+Regions have the colours of the palette.  Where regions overlap their colours are mixed in equal
+parts, not by blend weight: weights fade towards the border of a region, which would hide how far a
+stroke went.  Fixed vertices are grey, handles red, and the preview of a stroke covers everything.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from vtk_segdeform.session import Change
 from ..scene import SurfaceDisplay
 
 LAYER = "regions"
-_STRONG = 0.9  # of a preview's colour; the rest is what lies under it
+_PREVIEW_OPACITY = 0.9
 
 
 class RegionColours:
-    """A layer of colours over a surface; shown from the start.
+    """A colour layer of a surface, visible at once.
 
     Parameters
     ----------
@@ -34,27 +34,27 @@ class RegionColours:
         self._session = surface.session
         self._shown = True
         self._preview: tuple[BoolArray, NDArray[np.uint8]] | None = None
-        self._base = self._mixed()
+        self._base = self._base_colours()
         self._stop = self._session.on_change(self._changed)
         self._draw()
 
     @property
     def is_shown(self) -> bool:
-        """Whether the mesh has these colours, unless a newer layer covers them."""
+        """Whether the layer is shown; a newer layer may cover it."""
         return self._shown
 
     def show(self) -> None:
-        """Colour the mesh."""
+        """Show the layer."""
         self._shown = True
         self._draw()
 
     def hide(self) -> None:
-        """Leave the mesh as it is."""
+        """Hide the layer."""
         self._shown = False
         self._draw()
 
     def preview(self, vertices: BoolArray | None, colour: NDArray[np.uint8] | None = None) -> None:
-        """Show some *vertices*, a mask (n,), in a *colour* (3,) of 0 to 255; None ends it."""
+        """Show *vertices*, a mask (n,), in a *colour* (3,) of 0 to 255; None ends the preview."""
         if vertices is None and self._preview is None:
             return
         if vertices is None or colour is None:
@@ -64,16 +64,17 @@ class RegionColours:
         self._draw()
 
     def remove(self) -> None:
-        """Take the colours off the surface, for good."""
+        """Remove the layer from the surface permanently."""
         self._stop()
         self._surface.set_colours(LAYER, None)
 
     def _changed(self, change: Change) -> None:
         if change & (Change.REGIONS | Change.CONSTRAINTS):
-            self._base = self._mixed()
+            self._base = self._base_colours()
             self._draw()
 
-    def _mixed(self) -> NDArray[np.float64]:
+    def _base_colours(self) -> NDArray[np.float64]:
+        """Return the (n, 3) colours without the preview."""
         session = self._session
         if session.regions is None:
             colours = np.tile(rgb(BODY).astype(float), (session.mesh.n_vertices, 1))
@@ -94,5 +95,5 @@ class RegionColours:
         if self._preview is not None:
             vertices, colour = self._preview
             colours = colours.copy()
-            colours[vertices] += _STRONG * (colour - colours[vertices])
+            colours[vertices] += _PREVIEW_OPACITY * (colour - colours[vertices])
         self._surface.set_colours(LAYER, np.rint(colours).astype(np.uint8))

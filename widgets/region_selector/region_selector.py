@@ -1,15 +1,16 @@
-"""Paint regions, what stays fixed, and handles, on the mesh with the mouse.
+"""Painting of regions, fixed vertices and handles on the mesh with the mouse.
 
-A stroke adds to what is painted, with Control held it subtracts; what would change is shown while
-it goes on, and the release makes one undo step of it.  Escape ends it with nothing changed.
+A stroke adds vertices; with Control held it erases.  The vertices to change are previewed during
+the stroke, the release records one undo step, and Escape cancels.
 
-brush, component    a press beside the mesh is left to the camera
-lasso, rectangle    begin anywhere; with Shift held the press is left to the camera, of any tool
-``[``  ``]``        smaller, larger brush; so does the wheel over the mesh.  Beside it, and with
-                    Shift or Control held, the wheel zooms as ever.
+brush, component    a press beside the mesh moves the camera
+lasso, rectangle    start anywhere in the view
+all tools           a press with Shift held moves the camera
+``[``  ``]``        smaller, larger brush; the wheel over the mesh does the same.  Beside the mesh,
+                    or with Shift or Control held, the wheel zooms.
 
-Other regions put the pose to rest, as they do in `Session`; fixed vertices and handles keep it.
-What a stroke leaves alone is told in `roles`.
+A change of regions resets the pose, as in `Session`; fixed vertices and handles keep it.
+`PaintTarget` says which vertices a stroke skips.
 """
 
 from __future__ import annotations
@@ -29,41 +30,43 @@ from ..picking import Picker
 from ..scene import Gesture, Phase, Pointer, SurfaceDisplay, Widget
 from .brush_ring import BrushRing
 from .outline import Outline
+from .paint_target import Paint, PaintTarget, dominant_region
 from .region_colours import RegionColours
-from .roles import Paint, Role, heaviest
-from .strokes import Brush, Component, Lasso, Rectangle, Stroke, Tool, under
+from .strokes import Brush, Component, Lasso, Rectangle, Stroke, Tool, hits_at
 
 __all__ = ["Paint", "RegionSelector", "Tool"]
 
-_RADIUS = 0.05  # of the mesh's diagonal, at first
-_SMALLEST, _LARGEST = 1e-4, 2.0  # of the diagonal
-_LARGER = 1.2  # by a click of the wheel or a key
+_RADIUS = 0.05  # the initial radius, in diagonals of the mesh
+_SMALLEST, _LARGEST = 1e-4, 2.0  # in diagonals
+_GROWTH = 1.2  # factor for one click of the wheel or one key press
 
 
 class RegionSelector(Widget):
-    """Brush, lasso, rectangle and whole components, for regions, fixed vertices and handles.
+    """Paints regions, fixed vertices and handles with a brush, a lasso and other tools.
 
     Parameters
     ----------
     view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
-        Where it lives.  Call `remove` before its window closes.
+        The view to work in.  Call `remove` before its window closes.
     session : Session
-        What is painted.
+        The session to edit.
     surface : SurfaceDisplay, optional
-        The mesh in the view; by default one of its own.
+        The displayed mesh; by default the widget adds its own.
     colours : RegionColours, optional
-        What shows the regions on *surface*, and what a stroke would change; by default its own.
+        The region colours of *surface*, also used for the preview; by default the widget adds its
+        own.
 
     Attributes
     ----------
     paints : Paint
-        What is painted.
+        Whether strokes paint a region, fixed vertices or a handle.
     region : int
-        Which region; one more than there are makes a new one.
+        The region to paint; the number of regions stands for a new one.
     handle : str or None
-        Which handle, also one that is still to come; None makes a new one, and is then its name.
+        The handle to paint, which need not exist yet.  With None, the next stroke creates a handle
+        and sets its name here.
     through : bool
-        Whether what is hidden is painted too, as if the body were of glass.
+        Whether hidden vertices are painted too (X-ray).
     """
 
     def __init__(
@@ -84,32 +87,32 @@ class RegionSelector(Widget):
         self.through = False
         self._tool = Tool.BRUSH
         self._radius = _RADIUS * session.mesh.diagonal
-        self._own: list[Callable[[], None]] = []  # what was made here goes from here, last first
+        self._cleanup: list[Callable[[], None]] = []  # called in reverse order by `remove`
         if surface is None:
             surface = SurfaceDisplay(self.view, session)
-            self._own.append(surface.remove)
+            self._cleanup.append(surface.remove)
         if colours is None:
             colours = RegionColours(surface)
-            self._own.append(colours.remove)
+            self._cleanup.append(colours.remove)
         self.surface, self.colours = surface, colours
         self._picker = Picker(surface)
         self._ring, self._outline = BrushRing(surface), Outline(self.view)
-        self._own += [self._ring.remove, self._outline.remove, session.on_change(self._changed)]
+        self._cleanup += [self._ring.remove, self._outline.remove, session.on_change(self._changed)]
 
     @property
     def tool(self) -> Tool:
-        """With what is painted; a stroke goes on with what it began with."""
+        """The tool of the next stroke."""
         return self._tool
 
     @tool.setter
     def tool(self, tool: Tool) -> None:
         self._tool = require(tool, Tool, "tool")
         self._ring.hide()
-        self._tell("ModifiedEvent")
+        self._invoke("ModifiedEvent")
 
     @property
     def radius(self) -> float:
-        """How far the brush reaches along the surface, in the mesh's unit."""
+        """The radius of the brush along the surface, in the mesh's unit."""
         return self._radius
 
     @radius.setter
@@ -117,58 +120,57 @@ class RegionSelector(Widget):
         if not (is_number(radius) and radius > 0.0):
             raise ArgumentError(f"radius must be above 0; got {shown(radius)}")
         self._radius = radius
-        self._tell("ModifiedEvent")
+        self._invoke("ModifiedEvent")
 
     def grow(self) -> None:
-        """Add one ring of neighbours to what is painted."""
-        self.handle = self._role.give(self._next_to(self._role.members()))
+        """Add one ring of neighbours to the painted region, fixed vertices or handle."""
+        self.handle = self._target.add(self._neighbours(self._target.members()))
 
     def shrink(self) -> None:
-        """Take the outermost ring of vertices out of what is painted."""
-        members = self._role.members()
-        self.handle = self._role.take(members & self._next_to(~members))
+        """Remove the outermost ring of the painted region, fixed vertices or handle."""
+        members = self._target.members()
+        self.handle = self._target.erase(members & self._neighbours(~members))
 
     def region_under_pointer(self) -> int | None:
-        """Return the region that weighs most where the pointer is; None beside the mesh."""
+        """Return the region of largest blend weight at the pointer, or None beside the mesh."""
         hit = self._picker.hit(self.view.pointer(Phase.HOVER))
         regions = self.session.regions
-        return None if hit is None or regions is None else heaviest(regions, hit.vertex)
+        return None if hit is None or regions is None else dominant_region(regions, hit.vertex)
 
     def remove(self) -> None:
-        """Take everything out of the view, for good."""
+        """Remove the widget from the view permanently."""
         self.Off()
-        while self._own:
-            self._own.pop()()
+        while self._cleanup:
+            self._cleanup.pop()()
 
-    # What the hands do.
-
+    # Events.
     def On(self) -> None:  # noqa: N802 - VTK's word
-        """Listen to the view."""
+        """Start handling events."""
         if not self.GetEnabled():
             super().On()
             self._stops.append(self.view.observe("LeaveEvent", self._ring.hide))
 
     def Off(self) -> None:  # noqa: N802
-        """Stop listening; an ongoing stroke is finished."""
+        """Stop handling events; finish an ongoing stroke."""
         try:
             super().Off()
         finally:
             self._ring.hide()
 
-    def begins(self, press: Pointer) -> Gesture | None:
-        """Begin a stroke with the tool; with Shift, or off the mesh, it is the camera's."""
-        stroke = None if press.shift else self._begun(press)
-        return None if stroke is None else self._follow(stroke, self._role, press.control)
+    def on_press(self, press: Pointer) -> Gesture | None:
+        """Start a stroke; pass the press to the camera with Shift or beside the mesh."""
+        stroke = None if press.shift else self._stroke_from(press)
+        return None if stroke is None else self._follow(stroke, self._target, press.control)
 
-    def hovers(self, pointer: Pointer) -> None:
-        """Show how far the brush would reach."""
+    def on_hover(self, pointer: Pointer) -> None:
+        """Show the ring of the brush."""
         if self.tool is Tool.BRUSH:
-            self._draw_ring(pointer, self._role, pointer.control)
+            self._draw_ring(pointer, self._target, pointer.control)
 
-    def wheels(self, pointer: Pointer, clicks: int) -> bool:
-        """Make the brush larger or smaller, over the mesh; with Shift or Control zoom."""
+    def on_wheel(self, pointer: Pointer, clicks: int) -> bool:
+        """Resize the brush over the mesh; pass the wheel to the camera with Shift or Control."""
         if self.is_grabbing:
-            return True  # a stroke is of one view and one radius
+            return True  # camera and radius stay the same during a stroke
         if self.tool is not Tool.BRUSH or pointer.shift or pointer.control:
             return False
         if self._picker.hit(pointer) is None:
@@ -176,8 +178,8 @@ class RegionSelector(Widget):
         self._resize(clicks, pointer)
         return True
 
-    def types(self, key: str, pointer: Pointer) -> bool:
-        """Make the brush smaller or larger."""
+    def on_key(self, key: str, pointer: Pointer) -> bool:
+        """Resize the brush with the bracket keys."""
         clicks = {"bracketleft": -1, "bracketright": +1}.get(key)
         if clicks is None or self.tool is not Tool.BRUSH:
             return False
@@ -187,7 +189,7 @@ class RegionSelector(Widget):
 
     # Strokes.
 
-    def _begun(self, press: Pointer) -> Stroke | None:
+    def _stroke_from(self, press: Pointer) -> Stroke | None:
         picker, through = self._picker, self.through
         if self.tool is Tool.LASSO:
             return Lasso(picker, press, through=through)
@@ -200,55 +202,57 @@ class RegionSelector(Widget):
             return Component(picker, hit.vertex)
         return Brush(picker, press, radius=self.radius, through=through)
 
-    def _follow(self, stroke: Stroke, role: Role, subtract: bool) -> Gesture:
-        """Show what *stroke* would change until the release, then change it."""
+    def _follow(self, stroke: Stroke, target: PaintTarget, erase: bool) -> Gesture:
+        """Preview the changes of *stroke* until the release, then apply them."""
         try:
-            self._preview(stroke, role, subtract)
+            self._preview(stroke, target, erase)
             while (pointer := (yield)).phase is Phase.MOVE:
                 stroke.extend(pointer)
-                self._preview(stroke, role, subtract)
+                self._preview(stroke, target, erase)
                 if isinstance(stroke, Brush):
-                    self._draw_ring(pointer, role, subtract)
+                    self._draw_ring(pointer, target, erase)
             if pointer.phase is Phase.RELEASE:
                 stroke.extend(pointer)
-                self._finish(stroke.mask, role, subtract)
+                self._apply(stroke.mask, target, erase)
         finally:
             self.colours.preview(None)
             self._outline.hide()
 
-    def _preview(self, stroke: Stroke, role: Role, subtract: bool) -> None:
-        changed = role.changed(stroke.mask, subtract=subtract)
-        self.colours.preview(changed, rgb(PAPER) if subtract else role.colour)
+    def _preview(self, stroke: Stroke, target: PaintTarget, erase: bool) -> None:
+        changed = target.changed(stroke.mask, erase=erase)
+        self.colours.preview(changed, rgb(PAPER) if erase else target.colour)
         if stroke.outline is not None:
             self._outline.draw(stroke.outline)
 
-    def _finish(self, vertices: BoolArray, role: Role, subtract: bool) -> None:
-        self.remark = role.remark(vertices, subtract=subtract)
+    def _apply(self, vertices: BoolArray, target: PaintTarget, erase: bool) -> None:
+        self.remark = target.remark(vertices, erase=erase)
         if vertices.any():
-            self.handle = role.take(vertices) if subtract else role.give(vertices)
+            self.handle = target.erase(vertices) if erase else target.add(vertices)
 
     @property
-    def _role(self) -> Role:
-        return Role(self.session, self.paints, self.region, self.handle)
+    def _target(self) -> PaintTarget:
+        return PaintTarget(self.session, self.paints, self.region, self.handle)
 
-    def _next_to(self, vertices: BoolArray) -> BoolArray:
+    def _neighbours(self, vertices: BoolArray) -> BoolArray:
+        """Return the vertices, (n,) bool, that share an edge with one of *vertices*."""
         return np.asarray(self.session.mesh.adjacency @ vertices.astype(float) > 0.0)
 
     # The ring.
 
     def _resize(self, clicks: int, pointer: Pointer) -> None:
-        smallest, largest = (share * self.session.mesh.diagonal for share in (_SMALLEST, _LARGEST))
-        self.radius = float(np.clip(self.radius * _LARGER**clicks, smallest, largest))
-        self._draw_ring(pointer, self._role, pointer.control)
+        diagonal = self.session.mesh.diagonal
+        radius = self.radius * _GROWTH**clicks
+        self.radius = float(np.clip(radius, _SMALLEST * diagonal, _LARGEST * diagonal))
+        self._draw_ring(pointer, self._target, pointer.control)
 
-    def _draw_ring(self, pointer: Pointer, role: Role, subtract: bool) -> None:
-        hits = under(self._picker, pointer, self.through) if self.view.contains(pointer) else []
+    def _draw_ring(self, pointer: Pointer, target: PaintTarget, erase: bool) -> None:
+        hits = hits_at(self._picker, pointer, self.through) if self.view.contains(pointer) else []
         if hits:
             distance = self._picker.distances(hits, self.radius)
-            self._ring.draw(distance, self.radius, rgb(PAPER) if subtract else role.colour)
+            self._ring.draw(distance, self.radius, rgb(PAPER) if erase else target.colour)
         else:
             self._ring.hide()
 
     def _changed(self, change: Change) -> None:
         if change & Change.POSE:
-            self._ring.hide()  # it lies where the surface was
+            self._ring.hide()  # the surface has moved away from it

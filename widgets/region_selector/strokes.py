@@ -1,11 +1,11 @@
-"""The tools that select vertices by one stroke of the pointer, and what each has selected so far.
+"""The tools that select vertices with one stroke of the pointer.
 
-brush       within a radius along the surface of what the pointer went over
-lasso       inside the line that was drawn
-rectangle   between the press and the pointer
-component   whatever is connected with what was pressed on
+brush       within a radius, along the surface, of the path of the pointer
+lasso       inside a drawn line
+rectangle   inside the rectangle from the press to the pointer
+component   the connected part under the press
 
-The first three select what is seen only, or right through the body as if it were glass.
+The first three select visible vertices only, or also hidden ones (X-ray).
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from vtk_segdeform.arrays import BoolArray, FloatArray
 from ..picking import Hit, Picker
 from ..scene import Phase, Pointer
 
-_APART = 0.3  # of the radius: between the places that a fast brush touches
-_MOST = 200  # such places between two moves of the mouse
-_LEAST = 3.0  # pixels: a narrower lasso or rectangle is a slip of the hand
+_SPACING = 0.3  # of the radius, between the dabs of a fast brush
+_MOST_DABS = 200  # between two mouse moves
+_LEAST_SIZE = 3.0  # pixels; a smaller lasso or rectangle is taken for a click
 
 
 class Tool(enum.Enum):
-    """With what vertices are selected."""
+    """The tool that selects vertices."""
 
     BRUSH = enum.auto()
     LASSO = enum.auto()
@@ -35,10 +35,10 @@ class Tool(enum.Enum):
 
 
 class Stroke(Protocol):
-    """A selection in the making; it begins with the press."""
+    """A selection in progress; it begins with the press."""
 
     def extend(self, pointer: Pointer) -> None:
-        """Go on to where *pointer* is."""
+        """Continue the stroke to *pointer*."""
 
     @property
     def mask(self) -> BoolArray:
@@ -46,13 +46,13 @@ class Stroke(Protocol):
 
     @property
     def outline(self) -> FloatArray | None:
-        """(k, 2) float: the closed line in the display that tells of it, if there is one."""
+        """(k, 2) float: the closed line to draw in the display, or None."""
 
 
 class Brush:
-    """What is within *radius*, in the mesh's unit, of where the pointer went over the surface.
+    """Selects the vertices within *radius*, in the mesh's unit, of the path of the pointer.
 
-    At least the nearest vertex, however small the radius.
+    At least the vertex nearest to each hit is selected, however small the radius.
     """
 
     outline = None
@@ -61,50 +61,51 @@ class Brush:
         self._picker = picker
         self._radius, self._through = radius, through
         self._last = press.position
-        self._gap = 1.0
-        self.mask = self._reached([press])
+        self._spacing = 1.0  # pixels between dabs
+        self.mask = self._covered([press])
 
     def extend(self, pointer: Pointer) -> None:
-        """Brush along a straight line, however fast the pointer went."""
-        way = pointer.position - self._last
-        steps = int(np.clip(np.ceil(np.linalg.norm(way) / self._gap), 1, _MOST))
-        places = self._last + way * (np.arange(1, steps + 1) / steps)[:, None]
+        """Brush along a straight line to *pointer*, without gaps after a fast move."""
+        path = pointer.position - self._last
+        dabs = int(np.clip(np.ceil(np.linalg.norm(path) / self._spacing), 1, _MOST_DABS))
+        positions = self._last + path * (np.arange(1, dabs + 1) / dabs)[:, None]
         self._last = pointer.position
-        self.mask = self.mask | self._reached([Pointer(Phase.MOVE, *p) for p in places.tolist()])
+        pointers = [Pointer(Phase.MOVE, *position) for position in positions.tolist()]
+        self.mask = self.mask | self._covered(pointers)
 
-    def _reached(self, pointers: list[Pointer]) -> BoolArray:
-        hits = [hit for pointer in pointers for hit in under(self._picker, pointer, self._through)]
+    def _covered(self, pointers: list[Pointer]) -> BoolArray:
+        hits = [hit for each in pointers for hit in hits_at(self._picker, each, self._through)]
         if hits:
-            self._gap = max(1.0, _APART * self._radius / self._picker.pixel_at(hits[-1]))
-        reached = self._picker.distances(hits, self._radius) <= self._radius
-        reached[[hit.vertex for hit in hits]] = True
-        return reached if self._through else self._picker.seen(reached)
+            self._spacing = max(1.0, _SPACING * self._radius / self._picker.pixel_at(hits[-1]))
+        covered = self._picker.distances(hits, self._radius) <= self._radius
+        covered[[hit.vertex for hit in hits]] = True
+        return covered if self._through else self._picker.visible(covered)
 
 
 class Lasso:
-    """What is inside a line that closes itself.
+    """Selects the vertices inside a line whose ends are connected automatically.
 
-    A vertex is inside if a ray from it crosses the line an odd number of times.  Each piece is
-    compared with the vertices once, when it is drawn; only the one that closes the line changes.
+    A vertex is inside if a ray from it crosses the line an odd number of times.  Each segment is
+    tested against the vertices once, when it is drawn; only the closing segment changes.
     """
 
     def __init__(self, picker: Picker, press: Pointer, *, through: bool) -> None:
-        self._x, self._y, _ = picker.places().T
+        self._x, self._y, _ = picker.display_points().T
         self._picker, self._through = picker, through
         self._corners = [press.position]
         self._odd = np.zeros(len(self._x), dtype=bool)
 
     def extend(self, pointer: Pointer) -> None:
-        """Draw on."""
+        """Continue the line to *pointer*."""
         self._odd ^= self._crossed(self._corners[-1], pointer.position)
         self._corners.append(pointer.position)
 
     @property
     def mask(self) -> BoolArray:
-        """(n,) bool: what the line goes round."""
+        """(n,) bool: the vertices inside."""
         inside = self._odd ^ self._crossed(self._corners[-1], self._corners[0])
-        inside &= _is_meant(self.outline)
-        return inside if self._through else self._picker.seen(inside)
+        inside &= _is_large_enough(self.outline)
+        return inside if self._through else self._picker.visible(inside)
 
     @property
     def outline(self) -> FloatArray:
@@ -112,33 +113,34 @@ class Lasso:
         return np.array(self._corners)
 
     def _crossed(self, a: FloatArray, b: FloatArray) -> BoolArray:
-        """Tell whether a ray to the right of each vertex crosses the piece from *a* to *b*."""
+        """Return (n,) bool: whether a ray to the right of a vertex crosses the segment a b."""
         between = np.flatnonzero((a[1] > self._y) != (b[1] > self._y))
-        share = (self._y[between] - a[1]) / (b[1] - a[1])  # none is between if this is 0
+        fraction = (self._y[between] - a[1]) / (b[1] - a[1])  # *between* is empty if b[1] == a[1]
         crossed = np.zeros(len(self._x), dtype=bool)
-        crossed[between] = self._x[between] < a[0] + share * (b[0] - a[0])
+        crossed[between] = self._x[between] < a[0] + fraction * (b[0] - a[0])
         return crossed
 
 
 class Rectangle:
-    """What is between the press and the pointer."""
+    """Selects the vertices in the rectangle from the press to the pointer."""
 
     def __init__(self, picker: Picker, press: Pointer, *, through: bool) -> None:
-        self._x, self._y, _ = picker.places().T
+        self._x, self._y, _ = picker.display_points().T
         self._picker, self._through = picker, through
         self._ends = np.array([press.position, press.position])
 
     def extend(self, pointer: Pointer) -> None:
-        """Draw the corner opposite the press to where *pointer* is."""
+        """Move the corner opposite the press to *pointer*."""
         self._ends[1] = pointer.position
 
     @property
     def mask(self) -> BoolArray:
-        """(n,) bool: what is inside; NaN, behind the camera, is not."""
+        """(n,) bool: the vertices inside; vertices behind the camera, NaN, are not."""
         (left, low), (right, high) = self._ends.min(axis=0), self._ends.max(axis=0)
         x, y = self._x, self._y
-        inside = (x >= left) & (x <= right) & (y >= low) & (y <= high) & _is_meant(self._ends)
-        return np.asarray(inside if self._through else self._picker.seen(inside))
+        inside = (x >= left) & (x <= right) & (y >= low) & (y <= high)
+        inside &= _is_large_enough(self._ends)
+        return np.asarray(inside if self._through else self._picker.visible(inside))
 
     @property
     def outline(self) -> FloatArray:
@@ -148,7 +150,7 @@ class Rectangle:
 
 
 class Component:
-    """What is connected with a vertex, its far side too."""
+    """Selects the connected part that contains a vertex, including its far side."""
 
     outline = None
 
@@ -156,15 +158,15 @@ class Component:
         self.mask = picker.component(vertex)
 
     def extend(self, pointer: Pointer) -> None:
-        """Stay with what was pressed on."""
+        """Keep the connected part under the press."""
         del pointer
 
 
-def under(picker: Picker, pointer: Pointer, through: bool) -> list[Hit]:
-    """Return what is under *pointer*: what is seen only, or all that a needle would go through."""
+def hits_at(picker: Picker, pointer: Pointer, through: bool) -> list[Hit]:
+    """Return the first hit of the line of sight at *pointer*, or with *through* all hits."""
     hits = picker.hits(pointer)
     return hits if through else hits[:1]
 
 
-def _is_meant(corners: FloatArray) -> bool:
-    return bool(np.ptp(corners, axis=0).min() >= _LEAST)
+def _is_large_enough(corners: FloatArray) -> bool:
+    return bool(np.ptp(corners, axis=0).min() >= _LEAST_SIZE)

@@ -1,40 +1,40 @@
-"""What all widgets are built on.
+"""The base of all widgets.
 
 The files, in reading order:
 
-    view               a renderer and its interactor, wherever they come from
+    view               a renderer with its interactor: callbacks, timers, rendering
     widget             the base class of the widgets
-    gestures           press, move, release as one generator
+    gestures           press, move and release as one generator
     surface_display    the mesh of a session as an actor
-    sight              projection between world and display
-    front              a renderer in front of another
+    projection         projection between world and display coordinates
+    foreground         a renderer that draws over another one
     labels             rectangles and text in display coordinates
-    wires              a triangle mesh as wires and points
-    pace               solver steps per event
+    wireframe          edges and vertices of a mesh
+    step_budget        solver steps per event, recorded and replayed
 """
 
 from .gestures import Gesture, Phase, Pointer
-from .labels import Panel, Words
-from .pace import Pace, on_steps, order_steps
-from .sight import Sight
+from .labels import Panel, Text
+from .projection import Projection
+from .step_budget import StepBudget, observe_steps, prescribe_steps
 from .surface_display import SurfaceDisplay
 from .view import Stop, View
 from .widget import Widget
-from .wires import Wires
+from .wireframe import Wireframe
 
 __all__ = [
     "Gesture",
-    "Pace",
     "Panel",
     "Phase",
     "Pointer",
-    "Sight",
+    "Projection",
+    "StepBudget",
     "Stop",
     "SurfaceDisplay",
+    "Text",
     "View",
     "Widget",
-    "Wires",
-    "Words",
-    "on_steps",
-    "order_steps",
+    "Wireframe",
+    "observe_steps",
+    "prescribe_steps",
 ]

@@ -1,7 +1,7 @@
-"""Press, move, release, told as one function; no toolkit in sight.
+"""Press, move and release as one generator function, independent of any toolkit.
 
-A gesture is a generator.  It begins at a press, is sent every `Pointer` that follows, and ends
-by returning; what happens from press to release is read from top to bottom:
+A gesture is a generator.  It starts at a press, receives every following `Pointer`, and ends
+when it returns.  The code from press to release reads from top to bottom:
 
     def stroke(press: Pointer) -> Gesture:
         painted = [press.position]
@@ -10,12 +10,12 @@ by returning; what happens from press to release is read from top to bottom:
         if pointer.phase is Phase.RELEASE:  # and not CANCEL
             keep(painted)
 
-`Grab` runs one gesture at a time.  Positions are those of the window, as VTK counts: pixels from
-its lower left corner.
+`Grab` runs one gesture at a time.  Positions are in pixels from the window's lower left corner,
+as in VTK.
 
 Source
 ------
-The manner is that of napari's mouse callbacks (napari contributors, https://napari.org).
+The design follows napari's mouse callbacks (napari contributors, https://napari.org).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from vtk_segdeform.arrays import FloatArray
 
 
 class Phase(enum.Enum):
-    """What the pointer does."""
+    """The kind of a pointer event."""
 
     HOVER = enum.auto()
     PRESS = enum.auto()
@@ -42,7 +42,7 @@ class Phase(enum.Enum):
 
 @dataclass(frozen=True)
 class Pointer:
-    """Where the pointer is, and what is held down."""
+    """A pointer event: its phase, its position, and the modifier keys."""
 
     phase: Phase
     x: float
@@ -60,47 +60,47 @@ Gesture = Generator[None, Pointer, None]
 
 
 class Grab:
-    """The gesture that has the pointer, if any.
+    """Runs the current gesture, if there is one.
 
-    A gesture that raises has lost the pointer; the exception goes on to whoever sent the event.
+    A gesture that raises has ended; the exception propagates to the sender of the event.
 
-    An event may arrive while the gesture is still handling another one, if a listener lets the
-    event loop run; it is queued until the gesture is ready for it.
+    An event may arrive while the gesture still handles another one, if a listener runs the event
+    loop.  It is queued until the gesture is ready.
     """
 
     def __init__(self) -> None:
         self._gesture: Gesture | None = None
         self._last: Pointer | None = None
-        self._waiting: deque[Pointer] = deque()
-        self._is_working = False
+        self._queue: deque[Pointer] = deque()
+        self._is_handling = False
 
     @property
     def is_active(self) -> bool:
-        """Whether a gesture is going on."""
+        """Whether a gesture is running."""
         return self._gesture is not None
 
     def begin(self, gesture: Gesture, press: Pointer) -> None:
-        """Run *gesture* until it waits for the next pointer; finish an ongoing one first."""
+        """Run *gesture* up to its first yield; finish a running one first."""
         self.finish()
         self._gesture, self._last = gesture, press
         self._advance(None)
 
     def send(self, pointer: Pointer) -> None:
-        """Tell the gesture of *pointer*; after a release or a cancel it has ended."""
-        if self._waiting and self._waiting[-1].phase is pointer.phase is Phase.MOVE:
-            self._waiting.pop()  # superseded by the later position
-        self._waiting.append(pointer)
-        if self._is_working:
+        """Send *pointer* to the gesture; a release or a cancel ends it."""
+        if self._queue and self._queue[-1].phase is pointer.phase is Phase.MOVE:
+            self._queue.pop()  # superseded by the later position
+        self._queue.append(pointer)
+        if self._is_handling:
             return
-        self._is_working = True
+        self._is_handling = True
         try:
-            while self._waiting:
-                self._pass_on(self._waiting.popleft())
+            while self._queue:
+                self._handle(self._queue.popleft())
         finally:
-            self._waiting.clear()
-            self._is_working = False
+            self._queue.clear()
+            self._is_handling = False
 
-    def _pass_on(self, pointer: Pointer) -> None:
+    def _handle(self, pointer: Pointer) -> None:
         if self._gesture is None:
             return
         self._last = pointer
@@ -111,11 +111,11 @@ class Grab:
             gesture.close()
 
     def finish(self) -> None:
-        """Finish the gesture, if there is one, as if the button had been released."""
+        """Finish a running gesture, as if the button had been released."""
         self._end(Phase.RELEASE)
 
     def cancel(self) -> None:
-        """End the gesture, if there is one, as if it had never begun."""
+        """Cancel a running gesture; it undoes its changes."""
         self._end(Phase.CANCEL)
 
     def _end(self, phase: Phase) -> None:
@@ -126,15 +126,15 @@ class Grab:
         gesture = self._gesture
         if gesture is None:
             return
-        going_on = False
+        is_running = False
         try:
             if pointer is None:
                 next(gesture)
             else:
                 gesture.send(pointer)
-            going_on = True
+            is_running = True
         except StopIteration:
             pass
         finally:
-            if not going_on and self._gesture is gesture:
+            if not is_running and self._gesture is gesture:
                 self._gesture = None

@@ -1,6 +1,6 @@
-"""Rectangles and words over a picture, placed in pixels from the lower left of a renderer.
+"""Rectangles and text, placed in pixels from the lower left corner of a renderer.
 
-They are drawn over everything else in their renderer.  The letters are those of VTK's own Arial.
+They are drawn over everything else in their renderer.  The font is VTK's built-in Arial.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import vtkmodules.vtkRenderingFreeType
-import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - without the two nothing flat is drawn
+import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - both are required to draw in 2D
 from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
@@ -17,7 +17,7 @@ from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D, vtkText
 
 from vtk_segdeform.pictures import rgb
 
-_DOTS_PER_INCH = 72.0  # at which a letter of size 12 is 12 pixels high
+_DOTS_PER_INCH = 72.0  # the resolution at which font size 12 is 12 pixels
 
 
 class Panel:
@@ -26,13 +26,13 @@ class Panel:
     Parameters
     ----------
     renderer : vtkRenderer
-        Where it is drawn.
+        The renderer to draw in.
     colour : str
         "#RRGGBB".
     opacity : float
         0 to 1.
     layer : int
-        Of two that overlap, the one of the higher layer is seen.
+        Higher layers are drawn over lower ones.
     """
 
     def __init__(self, renderer: Any, colour: str, *, opacity: float = 1.0, layer: int = 0) -> None:
@@ -51,44 +51,44 @@ class Panel:
         self._actor.SetLayerNumber(layer)
         self._actor.PickableOff()
         self._actor.GetProperty().SetOpacity(opacity)
-        self.colour(colour)
+        self.set_colour(colour)
         renderer.AddViewProp(self._actor)
 
-    def colour(self, colour: str) -> None:
-        """Take another colour, "#RRGGBB"."""
+    def set_colour(self, colour: str) -> None:
+        """Set the colour, "#RRGGBB"."""
         self._actor.GetProperty().SetColor(*(rgb(colour) / 255.0))
 
     def place(self, x: float, y: float, width: float, height: float) -> None:
-        """Reach from (x, y), the lower left corner, *width* to the right and *height* up."""
+        """Set the lower left corner (x, y), the width and the height."""
         right, top = x + width, y + height
         corners = np.array([[x, y, 0], [right, y, 0], [right, top, 0], [x, top, 0]], dtype=float)
         self._corners.SetData(numpy_to_vtk(corners, deep=True))
         self._shape.Modified()
 
     def show(self, shown: bool) -> None:
-        """Be seen or not."""
+        """Show or hide the rectangle."""
         self._actor.SetVisibility(shown)
 
     def remove(self) -> None:
-        """Go out of the renderer, for good."""
+        """Remove the rectangle from the renderer permanently."""
         self._renderer.RemoveViewProp(self._actor)
 
 
-class Words:
-    """Text, of one line or more.
+class Text:
+    """Text of one line or more.
 
     Parameters
     ----------
     renderer : vtkRenderer
-        Where it is drawn.
+        The renderer to draw in.
     colour : str
         "#RRGGBB".
     bold : bool
-        Or of the usual weight.
-    typed : bool
-        As by a typewriter: brackets and commas are told apart better.
+        Whether the font is bold.
+    monospace : bool
+        Whether to use Courier, in which brackets and commas are easier to tell apart.
     layer : int
-        As of a `Panel`.
+        Higher layers are drawn over lower ones, as in `Panel`.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class Words:
         colour: str,
         *,
         bold: bool = False,
-        typed: bool = False,
+        monospace: bool = False,
         layer: int = 1,
     ) -> None:
         self._renderer = renderer
@@ -108,28 +108,28 @@ class Words:
         style = self._actor.GetTextProperty()
         style.SetColor(*(rgb(colour) / 255.0))
         style.SetBold(bold)
-        if typed:
+        if monospace:
             style.SetFontFamilyToCourier()
         style.SetVerticalJustificationToCentered()
         renderer.AddViewProp(self._actor)
 
     @property
     def text(self) -> str:
-        """What it says."""
+        """The text that is shown."""
         return str(self._actor.GetInput() or "").replace(r"\$", "$")
 
-    def say(self, text: str, size: float) -> None:
-        """Say *text* in letters of *size*, the pixels from line to line, about."""
+    def set_text(self, text: str, size: float) -> None:
+        """Show *text*; *size* is about the distance from line to line, in pixels."""
         dots = self._renderer.GetRenderWindow().GetDPI() or _DOTS_PER_INCH
         self._actor.GetTextProperty().SetFontSize(max(6, round(size * _DOTS_PER_INCH / dots)))
-        self._actor.SetInput(text.replace("$", r"\$"))  # else VTK takes what is between two for TeX
+        self._actor.SetInput(text.replace("$", r"\$"))  # VTK reads text between two $ as TeX
 
     def place(self, x: float, y: float) -> None:
-        """Begin at *x*, with the middle of the text's height at *y*."""
+        """Set the left end *x* and the vertical centre *y*."""
         self._actor.SetPosition(x, y)
 
     def width(self) -> float:
-        """Return how many pixels the text is wide."""
+        """Return the width of the text in pixels."""
         if not self.text:
             return 0.0
         box = [0.0] * 4
@@ -137,9 +137,9 @@ class Words:
         return box[1] - box[0] + 1.0
 
     def show(self, shown: bool) -> None:
-        """Be seen or not."""
+        """Show or hide the text."""
         self._actor.SetVisibility(shown)
 
     def remove(self) -> None:
-        """Go out of the renderer, for good."""
+        """Remove the text from the renderer permanently."""
         self._renderer.RemoveViewProp(self._actor)

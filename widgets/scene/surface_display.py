@@ -1,7 +1,7 @@
-"""The mesh of a session, in its pose, as one actor that every widget shares.
+"""The mesh of a session in its current pose, as one actor shared by all widgets.
 
-Positions and normals are written in place at every change of the pose; colours are layers, of which
-the one that came last is seen.
+Positions and normals are updated in place when the pose changes.  Colours come in layers, and the
+newest layer is visible.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ class SurfaceDisplay:
     Parameters
     ----------
     view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
-        Where to draw.
+        The view to draw in.
     session : Session
-        Whose mesh.
+        The session whose mesh is shown.
     """
 
     def __init__(self, view: Any, session: Session) -> None:
@@ -44,7 +44,7 @@ class SurfaceDisplay:
         corners = np.full(len(faces), 3)
         self.polydata = polydata_of(session.vertices.copy(), corners, faces.ravel())
         self._points: NDArray[np.float64] = vtk_to_numpy(self.polydata.GetPoints().GetData())
-        self._seen_points: NDArray[np.float64] = read_only(self._points)
+        self._read_only_points: NDArray[np.float64] = read_only(self._points)
         self._vertex_normals = VertexNormals(session.mesh)
         self._normals = self._vertex_normals.of(self._points)
         self._normal_array = numpy_to_vtk(self._normals)
@@ -53,7 +53,7 @@ class SurfaceDisplay:
         self._mapper = vtkPolyDataMapper()
         self._mapper.SetInputData(self.polydata)
         self._mapper.SetScalarVisibility(False)
-        self._mapper.SetResolveCoincidentTopologyToPolygonOffset()  # wires on it stay visible
+        self._mapper.SetResolveCoincidentTopologyToPolygonOffset()  # keeps edges on it visible
         self.actor = vtkActor()
         self.actor.SetMapper(self._mapper)
         surface = self.actor.GetProperty()
@@ -68,12 +68,12 @@ class SurfaceDisplay:
     @property
     def points(self) -> NDArray[np.float64]:
         """(n, 3) float: the displayed vertices; a read-only view, not a copy."""
-        return self._seen_points
+        return self._read_only_points
 
     def set_colours(self, layer: str, colours: NDArray[np.uint8] | None) -> None:
-        """Show *colours* (n, 3), 0 to 255, one for each vertex; or None to take a layer away.
+        """Set the vertex *colours* (n, 3) uint8 of a layer, or remove the layer with None.
 
-        The newest layer is seen; a layer that is there already keeps its place.
+        The newest layer is visible; new colours of an existing layer do not change the order.
         """
         require(layer, str, "layer")
         if colours is None:
@@ -86,23 +86,23 @@ class SurfaceDisplay:
             array = numpy_to_vtk(np.ascontiguousarray(top, dtype=np.uint8), deep=True)
             array.SetName("colours")
             self.polydata.GetPointData().SetScalars(array)
-        self.view.touch()
+        self.view.request_render()
 
     def update(self) -> None:
-        """Draw the pose that the session is in; done by itself at every change."""
+        """Show the session's current pose; called automatically when it changes."""
         self._points[:] = self.session.vertices
         self.polydata.GetPoints().GetData().Modified()
         self.polydata.GetPoints().Modified()
         self.update_normals()
-        self.view.touch()
+        self.view.request_render()
 
     def update_normals(self) -> None:
-        """Compute the normals of the pose that is drawn; done by itself at every change."""
+        """Compute the normals of the shown pose; called automatically when it changes."""
         self._vertex_normals.of(self._points, self._normals)
         self._normal_array.Modified()
 
     def remove(self) -> None:
-        """Take the mesh out of the view, for good."""
+        """Remove the mesh from the view permanently."""
         self._stop()
         self.view.renderer.RemoveActor(self.actor)
 

@@ -1,11 +1,12 @@
-"""A renderer and its interactor, wherever they come from, and what widgets need of the two.
+"""A renderer with its interactor, from VTK alone, a pyvista plotter or a Qt widget.
 
-Callbacks are guarded: an exception in one would be printed by VTK, or turned into a warning by
-pyvista, and be lost.  Here it reaches the listeners of `on_failure`: a status line, a test.
+Exceptions in callbacks are caught: VTK would only print them, and pyvista would turn them into
+warnings.  Here they reach the listeners of `on_failure`, such as a status line or a test.
 
-While a camera style drags it keeps all mouse events to itself, so whoever has to follow the
-camera asks for `before_render` instead.  Keys it would keep as well, and answer by VTK's own
-commands, such as stereo at "3": a key, unless it only modifies, ends the camera's drag first.
+During a camera drag VTK's interactor style withholds all mouse events from other observers.
+Anything that follows the camera therefore uses `before_render`.  The style would also withhold
+keys and run VTK's own commands for them, such as stereo for "3".  Pressing any key other than a
+modifier therefore ends the camera drag first.
 
 `View.every` shares a single repeating timer among all views of an interactor, and nothing else in
 this package creates or destroys timers.  Some hosts, pyvistaqt among them, drive all VTK timers by
@@ -21,7 +22,7 @@ from typing import Any
 from weakref import WeakValueDictionary
 
 import vtkmodules.vtkRenderingFreeType
-import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - both: what renders, for whom pyvista is not
+import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - both register the rendering backends
 from vtkmodules.vtkCommonCore import vtkCommand
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindowInteractor
 
@@ -29,9 +30,9 @@ from vtk_segdeform.arrays import is_number, is_whole
 from vtk_segdeform.checks import as_callable, as_text, shown
 from vtk_segdeform.errors import ArgumentError
 
-from .front import Front
+from .foreground import Foreground
 from .gestures import Phase, Pointer
-from .sight import Sight
+from .projection import Projection
 
 _log = logging.getLogger(__name__)
 
@@ -39,18 +40,18 @@ Stop = Callable[[], None]
 _LONGEST = 86_400_000  # milliseconds between ticks: a day
 ABOVE_CAMERA = 1.0  # priority: VTK's own widgets have 0.5, camera styles 0
 _MODIFIERS = ("Shift", "Control", "Alt", "Super", "Meta", "Caps_Lock", "ISO_Level")
-_HEARS_KEYS = vtkCommand.UserEvent + 411  # never happens: a mark on renderers whose views do
+_KEY_MARK = vtkCommand.UserEvent + 411  # never invoked: marks renderers whose views observe keys
 
 
-class View(Sight):
+class View(Projection):
     """One renderer in one window.
 
     Parameters
     ----------
     renderer : vtkRenderer
-        Where the widgets are drawn.
+        Draws the widgets.
     interactor : vtkRenderWindowInteractor
-        That of the renderer's window.
+        Belongs to the renderer's window.
     """
 
     def __init__(self, renderer: Any, interactor: Any) -> None:
@@ -58,10 +59,10 @@ class View(Sight):
         self.interactor = interactor
         self._timer = _SharedTimer.of(interactor)
         self._failures: list[Callable[[Exception], None]] = []
-        self._front: Front | None = None
-        self._stop_front: Stop | None = None
-        self._depth = 0  # of callbacks within callbacks
-        self._touched = False
+        self._foreground: Foreground | None = None
+        self._stop_foreground: Stop | None = None
+        self._depth = 0  # number of nested callbacks
+        self._render_requested = False
 
     @classmethod
     def of(cls, view: Any) -> View:
@@ -82,48 +83,48 @@ class View(Sight):
     def window(self) -> Any:
         """The vtkRenderWindow, or None once it is closed."""
         window = self.renderer.GetRenderWindow()
-        # pyvista finalises a window and keeps it; before its first picture none is initialised.
+        # A closed pyvista plotter keeps its finalised window.  No window is initialised before
+        # its first picture.
         closed = window is not None and not (window.GetNeverRendered() or window.GetInitialized())
         return None if closed else window
 
     @property
-    def front(self) -> Any:
-        """A vtkRenderer that looks the same way, its actors hidden by nothing; made on demand."""
-        if self._front is None:
-            self._front = Front(self.renderer)
-            self._stop_front = self.before_render(self._front.follow)
-        return self._front.renderer
+    def foreground(self) -> Any:
+        """A vtkRenderer with the same camera, drawn over this one; created on first access."""
+        if self._foreground is None:
+            self._foreground = Foreground(self.renderer)
+            self._stop_foreground = self.before_render(self._foreground.follow)
+        return self._foreground.renderer
 
-    def remove_front(self) -> None:
-        """Take the `front` renderer out of the window, with all that is in it."""
-        if self._front is not None and self._stop_front is not None:
-            self._stop_front()
-            self._front.remove()
-            self._front = None
+    def remove_foreground(self) -> None:
+        """Remove the `foreground` renderer, with all its actors, from the window."""
+        if self._foreground is not None and self._stop_foreground is not None:
+            self._stop_foreground()
+            self._foreground.remove()
+            self._foreground = None
 
     def render(self) -> None:
-        """Draw everything; nothing happens once the window is closed."""
+        """Draw the window; do nothing once it is closed."""
         if self.window is not None:
             self.window.Render()
 
-    def touch(self) -> None:
-        """See that what has changed is drawn: at the end of the event in hand, or else now.
+    def request_render(self) -> None:
+        """Draw the window once, at the end of the current event; outside an event, draw it now.
 
-        Nothing happens before the window was drawn for the first time.
+        Do nothing before the first picture of the window.
         """
         if self._depth:
-            self._touched = True
+            self._render_requested = True
         elif self.window is not None and not self.window.GetNeverRendered():
             self.render()
 
-    # What happens.
-
+    # Events.
     def observe(
         self, event: str, callback: Callable[[], bool | None], priority: float = ABOVE_CAMERA
     ) -> Stop:
-        """Call *callback* at each of an interactor's events.
+        """Call *callback* at each *event* of the interactor.
 
-        Where it returns True, or fails, those of lower priority do not hear of the event.
+        If it returns True or raises, observers of lower priority do not receive the event.
         """
         as_text(event, "event")
         as_callable(callback, "callback")
@@ -132,21 +133,21 @@ class View(Sight):
         tag = 0
 
         def called(*_: object) -> None:
-            taken: bool | None = True
+            consumed: bool | None = True
             try:
-                with self.guarded(), self._drawn_after():
-                    taken = callback()
-            finally:  # also where a listener of failures fails: a camera would hear half a drag
+                with self.guarded(), self._render_afterwards():
+                    consumed = callback()
+            finally:  # even if a failure listener raises: the camera must not see half a drag
                 command = self.interactor.GetCommand(tag)
-                if taken and command is not None:  # the callback may have stopped itself
+                if consumed and command is not None:  # the callback may have stopped itself
                     command.SetAbortFlag(1)
 
         tag = self.interactor.AddObserver(event, called, priority)
         if event != "KeyPressEvent":
             return _once(lambda: self.interactor.RemoveObserver(tag))
-        mark = self.renderer.AddObserver(_HEARS_KEYS, lambda *_: None)
+        mark = self.renderer.AddObserver(_KEY_MARK, lambda *_: None)
         first = self.interactor.AddObserver(event, self._end_camera_drag)
-        self.interactor.GetCommand(first).SetPassiveObserver(1)  # heard whoever has the focus
+        self.interactor.GetCommand(first).SetPassiveObserver(1)  # called despite any event focus
 
         def stop() -> None:
             self.interactor.RemoveObserver(first)
@@ -156,28 +157,28 @@ class View(Sight):
         return _once(stop)
 
     def before_render(self, callback: Callable[[], None]) -> Stop:
-        """Call *callback* each time the renderer is about to draw; what it touches is drawn."""
+        """Call *callback* before each picture; its changes are part of that picture."""
         as_callable(callback, "callback")
 
         def called(*_: object) -> None:
-            touched, self._depth = self._touched, self._depth + 1
+            touched, self._depth = self._render_requested, self._depth + 1
             try:
                 with self.guarded():
                     callback()
             finally:
-                self._touched, self._depth = touched, self._depth - 1
+                self._render_requested, self._depth = touched, self._depth - 1
 
         tag = self.renderer.AddObserver("StartEvent", called)
         return _once(lambda: self.renderer.RemoveObserver(tag))
 
     def every(self, milliseconds: int, callback: Callable[[], None]) -> Stop:
-        """Call *callback* again and again from the event loop, until stopped.
+        """Call *callback* repeatedly from the event loop, until stopped.
 
         All subscribers of an interactor share one timer with the shortest of their periods, and
         each is called at every tick, so at least once in *milliseconds*.  A callback may stop
         itself and others; if one raises, the others are still called.
 
-        Not while a camera style drags: it keeps the timer's events to itself as well; see `pulse`.
+        During a camera drag the interactor style withholds timer events too; see `pulse`.
         """
         if not is_whole(milliseconds, 1, _LONGEST):
             raise ArgumentError(
@@ -186,7 +187,7 @@ class View(Sight):
         as_callable(callback, "callback")
 
         def ticked(*_: object) -> None:
-            with self.guarded(), self._drawn_after():
+            with self.guarded(), self._render_afterwards():
                 callback()
 
         tag = self.interactor.AddObserver("TimerEvent", ticked, ABOVE_CAMERA)
@@ -199,14 +200,14 @@ class View(Sight):
         return _once(stop)
 
     def pulse(self, callback: Callable[[], None]) -> Stop:
-        """Call *callback* at every tick of any timer, also during a drag of a camera style.
+        """Call *callback* at every tick of any timer, even during a camera drag.
 
-        It may draw, but neither observe the interactor nor stop anything there.
+        The callback may draw, but must not add or remove observers of the interactor.
         """
         as_callable(callback, "callback")
 
         def ticked(*_: object) -> None:
-            with self.guarded(), self._drawn_after():
+            with self.guarded(), self._render_afterwards():
                 callback()
 
         tag = self.interactor.AddObserver("TimerEvent", ticked)
@@ -215,20 +216,20 @@ class View(Sight):
 
     @property
     def is_addressed(self) -> bool:
-        """Whether keys are meant for this view, not for another one that the pointer is in."""
+        """Whether key presses go to this view: the pointer is not over another view with keys."""
         pointer = self.pointer(Phase.HOVER)
         other = self.interactor.FindPokedRenderer(*self.interactor.GetEventPosition())
-        elsewhere = other is not None and other.HasObserver(_HEARS_KEYS)
-        return self.contains(pointer) or not (elsewhere and Sight(other).contains(pointer))
+        elsewhere = other is not None and other.HasObserver(_KEY_MARK)
+        return self.contains(pointer) or not (elsewhere and Projection(other).contains(pointer))
 
     def pointer(self, phase: Phase) -> Pointer:
-        """Return where the interactor has the pointer, as the given *phase*."""
+        """Return the current pointer position of the interactor, with the given *phase*."""
         x, y = self.interactor.GetEventPosition()
         shift, control = self.interactor.GetShiftKey(), self.interactor.GetControlKey()
         return Pointer(phase, float(x), float(y), shift=bool(shift), control=bool(control))
 
     def _end_camera_drag(self, *_: object) -> None:
-        """End what a camera style has in hand, as if the button had been released."""
+        """End an ongoing camera drag, as if the button had been released."""
         if (self.interactor.GetKeySym() or "").startswith(_MODIFIERS):
             return
         style = self.interactor.GetInteractorStyle()
@@ -239,35 +240,35 @@ class View(Sight):
             style.OnMiddleButtonUp()
             style.OnRightButtonUp()
 
-    # What goes wrong.
-
+    # Failures.
     def on_failure(self, listener: Callable[[Exception], None]) -> Stop:
-        """Tell *listener* of every exception in a callback, from now on until stopped."""
+        """Call ``listener(error)`` for every exception in a callback, until stopped."""
         self._failures.append(as_callable(listener, "listener"))
         return _once(lambda: self._failures.remove(listener))
 
     @contextmanager
     def guarded(self) -> Iterator[None]:
-        """Hand what is raised inside to those who asked; with nobody there it is raised on."""
+        """Pass exceptions raised inside to the failure listeners; without any, re-raise them."""
         try:
             yield
-        except Exception as error:  # the border to the event loop: anything may come
+        except Exception as error:  # the border to the event loop: any exception may arrive
             _log.info("a callback failed", exc_info=True)
             if not self._failures:
                 raise
-            with ExitStack() as told:  # one that fails keeps nobody from hearing
+            with ExitStack() as stack:  # every listener is called, even if another one raises
                 for listener in reversed(self._failures):
-                    told.callback(listener, error)
+                    stack.callback(listener, error)
 
     @contextmanager
-    def _drawn_after(self) -> Iterator[None]:
+    def _render_afterwards(self) -> Iterator[None]:
+        """Draw once at the end of the outermost callback if any callback requested it."""
         self._depth += 1
         try:
             yield
         finally:
             self._depth -= 1
-            if self._touched and not self._depth:
-                self._touched = False
+            if self._render_requested and not self._depth:
+                self._render_requested = False
                 self.render()
 
 
@@ -295,7 +296,7 @@ class _SharedTimer:
     @classmethod
     def of(cls, interactor: Any) -> _SharedTimer:
         """Return the timer of *interactor*, the same one as long as it is referenced."""
-        # It keeps its interactor alive, so no other one can have the same id meanwhile.
+        # The timer keeps its interactor alive, so its id stays unique.
         return cls._shared.setdefault(id(interactor), cls(interactor))
 
     def require(self, milliseconds: int) -> Stop:
@@ -321,7 +322,7 @@ class _SharedTimer:
                 self._interactor.RemoveObserver(self._tag)
             if period is not None:
                 self._id = self._interactor.CreateRepeatingTimer(period)
-                # The lowest priority: after the host has stopped its timer.
+                # Lowest priority: called after the host has stopped its timer.
                 self._tag = self._interactor.AddObserver("DestroyTimerEvent", self._revive, -1.0)
             self._period = period
         finally:
@@ -340,12 +341,12 @@ class _SharedTimer:
 
 
 def _once(action: Callable[[], object]) -> Stop:
-    """Return a callable that does *action* the first time it is called."""
-    waiting = [action]
+    """Return a function that calls *action* only the first time."""
+    pending = [action]
 
     def stop() -> None:
-        if waiting:
-            waiting.pop()()
+        if pending:
+            pending.pop()()
 
     return stop
 

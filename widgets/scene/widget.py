@@ -1,13 +1,13 @@
-"""What every widget is: something in a view that speaks to a session, and can be switched off.
+"""The base class of the widgets: event handling, gestures, and VTK's widget interface.
 
-A widget says what a press begins (`begins`), and the rest is done here: the press is taken from
-the camera only if it begins something, moves and the release go to the gesture, Escape or the
-right button cancels it.  Anything else that ends it, such as another tool or a job, finishes it as
-a release would: nothing is lost.  Elsewhere in the view the camera works as usual.
+A widget returns the gesture that a press starts from `on_press`.  If there is one, the press does
+not reach the camera, moves and the release are sent to the gesture, and Escape or the right button
+cancels it.  Any other interruption, such as a change of tool or a background job, finishes the
+gesture like a release, so no work is lost.  Elsewhere in the view the camera works as usual.
 
-VTK's words are kept: `On`, `Off`, `SetEnabled`, `GetEnabled`, and observers of
-``StartInteractionEvent``, ``InteractionEvent`` and ``EndInteractionEvent``, called after whatever
-they tell of; and of ``ModifiedEvent``, where the widget has something that is set.
+The interface follows VTK's widgets: `On`, `Off`, `SetEnabled`, `GetEnabled`, and observers of
+``StartInteractionEvent``, ``InteractionEvent`` and ``EndInteractionEvent``, each invoked after the
+change; and of ``ModifiedEvent``, invoked after a property was set.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ _EVENTS = (*INTERACTION_EVENTS, "ModifiedEvent")
 
 
 class Widget(abc.ABC):
-    """A piece of interface over one view and one session; off until `On`.
+    """Base class of the widgets over one view and one session; off until `On`.
 
     Parameters
     ----------
     view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
-        Where it lives.  Call `remove` before its window closes.
+        The view to work in.  Call `remove` before its window closes.
     session : Session
-        What it shows and changes.
+        The session to show and edit.
 
     Attributes
     ----------
     remark : str
-        What is to be said of the last gesture, if anything.
+        A message to the user about the last gesture; "" if there is none.
     """
 
     def __init__(self, view: Any, session: Session) -> None:
@@ -53,37 +53,35 @@ class Widget(abc.ABC):
         self._stops: list[Stop] = []
         self._observers: dict[int, tuple[str, Callable[[Widget, str], None]]] = {}
         self._next_tag = 1
-        self._took_key = False
+        self._consumed_key = False
 
-    # What a widget says of itself.
-
-    def begins(self, press: Pointer) -> Gesture | None:
-        """Return the gesture that *press* begins, or None to leave it to the camera."""
+    # Hooks of subclasses.
+    def on_press(self, press: Pointer) -> Gesture | None:
+        """Return the gesture that *press* starts, or None to pass the press to the camera."""
         del press
         return None
 
-    def hovers(self, pointer: Pointer) -> None:
-        """Show what a press here would do; the pointer moves and no button is down."""
+    def on_hover(self, pointer: Pointer) -> None:
+        """Highlight the target of a press at *pointer*; called on moves with no button down."""
         del pointer
 
-    def wheels(self, pointer: Pointer, clicks: int) -> bool:
-        """Turn the wheel by +1 or -1 *clicks*; False leaves it to the camera."""
+    def on_wheel(self, pointer: Pointer, clicks: int) -> bool:
+        """Handle +1 or -1 *clicks* of the wheel; return False to pass them to the camera."""
         del pointer, clicks
         return False
 
-    def types(self, key: str, pointer: Pointer) -> bool:
-        """Take a key, VTK's name of it ("z", "Escape", "bracketleft"); False leaves it."""
+    def on_key(self, key: str, pointer: Pointer) -> bool:
+        """Handle a *key* by VTK's name, such as "z" or "Escape"; return False to pass it on."""
         del key, pointer
         return False
 
     @abc.abstractmethod
     def remove(self) -> None:
-        """Take everything out of the view, for good."""
+        """Remove the widget from the view permanently."""
 
-    # Switching.
-
+    # VTK's widget interface.
     def On(self) -> None:  # noqa: N802 - VTK's word
-        """Listen to the view."""
+        """Start handling events."""
         if self._stops:
             return
         observe = self.view.observe
@@ -95,11 +93,11 @@ class Widget(abc.ABC):
             observe("MouseWheelForwardEvent", lambda: self._wheel(+1)),
             observe("MouseWheelBackwardEvent", lambda: self._wheel(-1)),
             observe("KeyPressEvent", self._key),
-            observe("CharEvent", lambda: self._took_key),  # comes after each press of a key
+            observe("CharEvent", lambda: self._consumed_key),  # follows each KeyPressEvent
         ]
 
     def Off(self) -> None:  # noqa: N802
-        """Stop listening; an ongoing gesture is finished."""
+        """Stop handling events; finish a running gesture."""
         try:
             self.finish()
         finally:
@@ -108,18 +106,18 @@ class Widget(abc.ABC):
             self._stops = []
 
     def SetEnabled(self, enabled: bool) -> None:  # noqa: N802
-        """Switch on or off."""
+        """Switch the widget on or off."""
         if as_switch(enabled, "enabled"):
             self.On()
         else:
             self.Off()
 
     def GetEnabled(self) -> bool:  # noqa: N802
-        """Tell whether it is on."""
+        """Return whether the widget is on."""
         return bool(self._stops)
 
     def AddObserver(self, event: str, callback: Callable[[Widget, str], None]) -> int:  # noqa: N802
-        """Call ``callback(widget, event)`` at one of the events above; return its tag."""
+        """Call ``callback(widget, event)`` at one of the events above; return the tag."""
         if not isinstance(event, str) or event not in _EVENTS:
             raise ArgumentError(f"event must be one of {', '.join(_EVENTS)}; got {shown(event)}")
         as_callable(callback, "callback")
@@ -128,22 +126,22 @@ class Widget(abc.ABC):
         return tag
 
     def RemoveObserver(self, tag: int) -> None:  # noqa: N802
-        """Forget the observer with this *tag*."""
+        """Remove the observer with this *tag*."""
         if not is_whole(tag, 0):
             raise ArgumentError(f"tag must be a value returned by AddObserver; got {shown(tag)}")
         self._observers.pop(tag, None)
 
     @property
     def is_grabbing(self) -> bool:
-        """Whether a gesture is going on."""
+        """Whether a gesture is running."""
         return self._grab.is_active
 
     def finish(self) -> bool:
-        """Finish the gesture as if the button had been released; False if there was none."""
+        """Finish a running gesture as a release would; return False if there was none."""
         return self._end(self._grab.finish)
 
     def cancel(self) -> bool:
-        """End the gesture as if it had never begun; False if there was none."""
+        """Cancel a running gesture and undo its changes; return False if there was none."""
         return self._end(self._grab.cancel)
 
     def _end(self, end: Callable[[], None]) -> bool:
@@ -152,26 +150,25 @@ class Widget(abc.ABC):
         try:
             end()
         finally:
-            self._tell("EndInteractionEvent")
+            self._invoke("EndInteractionEvent")
         return True
 
-    # From VTK's events to ours.
-
+    # VTK's events.
     def _press(self) -> bool:
         press = self.view.pointer(Phase.PRESS)
-        self.finish()  # the release never arrived
-        if self.is_grabbing:  # it is still handling an event, within which this one arrived
+        self.finish()  # in case the last release never arrived
+        if self.is_grabbing:  # the gesture is still handling the event that caused this one
             return True
-        gesture = self.begins(press) if self.view.contains(press) else None
+        gesture = self.on_press(press) if self.view.contains(press) else None
         if gesture is None:
             return False
         self._grab.begin(gesture, press)
-        self._tell("StartInteractionEvent")
+        self._invoke("StartInteractionEvent")
         return True
 
     def _move(self) -> bool:
         if not self._grab.is_active:
-            self.hovers(self.view.pointer(Phase.HOVER))
+            self.on_hover(self.view.pointer(Phase.HOVER))
             return False
         self._send(Phase.MOVE, "InteractionEvent")
         return True
@@ -186,27 +183,27 @@ class Widget(abc.ABC):
         try:
             self._grab.send(self.view.pointer(phase))
         except BaseException:
-            self._tell("EndInteractionEvent")
+            self._invoke("EndInteractionEvent")
             raise
-        self._tell(event if self._grab.is_active else "EndInteractionEvent")
+        self._invoke(event if self._grab.is_active else "EndInteractionEvent")
 
     def _wheel(self, clicks: int) -> bool:
         pointer = self.view.pointer(Phase.HOVER)
-        return self.view.contains(pointer) and self.wheels(pointer, clicks)
+        return self.view.contains(pointer) and self.on_wheel(pointer, clicks)
 
     def _key(self) -> bool:
         key = self.view.interactor.GetKeySym() or ""
         if not (self.is_grabbing or self.view.is_addressed):
-            self._took_key = False
+            self._consumed_key = False
             return False
-        self._took_key = True  # also where it fails
-        self._took_key = (key == "Escape" and self.cancel()) or self.types(
+        self._consumed_key = True  # even if the next line raises
+        self._consumed_key = (key == "Escape" and self.cancel()) or self.on_key(
             key, self.view.pointer(Phase.HOVER)
         )
-        return self._took_key
+        return self._consumed_key
 
-    def _tell(self, event: str) -> None:
-        with ExitStack() as told:  # one that raises keeps nobody from hearing
+    def _invoke(self, event: str) -> None:
+        with ExitStack() as stack:  # every observer is called, even if another one raises
             for name, callback in reversed(self._observers.values()):
                 if name == event:
-                    told.callback(callback, self, event)
+                    stack.callback(callback, self, event)

@@ -1,14 +1,14 @@
-"""The widget that shows local volume change in colours.
+"""The widget that shows the local volume change in colours.
 
 The files, in reading order:
 
     volume_overlay    `VolumeOverlay`
-    diverging         a diverging colour scale
-    legend            the scale and its labels
-    region_volumes    volume change of each region
+    diverging         the diverging colour scale
+    legend            the colour bar and the lines of text
+    region_volumes    the volume change of each region
 """
 
-from .legend import brief, precise, signed
+from .legend import brief, percent, signed
 from .region_volumes import RegionVolumes
 from .volume_overlay import VolumeOverlay
 
@@ -16,6 +16,6 @@ __all__ = [
     "RegionVolumes",
     "VolumeOverlay",
     "brief",
-    "precise",
+    "percent",
     "signed",
 ]

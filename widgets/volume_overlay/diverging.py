@@ -1,13 +1,13 @@
-"""Colours for a signed share: blue below zero, pale grey at it, orange above.
+"""A diverging colour scale for signed values: blue below zero, pale grey at zero, orange above.
 
-Equal steps of the share are equal steps of lightness, the same on both sides, so that size is
-read from the lightness and sign from the hue.  Blue and orange stay apart for every common kind
-of colour blindness, and zero is exactly one colour.
+Lightness decreases linearly with the absolute value, alike on both sides, so lightness shows the
+size and hue the sign.  Blue and orange remain distinguishable with all common kinds of colour
+blindness, and zero has exactly one colour.
 
     -half_range        0        +half_range
-    deep blue       pale grey      deep brown        beyond, the colour of the end
+    deep blue       pale grey      deep brown        values beyond are clamped
 
-`half_range_for` chooses half_range so that it does not flicker from frame to frame.
+`half_range_for` chooses half_range without flicker from frame to frame.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from vtkmodules.vtkCommonCore import vtkLookupTable
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.pictures import rgb
 
-# From zero outwards.  CIELAB lightness 90, 79, 68, 57, 46, 35; hue and chroma as sRGB allows.
+# From zero outwards: CIELAB lightness 90, 79, 68, 57, 46, 35, within the gamut of sRGB.
 _BELOW = ("#E2E2E2", "#AAC7E0", "#6DACDC", "#2090D3", "#0073C1", "#0055A6")
 _ABOVE = ("#E2E2E2", "#E3BD96", "#D79958", "#C67520", "#AE5400", "#8A3A02")
-_N = 255  # odd: the middle colour is zero's alone
+_N = 255  # odd: the middle colour is that of zero
 
-HALF_RANGES = (0.05, 0.1, 0.2, 0.5, 1.0)  # the last ends where the body turns inside-out
-_SEEN = 99.0  # per cent of the vertices that are to be within the range
-_SLACK = 0.7  # a smaller range has to be this much too large before it is taken
+HALF_RANGES = (0.05, 0.1, 0.2, 0.5, 1.0)  # at -1 the local volume turns inside-out
+_PERCENTILE = 99.0  # of the absolute values, to be within the range
+_HYSTERESIS = 0.7  # a smaller range must leave this margin before it is used
 
 
 def _table() -> NDArray[np.uint8]:
     anchors = np.array([rgb(colour) for colour in (*_BELOW[:0:-1], *_ABOVE)], dtype=float)
-    places = np.linspace(0.0, len(anchors) - 1.0, _N)
-    columns = [np.interp(places, np.arange(len(anchors)), column) for column in anchors.T]
+    positions = np.linspace(0.0, len(anchors) - 1.0, _N)
+    columns = [np.interp(positions, np.arange(len(anchors)), column) for column in anchors.T]
     return np.round(np.stack(columns, axis=1)).astype(np.uint8)
 
 
@@ -43,12 +43,12 @@ NEUTRAL = _COLOURS[_N // 2]
 
 
 def colours_of(shares: FloatArray, half_range: float) -> NDArray[np.uint8]:
-    """Return the (n, 3) red, green and blue, 0 to 255, of signed *shares* (n,).
+    """Return the colours (n, 3) uint8 of signed *shares* (n,).
 
     Parameters
     ----------
     shares : (n,) float
-        0.1 is ten per cent more.
+        Relative changes: 0.1 is ten per cent more.
     half_range : float
         The share of the last colour, above 0.
 
@@ -64,7 +64,7 @@ def colours_of(shares: FloatArray, half_range: float) -> NDArray[np.uint8]:
 
 
 def lookup_table(half_range: float) -> Any:
-    """Return a vtkLookupTable that gives every share the same colour as `colours_of`."""
+    """Return a vtkLookupTable with the colours of `colours_of`."""
     table = vtkLookupTable()
     table.SetNumberOfTableValues(_N)
     table.SetTableRange(-half_range, half_range)
@@ -74,24 +74,24 @@ def lookup_table(half_range: float) -> Any:
 
 
 def half_range_for(shares: FloatArray, before: float | None = None) -> float:
-    """Return one of `HALF_RANGES`, wide enough for all but a hundredth of *shares*.
+    """Return one of `HALF_RANGES` that contains all but one per cent of *shares*.
 
     Parameters
     ----------
     shares : (n,) float
-        What is to be shown; a few wild values make no difference.
+        The values to show; a few outliers make no difference.
     before : float, optional
-        What the last frame had.  It is given up for a smaller one only with some slack, so that
-        a value that trembles between two ranges does not make the colours flicker.
+        The range of the last frame.  A smaller one replaces it only with a margin, so that values
+        close to the limit of a range do not make the colours flicker.
 
     Examples
     --------
     >>> half_range_for(np.array([0.0, -0.12])), half_range_for(np.array([0.09]), before=0.2)
     (0.2, 0.2)
     """
-    size = float(np.percentile(np.abs(shares), _SEEN)) if len(shares) else 0.0
+    size = float(np.percentile(np.abs(shares), _PERCENTILE)) if len(shares) else 0.0
     wide_enough = [step for step in HALF_RANGES if size <= step] or [HALF_RANGES[-1]]
     if before is None or before <= wide_enough[0]:
         return wide_enough[0]
-    with_slack = [step for step in HALF_RANGES if size <= _SLACK * step] or [HALF_RANGES[-1]]
-    return min(before, with_slack[0])
+    with_margin = [step for step in HALF_RANGES if size <= _HYSTERESIS * step] or [HALF_RANGES[-1]]
+    return min(before, with_margin[0])

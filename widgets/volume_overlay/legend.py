@@ -1,7 +1,7 @@
-"""A diverging scale at the right of a view and lines of text at its upper left.
+"""A colour bar at the right of a view and lines of text at its upper left.
 
-Sizes follow the window; the ink is dark or white, whichever is read better on what is behind it.
-A line may stand on the colour of a region.
+Sizes follow the window.  Text is dark or white, whichever contrasts more with its background, and a
+line may have the colour of a region as its background.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import vtkmodules.vtkRenderingFreeType  # noqa: F401 - without it text is not drawn
+import vtkmodules.vtkRenderingFreeType  # noqa: F401 - required to draw text
 from vtkmodules.vtkRenderingAnnotation import vtkScalarBarActor
 from vtkmodules.vtkRenderingCore import vtkTextActor
 
@@ -21,20 +21,20 @@ from ..scene import Stop, View
 from .diverging import lookup_table
 
 _TICKS = 5
-_LETTERS = 25  # of a name
-_LATIN, _SIGNS = 0x17F, "–—‘’‚“”„†‡•…‰‹›€™"  # the letters of VTK's own font
-_GROUND = 0.7  # opacity of the background's colour under what may lie over the mesh
+_LONGEST_NAME = 25  # characters
+_LATIN, _SIGNS = 0x17F, "–—‘’‚“”„†‡•…‰‹›€™"  # the characters of VTK's built-in font
+_BACKGROUND_OPACITY = 0.7  # of text that may lie over the mesh
 
 
 class Legend:
-    """What the colours of a mesh mean, and some words; hidden until `show`.
+    """A colour bar and lines of text; hidden until `show`.
 
     Parameters
     ----------
     view : View
-        Where to draw.
+        The view to draw in.
     title : str
-        Stands over the scale.
+        The title of the colour bar.
     """
 
     def __init__(self, view: View, title: str) -> None:
@@ -45,14 +45,15 @@ class Legend:
         self._stop: Stop | None = None
 
     def show(self, half_range: float, lines: Sequence[tuple[str, int | None]]) -> None:
-        """Show a scale up to *half_range*, a share, and *lines*; or other ones than before.
+        """Show or replace the colour bar and the lines.
 
         Parameters
         ----------
         half_range : float
-            See `diverging`.
+            The value at the ends of the scale; see `diverging`.
         lines : sequence of (text, region)
-            From the top; *region* is a number whose colour it stands on, or None.
+            From the top; *region* is the number of the region whose colour is the background, or
+            None.
         """
         renderer = self.view.renderer
         if self._stop is None:
@@ -67,9 +68,9 @@ class Legend:
             self._lines.append(vtkTextActor())
             renderer.AddViewProp(self._lines[-1])
         for actor, (text, region) in zip(self._lines, lines, strict=True):
-            actor.SetInput(f" {text} ".replace("$", r"\$"))  # which begins TeX
+            actor.SetInput(f" {text} ".replace("$", r"\$"))  # VTK reads text between two $ as TeX
             style = actor.GetTextProperty()
-            style.SetBackgroundOpacity(_GROUND if region is None else 1.0)
+            style.SetBackgroundOpacity(_BACKGROUND_OPACITY if region is None else 1.0)
             style.SetFrame(region is not None)
             if region is not None:
                 style.SetBackgroundColor(*(of_region(region) / 255.0))
@@ -77,7 +78,7 @@ class Legend:
         self._laid_out = ()
 
     def hide(self) -> None:
-        """Take everything out of the view."""
+        """Hide the colour bar and the lines."""
         if self._stop is not None:
             self._stop()
             self._stop = None
@@ -92,7 +93,7 @@ class Legend:
         if now == self._laid_out:
             return
         self._laid_out = now
-        size = int(np.clip(height / 42, 11, 30))  # pixels; VTK's are as large at 72 dots per inch
+        size = int(np.clip(height / 42, 11, 30))  # pixels; font sizes are pixels at 72 dpi
         points = max(6, round(size * 72 / (renderer.GetRenderWindow().GetDPI() or 72)))
         for k, actor in enumerate(self._lines):
             style = actor.GetTextProperty()
@@ -108,12 +109,12 @@ class Legend:
         for style in (self._bar.GetTitleTextProperty(), self._bar.GetAnnotationTextProperty()):
             style.SetFontSize(points)
             style.SetBackgroundColor(*now[2])
-            style.SetBackgroundOpacity(_GROUND)
+            style.SetBackgroundOpacity(_BACKGROUND_OPACITY)
             style.SetColor(*_ink_on(now[2]))
 
 
 def signed(number: float, digits: int) -> str:
-    """Write "+2.5", "-10" or "0": no needless zeros, and no sign where there is nothing.
+    """Format a number with its sign; zero has no sign.
 
     >>> signed(2.5, 1), signed(-10.0, 1), signed(-0.01, 1)
     ('+2.5', '-10', '0')
@@ -122,24 +123,26 @@ def signed(number: float, digits: int) -> str:
     return f"{rounded:+.{digits}f}".removesuffix(".0") if rounded else "0"
 
 
-def brief(name: str, place: str) -> str:
-    """Return a name that takes no more of a view than it may, or *place*, if VTK lacks letters.
+def brief(name: str, default: str) -> str:
+    """Shorten a name for display; return *default* if VTK's font lacks a character of it.
 
     >>> brief("the lower half of the left arm", "region 1"), brief("左腕", "region 2")
     ('the lower half of the ...', 'region 2')
     """
     if any(ord(letter) > _LATIN and letter not in _SIGNS for letter in name):
-        return place
-    return name if len(name) <= _LETTERS else f"{name[: _LETTERS - 3].rstrip()} ..."
+        return default
+    return name if len(name) <= _LONGEST_NAME else f"{name[: _LONGEST_NAME - 3].rstrip()} ..."
 
 
-def precise(share: float) -> str:
-    """Write a share in per cent, or with its power of ten where that would read as nothing.
+def percent(share: float) -> str:
+    """Format a share in per cent, with more digits if it is small; below 0.0001 % it is zero.
 
-    >>> precise(0.025), precise(2e-16), precise(0.0)
-    ('+2.5 %', '+2.0e-16', '0 %')
+    >>> percent(0.025), percent(-0.0004), percent(2e-16)
+    ('+2.5 %', '-0.04 %', '0 %')
     """
-    return f"{signed(100.0 * share, 1)} %" if abs(share) >= 1e-3 or not share else f"{share:+.1e}"
+    if abs(share) >= 1e-3:
+        return f"{signed(100.0 * share, 1)} %"
+    return f"{signed(100.0 * share, 4).rstrip('0') or '0'} %"
 
 
 def _scalar_bar(title: str) -> Any:
@@ -151,7 +154,7 @@ def _scalar_bar(title: str) -> Any:
     bar.UnconstrainedFontSizeOn()
     bar.SetMaximumNumberOfColors(255)
     bar.SetVerticalTitleSeparation(8)
-    # Ticks are annotations: VTK's number formats cannot write "+20 %", "0" and "-20 %" alike.
+    # Ticks are annotations: no number format of VTK writes "+20 %", "0" and "-20 %".
     bar.DrawTickLabelsOff()
     bar.DrawAnnotationsOn()
     for style in (bar.GetTitleTextProperty(), bar.GetAnnotationTextProperty()):
@@ -164,12 +167,12 @@ def _scalar_bar(title: str) -> Any:
 def _annotated_table(half_range: float) -> Any:
     table = lookup_table(half_range)
     for share in np.linspace(-half_range, half_range, _TICKS):
-        percent = signed(100.0 * float(share), 1 if half_range >= 0.01 else 3)
-        table.SetAnnotation(float(share), percent if percent == "0" else f"{percent} %")
+        tick = signed(100.0 * float(share), 1 if half_range >= 0.01 else 3)
+        table.SetAnnotation(float(share), tick if tick == "0" else f"{tick} %")
     return table
 
 
 def _ink_on(colour: Any) -> FloatArray:
-    """Return the one of dark and white that is read better on *colour*."""
+    """Return dark or white, whichever contrasts more with *colour*."""
     dark = np.dot(colour, [0.2126, 0.7152, 0.0722]) < 0.45
     return np.asarray(rgb(PAPER if dark else INK) / 255.0)

@@ -1,7 +1,6 @@
-"""How the volume of each region of a session has changed, for people to read.
+"""The relative volume change (V - V0) / V0 of each region of a session.
 
-A region is closed at its border as in `vtk_segdeform.solver.volume_constraints`; the change is
-(V - V0) / V0.
+A region is closed at its border as in `vtk_segdeform.solver.volume_constraints`.
 """
 
 from __future__ import annotations
@@ -13,12 +12,12 @@ from vtk_segdeform.solver import VolumeConstraint, region_volumes
 
 
 class RegionVolumes:
-    """The volumes of the regions of one session, whatever its regions and its pose become.
+    """The volume changes of the current regions in the current pose of a session.
 
     Parameters
     ----------
     session : Session
-        Whose; it is only read.
+        Only read.
     """
 
     def __init__(self, session: Session) -> None:
@@ -26,9 +25,9 @@ class RegionVolumes:
         self._volumes: tuple[Regions, list[tuple[int, VolumeConstraint]]] | None = None
 
     def changes(self) -> list[tuple[int, float]]:
-        """Return the number of each region that owns a face, and its (V - V0) / V0.
+        """Return the number and the volume change of each region that owns a face.
 
-        Nothing where there is one region, whose volume is the whole.
+        The list is empty if there is only one region, whose volume is that of the mesh.
         """
         session = self._session
         owned = self._owned()
@@ -37,7 +36,7 @@ class RegionVolumes:
         owners, volumes = zip(*owned, strict=True)
         if session.state.pose is None:
             return [(owner, 0.0) for owner in owners]
-        if session.solution is not None:  # the solver has them already
+        if session.solution is not None:  # the solver has computed them
             shares = session.solution.region_volume_change.tolist()
         else:
             x = session.vertices
@@ -45,7 +44,7 @@ class RegionVolumes:
         return list(zip(owners, shares, strict=True))
 
     def prepare(self) -> None:
-        """Do ahead of time what the first `changes` would have to wait for."""
+        """Compute in advance everything the first call of `changes` needs."""
         self._owned()
 
     def _owned(self) -> list[tuple[int, VolumeConstraint]]:
@@ -62,6 +61,6 @@ def _owned_volumes(mesh: Mesh, regions: Regions) -> list[tuple[int, VolumeConstr
     labels = regions.labels
     owned = []
     for volume in region_volumes(mesh, labels):
-        a, b, c = labels[volume.faces[0]].tolist()  # its own, and owned by the rule told there
+        a, b, c = labels[volume.faces[0]].tolist()  # the rule of `volume_constraints` for owners
         owned.append((b if b == c else a, volume))
     return owned

@@ -1,19 +1,20 @@
-"""The local volume change in colours over the mesh, with a scale, and totals as text.
+"""The local volume change in colours on the mesh, with a colour bar and lines of text.
 
-At each vertex i the share s_i by which the flesh under it has swollen (orange) or been pinched
-(blue) since rest.  The flesh under i are the tetrahedra from the triangles around i to o(i), the
-vertex across from it, where the largest inner ball that touches the skin at i touches it again:
+The local volume change s_i of vertex i is relative to the rest pose: positive (orange) where volume
+grows, negative (blue) where it shrinks.  The volume at i is that of the tetrahedra from the
+triangles around i to the opposite vertex o(i), where the largest inner ball that touches the
+surface at i touches it again:
 
     L_i(x) = sum_{T = (a, b, c) at i} det(x_a - x_o, x_b - x_o, x_c - x_o) / 18
     s_i(x) = sum_j k_ij L_j(x) / sum_j k_ij L_j(rest) - 1
 
-with k a smoothing over the surface.  s is 0 under any rigid motion, and is then one colour to the
-last pixel.  `vtk_segdeform.geometry.local_volume` computes it, and only while it is shown.
+with a smoothing kernel k on the surface.  Under a rigid motion s is 0 and the mesh has exactly one
+colour.  `vtk_segdeform.geometry.local_volume` computes s, only while the overlay is shown.
 
-The text tells, from top to bottom: (V - V0) / V0 of the whole mesh; the least and the largest s;
-(V - V0) / V0 of each region, closed at its border as in
-`vtk_segdeform.solver.volume_constraints`; the steps of the last solve, and the time from the event
-that changed the pose to the end of drawing it.
+The lines of text are, from the top: (V - V0) / V0 of the whole mesh; the smallest and the largest
+s; (V - V0) / V0 of each region, closed at its border as in
+`vtk_segdeform.solver.volume_constraints`; the number of steps of the last solve, and the time from
+the event that changed the pose to the end of rendering.
 
 Source
 ------
@@ -35,27 +36,28 @@ from vtk_segdeform.session import Change, Session, region_name
 
 from ..scene import Stop, SurfaceDisplay, View
 from .diverging import colours_of, half_range_for
-from .legend import Legend, brief, precise, signed
+from .legend import Legend, brief, percent, signed
 from .region_volumes import RegionVolumes
 
 _LAYER = "volume"
 _OF_REGIONS = Change.REGIONS | Change.NAMES
-_FIRST = 100.0  # priority: hears of an event before whoever changes the pose in it
+_FIRST = 100.0  # priority: called before the widgets that change the pose
 _MOST_REGIONS = 8  # more lines would cover the mesh
-_SOFT = 0.55, 0.45, 0.0  # ambient, diffuse, specular light: shadows are not to pass for values
+# Ambient, diffuse and specular light: strong shading would be confused with the colour scale.
+_SOFT_LIGHT = 0.55, 0.45, 0.0
 
 
 class VolumeOverlay:
-    """Colours, scale and text over a mesh; hidden until `show`.
+    """Colours of the mesh, a colour bar and lines of text; hidden until `show`.
 
     Parameters
     ----------
     view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
-        Where to draw.
+        The view to draw in.
     session : Session
-        Whose pose.
+        The session whose pose is shown.
     surface : SurfaceDisplay, optional
-        The mesh to colour, of the same session; without it there is one of its own.
+        The displayed mesh of the session; by default the overlay adds its own.
     """
 
     def __init__(self, view: Any, session: Session, surface: SurfaceDisplay | None = None) -> None:
@@ -65,36 +67,36 @@ class VolumeOverlay:
             require(surface, SurfaceDisplay, "surface")
         self._own_surface = surface is None
         self._surface = SurfaceDisplay(self.view, session) if surface is None else surface
-        self._legend = Legend(self.view, "local volume")
+        self._legend = Legend(self.view, "Local volume\nchange")
         self._clock = _FrameClock(self.view)
         self._local: LocalVolume | None = None
         self._regions = RegionVolumes(session)
         self._change: FloatArray | None = None
         self._half_range: float | None = None
         self._wanted_range: float | None = None
-        self._light = _SOFT
+        self._light = _SOFT_LIGHT
         self._stop: Stop | None = None
 
     @property
     def is_shown(self) -> bool:
-        """Whether it is to be seen."""
+        """Whether the overlay is shown."""
         return self._stop is not None
 
     @property
     def change(self) -> FloatArray | None:
-        """(n,) float: s of the pose that is shown; None while hidden."""
+        """(n,) float: s of the current pose; None while hidden."""
         return self._change
 
     @property
     def half_range(self) -> float | None:
-        """The share at the ends of the scale; None while hidden."""
+        """The local volume change at the ends of the scale; None while hidden."""
         return self._half_range
 
     @property
     def wanted_range(self) -> float | None:
-        """The share that is to be at the ends of the scale; None, as at first, chooses.
+        """The local volume change wanted at the ends of the scale; None, the default, is automatic.
 
-        Can be set to a number above 0; anything else raises an ArgumentError.
+        Can be set to None or a number above 0; anything else raises an ArgumentError.
         """
         return self._wanted_range
 
@@ -102,7 +104,7 @@ class VolumeOverlay:
     def wanted_range(self, share: float | None) -> None:
         if share is not None and not (is_number(share) and share > 0.0):
             raise ArgumentError(
-                f"wanted_range must be a share above 0, or None; got {shown(share)}"
+                f"wanted_range must be a number above 0, or None; got {shown(share)}"
             )
         if share != self._wanted_range:
             self._wanted_range, self._half_range = share, None
@@ -111,19 +113,20 @@ class VolumeOverlay:
 
     @property
     def is_prepared(self) -> bool:
-        """Whether `prepare` is done, so that `show` takes no longer than drawing."""
+        """Whether `prepare` is done, so that `show` is immediate."""
         return self._local is not None
 
     def prepare(self) -> None:
-        """Do ahead of time what the first `show` would have to wait for.
+        """Compute in advance everything the first `show` needs.
 
-        It depends on the mesh and its regions alone and draws nothing: another thread may do it.
+        The result depends on the mesh and its regions only, and nothing is drawn, so this may be
+        called in another thread.
         """
         self._prepared()
         self._regions.prepare()
 
     def show(self) -> None:
-        """Show it, and keep it up to date."""
+        """Show the overlay and update it whenever the pose changes."""
         if not self.is_shown:
             self._stop = self.session.on_change(self._changed)
             self._clock.start()
@@ -131,7 +134,7 @@ class VolumeOverlay:
             self._update()
 
     def hide(self) -> None:
-        """Take it out of the view; nothing more is computed."""
+        """Hide the overlay and stop computing."""
         if self._stop is None:
             return
         self._stop()
@@ -142,7 +145,7 @@ class VolumeOverlay:
         self._surface.set_colours(_LAYER, None)
 
     def remove(self) -> None:
-        """Take everything out of the view, for good."""
+        """Remove the overlay from the view permanently."""
         self.hide()
         if self._own_surface:
             self._surface.remove()
@@ -157,7 +160,7 @@ class VolumeOverlay:
             self._update()
         elif change & _OF_REGIONS and self._change is not None and self._half_range is not None:
             self._legend.show(self._half_range, self._lines(self._change))
-            self.view.touch()
+            self.view.request_render()
 
     def _update(self) -> None:
         self._change = read_only(self._prepared().change(self.session.vertices))
@@ -169,18 +172,18 @@ class VolumeOverlay:
         self._surface.set_colours(_LAYER, colours_of(change, self._half_range))
 
     def _swap_light(self) -> None:
-        """Give the surface the soft light and keep its own, or the other way round."""
-        skin, light = self._surface.actor.GetProperty(), self._light
-        self._light = skin.GetAmbient(), skin.GetDiffuse(), skin.GetSpecular()
-        skin.SetAmbient(light[0])
-        skin.SetDiffuse(light[1])
-        skin.SetSpecular(light[2])
+        """Exchange the light of the surface with the stored one: the soft light or its own."""
+        material, light = self._surface.actor.GetProperty(), self._light
+        self._light = material.GetAmbient(), material.GetDiffuse(), material.GetSpecular()
+        material.SetAmbient(light[0])
+        material.SetDiffuse(light[1])
+        material.SetSpecular(light[2])
 
     def _lines(self, change: FloatArray) -> list[tuple[str, int | None]]:
         low, high = (signed(100.0 * float(share), 0) for share in (change.min(), change.max()))
         lines: list[tuple[str, int | None]] = [
-            (f"volume: {precise(self.session.volume_change)}", None),
-            (f"local: {low} to {high} %", None),
+            (f"Volume: {percent(self.session.volume_change)}", None),
+            (f"Local: {low} to {high} %", None),
         ]
         regions = self._regions.changes()
         lines += [
@@ -188,18 +191,19 @@ class VolumeOverlay:
             for region, share in regions[:_MOST_REGIONS]
         ]
         if len(regions) > _MOST_REGIONS:
-            lines.append((f"and {len(regions) - _MOST_REGIONS} regions more", None))
+            more = len(regions) - _MOST_REGIONS
+            lines.append((f"{more} more region{'s' * (more != 1)}", None))
         solution, seconds = self.session.solution, self._clock.seconds
-        work = [f"{solution.steps} step{'s' * (solution.steps != 1)}"] if solution else []
-        work += [f"{1000.0 * seconds:.0f} ms a frame"] if seconds is not None else []
-        return lines + [(", ".join(work), None)] if work else lines
+        speed = [f"{solution.steps} step{'s' * (solution.steps != 1)}"] if solution else []
+        speed += [f"{1000.0 * seconds:.0f} ms per frame"] if seconds is not None else []
+        return lines + [(", ".join(speed), None)] if speed else lines
 
     def _name(self, region: int) -> str:
         return brief(self.session.region_name(region), region_name((), region))
 
 
 class _FrameClock:
-    """How long the last change of the pose took, from the event it came by to its picture."""
+    """Measures the time from the event that changed the pose to the end of rendering."""
 
     def __init__(self, view: View) -> None:
         self.seconds: float | None = None
@@ -209,7 +213,7 @@ class _FrameClock:
         self._stops: list[Stop] = []
 
     def start(self) -> None:
-        """Wait for events."""
+        """Start observing events."""
         window = self._view.window
         events = ("MouseMoveEvent", "TimerEvent")
         self._stops = [self._view.observe(event, self._begin, _FIRST) for event in events]
@@ -218,13 +222,13 @@ class _FrameClock:
             self._stops.append(lambda: window.RemoveObserver(tag))
 
     def note(self) -> None:
-        """Note that the pose has changed, by the event in hand or, untimed, by a script."""
+        """Note a change of the pose; outside an event, by a script, it is not timed."""
         self._posed = True
         if self._began is None:
             self.seconds = None
 
     def stop(self) -> None:
-        """Wait no more, and forget."""
+        """Stop observing events and discard the measurement."""
         for stop in self._stops:
             stop()
         self._stops, self.seconds, self._began = [], None, None

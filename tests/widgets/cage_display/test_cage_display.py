@@ -1,4 +1,4 @@
-"""Cages as wires: seen in their colours, following the pose, dragged by the vertex."""
+"""Cages as wireframes: their colours, the pose, dragging vertices, rejected cages."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def surface():
 
 @pytest.fixture
 def cages(surface):
-    """Return three cages around it; switched on, with a free volume."""
+    """Return a display of its three cages, switched on; the volume is not preserved."""
     display = CageDisplay(surface.view, surface.session)
     display.On()
     yield display
@@ -62,12 +62,12 @@ def hand(cages):
 
 
 def top_of(display, region: int) -> int:
-    """Return the vertex of a cage that is highest as it is seen: beside the body."""
+    """Return the vertex of a cage that is highest in the display: outside the mesh."""
     return int(np.argmax(display.view.to_display(display.session.cage_vertices[region])[:, 1]))
 
 
 def count(display, colour) -> int:
-    """Return the number of pixels that are *colour* as it is, or a little shaded."""
+    """Return the number of pixels with *colour*, possibly shaded."""
     hue = np.asarray(colour, float) / np.linalg.norm(colour)
     image = picture(display.view).astype(float)
     bright = np.linalg.norm(image, axis=2)
@@ -76,7 +76,7 @@ def count(display, colour) -> int:
 
 
 def near(display, point, colour) -> bool:
-    """Tell whether *colour* is seen within two pixels of a world *point*."""
+    """Return whether a pixel within two pixels of a world *point* has *colour*."""
     x, y = (round(float(p)) for p in display.view.to_display(np.array([point]))[0, :2])
     image = picture(display.view)[::-1][y - 2 : y + 3, x - 2 : x + 3].reshape(-1, 3).astype(float)
     hue = np.asarray(colour, float) / np.linalg.norm(colour)
@@ -84,21 +84,21 @@ def near(display, point, colour) -> bool:
 
 
 def ball(display, point, colour) -> bool:
-    """Tell whether *colour* fills the pixels around a world *point*."""
+    """Return whether all pixels around a world *point* have *colour*."""
     x, y = (round(float(p)) for p in display.view.to_display(np.array([point]))[0, :2])
     image = picture(display.view)[::-1][y - 1 : y + 2, x - 1 : x + 2].reshape(-1, 3).astype(float)
     hue = np.asarray(colour, float) / np.linalg.norm(colour)
     return bool((image @ hue > 0.99 * np.linalg.norm(image, axis=1)).all())
 
 
-def test_each_cage_is_seen_in_the_colour_of_its_region(cages):
+def test_each_cage_has_the_colour_of_its_region(cages):
     for region in range(3):
         assert count(cages, of_region(region)) > 500
         vertex = cages.session.cage_vertices[region][top_of(cages, region)]
         assert near(cages, vertex, of_region(region))
 
 
-def test_a_cage_is_switched_off_alone_and_all_are_hidden_together(cages):
+def test_one_cage_or_all_cages_can_be_hidden(cages):
     cages.set_visible(1, False)
     assert not cages.is_visible(1)
     assert count(cages, of_region(1)) < 20
@@ -111,7 +111,7 @@ def test_a_cage_is_switched_off_alone_and_all_are_hidden_together(cages):
     assert all(count(cages, of_region(region)) > 500 for region in range(3))
 
 
-def test_wires_fade_with_their_opacity(cages):
+def test_opacity_makes_wireframes_fainter(cages):
     solid = picture(cages.view).astype(int)
     cages.opacity = 0.3
     faint = picture(cages.view).astype(int)
@@ -121,7 +121,7 @@ def test_wires_fade_with_their_opacity(cages):
             cages.opacity = wrong
 
 
-def test_wires_in_front_of_the_body_are_seen_and_those_behind_are_not(cages, surface):
+def test_the_mesh_hides_the_wireframe_behind_it(cages, surface):
     p = cages.session.cage_vertices[1]
     in_front = p[(p[:, 1] < -0.6) & (np.abs(p[:, 2]) < 0.5)]
     assert len(in_front)
@@ -143,7 +143,7 @@ def test_cages_follow_the_pose(cages):
     assert session.state.pose is None
 
 
-def test_other_regions_bring_other_wires(cages):
+def test_a_change_of_regions_replaces_the_wireframes(cages):
     session = cages.session
     session.merge_regions([1, 2])
     assert all(count(cages, of_region(region)) < 20 for region in range(3))
@@ -151,7 +151,7 @@ def test_other_regions_bring_other_wires(cages):
     assert all(count(cages, of_region(region)) > 500 for region in range(3))
 
 
-def test_the_vertex_under_the_pointer_is_marked(cages, hand):
+def test_the_vertex_under_the_pointer_is_highlighted(cages, hand):
     before = picture(cages.view)
     vertex = cages.session.cage_vertices[1][top_of(cages, 1)]
     x, y = hand.at(vertex)
@@ -165,19 +165,20 @@ def test_the_vertex_under_the_pointer_is_marked(cages, hand):
     assert not hand.failures
 
 
-def test_a_dragged_vertex_is_where_the_pointer_is_and_as_far_away_as_before(cages, hand):
+def test_a_dragged_vertex_follows_the_pointer_at_constant_depth(cages, hand):
     session, view = cages.session, cages.view
     k = top_of(cages, 1)
     start, rest = session.cage_vertices[1][k], session.vertices
     camera = view.camera.GetPosition()
     x, y = hand.at(start)
-    hand.press((x + 4, y))  # the pointer is a little beside it, and stays so
+    hand.press((x + 4, y))  # the offset from the pointer is kept
     for step in range(1, 5):
         hand.move((x + 4 + 8 * step, y + 6 * step))
         now = session.cage_vertices[1]
         seen = view.to_display(now[k : k + 1])[0]
-        assert np.abs(seen[:2] - [x + 8 * step, y + 6 * step]).max() <= 1.0  # events have pixels
-        assert (now[k] - start) @ view.towards_scene == pytest.approx(0.0, abs=1e-9)
+        # Positions of events are whole pixels.
+        assert np.abs(seen[:2] - [x + 8 * step, y + 6 * step]).max() <= 1.0
+        assert (now[k] - start) @ view.view_direction == pytest.approx(0.0, abs=1e-9)
         assert near(cages, now[k], rgb(HANDLE))
     others = np.delete(np.arange(len(now)), k)
     assert np.array_equal(now[others], session.cages[1].vertices[others])
@@ -192,7 +193,7 @@ def test_a_dragged_vertex_is_where_the_pointer_is_and_as_far_away_as_before(cage
     assert not hand.failures
 
 
-def test_the_volume_is_kept_at_every_move_if_asked(cages, hand):
+def test_the_volume_is_preserved_at_every_move_if_the_option_is_on(cages, hand):
     session = cages.session
     session.change_options(preserve_volume=True)
     x, y = hand.at(session.cage_vertices[1][top_of(cages, 1)])
@@ -204,7 +205,7 @@ def test_the_volume_is_kept_at_every_move_if_asked(cages, hand):
     assert not hand.failures
 
 
-def test_escape_and_the_right_button_leave_no_trace(cages, hand):
+def test_escape_and_the_right_button_cancel_the_drag(cages, hand):
     session = cages.session
     before, step = picture(cages.view), session.undo_label
     x, y = hand.at(session.cage_vertices[1][top_of(cages, 1)])
@@ -223,14 +224,14 @@ def test_escape_and_the_right_button_leave_no_trace(cages, hand):
     assert not hand.failures
 
 
-def test_a_click_is_no_step(cages, hand):
+def test_a_click_makes_no_undo_step(cages, hand):
     step = cages.session.undo_label
     hand.click(hand.at(cages.session.cage_vertices[1][top_of(cages, 1)]))
     assert cages.session.undo_label == step
     assert cages.session.state.pose is None
 
 
-def test_a_drag_that_was_left_in_hand_is_not_taken_back_with_ours(cages, hand):
+def test_cancelling_keeps_an_earlier_unfinished_drag(cages, hand):
     session = cages.session
     moved = session.cage_vertices[0] * 1.1
     session.move_cage(0, moved)
@@ -241,7 +242,7 @@ def test_a_drag_that_was_left_in_hand_is_not_taken_back_with_ours(cages, hand):
     assert np.array_equal(session.cage_vertices[0], moved)
 
 
-def test_a_vertex_behind_the_body_is_only_dragged_through_it(cages, hand):
+def test_a_hidden_vertex_can_only_be_dragged_with_through(cages, hand):
     session, view = cages.session, cages.view
     for region in (0, 2):
         cages.set_visible(region, False)
@@ -256,7 +257,7 @@ def test_a_vertex_behind_the_body_is_only_dragged_through_it(cages, hand):
     before = session.cage_vertices[1]
     x, y = seen[alone[0]]
     hand.drag([(x, y), (x + 10, y)])
-    assert session.cage_vertices[1] is before  # the camera has turned
+    assert session.cage_vertices[1] is before  # the camera moved instead
     cages.through = True
     x, y = hand.at(p[alone[0]])
     hand.drag([(x, y), (x + 10, y)])
@@ -265,7 +266,7 @@ def test_a_vertex_behind_the_body_is_only_dragged_through_it(cages, hand):
     assert not hand.failures
 
 
-def test_of_two_vertices_in_line_the_nearer_is_dragged(cages, hand):
+def test_of_two_vertices_at_the_pointer_the_nearer_is_dragged(cages, hand):
     session, view = cages.session, cages.view
     session.set_cages(fitted()[0].cages)  # symmetrical: y and -y in line
     view.camera.SetPosition(0.0, -10.0, 0.0)
@@ -274,7 +275,7 @@ def test_of_two_vertices_in_line_the_nearer_is_dragged(cages, hand):
     view.renderer.ResetCamera()
     view.render()
     p = session.cage_vertices[1]
-    above = np.flatnonzero((p[:, 1] < -0.4) & (p[:, 2] > 1.0))  # where no body hides anything
+    above = np.flatnonzero((p[:, 1] < -0.4) & (p[:, 2] > 1.0))  # above the mesh
     front = above[0]
     back = int(np.argmin(np.linalg.norm(p - p[front] * [1, -1, 1], axis=1)))
     x, y = hand.at(p[back])
@@ -283,7 +284,7 @@ def test_of_two_vertices_in_line_the_nearer_is_dragged(cages, hand):
     assert np.flatnonzero((session.cage_vertices[1] != p).any(axis=1)).tolist() == [front]
 
 
-def test_only_what_is_shown_is_dragged_and_only_while_on(cages, hand):
+def test_only_visible_cages_can_be_dragged_and_only_while_on(cages, hand):
     session = cages.session
     path = [hand.at(session.cage_vertices[1][top_of(cages, 1)]), (10, 10)]
     camera = cages.view.camera.GetPosition()
@@ -307,7 +308,7 @@ def test_only_what_is_shown_is_dragged_and_only_while_on(cages, hand):
     assert not turns_the_camera()
 
 
-def test_a_move_that_is_refused_is_told_and_takes_everything_back(cages, hand):
+def test_a_move_that_is_refused_is_reported_and_the_drag_cancelled(cages, hand):
     session = cages.session
     x, y = hand.at(session.cage_vertices[1][top_of(cages, 1)])
     hand.press((x, y))
@@ -323,7 +324,7 @@ def test_a_move_that_is_refused_is_told_and_takes_everything_back(cages, hand):
     assert len(hand.failures) == 1
 
 
-def test_cages_that_come_during_a_drag_end_it(cages, hand):
+def test_new_cages_during_a_drag_cancel_it(cages, hand):
     session = cages.session
     x, y = hand.at(session.cage_vertices[1][top_of(cages, 1)])
     hand.press((x, y))
@@ -343,7 +344,7 @@ def test_an_open_cage_is_marked_along_its_hole(cages):
     assert cages.show_faults(cage.vertices, faces, 1) == (
         "3 edges border only one face: the cage is open"
     )
-    assert count(cages, of_region(1)) < 20  # it stands in the place of that region's own
+    assert count(cages, of_region(1)) < 20  # the cage of the region is hidden
     for a, b in ((0, 1), (1, 2), (2, 0)):
         middle = cage.vertices[cage.faces[hole][[a, b]]].mean(axis=0)
         assert near(cages, middle, WARNING)
@@ -354,24 +355,26 @@ def test_an_open_cage_is_marked_along_its_hole(cages):
     assert count(cages, of_region(1)) > 500
 
 
-def test_what_a_cage_leaves_out_is_marked(cages):
+def test_vertices_outside_a_cage_are_marked(cages):
     session, cage = cages.session, cages.session.cages[1]
     tight = Cage(cage.vertices * [1.0, 0.8, 0.8], cage.faces)
     with pytest.raises(CageError, match="are outside the cage") as refused:
         session.set_cages([session.cages[0], tight, session.cages[2]])
     outside = session.mesh.vertices[session.regions.membership[1]]
     outside = outside[~tight.contains(outside)]
-    words = cages.show_faults(tight.vertices, tight.faces, 1, message=str(refused.value))
-    assert words == str(refused.value)
+    message = cages.show_faults(tight.vertices, tight.faces, 1, message=str(refused.value))
+    assert message == str(refused.value)
     facing = outside[outside[:, 1] < -0.2]
     assert len(facing)
     assert all(near(cages, point, WARNING) for point in facing[::5])
-    shown = [p.GetInput() for p in cages.view.front.GetViewProps() if isinstance(p, vtkTextActor)]
-    assert [" ".join(text.split()) for text in shown] == [words]
+    shown = [
+        p.GetInput() for p in cages.view.foreground.GetViewProps() if isinstance(p, vtkTextActor)
+    ]
+    assert [" ".join(text.split()) for text in shown] == [message]
 
 
 @pytest.mark.parametrize("fault", ["crossing", "flat", "inside-out", "loose vertex", "no fault"])
-def test_other_faults_are_marked_and_told(cages, fault):
+def test_other_faults_are_marked_and_described(cages, fault):
     cage = cages.session.cages[1]
     vertices, faces = cage.vertices.copy(), cage.faces
     if fault == "crossing":
@@ -382,16 +385,16 @@ def test_other_faults_are_marked_and_told(cages, fault):
         faces = faces[:, ::-1]
     elif fault == "loose vertex":
         vertices = np.concatenate([vertices, [[0.0, -1.0, 1.5]]])
-    words = {
+    messages = {
         "crossing": "intersects itself",
         "flat": "no area",
         "inside-out": "inside-out",
         "loose vertex": "in no face",
         "no fault": "",
     }
-    told = cages.show_faults(vertices, faces)
-    assert words[fault] in told
-    assert (told == "") == (fault == "no fault")
+    message = cages.show_faults(vertices, faces)
+    assert messages[fault] in message
+    assert (message == "") == (fault == "no fault")
     assert (count(cages, WARNING) > 0) == (fault != "no fault")
     if fault == "loose vertex":
         assert near(cages, vertices[-1], WARNING)
@@ -399,22 +402,22 @@ def test_other_faults_are_marked_and_told(cages, fault):
 
 
 @pytest.mark.parametrize("zoom", [0.5, 1.6, 4.0])
-def test_words_stay_inside_the_window_and_off_the_marks(cages, zoom):
+def test_the_message_stays_inside_the_window_and_beside_the_marks(cages, zoom):
     cage = cages.session.cages[2]
     view = cages.view
     view.camera.Zoom(zoom)
     cages.show_faults(cage.vertices, cage.faces[:-1], 2)
     picture(view)
-    words = next(p for p in view.front.GetViewProps() if isinstance(p, vtkTextActor))
-    low, size = np.array(words.GetPosition()), np.zeros(2)
-    words.GetSize(view.front, size)
+    text = next(p for p in view.foreground.GetViewProps() if isinstance(p, vtkTextActor))
+    low, size = np.array(text.GetPosition()), np.zeros(2)
+    text.GetSize(view.foreground, size)
     assert (low >= 0).all()
     assert (low + size <= view.renderer.GetSize()).all()
     marks = view.to_display(cage.vertices[cage.faces[-1]])[:, :2]
     assert not ((marks > low) & (marks < low + size)).all(axis=1).any()
 
 
-def test_faults_go_when_good_cages_come(cages):
+def test_new_cages_clear_the_faults(cages):
     session = cages.session
     cages.show_faults(session.cages[0].vertices, session.cages[0].faces[1:], 0)
     session.set_cages([Cage(c.vertices * 1.05, c.faces) for c in session.cages])
@@ -424,12 +427,12 @@ def test_faults_go_when_good_cages_come(cages):
         cages.show_faults(session.cages[0].vertices, session.cages[0].faces, 7)
 
 
-def test_removed_it_leaves_nothing_behind(cages, hand):
+def test_remove_restores_the_view(cages, hand):
     view = cages.view
     cages.show_faults(cages.session.cages[0].vertices, cages.session.cages[0].faces[1:], 0)
     hand.hover(hand.at(cages.session.cage_vertices[1][top_of(cages, 1)]))
     cages.remove()
     assert view.renderer.GetViewProps().GetNumberOfItems() == 1  # the surface
-    assert view.front.GetViewProps().GetNumberOfItems() == 0
+    assert view.foreground.GetViewProps().GetNumberOfItems() == 0
     cages.session.move_cage(1, cages.session.cage_vertices[1] * 1.1)
     assert not hand.failures

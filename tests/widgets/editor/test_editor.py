@@ -23,7 +23,7 @@ from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.widgets.editor import actions
 from vtk_segdeform.widgets.editor.bindings import BINDINGS
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
-from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import Part, Way
+from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import Kind, Part
 from vtk_segdeform.widgets.region_selector.region_selector import Paint, Tool
 from vtk_segdeform.widgets.scene.view import View
 from vtk_segdeform.widgets.volume_overlay.volume_overlay import VolumeOverlay
@@ -209,10 +209,10 @@ sys.stdout.buffer.write(load_session(sys.argv[1]).vertices.tobytes())
 def turn_by_a_ring(bench):
     """Rotate the handle about the view direction, by a sixth of the outermost ring."""
     dragger = bench.editor.widgets.dragger
-    ring = dragger.gizmo.line(Part(Way.ABOUT))[:, :2]
+    ring = dragger.gizmo.line(Part(Kind.ROTATION))[:, :2]
     before = bench.session.targets[dragger.handle]
     bench.hand.drag(ring[: len(ring) // 6])
-    assert bench.session.undo_label == "turn handle 1"
+    assert bench.session.undo_label == "rotate handle 1"
     a, b = (x - x.mean(axis=0) for x in (before, bench.session.targets[dragger.handle]))
     turn = Rotation.align_vectors(b, a)[0]
     assert np.degrees(turn.magnitude()) == pytest.approx(60.0, abs=8.0)
@@ -335,7 +335,7 @@ def test_the_status_line_reports_vertices_that_a_stroke_left_unchanged(bench):
     hand.drag([(2, 40), (398, 398)], control=True)
     left = np.count_nonzero(bench.session.regions.membership[0])
     assert 0 < left < size
-    assert f"{left} vertices left as they were: no other region holds them" in bench.editor.status
+    assert f"{left} vertices skipped: in no other region" in bench.editor.status
     assert left == np.count_nonzero(held[bench.session.regions.membership[0]] == 1)
 
 

@@ -37,7 +37,7 @@ def test_the_card_fits_into_the_window_and_is_legible_on_any_background(size, ba
     assert (edge[[0, -1]] > 240).all()
     card.hide()
     assert (picture(view) == blank).all()
-    view.remove_front()
+    view.remove_foreground()
 
 
 def test_the_card_is_laid_out_again_when_the_window_grows():
@@ -55,4 +55,4 @@ def test_the_card_is_laid_out_again_when_the_window_grows():
     card.toggle()
     assert not card.is_shown
     card.remove()
-    view.remove_front()
+    view.remove_foreground()

@@ -89,9 +89,7 @@ def test_editing_a_cage_is_logged_without_solver_steps(written):
     session.commit()
     (entry,) = log.entries
     assert (entry.title, entry.steps) == ("drag the cage of region 2", None)
-    assert entry.text.endswith(
-        "  drag the cage of region 2\nCage edited\nvolume " + entry.text.rpartition(" ")[2]
-    )
+    assert entry.text.endswith("  drag the cage of region 2\nCage edited\nvolume 0 %")
 
 
 def test_the_oldest_entries_are_dropped_and_other_sessions_are_not_logged(written):
@@ -153,7 +151,7 @@ def test_a_job_is_logged_with_its_outcome():
         (Entry(1, 0.0, "Fitting cages", 2.04, "Done"), ["2.0 s: Done"]),
         (
             Entry(1, 0.0, "drag tip", 0.0314, "converged", 1, 1.234e-4, -2e-16),
-            ["1 step, 31 ms: converged", "volume -2.0e-16, handle error 0.012 % of model size"],
+            ["1 step, 31 ms: converged", "volume 0 %, handle error 0.012 % of model size"],
         ),
     ],
 )

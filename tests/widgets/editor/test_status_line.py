@@ -16,7 +16,7 @@ def line():
     view.render()
     yield line
     line.remove()
-    view.remove_front()
+    view.remove_foreground()
 
 
 def strip_height(view) -> int:

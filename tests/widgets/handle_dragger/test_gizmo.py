@@ -1,4 +1,4 @@
-"""The gizmo: as large everywhere, seen through everything, and hit where it is drawn."""
+"""The gizmo: constant size, never hidden, and hit where it is drawn."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from solids import rotation
 from vtk_segdeform import Session, models
 from vtk_segdeform.pictures.palette import COLOURS, INK, rgb
 from vtk_segdeform.widgets.handle_dragger.gizmo import AXIS_COLOURS, Gizmo
-from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import FREE, PARTS, Part, Way
+from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import FREE, PARTS, Kind, Part
 from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 
-CENTRE = np.array([0.2, 0.1, -0.1])  # within the ball that is in the view
+CENTRE = np.array([0.2, 0.1, -0.1])  # inside the displayed sphere
 TURNED = rotation([1.0, 2.0, 3.0], 0.7)
 LOOKS = [(4.0, -9.0, 5.0), (-6.0, 5.0, 3.0), (3.0, 4.0, -8.0)]
-VIEW_RING = Part(Way.ABOUT)
+VIEW_RING = Part(Kind.ROTATION)
 
 
 @pytest.fixture
@@ -40,11 +40,11 @@ def pointer(place):
 
 
 def seen_lines(gizmo, part):
-    """Return the points where a part is drawn, (k, 2), none for one that points at the viewer."""
+    """Return pixels where a part is drawn, (k, 2); none for a hidden part."""
     line = gizmo.line(part)[:, :2]
-    if part.way is Way.ALONG:
+    if part.kind is Kind.AXIS:
         line = line[0] + np.linspace(0.3, 0.9, 7)[:, None] * (line[1] - line[0])
-    elif part.way is Way.WITHIN:
+    elif part.kind is Kind.PLANE:
         line = line[:4].mean(axis=0)[None]
     else:
         line = line[np.isfinite(line).all(axis=1)][::3]
@@ -52,7 +52,7 @@ def seen_lines(gizmo, part):
 
 
 def is_painted(image, place, colour):
-    """Tell whether a *colour* is at a display *place*, within a pixel."""
+    """Return whether a pixel within one pixel of *place* has *colour*."""
     x, y = np.round(place).astype(int)
     row = len(image) - 1 - y
     near = image[row - 1 : row + 2, x - 1 : x + 2].astype(int)
@@ -60,7 +60,7 @@ def is_painted(image, place, colour):
 
 
 @pytest.mark.parametrize("parallel", [False, True], ids=["perspective", "parallel"])
-def test_it_is_as_large_on_the_screen_from_near_and_far(view, parallel):
+def test_its_size_on_the_screen_is_constant(view, parallel):
     view.camera.SetParallelProjection(parallel)
     gizmo = Gizmo(view)
     gizmo.place(CENTRE)
@@ -74,7 +74,7 @@ def test_it_is_as_large_on_the_screen_from_near_and_far(view, parallel):
         ring = gizmo.line(VIEW_RING)[:, :2]
         sizes.append(np.linalg.norm(ring - middle, axis=1).mean())
         drawn = [is_painted(image, place, INK) for place in ring[::9]]
-        assert np.mean(drawn) > 0.8  # and it is there that it is drawn
+        assert np.mean(drawn) > 0.8  # the ring is drawn at its line
     assert np.ptp(sizes) < 1.0
     assert 60.0 < sizes[0] < 130.0
 
@@ -90,7 +90,7 @@ def test_it_grows_a_little_with_the_window():
     assert 100.0 < size(1200) < 150.0
 
 
-def test_the_body_does_not_hide_it(view):
+def test_the_mesh_does_not_hide_it(view):
     gizmo = Gizmo(view)
     before = picture(view)
     gizmo.place(CENTRE)
@@ -103,7 +103,7 @@ def test_the_body_does_not_hide_it(view):
 
 @pytest.mark.parametrize("axes", [np.eye(3), TURNED], ids=["world", "turned"])
 @pytest.mark.parametrize("place", LOOKS)
-def test_what_is_drawn_is_what_is_hit(view, place, axes):
+def test_parts_are_hit_where_they_are_drawn(view, place, axes):
     view.camera.SetParallelProjection(place == LOOKS[1])
     look_from(view, place)
     gizmo = Gizmo(view)
@@ -111,21 +111,21 @@ def test_what_is_drawn_is_what_is_hit(view, place, axes):
     image = picture(view)
     for part in PARTS:
         places = seen_lines(gizmo, part)
-        found = [gizmo.under(pointer(p)) for p in places]
+        found = [gizmo.part_at(pointer(p)) for p in places]
         own = INK if part.axis is None else AXIS_COLOURS[part.axis]
         drawn = [is_painted(image, p, own) for p in places]
-        if part in found or part.way in (Way.FREE, Way.ABOUT):
-            assert found.count(part) > 0.4 * len(found), part  # the rest is crossed by others
+        if part in found or part.kind in (Kind.FREE, Kind.ROTATION):
+            assert found.count(part) > 0.4 * len(found), part  # other parts cross the rest
             assert np.mean(drawn) > 0.4, part
-        else:  # it is seen from its side, or end on: neither drawn nor hit
-            edge = abs(axes[part.axis] @ view.towards_scene)
-            assert edge > 0.9 if part.way is Way.ALONG else edge < 0.4
+        else:  # a part seen edge-on or end-on is neither drawn nor hit
+            edge = abs(axes[part.axis] @ view.view_direction)
+            assert edge > 0.9 if part.kind is Kind.AXIS else edge < 0.4
 
 
-def test_the_far_half_of_a_ring_is_not_there(view):
+def test_the_far_half_of_a_ring_is_neither_drawn_nor_hit(view):
     gizmo = Gizmo(view)
     gizmo.place(CENTRE)
-    ring = Part(Way.ABOUT, 2)
+    ring = Part(Kind.ROTATION, 2)
     turn = np.linspace(0.0, 2.0 * np.pi, 90, endpoint=False)
     around = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(90)])
     hidden = around[around @ np.array(LOOKS[0]) < -3.0]
@@ -133,7 +133,7 @@ def test_the_far_half_of_a_ring_is_not_there(view):
 
     def hits(points):
         places = view.to_display(CENTRE + gizmo.radius * points)
-        return [gizmo.under(pointer(place)) for place in places]
+        return [gizmo.part_at(pointer(place)) for place in places]
 
     def drawn(points):
         image, places = picture(view), view.to_display(CENTRE + gizmo.radius * points)[:, :2]
@@ -141,14 +141,14 @@ def test_the_far_half_of_a_ring_is_not_there(view):
 
     assert ring not in hits(hidden)
     assert hits(shown).count(ring) > 0.7 * len(shown)
-    assert drawn(hidden) < 0.2  # where something else is
+    assert drawn(hidden) < 0.2  # a few pixels belong to other parts
     assert drawn(shown) > 0.7
     gizmo.show_only(ring)
     assert drawn(hidden) > 0.9
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_what_is_seen_end_on_is_not_there(view, axis):
+def test_parts_seen_end_on_are_not_hit(view, axis):
     view.camera.SetParallelProjection(axis == 1)
     place = 9.0 * np.eye(3)[axis]
     view.camera.SetViewUp(*np.eye(3)[axis - 1])
@@ -158,33 +158,33 @@ def test_what_is_seen_end_on_is_not_there(view, axis):
     gizmo.place(np.zeros(3))
     x, y = view.to_display(np.zeros((1, 3)))[0, :2]
     grid = [(x + i, y + j) for i in range(-99, 100, 11) for j in range(-99, 100, 11)]
-    found = {gizmo.under(pointer(p)) for p in grid}
+    found = {gizmo.part_at(pointer(p)) for p in grid}
     others = [a for a in range(3) if a != axis]
     assert found == {
-        None, FREE, VIEW_RING, *(Part(Way.ABOUT, a) for a in range(3)),
-        Part(Way.WITHIN, axis), *(Part(Way.ALONG, a) for a in others),
+        None, FREE, VIEW_RING, *(Part(Kind.ROTATION, a) for a in range(3)),
+        Part(Kind.PLANE, axis), *(Part(Kind.AXIS, a) for a in others),
     }  # fmt: skip
 
 
 def test_beside_it_and_while_it_is_hidden_nothing_is_hit(view):
     gizmo = Gizmo(view)
     middle = view.to_display(CENTRE[None])[0]
-    assert gizmo.under(pointer(middle)) is None
+    assert gizmo.part_at(pointer(middle)) is None
     gizmo.place(CENTRE)
-    assert gizmo.under(pointer(middle)) == FREE
+    assert gizmo.part_at(pointer(middle)) == FREE
     outer = 1.14 * gizmo.radius / view.pixel_at(CENTRE)
-    assert gizmo.under(pointer(middle[:2] + [0.0, outer + 2.0])) == VIEW_RING
-    assert gizmo.under(pointer(middle[:2] + [0.0, outer + 12.0])) is None
+    assert gizmo.part_at(pointer(middle[:2] + [0.0, outer + 2.0])) == VIEW_RING
+    assert gizmo.part_at(pointer(middle[:2] + [0.0, outer + 12.0])) is None
     gizmo.place(None)
-    assert gizmo.under(pointer(middle)) is None
+    assert gizmo.part_at(pointer(middle)) is None
 
 
-def test_the_part_that_is_pointed_at_is_yellow_and_the_one_in_hand_is_alone(view):
+def test_a_highlighted_part_is_yellow_and_show_only_hides_the_others(view):
     gizmo = Gizmo(view)
     gizmo.place(CENTRE)
-    arrow, ring = Part(Way.ALONG, 0), Part(Way.ABOUT, 2)
+    arrow, ring = Part(Kind.AXIS, 0), Part(Kind.ROTATION, 2)
     there, other = seen_lines(gizmo, arrow)[3], seen_lines(gizmo, ring)
-    gizmo.point_at(arrow)
+    gizmo.highlight(arrow)
     image = picture(view)
     assert is_painted(image, there, COLOURS[4])
     assert any(is_painted(image, place, AXIS_COLOURS[2]) for place in other)
@@ -193,15 +193,15 @@ def test_the_part_that_is_pointed_at_is_yellow_and_the_one_in_hand_is_alone(view
     assert is_painted(image, there, COLOURS[4])
     assert not any(is_painted(image, place, AXIS_COLOURS[2]) for place in other)
     gizmo.show_only(None)
-    gizmo.point_at(None)
+    gizmo.highlight(None)
     assert is_painted(picture(view), there, AXIS_COLOURS[0])
 
 
-def test_after_a_step_of_the_camera_the_first_picture_is_right():
+def test_the_first_picture_after_a_camera_move_is_final():
     view = plain_view()
     SurfaceDisplay(view, Session(models.sphere(300)))
     look_from(view, LOOKS[0])
-    assert view.front.GetLayer() == 1  # somebody else was there first
+    assert view.foreground.GetLayer() == 1  # the foreground exists already
     gizmo = Gizmo(view)
     gizmo.place(np.array([0.0, -0.9, 0.4]))
     for zoom in (0.2, 0.3, 4.0):
@@ -210,12 +210,12 @@ def test_after_a_step_of_the_camera_the_first_picture_is_right():
         assert np.array_equal(first, picture(view))
 
 
-def test_removed_it_leaves_nothing(view):
+def test_remove_restores_the_view(view):
     before = picture(view)
     gizmo = Gizmo(view)
     gizmo.place(CENTRE)
-    gizmo.say("30.0°")
+    gizmo.set_caption("30.0°")
     assert (picture(view) != before).any()
     gizmo.remove()
     assert np.array_equal(picture(view), before)
-    assert view.front.GetViewProps().GetNumberOfItems() == 0
+    assert view.foreground.GetViewProps().GetNumberOfItems() == 0

@@ -1,4 +1,4 @@
-"""Handles moved and turned by the mouse: where targets go, what is kept, what is taken back."""
+"""Moving and rotating handles with the mouse: targets, constraints, undo, refining."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ import pytest
 from hands import Hand, picture, plain_view
 from scenes import sausage
 from solids import rotation
+from vtkmodules.vtkRenderingCore import vtkTextActor
 
 from vtk_segdeform import Session
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.geometry.rotations import rigid_fit
 from vtk_segdeform.solver.solution import Status
-from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import FREE, PARTS, Part, Way
+from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import FREE, PARTS, Kind, Part
 from vtk_segdeform.widgets.handle_dragger.handle_dragger import HandleDragger
 from vtk_segdeform.widgets.handle_dragger.handle_motion import Grip, Motion
 from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
@@ -22,7 +23,7 @@ from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
 SCENE = sausage()
 TIP, TOP = "handle 1", "handle 2"
 LOOKS = [(10.0, -8.0, 6.0), (9.0, 7.0, 4.0), (-5.0, 6.0, -8.0)]
-VIEW_RING = Part(Way.ABOUT)
+VIEW_RING = Part(Kind.ROTATION)
 
 
 class Bench:
@@ -54,28 +55,28 @@ class Bench:
         return self.session.targets[name]
 
     def shift(self, name=TIP):
-        """Return how far the targets were shifted, all alike, (3,)."""
+        """Return the translation of the targets, (3,); it is the same for all."""
         away = self.targets(name) - SCENE.mesh.vertices[self.session.handles[name]]
         assert np.ptp(away, axis=0).max() < 1e-12
         return away[0]
 
     def aim(self, part):
-        """Return a pixel at which a press takes *part*."""
+        """Return a pixel at which a press grabs *part*."""
         line = self.gizmo.line(part)[:, :2]
-        if part.way is Way.WITHIN:
+        if part.kind is Kind.PLANE:
             line = np.concatenate([line[:4].mean(axis=0)[None], 0.5 * (line[:4] + line[1:])])
-        elif part.way is Way.ALONG:
+        elif part.kind is Kind.AXIS:
             line = line[0] + np.linspace(0.2, 0.9, 15)[:, None] * (line[1] - line[0])
         places = np.round(line[np.isfinite(line).all(axis=1)])
         places = places[:: 1 + len(places) // 10]
-        taken = [p for p in places if self.gizmo.under(Pointer(Phase.HOVER, *p)) == part]
+        taken = [p for p in places if self.gizmo.part_at(Pointer(Phase.HOVER, *p)) == part]
         assert taken, f"{part} is not to be seen"
         place = taken[len(taken) // 2]
         assert 20.0 < place.min() <= place.max() < 380.0
         return place
 
     def watch_timers(self):
-        """Keep in `timers` the numbers of the timers that run, as a window would."""
+        """Keep the numbers of the running timers in `timers`, as a window would."""
         interactor = self.view.interactor
 
         def create(*_):
@@ -108,7 +109,7 @@ each_view = pytest.mark.parametrize(
 
 
 def turned(bench):
-    """Turn the active handle a bit, and have its axes turned with it; return them."""
+    """Rotate the active handle slightly, switch to its local axes, and return them."""
     turn = np.eye(4)
     turn[:3, :3] = rotation([1.0, 2.0, 0.5], 0.2)
     centre = bench.targets().mean(axis=0)
@@ -119,7 +120,7 @@ def turned(bench):
     return turn[:3, :3].T
 
 
-# What moves where.
+# Directions of motion.
 
 
 @pytest.mark.parametrize(
@@ -131,18 +132,18 @@ def test_every_part_moves_as_it_says(look, parallel, local):
     axes = turned(bench) if local else np.eye(3)
     assert np.allclose(bench.gizmo.axes, axes, atol=1e-9)
     hand = bench.hand
-    for way in (Way.ALONG, Way.WITHIN, Way.ABOUT):
+    for way in (Kind.AXIS, Kind.PLANE, Kind.ROTATION):
         for axis in range(3):
             place = bench.aim(Part(way, axis))
             start, centre = bench.targets(), bench.gizmo.centre
             step = np.array([9.0, 7.0])
-            if way is Way.ALONG:
+            if way is Kind.AXIS:
                 step = np.diff(bench.gizmo.line(Part(way, axis))[:, :2], axis=0)[0]
                 step *= 12.0 / np.linalg.norm(step)
             hand.press(place)
             hand.move(place + step)
             after = bench.targets()
-            if way is Way.ABOUT:
+            if way is Kind.ROTATION:
                 R, shift = rigid_fit(start, after)
                 assert np.allclose(R @ axes[axis], axes[axis], atol=1e-9)
                 assert np.allclose(start @ R.T + shift, after, atol=1e-9)
@@ -151,7 +152,7 @@ def test_every_part_moves_as_it_says(look, parallel, local):
             else:
                 away = (after - start) @ axes.T
                 assert np.ptp(away, axis=0).max() < 1e-12
-                still = np.arange(3) != axis if way is Way.ALONG else np.arange(3) == axis
+                still = np.arange(3) != axis if way is Kind.AXIS else np.arange(3) == axis
                 assert np.abs(away[:, still]).max() < 1e-12
                 assert 0.02 < np.linalg.norm(away[0]) < 3.0
             hand.key("Escape")
@@ -160,10 +161,10 @@ def test_every_part_moves_as_it_says(look, parallel, local):
 
 
 @each_view
-def test_what_is_grabbed_stays_under_the_pointer(look, parallel):
+def test_the_grabbed_point_stays_under_the_pointer(look, parallel):
     bench = Bench(look, parallel=parallel)
     hand, view, centre = bench.hand, bench.view, bench.gizmo.centre
-    for part, normal in ((FREE, view.towards_scene), (Part(Way.WITHIN, 1), np.eye(3)[1])):
+    for part, normal in ((FREE, view.view_direction), (Part(Kind.PLANE, 1), np.eye(3)[1])):
         place = bench.aim(part)
         near, far = view.ray(Pointer(Phase.PRESS, *place))
         grabbed = near + ((centre - near) @ normal) / ((far - near) @ normal) * (far - near)
@@ -172,21 +173,21 @@ def test_what_is_grabbed_stays_under_the_pointer(look, parallel):
         assert np.allclose(hand.at(grabbed + bench.shift()), place + [-25.0, 31.0], atol=1e-6)
         assert abs(bench.shift() @ normal) < 1e-12
         hand.key("Escape")
-    arrow = Part(Way.ALONG, 2)
+    arrow = Part(Kind.AXIS, 2)
     start, end = bench.gizmo.line(arrow)[:, :2]
     place, along = bench.aim(arrow), (end - start) / np.linalg.norm(end - start)
     hand.press(place)
     hand.move(place + 30.0 * along)
     way = hand.at(centre + bench.shift()) - np.array(hand.at(centre))
-    assert way @ along == pytest.approx(30.0, rel=0.15)  # it gets nearer or farther on the way
+    assert way @ along == pytest.approx(30.0, rel=0.15)  # perspective: its depth changes
     assert not hand.failures
 
 
-@pytest.mark.parametrize(("ring", "parallel"), [(VIEW_RING, False), (Part(Way.ABOUT, 1), True)])
-def test_a_ring_turns_by_the_very_angle_seen_on_the_screen(ring, parallel):
+@pytest.mark.parametrize(("ring", "parallel"), [(VIEW_RING, False), (Part(Kind.ROTATION, 1), True)])
+def test_a_ring_rotates_by_the_angle_on_the_screen(ring, parallel):
     bench = Bench((0.0, -12.0, 0.0), parallel=parallel)
     hand, start, centre = bench.hand, bench.targets(), bench.gizmo.centre
-    if not parallel:  # the centre in the middle, so that its line of sight is y
+    if not parallel:  # centred, so that its line of sight is y
         offset = np.array([centre[0], 0.0, centre[2]])
         bench.view.camera.SetPosition(*(offset + [0.0, -12.0, 0.0]))
         bench.view.camera.SetFocalPoint(*offset)
@@ -203,15 +204,15 @@ def test_a_ring_turns_by_the_very_angle_seen_on_the_screen(ring, parallel):
         R = rotation([0.0, -1.0, 0.0], angle)  # towards the viewer, counterclockwise
         assert np.allclose(bench.targets(), centre + (start - centre) @ R.T, atol=1e-9)
     hand.release(there)
-    assert bench.session.undo_label == "turn handle 1"
+    assert bench.session.undo_label == "rotate handle 1"
     assert not hand.failures
 
 
-def test_there_and_back_the_targets_are_where_they_were(bench):
+def test_when_the_pointer_returns_so_do_the_targets(bench):
     bench.session.drag({TIP: bench.targets() + [0.1, 0.2, 0.0]})
     bench.session.commit()
     before, pose = bench.targets(), bench.session.vertices
-    for part in (FREE, Part(Way.ALONG, 0), VIEW_RING):
+    for part in (FREE, Part(Kind.AXIS, 0), VIEW_RING):
         place = bench.aim(part)
         bench.hand.press(place)
         for step in (10.0, 25.0, 10.0, 0.0):
@@ -224,7 +225,7 @@ def test_there_and_back_the_targets_are_where_they_were(bench):
         bench.session.undo()
 
 
-def test_the_volume_is_exact_at_every_move_of_a_long_turn():
+def test_the_volume_is_exact_at_every_move_of_a_long_rotation():
     bench = Bench((0.0, -12.0, 0.0), parallel=True)
     middle = np.array(bench.hand.at(bench.gizmo.centre))
     place = bench.aim(VIEW_RING)
@@ -241,16 +242,16 @@ def test_the_volume_is_exact_at_every_move_of_a_long_turn():
     assert not bench.hand.failures
 
 
-# Seen from the side.
+# Edge-on.
 
 
 @pytest.mark.parametrize(("axis", "parallel"), [(0, True), (1, False)])
-def test_seen_from_its_side_nothing_flies_away(axis, parallel):
+def test_edge_on_parts_do_not_make_the_handle_jump(axis, parallel):
     bench = Bench(12.0 * np.eye(3)[axis], parallel=parallel, up=np.eye(3)[axis - 2])
     hand, centre = bench.hand, bench.gizmo.centre
     bench.dragger.refine_while_resting = False
     window = 400.0 * bench.view.pixel_at(centre)
-    for first in (FREE, Part(Way.ABOUT, (axis - 1) % 3)):
+    for first in (FREE, Part(Kind.ROTATION, (axis - 1) % 3)):
         place = bench.aim(first)
         hand.press(place)
         hand.move(place + [2.0, 3.0])
@@ -268,7 +269,7 @@ def test_seen_from_its_side_nothing_flies_away(axis, parallel):
 
 @pytest.mark.parametrize("parallel", [False, True], ids=["perspective", "parallel"])
 @pytest.mark.parametrize("tilt", [0.0, 1e-9, 0.19, 0.21, 1.0])
-def test_whatever_the_pointer_does_a_motion_is_rigid_and_near(parallel, tilt):
+def test_every_motion_is_rigid_and_bounded(parallel, tilt):
     view = plain_view()
     view.camera.SetParallelProjection(parallel)
     view.camera.SetParallelScale(3.0)
@@ -288,25 +289,25 @@ def test_whatever_the_pointer_does_a_motion_is_rigid_and_near(parallel, tilt):
                 matrix = motion.matrix(Pointer(Phase.MOVE, x, y))
                 assert np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-12)
                 assert np.linalg.det(matrix) == pytest.approx(1.0)
-                if part.way is not Way.ABOUT:
-                    farthest = {Way.FREE: 1.0, Way.ALONG: 5.0, Way.WITHIN: 5.0}[part.way]
+                if part.kind is not Kind.ROTATION:
+                    farthest = {Kind.FREE: 1.0, Kind.AXIS: 5.0, Kind.PLANE: 5.0}[part.kind]
                     assert np.linalg.norm(matrix[:3, 3]) < farthest * window
             back = motion.matrix(Pointer(Phase.MOVE, 220.0, 190.0))
-            if part.way is not Way.ABOUT:
+            if part.kind is not Kind.ROTATION:
                 assert np.allclose(back, np.eye(4), atol=1e-12)
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_a_ring_seen_edge_on_turns_with_what_is_in_front(axis):
+def test_the_front_of_a_ring_seen_edge_on_follows_the_pointer(axis):
     bench = Bench(12.0 * np.eye(3)[axis - 1], parallel=True, up=np.eye(3)[axis])
-    ring = Part(Way.ABOUT, axis)
+    ring = Part(Kind.ROTATION, axis)
     middle, place = np.array(bench.hand.at(bench.gizmo.centre)), bench.aim(ring)
     centre, start = bench.gizmo.centre, bench.targets()
     across = np.array([1.0, 0.0])  # the ring is level
     bench.hand.press(place)
     bench.hand.move(place + 45.0 * across)
     radius = bench.gizmo.radius / bench.view.pixel_at(centre)
-    right = np.cross(np.eye(3)[axis], np.eye(3)[axis - 1])  # of the viewer
+    right = np.cross(np.eye(3)[axis], np.eye(3)[axis - 1])  # the viewer's right
     R = rotation(np.eye(3)[axis], 45.0 / radius)
     assert np.allclose(bench.targets(), centre + (start - centre) @ R.T, atol=1e-9)
     assert R @ np.eye(3)[axis - 1] @ right > 0.0
@@ -318,7 +319,7 @@ def test_a_ring_seen_edge_on_turns_with_what_is_in_front(axis):
 # Keys.
 
 
-def test_keys_bind_a_move_to_an_axis_then_across_it_then_to_nothing(bench):
+def test_keys_constrain_a_translation_to_an_axis_then_a_plane_then_not(bench):
     hand, place = bench.hand, bench.aim(FREE)
     hand.press(place)
     hand.move(place + [-30.0, 40.0])
@@ -341,7 +342,7 @@ def test_keys_bind_a_move_to_an_axis_then_across_it_then_to_nothing(bench):
     assert bench.session.undo_label == "drag handle 1"
 
 
-def test_keys_bind_a_turn_to_an_axis_then_to_its_own(bench):
+def test_keys_constrain_a_rotation_to_an_axis_then_to_its_own(bench):
     hand, place, start = bench.hand, bench.aim(VIEW_RING), bench.targets()
     hand.press(place)
     hand.move(place + [12.0, -30.0])
@@ -355,7 +356,7 @@ def test_keys_bind_a_turn_to_an_axis_then_to_its_own(bench):
         assert np.allclose(bench.targets(), own, atol=1e-12)
 
 
-def test_keys_are_left_to_others_while_nothing_is_dragged(bench):
+def test_axis_keys_are_passed_on_while_nothing_is_dragged(bench):
     heard = []
     bench.view.interactor.AddObserver("KeyPressEvent", lambda *_: heard.append("key"), 0.5)
     bench.hand.key("x")
@@ -366,8 +367,8 @@ def test_keys_are_left_to_others_while_nothing_is_dragged(bench):
     assert heard == ["key"] * 3
 
 
-def test_shift_moves_a_fifth_and_without_it_goes_on_from_there(bench):
-    hand, place = bench.hand, bench.aim(Part(Way.ALONG, 0))
+def test_shift_slows_the_motion_to_a_fifth_without_a_jump(bench):
+    hand, place = bench.hand, bench.aim(Part(Kind.AXIS, 0))
     hand.press(place)
     hand.move(place + [40.0, 0.0])
     whole = bench.shift()
@@ -381,7 +382,7 @@ def test_shift_moves_a_fifth_and_without_it_goes_on_from_there(bench):
     assert bench.shift()[0] < 0.0
 
 
-def test_a_slow_turn_goes_on_past_half_a_turn_of_the_hand():
+def test_a_slow_rotation_continues_past_half_a_turn_of_the_pointer():
     bench = Bench((0.0, -12.0, 0.0), parallel=True)
     middle, start = np.array(bench.hand.at(bench.gizmo.centre)), bench.targets()
     place = bench.aim(VIEW_RING)
@@ -394,7 +395,7 @@ def test_a_slow_turn_goes_on_past_half_a_turn_of_the_hand():
     assert not bench.hand.failures
 
 
-def test_control_turns_by_fifteen_degrees_at_a_time():
+def test_control_rotates_in_steps_of_fifteen_degrees():
     bench = Bench((0.0, -12.0, 0.0), parallel=True)
     middle, start = np.array(bench.hand.at(bench.gizmo.centre)), bench.targets()
     place = bench.aim(VIEW_RING)
@@ -410,7 +411,7 @@ def test_control_turns_by_fifteen_degrees_at_a_time():
 # Handles.
 
 
-def test_a_press_on_a_patch_takes_that_handle_by_the_point_of_the_surface(bench):
+def test_a_press_on_the_vertices_of_a_handle_grabs_it_at_that_point(bench):
     hand, view = bench.hand, bench.view
     ids = bench.session.handles[TOP]
     vertex = ids[np.abs(SCENE.mesh.vertices[ids] - [0.0, -0.4, 0.7]).sum(axis=1).argmin()]
@@ -419,15 +420,32 @@ def test_a_press_on_a_patch_takes_that_handle_by_the_point_of_the_surface(bench)
     assert bench.dragger.handle == TIP
     hand.press(place)
     assert bench.dragger.handle == TOP
-    hand.move(place + [2.0, 0.0])  # a hand that trembles
+    hand.move(place + [2.0, 0.0])  # within the click tolerance
     assert not bench.session.is_dragging
     hand.move(place + [30.0, 20.0])
     seen = hand.at(point + bench.shift(TOP))
     assert np.abs(seen - (place + [30.0, 20.0])).max() < 1.5
-    assert abs(bench.shift(TOP) @ view.towards_scene) < 1e-12
+    assert abs(bench.shift(TOP) @ view.view_direction) < 1e-12
     hand.release(place + [30.0, 20.0])
     assert bench.session.undo_label == "drag handle 2"
     assert np.array_equal(bench.targets(TIP), SCENE.mesh.vertices[SCENE.handle])
+
+
+@pytest.mark.parametrize("direction", [(1, 0), (0, -1), (-0.6, 0.8)])
+def test_a_press_on_a_handle_moves_it_from_more_than_three_pixels_on(bench, direction):
+    ids = bench.session.handles[TOP]
+    vertex = ids[np.abs(SCENE.mesh.vertices[ids] - [0.0, -0.4, 0.7]).sum(axis=1).argmin()]
+    place = np.round(bench.hand.at(SCENE.mesh.vertices[vertex]))
+    bench.hand.press(place)
+    assert bench.dragger.handle == TOP
+    bench.hand.move(place + 3.0 * np.array(direction))
+    assert not bench.session.is_dragging
+    bench.hand.move(place + 5.0 * np.array(direction))
+    assert bench.session.is_dragging
+    bench.hand.move(place + 1.0 * np.array(direction))  # a drag remains one near the press
+    assert bench.session.is_dragging
+    bench.hand.release(place)
+    assert bench.session.undo_label == "drag handle 2"
 
 
 def test_the_other_handle_keeps_its_targets(bench):
@@ -440,7 +458,7 @@ def test_the_other_handle_keeps_its_targets(bench):
     assert np.linalg.norm(bench.shift(TOP)) > 0.05
 
 
-def test_a_click_chooses_and_makes_no_step(bench):
+def test_a_click_activates_a_handle_and_makes_no_undo_step(bench):
     label = bench.session.undo_label
     top = SCENE.mesh.vertices[bench.session.handles[TOP]].mean(axis=0)
     bench.hand.click(bench.hand.at(top))
@@ -450,7 +468,7 @@ def test_a_click_chooses_and_makes_no_step(bench):
     assert np.allclose(bench.gizmo.centre, top)
 
 
-def test_a_patch_on_the_far_side_and_bare_skin_are_left_to_the_camera():
+def test_presses_on_hidden_handles_and_other_vertices_move_the_camera():
     bench = Bench((0.0, -3.0, -12.0))
     top = SCENE.mesh.vertices[bench.session.handles[TOP]].mean(axis=0)
     for place in (bench.hand.at(top), bench.hand.at([-1.0, 0.0, -0.8]), (5, 5)):
@@ -462,7 +480,7 @@ def test_a_patch_on_the_far_side_and_bare_skin_are_left_to_the_camera():
     assert not bench.hand.failures
 
 
-def test_a_handle_that_goes_makes_room_for_another_and_one_renamed_stays(bench):
+def test_when_the_active_handle_is_removed_the_next_one_is_active_and_a_renamed_one_stays(bench):
     session, dragger = bench.session, bench.dragger
     dragger.handle = TOP
     session.rename_handle(TOP, "back")
@@ -481,7 +499,7 @@ def test_a_handle_that_goes_makes_room_for_another_and_one_renamed_stays(bench):
     assert bench.gizmo.centre is None
 
 
-def test_a_handle_that_goes_in_mid_drag_ends_the_drag(bench):
+def test_removing_the_handle_during_a_drag_ends_it(bench):
     place = bench.aim(FREE)
     for end in (lambda: bench.session.remove_handle(TIP), bench.session.undo):
         bench.dragger.handle = TIP
@@ -499,7 +517,7 @@ def test_a_handle_that_goes_in_mid_drag_ends_the_drag(bench):
     assert not bench.dragger.is_grabbing
 
 
-def test_before_there_are_cages_there_is_nothing_to_see_or_grab():
+def test_without_cages_nothing_is_shown_or_grabbed():
     session, view = Session(SCENE.mesh), plain_view()
     session.add_handle(SCENE.handle)
     dragger, hand = HandleDragger(view, session), Hand(view)
@@ -520,10 +538,10 @@ def test_before_there_are_cages_there_is_nothing_to_see_or_grab():
     assert not hand.failures
 
 
-# Solving on, and going back.
+# Refining and cancelling.
 
 
-def test_it_solves_on_until_it_has_converged_and_then_no_timer_runs(bench):
+def test_refining_ends_when_the_pose_has_converged(bench):
     hand, place = bench.hand, bench.aim(FREE)
     assert not bench.has_timer
     hand.press(place)
@@ -543,11 +561,11 @@ def test_it_solves_on_until_it_has_converged_and_then_no_timer_runs(bench):
     assert not bench.has_timer
     assert bench.session.solution.handle_error < 1e-3
     assert np.allclose(bench.gizmo.centre, bench.targets().mean(axis=0), atol=0.02)
-    assert bench.session.undo() == "drag handle 1"  # all of it is one step
+    assert bench.session.undo() == "drag handle 1"  # a single undo step
     assert bench.session.state.pose is None
 
 
-def test_no_timer_runs_after_undo_off_or_remove_nor_where_it_is_not_wanted(bench):
+def test_no_timer_runs_after_undo_off_or_remove_or_while_refining_is_off(bench):
     hand, place = bench.hand, bench.aim(FREE)
 
     def drag():
@@ -577,7 +595,7 @@ def test_no_timer_runs_after_undo_off_or_remove_nor_where_it_is_not_wanted(bench
     assert not bench.has_timer
 
 
-def test_escape_and_the_right_button_go_back_to_the_pose_before_the_press(bench):
+def test_escape_and_the_right_button_restore_the_pose_before_the_press(bench):
     hand, place = bench.hand, bench.aim(FREE)
     bench.session.drag({TIP: bench.targets() + [0.0, 0.1, 0.2]})
     bench.session.commit("before")
@@ -597,7 +615,7 @@ def test_escape_and_the_right_button_go_back_to_the_pose_before_the_press(bench)
     assert np.allclose(hand.at(bench.gizmo.centre), place, atol=1.0)
 
 
-def test_what_somebody_else_has_left_in_hand_is_not_taken_back(bench):
+def test_cancelling_keeps_an_earlier_unfinished_drag(bench):
     bench.session.drag({TIP: bench.targets() + [0.0, 0.1, 0.2]})
     pose, place = bench.session.state.pose, bench.aim(FREE)
     bench.hand.press(place)
@@ -607,7 +625,7 @@ def test_what_somebody_else_has_left_in_hand_is_not_taken_back(bench):
     assert bench.session.undo_label == "drag handle 1"
 
 
-def test_what_is_undone_is_not_refined(bench):
+def test_a_pose_reached_by_undo_is_not_refined(bench):
     place = bench.aim(FREE)
     bench.hand.drag([place, place + [-40.0, 60.0]])
     place = bench.aim(FREE)
@@ -659,7 +677,7 @@ def test_a_pose_that_must_be_bound_first_is_not_refined(bench):
 
 
 @pytest.mark.parametrize("fails", ["move_handle", "refine"])
-def test_a_solve_that_fails_takes_the_drag_back_and_is_told(fails, monkeypatch):
+def test_a_solve_that_fails_is_reported_and_the_drag_cancelled(fails, monkeypatch):
     bench = Bench()
     hand, place = bench.hand, bench.aim(FREE)
     hand.press(place)
@@ -682,7 +700,7 @@ def test_a_solve_that_fails_takes_the_drag_back_and_is_told(fails, monkeypatch):
     assert bench.session.undo_label == "drag handle 1"
 
 
-def test_targets_too_far_away_are_refused_and_the_drag_is_taken_back():
+def test_targets_too_far_away_are_refused_and_the_drag_is_cancelled():
     bench = Bench(parallel=True)
     bench.view.camera.SetParallelScale(1e5)
     bench.view.render()
@@ -695,7 +713,7 @@ def test_targets_too_far_away_are_refused_and_the_drag_is_taken_back():
     assert bench.session.state.pose is None
 
 
-# What is seen.
+# Display.
 
 
 def test_the_gizmo_goes_where_the_handle_is(bench):
@@ -720,7 +738,7 @@ def test_idle_hover_and_active_look_different_and_off_shows_nothing(bench):
     off = picture(view)
     bench.dragger.On()
     idle = picture(view)
-    place = bench.aim(Part(Way.ABOUT, 2))
+    place = bench.aim(Part(Kind.ROTATION, 2))
     hand.hover(place)
     hover = picture(view)
     hand.hover(hand.at(SCENE.mesh.vertices[bench.session.handles[TOP]].mean(axis=0)))
@@ -738,13 +756,23 @@ def test_idle_hover_and_active_look_different_and_off_shows_nothing(bench):
     assert np.array_equal(picture(view), off)
 
 
-def test_how_far_it_is_turned_is_told(bench):
+def test_the_caption_shows_the_angle_during_a_rotation(bench):
+    def captions():
+        texts = [p for p in bench.view.foreground.GetViewProps() if isinstance(p, vtkTextActor)]
+        return [text.GetInput() for text in texts if text.GetVisibility()]
+
     before = picture(bench.view)
     place = bench.aim(VIEW_RING)
     bench.hand.press(place, control=True)
-    held = picture(bench.view)
+    pressed = picture(bench.view)
     bench.hand.move(place + [1.0, 0.0], control=True)
-    assert np.array_equal(picture(bench.view), held)  # nothing yet
+    assert np.array_equal(picture(bench.view), pressed)  # less than half a step of 15 degrees
+    middle = np.array(bench.hand.at(bench.gizmo.centre))
+    R = rotation([0.0, 0.0, 1.0], np.radians(31.0))[:2, :2]
+    bench.hand.move(middle + R @ (place - middle), control=True)
+    bench.view.render()
+    assert captions() == ["30.0°"]
     bench.hand.key("Escape")
     bench.hand.hover((5, 5))
     assert np.array_equal(picture(bench.view), before)
+    assert captions() == ["x", "y", "z"]

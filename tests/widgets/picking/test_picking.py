@@ -1,4 +1,4 @@
-"""From the window to the mesh, checked against brute force."""
+"""Hits, distances and visible vertices, compared with brute force."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from solids import icosphere, two_components
 from vtk_segdeform import Mesh, Session, models
 from vtk_segdeform.widgets.picking.picking import Picker
 from vtk_segdeform.widgets.picking.surface_distance import SurfaceDistance
-from vtk_segdeform.widgets.picking.visibility import seen_vertices
+from vtk_segdeform.widgets.picking.visibility import visible_vertices
 from vtk_segdeform.widgets.region_selector.strokes import Lasso
 from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
@@ -33,7 +33,7 @@ def over(mesh, size=(400, 400), *, parallel=False):
 
 
 def first_crossing(points, faces, near, far):
-    """Return (face, share of the way) of the first triangle on the way from near to far."""
+    """Return (face, fraction) of the first intersection of the segment from near to far."""
     a, b, c = points[faces.T]
     way = far - near
     normal = np.cross(b - a, c - a)
@@ -47,7 +47,7 @@ def first_crossing(points, faces, near, far):
 
 
 @pytest.mark.parametrize("parallel", [False, True])
-def test_the_point_under_the_pointer_is_the_first_crossing(parallel):
+def test_a_hit_is_the_first_intersection_of_the_line_of_sight(parallel):
     view, session, surface, picker = over(models.cactus(1200), parallel=parallel)
     met = 0
     for x, y in RNG.uniform(60, 340, (60, 2)):
@@ -64,7 +64,7 @@ def test_the_point_under_the_pointer_is_the_first_crossing(parallel):
     assert met > 5
 
 
-def test_the_pose_that_is_drawn_is_the_one_that_is_asked():
+def test_hits_are_in_the_displayed_pose():
     scene = sausage()
     view, session, surface, picker = over(scene.mesh)
     session.set_regions(scene.regions)
@@ -87,8 +87,8 @@ def test_the_pose_that_is_drawn_is_the_one_that_is_asked():
     assert picker.hit(Pointer(Phase.HOVER, *before[:2])) is None
 
 
-def test_a_brush_does_not_leak_to_what_is_near_in_space_only():
-    # Two leaves of one folded sheet: a flat box bent to a U by its coordinates.
+def test_a_brush_does_not_reach_a_sheet_that_is_close_in_space_only():
+    # Two layers of one folded sheet: a flat box bent to a U.
     u, v = np.meshgrid(np.linspace(-1, 1, 81), np.linspace(0, 1, 21), indexing="ij")
     angle = np.pi * np.clip((u + 0.1) / 0.2, 0.0, 1.0)
     middle = np.stack([np.abs(u), v, np.where(u < 0, -0.05, 0.05)], axis=-1)
@@ -123,13 +123,13 @@ def test_a_brush_does_not_leak_to_what_is_near_in_space_only():
     x, y, _ = view.to_display(np.array([[0.6, 0.5, 0.06]]))[0]
     taken = picker.distances([picker.hit(Pointer(Phase.HOVER, x, y))], 0.2) <= 0.2
     assert np.count_nonzero(taken) > 20
-    assert (surface.points[taken, 2] > 0.0).all()  # the other leaf is half as far as the brush
+    assert (surface.points[taken, 2] > 0.0).all()  # the other layer is within half the radius
     near = np.linalg.norm(surface.points - [0.6, 0.5, 0.06], axis=1) < 0.15
     assert (near & (surface.points[:, 2] < 0.0)).any()
 
 
 @pytest.mark.parametrize("count", [1, 3])
-def test_along_a_sphere_it_is_as_far_as_along_its_great_circles(count):
+def test_distances_on_a_sphere_are_those_of_great_circles(count):
     vertices, faces = icosphere(4)
     wave = SurfaceDistance(len(vertices), faces)
     where = RNG.choice(len(faces), count, replace=False)
@@ -144,10 +144,10 @@ def test_along_a_sphere_it_is_as_far_as_along_its_great_circles(count):
     assert np.allclose(distance[reached], exact[reached], rtol=0.02, atol=0.01)
 
 
-def test_along_a_plane_it_is_exactly_as_far_as_straight():
+def test_distances_on_a_plane_are_exact():
     n = 30
     u, v = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
-    flat = np.stack([u + 0.3 * v, v, 0.5 * u], axis=-1).reshape(-1, 3)  # skew triangles
+    flat = np.stack([u + 0.3 * v, v, 0.5 * u], axis=-1).reshape(-1, 3)  # sheared triangles
     k = (u * n + v)[:-1, :-1].ravel()
     faces = np.concatenate([np.stack([k, k + n, k + n + 1], 1), np.stack([k, k + n + 1, k + 1], 1)])
     middle = len(faces) // 4 + n // 2
@@ -160,7 +160,7 @@ def test_along_a_plane_it_is_exactly_as_far_as_straight():
     assert np.allclose(distance[reached], straight[reached], rtol=1e-5)
 
 
-def test_it_is_never_nearer_than_straight_nor_further_than_along_the_edges():
+def test_distances_lie_between_the_straight_line_and_the_path_along_edges():
     mesh = models.cactus(1500)
     start = 700
     face = int(np.flatnonzero((mesh.faces == start).any(axis=1))[0])
@@ -176,15 +176,15 @@ def test_it_is_never_nearer_than_straight_nor_further_than_along_the_edges():
     assert np.isinf(distance[straight > 1.5 * radius]).all()
     inside = distance[mesh.edges] <= radius
     around = mesh.edges[inside[:, 0] != inside[:, 1]]
-    assert np.isfinite(distance[around]).all()  # what a ring is drawn through
+    assert np.isfinite(distance[around]).all()  # the ring is interpolated there
 
 
-def test_nothing_is_near_to_no_point():
+def test_without_points_all_distances_are_infinite():
     _, _, _, picker = over(models.sphere(300))
     assert np.isinf(picker.distances([], 1.0)).all()
 
 
-def test_a_needle_goes_through_front_and_back():
+def test_hits_include_the_front_and_the_back():
     view, _, surface, picker = over(models.sphere(800))
     front, back = picker.hits(Pointer(Phase.HOVER, 205, 213))
     assert back.face != front.face
@@ -195,18 +195,18 @@ def test_a_needle_goes_through_front_and_back():
     assert picker.hits(Pointer(Phase.HOVER, 2, 2)) == []
 
 
-def test_a_component_is_all_that_hangs_together():
+def test_a_component_is_a_connected_part():
     vertices, faces = two_components()
     _, _, _, picker = over(Mesh(vertices, faces))
     second = picker.component(len(vertices) - 1)
     assert np.array_equal(np.flatnonzero(second), np.arange(len(vertices) // 2, len(vertices)))
 
 
-def test_what_is_seen_is_what_no_triangle_hides():
+def test_visible_vertices_agree_with_ray_casting():
     mesh = models.cactus(1500)
     view, _, surface, _ = over(mesh, (500, 500))
     display = view.to_display(surface.points)
-    seen = seen_vertices(display, mesh.faces)
+    seen = visible_vertices(display, mesh.faces)
     eye = np.array(view.camera.GetPosition())
     exact = np.zeros(len(seen), dtype=bool)
     sample = RNG.choice(mesh.n_vertices, 400, replace=False)
@@ -218,27 +218,36 @@ def test_what_is_seen_is_what_no_triangle_hides():
     assert np.array_equal(seen[sample], exact[sample])
 
 
-def test_few_large_triangles_hide_as_well_as_many_small_ones():
+def test_a_corner_of_a_cube_is_hidden_by_few_large_triangles():
     cube = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
     square = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
               [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]  # fmt: skip
     mesh = Mesh(cube, np.array(square))
     view, *_ = over(mesh)
-    seen = seen_vertices(view.to_display(cube), mesh.faces)
-    assert np.count_nonzero(~seen) == 1  # of a cube's corners one is behind
+    seen = visible_vertices(view.to_display(cube), mesh.faces)
+    assert np.count_nonzero(~seen) == 1  # one corner of a cube is behind
     far = np.linalg.norm(cube - view.camera.GetPosition(), axis=1)
     assert not seen[far.argmax()]
 
 
-def test_what_is_behind_the_camera_is_not_seen():
+def test_vertices_behind_the_camera_are_not_visible():
     display = np.array([[10.0, 10, 0.5], [20, 10, 0.5], [10, 20, 0.5], [np.nan] * 3])
-    seen = seen_vertices(display, np.array([[0, 1, 2], [1, 3, 2]]))
+    seen = visible_vertices(display, np.array([[0, 1, 2], [1, 3, 2]]))
     assert seen.tolist() == [True, True, True, False]
-    assert not seen_vertices(np.full((3, 3), np.nan), np.array([[0, 1, 2]])).any()
+    assert not visible_vertices(np.full((3, 3), np.nan), np.array([[0, 1, 2]])).any()
+
+
+def test_the_depth_tolerance_separates_rounding_errors_from_hidden_vertices():
+    x, y = np.array([[0.0, 30.0, 0.0, 7.0, 8.0, 9.0], [0.0, 0.0, 30.0, 5.0, 6.0, 7.0]])
+    depth = 0.4 + 0.002 * x + 0.001 * y  # the plane of the triangle
+    depth[3:] += [-1e-10, 5e-10, 2e-9]  # in front of it, behind within the tolerance, behind it
+    display = np.stack([x, y, depth], axis=1)
+    visible = visible_vertices(display, np.array([[0, 1, 2]]))
+    assert visible.tolist() == [True, True, True, True, True, False]
 
 
 def crossings_above(point, corners):
-    """Return how often a ray straight up crosses a closed line; side by side, in plain Python."""
+    """Return how often a ray straight up crosses a closed line, by a loop over its segments."""
     count = 0
     for (x0, y0), (x1, y1) in zip(corners, [*corners[1:], corners[0]], strict=True):
         if (x0 > point[0]) != (x1 > point[0]):
@@ -246,19 +255,19 @@ def crossings_above(point, corners):
     return count
 
 
-def test_a_lasso_goes_round_what_is_crossed_an_odd_number_of_times():
+def test_a_lasso_selects_by_the_even_odd_rule():
     _, _, _, picker = over(models.cactus(800))
-    corners = (200 + 170 * RNG.uniform(-1, 1, (9, 2))).tolist()  # crosses itself
+    corners = (200 + 170 * RNG.uniform(-1, 1, (9, 2))).tolist()  # a line that crosses itself
     lasso = Lasso(picker, Pointer(Phase.PRESS, *corners[0]), through=True)
     for corner in corners[1:]:
         lasso.extend(Pointer(Phase.MOVE, *corner))
         so_far = lasso.outline.tolist()
-        odd = [crossings_above(p, so_far) % 2 == 1 for p in picker.places()]
+        odd = [crossings_above(p, so_far) % 2 == 1 for p in picker.display_points()]
         assert lasso.mask.tolist() == (odd if len(so_far) > 2 else [False] * len(odd))
     assert 20 < lasso.mask.sum() < 780
 
 
-def test_what_is_seen_is_looked_at_again_when_the_camera_or_the_pose_has_changed():
+def test_visible_vertices_are_cached_until_the_camera_or_the_pose_changes():
     scene = sausage()
     view, session, surface, picker = over(scene.mesh)
     session.set_regions(scene.regions)
@@ -267,43 +276,43 @@ def test_what_is_seen_is_looked_at_again_when_the_camera_or_the_pose_has_changed
     session.add_handle(scene.handle)
 
     def now():
-        return seen_vertices(view.to_display(surface.points), scene.mesh.faces)
+        return visible_vertices(view.to_display(surface.points), scene.mesh.faces)
 
-    first = picker.seen()
+    first = picker.visible()
     assert np.array_equal(first, now())
     view.renderer.ResetCameraClippingRange(-9, 9, -9, 9, -9, 9)
-    assert picker.seen() is first  # no need to look
+    assert picker.visible() is first  # cached
     view.camera.Azimuth(50)
-    assert not np.array_equal(picker.seen(), first)
-    assert np.array_equal(picker.seen(), now())
-    second = picker.seen()
+    assert not np.array_equal(picker.visible(), first)
+    assert np.array_equal(picker.visible(), now())
+    second = picker.visible()
     session.drag(scene.turned(60.0), max_steps=5)
-    assert not np.array_equal(picker.seen(), second)
-    assert np.array_equal(picker.seen(), now())
+    assert not np.array_equal(picker.visible(), second)
+    assert np.array_equal(picker.visible(), now())
 
 
 @pytest.mark.parametrize("parallel", [False, True])
-def test_asked_about_some_vertices_it_tells_of_them_what_it_would_tell_of_all(parallel):
+def test_a_test_of_some_vertices_agrees_with_the_test_of_all(parallel):
     mesh = models.cactus(1500)
     view, _, surface, picker = over(mesh, parallel=parallel)
-    view.camera.Zoom(3.0)  # some are beside the window
-    everything = seen_vertices(view.to_display(surface.points), mesh.faces)
+    view.camera.Zoom(3.0)  # some vertices are outside the window
+    everything = visible_vertices(view.to_display(surface.points), mesh.faces)
     assert 0.2 < everything.mean() < 0.8
     nowhere = np.zeros(mesh.n_vertices, dtype=bool)
-    assert not picker.seen(nowhere).any()
+    assert not picker.visible(nowhere).any()
     for share in (0.002, 0.1, 0.5):
         some = RNG.random(mesh.n_vertices) < share
-        assert np.array_equal(picker.seen(some), everything & some)
+        assert np.array_equal(picker.visible(some), everything & some)
     near = view.to_display(surface.points)
     near = np.hypot(*(near - near[7])[:, :2].T) < 25.0
-    assert np.array_equal(Picker(surface).seen(near), everything & near)
-    assert np.array_equal(picker.seen(), everything)
+    assert np.array_equal(Picker(surface).visible(near), everything & near)
+    assert np.array_equal(picker.visible(), everything)
 
 
-def test_what_is_drawn_in_front_of_the_mesh_hides_none_of_it():
+def test_other_actors_do_not_hide_vertices():
     view, session, surface, picker = over(models.sphere(300))
-    before = picker.seen()
+    before = picker.visible()
     other = SurfaceDisplay(view, Session(Mesh(1.5 * surface.points, session.mesh.faces)))
     view.render()
-    assert np.array_equal(Picker(surface).seen(), before)
+    assert np.array_equal(Picker(surface).visible(), before)
     other.remove()

@@ -1,4 +1,4 @@
-"""Untrusted recordings: where a replay may write files, and how long it may run."""
+"""Untrusted recordings: the files a replay may write, and its limits."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ALL = [TITLE, *SAVES, *RECORDS, *FILM, *OPENS, "0 Timer 20"]
 
 
 class Bench:
-    """An editor in a folder of its own, and the errors that it reports."""
+    """An editor in its own folder, and the errors it reports."""
 
     def __init__(self) -> None:
         self.view = plain_view((200, 150))
@@ -39,7 +39,7 @@ class Bench:
         self.editor.On()
 
     def replay(self, lines, **options):
-        """Replay *lines*, and wait for the jobs they start."""
+        """Replay *lines* and wait for the background jobs they start."""
         replay(self.view, lines, busy=lambda: self.editor.is_busy, **options)
         self.editor.wait()
 
@@ -123,7 +123,7 @@ def test_a_missing_folder_is_an_error_before_any_event(bench, tmp_path):
         (["0 Window 16384 16384"], "16384 x 16384 exceeds the limit of 16,000,000 pixels"),
     ],
 )
-def test_a_recording_beyond_the_limits_is_refused_with_its_line_before_any_event(lines, says):
+def test_a_recording_beyond_the_limits_is_refused_before_any_event(lines, says):
     view = plain_view((50, 50))
     moved = []
     view.observe("MouseMoveEvent", lambda: moved.append("moved"))
@@ -161,7 +161,7 @@ def test_pauses_that_are_longer_than_the_limit_are_refused_at_once():
         SessionError, match=r"would take 198 seconds, more than its limit of 100 seconds"
     ):
         replay(plain_view((50, 50)), lines, pace=1.0, limits=ReplayLimits(seconds=100.0))
-    replay(plain_view((50, 50)), lines, limits=ReplayLimits(seconds=100.0))  # waits for nothing
+    replay(plain_view((50, 50)), lines, limits=ReplayLimits(seconds=100.0))  # without pauses
 
 
 def test_a_huge_file_a_pipe_and_a_device_are_refused_at_once(tmp_path):
@@ -195,7 +195,7 @@ def test_the_command_writes_only_to_the_given_folder(tmp_path, monkeypatch, caps
 def test_the_limits_are_in_the_help_and_the_messages_of_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     sd.write_mesh("ball.ply", MESH)
-    # 100 million ticks last longer than a second on any machine.
+    # 100 million ticks take longer than a second on any machine.
     (tmp_path / "long.txt").write_text("\n".join([TITLE, *["0 Timer 100000"] * 1000]))
     assert main(["replay", "long.txt", "ball.ply", "--film", "a.gif"]) == 1
     assert "long.txt, line 4: the limit of 200,000 events" in capsys.readouterr().err
@@ -204,6 +204,6 @@ def test_the_limits_are_in_the_help_and_the_messages_of_the_command(tmp_path, mo
     assert "stopped at its limit of 1 seconds" in capsys.readouterr().err
     assert set(tree_of(tmp_path)) == {"ball.ply", "long.txt"}
     assert main(["replay", "--help"]) == 0
-    told = " ".join(capsys.readouterr().out.split())
+    output = " ".join(capsys.readouterr().out.split())
     for limit in ("200000", "300", "16 million pixels", "--folder"):
-        assert limit in told
+        assert limit in output

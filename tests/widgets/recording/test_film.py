@@ -1,4 +1,4 @@
-"""Films: what is in the files is what was seen, and a file is there whole or not at all."""
+"""Films: the files contain the pictures drawn, and are written atomically."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_a_drag_becomes_a_picture_for_each_target_and_one_step(tmp_path, session
     pictures = read(path)
     assert [p.shape for p in pictures] == [(90, 120, 3)] * 3
     heights = [np.nonzero(red(p))[0].mean() for p in pictures]
-    assert heights[0] + 5 < heights[1] < heights[2] - 5  # the handle goes down
+    assert heights[0] + 5 < heights[1] < heights[2] - 5  # the handle moves down
     with Image.open(path) as image:
         assert image.info["duration"] == 100
         assert image.info["loop"] == 0
@@ -95,7 +95,7 @@ def test_targets_may_be_named_or_come_one_by_one(tmp_path, session):
     assert len(read(tmp_path / "a")) == len(read(tmp_path / "b")) == 3
 
 
-def test_a_folder_holds_the_very_pixels(tmp_path, ball):
+def test_a_folder_of_png_pictures_is_lossless(tmp_path, ball):
     film(tmp_path / "turn", ball, [None, lambda: ball.camera.Roll(20)] * 2)
     pictures = read(tmp_path / "turn")
     assert [p.name for p in sorted((tmp_path / "turn").iterdir())] == [
@@ -106,7 +106,7 @@ def test_a_folder_holds_the_very_pixels(tmp_path, ball):
     assert (pictures[0] != pictures[1]).any()
 
 
-def test_a_gif_is_true_to_shades_and_its_white_is_white(tmp_path, ball):
+def test_a_gif_has_accurate_colours_and_a_white_background(tmp_path, ball):
     film(tmp_path / "a.gif", ball, [None, lambda: ball.camera.Azimuth(40)])
     film(tmp_path / "a", ball, [lambda: ball.camera.Azimuth(-40), lambda: ball.camera.Azimuth(40)])
     for shown, seen in zip(read(tmp_path / "a.gif"), read(tmp_path / "a"), strict=True):
@@ -114,7 +114,7 @@ def test_a_gif_is_true_to_shades_and_its_white_is_white(tmp_path, ball):
         assert (shown[0] == 255).all()
 
 
-def test_what_is_drawn_by_hand_or_in_a_replay_is_watched(tmp_path, ball):
+def test_watch_records_interaction_and_replays(tmp_path, ball):
     made = Film(ball)
     stop = made.watch()
     replay(ball, ["vtk_segdeform recording 1", "0 LeftButtonPress 40 40", "0 MouseMove 50 45"])
@@ -127,7 +127,7 @@ def test_what_is_drawn_by_hand_or_in_a_replay_is_watched(tmp_path, ball):
     assert (tmp_path / "work.gif").exists()
 
 
-def test_a_window_that_changes_its_size_and_odd_sizes_make_one_film(tmp_path):
+def test_a_film_has_one_even_size_even_if_the_window_is_resized(tmp_path):
     view = plain_view((61, 41))
     made = Film(view)
     for size in ((61, 41), (30, 80)):
@@ -155,34 +155,34 @@ def test_a_failure_leaves_no_file_and_the_session_as_it_was(tmp_path, session):
 
 
 def test_a_film_that_is_cancelled_leaves_no_file(tmp_path, ball):
-    made, told = Film(ball), []
+    made, reported = Film(ball), []
     for _ in range(3):
         made.snap()
 
     def progress(fraction, text):
-        told.append((fraction, text))
-        if len(told) == 3:
+        reported.append((fraction, text))
+        if len(reported) == 3:
             raise Cancelled("enough")
 
     with pytest.raises(Cancelled, match="enough"):
         made.save(tmp_path / "ball.gif", progress=progress)
-    assert told[0] == (0.0, "picture 1")
+    assert reported[0] == (0.0, "picture 1")
     assert list(tmp_path.iterdir()) == []
-    made.save(tmp_path / "ball.gif", progress=lambda *said: told.append(said))
-    assert max(fraction for fraction, _ in told) <= 1.0
+    made.save(tmp_path / "ball.gif", progress=lambda *said: reported.append(said))
+    assert max(fraction for fraction, _ in reported) <= 1.0
 
 
-def test_what_says_when_to_take_a_picture_is_asked_for_at_once(ball):
+def test_the_condition_of_watch_is_checked_at_once(ball):
     with pytest.raises(ArgumentError, match="when must be callable; got 3"):
         Film(ball).watch(3)
 
 
-def test_what_cannot_be_written_is_refused_before_anything_is_done(tmp_path, ball):
+def test_a_path_that_cannot_be_written_is_refused_before_the_first_frame(tmp_path, ball):
     (tmp_path / "there").mkdir()
     done = []
     for path, says in [
         ("a.avi", "a film is a .gif, an .mp4 or"),
-        ("there", "is there already"),
+        ("there", "already exists"),
         ("no/a.gif", "there is no folder"),
     ]:
         with pytest.raises(SessionError, match=says):
@@ -193,16 +193,14 @@ def test_what_cannot_be_written_is_refused_before_anything_is_done(tmp_path, bal
 
 
 @pytest.mark.parametrize(("suffix", "module"), [("mp4", "imageio_ffmpeg"), ("gif", "PIL.Image")])
-def test_a_library_that_is_absent_is_named_with_the_way_to_get_it(
-    tmp_path, monkeypatch, suffix, module
-):
+def test_a_missing_library_is_reported_with_its_pip_command(tmp_path, monkeypatch, suffix, module):
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(MissingDependencyError, match="pip install") as error:
         require_film(tmp_path / f"a.{suffix}")
     assert {"mp4": "'imageio[ffmpeg]'", "gif": "pillow"}[suffix] in str(error.value)
 
 
-def test_a_video_is_fed_picture_by_picture_and_its_writer_closed(tmp_path, monkeypatch, ball):
+def test_a_video_is_written_picture_by_picture_and_closed(tmp_path, monkeypatch, ball):
     fed = []
 
     def write_frames(path, size, *, fps, macro_block_size):
@@ -222,7 +220,7 @@ def test_a_video_is_fed_picture_by_picture_and_its_writer_closed(tmp_path, monke
     assert (tmp_path / "a.mp4").read_bytes() == b"video"
 
 
-def test_a_real_video_where_ffmpeg_is(tmp_path, ball):
+def test_a_real_video_is_written_if_ffmpeg_is_installed(tmp_path, ball):
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
     film(tmp_path / "a.mp4", ball, [lambda: ball.camera.Roll(5)] * 4)
     about, *frames = ffmpeg.read_frames(str(tmp_path / "a.mp4"))

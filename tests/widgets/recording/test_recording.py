@@ -1,4 +1,4 @@
-"""Recording and replay: the same hands, the same camera, the same session."""
+"""Recording and replay: the same input gives the same camera and the same session."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vtk_segdeform.errors import SessionError
 from vtk_segdeform.widgets.handle_dragger.handle_dragger import HandleDragger
 from vtk_segdeform.widgets.recording.recording import Recorder, replay
 from vtk_segdeform.widgets.scene.gestures import Gesture, Phase, Pointer
-from vtk_segdeform.widgets.scene.pace import Pace, order_steps
+from vtk_segdeform.widgets.scene.step_budget import StepBudget, prescribe_steps
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 from vtk_segdeform.widgets.scene.view import View
 from vtk_segdeform.widgets.scene.widget import Widget
@@ -26,16 +26,16 @@ TITLE = "vtk_segdeform recording 1"
 
 
 class Puller(Widget):
-    """Drags the handle in the plane of the screen; z undoes, and a timer turns the handle."""
+    """Drags the handle in the view plane; Ctrl+Z undoes, and a timer rotates the handle."""
 
     ticks = 0
 
-    def begins(self, press: Pointer) -> Gesture | None:
+    def on_press(self, press: Pointer) -> Gesture | None:
         middle = self.session.vertices[SCENE.handle].mean(axis=0)
         there = self.view.to_display(middle[None])[0]
         return self._pull(there) if np.linalg.norm(there[:2] - press.position) < 25 else None
 
-    def types(self, key, pointer):
+    def on_key(self, key, pointer):
         return key == "z" and pointer.control and self.session.undo() is not None
 
     def tick(self):
@@ -109,7 +109,7 @@ def same(one: Desk, other: Desk) -> bool:
 
 @pytest.fixture(scope="module")
 def recorded():
-    """Return a desk where somebody worked, and the lines that tell of it."""
+    """Return a desk after some work, and the recorded lines."""
     desk = Desk(plain_view())
     recorder = Recorder(desk.view)
     desk.work()
@@ -118,7 +118,7 @@ def recorded():
     return desk, recorder.lines
 
 
-def test_a_replay_does_the_same_bit_for_bit_and_shows_the_same_picture(recorded, tmp_path):
+def test_a_replay_gives_the_same_pose_bit_by_bit_and_the_same_picture(recorded, tmp_path):
     desk, lines = recorded
     path = tmp_path / "work.txt"
     path.write_text("\n".join(lines))
@@ -132,14 +132,14 @@ def test_a_replay_does_the_same_bit_for_bit_and_shows_the_same_picture(recorded,
         assert again.session.undo() == step
 
 
-def test_the_events_alone_move_the_camera_while_its_style_keeps_them_to_itself(recorded):
+def test_camera_drags_are_replayed_from_their_events_alone(recorded):
     desk, lines = recorded
     again = Desk(plain_view())
     replay(again.view, [line for line in lines if " Camera " not in line])
     assert same(desk, again)
 
 
-def test_what_a_program_did_to_the_camera_is_told_before_the_next_press():
+def test_a_camera_moved_by_a_program_is_recorded_before_the_next_press():
     desk, again = (Desk(plain_view()) for _ in range(2))
     recorder = Recorder(desk.view)
     desk.hand.hover((10, 10))
@@ -151,7 +151,7 @@ def test_what_a_program_did_to_the_camera_is_told_before_the_next_press():
     assert same(desk, again)
 
 
-def test_the_size_of_the_window_is_part_of_it():
+def test_the_size_of_the_window_is_recorded():
     desk, again = Desk(plain_view((300, 260))), Desk(plain_view((500, 500)))
     recorder = Recorder(desk.view)
     desk.view.window.SetSize(320, 280)
@@ -162,7 +162,7 @@ def test_the_size_of_the_window_is_part_of_it():
     assert same(desk, again)
 
 
-def test_a_line_is_there_as_soon_as_its_event_was(tmp_path):
+def test_each_line_is_written_at_once(tmp_path):
     path = tmp_path / "work.txt"
     view = plain_view()
     recorder = Recorder(view, path)
@@ -172,8 +172,8 @@ def test_a_line_is_there_as_soon_as_its_event_was(tmp_path):
     hand.event("CharEvent", key="z", control=True)
     lines = path.read_text().splitlines()
     assert lines[0] == TITLE
-    told = [line.split(" ", 1)[1] for line in lines if "# " not in line]
-    assert told[-6:] == [
+    events = [line.split(" ", 1)[1] for line in lines if "# " not in line]
+    assert events[-6:] == [
         "MouseMove 5 7 shift",
         "LeftButtonPress 5 7 shift",
         "KeyPress 5 7 key=Escape",
@@ -188,7 +188,7 @@ def test_a_line_is_there_as_soon_as_its_event_was(tmp_path):
     assert not hand.failures
 
 
-def test_a_recording_of_a_replay_is_the_recording(recorded):
+def test_a_recording_of_a_replay_equals_the_recording(recorded):
     _, lines = recorded
     again = Desk(plain_view())
     recorder = Recorder(again.view)
@@ -223,7 +223,7 @@ def test_a_plotter_is_recorded_and_replayed_with_the_keys_of_pyvista():
 
 
 class Dragging:
-    """A view where a handle can be dragged; a step of the solver seems to take *seconds*."""
+    """A view with a handle to drag; each step of the solver appears to take *seconds*."""
 
     def __init__(self, monkeypatch, seconds: float) -> None:
         clock = itertools.count()
@@ -237,7 +237,7 @@ class Dragging:
         self.view.render()
 
     def work(self, hand: Hand) -> None:
-        """Drag, let it refine, take it back, drag from elsewhere, and look from elsewhere."""
+        """Drag, refine during and after the drag, and move the camera."""
         x, y = hand.at(self.session.vertices[SCENE.handle].mean(axis=0))
         hand.press((x, y))
         for k in range(1, 5):
@@ -250,36 +250,36 @@ class Dragging:
         hand.tick(2)
 
 
-def test_a_drag_is_replayed_bit_for_bit_where_solving_is_much_slower(monkeypatch):
+def test_a_drag_is_replayed_bit_by_bit_on_a_slower_machine(monkeypatch):
     fast = Dragging(monkeypatch, 0.001)
     hand, recorder = Hand(fast.view), Recorder(fast.view)
     fast.work(hand)
     recorder.stop()
     assert hand.failures == []
     given = {line.split()[-1] for line in recorder.lines if " Steps " in line}
-    assert len(given) > 1  # the first solve knows nothing of how long a step takes
+    assert len(given) > 1  # the first solve has no measurement yet
     ends = []
     for lines in (recorder.lines, [line for line in recorder.lines if " Steps " not in line]):
         slow = Dragging(monkeypatch, 0.5)
         replay(slow.view, lines)
         ends.append(np.array_equal(slow.session.vertices, fast.session.vertices))
-    assert ends == [True, False]  # and without being told how many steps it ends elsewhere
+    assert ends == [True, False]  # without the recorded steps the pose differs
 
 
-def test_two_who_drag_in_one_window_share_the_orders_of_a_replay():
+def test_two_widgets_of_one_window_share_the_prescribed_steps():
     view = plain_view((50, 50))
-    one, other = Pace(view.interactor), Pace(view.interactor)
-    order_steps(view.interactor, (3, 4))
+    one, other = StepBudget(view.interactor), StepBudget(view.interactor)
+    prescribe_steps(view.interactor, (3, 4))
     assert [one.steps(8), other.steps(8), one.steps(8)] == [3, 4, 8]
-    order_steps(view.interactor, (3, 4))
-    order_steps(view.interactor, ())
+    prescribe_steps(view.interactor, (3, 4))
+    prescribe_steps(view.interactor, ())
     assert other.steps(7) == 7
     other.stop()
-    order_steps(view.interactor, (2,))
+    prescribe_steps(view.interactor, (2,))
     assert [other.steps(7), one.steps(7)] == [7, 7]
 
 
-def test_the_next_event_waits_for_work_in_the_background():
+def test_the_next_event_waits_for_background_work():
     view = plain_view((50, 50))
     said = []
     view.observe("TimerEvent", lambda: said.append("tick"))
@@ -289,7 +289,7 @@ def test_the_next_event_waits_for_work_in_the_background():
     assert said == ["tick", "tick", "move", "move"]
 
 
-def test_it_ends_where_the_window_closes():
+def test_a_replay_ends_when_the_window_closes():
     plotter = pv.Plotter(off_screen=True, window_size=(50, 50))
     plotter.show(auto_close=False, interactive=False)
     view = View.of(plotter)
@@ -309,23 +309,23 @@ GOOD_CAMERA = "0 Camera position 0 0 5 focus 0 0 0 up 0 1 0 angle 30 parallel 0 
         ("0.1 LeftButtonPress 10", "expected 2 words"),
         ("0.1 LeftButtonPress ten 10", "expected a whole number"),
         ("0.1 LeftButtonPress 10 9999999", "expected a whole number from -100000 to 100000"),
-        ("0.1 LeftButtonPress 10 10 __import__('os')", "nothing that can be held down"),
+        ("0.1 LeftButtonPress 10 10 __import__('os')", "is not shift, control, alt, key=NAME"),
         ("0.1 KeyPress 10 10 key=z code=-1", "from 0 to 127"),
-        ("0.1 DeleteEvent 1 1", "'DeleteEvent' is no event of a recording"),
-        ("0.1 ExitEvent", "no event"),
+        ("0.1 DeleteEvent 1 1", "'DeleteEvent' is not an event of a recording"),
+        ("0.1 ExitEvent", "not an event"),
         ("soon MouseMove 1 1", "expected a number; got 'soon'"),
         ("nan MouseMove 1 1", "expected a number"),
         ("0.1", "expected a time and an event"),
         ("0.1 Timer 99999999", "whole number from 1 to 100000"),
         ("0.1 Steps 0", "whole number from 1 to 100"),
         ("0.1 Window 99999 99999", "whole number from 1 to 16384"),
-        (GOOD_CAMERA.replace("focus 0 0 0", "focus 0 0 5"), "no camera can stand like this"),
+        (GOOD_CAMERA.replace("focus 0 0 0", "focus 0 0 5"), "position and focus must differ"),
         (GOOD_CAMERA.replace("angle 30", "angle inf"), "expected a number"),
-        (GOOD_CAMERA.replace("up 0 1 0", "0 1 0"), "a camera needs 'up'"),
+        (GOOD_CAMERA.replace("up 0 1 0", "0 1 0"), "expected 'up' and 3 numbers; got '0 1 0 angle"),
         (GOOD_CAMERA + " more", "expected 0 words"),
     ],
 )
-def test_a_damaged_line_is_named_before_anything_is_done(line, says):
+def test_a_damaged_line_is_reported_before_any_event(line, says):
     view = plain_view((50, 50))
     moved = []
     view.observe("MouseMoveEvent", lambda: moved.append("moved"))
@@ -336,7 +336,7 @@ def test_a_damaged_line_is_named_before_anything_is_done(line, says):
     assert moved == []
 
 
-def test_what_is_no_recording_is_refused(tmp_path):
+def test_a_file_that_is_not_a_recording_is_refused(tmp_path):
     view = plain_view((50, 50))
     path = tmp_path / "x.txt"
     with pytest.raises(SessionError, match=r"x.txt: cannot be read"):
@@ -354,7 +354,7 @@ def test_what_is_no_recording_is_refused(tmp_path):
         Recorder(view, tmp_path / "no" / "x.txt")
 
 
-def test_random_damage_is_an_error_or_a_replay_and_never_anything_else(recorded):
+def test_random_damage_leads_to_an_error_or_a_replay(recorded):
     _, lines = recorded
     random = np.random.default_rng(5)
     text = "\n".join(lines[:14]).encode()
@@ -365,7 +365,7 @@ def test_random_damage_is_an_error_or_a_replay_and_never_anything_else(recorded)
         for place in random.integers(0, len(text), size=2):
             damaged[place] = text[random.integers(len(text))]
         if "Window" in damaged.decode() and b"Window 400 400" not in damaged:
-            continue  # may well be a large one
+            continue  # it may be a very large window
         try:
             replay(view, damaged.decode().splitlines())
             outcomes.add("replayed")

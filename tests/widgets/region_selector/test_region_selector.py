@@ -1,4 +1,4 @@
-"""Painting, by events only: what a hand does, what the session then holds, what is seen."""
+"""Painting by input events: the effect on the session and on the picture."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from hands import Hand, picture, plain_view
 from scenes import sausage
+from solids import icosphere, rotation
 
-from vtk_segdeform import Regions, Session, models
+from vtk_segdeform import Mesh, Regions, Session, models
 from vtk_segdeform.errors import ConstraintError, RegionError, SegDeformError
 from vtk_segdeform.pictures.palette import FIXED, HANDLE, rgb
 from vtk_segdeform.widgets.region_selector.region_selector import Paint, RegionSelector, Tool
@@ -16,7 +17,7 @@ WHOLE = [(2, 2), (398, 2), (398, 398), (2, 398)]
 
 
 class Desk:
-    """A sphere seen along y, z up, a selector over it and a hand."""
+    """A sphere seen along y, z up, with a selector and a hand."""
 
     def __init__(self, *, halves=True):
         self.view = plain_view()
@@ -37,7 +38,7 @@ class Desk:
         return self.session.mesh.vertices
 
     def under(self, x, z):
-        """Return where the near side of the sphere has these two coordinates."""
+        """Return the pixel of the point (x, y, z) on the near side of the sphere."""
         return self.hand.at([x, -np.sqrt(max(0.0, 1.0 - x * x - z * z)), z])
 
 
@@ -50,15 +51,15 @@ def desk():
     made.selector.remove()
 
 
-def test_a_stroke_of_the_brush_adds_what_it_passes_over_in_one_step(desk):
+def test_a_brush_stroke_adds_the_vertices_along_its_path_in_one_step(desk):
     before = desk.session.regions.membership[1].copy()
     desk.selector.region, desk.selector.radius = 1, 0.3
-    # A fast hand: one move over half the sphere must leave no gap.
+    # A fast stroke, one move over half the sphere, must leave no gap.
     desk.hand.drag([desk.under(-0.6, 0.6), desk.under(0.6, 0.6)])
     added = desk.session.regions.membership[1] & ~before
     places = desk.points[added]
     assert len(places) > 10
-    assert (places[:, 1] < 0.0).all()  # not through to the far side
+    assert (places[:, 1] < 0.0).all()  # not on the far side
     assert np.abs(places[:, 2] - 0.6).max() < 0.35
     for x in (-0.6, -0.3, 0.0, 0.3, 0.6):
         assert np.abs(places[:, 0] - x).min() < 0.15
@@ -66,7 +67,7 @@ def test_a_stroke_of_the_brush_adds_what_it_passes_over_in_one_step(desk):
     assert np.array_equal(desk.session.regions.membership[1], before)
 
 
-def test_control_takes_away(desk):
+def test_control_erases(desk):
     desk.selector.region, desk.selector.radius = 0, 0.15
     both = desk.session.regions.membership.all(axis=0)
     desk.hand.drag([desk.under(0.0, 0.0), desk.under(0.2, 0.0)], control=True)
@@ -75,7 +76,7 @@ def test_control_takes_away(desk):
     assert desk.session.regions.membership[1][out].all()
 
 
-def test_the_first_stroke_makes_regions_where_there_are_none():
+def test_the_first_stroke_creates_regions():
     desk = Desk(halves=False)
     desk.selector.region = 1
     desk.hand.click(desk.under(0.3, 0.3))
@@ -85,7 +86,7 @@ def test_the_first_stroke_makes_regions_where_there_are_none():
     desk.selector.remove()
 
 
-def test_a_stroke_is_seen_while_it_is_made_and_escape_ends_it(desk):
+def test_a_stroke_is_previewed_and_escape_cancels_it(desk):
     idle = picture(desk.view)
     desk.selector.region, desk.selector.radius = 1, 0.3
     desk.hand.press(desk.under(0.0, 0.6))
@@ -100,7 +101,7 @@ def test_a_stroke_is_seen_while_it_is_made_and_escape_ends_it(desk):
     assert (picture(desk.view) == idle).all()
 
 
-def test_a_press_beside_the_mesh_or_with_shift_turns_the_camera(desk):
+def test_a_press_beside_the_mesh_or_with_shift_moves_the_camera(desk):
     camera, regions = desk.view.camera.GetPosition(), desk.session.regions
     desk.hand.drag([(5, 5), (40, 40), (60, 50)])
     assert desk.view.camera.GetPosition() != camera
@@ -111,7 +112,7 @@ def test_a_press_beside_the_mesh_or_with_shift_turns_the_camera(desk):
 
 
 @pytest.mark.parametrize("through", [False, True])
-def test_a_rectangle_takes_what_is_in_it_seen_or_all(desk, through):
+def test_a_rectangle_selects_visible_vertices_or_all(desk, through):
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
     desk.selector.through = through
     (x0, y0), (x1, y1) = (2, 2), desk.under(0.99, -0.5)
@@ -125,7 +126,28 @@ def test_a_rectangle_takes_what_is_in_it_seen_or_all(desk, through):
     assert x1 > x0
 
 
-def test_a_lasso_takes_what_it_goes_around(desk):
+def test_a_rectangle_selects_one_side_of_a_sheet_2e_8_thick():
+    vertices, faces = icosphere(3)
+    flat = vertices * [1.0, 1.0, 2e-8]
+    session = Session(Mesh(flat @ rotation([1.0, 0.0, 0.0], 0.5).T, faces))
+    view = plain_view()
+    selector, hand = RegionSelector(view, session), Hand(view)
+    view.camera.ParallelProjectionOn()
+    view.camera.SetParallelScale(1.2)
+    view.camera.SetPosition(0.0, 0.0, 10.0)
+    view.camera.SetFocalPoint(0.0, 0.0, 0.0)
+    view.camera.SetClippingRange(5.0, 15.0)
+    selector.On()
+    selector.tool, selector.paints = Tool.RECTANGLE, Paint.FIXED
+    hand.drag([(2, 2), (200, 200), (398, 398)])
+    assert hand.failures == []
+    selected = np.isin(np.arange(len(vertices)), session.fixed)
+    assert selected[vertices[:, 2] > 0.5].all()
+    assert not selected[vertices[:, 2] < -0.5].any()  # 2e-9 of the depth range or more behind
+    selector.remove()
+
+
+def test_a_lasso_selects_the_vertices_inside(desk):
     desk.selector.tool, desk.selector.paints = Tool.LASSO, Paint.HANDLE
     angle = np.linspace(0, 2 * np.pi, 40)
     x, z = 0.3 * np.cos(angle), 0.5 + 0.3 * np.sin(angle)
@@ -146,13 +168,13 @@ def test_the_line_is_drawn_while_the_button_is_down(desk):
     changed = (picture(desk.view) != idle).any(axis=2)
     assert changed[18:23, 30:370].any(axis=0).all()
     assert changed[30:370, 378:383].any(axis=1).all()
-    assert not changed[30:60, 30:60].any()  # a line, no area
+    assert not changed[30:60, 30:60].any()  # the inside is not filled
     desk.hand.key("Escape")
     desk.hand.release()
     assert (picture(desk.view) == idle).all()
 
 
-def test_a_slip_of_the_hand_takes_nothing(desk):
+def test_a_tiny_rectangle_selects_nothing(desk):
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
     nearest = desk.points[desk.points[:, 1].argmin()]
     x, y = (int(p) for p in desk.hand.at(nearest))  # just below and left of a vertex
@@ -163,7 +185,7 @@ def test_a_slip_of_the_hand_takes_nothing(desk):
     assert len(desk.session.fixed) == 1
 
 
-def test_a_click_takes_a_whole_component(desk):
+def test_a_click_selects_a_connected_part(desk):
     desk.selector.tool, desk.selector.paints = Tool.COMPONENT, Paint.HANDLE
     desk.hand.click(desk.under(0.1, 0.1))
     assert len(desk.session.handles["handle 1"]) == desk.session.mesh.n_vertices
@@ -172,13 +194,13 @@ def test_a_click_takes_a_whole_component(desk):
     assert desk.selector.handle is None
 
 
-def test_what_is_fixed_stays_out_of_a_handle_and_the_other_way_round(desk):
+def test_fixed_vertices_and_handles_remain_disjoint(desk):
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
     desk.selector.through = True
     desk.hand.drag([(2, 2), (398, 150)])
     fixed = desk.session.fixed.copy()
     desk.selector.paints = Paint.HANDLE
-    desk.hand.drag([(2, 2), (398, 398)])  # all of it
+    desk.hand.drag([(2, 2), (398, 398)])  # the whole mesh
     handle = desk.session.handles["handle 1"]
     assert len(fixed) + len(handle) == desk.session.mesh.n_vertices
     assert np.array_equal(desk.session.fixed, fixed)
@@ -187,7 +209,7 @@ def test_what_is_fixed_stays_out_of_a_handle_and_the_other_way_round(desk):
     assert isinstance(desk.hand.failures.pop(), ConstraintError)
 
 
-def test_a_second_handle_is_another_one(desk):
+def test_a_second_handle_gets_its_own_name_and_vertices(desk):
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
     desk.hand.drag([(100, 300), (200, 390)])
     desk.selector.handle = None
@@ -197,7 +219,9 @@ def test_a_second_handle_is_another_one(desk):
     assert not np.intersect1d(one, two).size
 
 
-def test_what_no_other_region_holds_stays_and_where_that_is_all_of_it_one_is_told(desk):
+def test_vertices_of_no_other_region_cannot_be_erased(
+    desk,
+):
     desk.selector.tool, desk.selector.through = Tool.RECTANGLE, True
     first, second = desk.session.regions.membership
     desk.hand.drag([(2, 2), (398, 398)], control=True)
@@ -211,7 +235,7 @@ def test_what_no_other_region_holds_stays_and_where_that_is_all_of_it_one_is_tol
 
 
 def test_a_region_cannot_be_emptied(desk):
-    desk.session.paint_region(1, desk.points[:, 2] < np.inf)  # holds all of region 0 too
+    desk.session.paint_region(1, desk.points[:, 2] < np.inf)  # contains all of region 0
     desk.selector.tool, desk.selector.through = Tool.RECTANGLE, True
     regions = desk.session.regions
     desk.hand.drag([(2, 2), (398, 398)], control=True)
@@ -235,7 +259,7 @@ def test_brackets_and_the_wheel_over_the_mesh_change_the_brush(desk):
     assert desk.view.camera.GetDistance() == camera
 
 
-def test_the_wheel_zooms_beside_the_mesh_and_with_a_key_held_but_not_during_a_stroke(desk):
+def test_the_wheel_zooms_beside_the_mesh_and_with_a_modifier_but_not_during_a_stroke(desk):
     here, radius = desk.under(0.0, 0.0), desk.selector.radius
     for place, held in (((5, 5), {}), (here, {"shift": True}), (here, {"control": True})):
         camera = desk.view.camera.GetDistance()
@@ -251,7 +275,7 @@ def test_the_wheel_zooms_beside_the_mesh_and_with_a_key_held_but_not_during_a_st
     desk.hand.release()
 
 
-def test_the_brush_stays_between_a_speck_and_everything(desk):
+def test_the_radius_of_the_brush_is_limited(desk):
     here, size = desk.under(0.0, 0.0), desk.session.mesh.diagonal
     desk.hand.wheel(+80, here)
     assert desk.selector.radius == pytest.approx(2.0 * size)
@@ -265,9 +289,9 @@ def test_the_brush_stays_between_a_speck_and_everything(desk):
             desk.selector.radius = radius
 
 
-def test_a_brush_paints_what_is_seen_or_right_through(desk):
+def test_a_brush_paints_visible_vertices_or_also_hidden_ones(desk):
     desk.selector.paints, desk.selector.radius = Paint.FIXED, 0.5
-    desk.hand.click(desk.under(0.9, 0.0))  # reaches round the side
+    desk.hand.click(desk.under(0.9, 0.0))  # near the silhouette
     assert (desk.points[desk.session.fixed, 1] < -0.05).all()
     assert (desk.points[desk.session.fixed, 1] > -0.3).any()
     desk.session.undo()
@@ -279,7 +303,7 @@ def test_a_brush_paints_what_is_seen_or_right_through(desk):
     assert not ((sides > -0.6) & (sides < 0.6)).any()
 
 
-def test_what_a_lasso_would_take_is_seen_before_it_is_taken(desk):
+def test_a_lasso_is_previewed_before_it_changes_anything(desk):
     desk.selector.tool, desk.selector.paints = Tool.LASSO, Paint.FIXED
     corners = [(100, 100), (300, 100), (300, 300), (100, 300)]
 
@@ -299,7 +323,7 @@ def test_what_a_lasso_would_take_is_seen_before_it_is_taken(desk):
     assert not len(desk.session.fixed)
 
 
-def test_only_what_would_change_is_shown(desk):
+def test_the_preview_shows_only_vertices_that_will_change(desk):
     desk.session.set_fixed(desk.points[:, 2] > 0.5)
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
     idle = picture(desk.view).astype(int)
@@ -314,7 +338,7 @@ def test_only_what_would_change_is_shown(desk):
     desk.hand.release()
 
 
-def test_over_the_ground_nothing_is_taken_and_there_is_nothing_to_undo(desk):
+def test_a_stroke_beside_the_mesh_makes_no_undo_step(desk):
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
     label = desk.session.undo_label
     desk.hand.drag([(2, 2), (30, 30)])
@@ -323,7 +347,7 @@ def test_over_the_ground_nothing_is_taken_and_there_is_nothing_to_undo(desk):
     assert desk.session.undo_label == label
 
 
-def test_control_takes_vertices_out_of_a_chosen_handle_and_the_last_one_ends_it(desk):
+def test_control_erases_from_the_selected_handle_and_removes_it_when_empty(desk):
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
     desk.hand.drag([(2, 200), (398, 398)])
     count = len(desk.session.handles["handle 1"])
@@ -331,7 +355,7 @@ def test_control_takes_vertices_out_of_a_chosen_handle_and_the_last_one_ends_it(
     assert 0 < len(desk.session.handles["handle 1"]) < count
     desk.selector.handle = None
     desk.hand.drag([(2, 200), (398, 398)], control=True)
-    assert "choose the handle" in str(desk.hand.failures.pop())
+    assert "select the handle" in str(desk.hand.failures.pop())
     desk.selector.handle = "handle 1"
     desk.hand.drag([(2, 200), (398, 398)], control=True)
     assert not desk.session.handles
@@ -339,7 +363,7 @@ def test_control_takes_vertices_out_of_a_chosen_handle_and_the_last_one_ends_it(
     assert len(desk.session.handles["handle 1"])
 
 
-def test_the_pose_stays_for_handles_and_goes_to_rest_for_regions():
+def test_painting_a_handle_keeps_the_pose_and_painting_a_region_resets_it():
     scene = sausage()
     view = plain_view()
     session = Session(scene.mesh)
@@ -358,7 +382,7 @@ def test_the_pose_stays_for_handles_and_goes_to_rest_for_regions():
     pose = session.vertices.copy()
     middle = int(np.argmin(np.linalg.norm(scene.mesh.vertices - [0.0, -0.8, 0.0], axis=1)))
     selector.paints = Paint.HANDLE
-    hand.click(hand.at(pose[middle]))  # where it is now
+    hand.click(hand.at(pose[middle]))  # in the current pose
     assert middle in session.handles["handle 2"]
     assert np.array_equal(session.vertices, pose)
     selector.paints, selector.region = Paint.REGION, 2
@@ -371,7 +395,7 @@ def test_the_pose_stays_for_handles_and_goes_to_rest_for_regions():
     selector.remove()
 
 
-def test_what_is_under_the_pointer_tells_its_region(desk):
+def test_region_under_pointer_is_that_of_the_vertex_there(desk):
     for z, region in ((0.6, 0), (-0.6, 1)):
         desk.hand.hover(desk.under(0.0, z))
         assert desk.selector.region_under_pointer() == region
@@ -379,7 +403,7 @@ def test_what_is_under_the_pointer_tells_its_region(desk):
     assert desk.selector.region_under_pointer() is None
 
 
-def test_random_strokes_leave_nothing_behind(desk):
+def test_random_strokes_can_all_be_undone(desk):
     dice = np.random.default_rng(5)
     for _ in range(60):
         desk.selector.tool = list(Tool)[dice.integers(4)]
@@ -402,10 +426,10 @@ def test_random_strokes_leave_nothing_behind(desk):
     desk.hand.hover((3, 3))
     assert desk.session.regions is None
     reds = picture(desk.view).astype(int)
-    assert not ((reds[..., 0] > 150) & (reds[..., 1] < 90)).any()  # no preview stays
+    assert not ((reds[..., 0] > 150) & (reds[..., 1] < 90)).any()  # no preview is left
 
 
-def test_the_ring_is_as_large_as_the_brush(desk):
+def test_the_ring_has_the_radius_of_the_brush(desk):
     idle = picture(desk.view)
     widths = []
     for radius in (0.2, 0.4):
@@ -420,7 +444,7 @@ def test_the_ring_is_as_large_as_the_brush(desk):
     assert (picture(desk.view) == idle).all()
 
 
-def test_the_ring_goes_with_the_pointer_and_with_the_tool(desk):
+def test_the_ring_disappears_with_the_pointer_and_with_the_tool(desk):
     idle = picture(desk.view)
     leave = [
         lambda: desk.hand.event("LeaveEvent"),
@@ -435,7 +459,7 @@ def test_the_ring_goes_with_the_pointer_and_with_the_tool(desk):
         assert (picture(desk.view) == idle).all()
 
 
-def test_growing_and_shrinking_are_rings_of_edges(desk):
+def test_grow_and_shrink_change_one_ring_of_neighbours(desk):
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
     desk.selector.through = True
     desk.hand.drag([(2, 300), (398, 398)])
@@ -449,7 +473,7 @@ def test_growing_and_shrinking_are_rings_of_edges(desk):
     assert np.array_equal(desk.session.handles["handle 1"], small)
 
 
-def test_fixed_is_grey_handles_are_red_and_an_overlap_is_a_bit_of_both(desk):
+def test_fixed_vertices_are_grey_handles_red_and_overlaps_mixed(desk):
     def colour(x, z):
         px, py = desk.under(x, z)
         pixel = picture(desk.view)[400 - round(py), round(px)].astype(float)
@@ -465,7 +489,7 @@ def test_fixed_is_grey_handles_are_red_and_an_overlap_is_a_bit_of_both(desk):
         assert np.abs(colour(x, z) - wanted).max() < 0.12
 
 
-def test_undo_and_redo_are_seen(desk):
+def test_undo_and_redo_are_displayed(desk):
     before = picture(desk.view)
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
     desk.hand.drag([(2, 300), (398, 398)])
@@ -477,7 +501,7 @@ def test_undo_and_redo_are_seen(desk):
     assert (picture(desk.view) == after).all()
 
 
-def test_removed_it_leaves_the_view_as_it_was():
+def test_remove_restores_the_view():
     view = plain_view()
     props = view.renderer.GetViewProps().GetNumberOfItems()
     selector = RegionSelector(view, Session(models.sphere(200)))

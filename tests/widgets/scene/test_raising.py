@@ -1,7 +1,7 @@
-"""A user's callback that raises, at whatever moment of a drag, does not break the editor.
+"""User callbacks that raise at any moment of a drag do not break the editor.
 
-By real events: a drag during which it raises, and what it raises is told; then one that goes as if
-nothing had been, to the exact volume, and is undone.
+First comes a drag with a callback that raises, whose exception is reported; then a drag without it,
+which works, preserves the volume exactly and can be undone.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ WAY = np.array([[0, 0], [5, 4], [14, 12]])
 
 
 class Fault(Exception):
-    """What a callback of a user raises."""
+    """An exception raised by a user's callback."""
 
 
 class Raiser:
-    """A callback that raises when it is called the *moment*-th time, or always."""
+    """A callback that raises at the *moment*-th call, or always."""
 
     def __init__(self, moment: int | None = None) -> None:
         self.moment, self.calls = moment, 0
@@ -37,7 +37,7 @@ class Raiser:
 
 
 class Bench:
-    """An editor at work, and a hand."""
+    """An editor in deform mode, and a hand."""
 
     def __init__(self) -> None:
         self.session = session_of(slender())
@@ -55,7 +55,7 @@ class Bench:
         self.require_works()
 
     def drags(self) -> None:
-        """Drag the ball of the gizmo, and let the pose be refined."""
+        """Drag the ball of the gizmo and refine the pose."""
         self.hand.drag(self.hand.at(self.dragger.gizmo.centre) + WAY)
         for _ in range(50):
             if self.dragger.is_refining:
@@ -63,7 +63,7 @@ class Bench:
         assert not self.dragger.is_refining
 
     def require_works(self) -> None:
-        """Assert that a drag drags and is undone, and that nobody holds on to anything."""
+        """Assert that a drag works and can be undone, and that no gesture is running."""
         session, before = self.session, self.session.vertices
         step, camera = session.undo_label, self.view.camera.GetPosition()
         assert not session.is_dragging
@@ -85,14 +85,14 @@ class Bench:
         assert self.hand.failures == []
 
     def require_seen(self) -> None:
-        """Assert that what is drawn is the pose, and the gizmo at the handle."""
+        """Assert that the displayed mesh has the current pose, and the gizmo is at the handle."""
         self.view.render()
         x = self.session.vertices
         assert np.array_equal(self.widgets.surface.points, x)
         assert np.allclose(self.dragger.gizmo.centre, x[self.session.handles[NAME]].mean(axis=0))
 
-    def told(self) -> bool:
-        """Tell whether a fault was told to the listeners of failures; forget of it."""
+    def has_reported(self) -> bool:
+        """Return whether a fault reached the failure listeners, and clear the list."""
         found = any(isinstance(failure, Fault) for failure in self.hand.failures)
         self.hand.failures.clear()
         return found
@@ -100,14 +100,14 @@ class Bench:
 
 @pytest.fixture(scope="module")
 def bench():
-    """Yield an editor that all must leave as it was."""
+    """Yield an editor shared by all tests; each must restore it."""
     made = Bench()
     yield made
     made.editor.remove()
 
 
 def observer(event):
-    """Return what adds an observer to the dragger."""
+    """Return a function that adds an observer of *event* to the dragger."""
 
     def add(bench, callback):
         tag = bench.dragger.AddObserver(event, callback)
@@ -135,42 +135,42 @@ PLACES = {
 
 @pytest.fixture(autouse=True)
 def unheard(monkeypatch):
-    """Return what reaches nobody: VTK would print it."""
+    """Return the exceptions that reach no listener; VTK would print them."""
     faults = []
     monkeypatch.setattr(sys, "excepthook", lambda _type, fault, _trace: faults.append(fault))
     return faults
 
 
 def raises_in_a_drag(bench, place, moment=None) -> bool:
-    """Drag while a callback raises, and then without; return whether it did raise."""
+    """Drag with a callback that raises, then without it; return whether it raised."""
     raiser = Raiser(moment)
     stop = PLACES[place](bench, raiser)
     try:
         bench.drags()
         has_raised = raiser.calls >= (moment or 1)
-        assert bench.told() == has_raised
+        assert bench.has_reported() == has_raised
     finally:
         stop()
-    if bench.session.undo_label == f"drag {NAME}":  # it was kept, as what it raised came after
+    if bench.session.undo_label == f"drag {NAME}":  # committed before the callback raised
         bench.session.undo()
     bench.require_works()
     return has_raised
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_what_raises_during_a_drag_does_not_harm_the_next(bench, place):
+def test_a_callback_that_raises_during_a_drag_does_not_affect_the_next_drag(bench, place):
     assert raises_in_a_drag(bench, place)
 
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("place", PLACES)
-def test_nor_does_what_raises_once_at_whatever_moment(bench, place):
+def test_nor_does_a_callback_that_raises_once_at_any_moment(bench, place):
     moments = next(k for k in itertools.count(1) if not raises_in_a_drag(bench, place, k)) - 1
     print(f"\n{place}: raised at {moments} moments")
 
 
 @pytest.mark.parametrize("place", ["a listener of the session", "an observer of the beginning"])
-def test_nor_where_the_listener_of_failures_raises_as_well(bench, place, unheard):
+def test_nor_if_the_failure_listener_raises_too(bench, place, unheard):
     handler = Raiser()
     stop = bench.view.on_failure(handler)
     try:
@@ -182,7 +182,7 @@ def test_nor_where_the_listener_of_failures_raises_as_well(bench, place, unheard
     assert len(unheard) == handler.calls
 
 
-def test_one_that_raises_keeps_no_other_from_hearing(bench):
+def test_an_observer_that_raises_does_not_suppress_the_others(bench):
     heard = []
     tags = [
         bench.dragger.AddObserver("EndInteractionEvent", call)
@@ -191,27 +191,27 @@ def test_one_that_raises_keeps_no_other_from_hearing(bench):
     bench.drags()
     for tag in tags:
         bench.dragger.RemoveObserver(tag)
-    assert bench.told()
+    assert bench.has_reported()
     assert heard == ["end"]
     bench.session.undo()
     bench.require_works()
 
 
-def test_a_drag_that_a_listener_has_ended_leaves_no_key_to_it(bench):
+def test_after_a_listener_has_ended_a_drag_its_keys_have_no_effect(bench):
     stop = bench.session.on_change(Raiser())
     bench.drags()
     stop()
-    assert bench.told()
+    assert bench.has_reported()
     ended = []
     tag = bench.dragger.AddObserver("EndInteractionEvent", lambda *_: ended.append(1))
-    bench.hand.key("x")  # binds a drag in hand to an axis
+    bench.hand.key("x")  # would constrain a running drag to an axis
     bench.dragger.RemoveObserver(tag)
     assert ended == []
     bench.require_works()
 
 
 @pytest.mark.parametrize("part", ["work", "report", "done"])
-def test_work_of_a_user_that_raises_ends_and_the_next_drag_works(bench, part):
+def test_a_background_job_that_raises_ends_and_the_next_drag_works(bench, part):
     def work(progress):
         if part == "work":
             raise Fault("in another thread")
@@ -221,6 +221,6 @@ def test_work_of_a_user_that_raises_ends_and_the_next_drag_works(bench, part):
     bench.editor.controller.start("my work", work, Raiser())
     with bench.view.guarded():
         bench.editor.wait()
-    assert bench.told()
+    assert bench.has_reported()
     assert "Fault" in bench.editor.status
     bench.require_works()

@@ -35,7 +35,7 @@ def test_stopping_one_callback_leaves_the_others_running(view, host):
     host.tick()
     assert heard == [0, 1, 2]
     stops[1]()
-    stops[1]()  # once is enough, twice is no harm
+    stops[1]()  # the second call does nothing
     host.tick()
     assert heard == [0, 1, 2, 0, 2]
     stops[0]()
@@ -165,7 +165,7 @@ def test_stopping_after_the_window_is_closed_is_harmless():
 def test_a_timer_that_was_not_stopped_keeps_nothing_alive():
     view = plain_view((60, 60))
     OneTimerHost(view.interactor)
-    view.every(20, view.touch)
+    view.every(20, view.request_render)
     gone = weakref.ref(view), weakref.ref(view.interactor)
     del view
     gc.collect()

@@ -1,4 +1,4 @@
-"""The border to VTK: where things are, who hears of an event, what becomes of an exception."""
+"""The interface to VTK: projection, delivery of events, exceptions, rendering."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ RNG = np.random.default_rng(7)
 
 
 class Scribble(Widget):
-    """A widget that takes presses in the left half and remembers what it was told."""
+    """A widget that draws strokes in the left half of the view and records its input."""
 
     def __init__(self, view, session):
         super().__init__(view, session)
         self.strokes, self.keys = [], []
         self.fail_on = None
 
-    def begins(self, press: Pointer) -> Gesture | None:
+    def on_press(self, press: Pointer) -> Gesture | None:
         return self._stroke(press) if press.x < 200 else None
 
-    def types(self, key, pointer):
+    def on_key(self, key, pointer):
         self.keys.append(key)
         return key == "w"
 
@@ -46,7 +46,7 @@ class Scribble(Widget):
         places = [press.position]
         while (pointer := (yield)).phase is Phase.MOVE:
             if pointer.x == self.fail_on:
-                raise RuntimeError("a pen without ink")
+                raise RuntimeError("out of ink")
             places.append(pointer.position)
         if pointer.phase is Phase.RELEASE:
             self.strokes.append(len(places))
@@ -67,7 +67,7 @@ def scribble():
 
 
 @pytest.mark.parametrize("parallel", [False, True])
-def test_display_and_world_undo_each_other(parallel):
+def test_to_display_and_to_world_are_inverses(parallel):
     view = plain_view((320, 240))
     SurfaceDisplay(view, Session(models.sphere(200)))
     view.camera.SetParallelProjection(parallel)
@@ -78,11 +78,11 @@ def test_display_and_world_undo_each_other(parallel):
     assert np.allclose(view.to_world(there), points, atol=1e-9)
     view.renderer.SetWorldPoint(*points[0], 1.0)
     view.renderer.WorldToDisplay()
-    assert np.allclose(there[0], view.renderer.GetDisplayPoint(), atol=1e-6)  # VTK's own word
+    assert np.allclose(there[0], view.renderer.GetDisplayPoint(), atol=1e-6)  # VTK's own projection
 
 
 @pytest.mark.parametrize("parallel", [False, True])
-def test_a_pixel_is_as_long_as_what_it_covers(parallel):
+def test_the_length_of_a_pixel_agrees_with_the_projection(parallel):
     view = plain_view((300, 300))
     SurfaceDisplay(view, Session(models.sphere(200)))
     view.camera.SetParallelProjection(parallel)
@@ -93,7 +93,7 @@ def test_a_pixel_is_as_long_as_what_it_covers(parallel):
     assert view.pixel_at(point) == pytest.approx(np.linalg.norm(beside - point), rel=1e-6)
 
 
-def test_a_view_is_made_from_a_plotter_or_a_pair_and_from_nothing_else():
+def test_a_view_is_made_from_a_plotter_or_a_renderer_and_interactor_only():
     plotter = pv.Plotter(off_screen=True)
     try:
         view = View.of(plotter)
@@ -112,13 +112,13 @@ def test_a_view_is_made_from_a_plotter_or_a_pair_and_from_nothing_else():
         plotter.close()
 
 
-def test_a_gesture_has_the_pointer_from_press_to_release_and_the_camera_rests(scribble):
+def test_a_gesture_receives_all_events_from_press_to_release_and_the_camera_none(scribble):
     hand = Hand(scribble.view)
     camera = scribble.view.camera.GetPosition()
     hand.drag([(50, 50), (60, 60), (300, 70)])
     assert scribble.strokes == [3]
     assert scribble.view.camera.GetPosition() == camera
-    hand.drag([(300, 50), (320, 60), (340, 90)])  # not the widget's
+    hand.drag([(300, 50), (320, 60), (340, 90)])  # outside the widget's half
     assert scribble.strokes == [3]
     assert scribble.view.camera.GetPosition() != camera
     assert not hand.failures
@@ -140,7 +140,7 @@ def test_a_press_without_a_previous_release_finishes_the_gesture(scribble):
     hand.press((50, 50))
     hand.move((60, 60))
     hand.drag([(70, 70), (80, 80), (90, 90)])
-    assert scribble.strokes == [3, 3]  # a press comes with a move to where it is
+    assert scribble.strokes == [3, 3]  # each press is preceded by a move
 
 
 @pytest.mark.parametrize("end", ["finish", "Off"])
@@ -157,22 +157,22 @@ def test_a_gesture_ended_from_outside_is_finished_and_not_cancelled(scribble, en
     assert hand.failures == []
 
 
-def test_a_gesture_that_fails_when_it_is_finished_does_not_keep_a_widget_on(scribble):
+def test_off_succeeds_even_if_finishing_the_gesture_raises(scribble):
     hand = Hand(scribble.view)
 
     def stroke(press):
         yield
-        raise RuntimeError("a pen without ink")
+        raise RuntimeError("out of ink")
 
-    scribble.begins = stroke
+    scribble.on_press = stroke
     hand.press((50, 50))
-    with pytest.raises(RuntimeError, match="without ink"):
+    with pytest.raises(RuntimeError, match="out of ink"):
         scribble.Off()
     assert not scribble.GetEnabled()
     assert not scribble.is_grabbing
 
 
-def test_vtks_words_are_spoken_in_vtks_order(scribble):
+def test_interaction_events_come_in_the_order_of_vtk(scribble):
     said = []
     for event in ("StartInteractionEvent", "InteractionEvent", "EndInteractionEvent"):
         scribble.AddObserver(event, lambda widget, name: said.append(name))
@@ -181,12 +181,12 @@ def test_vtks_words_are_spoken_in_vtks_order(scribble):
     assert [name.removesuffix("InteractionEvent") for name in said] == ["Start", "", "", "End"]
 
 
-def test_an_exception_is_collected_and_leaves_no_grab(scribble):
+def test_an_exception_reaches_the_listener_and_ends_the_gesture(scribble):
     hand = Hand(scribble.view)
     scribble.fail_on = 60
     hand.press((50, 50))
     hand.move((60, 60))
-    assert [str(failure) for failure in hand.failures] == ["a pen without ink"]
+    assert [str(failure) for failure in hand.failures] == ["out of ink"]
     assert not scribble.is_grabbing
     scribble.fail_on = None
     hand.release((60, 60))
@@ -194,8 +194,8 @@ def test_an_exception_is_collected_and_leaves_no_grab(scribble):
     assert scribble.strokes == [2]
 
 
-def test_an_event_within_an_event_waits_for_its_turn(scribble):
-    """For example, a listener runs the event loop, which delivers moves and the release."""
+def test_an_event_inside_an_event_is_queued(scribble):
+    """As if a listener runs the event loop, which delivers moves and the release."""
     hand = Hand(scribble.view)
     seen, inside = [], {20: ("move", 30), 40: ("release", 40), 50: ("press", 70)}
 
@@ -208,7 +208,7 @@ def test_an_event_within_an_event_waits_for_its_turn(scribble):
                 assert scribble.is_grabbing
         seen.append(pointer.phase)
 
-    scribble.begins = stroke
+    scribble.on_press = stroke
     hand.press((10, 50))
     hand.move((20, 50))
     assert seen == [20, 30]
@@ -217,16 +217,16 @@ def test_an_event_within_an_event_waits_for_its_turn(scribble):
     assert not scribble.is_grabbing
     hand.press((10, 50))
     hand.move((50, 50))
-    assert seen[4:] == [50, 70, Phase.RELEASE]  # a press can only mean that a release was lost
+    assert seen[4:] == [50, 70, Phase.RELEASE]  # a press means that the release was lost
     assert not scribble.is_grabbing
     assert hand.failures == []
 
 
-def test_a_key_that_is_taken_stays_from_the_camera_and_others_do_not(scribble):
+def test_only_keys_that_no_widget_handles_reach_the_camera(scribble):
     hand = Hand(scribble.view)
     heard = []
     scribble.view.interactor.AddObserver("CharEvent", lambda *_: heard.append("char"), -1.0)
-    hand.key("w")  # VTK would show wires
+    hand.key("w")  # VTK would switch to wireframe
     assert heard == []
     hand.key("s")
     assert heard == ["char"]
@@ -234,7 +234,7 @@ def test_a_key_that_is_taken_stays_from_the_camera_and_others_do_not(scribble):
 
 
 @pytest.mark.parametrize("style", [vtkInteractorStyleTrackballCamera, vtkInteractorStyleSwitch])
-def test_a_key_in_the_middle_of_a_camera_drag_is_the_widgets_and_not_vtks(scribble, style):
+def test_a_key_during_a_camera_drag_goes_to_the_widget_and_not_to_vtk(scribble, style):
     interactor, camera = scribble.view.interactor, scribble.view.camera
     interactor.SetInteractorStyle(style := style())
     if isinstance(style, vtkInteractorStyleSwitch):
@@ -245,11 +245,11 @@ def test_a_key_in_the_middle_of_a_camera_drag_is_the_widgets_and_not_vtks(scribb
     hand.press((300, 200))
     hand.move((320, 210))
     before = camera.GetPosition()
-    hand.key("Shift_L")  # which changes nothing
+    hand.key("Shift_L")  # has no effect
     hand.move((340, 220))
     turned = camera.GetPosition()
     assert turned != before
-    hand.key("w")  # VTK would show wires
+    hand.key("w")  # VTK would switch to wireframe
     assert (scribble.keys, heard) == (["w"], [])
     hand.move((360, 230))
     assert camera.GetPosition() == turned
@@ -268,10 +268,10 @@ def test_a_closed_window_is_none_and_drawing_in_it_does_nothing():
     plotter.close()
     assert view.window is None
     view.render()
-    view.touch()
+    view.request_render()
 
 
-def test_off_hears_nothing(scribble):
+def test_a_widget_that_is_off_receives_no_events(scribble):
     scribble.Off()
     Hand(scribble.view).drag([(50, 50), (60, 60)])
     assert scribble.strokes == []
@@ -299,18 +299,49 @@ def test_the_surface_follows_the_pose_in_place():
 def test_one_event_draws_once_whatever_it_changes(scribble):
     drawn = []
     scribble.view.renderer.AddObserver("EndEvent", lambda *_: drawn.append("once"))
-    scribble.view.touch()  # outside of any event: now
+    scribble.view.request_render()  # outside an event: draws at once
     assert len(drawn) == 1
 
-    def types(key, pointer):
+    def on_key(key, pointer):
         for _ in range(3):
-            scribble.view.touch()
+            scribble.view.request_render()
         return True
 
-    scribble.types = types
-    scribble.view.before_render(scribble.view.touch)  # must not go on for ever
+    scribble.on_key = on_key
+    scribble.view.before_render(scribble.view.request_render)  # must not render endlessly
     Hand(scribble.view).event("KeyPressEvent", key="a")
     assert len(drawn) == 2
+
+
+def test_an_event_inside_an_event_does_not_draw_on_its_own(scribble):
+    """As if the callback of a move runs the event loop, which fires a timer."""
+    view, drawn = scribble.view, []
+    hand = Hand(view)
+    view.renderer.AddObserver("EndEvent", lambda *_: drawn.append(len(calls)))
+    calls = []
+
+    def timer():
+        calls.append("timer")
+        view.request_render()
+
+    def move():
+        calls.append("move")
+        view.request_render()
+        hand.tick()
+        calls.append("end of move")
+        view.request_render()
+
+    stops = [view.every(20, timer), view.observe("MouseMoveEvent", move)]
+    hand.hover((300, 50))
+    assert calls == ["move", "timer", "end of move"]
+    assert drawn == [3]  # once, at the end of the outer event
+    stops[1]()
+    hand.hover((310, 50))
+    assert drawn == [3]  # nothing more was requested
+    hand.tick()
+    assert drawn == [3, 4]
+    stops[0]()
+    assert hand.failures == []
 
 
 def test_the_newest_layer_of_colours_is_seen():
@@ -332,19 +363,19 @@ def test_the_newest_layer_of_colours_is_seen():
     surface.remove()
 
 
-def test_what_is_in_front_is_hidden_by_nothing():
+def test_actors_in_the_foreground_are_never_hidden():
     view = plain_view((60, 60))
     session = Session(models.sphere(200))
     surface = SurfaceDisplay(view, session)
     view.renderer.ResetCamera()
     inner = SurfaceDisplay(
-        View(view.front, view.interactor),
+        View(view.foreground, view.interactor),
         Session(Mesh(0.2 * session.mesh.vertices, session.mesh.faces)),
     )
     inner.set_colours("all", np.tile(np.uint8([200, 0, 0]), (session.mesh.n_vertices, 1)))
     pixel = picture(view)[30, 30].astype(int)
     assert pixel[0] > 3 * pixel[1]
-    view.remove_front()
+    view.remove_foreground()
     pixel = picture(view)[30, 30].astype(int)
     assert pixel[0] < 2 * pixel[1]
     surface.remove()

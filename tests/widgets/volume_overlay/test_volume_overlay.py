@@ -1,4 +1,4 @@
-"""The local volume change: the right colours, the right words, and no work while hidden."""
+"""The overlay of the local volume change: colours, lines of text, no work while hidden."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ from vtk_segdeform.widgets.volume_overlay.diverging import (
     half_range_for,
     lookup_table,
 )
+from vtk_segdeform.widgets.volume_overlay.legend import percent
 from vtk_segdeform.widgets.volume_overlay.volume_overlay import VolumeOverlay
 
 RNG = np.random.default_rng(5)
@@ -45,7 +46,7 @@ def session_of(n_regions: int) -> Session:
 
 @pytest.fixture
 def overlay(request):
-    """Return the overlay over a sausage along x seen from -y, in one region or as asked for."""
+    """Return the overlay of a sausage along x seen from -y, by default with one region."""
     session = session_of(getattr(request, "param", 1))
     view = plain_view((400, 300))
     surface = SurfaceDisplay(view, session)
@@ -72,14 +73,14 @@ def props(overlay, kind):
     return [prop for prop in overlay.view.renderer.GetViewProps() if isinstance(prop, kind)]
 
 
-def words(overlay):
-    """Return what is written, from the top."""
+def lines_of(overlay):
+    """Return the lines of text from the top."""
     lines = sorted(props(overlay, vtkTextActor), key=lambda line: -line.GetPosition()[1])
     return [line.GetInput().strip() for line in lines]
 
 
 def move_all(session, matrix, shift=(0.0, 0.0, 0.0)):
-    """Move every cage, and so the mesh, by an affine map."""
+    """Apply an affine map to all cages, and thereby to the mesh."""
     for region, cage in enumerate(session.cages):
         session.move_cage(region, cage.vertices @ np.asarray(matrix).T + shift)
     session.commit()
@@ -96,7 +97,7 @@ def lightness(rgb):
     return np.where(y > (6 / 29) ** 3, 116 * np.cbrt(y) - 16, y * (29 / 3) ** 3)
 
 
-def test_zero_and_what_rounds_to_it_is_one_colour_and_only_that():
+def test_zero_has_exactly_one_colour():
     tiny = np.array([-1e-12, 0.0, 1e-12, -1e-4, 1e-4])
     assert (colours_of(tiny, 0.1) == NEUTRAL).all()
     others = colours_of(np.array([-0.05, -0.002, 0.002, 0.05]), 0.1)
@@ -109,7 +110,7 @@ def test_lightness_falls_evenly_and_alike_on_both_sides():
     expected = np.interp(size, [0.0, 1.0], [below[0], below[-1]])
     for side in (below, above):
         assert np.abs(side - expected).max() < 2.0
-        assert (np.diff(side) <= 0.3).all()  # colours are whole numbers
+        assert (np.diff(side) <= 0.3).all()  # colours are rounded to whole numbers
     assert below[-1] < 40 < 85 < below[0]
 
 
@@ -127,7 +128,7 @@ def test_the_two_sides_stay_apart_for_colour_blind_eyes():
 
 
 @pytest.mark.parametrize("half_range", HALF_RANGES)
-def test_the_scale_shows_the_very_colours_of_the_mesh(half_range):
+def test_the_colour_bar_has_the_colours_of_the_mesh(half_range):
     shares = RNG.uniform(-1.3 * half_range, 1.3 * half_range, 500)
     table, got = lookup_table(half_range), np.zeros(3)
     for share, colour in zip(shares, colours_of(shares, half_range), strict=True):
@@ -135,7 +136,7 @@ def test_the_scale_shows_the_very_colours_of_the_mesh(half_range):
         assert np.array_equal(np.round(255 * got), colour)
 
 
-def test_the_range_is_wide_enough_but_not_for_a_few_wild_values():
+def test_the_range_contains_all_values_except_outliers():
     shares = np.full(1000, 0.07)
     assert half_range_for(shares) == 0.1
     shares[:5] = 40.0
@@ -144,16 +145,16 @@ def test_the_range_is_wide_enough_but_not_for_a_few_wild_values():
     assert half_range_for(np.array([-7.0])) == 1.0
 
 
-def test_the_range_does_not_flicker_where_a_value_trembles():
+def test_the_range_does_not_flicker_when_values_vary_slightly():
     half_range, seen = None, []
     for size in 0.1 + 0.01 * np.sin(np.arange(50)):
         half_range = half_range_for(np.array([size]), half_range)
         seen.append(half_range)
     assert set(seen[3:]) == {0.2}
-    assert half_range_for(np.array([0.01]), 0.2) == 0.05  # but it does become smaller
+    assert half_range_for(np.array([0.01]), 0.2) == 0.05  # a much smaller size does reduce it
 
 
-# Over the mesh.
+# On the mesh.
 
 
 def test_hidden_it_computes_nothing_and_changes_no_pixel(overlay, monkeypatch):
@@ -183,7 +184,7 @@ def test_it_is_neutral_under_any_rigid_motion(overlay):
         move_all(overlay.session, rotation(axis, angle), (1.0, 2.0, -0.5))
         assert np.abs(overlay.session.vertices - overlay.session.mesh.vertices).max() > 1.0
         assert (colours(overlay) == NEUTRAL).all()
-        assert words(overlay)[1] == "local: 0 to 0 %"
+        assert lines_of(overlay)[1] == "Local: 0 to 0 %"
 
 
 @pytest.mark.parametrize("factor", [0.96, 1.17])
@@ -192,12 +193,13 @@ def test_a_stretch_is_one_colour_everywhere_that_of_its_determinant(overlay, fac
     move_all(overlay.session, np.diag([1.0, 1.0, factor]))
     assert np.allclose(overlay.change, factor - 1.0, atol=1e-9)
     expected = colours_of(np.full(1, factor - 1.0), overlay.half_range)
-    assert np.abs(colours(overlay).astype(int) - expected).max() <= 2  # a neighbour in the table
-    assert words(overlay)[0] == f"volume: {100 * (factor - 1):+.0f} %"
+    # At most a neighbouring colour of the table.
+    assert np.abs(colours(overlay).astype(int) - expected).max() <= 2
+    assert lines_of(overlay)[0] == f"Volume: {100 * (factor - 1):+.0f} %"
 
 
 def bent(overlay):
-    """Bend it, look at it, and return the mean colour seen inside the bend and at its end."""
+    """Bend the mesh; return the mean colour of the picture inside the bend and at the end."""
     scene = sausage(1)
     overlay.session.drag(scene.turned(75.0))
     view = overlay.view
@@ -213,7 +215,7 @@ def bent(overlay):
     return seen
 
 
-def test_a_bend_that_loses_volume_is_seen_to_be_pinched(overlay):
+def test_a_bend_that_loses_volume_is_blue_inside(overlay):
     overlay.show()
     pinch, end = bent(overlay)
     assert overlay.session.volume_change < -0.05
@@ -228,38 +230,37 @@ def test_a_bend_that_loses_volume_is_seen_to_be_pinched(overlay):
     assert abs(overlay.session.volume_change) < 1e-12
 
 
-# The words.
+# The lines of text.
 
 
 @several(3)
-def test_the_words_tell_totals_regions_and_steps(overlay):
+def test_the_lines_show_totals_regions_and_steps(overlay):
     session = overlay.session
     overlay.show()
     regions = [f"region {r}: 0 %" for r in (1, 2, 3)]
-    assert words(overlay) == ["volume: 0 %", "local: 0 to 0 %", *regions]
+    assert lines_of(overlay) == ["Volume: 0 %", "Local: 0 to 0 %", *regions]
     session.change_options(preserve_volume=True)
     solution = session.drag(sausage(3).turned(30.0), max_steps=4)
-    told = words(overlay)
-    exact = session.volume_change
-    assert told[0] == (f"volume: {exact:+.1e}" if exact else "volume: 0 %")
+    lines = lines_of(overlay)
+    assert lines[0] == "Volume: 0 %"
     s = LocalVolume(session.mesh).change(session.vertices)
-    assert told[1] == f"local: {100 * s.min():+.0f} to {100 * s.max():+.0f} %"
+    assert lines[1] == f"Local: {100 * s.min():+.0f} to {100 * s.max():+.0f} %"
     for r, volume in enumerate(region_volumes(session.mesh, session.regions.labels)):
         share = volume.violation(session.vertices) / volume.target
-        assert float(told[2 + r].split()[2]) == pytest.approx(100 * share, abs=0.051)
-    assert any("region" in line and line.split()[2] != "0" for line in told)
-    assert told[-1] == f"{solution.steps} steps"
+        assert float(lines[2 + r].split()[2]) == pytest.approx(100 * share, abs=0.051)
+    assert any("region" in line and line.split()[2] != "0" for line in lines)
+    assert lines[-1] == f"{solution.steps} steps"
     overlay.hide()
-    loaded = Session(session.mesh, state=session.state)  # nothing was solved for here,
+    loaded = Session(session.mesh, state=session.state)  # has no solution,
     assert loaded.solution is None
     again = VolumeOverlay(overlay.view, loaded, overlay.surface)
     again.show()
-    assert words(again) == told[:-1]  # so the regions' volumes are measured
+    assert lines_of(again) == lines[:-1]  # so the regions' volumes are measured
     again.remove()
 
 
 @several(3)
-def test_each_region_is_told_on_its_colour(overlay):
+def test_the_line_of_a_region_has_its_colour(overlay):
     overlay.show()
     lines = {
         line.GetInput().strip(): line.GetTextProperty() for line in props(overlay, vtkTextActor)
@@ -269,12 +270,12 @@ def test_each_region_is_told_on_its_colour(overlay):
         assert np.allclose(style.GetBackgroundColor(), of_region(region) / 255.0)
         assert style.GetBackgroundOpacity() == 1.0
     overlay.session.merge_regions([0, 1])
-    assert len(words(overlay)) == 4
+    assert len(lines_of(overlay)) == 4
     overlay.session.merge_regions([0, 1])
-    assert len(words(overlay)) == 2  # one region is the whole
+    assert len(lines_of(overlay)) == 2  # a single region has no line
 
 
-def test_the_time_of_a_frame_is_told_from_the_second_on(overlay):
+def test_the_time_per_frame_is_shown_from_the_second_frame_on(overlay):
     cages = CageDisplay(overlay.view, overlay.session)
     cages.through = True
     cages.On()
@@ -284,13 +285,13 @@ def test_the_time_of_a_frame_is_told_from_the_second_on(overlay):
     x, y = hand.at(cage[np.argmin(np.abs(cage).sum(axis=1))])
     hand.press((x, y))
     hand.move((x - 5, y))
-    assert not any("ms" in line for line in words(overlay))
+    assert not any("ms" in line for line in lines_of(overlay))
     hand.move((x - 9, y))
-    assert words(overlay)[-1].endswith(" ms a frame")
-    assert 1 <= int(words(overlay)[-1].split()[0]) < 5000
+    assert lines_of(overlay)[-1].endswith(" ms per frame")
+    assert 1 <= int(lines_of(overlay)[-1].split()[0]) < 5000
     hand.release()
-    overlay.session.undo()  # by nobody's hand
-    assert not any("ms" in line for line in words(overlay))
+    overlay.session.undo()  # outside an event
+    assert not any("ms" in line for line in lines_of(overlay))
     cages.remove()
     assert not hand.failures
 
@@ -298,7 +299,7 @@ def test_the_time_of_a_frame_is_told_from_the_second_on(overlay):
 @several(3)
 @pytest.mark.parametrize("size", [(400, 300), (800, 600), (1600, 1200)])
 @pytest.mark.parametrize("background", [(1.0, 1.0, 1.0), (0.0, 0.0, 0.0)])
-def test_words_and_scale_are_legible_and_apart(overlay, size, background):
+def test_text_and_colour_bar_are_legible_and_do_not_overlap(overlay, size, background):
     view = overlay.view
     view.window.SetSize(*size)
     view.renderer.SetBackground(*background)
@@ -355,14 +356,36 @@ def test_a_region_without_a_face_is_left_out():
     view = plain_view()
     overlay = VolumeOverlay(view, session)
     overlay.show()
-    assert words(overlay)[2:] == ["region 1: 0 %", "region 3: 0 %"]
+    assert lines_of(overlay)[2:] == ["region 1: 0 %", "region 3: 0 %"]
     session.change_options(preserve_volume=False)
     move_all(session, np.diag([1.0, 1.0, 1.1]))
-    assert words(overlay)[2:] == ["region 1: +10 %", "region 3: +10 %"]
+    assert lines_of(overlay)[2:] == ["region 1: +10 %", "region 3: +10 %"]
     overlay.remove()
 
 
-def test_removed_it_leaves_the_surface_as_it_was(overlay):
+def test_of_more_than_eight_regions_the_rest_is_counted():
+    mesh = sausage(1).mesh
+    labels = np.digitize(
+        mesh.vertices[:, 0], np.quantile(mesh.vertices[:, 0], np.arange(0.1, 1, 0.1))
+    )
+    session = Session(mesh)
+    session.set_regions(Regions.from_labels(mesh, labels, overlap=1))
+    overlay = VolumeOverlay(plain_view(), session)
+    overlay.show()
+    regions = [f"region {r}: 0 %" for r in range(1, 9)]
+    assert lines_of(overlay)[2:] == [*regions, "2 more regions"]
+    session.merge_regions([0, 1])
+    assert lines_of(overlay)[-1] == "1 more region"
+    overlay.remove()
+
+
+def test_small_changes_are_percentages_too():
+    shares = [0.25, -0.0123, 1e-3, -4e-4, 1.2e-5, 2e-16, 0.0]
+    texts = ["+25 %", "-1.2 %", "+0.1 %", "-0.04 %", "+0.0012 %", "0 %", "0 %"]
+    assert [percent(share) for share in shares] == texts
+
+
+def test_remove_restores_the_view(overlay):
     view = overlay.view
     before = picture(view)
     overlay.show()

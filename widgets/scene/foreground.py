@@ -1,4 +1,4 @@
-"""A renderer in front of another one: it looks the same way, and nothing hides what is in it."""
+"""A renderer in a layer above another one, with the same camera: its actors are never hidden."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from typing import Any
 import numpy as np
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
-_SMALLEST = 8  # pixels, below which text would be a texture of nothing, of which VTK complains
+_SMALLEST = 8  # pixels; in a smaller window VTK warns about empty text textures
 
 
-class Front:
-    """A layer over *renderer*, in its window, until `remove`.
+class Foreground:
+    """A layer above a renderer, until `remove`.
 
     Parameters
     ----------
     renderer : vtkRenderer
-        What it lies over and whose camera it follows; in a window.
+        The renderer below, in a window; its camera is copied.
 
     Attributes
     ----------
     renderer : vtkRenderer
-        The one in front.
+        The renderer of the layer.
     """
 
     def __init__(self, renderer: Any) -> None:
@@ -36,7 +36,7 @@ class Front:
         window.AddRenderer(self.renderer)
 
     def follow(self) -> None:
-        """Look where the renderer behind does, both so that they see all of both."""
+        """Copy camera and viewport, with a clipping range that covers the actors of both."""
         front, behind = self.renderer, self._behind
         front.SetViewport(*behind.GetViewport())
         front.SetDraw(min(behind.GetSize()) >= _SMALLEST)
@@ -45,11 +45,11 @@ class Front:
         if len(bounds):
             low, high = bounds[:, ::2].min(axis=0), bounds[:, 1::2].max(axis=0)
             behind.ResetCameraClippingRange(*np.stack([low, high], axis=1).ravel())
-        # A copy: whoever takes a screenshot swaps the cameras while it draws.
+        # A copy: pyvista swaps the cameras during a screenshot.
         front.GetActiveCamera().DeepCopy(behind.GetActiveCamera())
 
     def remove(self) -> None:
-        """Go out of the window, with all that is in it; other layers stay where they are."""
+        """Remove the layer and its actors from the window; other layers keep their numbers."""
         self.renderer.RemoveAllViewProps()
         window = self.renderer.GetRenderWindow()
         if window is not None:
@@ -63,6 +63,6 @@ def _renderers(window: Any) -> list[Any]:
 
 
 def _overlap(one: Any, other: Any) -> bool:
-    """Tell whether two renderers draw on the same part of the window."""
+    """Return whether the viewports of two renderers overlap."""
     a, b = np.array([one.GetViewport(), other.GetViewport()])
     return bool((np.maximum(a, b)[:2] < np.minimum(a, b)[2:]).all())

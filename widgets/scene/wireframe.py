@@ -1,4 +1,4 @@
-"""A triangle mesh as wires with a ball at each vertex, moved in place."""
+"""Edges of a mesh as lines and vertices as small spheres, updated in place."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 from vtk_segdeform.arrays import FloatArray, IntArray
 
 
-class Wires:
+class Wireframe:
     """Edges and vertices in one colour, as one actor.
 
     Parameters
@@ -22,22 +22,22 @@ class Wires:
         Copied.
     edges : (e, 2) int
         Drawn as lines.
-    balls : (b,) int
-        The vertices drawn as balls.
+    spheres : (b,) int
+        The vertices drawn as spheres.
     """
 
-    def __init__(self, vertices: FloatArray, edges: IntArray, balls: IntArray) -> None:
+    def __init__(self, vertices: FloatArray, edges: IntArray, spheres: IntArray) -> None:
         points = vtkPoints()
         points.SetData(numpy_to_vtk(np.array(vertices, dtype=np.float64), deep=True))
         self._data = vtkPolyData()
         self._data.SetPoints(points)
         self._data.SetLines(_cells(edges))
-        self._data.SetVerts(_cells(balls[:, None]))
+        self._data.SetVerts(_cells(spheres[:, None]))
         self._points = vtk_to_numpy(points.GetData())
         mapper = vtkPolyDataMapper()
         mapper.SetInputData(self._data)
-        # With the offset that a surface asks VTK's mappers for, all of them, balls would sink
-        # into the depth: here it is taken off again.
+        # A mapper that resolves coincident topology shifts the points of all mappers backwards,
+        # which would hide the spheres.  This cancels the shift.
         offset = reference(0.0)
         mapper.GetResolveCoincidentTopologyPointOffsetParameter(offset)
         mapper.SetRelativeCoincidentTopologyPointOffsetParameter(-float(offset))
@@ -46,15 +46,15 @@ class Wires:
         self.actor.PickableOff()
         self.actor.GetProperty().RenderPointsAsSpheresOn()
 
-    def draw(self, colour: Any, *, line_width: float, ball_size: float) -> None:
-        """Draw with *colour*, (3,) of 0 to 255, and sizes in pixels."""
+    def set_style(self, colour: Any, *, line_width: float, sphere_size: float) -> None:
+        """Set the *colour*, (3,) of 0 to 255, and the sizes in pixels."""
         style = self.actor.GetProperty()
         style.SetColor(*(np.asarray(colour) / 255.0))
         style.SetLineWidth(line_width)
-        style.SetPointSize(ball_size)
+        style.SetPointSize(sphere_size)
 
     def move(self, vertices: FloatArray) -> None:
-        """Put the vertices at other places (m, 3)."""
+        """Set the positions of the vertices, (m, 3)."""
         self._points[:] = vertices
         self._data.GetPoints().GetData().Modified()
         self._data.GetPoints().Modified()

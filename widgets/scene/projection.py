@@ -1,6 +1,6 @@
-"""Where things of the world are seen, and what of the world is where something is seen.
+"""Projection between world and display coordinates.
 
-world       where the mesh is
+world       the coordinates of the mesh
 display     (x, y) pixels from the window's lower left corner, and a depth in 0..1
 """
 
@@ -15,13 +15,13 @@ from vtk_segdeform.arrays import FloatArray
 from .gestures import Pointer
 
 
-class Sight:
-    """What a renderer's camera sees.
+class Projection:
+    """The projection of a renderer's current camera.
 
     Parameters
     ----------
     renderer : vtkRenderer
-        In a window; its camera may change at any time.
+        Must be in a window; its camera may change at any time.
     """
 
     def __init__(self, renderer: Any) -> None:
@@ -41,42 +41,45 @@ class Sight:
         if len(w) and w.min() > 0.0:
             display = homogeneous[:, :3] / w
         else:
-            nowhere = np.full((len(w), 3), np.nan)
-            display = np.divide(homogeneous[:, :3], w, out=nowhere, where=w > 0.0)
+            undefined = np.full((len(w), 3), np.nan)
+            display = np.divide(homogeneous[:, :3], w, out=undefined, where=w > 0.0)
         display *= 0.5 * self._extent()
         display += self._origin() + 0.5 * self._extent()
         return np.asarray(display)
 
     def to_world(self, display: FloatArray) -> FloatArray:
-        """Return (k, 3) world points of (k, 3) *display* coordinates; NaN if a camera sees none."""
+        """Return (k, 3) world points of (k, 3) *display* coordinates.
+
+        NaN where the camera's matrix cannot be inverted.
+        """
         clip = 2.0 * (np.asarray(display) - self._origin()) / self._extent() - 1.0
         try:
             inverse = np.linalg.inv(self._projection())
-        except np.linalg.LinAlgError:  # zoomed in or out beyond all numbers
+        except np.linalg.LinAlgError:  # zoomed in or out beyond floating point
             return np.full(clip.shape, np.nan)
         homogeneous = np.column_stack([clip, np.ones(len(clip))]) @ inverse.T
         return np.asarray(homogeneous[:, :3] / homogeneous[:, 3:])
 
     def ray(self, pointer: Pointer) -> tuple[FloatArray, FloatArray]:
-        """Return where the line of sight enters and leaves what the camera sees, (3,) each."""
+        """Return the points (3,) where the line of sight enters and leaves the view frustum."""
         ends = self.to_world(np.array([[*pointer.position, 0.0], [*pointer.position, 1.0]]))
         return ends[0], ends[1]
 
     def pixel_at(self, point: FloatArray) -> float:
-        """Return how long one pixel is at a world *point* (3,), in the mesh's unit."""
+        """Return the length of one pixel at a world *point* (3,), in the mesh's unit."""
         if self.camera.GetParallelProjection():
             return float(2.0 * self.camera.GetParallelScale() / self._extent()[1])
-        away = (np.asarray(point) - self.camera.GetPosition()) @ self.towards_scene
+        away = (np.asarray(point) - self.camera.GetPosition()) @ self.view_direction
         half = np.tan(0.5 * np.radians(self.camera.GetViewAngle()))
         return float(2.0 * max(away, 1e-12) * half / self._extent()[1])
 
     @property
-    def towards_scene(self) -> FloatArray:
-        """(3,) float: the direction in which the camera looks, length 1."""
+    def view_direction(self) -> FloatArray:
+        """(3,) float: the viewing direction of the camera, of length 1."""
         return np.array(self.camera.GetDirectionOfProjection())
 
     def contains(self, pointer: Pointer) -> bool:
-        """Tell whether *pointer* is in this renderer's part of the window."""
+        """Return whether *pointer* is within this renderer's viewport."""
         inside = (pointer.position - self._origin()[:2]) / self._extent()[:2]
         return bool(((inside >= 0.0) & (inside <= 1.0)).all())
 

@@ -1,27 +1,27 @@
-"""Words of a line that somebody may have damaged, as numbers; ValueError says what is wrong."""
+"""Parsing the words of a line, which may be damaged; a ValueError describes the fault."""
 
 from __future__ import annotations
 
 import math
 
 
-def so_many(words: list[str], n: int) -> list[str]:
-    """Return *words* if they are *n*."""
+def require_count(words: list[str], n: int) -> list[str]:
+    """Return *words* if there are *n* of them."""
     if len(words) != n:
         raise ValueError(f"expected {n} words, not {' '.join(words)[:60]!r}")
     return words
 
 
-def whole(word: str, least: int, most: int) -> int:
-    """Return the whole number that a *word* says, if it is from *least* to *most*."""
+def parse_int(word: str, least: int, most: int) -> int:
+    """Return the whole number in *word*, which must be from *least* to *most*."""
     number = int(word) if word.removeprefix("-").isdecimal() and len(word) < 9 else None
     if number is None or not least <= number <= most:
         raise ValueError(f"expected a whole number from {least} to {most}; got {word[:40]!r}")
     return number
 
 
-def finite(word: str) -> float:
-    """Return the number that a *word* says, if it is one."""
+def parse_float(word: str) -> float:
+    """Return the finite number in *word*."""
     try:
         number = float(word)
     except ValueError:

@@ -1,8 +1,8 @@
-"""What a stroke makes of vertices: part of a region, fixed, or a handle.
+"""The target of a stroke, to which vertices are added: a region, the fixed vertices or a handle.
 
-A vertex is either fixed, or of one handle, or neither; and it is in some region.  So painting
-leaves alone what is fixed or of a handle already, and taking away from a region what no other
-region holds.  Where nothing would be left to do for that reason, an error says so.
+A vertex is fixed, or in one handle, or neither, and it is in at least one region.  Adding therefore
+skips vertices that are already fixed or in a handle, and erasing from a region skips vertices of no
+other region.  If a stroke would skip all its vertices, an error gives the reason.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from vtk_segdeform.session import Session
 
 
 class Paint(enum.Enum):
-    """What vertices become."""
+    """The kind of a target."""
 
     REGION = enum.auto()
     FIXED = enum.auto()
     HANDLE = enum.auto()
 
 
-def heaviest(regions: Regions, vertex: int) -> int:
-    """Return the region that weighs most at *vertex*; one that is there alone needs no weights."""
+def dominant_region(regions: Regions, vertex: int) -> int:
+    """Return the region with the largest blend weight at *vertex*."""
     own = np.flatnonzero(regions.membership[:, vertex])
-    return int(own[0] if len(own) == 1 else regions.labels[vertex])
+    return int(own[0] if len(own) == 1 else regions.labels[vertex])  # labels need all weights
 
 
 @dataclass(frozen=True)
-class Role:
-    """One region, what is fixed, or one handle of a session of n vertices."""
+class PaintTarget:
+    """One region, the fixed vertices, or one handle, of a session with n vertices."""
 
     session: Session
     paint: Paint
@@ -45,13 +45,13 @@ class Role:
 
     @property
     def colour(self) -> NDArray[np.uint8]:
-        """(3,) of 0 to 255."""
+        """(3,) uint8: red, green and blue."""
         if self.paint is Paint.REGION:
             return of_region(self.region)
         return rgb(FIXED if self.paint is Paint.FIXED else HANDLE)
 
     def members(self) -> BoolArray:
-        """Return (n,) bool: the vertices that have the role."""
+        """Return the vertices of the target, (n,) bool."""
         session = self.session
         if self.paint is Paint.REGION:
             regions = session.regions
@@ -61,36 +61,35 @@ class Role:
         ids = session.fixed if self.paint is Paint.FIXED else session.handles.get(self.handle or "")
         return self._mask([] if ids is None else ids)
 
-    def changed(self, vertices: BoolArray, *, subtract: bool) -> BoolArray:
-        """Return which of *vertices*, a mask (n,), `give` would change, or `take`."""
-        return vertices & self._open(subtract) & ~self._barred(subtract)
+    def changed(self, vertices: BoolArray, *, erase: bool) -> BoolArray:
+        """Return those of *vertices*, a mask (n,), that `add`, or `erase`, would change."""
+        return vertices & self._candidates(erase) & ~self._protected(erase)
 
-    def remark(self, vertices: BoolArray, *, subtract: bool) -> str:
-        """Return what is to be said of those of *vertices* that `give`, or `take`, leaves alone."""
-        count = np.count_nonzero(vertices & self._open(subtract) & self._barred(subtract))
+    def remark(self, vertices: BoolArray, *, erase: bool) -> str:
+        """Return a message about those of *vertices* that `add`, or `erase`, skips."""
+        count = np.count_nonzero(vertices & self._candidates(erase) & self._protected(erase))
         if not count:
             return ""
-        reason = "no other region holds them" if subtract else "fixed or of a handle already"
-        return f"{count} vertices left as they were: {reason}"
+        reason = "in no other region" if erase else "already fixed or in a handle"
+        return f"{count} {'vertices' if count != 1 else 'vertex'} skipped: {reason}"
 
-    def give(self, vertices: BoolArray) -> str | None:
-        """Give the role to *vertices*, a mask (n,); return the handle's name, if it is one.
+    def add(self, vertices: BoolArray) -> str | None:
+        """Add *vertices*, a mask (n,); return the name of the handle, if the target is one.
 
-        Nothing happens if all of them have it.
+        Vertices that are already in the target are ignored.
 
         Raises
         ------
         ConstraintError
-            If all that do not are fixed or of another handle.
+            If all others are fixed or in another handle.
         RegionError
             If there is no such region.
         """
-        new = self.changed(vertices, subtract=False)
+        new = self.changed(vertices, erase=False)
         if not new.any():
-            if (vertices & self._open(False)).any():
+            if (vertices & self._candidates(False)).any():
                 raise ConstraintError(
-                    "all of these vertices are fixed or of a handle already; "
-                    "take them out there first"
+                    "all these vertices are already fixed or in a handle; erase them there first"
                 )
             return self.handle
         if self.paint is Paint.REGION:
@@ -101,29 +100,29 @@ class Role:
             return self.session.add_handle(self.members() | new, self.handle)
         return self.handle
 
-    def take(self, vertices: BoolArray) -> str | None:
-        """Take the role from *vertices*; return the handle's name, None once it has none left.
+    def erase(self, vertices: BoolArray) -> str | None:
+        """Remove *vertices*, a mask (n,); return the name of the handle, None once it is empty.
 
-        Nothing happens if none of them has it.
+        Vertices outside the target are ignored.
 
         Raises
         ------
         RegionError
-            If the region would be empty, or no other holds any of them.
+            If the region would be empty, or all the vertices are in no other region.
         ConstraintError
-            If it is not said which handle.
+            If the target is a handle and none is selected.
         """
         if self.paint is Paint.HANDLE and self.handle is None:
             if not self.session.handles:
-                raise ConstraintError("there is no handle to take vertices out of yet")
-            raise ConstraintError("choose the handle to take vertices out of")
-        old = vertices & self._open(True)
+                raise ConstraintError("no handle to erase from yet")
+            raise ConstraintError("select the handle to erase from")
+        old = vertices & self._candidates(True)
         if not old.any():
             return self.handle
-        free = self.changed(vertices, subtract=True)
+        free = self.changed(vertices, erase=True)
         after = self.members() & ~old
         if self.paint is Paint.REGION:
-            # Where none is free, the session says why.
+            # With *old*, the session raises an error that gives the reason.
             self.session.paint_region(self.region, free if free.any() else old, subtract=True)
         elif self.paint is Paint.FIXED:
             self.session.set_fixed(after)
@@ -134,18 +133,18 @@ class Role:
             return None
         return self.handle
 
-    def _open(self, subtract: bool) -> BoolArray:
-        """Tell which vertices are not yet as a stroke would make them."""
-        return self.members() if subtract else ~self.members()
+    def _candidates(self, erase: bool) -> BoolArray:
+        """Return the vertices inside the target if *erase*, else those outside."""
+        return self.members() if erase else ~self.members()
 
-    def _barred(self, subtract: bool) -> BoolArray:
-        """Tell which vertices a stroke leaves alone."""
+    def _protected(self, erase: bool) -> BoolArray:
+        """Return the vertices that a stroke skips."""
         session = self.session
         if self.paint is Paint.REGION:
-            if subtract and session.regions is not None:
+            if erase and session.regions is not None:
                 return np.asarray(session.regions.membership.sum(axis=0) < 2)
             return self._mask([])
-        if subtract:
+        if erase:
             return self._mask([])
         return self._mask(np.concatenate([session.fixed, *session.handles.values()]))
 
