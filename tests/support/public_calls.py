@@ -110,9 +110,9 @@ def _names(module: Any) -> list[str]:
 def _calls_of_class(cls: type) -> Iterator[Call]:
     if issubclass(cls, enum.Enum | BaseException):
         return
-    made_by_pyvista = cls.__module__ == "vtk_segdeform.widgets.plugin"
-    ours = cls.__module__.startswith("vtk_segdeform.widgets") and not made_by_pyvista
-    if cls in MADE_BY_HAND or ours:
+    is_widget = cls.__module__.startswith("vtk_segdeform.widgets")
+    by_pyvista = cls.__module__ == "vtk_segdeform.widgets.plugin"  # which pyvista constructs
+    if cls in MADE_BY_HAND or (is_widget and not by_pyvista):
         yield _call(cls.__name__, lambda: cls, cls)
     for name, member in inspect.getmembers(cls):
         if name.startswith("_") or name in NOT_CALLED:
