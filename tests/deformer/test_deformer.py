@@ -224,7 +224,7 @@ def test_cages_that_do_not_fit_are_refused():
 
 
 def test_regions_of_another_mesh_are_refused():
-    with pytest.raises(RegionError, match="belong to a mesh of 1026 vertices, this one has 258"):
+    with pytest.raises(RegionError, match="mesh of 1026 vertices, but this mesh has 258"):
         Deformer(Mesh(*icosphere(3)), SCENE.regions, SCENE.cages)
 
 

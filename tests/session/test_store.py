@@ -328,7 +328,7 @@ WRONG = [
     ({"mesh_vertices": np.full((6, 3), np.nan)}, "NaN|non-finite|not finite"),
     ({"mesh_vertices": OCTAHEDRON[0].astype(np.float32)}, "must be float64 of shape"),
     ({"mesh_vertices": np.array([[None] * 3] * 6)}, "must be float64 of shape"),
-    ({"mesh_faces": OCTAHEDRON[1] + 1}, "does not exist"),
+    ({"mesh_faces": OCTAHEDRON[1] + 1}, "out of range"),
     ({"mesh_faces": OCTAHEDRON[1][:, ::-1]}, "outward"),
     ({"membership": np.zeros((1, 6), bool)}, "no vertices"),
     ({"membership": np.full((1, 6), 7, np.uint8).view(bool)}, "neither true nor false"),

@@ -276,7 +276,7 @@ def test_off_screen_the_command_says_that_nothing_can_be_edited(tmp_path, bar, c
     path = tmp_path / "bar.vtp"
     convert.write_mesh(path, bar)
     assert main(["edit", str(path)]) == 1
-    assert "pyvista draws off-screen" in capsys.readouterr().err
+    assert "pyvista renders off-screen" in capsys.readouterr().err
 
 
 def test_the_command_explains_itself(capsys):
