@@ -10,7 +10,7 @@ import public_calls
 import pytest
 from numpy.testing import assert_array_equal
 from scenes import sausage
-from test_read_only import CLASSES, _shared
+from shared_arrays import CLASSES, writable_shared_arrays
 
 import vtk_segdeform as sd
 from vtk_segdeform import Session
@@ -46,7 +46,7 @@ def working_session() -> Session:
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
 @pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.__name__)
 def test_the_arrays_of_a_copy_are_read_only_as_well(cls, way):
-    assert _shared(way(public_calls.instance(cls))) == []
+    assert writable_shared_arrays(way(public_calls.instance(cls))) == []
 
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
