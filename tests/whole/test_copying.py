@@ -58,8 +58,8 @@ def test_copies_of_a_mesh_regions_and_cages_are_equal_and_have_no_caches(way):
                         (cage, "vertices"), (cage, "faces")):  # fmt: skip
         assert_array_equal(getattr(way(thing), name), getattr(thing, name))
     before = [len(pickle.dumps(thing)) for thing in (mesh, regions)]
-    asked = mesh.edges, mesh.adjacency, mesh.components, mesh.face_areas, mesh.diagonal
-    assert len(asked) == 5
+    cached = mesh.edges, mesh.adjacency, mesh.components, mesh.face_areas, mesh.diagonal
+    assert len(cached) == 5
     assert_array_equal(way(regions).weights, regions.weights)
     assert [len(pickle.dumps(thing)) for thing in (mesh, regions)] == before
     assert set(vars(way(mesh))) == {each.name for each in fields(mesh)}

@@ -1,4 +1,4 @@
-"""Every example in a docstring is run, and prints what it says."""
+"""Every example in a docstring runs and prints the output shown."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ELSEWHERE = {"vtk_segdeform.filters.paraview_plugin"}  # imported by ParaView on
 
 
 def module_names() -> list[str]:
-    """Return the dotted names, as an installed package has them."""
+    """Return the dotted names of all modules of the installed package."""
     places = [path.relative_to(ROOT) for path in OURS]
     places += [Path("vtk_segdeform", path.relative_to(ROOT)) for path in WIDGETS]
     names = [".".join(path.with_suffix("").parts).removesuffix(".__init__") for path in places]
@@ -25,16 +25,16 @@ def module_names() -> list[str]:
 
 
 @pytest.mark.parametrize("name", module_names())
-def test_the_examples_print_what_they_say(name, monkeypatch, tmp_path, cached_models):
-    monkeypatch.chdir(tmp_path)  # an example that writes a file writes it here
+def test_the_examples_of_a_module_are_right(name, monkeypatch, tmp_path, cached_models):
+    monkeypatch.chdir(tmp_path)  # for examples that write files
     if name.startswith("vtk_segdeform.widgets.qt"):
         pytest.importorskip("pyvistaqt", exc_type=ImportError)
     module = importlib.import_module(name)
-    linecache.clearcache()  # else doctest looks after every file in it, before each docstring
+    linecache.clearcache()  # otherwise doctest checks every cached file before each docstring
     failed, _ = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
     assert not failed
 
 
-def test_an_example_that_lies_is_caught():
-    liar = doctest.DocTestParser().get_doctest(">>> 1 + 1\n3\n", {}, "liar", None, 0)
-    assert doctest.DocTestRunner(verbose=False).run(liar, out=lambda _: None).failed == 1
+def test_a_wrong_example_is_found():
+    wrong = doctest.DocTestParser().get_doctest(">>> 1 + 1\n3\n", {}, "wrong", None, 0)
+    assert doctest.DocTestRunner(verbose=False).run(wrong, out=lambda _: None).failed == 1
