@@ -140,7 +140,10 @@ def test_the_botsch_sorkine_poses_preserve_the_volume_that_arap_loses(name, most
     targets = vertices[handle] @ matrix[:3, :3].T + matrix[:3, 3]
 
     begin = time.perf_counter()
-    ours = sd.deform(mesh, fixed, handle, targets, n_regions=3, n_cage_vertices=200)
+    regions = sd.segment(mesh, 3)
+    cages = sd.fit_cages(mesh, regions, 200)
+    deformer = sd.Deformer(mesh, regions, cages, fixed=fixed, handle=handle)
+    ours = deformer.solve(targets)
     seconds = time.perf_counter() - begin
     change, ours_distortion = ours.volume_change, distortion(mesh, ours.vertices)
     print(
@@ -149,9 +152,7 @@ def test_the_botsch_sorkine_poses_preserve_the_volume_that_arap_loses(name, most
         f"distortion {ours_distortion:.4f}"
     )
 
-    free = sd.deform(
-        mesh, fixed, handle, targets, n_regions=3, n_cage_vertices=200, preserve_volume=False
-    )
+    free = deformer.hold(fixed=fixed, handle=handle, preserve_volume=False).solve(targets)
     free_distortion = distortion(mesh, free.vertices)
     gain = 1.0 - free_distortion / ours_distortion
     print(
