@@ -1,4 +1,4 @@
-"""Long drags, and what is watched while they go on: the volume, and the memory of the process."""
+"""Long drags that check the volume of every pose, and the memory of the process."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from vtk_segdeform.regions.regions import Regions
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.solver.solution import Solution, Status
 
-SWEEP = 40  # events there and back
+SWEEP = 40  # events of one sweep, back and forth
 NAME = "tip"
 
 
 def resident() -> int:
-    """Return the bytes that the process has in memory now; 0 where the system does not tell."""
+    """Return the resident memory of the process in bytes; 0 if the system does not report it."""
     try:
         with open("/proc/self/statm") as file:
             return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
@@ -31,7 +31,7 @@ def resident() -> int:
 
 
 def slender() -> Scene:
-    """Return an ellipsoid of 66 vertices in two cages of 18: what solving it takes is small."""
+    """Return an ellipsoid of 66 vertices in two cages of 18, which is fast to solve."""
     ball, faces = icosphere(2)
     mesh = Mesh(ball * [3.0, 0.8, 0.8], faces)
     x = mesh.vertices[:, 0]
@@ -43,7 +43,7 @@ def slender() -> Scene:
 
 
 def session_of(scene: Scene) -> Session:
-    """Return a session of *scene*, at rest, its handle called `NAME`."""
+    """Return a session of *scene* at rest, with one handle, `NAME`."""
     session = Session(scene.mesh)
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
@@ -53,7 +53,7 @@ def session_of(scene: Scene) -> Session:
 
 
 def sways(scene: Scene, count: int, degrees: float) -> Iterator[np.ndarray]:
-    """Yield *count* targets: there and back, each time about another axis and another way."""
+    """Yield *count* targets, back and forth, every sweep about another axis."""
     for event in range(count):
         sweep, part = divmod(event, SWEEP)
         rng = np.random.default_rng(sweep)
@@ -64,14 +64,14 @@ def sways(scene: Scene, count: int, degrees: float) -> Iterator[np.ndarray]:
 
 @dataclass
 class LongDrag:
-    """One drag, of as many events as it is given, each seen to keep the volume.
+    """One drag of any number of events, which checks the volume after each.
 
     Attributes
     ----------
     worst : float
         The largest |dV|/V of all poses.
     steps, events : int
-        Of the solver, and what was asked of it.
+        Steps of the solver, and calls of it.
     """
 
     scene: Scene = field(repr=False)
@@ -85,19 +85,19 @@ class LongDrag:
         self._volume = signed_volume(self.scene.mesh.vertices, self.scene.mesh.faces)
 
     def follow(self, targets: np.ndarray, max_steps: int) -> Solution:
-        """Go on to *targets*, with as many steps as an event has time for."""
-        return self._seen(self.session.drag({NAME: targets}, max_steps=max_steps))
+        """Follow *targets* with at most *max_steps* steps, as one mouse event does."""
+        return self._checked(self.session.drag({NAME: targets}, max_steps=max_steps))
 
     def arrive(self, targets: np.ndarray, max_steps: int = 8) -> Solution:
-        """Stay at *targets* until the pose is final."""
+        """Refine at *targets* until the pose is final."""
         solution = self.follow(targets, max_steps)
         for _ in range(500):
             if solution.status is not Status.STEP_LIMIT:
                 return solution
-            solution = self._seen(self.session.refine(max_steps=max_steps))
-        raise AssertionError("it never ends")
+            solution = self._checked(self.session.refine(max_steps=max_steps))
+        raise AssertionError("the pose is not final after 500 calls")
 
-    def _seen(self, solution: Solution) -> Solution:
+    def _checked(self, solution: Solution) -> Solution:
         faces = self.scene.mesh.faces
         change = signed_volume(self.session.vertices, faces) / self._volume - 1.0
         assert abs(change) <= 1e-12, f"event {self.events}: the volume is off by {change:.1e}"
@@ -107,7 +107,7 @@ class LongDrag:
         return solution
 
     @property
-    def away(self) -> float:
-        """How far the farthest vertex is from where it is at rest, in diagonals."""
+    def distance_from_rest(self) -> float:
+        """The largest distance of a vertex from its rest position, in diagonals."""
         mesh = self.scene.mesh
         return float(np.abs(self.session.vertices - mesh.vertices).max() / mesh.diagonal)

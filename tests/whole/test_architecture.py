@@ -86,7 +86,7 @@ class Import(NamedTuple):
 
 
 def room_of(name: str) -> str:
-    """Return the room that a file or a module belongs to: the longest that its name begins with."""
+    """Return the room of a file or a module: the longest prefix of its name in `ROOMS`."""
     parts = name.removesuffix(".__init__").split(".")
     prefixes = (".".join(parts[:n]) for n in range(len(parts), 0, -1))
     return next((prefix for prefix in prefixes if prefix in ROOMS), "")
@@ -94,13 +94,13 @@ def room_of(name: str) -> str:
 
 @functools.cache
 def tree_of(name: str) -> ast.Module:
-    """Return a file as it is parsed; nobody changes it."""
+    """Return the syntax tree of a file, which must not be changed."""
     return ast.parse(FILES[name].read_text())
 
 
 @functools.cache
 def nodes_of(name: str) -> tuple[ast.AST, ...]:
-    """Return all nodes of a file, which takes longer than what is asked of them."""
+    """Return all nodes of a file; cached, since walking the tree dominates the tests."""
     return tuple(ast.walk(tree_of(name)))
 
 
@@ -158,7 +158,7 @@ def between_rooms() -> Iterator[tuple[str, Import]]:
 
 
 def floors() -> dict[str, int]:
-    """Return the floor of each room: one above the highest from which it imports."""
+    """Return the floor of each room: one above the highest room that it imports."""
     found: dict[str, int] = {}
     for room in ROOMS:
         below = {room_of(what.module) for name, what in between_rooms() if room_of(name) == room}
@@ -191,16 +191,16 @@ def test_a_room_imports_only_from_rooms_before_it():
     )
 
 
-def test_a_room_is_entered_by_its_face():
+def test_rooms_import_each_other_through_their_faces():
     """`from ..mesh import Mesh`, never `from ..mesh.topology import`; only names in `__all__`."""
     none(
         f"{name}: imports {what.name or 'all'} of {what.module}; import it from its folder"
         for name, what in between_rooms()
-        if f"{room_of(what.module)}.__init__" in FILES and not _by_the_face(what)
+        if f"{room_of(what.module)}.__init__" in FILES and not _through_the_face(what)
     )
 
 
-def _by_the_face(what: Import) -> bool:
+def _through_the_face(what: Import) -> bool:
     room = room_of(what.module)
     return what.module == room and (not what.name or what.name in face(room))
 
@@ -227,7 +227,7 @@ def _reached(graph: dict[str, set[str]], start: str) -> set[str]:
     return found
 
 
-def test_the_house_stays_low_and_its_rooms_small():
+def test_floors_imports_and_folders_are_few():
     assert max(floors().values()) <= MOST_FLOORS
     assert (
         len({(room_of(name), room_of(what.module)) for name, what in between_rooms()})
@@ -237,7 +237,7 @@ def test_the_house_stays_low_and_its_rooms_small():
     none(f"{folder}: {size} files" for folder, size in sizes.items() if size > MOST_FILES)
 
 
-def test_a_face_names_files_that_are_there_and_leaves_none_out():
+def test_the_docstring_of_a_face_lists_all_files():
     """A folder's docstring lists its files in reading order."""
     none(
         f"{folder}: {name} is not in the docstring of __init__.py"
@@ -247,7 +247,7 @@ def test_a_face_names_files_that_are_there_and_leaves_none_out():
     )
 
 
-def test_a_room_imports_only_the_libraries_it_is_granted():
+def test_a_room_imports_only_the_libraries_in_its_list():
     everywhere = NUMERIC | set(sys.stdlib_module_names)
     none(
         f"{name}: imports {what.module}"
@@ -259,7 +259,7 @@ def test_a_room_imports_only_the_libraries_it_is_granted():
     )
 
 
-def test_a_chapter_is_short_enough_to_read_at_once():
+def test_a_long_file_says_why():
     lengths = {name: path.read_text().count("\n") for name, path in FILES.items()}
     none(
         f"{name}: {length} lines; say 'Long because ...' or split it"
@@ -268,7 +268,7 @@ def test_a_chapter_is_short_enough_to_read_at_once():
     )
 
 
-def test_a_chapter_begins_by_saying_what_it_is():
+def test_every_file_has_a_docstring():
     none(f"{name}: no docstring" for name in FILES if not ast.get_docstring(tree_of(name)))
 
 
@@ -291,7 +291,7 @@ def test_only_the_command_line_prints_or_exits():
     )
 
 
-def test_a_chapter_changes_no_global_state_and_evaluates_no_text():
+def test_no_file_changes_global_state_or_evaluates_text():
     forbidden = {
         "eval", "exec", "compile", "np.random.seed", "np.seterr", "warnings.filterwarnings",
         "warnings.simplefilter", "logging.basicConfig", "pickle.load", "pickle.loads",
@@ -323,8 +323,8 @@ def test_public_functions_take_at_most_four_positional_arguments():
     none(offences)
 
 
-# Given a draft to write to; the log of a recording, which grows event by event; and /proc.
-WRITE_TO_WHAT_THEY_ARE_GIVEN = {
+# They write to a draft from their caller, to the growing log of a recording, or to /proc.
+WRITE_DIRECTLY = {
     "io.off", "io.ply", "io.wavefront", "io.vtk_formats", "io.reading_child",
     "widgets.recording.film_files", "widgets.recording.recording",
     "benchmarks.measuring",
@@ -349,7 +349,7 @@ def test_files_are_written_only_where_they_are_replaced():
     none(
         f"{name}: {ast.unparse(call)}: write to a draft of files.replacing"
         for name in FILES
-        if name not in {"files.atomic", *WRITE_TO_WHAT_THEY_ARE_GIVEN}
+        if name not in {"files.atomic", *WRITE_DIRECTLY}
         for what, call in calls_in(name)
         if _writes(what, call) and id(call) not in _within_replacing(name)
     )
@@ -371,13 +371,13 @@ def _is_replacing(node: ast.expr) -> bool:
 
 
 def _replaces(what: str, call: ast.Call) -> bool:
-    """Tell whether a call puts a file in the place of another one."""
+    """Return whether a call replaces a file."""
     renames = what.endswith((".rename", ".replace")) and len(call.args) == 1
     return what in REPLACING or (renames and not call.keywords)
 
 
 def _writes(what: str, call: ast.Call) -> bool:
-    """Tell whether a call writes a file."""
+    """Return whether a call writes a file."""
     if what.endswith((".write_text", ".write_bytes", ".savefig", ".SetFileName", "np.savez")):
         return True
     texts = [*call.args, *(word.value for word in call.keywords)]
@@ -393,7 +393,7 @@ TIMERS = {
 
 
 def test_only_the_view_creates_and_destroys_vtk_timers():
-    """Hosts may have one timer behind all of them, so a second owner would stop the first's."""
+    """Hosts may share one timer among all, so a second owner would stop the timer of the first."""
     none(
         f"{name}: {word}"
         for name in FILES

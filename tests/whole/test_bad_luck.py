@@ -1,7 +1,7 @@
-"""Kills, full disks, cancelling at any moment, listeners that raise: what is there stays whole.
+"""Kills, full disks, cancellation and failing listeners leave files and sessions intact.
 
-A disk that is full at byte n is made by a limit on the size of files, which the system itself
-enforces, also on native code that writes.
+A limit on the size of files simulates a disk that is full at byte n; the system enforces it for
+native code as well.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ FOREIGN = [".dae", ".ctm", ".x3d", ".wrl", ".3ds"] if meshlab.available() else [
 
 
 def killed(folder, count, seed):
-    """Return what `killed_saver` counted."""
+    """Return the counts of `killed_saver`."""
     done = subprocess.run(
         [sys.executable, SUPPORT / "killed_saver.py", folder, str(count), str(seed)],
         capture_output=True, text=True, check=False,
@@ -47,7 +47,7 @@ def killed(folder, count, seed):
 def test_a_save_that_is_killed_leaves_the_old_file_or_the_new(tmp_path):
     found = killed(tmp_path, 40, seed=1)
     assert found["old"] + found["new"] == 40
-    assert found["killed while writing"] > 0  # or nothing was tested
+    assert found["killed while writing"] > 0  # otherwise nothing was tested
 
 
 @posix
@@ -60,8 +60,8 @@ def test_a_thousand_killed_saves_lose_no_file(tmp_path):
 
 
 @contextmanager
-def room_for(size):
-    """Let no file grow beyond *size* bytes."""
+def limited_to(size):
+    """Limit files to *size* bytes."""
     import resource
 
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -72,40 +72,40 @@ def room_for(size):
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def kept(folder):
-    """Return all files by name, with what is in them."""
+def contents(folder):
+    """Return the contents of all files, by name."""
     return {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def require_kept_on_a_full_disk(folder, suffix):
-    """Assert that a mesh stays as it was, whatever room there is for the next one."""
+    """Check that a mesh file is unchanged if there is not enough space for its replacement."""
     path = folder / f"a{suffix}"
     larger = sd.Mesh(*icosphere(2))
     write_mesh(path, larger)
     size = path.stat().st_size
     write_mesh(path, sd.Mesh(*OCTAHEDRON))
-    before = kept(folder)
-    nearly = [] if suffix in FOREIGN else [size - 1]  # which is as good as all, in some formats
-    for room in (0, 100, size // 2, *nearly):
-        with room_for(room), pytest.raises(MeshError, match=rf"a\{suffix}: cannot be written"):
+    before = contents(folder)
+    nearly = [] if suffix in FOREIGN else [size - 1]  # in other formats the last byte is optional
+    for space in (0, 100, size // 2, *nearly):
+        with limited_to(space), pytest.raises(MeshError, match=rf"a\{suffix}: cannot be written"):
             write_mesh(path, larger)
-        assert kept(folder) == before, room
+        assert contents(folder) == before, space
     write_mesh(path, larger)
-    assert kept(folder) != before
+    assert contents(folder) != before
 
 
 @posix
 @pytest.mark.parametrize("suffix", SUFFIXES + FOREIGN)
-def test_on_a_full_disk_a_mesh_is_as_it_was_and_the_error_names_it(tmp_path, suffix, capfd):
+def test_on_a_full_disk_a_mesh_file_is_unchanged_and_the_error_names_it(tmp_path, suffix, capfd):
     here = os.getcwd()
     require_kept_on_a_full_disk(tmp_path, suffix)
-    assert os.getcwd() == here  # PyMeshLab goes elsewhere when it fails
+    assert os.getcwd() == here  # PyMeshLab changes the folder when it fails
     capfd.readouterr()
 
 
 @posix
-def test_on_a_full_disk_the_same_is_true_of_vtkhdf(tmp_path):
-    call = "import pathlib, sys, test_bad_luck as t; "  # HDF5 complains again when a program ends
+def test_on_a_full_disk_a_vtkhdf_file_is_unchanged(tmp_path):
+    call = "import pathlib, sys, test_bad_luck as t; "  # HDF5 prints again at exit
     call += "t.require_kept_on_a_full_disk(pathlib.Path(sys.argv[1]), '.vtkhdf')"
     done = subprocess.run(
         [sys.executable, "-c", call, tmp_path],
@@ -116,53 +116,53 @@ def test_on_a_full_disk_the_same_is_true_of_vtkhdf(tmp_path):
 
 
 @posix
-def test_on_a_full_disk_a_session_is_as_it_was_at_whatever_byte(tmp_path):
+def test_on_a_disk_that_is_full_at_any_byte_a_session_file_is_unchanged(tmp_path):
     path = tmp_path / "a.segdeform"
     session = sd.Session(sd.Mesh(*icosphere(2)))
     sd.save_session(path, session)
     size = path.stat().st_size
     sd.save_session(path, sd.Session(sd.Mesh(*OCTAHEDRON)))
-    before = kept(tmp_path)
-    for room in np.linspace(0, size - 1, 40).astype(int):
-        with room_for(int(room)), pytest.raises(SessionError, match="cannot be written"):
+    before = contents(tmp_path)
+    for space in np.linspace(0, size - 1, 40).astype(int):
+        with limited_to(int(space)), pytest.raises(SessionError, match="cannot be written"):
             sd.save_session(path, session)
-        assert kept(tmp_path) == before
+        assert contents(tmp_path) == before
 
 
 @posix
-def test_on_a_full_disk_a_project_is_as_it_was(tmp_path):
+def test_on_a_full_disk_a_project_is_unchanged(tmp_path):
     path = tmp_path / "a.mlp"
     write_project(path, sd.Mesh(*OCTAHEDRON))
-    before = kept(tmp_path)
-    for room in (0, 100, 2000):
-        with room_for(room), pytest.raises(MeshError, match="cannot be written"):
+    before = contents(tmp_path)
+    for space in (0, 100, 2000):
+        with limited_to(space), pytest.raises(MeshError, match="cannot be written"):
             write_project(path, sd.Mesh(*icosphere(2)))
-        assert {name: data for name, data in kept(tmp_path).items() if name in before} == before
+        assert {name: data for name, data in contents(tmp_path).items() if name in before} == before
         assert len(read_project(path)) == 1
 
 
-def refused(*_args, **_options):
+def deny(*_args, **_options):
     raise PermissionError(13, "Permission denied")
 
 
 @pytest.mark.parametrize("call", ["os.open", "os.replace", "os.fsync"])
-def test_without_permission_nothing_changes_and_the_error_says_so(tmp_path, monkeypatch, call):
+def test_without_permission_no_file_changes_and_the_error_says_so(tmp_path, monkeypatch, call):
     session, mesh = sd.Session(sd.Mesh(*OCTAHEDRON)), sd.Mesh(*icosphere(1))
     path, surface = tmp_path / "a.segdeform", tmp_path / "a.ply"
     sd.save_session(path, session)
     write_mesh(surface, session.mesh)
-    before = kept(tmp_path)
-    monkeypatch.setattr(call, refused)
+    before = contents(tmp_path)
+    monkeypatch.setattr(call, deny)
     with pytest.raises(SessionError, match="Permission denied"):
         sd.save_session(path, sd.Session(mesh))
     with pytest.raises(MeshError, match="Permission denied"):
         write_mesh(surface, mesh)
-    assert kept(tmp_path) == before
+    assert contents(tmp_path) == before
 
 
 @lru_cache(maxsize=1)
-def work():
-    """Return a session that can do everything, at work, and what can be cancelled in it."""
+def posed_session():
+    """Return a session with regions, cages, a handle and a pose."""
     scene = sausage(2)
     session = sd.Session(scene.mesh)
     session.set_regions(scene.regions)
@@ -189,13 +189,13 @@ JOBS = {
 
 
 def cancelled_at(job, moment):
-    """Cancel *job* at its report number *moment*; return whether it got there."""
-    session, reports = work(), iter(range(10**6))
+    """Cancel *job* at its progress report number *moment*; return whether it made that report."""
+    session, reports = posed_session(), iter(range(10**6))
     before, label = session.state, session.undo_label
 
     def stop(_fraction, _text):
         if next(reports) == moment:
-            raise Cancelled("enough")
+            raise Cancelled("stop")
 
     try:
         JOBS[job](session, stop)
@@ -211,7 +211,7 @@ def cancelled_at(job, moment):
 
 
 @pytest.mark.parametrize("job", JOBS)
-def test_cancelling_at_any_moment_leaves_the_session_as_it_was(job):
+def test_cancelling_at_some_moments_leaves_the_session_unchanged(job):
     moments = np.random.default_rng(0).permutation(12)[:3]
     assert cancelled_at(job, 0)
     for moment in moments:
@@ -220,15 +220,15 @@ def test_cancelling_at_any_moment_leaves_the_session_as_it_was(job):
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("job", JOBS)
-def test_cancelling_at_every_moment_leaves_the_session_as_it_was(job):
+def test_cancelling_at_every_moment_leaves_the_session_unchanged(job):
     moment = 0
     while cancelled_at(job, moment):
         moment += 1
     print(f"\n{job}: cancelled at {moment} moments")
 
 
-def test_a_session_works_on_while_all_its_listeners_raise():
-    session = sd.Session(work().mesh, state=work().state)
+def test_a_session_works_although_all_its_listeners_raise():
+    session = sd.Session(posed_session().mesh, state=posed_session().state)
     stops = [session.on_change(raising) for _ in range(3)]
     pose = session.vertices.copy()
     steps = [
@@ -258,8 +258,8 @@ def raising(_change):
     raise ZeroDivisionError
 
 
-def test_a_progress_that_raises_something_else_leaves_the_session_as_it_was_too():
-    session = work()
+def test_a_progress_callback_that_raises_leaves_the_session_unchanged():
+    session = posed_session()
     before = session.state
     for job in ("segment", "fit", "bind"):
         with pytest.raises(ZeroDivisionError):

@@ -10,7 +10,7 @@ import public_calls
 import pytest
 from numpy.testing import assert_array_equal
 from scenes import sausage
-from test_read_only import CLASSES, _shared
+from shared_arrays import CLASSES, writable_shared_arrays
 
 import vtk_segdeform as sd
 from vtk_segdeform import Session
@@ -46,7 +46,7 @@ def working_session() -> Session:
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
 @pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.__name__)
 def test_the_arrays_of_a_copy_are_read_only_as_well(cls, way):
-    assert _shared(way(public_calls.instance(cls))) == []
+    assert writable_shared_arrays(way(public_calls.instance(cls))) == []
 
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
@@ -58,8 +58,8 @@ def test_copies_of_a_mesh_regions_and_cages_are_equal_and_have_no_caches(way):
                         (cage, "vertices"), (cage, "faces")):  # fmt: skip
         assert_array_equal(getattr(way(thing), name), getattr(thing, name))
     before = [len(pickle.dumps(thing)) for thing in (mesh, regions)]
-    asked = mesh.edges, mesh.adjacency, mesh.components, mesh.face_areas, mesh.diagonal
-    assert len(asked) == 5
+    cached = mesh.edges, mesh.adjacency, mesh.components, mesh.face_areas, mesh.diagonal
+    assert len(cached) == 5
     assert_array_equal(way(regions).weights, regions.weights)
     assert [len(pickle.dumps(thing)) for thing in (mesh, regions)] == before
     assert set(vars(way(mesh))) == {each.name for each in fields(mesh)}

@@ -1,4 +1,4 @@
-"""Bad arguments to every public callable end in one of our errors, or in an answer.
+"""Every public callable either accepts a bad argument or raises one of our errors.
 
 The callables are discovered (`public_calls`), so that new ones are tested as well.  One argument of
 a valid call, sometimes two, is replaced by an unexpected value (`bad_values`).  Only errors of
@@ -60,18 +60,18 @@ def _tried(call: Call, bad: dict[str, str], fd: int) -> str:
     arguments |= values
     owner = getattr(function, "__self__", None)
     before = owner.state if isinstance(owner, Session) else None
-    told = f"{call.name}({', '.join(f'{name}={kind}' for name, kind in bad.items())})"
+    label = f"{call.name}({', '.join(f'{name}={kind}' for name, kind in bad.items())})"
     try:
-        with _in_time():
+        with _within_limit():
             answer = function(**arguments)
     except SegDeformError as error:
         if len(str(error)) > LONGEST:
-            return f"{told}: a message of {len(str(error))} characters: {str(error)[:200]}"
+            return f"{label}: a message of {len(str(error))} characters: {str(error)[:200]}"
         if before is not None and owner.state is not before:
-            return f"{told}: refused, and yet the session changed"
-        return _named(call, told, str(error), bad)
-    except BaseException as error:  # noqa: BLE001 - that is what is asked
-        return f"{told}: {type(error).__name__}: {str(error)[:200]}"
+            return f"{label}: raised an error, but changed the session"
+        return _named(call, label, str(error), bad)
+    except BaseException as error:  # noqa: BLE001 - any other is the fault
+        return f"{label}: {type(error).__name__}: {str(error)[:200]}"
     finally:
         os.fstat(fd)
         public_calls.tidy()
@@ -79,7 +79,7 @@ def _tried(call: Call, bad: dict[str, str], fd: int) -> str:
     return ""
 
 
-def _named(call: Call, told: str, message: str, bad: dict[str, str]) -> str:
+def _named(call: Call, label: str, message: str, bad: dict[str, str]) -> str:
     """Return a complaint unless *message* names the argument, or the path passed for it."""
     if len(bad) > 1:
         return ""
@@ -90,15 +90,15 @@ def _named(call: Call, told: str, message: str, bad: dict[str, str]) -> str:
     is_path = kind in ("text", "empty text", "path", "long name") and name in ("path", "source")
     if is_path or any(each in message for each in names):
         return ""
-    return f"{told}: the message does not say {' or '.join(names)}: {message[:200]}"
+    return f"{label}: the message does not say {' or '.join(names)}: {message[:200]}"
 
 
 @contextlib.contextmanager
-def _in_time() -> Iterator[None]:
-    def late(*_: Any) -> None:
+def _within_limit() -> Iterator[None]:
+    def stop(*_: Any) -> None:
         raise TimeoutError(f"still running after {SECONDS:.0f} s")
 
-    before = signal.signal(signal.SIGALRM, late)
+    before = signal.signal(signal.SIGALRM, stop)
     signal.setitimer(signal.ITIMER_REAL, SECONDS)
     try:
         yield
@@ -124,14 +124,14 @@ def _draws(seed: int, these: list[Call], each: int) -> Iterator[tuple[Call, dict
                 yield call, bad
 
 
-def _require_ours(these: list[Call], seed: int, each: int, fd: int) -> None:
+def _check_errors(these: list[Call], seed: int, each: int, fd: int) -> None:
     faults = [_tried(call, bad, fd) for call, bad in _draws(seed, these, each)]
     faults = list(filter(None, faults))
     assert not faults, f"{len(faults)} calls:\n" + "\n".join(faults)
 
 
 @pytest.mark.parametrize("modules", [CORE, WIDGETS], ids=["core", "widgets"])
-def test_every_parameter_has_a_valid_value_and_the_call_is_answered(modules):
+def test_every_parameter_has_a_valid_value_and_the_call_returns(modules):
     for call in _all(modules):
         for name in call.parameters:
             valid(call.name, name)
@@ -141,33 +141,33 @@ def test_every_parameter_has_a_valid_value_and_the_call_is_answered(modules):
 
 
 @pytest.mark.parametrize("modules", [CORE, WIDGETS], ids=["core", "widgets"])
-def test_a_bad_argument_is_answered_or_raises_an_error_that_names_it(modules, bounded):
+def test_a_bad_argument_is_accepted_or_the_error_names_it(modules, bounded):
     cheap = [call for call in _all(modules) if not public_calls.expensive(call)]
-    _require_ours(cheap, 1, 2, bounded)
+    _check_errors(cheap, 1, 2, bounded)
 
 
 @pytest.mark.parametrize("cls", [State, Pose], ids=lambda cls: cls.__name__)
-def test_a_state_with_bad_parts_is_refused_by_session(cls, bounded):
+def test_a_session_rejects_a_state_with_bad_parts(cls, bounded):
     """Each field of a state, or of its pose, in turn holds each bad value."""
     state = public_calls.session().state
     thing = state if cls is State else state.pose
-    answered = 0
+    accepted = 0
     for each in fields(cls):
         for kind in BAD:
             bad = replace(thing, **{each.name: BAD[kind]()})
             bad = bad if cls is State else replace(state, pose=bad)
             try:
-                with _in_time():
+                with _within_limit():
                     Session(public_calls.mesh(), state=bad)
             except SegDeformError as error:
-                said = str(error)
-            except Exception as error:  # noqa: BLE001 - that is what is asked
+                message = str(error)
+            except Exception as error:  # noqa: BLE001 - any other is the fault
                 pytest.fail(f"{cls.__name__}({each.name}={kind}): {type(error)} {error!s:.200}")
             else:
-                said = ""
-                answered += 1
-            assert len(said) < LONGEST, (each.name, kind)
-    assert answered < 20
+                message = ""
+                accepted += 1
+            assert len(message) < LONGEST, (each.name, kind)
+    assert accepted < 20
 
 
 def _paths() -> list[tuple[Call, str]]:
@@ -179,7 +179,7 @@ def _paths() -> list[tuple[Call, str]]:
     return pairs
 
 
-def test_a_file_name_that_is_too_long_is_one_of_our_errors(bounded):
+def test_a_file_name_that_is_too_long_raises_one_of_our_errors(bounded):
     cheap = [pair for pair in _paths() if not public_calls.expensive(pair[0])]
     for call, name in cheap:
         suffix = Path(valid(call.name, name)).suffix if name == "path" else ""
@@ -207,4 +207,4 @@ def test_a_file_descriptor_is_not_a_path_and_stays_open(bounded):
 @pytest.mark.parametrize("modules", [CORE, WIDGETS], ids=["core", "widgets"])
 @pytest.mark.parametrize("seed", range(3))
 def test_every_bad_value_for_every_argument(modules, seed, bounded):
-    _require_ours(_all(modules), seed, len(BAD) + 1, bounded)
+    _check_errors(_all(modules), seed, len(BAD) + 1, bounded)

@@ -1,8 +1,8 @@
-"""Files that were cut off, scrambled or made to harm: a clear error, soon, and nothing else.
+"""Truncated, corrupted and malicious files: each reader reads them or raises a clear error.
 
-Every reader that takes a path reads files that something was done to: in a process of its own,
-with 2 GB and 20 seconds, because VTK's readers are native code.  A file is either read, or refused
-by an error of ours that names it; it never ends the process, hangs, or takes all the memory.
+Every reader that accepts a path reads damaged files, each in a separate process with limits on
+memory and time, because VTK's readers are native code.  A file is either read, or rejected by one
+of our errors that names it; it never crashes the process, hangs, or exhausts the memory.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ HUGE = [b"4294967295", b"2147483647", b"99999999999999999999", b"-1", b"1e308", 
 
 
 def originals(folder):
-    """Write a sound file of every kind; return [(reader, path)]."""
+    """Write a valid file of every kind; return [(reader, path)]."""
     mesh = sd.Mesh(*icosphere(1))
     surface = to_polydata(mesh)
     surface.point_data["red"] = np.arange(mesh.n_vertices, dtype=np.uint8)
@@ -107,7 +107,7 @@ def originals(folder):
 
 
 def save_raw(path, surface):
-    """Write an XML file whose numbers follow it as they are."""
+    """Write an XML file with its numbers appended in raw binary."""
     writer = vtkXMLPolyDataWriter()
     writer.SetInputData(surface)
     writer.SetFileName(str(path))
@@ -118,7 +118,7 @@ def save_raw(path, surface):
 
 
 def session():
-    """Return a small session with something of everything."""
+    """Return a small session with regions, a cage, a handle and a pose."""
     scene = sausage(1)
     result = sd.Session(sd.Mesh(*OCTAHEDRON))
     result.set_regions(sd.Regions.single(result.mesh))
@@ -128,8 +128,8 @@ def session():
     return result
 
 
-def harmed(data, rng):
-    """Return *data* after one of the things that happen to files."""
+def damaged(data, rng):
+    """Return *data* with random damage of one of nine kinds."""
     data = bytearray(data)
     at = int(rng.integers(len(data)))
     kind = int(rng.integers(9))
@@ -140,17 +140,17 @@ def harmed(data, rng):
             data[place] ^= 1 << int(rng.integers(8))
     elif kind == 2:
         data[at : at + int(rng.integers(1, 200))] = rng.bytes(int(rng.integers(1, 200)))
-    elif kind == 3:  # a number, in words, is another one
+    elif kind == 3:  # replace a number in text
         found = list(re.finditer(rb"\d+", data[:4000]))
         if found:
             match = found[int(rng.integers(len(found)))]
             data[match.start() : match.end()] = HUGE[int(rng.integers(len(HUGE)))]
-    elif kind == 4:  # a number, in bytes, is another one
+    elif kind == 4:  # replace a binary number
         data[at : at + 4] = [b"\xff\xff\xff\x7f", b"\xff" * 4, b"\0\0\0\x40"][int(rng.integers(3))]
     elif kind == 5:
         other = int(rng.integers(len(data)))
         data[at:at] = data[min(at, other) : max(at, other)]
-    elif kind == 8:  # two pieces change places
+    elif kind == 8:  # swap two pieces
         a, b, c = np.sort(rng.integers(len(data), size=3)).tolist()
         data[a:c] = data[b:c] + data[a:b]
     elif kind == 6:
@@ -160,15 +160,15 @@ def harmed(data, rng):
     return bytes(data)
 
 
-def places(value):
-    """Yield (container, key) of everything in a JSON value."""
+def entries(value):
+    """Yield (container, key) of every entry in a JSON value."""
     if isinstance(value, dict | list):
         for key in list(value) if isinstance(value, dict) else range(len(value)):
             yield value, key
-            yield from places(value[key])
+            yield from entries(value[key])
 
 
-WORTHS = [
+JSON_VALUES = [
     0,
     1,
     -1,
@@ -201,18 +201,18 @@ WORTHS = [
 ]
 
 
-def harmed_json(head, rng):
+def damaged_json(head, rng):
     """Return a JSON document with a value replaced, moved, removed or duplicated."""
     head = json.loads(json.dumps(head))
-    found = list(places(head))
+    found = list(entries(head))
     container, key = found[int(rng.integers(len(found)))]
     other, there = found[int(rng.integers(len(found)))]
     kind = int(rng.integers(5))
     if kind <= 1:
-        container[key] = WORTHS[int(rng.integers(len(WORTHS)))]
+        container[key] = JSON_VALUES[int(rng.integers(len(JSON_VALUES)))]
     elif kind == 2:
         del container[key]
-    elif kind == 3:  # as another value is
+    elif kind == 3:  # a copy of another value
         container[key] = json.loads(json.dumps(other[there]))
     elif isinstance(container, list):
         container.append(json.loads(json.dumps(container[key])))
@@ -221,8 +221,8 @@ def harmed_json(head, rng):
     return head
 
 
-def save_harmed(path, document):
-    """Write any JSON, with the buffer that belongs to it."""
+def save_document(path, document):
+    """Write a document with any JSON, and its buffer."""
     if path.suffix == ".glb":
         path.write_bytes(glb(json.dumps(document.head).encode(), document.blob))
         return
@@ -234,7 +234,7 @@ def save_harmed(path, document):
 
 
 def mutants(folder, sound, count, seed):
-    """Write *count* harmed files; return [(reader, path)]."""
+    """Write *count* damaged files; return [(reader, path)]."""
     rng = np.random.default_rng(seed)
     files = []
     for number in range(count):
@@ -243,12 +243,12 @@ def mutants(folder, sound, count, seed):
         if path.suffix in (".glb", ".gltf") and rng.random() < 0.8:
             document = octahedron(*OCTAHEDRON)
             for _ in range(int(rng.integers(1, 4))):
-                document.head = harmed_json(document.head, rng)
-            save_harmed(place, document)
+                document.head = damaged_json(document.head, rng)
+            save_document(place, document)
         else:
             data = path.read_bytes()
             for _ in range(int(rng.integers(1, 3))):
-                data = harmed(data or b"\0", rng)
+                data = damaged(data or b"\0", rng)
             place.write_bytes(data)
         files.append((reader, place))
     return files
@@ -285,7 +285,7 @@ X3D = '<?xml version="1.0"?>{}<X3D version="3.0"><Scene>{}</Scene></X3D>'
 OUTSIDE = '<DataArray type="Float64" Name="a" format="appended" offset="{}"/>'
 
 
-def lies(folder):
+def false_counts(folder):
     """Write files with counts or nesting beyond any reader's limits; return [(reader, path)]."""
     texts = {
         "sound.vtp": VTP.format(**SOUND),
@@ -358,17 +358,17 @@ def answers(files):
     return lines
 
 
-def wrong_among(files, told):
-    """Return in words what was neither read nor refused by name."""
+def failures(files, found):
+    """Describe the files that were neither read nor rejected by name."""
     return [
         f"{path}: {answer}: {text[:300]}"
-        for (_, path), (answer, text) in zip(files, told, strict=True)
+        for (_, path), (answer, text) in zip(files, found, strict=True)
         if answer not in ("read", "refused")
     ]
 
 
 def special(folder, sound):
-    """Write, or name, what is no file, or another file than its name says."""
+    """Create paths that are not regular files, and files of another format than their suffix."""
     by_suffix = {path.suffix: path for _, path in sound}
     files = []
     for reader, path in sound:
@@ -391,59 +391,64 @@ def special(folder, sound):
 
 
 @pytest.fixture(scope="module")
-def seen(tmp_path_factory):
-    """Have a few files of every kind read, by one program: [(files, answers)] of three sorts."""
+def results(tmp_path_factory):
+    """Read files of four sorts in one program; return [(files, answers)] by sort."""
     folder = tmp_path_factory.mktemp("files")
     sound = originals(folder)
-    harmed = mutants(folder, sound, 34, seed=1)
-    (folder / "lies").mkdir()
-    sorts = [sound, harmed, special(folder, sound)[::7], lies(folder / "lies")[::2]]
+    damaged_files = mutants(folder, sound, 34, seed=1)
+    (folder / "counts").mkdir()
+    sorts = [
+        sound,
+        damaged_files,
+        special(folder, sound)[::7],
+        false_counts(folder / "counts")[::2],
+    ]
     before = sorted(folder.rglob("*"))
-    told = iter(answers([file for files in sorts for file in files]))
+    found = iter(answers([file for files in sorts for file in files]))
     assert sorted(folder.rglob("*")) == before  # reading writes nothing
-    return [(files, [next(told) for _ in files]) for files in sorts]
+    return [(files, [next(found) for _ in files]) for files in sorts]
 
 
-def test_sound_files_of_every_kind_are_read(seen):
-    files, told = seen[0]
-    assert {path.name: answer for (_, path), (answer, _) in zip(files, told, strict=True)} == {
+def test_valid_files_of_every_kind_are_read(results):
+    files, found = results[0]
+    assert {path.name: answer for (_, path), (answer, _) in zip(files, found, strict=True)} == {
         path.name: "read" for _, path in files
     }
 
 
-def test_harmed_files_of_every_kind_are_read_or_refused_by_their_names(seen):
-    assert not wrong_among(*seen[1])
+def test_damaged_files_of_every_kind_are_read_or_the_error_names_them(results):
+    assert not failures(*results[1])
 
 
-def test_what_is_no_file_or_another_kind_is_refused_by_its_name(seen):
-    files, told = seen[2]
-    assert not wrong_among(files, told)
-    assert Counter(answer for answer, _ in told)["refused"] > 0.9 * len(files)
+def test_the_error_names_a_path_that_is_not_a_file_of_its_kind(results):
+    files, found = results[2]
+    assert not failures(files, found)
+    assert Counter(answer for answer, _ in found)["refused"] > 0.9 * len(files)
 
 
-def test_counts_in_a_file_are_checked_against_its_size(seen):
-    files, told = seen[3]
-    assert not wrong_among(files, told)
+def test_counts_in_a_file_are_checked_against_its_size(results):
+    files, found = results[3]
+    assert not failures(files, found)
     refused = {
-        path.name for (_, path), (answer, _) in zip(files, told, strict=True) if answer != "read"
+        path.name for (_, path), (answer, _) in zip(files, found, strict=True) if answer != "read"
     }
     assert len(refused) > 0.7 * len(files)
 
 
 @pytest.mark.campaign
 def test_no_false_count_is_accepted(tmp_path):
-    files = lies(tmp_path)
-    told = answers(files)
-    assert not wrong_among(files, told)
+    files = false_counts(tmp_path)
+    found = answers(files)
+    assert not failures(files, found)
     read = [
-        path.name for (_, path), (answer, _) in zip(files, told, strict=True) if answer == "read"
+        path.name for (_, path), (answer, _) in zip(files, found, strict=True) if answer == "read"
     ]
     # An unused offset, a count that VTK computes itself, a long name: all of these are valid.
     assert read == ["sound.vtp", "minus.vtp", "sound.vtk", "cells.vtk", "name.vtk", "nothing.ply"]
 
 
 @pytest.mark.campaign
-def test_two_thousand_harmed_files_are_read_or_refused(tmp_path):
+def test_two_thousand_damaged_files_are_read_or_rejected(tmp_path):
     counts, wrong = Counter(), []
     sound = originals(tmp_path)
     for seed in range(10):
@@ -451,8 +456,8 @@ def test_two_thousand_harmed_files_are_read_or_refused(tmp_path):
         folder.mkdir()
         files = mutants(folder, sound, 200, seed=100 + seed)
         files += [] if seed else special(tmp_path, sound)
-        told = answers(files)
-        counts += Counter(answer for answer, _ in told)
-        wrong += wrong_among(files, told)
+        found = answers(files)
+        counts += Counter(answer for answer, _ in found)
+        wrong += failures(files, found)
     print(f"\n{sum(counts.values())} files: {dict(counts)}")
     assert not wrong, "\n".join(wrong)

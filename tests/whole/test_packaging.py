@@ -1,4 +1,4 @@
-"""What an installed package holds, checked against the folder it is built from."""
+"""The contents of the installed package match the folder from which it is built."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ def test_every_library_imported_is_declared(setup_cfg):
     for extra in ("meshlab", "qt"):
         declared |= names_in(setup_cfg["options.extras_require"][extra])
     used = imported_by("vtk_segdeform") | imported_by("widgets")
-    used -= {"paraview"}  # where it is, it runs us; no package has it
+    used -= {"paraview"}  # which loads the plugin itself; no package provides it
     assert {LIBRARY_OF.get(name, name) for name in used} <= declared
 
 
 def test_a_plain_install_includes_the_libraries_for_speed(setup_cfg):
     required = setup_cfg["options"]["install_requires"]
     assert {"numba", "threadpoolctl"} <= names_in(required)
-    # Where numba has no wheel, pip would try to build LLVM: a marker keeps it away.
+    # Without a wheel of numba pip would try to build LLVM; a marker prevents that.
     numba = [line for line in required.splitlines() if line.startswith("numba")]
     assert all("python_version<" in line for line in numba)
     assert "fast" not in setup_cfg["options.extras_require"]
@@ -82,7 +82,7 @@ def test_the_command_points_at_a_function(setup_cfg):
     assert callable(getattr(importlib.import_module(module), function))
 
 
-def test_the_widgets_are_a_subpackage_of_the_checkout_too():
+def test_the_widgets_are_a_subpackage_in_a_checkout():
     widgets = importlib.import_module("vtk_segdeform.widgets")
     assert Path(widgets.__file__).parent in (
         ROOT / "widgets",
@@ -101,7 +101,7 @@ def test_importing_the_package_is_silent_and_loads_no_toolkit():
     assert (done.stdout.strip(), done.stderr) == ("[]", "")
 
 
-def test_the_wheel_holds_both_packages_and_the_licence(tmp_path):
+def test_the_wheel_contains_both_packages_and_the_licence(tmp_path):
     pytest.importorskip("setuptools", minversion="77", reason="an older one needs wheel")
     source = tmp_path / "source"
     source.mkdir()
@@ -147,7 +147,7 @@ def test_the_newest_release_of_the_changelog_is_this_version():
     assert re.fullmatch(rf"{re.escape(vtk_segdeform.__version__)} - \d{{4}}-\d\d-\d\d", releases[0])
 
 
-def test_no_file_speaks_of_the_machine_it_was_written_on():
+def test_no_file_contains_a_private_path():
     private = re.compile(r"/work/|/root/|/home/\w+/")
     for folder in ("vtk_segdeform", "widgets", "examples", "tests"):
         for path in sorted((ROOT / folder).rglob("*.py")):

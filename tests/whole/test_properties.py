@@ -1,6 +1,6 @@
-"""What is true of every mesh, region, cage and drag, asked of those that hypothesis makes up.
+"""Properties of every mesh, region, cage and drag, checked on examples drawn by hypothesis.
 
-Each is a test that asks for a few examples; the campaign asks all of them for a thousand.
+Each test draws a few examples; the campaign draws a thousand for each property.
 """
 
 from __future__ import annotations
@@ -25,47 +25,47 @@ from vtk_segdeform.session.state import State
 FEW, MANY = 3, int(os.environ.get("SEGDEFORM_EXAMPLES", "1000"))
 NUMBERS = st.floats(-1.0, 1.0, allow_nan=False, width=32)
 SEEDS = st.integers(0, 2**32 - 1)
-TRUTHS = []
+PROPERTIES = []
 
 
-def truth(**given_):
-    """Mark a function as true for all of what is given; `test_in_the_long_run` asks it again."""
+def holds_for(**given_):
+    """Make a function a test of a few examples; `test_many_examples` draws more."""
 
     def mark(claim):
-        TRUTHS.append((claim, given_))
-        return asked(claim, given_, FEW)
+        PROPERTIES.append((claim, given_))
+        return checked(claim, given_, FEW)
 
     return mark
 
 
-def asked(claim, given_, count):
-    """Return a test that asks *count* times, the same every time."""
+def checked(claim, given_, count):
+    """Return a test of *count* examples, the same in every run."""
 
-    def ask(**values):
+    def check(**values):
         claim(**values)
 
-    ask.__name__ = claim.__name__
+    check.__name__ = claim.__name__
     quiet = settings(
         max_examples=count, deadline=None, derandomize=True, database=None,
         suppress_health_check=list(HealthCheck),
     )  # fmt: skip
-    return quiet(given(**given_)(ask))
+    return quiet(given(**given_)(check))
 
 
 @lru_cache(maxsize=4)
 def scene(n_regions=2):
-    """Return a small sausage with everything, its mesh of 1026 vertices."""
+    """Return a complete scene, with a mesh of 1026 vertices."""
     return sausage(n_regions)
 
 
 @lru_cache(maxsize=1)
 def bound():
-    """Return a deformer of it."""
+    """Return a deformer of the scene."""
     return scene().deformer()
 
 
 def body(seed, subdivisions=2):
-    """Return a star-shaped body of random radii: closed, outward, of any unevenness."""
+    """Return a closed star-shaped body with random radii, more or less uneven."""
     rng = np.random.default_rng(seed)
     vertices, faces = icosphere(subdivisions)
     waves = np.cos(vertices @ rng.normal(0, 3, (3, 6)) + rng.uniform(0, 6, 6)) @ rng.normal(0, 1, 6)
@@ -75,14 +75,14 @@ def body(seed, subdivisions=2):
 
 
 def motion(seed):
-    """Return a random turn (3, 3), scale and shift (3,)."""
+    """Return a random rotation (3, 3), scale and shift (3,)."""
     rng = np.random.default_rng(seed)
     turn = rotation(rng.normal(size=3), rng.uniform(0, np.pi))
     return turn, float(np.exp(rng.uniform(-5, 5))), rng.uniform(-3, 3, 3)
 
 
 def cage(seed, points):
-    """Return a convex cage around *points*: the hull of a random few, pushed outward."""
+    """Return a convex cage around *points*: the hull of random directions, scaled."""
     rng = np.random.default_rng(seed)
     around = rng.normal(size=(int(rng.integers(8, 40)), 3))
     around /= np.linalg.norm(around, axis=1, keepdims=True)
@@ -92,14 +92,14 @@ def cage(seed, points):
     inward = np.einsum("fi,fi->f", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
     faces[inward] = faces[inward, ::-1]
     nearest = -hull.equations[:, 3].max()
-    assume(nearest > 0.05)  # the origin is well inside
+    assume(nearest > 0.05)  # with the origin well inside
     centre = points.mean(axis=0)
     reach = np.linalg.norm(points - centre, axis=1).max() / nearest * rng.uniform(1.05, 2.0)
     return sd.Cage(around * reach + centre, faces)
 
 
-@truth(seed=SEEDS)
-def test_volume_turns_and_scales_as_a_volume_does(seed):
+@holds_for(seed=SEEDS)
+def test_volume_is_invariant_under_motion_and_scales_with_the_cube(seed):
     mesh = body(seed)
     turn, scale, shift = motion(seed)
     before = signed_volume(mesh.vertices, mesh.faces)
@@ -109,7 +109,7 @@ def test_volume_turns_and_scales_as_a_volume_does(seed):
     assert abs(after / scale**3 - before) <= digits * before * 10
 
 
-@truth(seed=SEEDS, count=st.integers(1, 5))
+@holds_for(seed=SEEDS, count=st.integers(1, 5))
 def test_blend_weights_of_any_regions_are_a_partition_of_unity(seed, count):
     mesh = body(seed)
     rng = np.random.default_rng(seed)
@@ -121,8 +121,8 @@ def test_blend_weights_of_any_regions_are_a_partition_of_unity(seed, count):
     assert weights.min() >= 0.0
 
 
-@truth(seed=SEEDS, labels=st.integers(1, 6), overlap=st.integers(0, 8))
-def test_labels_grow_and_weights_stay_inside_their_regions(seed, labels, overlap):
+@holds_for(seed=SEEDS, labels=st.integers(1, 6), overlap=st.integers(0, 8))
+def test_regions_from_labels_contain_their_labels_and_their_weights(seed, labels, overlap):
     mesh = body(seed)
     numbers = np.random.default_rng(seed).integers(0, labels, mesh.n_vertices)
     regions = sd.Regions.from_labels(mesh, numbers, overlap)
@@ -133,7 +133,7 @@ def test_labels_grow_and_weights_stay_inside_their_regions(seed, labels, overlap
     assert not regions.weights[~regions.membership].any()
 
 
-@truth(seed=SEEDS)
+@holds_for(seed=SEEDS)
 def test_coordinates_in_any_convex_cage_sum_to_one_and_reproduce_the_points(seed):
     points = body(seed).vertices
     around = cage(seed, points)
@@ -144,8 +144,8 @@ def test_coordinates_in_any_convex_cage_sum_to_one_and_reproduce_the_points(seed
     assert weights.min() > -1e-9  # inside a convex cage none is negative
 
 
-@truth(seed=SEEDS)
-def test_coordinates_do_not_depend_on_place_turn_or_unit(seed):
+@holds_for(seed=SEEDS)
+def test_coordinates_do_not_depend_on_position_orientation_or_unit(seed):
     points = body(seed, 1).vertices
     around = cage(seed, points)
     turn, scale, shift = motion(seed)
@@ -155,8 +155,8 @@ def test_coordinates_do_not_depend_on_place_turn_or_unit(seed):
     assert np.abs(again - weights).max() < 1e-7
 
 
-@truth(seed=SEEDS, n=st.integers(12, 60))
-def test_a_fitted_cage_is_a_cage_around_its_region_with_the_vertices_asked_for(seed, n):
+@holds_for(seed=SEEDS, n=st.integers(12, 60))
+def test_a_fitted_cage_encloses_its_region_and_has_the_requested_vertices(seed, n):
     mesh = body(seed)
     rng = np.random.default_rng(seed)
     x = mesh.vertices @ rng.normal(size=3)
@@ -167,8 +167,8 @@ def test_a_fitted_cage_is_a_cage_around_its_region_with_the_vertices_asked_for(s
     assert sum(each.n_vertices for each in cages) == 2 * n
 
 
-@truth(move=st.tuples(NUMBERS, NUMBERS, NUMBERS), degrees=st.floats(-90, 90), axis=SEEDS)
-def test_the_volume_is_exact_wherever_a_handle_is_put(move, degrees, axis):
+@holds_for(move=st.tuples(NUMBERS, NUMBERS, NUMBERS), degrees=st.floats(-90, 90), axis=SEEDS)
+def test_the_volume_is_exact_for_any_targets(move, degrees, axis):
     axis = np.random.default_rng(axis).normal(size=3)
     deformer = bound()
     solution = deformer.solve(scene().turned(degrees, axis) + move, max_steps=5)
@@ -176,7 +176,7 @@ def test_the_volume_is_exact_wherever_a_handle_is_put(move, degrees, axis):
     now, rest = (signed_volume(x, mesh.faces) for x in (solution.vertices, mesh.vertices))
     assert np.isfinite(solution.vertices).all()
     assert abs(now - rest) <= 1e-12 * rest
-    # Back at rest the objective is what is left of two sums as large as its constant.
+    # Near rest the objective is the difference of two sums as large as its constant.
     rounding = 2e-13 * deformer._binding.energy.constant
     assert all(
         b <= a * (1 + 1e-12) + rounding
@@ -184,8 +184,8 @@ def test_the_volume_is_exact_wherever_a_handle_is_put(move, degrees, axis):
     )
 
 
-@truth(seed=SEEDS)
-def test_regions_cages_and_handles_at_random_hold_the_volume(seed):
+@holds_for(seed=SEEDS)
+def test_random_regions_cages_and_handles_preserve_the_volume(seed):
     mesh = body(seed)
     rng = np.random.default_rng(seed)
     x = mesh.vertices @ rng.normal(size=3)
@@ -220,7 +220,7 @@ ACTIONS = st.lists(
 
 
 def act(work, action, seed):
-    """Do one thing that a person might do."""
+    """Perform one action of a user."""
     rng = np.random.default_rng(seed)
     some = rng.permutation(work.mesh.n_vertices)[: rng.integers(1, 30)]
     if action == "drag" and work.handles and work.cages:
@@ -246,8 +246,8 @@ def act(work, action, seed):
         work.reset_pose()
 
 
-@truth(actions=ACTIONS)
-def test_undo_and_redo_of_anything_is_nothing_and_the_volume_stays(actions):
+@holds_for(actions=ACTIONS)
+def test_undo_and_redo_of_any_action_restore_the_pose(actions):
     work = session()
     for action, seed in actions:
         act(work, action, seed)
@@ -260,8 +260,8 @@ def test_undo_and_redo_of_anything_is_nothing_and_the_volume_stays(actions):
         assert abs(work.volume_change) <= 1e-12
 
 
-@truth(actions=ACTIONS)
-def test_saving_and_loading_anything_is_nothing(actions):
+@holds_for(actions=ACTIONS)
+def test_saving_and_loading_restore_any_session(actions):
     work = session()
     for action, seed in actions:
         act(work, action, seed)
@@ -276,7 +276,9 @@ def test_saving_and_loading_anything_is_nothing(actions):
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize(("claim", "given_"), TRUTHS, ids=[c.__name__[5:] for c, _ in TRUTHS])
-def test_in_the_long_run(claim, given_):
-    asked(claim, given_, MANY)()
+@pytest.mark.parametrize(
+    ("claim", "given_"), PROPERTIES, ids=[c.__name__[5:] for c, _ in PROPERTIES]
+)
+def test_many_examples(claim, given_):
+    checked(claim, given_, MANY)()
     print(f"\n{MANY} examples: {claim.__name__[5:].replace('_', ' ')}")

@@ -1,11 +1,12 @@
-"""Every creature of the zoo meets every operation: a right answer, or an error of ours that says.
+"""Every operation on every bad input of `zoo` gives a correct result or one of our errors.
 
-Right is: as many vertices, all finite, the volume that it was to 1e-12, handles met or the status
-says that they are not.  A refusal names the fault, by the words that `zoo` expects, and a cure.
-Nothing else may come out: no other exception, no warning, nothing that takes minutes.
+A correct result has the same number of vertices, all finite, the same volume to 1e-12, and handles
+at their targets or a status that says they are not.  An error names the fault, in the words that
+`zoo` expects, and a remedy.  There must be no other exception, no warning, and no computation of
+minutes.
 
-`pytest -m campaign tests/whole/test_zoo.py -s` takes all and prints the
-counts. With SEGDEFORM_ZOO=1 the page of the documentation is written again.
+`pytest -m campaign tests/whole/test_zoo.py -s` runs all cases and prints the counts.  With
+SEGDEFORM_ZOO=1 the page of the documentation is generated again.
 """
 
 from __future__ import annotations
@@ -28,62 +29,61 @@ from zoo_page import page
 from vtk_segdeform.errors import MeshError, SegDeformError
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "bad-input.rst"
-LONGEST = 120.0  # seconds of work, for one case
-CURE = re.compile(
+LONGEST = 120.0  # seconds of processor time for one case
+REMEDY = re.compile(
     r"\b(must|repair|make|add|give|use|take|leave|enlarge|scale|mark|name|choose|move|look|"
     r"same unit|raise|reverse|pass|fit|segment|count|write|tell|select|check|remove|list each)\b"
 )
 
 
-# One case, and how it ended.
+# One case and its outcome.
 
 
-def outcome(run, fault, cure=CURE):
-    """Return "answered" or "refused"; anything else raises, a wrong answer too."""
+def outcome(run, fault, remedy=REMEDY):
+    """Return "accepted" or "refused"; raise for a wrong result or any other exception."""
     refusal = None
     try:
         run()
     except SegDeformError as error:
         refusal = error
     if refusal is None:
-        assert fault is None, f"answered, though {fault}"
-        return "answered"
-    said = " ".join(str(refusal).split())
-    assert fault is not None, f"refused what is sound: {type(refusal).__name__}: {said}"
-    assert re.search(fault, said), f"does not name the fault, {fault}: {said}"
-    assert cure.search(said), f"names no cure: {said}"
+        assert fault is None, f"accepted, despite {fault}"
+        return "accepted"
+    message = " ".join(str(refusal).split())
+    assert fault is not None, f"refused sound input: {type(refusal).__name__}: {message}"
+    assert re.search(fault, message), f"does not name the fault, {fault}: {message}"
+    assert remedy.search(message), f"names no remedy: {message}"
     return "refused"
 
 
 def cases():
-    """Yield (exhibit, operation, run, fault) of everything."""
+    """Yield (exhibit, operation, run, fault) for all cases."""
     for creature in [*zoo.SOUND, *zoo.FAULTY]:
         for name, operation in OPERATIONS.items():
             if not creature.is_soup and name not in TAKE_ANY_ARRAYS:
-                continue  # nothing that a file or a PolyData could hold
+                continue  # a file or a PolyData cannot contain it
             fault = None if name == "repair" and creature.mended else creature.fault
-            yield creature.name, name, partial(_met, creature, operation), fault
+            yield creature.name, name, partial(_run_pair, creature, operation), fault
 
     for kind, (creatures, operations) in OTHERS.items():
         for creature, operation in itertools.product(creatures, operations):
-            run = partial(_met if kind in TAKE_PAIRS else _met_whole, creature, operation)
+            run = partial(_run_pair if kind in TAKE_PAIRS else _run_single, creature, operation)
             name = operation.__name__.replace("_", " ")
             yield f"{kind}: {creature.name}", name, run, creature.but.get(name, creature.fault)
 
 
-def _met_whole(creature, operation):
+def _run_single(creature, operation):
     operation(creature.make())
 
 
-def _met(creature, operation):
+def _run_pair(creature, operation):
     operation(*creature.make())
 
 
-# A case that takes long, and is known to: the cages are larger than the mesh.
+# Cages larger than the mesh take long.
 SLOW = {"cages: 1600 vertices"}
-EVERY = 31  # of the cases is in the suite
+EVERY = 31  # one case in this many belongs to the suite, all of them to the campaign
 
-# One for each kind of exhibit and operation would be too many; every so manieth is in the suite.
 FEW = [case for case in cases() if case[0] not in SLOW and "segdeform deform" not in case[1]][
     ::EVERY
 ]
@@ -91,7 +91,7 @@ FEW = [case for case in cases() if case[0] not in SLOW and "segdeform deform" no
 
 @pytest.fixture
 def bounded(tmp_path, monkeypatch):
-    """Work in an empty folder; whatever takes too long is an error."""
+    """Work in an empty folder, with limited processor time."""
 
     def stop(*_):
         raise TimeoutError(f"took more than {LONGEST:.0f} s")
@@ -100,7 +100,7 @@ def bounded(tmp_path, monkeypatch):
     if not hasattr(signal, "SIGPROF"):
         yield lambda: None
         return
-    before = signal.signal(signal.SIGPROF, stop)  # by work, not by the clock: others work as well
+    before = signal.signal(signal.SIGPROF, stop)  # processor time, since other tests run as well
     try:
         yield lambda: signal.setitimer(signal.ITIMER_PROF, LONGEST)
     finally:
@@ -111,12 +111,14 @@ def bounded(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("exhibit", "operation", "run", "fault"), FEW, ids=[f"{c[0]} - {c[1]}" for c in FEW]
 )
-def test_each_is_answered_rightly_or_refused_with_a_reason(exhibit, operation, run, fault, bounded):
+def test_bad_input_gives_a_correct_result_or_an_error_with_a_reason(
+    exhibit, operation, run, fault, bounded
+):
     bounded()
-    assert outcome(run, fault) in ("answered", "refused")
+    assert outcome(run, fault) in ("accepted", "refused")
 
 
-def test_a_wrong_answer_and_an_error_of_others_are_both_caught():
+def test_wrong_results_and_other_exceptions_are_found():
     mesh = scene()[0]
     with pytest.raises(AssertionError):
         outcome(lambda: require_right(mesh, mesh.vertices * (1.0 + 1e-11)), None)
@@ -124,13 +126,13 @@ def test_a_wrong_answer_and_an_error_of_others_are_both_caught():
         outcome(lambda: require_right(mesh, mesh.vertices * np.nan), None)
     with pytest.raises(ZeroDivisionError):
         outcome(lambda: 1 // 0, None)
-    with pytest.raises(AssertionError, match="though open edges"):
+    with pytest.raises(AssertionError, match="despite open edges"):
         outcome(lambda: None, "open edges")
 
     def refuse(text):
         raise MeshError(text)
 
-    with pytest.raises(AssertionError, match="no cure"):
+    with pytest.raises(AssertionError, match="no remedy"):
         outcome(partial(refuse, "3 open edges"), "open edges")
     with pytest.raises(AssertionError, match="name the fault"):
         outcome(partial(refuse, "something; repair it"), "open edges")
@@ -138,14 +140,14 @@ def test_a_wrong_answer_and_an_error_of_others_are_both_caught():
         outcome(partial(refuse, "something; repair it"), None)
 
 
-def test_the_page_of_the_documentation_tells_what_is_expected_of_every_case():
+def test_the_page_of_the_documentation_lists_the_expected_outcomes():
     if os.environ.get("SEGDEFORM_ZOO"):
         PAGE.write_text(page(cases()), encoding="utf-8")
     assert PAGE.read_text(encoding="utf-8") == page(cases())
 
 
 @pytest.mark.campaign
-def test_the_whole_zoo_is_answered_or_refused_and_nothing_else(bounded):
+def test_every_case_is_accepted_or_refused(bounded):
     counts, others, slow = Counter(), [], []
     for exhibit, operation, run, fault in cases():
         began = time.perf_counter()
@@ -157,11 +159,11 @@ def test_the_whole_zoo_is_answered_or_refused_and_nothing_else(bounded):
             others.append((exhibit, operation, ended))
         seconds = time.perf_counter() - began
         counts[
-            "answered" if ended == "answered" else "refused" if ended == "refused" else "other"
+            "accepted" if ended == "accepted" else "refused" if ended == "refused" else "other"
         ] += 1
         if seconds > 5.0:
             slow.append(f"{exhibit} - {operation}: {seconds:.0f} s")
-    print(f"\n{counts.total()} cases: {counts['answered']} answered, {counts['refused']} refused "
+    print(f"\n{counts.total()} cases: {counts['accepted']} accepted, {counts['refused']} refused "
           f"with a named fault, {counts['other']} others")  # fmt: skip
     print("longer than 5 s:", *slow, sep="\n  ")
     assert counts.total() >= 400
