@@ -10,7 +10,13 @@ from solids import rotation
 from vtk_segdeform import Session, models
 from vtk_segdeform.pictures.palette import COLOURS, INK, rgb
 from vtk_segdeform.widgets.handle_dragger.gizmo import AXIS_COLOURS, Gizmo
-from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import FREE, PARTS, Kind, Part
+from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import (
+    FREE,
+    PARTS,
+    Kind,
+    Part,
+    distance_to_origin,
+)
 from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 
@@ -147,6 +153,24 @@ def test_the_far_half_of_a_ring_is_neither_drawn_nor_hit(view):
     assert drawn(hidden) > 0.9
 
 
+def test_where_a_ring_crosses_an_arrow_the_arrow_is_hit(view):
+    look_from(view, (8.0, -6.0, 6.0))  # the ring about y crosses the arrow along y
+    gizmo = Gizmo(view)
+    gizmo.place(CENTRE)
+    arrows = [gizmo.line(Part(Kind.AXIS, axis))[:, :2] for axis in range(3)]
+    rings = [gizmo.line(Part(Kind.ROTATION, axis))[:, :2] for axis in range(3)]
+    crossings = 0
+    for axis, arrow in enumerate(arrows):
+        for share in np.linspace(0.05, 0.95, 120):
+            place = arrow[0] + share * (arrow[1] - arrow[0])
+            side = np.array([arrow[0, 1] - arrow[1, 1], arrow[1, 0] - arrow[0, 0]])
+            place = place + 1.5 * side / np.linalg.norm(side)  # pixels beside the arrow
+            if min(distance_to_origin(ring - place) for ring in rings) < 1.0:
+                crossings += 1
+                assert gizmo.part_at(pointer(place)) == Part(Kind.AXIS, axis)
+    assert crossings > 0
+
+
 @pytest.mark.parametrize("axis", range(3))
 def test_parts_seen_end_on_are_not_hit(view, axis):
     view.camera.SetParallelProjection(axis == 1)
@@ -174,7 +198,7 @@ def test_beside_it_and_while_it_is_hidden_nothing_is_hit(view):
     assert gizmo.part_at(pointer(middle)) == FREE
     outer = 1.14 * gizmo.radius / view.pixel_at(CENTRE)
     assert gizmo.part_at(pointer(middle[:2] + [0.0, outer + 2.0])) == VIEW_RING
-    assert gizmo.part_at(pointer(middle[:2] + [0.0, outer + 12.0])) is None
+    assert gizmo.part_at(pointer(middle[:2] + [0.0, outer + 5.0])) is None
     gizmo.place(None)
     assert gizmo.part_at(pointer(middle)) is None
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import time
+from pathlib import Path
 
 import pytest
 from hands import plain_view
@@ -14,6 +15,7 @@ import vtk_segdeform as sd
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.errors import ArgumentError, SessionError
 from vtk_segdeform.widgets import DeformEditor, ReplayLimits, replay
+from vtk_segdeform.widgets.recording.confinement import confined, confined_path
 from vtk_segdeform.widgets.recording.reading import read_recording
 
 TITLE = "vtk_segdeform recording 1"
@@ -106,6 +108,16 @@ def test_a_link_does_not_lead_out_of_the_folder(bench, tmp_path):
     assert (tmp_path / "precious").read_text() == "mine"
     assert all("leads out of the folder" in str(fault) for fault in bench.faults)
     assert len(bench.faults) == 3
+
+
+def test_a_replay_inside_a_replay_restores_the_outer_folder(tmp_path):
+    interactor, path = plain_view((50, 50)).interactor, Path("elsewhere/work.segdeform")
+    outer, inner = tmp_path / "outer", tmp_path / "inner"
+    with confined(interactor, outer):
+        with confined(interactor, inner):
+            assert confined_path(interactor, path) == inner / path.name
+        assert confined_path(interactor, path) == outer / path.name
+    assert confined_path(interactor, path) == path
 
 
 def test_a_missing_folder_is_an_error_before_any_event(bench, tmp_path):

@@ -67,6 +67,26 @@ def test_a_brush_stroke_adds_the_vertices_along_its_path_in_one_step(desk):
     assert np.array_equal(desk.session.regions.membership[1], before)
 
 
+def test_a_fast_stroke_of_a_small_brush_has_no_gaps(desk):
+    desk.selector.paints, desk.selector.radius = Paint.FIXED, 0.12
+    desk.hand.drag([desk.under(-0.7, 0.0), desk.under(0.7, 0.0)])
+    x, y, z = desk.points.T
+    along = (np.abs(x) < 0.65) & (y < 0.0) & (np.abs(z) < 0.05)
+    assert along.sum() > 5
+    assert np.isin(np.flatnonzero(along), desk.session.fixed).all()
+    assert np.abs(z[desk.session.fixed]).max() < 0.2
+
+
+def test_a_second_stroke_adds_to_the_fixed_vertices(desk):
+    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
+    desk.hand.drag([(2, 2), (398, 120)])
+    first = desk.session.fixed
+    desk.hand.drag([(2, 300), (398, 398)])
+    assert len(first) > 0
+    assert np.isin(first, desk.session.fixed).all()
+    assert (desk.points[desk.session.fixed, 2] > 0.0).any()
+
+
 def test_control_erases(desk):
     desk.selector.region, desk.selector.radius = 0, 0.15
     both = desk.session.regions.membership.all(axis=0)

@@ -222,6 +222,41 @@ def test_an_event_inside_an_event_is_queued(scribble):
     assert hand.failures == []
 
 
+def test_of_several_moves_inside_an_event_only_the_last_is_handled(scribble):
+    hand, seen = Hand(scribble.view), []
+
+    def stroke(press):
+        while (pointer := (yield)).phase is Phase.MOVE:
+            seen.append(pointer.x)
+            if pointer.x == 20:
+                for x in (30, 40, 50):
+                    hand.move((x, 50))
+
+    scribble.on_press = stroke
+    hand.press((10, 50))
+    hand.move((20, 50))
+    assert seen == [20, 50]
+    hand.release((50, 50))
+    assert hand.failures == []
+
+
+def test_escape_ends_even_a_gesture_that_ignores_it(scribble):
+    hand, closed = Hand(scribble.view), []
+
+    def stroke(press):
+        try:
+            while True:
+                yield
+        finally:
+            closed.append("closed")
+
+    scribble.on_press = stroke
+    hand.press((10, 50))
+    hand.key("Escape")
+    assert closed == ["closed"]
+    assert not scribble.is_grabbing
+
+
 def test_only_keys_that_no_widget_handles_reach_the_camera(scribble):
     hand = Hand(scribble.view)
     heard = []
@@ -309,8 +344,12 @@ def test_one_event_draws_once_whatever_it_changes(scribble):
 
     scribble.on_key = on_key
     scribble.view.before_render(scribble.view.request_render)  # must not render endlessly
-    Hand(scribble.view).event("KeyPressEvent", key="a")
+    hand = Hand(scribble.view)
+    hand.event("KeyPressEvent", key="a")
     assert len(drawn) == 2
+    hand.event("KeyReleaseEvent", key="a")
+    hand.hover((300, 50))
+    assert len(drawn) == 2  # the request before rendering does not cause another picture
 
 
 def test_an_event_inside_an_event_does_not_draw_on_its_own(scribble):
@@ -379,3 +418,15 @@ def test_actors_in_the_foreground_are_never_hidden():
     pixel = picture(view)[30, 30].astype(int)
     assert pixel[0] < 2 * pixel[1]
     surface.remove()
+
+
+def test_the_foreground_follows_viewport_and_camera():
+    view = plain_view((80, 60))
+    front = view.foreground
+    view.renderer.SetViewport(0.5, 0.0, 1.0, 1.0)
+    view.camera.SetPosition(1.0, 2.0, 3.0)
+    view.camera.ParallelProjectionOn()
+    view.render()
+    assert front.GetViewport() == (0.5, 0.0, 1.0, 1.0)
+    assert front.GetActiveCamera().GetPosition() == (1.0, 2.0, 3.0)
+    assert front.GetActiveCamera().GetParallelProjection()
