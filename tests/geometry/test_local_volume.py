@@ -52,6 +52,18 @@ def test_it_is_negative_where_a_body_shrinks_and_positive_where_it_expands():
     assert np.abs(change[np.abs(x[:, 0]) > 2.7]).max() < 0.1
 
 
+def test_it_varies_over_the_thickness_of_the_body_not_from_vertex_to_vertex():
+    """One vertex of a sphere, raised, changes a neighbourhood, and none much more than the next."""
+    vertices, faces = icosphere(4)
+    raised = vertices.copy()
+    raised[0] *= 1.1
+    mesh = Mesh(vertices, faces)
+    change = np.abs(local_volume_change(mesh, raised))
+    assert np.count_nonzero(change > 0.5 * change.max()) > 20
+    i, j = mesh.edges.T
+    assert np.abs(change[i] - change[j]).max() < 0.3 * change.max()
+
+
 @pytest.mark.usefixtures("either")
 def test_it_is_zero_for_a_sheared_bar():
     mesh = sausage().mesh

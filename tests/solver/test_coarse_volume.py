@@ -34,6 +34,24 @@ def test_a_small_mesh_has_its_own_volume():
 
 
 @pytest.mark.usefixtures("coarse")
+def test_a_point_is_the_mean_of_its_cell_over_the_surface():
+    """Each vertex counts by its area: a part that is meshed more finely has no more weight."""
+    mesh = SCENE.mesh
+    coarse_volume = CoarseVolume.of(mesh, SUBSPACE)
+    areas = np.zeros(mesh.n_vertices)
+    for face, area in zip(mesh.faces, mesh.face_areas, strict=True):
+        areas[face] += area / 3.0
+    points = coarse_volume.surface.map(P0)
+    differences = []
+    for cell, point in enumerate(points):
+        own = np.flatnonzero(coarse_volume.cells == cell)
+        mean = np.average(mesh.vertices[own], axis=0, weights=areas[own])
+        assert_allclose(point, mean, atol=1e-9)
+        differences.append(np.linalg.norm(mesh.vertices[own].mean(axis=0) - mean))
+    assert max(differences) > 1e-3  # the mean by number of vertices is another one
+
+
+@pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize("constraints", [total_volume, region_volumes])
 def test_coarse_volumes_change_like_those_of_the_mesh(constraints):
     mesh = SCENE.mesh

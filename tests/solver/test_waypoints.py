@@ -66,3 +66,13 @@ def test_half_a_turn_has_the_same_direction_in_every_frame():
 
 def test_without_handles_there_is_no_waypoint():
     assert len(waypoints(np.empty((0, 3)), np.empty((0, 3)), [])) == 1
+
+
+def test_a_change_of_shape_is_spread_evenly_over_the_waypoints():
+    """A uniform growth has no rotation, so that every point moves along a straight line."""
+    start = somewhere(size=0.1)
+    end = 1.2 * start + [0.9, 0.0, 0.0]
+    way = waypoints(start, end, ALL)
+    assert len(way) >= 4
+    for leg, targets in enumerate(way, 1):
+        assert_allclose(targets, start + leg / len(way) * (end - start), atol=1e-9)
