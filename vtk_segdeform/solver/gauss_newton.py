@@ -277,10 +277,10 @@ class GaussNewton:
         h, *z = factor.solve_all([-here.slope, *here.rows])  # -H^-1 d, and Z
         if not self.volumes.constraints:
             return h, np.zeros(0), []
-        gz = np.array([[np.vdot(row, direction) for direction in z] for row in here.rows])
         g = np.array([constraint.violation(here.x) for constraint in self.volumes.constraints])
-        gh = np.array([np.vdot(row, h) for row in here.rows])
-        multipliers = np.linalg.lstsq(gz, g + gh, rcond=1e-12)[0]
+        gh = np.array([np.vdot(row, h) for row in here.rows])  # -G H^-1 d
+        gz = np.array([[np.vdot(row, direction) for direction in z] for row in here.rows])
+        multipliers = np.linalg.lstsq(gz, g + gh, rcond=1e-12)[0]  # (G Z)^-1 (g - G H^-1 d)
         for multiplier, direction in zip(multipliers, z, strict=True):
             h -= multiplier * direction
         return h, multipliers, z
