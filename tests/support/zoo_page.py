@@ -16,7 +16,7 @@ HEADINGS = {
     "overlaps": "Overlaps of regions",
     "cages": "Cages",
     "cage poses": "Poses of a cage",
-    "held": "Fixed vertices and handles",
+    "selections": "Fixed vertices and handles",
     "targets": "Targets",
     "motions": "Motions of a handle",
     "numbers": "Options that are numbers",
