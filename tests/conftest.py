@@ -7,7 +7,7 @@ import os
 import sys
 
 # Set before numpy, scipy and VTK are imported, because they read these variables once.  More
-# threads than cores would slow the workers down, and another order of summation changes last digits.
+# threads than cores slow the workers down, and another order of summation changes last digits.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 os.environ.setdefault("LP_NUM_THREADS", "0")  # additional rendering threads of Mesa
