@@ -35,7 +35,7 @@ class Anything:
         pass
 
     def __bool__(self):
-        return False  # no caller waits for it
+        return False  # so that no caller waits for it
 
 
 class Endless:

@@ -1,9 +1,10 @@
-"""Reads files, each in a process of its own, with little memory and little time; nothing survives.
+"""Reads files, each in a separate process with limits on memory and time.
 
     python careful_reader.py < list        one "reader<TAB>path" a line
 
-For each comes a line "answer<TAB>what": "read", "refused" by an error of ours that names the file,
-"other" exception, or what became of the process: "crashed", "hung", "memory".
+For each file it prints "answer<TAB>message".  The answer is "read", "refused" for one of our errors
+that names the file, "refused without a name", "other" for other exceptions, or the end of the
+process: "crashed", "hung", "memory".
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ CODES = {0: "read", 3: "refused", 4: "other", 5: "memory", 6: "refused without a
 
 
 def read(reader: str, path: str) -> tuple[int, str]:
-    """Return a code of `CODES`, and what was said."""
+    """Return a code of `CODES`, and the message of the error."""
     try:
         READERS[reader](path)
     except SegDeformError as error:
@@ -51,32 +52,32 @@ def read(reader: str, path: str) -> tuple[int, str]:
         return (3 if named else 6), f"{type(error).__name__}: {error}"
     except MemoryError as error:
         return 5, str(error)
-    except BaseException as error:  # noqa: BLE001 - whatever it is, it is to be told
+    except BaseException as error:  # noqa: BLE001 - reports any exception
         return 4, f"{type(error).__name__}: {error}"
     return 0, ""
 
 
 def one(reader: str, path: str) -> tuple[str, str]:
-    """Return what became of a process that reads one file."""
-    with tempfile.TemporaryFile() as said:
+    """Return the answer and the message of a process that reads one file."""
+    with tempfile.TemporaryFile() as output:
         child = os.fork()
         if child == 0:
             for number in (1, 2):
-                os.dup2(said.fileno(), number)
+                os.dup2(output.fileno(), number)
             used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
             resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY,) * 2)
             resource.setrlimit(resource.RLIMIT_CPU, (SECONDS,) * 2)
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-            signal.alarm(SECONDS)  # ends the process: nobody handles it
+            signal.alarm(SECONDS)  # not handled, so it ends the process
             code, text = read(reader, path)
-            said.seek(0)
-            said.truncate()
-            said.write(text.encode(errors="replace")[-4000:])
-            said.flush()
+            output.seek(0)
+            output.truncate()
+            output.write(text.encode(errors="replace")[-4000:])
+            output.flush()
             os._exit(code)
         _, status = os.waitpid(child, 0)
-        said.seek(0)
-        text = said.read().decode(errors="replace")
+        output.seek(0)
+        text = output.read().decode(errors="replace")
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)
         hung = number in (signal.SIGALRM, signal.SIGXCPU)
@@ -85,9 +86,9 @@ def one(reader: str, path: str) -> tuple[str, str]:
 
 
 def main() -> None:
-    """Read all that is listed."""
+    """Read all listed files."""
     np.seterr(all="ignore")
-    pv.Sphere()  # so that nothing is imported in every process anew
+    pv.Sphere()  # imports pyvista once, before the forks
     for line in sys.stdin:
         reader, path = line.rstrip("\n").split("\t")
         answer, text = one(reader, path)

@@ -1,8 +1,8 @@
-"""Saves a session again and again, and is killed at random moments, as by a power cut or a user.
+"""Saves a session repeatedly in a child process, which is killed at random moments.
 
     python killed_saver.py FOLDER COUNT SEED
 
-Prints how often the file held the old and the new session; anything else there is an error.
+Prints how often the file contained the old and the new session; any other content is an error.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def main() -> None:
         os.waitpid(child, 0)
         os.close(ready)
         os.close(begin)
-        after = whole.index(path.read_bytes())  # ValueError if it is neither
+        after = whole.index(path.read_bytes())  # ValueError for any other content
         sd.load_session(path)
         found["old" if after == before else "new"] += 1
         found["killed while writing"] += any(folder.glob(".segdeform-*"))

@@ -13,7 +13,7 @@ DATA = Path(os.environ.get("SEGDEFORM_DATA", _ROOT.parent / "shared" / "data"))
 
 
 def path_of(name: str) -> Path:
-    """Return the path of a benchmark file, or skip the test that asks for it."""
+    """Return the path of a benchmark file, or skip the current test."""
     path = DATA / name
     if not path.is_file():
         pytest.skip(f"{name} is not in {DATA}; set SEGDEFORM_DATA to the folder that has it")

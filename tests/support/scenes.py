@@ -1,4 +1,4 @@
-"""Small complete scenes: a mesh, its regions, their cages, what is held and what is moved."""
+"""Small complete scenes: a mesh, its regions and cages, fixed vertices and a handle."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ class Scene:
         )
 
     def held(self, **volumes) -> Deformer:
-        """Return the same, with options of `Deformer.hold` only; the cages are bound but once."""
+        """Return a deformer with options of `Deformer.hold` only; the cages are bound only once."""
         bound = _bound(self.mesh, self.regions, self.cages)
         return bound.hold(fixed=self.fixed, handle=self.handle, **volumes)
 
     def turned(self, degrees: float, axis=(0.0, 1.0, 0.0), about=(0.0, 0.0, 0.0)) -> np.ndarray:
-        """Return targets: the handle turned about a line."""
+        """Return targets: the handle rotated about a line."""
         x = self.mesh.vertices[self.handle] - about
         return x @ rotation(axis, np.radians(degrees)).T + about
 
     def transformed(self, turn=None, scale: float = 1.0, shift=(0.0, 0.0, 0.0)) -> Scene:
-        """Return the whole scene turned, scaled and shifted, cages and all."""
+        """Return the scene with its cages rotated, scaled and shifted."""
         turn = np.eye(3) if turn is None else turn
 
         def move(x):
@@ -63,7 +63,7 @@ def _bound(mesh: Mesh, regions: Regions, cages: tuple[Cage, ...]) -> Deformer:
 def sausage(n_regions: int = 2) -> Scene:
     """Return an ellipsoid along x with bumps, in *n_regions* overlapping cages of 66 vertices.
 
-    All tests of a process get the very same, and nobody changes it.
+    All tests of a process share it, so they must not change it.
     """
     sphere, faces = icosphere(4)
     bumps = 1.0 + 0.03 * np.sin(9 * sphere[:, :1]) * np.cos(5 * sphere[:, 1:2])

@@ -1,4 +1,4 @@
-"""Tiny solids whose volume, area or coordinates are known in closed form."""
+"""Small solids with a closed form for volume, area or coordinates."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SOLIDS = {"tetrahedron": TETRAHEDRON, "octahedron": OCTAHEDRON, "cube": CUBE}
 
 
 def icosphere(subdivisions: int = 3, radius: float = 1.0) -> tuple[FloatArray, FloatArray]:
-    """Return the octahedron, each triangle split in four *subdivisions* times, on a sphere."""
+    """Return a sphere: the octahedron with each triangle split in four *subdivisions* times."""
     vertices, faces = OCTAHEDRON
     for _ in range(subdivisions):
         vertices, faces = _split(vertices, faces)
@@ -60,21 +60,21 @@ def torus(
 
 
 def two_components() -> tuple[FloatArray, FloatArray]:
-    """Return two spheres apart from each other, as one mesh."""
+    """Return two separate spheres as one mesh."""
     vertices, faces = icosphere(2)
     shifted = vertices * 0.7 + [2.5, 0.0, 0.0]
     return np.concatenate([vertices, shifted]), np.concatenate([faces, faces + len(vertices)])
 
 
 def rotation(axis: FloatArray, angle: float) -> FloatArray:
-    """Return the (3, 3) turn by *angle* radians about *axis* (Rodrigues)."""
+    """Return the (3, 3) rotation by *angle* radians about *axis* (Rodrigues)."""
     x, y, z = np.asarray(axis, float) / np.linalg.norm(axis)
     k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
 
 
 def somewhere(n: int = 50, seed: int = 0, size: float = 2.0) -> FloatArray:
-    """Return *n* points, uniform in a box of half-width *size*."""
+    """Return *n* random points, uniform in a box of half-width *size*."""
     return np.random.default_rng(seed).uniform(-size, size, (n, 3))
 
 
@@ -91,7 +91,7 @@ def _split(vertices: FloatArray, faces: FloatArray) -> tuple[FloatArray, FloatAr
 
 
 def exact_volume_change(before: np.ndarray, after: np.ndarray, faces: np.ndarray) -> float:
-    """Return (V - V0) / V0 of two (n, 3) of the same *faces*, in whole numbers until the end."""
+    """Return (V - V0) / V0 for two (n, 3) poses of *faces*, computed with integers."""
 
     def six_volumes(vertices: np.ndarray) -> int:
         points = [[int(math.ldexp(c, 400)) for c in point] for point in vertices.tolist()]

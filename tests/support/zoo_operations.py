@@ -1,7 +1,7 @@
-"""What is done to the exhibits of the zoo, each ending in an assertion that it was done rightly.
+"""The operations on the creatures of the zoo, each of which checks its result.
 
-Operations raise what the package raises; what the filter or the command line say instead of
-raising is a `ToldError`.
+Operations raise the errors of the package; errors that the filter and the command line only report
+become a `ReportedError`.
 """
 
 from __future__ import annotations
@@ -24,35 +24,35 @@ from vtk_segdeform.io.convert import from_polydata, to_polydata, write_mesh
 from vtk_segdeform.io.polygons import polydata_of
 
 
-class ToldError(SegDeformError):
-    """What the filter or the command line said, neither of which raises."""
+class ReportedError(SegDeformError):
+    """An error message of the filter or the command line, neither of which raises."""
 
 
 def volume(vertices, faces):
-    """Return the volume with more digits than the package has."""
+    """Return the volume in extended precision."""
     x = np.asarray(vertices, dtype=np.longdouble)
     a, b, c = (x - x.mean(axis=0))[faces.T]
     return (a * np.cross(b, c)).sum() / 6
 
 
 def require_right(mesh, vertices, digits=1e-12):
-    """Assert that *vertices* are a pose of *mesh* with its volume."""
+    """Check that *vertices* are a pose of *mesh* with its volume."""
     assert vertices.shape == mesh.vertices.shape
     assert np.isfinite(vertices).all()
     rest, now = volume(mesh.vertices, mesh.faces), volume(vertices, mesh.faces)
-    # A coordinate has 16 digits from the origin; the volume cannot have more of them than that.
+    # Coordinates are rounded relative to their distance from the origin, and so is the volume.
     far = np.abs(vertices).max()
     rounding = 4 * np.finfo(float).eps * far * mesh.face_areas.sum() / rest
     assert abs(now - rest) <= max(digits, float(rounding)) * rest
 
 
 def require_met(solution):
-    """Assert that handles are in their places, or that the status says what else."""
+    """Check that handles are at their targets, or that the status says they are not."""
     assert solution.handle_error <= 1e-3 or solution.status is not sd.Status.CONVERGED
 
 
 def ends(mesh):
-    """Return what is at the two ends of *mesh* along its longest side."""
+    """Return the vertices at both ends of *mesh* along its longest side."""
     extent = np.ptp(mesh.vertices, axis=0)
     x = mesh.vertices[:, extent.argmax()]
     x = (x - x.min()) / np.ptp(x)
@@ -60,7 +60,7 @@ def ends(mesh):
 
 
 def bent(mesh, handle, degrees=20.0):
-    """Return targets: the handle turned about the middle, and shifted by a little."""
+    """Return targets: the handle rotated about the centre, and slightly shifted."""
     axis = np.eye(3)[(np.ptp(mesh.vertices, axis=0).argmax() + 1) % 3]
     middle = mesh.vertices.mean(axis=0)
     x = (mesh.vertices[handle] - middle) @ rotation(axis, np.radians(degrees)).T
@@ -68,29 +68,29 @@ def bent(mesh, handle, degrees=20.0):
 
 
 def fitted(mesh):
-    """Return regions and cages as a beginner would ask for them."""
+    """Return two regions, or one, and cages of 60 vertices."""
     regions = sd.segment(mesh, min(2, mesh.n_vertices))
     return regions, sd.fit_cages(mesh, regions, 60)
 
 
-# What is done to triangles.
+# Operations on triangles.
 
 
-def look(vertices, faces):
+def check_faults(vertices, faces):
     report = sd.find_faults(vertices, faces)
     if not report.ok:
-        raise ToldError(str(report))
+        raise ReportedError(str(report))
 
 
-def mend(vertices, faces):
-    mended = sd.repair(vertices, faces)
-    if not mended.report.ok:
-        raise ToldError(str(mended.report))
-    mesh = sd.Mesh(mended.vertices, mended.faces)
+def repair(vertices, faces):
+    repaired = sd.repair(vertices, faces)
+    if not repaired.report.ok:
+        raise ReportedError(str(repaired.report))
+    mesh = sd.Mesh(repaired.vertices, repaired.faces)
     assert volume(mesh.vertices, mesh.faces) > 0
 
 
-def check(vertices, faces):
+def check_mesh(vertices, faces):
     mesh = sd.Mesh(vertices, faces)
     assert volume(mesh.vertices, mesh.faces) > 0
     assert np.isfinite(sd.local_volume_change(mesh, mesh.vertices)).all()
@@ -143,7 +143,7 @@ def drag(vertices, faces):
 
 
 def dragged(session, targets):
-    """Drag, let go, undo, redo; save and load."""
+    """Drag, commit, undo, redo, save and load."""
     for max_steps in (3, None):
         require_met(session.drag(targets, max_steps=max_steps))
         require_right(session.mesh, session.vertices)
@@ -162,37 +162,37 @@ def pipeline(vertices, faces):
     filtered(mesh_free)
 
 
-def filtered(polydata, *, cages=None, **told):
-    """Run the filter over *polydata*; what it says by an event is raised."""
-    bend, said = SegmentedCageDeformFilter(), []
-    bend.AddObserver("ErrorEvent", lambda *_: said.append("something that VTK says"))
-    bend._report_error = said.append  # the only function that reports errors
+def filtered(polydata, *, cages=None, **options):
+    """Run the filter on *polydata*, and raise the errors that it reports."""
+    bend, errors = SegmentedCageDeformFilter(), []
+    bend.AddObserver("ErrorEvent", lambda *_: errors.append("an error of VTK"))
+    bend._report_error = errors.append  # the only function that reports errors
     bend.SetInputDataObject(0, polydata)
     if cages is not None:
         bend.SetInputDataObject(1, cages)
-    if "handle" not in told and polydata.n_points:
+    if "handle" not in options and polydata.n_points:
         x = np.nan_to_num(np.asarray(polydata.points, float), posinf=0.0)
         x = x[:, np.ptp(x, axis=0).argmax()]
-        told["fixed"] = np.flatnonzero(x <= x.min() + 0.12 * np.ptp(x)).tolist()
-        told["handle"] = np.flatnonzero(x >= x.max() - 0.12 * np.ptp(x)).tolist()
-    bend.SetNumberOfRegions(told.pop("n_regions", 2))
+        options["fixed"] = np.flatnonzero(x <= x.min() + 0.12 * np.ptp(x)).tolist()
+        options["handle"] = np.flatnonzero(x >= x.max() - 0.12 * np.ptp(x)).tolist()
+    bend.SetNumberOfRegions(options.pop("n_regions", 2))
     bend.SetNumberOfCageVertices(60)
-    bend.SetFixed(told.get("fixed", []))
-    bend.SetHandle(told.get("handle", []))
-    if "targets" in told:
-        bend.SetTargets(told["targets"])
+    bend.SetFixed(options.get("fixed", []))
+    bend.SetHandle(options.get("handle", []))
+    if "targets" in options:
+        bend.SetTargets(options["targets"])
     else:
         bend.SetRotationAxis(0, 1, 0)
         bend.SetRotationAngle(15)
     bend.Update()
-    if said:
-        raise ToldError(said[0])
+    if errors:
+        raise ReportedError(errors[0])
     mesh = sd.Mesh(*surface(polydata))
     require_right(mesh, np.asarray(surface(bend.GetOutputDataObject(0))[0]))
 
 
 def as_off(vertices, faces):
-    """Write triangles, whatever they hold, into a file that is one."""
+    """Write any triangles to an OFF file."""
     vertices, faces = np.asarray(vertices), np.asarray(faces)
     rows = [" ".join(map(str, row)) for row in np.atleast_2d(vertices).tolist()]
     rows += [" ".join(map(str, [len(row), *row])) for row in np.atleast_2d(faces).tolist() if row]
@@ -200,16 +200,16 @@ def as_off(vertices, faces):
 
 
 def commanded(*words):
-    """Run the command line; what it prints instead of doing it is raised, an error as it is."""
+    """Run the command line, and raise the errors that it prints."""
     with redirect_stdout(io.StringIO()) as printed:
         try:
             code = main(["--debug", *words])
-        except MeshError as missed:  # an answer, and it says how good
+        except MeshError as missed:  # it has a result nevertheless
             if "is written, but a handle misses its target" not in str(missed):
                 raise
             code = 0
     if code:
-        raise ToldError(printed.getvalue())
+        raise ReportedError(printed.getvalue())
 
 
 def check_command(vertices, faces):
@@ -229,31 +229,31 @@ def deform_command(vertices, faces):
 
 
 OPERATIONS = {
-    "find_faults": look, "repair": mend, "Mesh": check, "segment": segment, "fit_cages": fit,
-    "Deformer": solve, "deform": deform, "Session": drag, "filter": pipeline,
+    "find_faults": check_faults, "repair": repair, "Mesh": check_mesh, "segment": segment,
+    "fit_cages": fit, "Deformer": solve, "deform": deform, "Session": drag, "filter": pipeline,
     "segdeform check": check_command, "segdeform deform": deform_command,
 }  # fmt: skip
 TAKE_ANY_ARRAYS = {name for name in OPERATIONS if name != "filter" and " " not in name}
 
 
-# What is done to the rest: regions, overlaps, cages, what is held, targets, numbers.
+# Operations on regions, overlaps, cages, selections, targets, numbers and surfaces of VTK.
 
 
 @lru_cache(maxsize=1)
 def scene():
-    """Return the body in one snug cage."""
+    """Return the body in one tight cage."""
     mesh = sd.Mesh(*zoo.body())
     return mesh, sd.Regions.single(mesh), (sd.Cage(*zoo.ball()),)
 
 
-def regions_alone(masks):
+def regions_only(masks):
     mesh = scene()[0]
     regions = sd.Regions.from_masks(mesh, masks)
     assert np.allclose(regions.weights.sum(axis=0), 1.0, atol=1e-12)
     assert not regions.weights[~regions.membership].any()
 
 
-def regions_solved(masks):
+def regions_in_a_deformer(masks):
     mesh = scene()[0]
     regions = sd.Regions.from_masks(mesh, masks)
     cages = sd.fit_cages(mesh, regions, 30 * regions.n_regions)
@@ -261,7 +261,7 @@ def regions_solved(masks):
     require_solved(deformer, bent(mesh, zoo.RIGHT))
 
 
-def regions_dragged(masks):
+def regions_in_a_session(masks):
     session = sd.Session(scene()[0])
     session.set_regions(sd.Regions.from_masks(session.mesh, masks))
     session.change_options(n_cage_vertices=30 * session.regions.n_regions)
@@ -273,18 +273,18 @@ def regions_dragged(masks):
 def overlap_of_labels(rings):
     mesh = scene()[0]
     regions = sd.Regions.from_labels(mesh, (mesh.vertices[:, 0] > 0).astype(int), rings)
-    regions_solved(regions.membership)
+    regions_in_a_deformer(regions.membership)
 
 
 def overlap_of_segments(rings):
     mesh = scene()[0]
-    regions_solved(sd.segment(mesh, 2, overlap=rings).membership)
+    regions_in_a_deformer(sd.segment(mesh, 2, overlap=rings).membership)
 
 
-def overlap_of_halves(rings):
+def overlap_of_a_split_region(rings):
     session = sd.Session(scene()[0])
     session.split_region(0, overlap=rings)
-    regions_alone(session.regions.membership)
+    regions_only(session.regions.membership)
 
 
 def require_solved(deformer, targets):
@@ -293,20 +293,20 @@ def require_solved(deformer, targets):
     require_met(solution)
 
 
-def cage_alone(vertices, faces):
+def cage_only(vertices, faces):
     cage = sd.Cage(vertices, faces)
     cage.require_encloses(scene()[0].vertices, "vertices")
-    sd.Deformer(*scene()[:2], [cage])  # which alone knows what is too large
+    sd.Deformer(*scene()[:2], [cage])  # which checks that it is not too large
 
 
-def cage_solved(vertices, faces):
+def cage_in_a_deformer(vertices, faces):
     mesh, regions, _ = scene()
     cages = [sd.Cage(vertices, faces)]
     deformer = sd.Deformer(mesh, regions, cages, fixed=zoo.LEFT, handle=zoo.RIGHT)
     require_solved(deformer, bent(mesh, zoo.RIGHT))
 
 
-def cage_dragged(vertices, faces):
+def cage_in_a_session(vertices, faces):
     mesh, regions, _ = scene()
     session = sd.Session(mesh)
     session.set_regions(regions)
@@ -315,34 +315,34 @@ def cage_dragged(vertices, faces):
     dragged(session, {session.add_handle(zoo.RIGHT): bent(mesh, zoo.RIGHT)})
 
 
-def cage_in_a_pipeline(vertices, faces):
+def cage_in_the_filter(vertices, faces):
     cage = polydata_of(np.asarray(vertices, float), np.full(len(faces), 3), np.ravel(faces))
     filtered(to_polydata(scene()[0]), cages=cage)
 
 
-def held_by_a_deformer(fixed, handle):
+def selection_in_a_deformer(fixed, handle):
     mesh = scene()[0]
     deformer = sd.Deformer(*scene(), fixed=fixed, handle=handle)
     require_solved(deformer, bent(mesh, deformer.handle, 5.0))
 
 
-def held_again(fixed, handle):
+def selection_changed_later(fixed, handle):
     deformer = sd.Deformer(*scene()).hold(fixed=fixed, handle=handle)
     require_solved(deformer, deformer.mesh.vertices[deformer.handle])
 
 
-def held_in_one_call(fixed, handle):
+def selection_in_deform(fixed, handle):
     mesh = scene()[0]
     try:
         targets = bent(mesh, np.asarray(handle) if len(handle) else np.zeros(0, int), 5.0)
-    except IndexError:  # no such vertices: it is the handle that has to be refused
+    except IndexError:  # the handle has bad indices, which must be refused
         targets = np.zeros((1, 3))
     solution = sd.deform(mesh, fixed, handle, targets, n_regions=1, n_cage_vertices=40)
     require_right(mesh, solution.vertices)
     require_met(solution)
 
 
-def held_in_a_session(fixed, handle):
+def selection_in_a_session(fixed, handle):
     mesh, regions, cages = scene()
     session = sd.Session(mesh)
     session.set_regions(regions)
@@ -352,19 +352,19 @@ def held_in_a_session(fixed, handle):
     dragged(session, {name: bent(mesh, session.handles[name], 5.0)})
 
 
-def held_in_a_pipeline(fixed, handle):
+def selection_in_the_filter(fixed, handle):
     filtered(to_polydata(scene()[0]), n_regions=1, fixed=fixed, handle=handle)
 
 
-def targets_solved(targets):
+def targets_in_a_deformer(targets):
     deformer = sd.Deformer(*scene(), fixed=zoo.LEFT, handle=zoo.RIGHT)
     try:
         require_solved(deformer, targets)
-    finally:  # and, whatever came of it, it goes on working
+    finally:  # it continues to work after an error
         require_solved(deformer, deformer.mesh.vertices[zoo.RIGHT])
 
 
-def targets_in_one_call(targets):
+def targets_in_deform(targets):
     mesh = scene()[0]
     options = {"n_regions": 1, "n_cage_vertices": 40}
     solution = sd.deform(mesh, zoo.LEFT, zoo.RIGHT, targets, **options)
@@ -391,18 +391,18 @@ def unchanged_if_refused(session, change):
         raise
 
 
-def targets_dragged(targets):
+def targets_in_a_session(targets):
     session = session_of_the_scene()
     unchanged_if_refused(session, lambda: dragged(session, {"right": targets}))
 
 
-def targets_of_all_dragged(targets):
+def targets_without_names(targets):
     dragged(session_of_the_scene(), targets)
 
 
-def targets_in_a_pipeline(targets):
-    held = {"fixed": zoo.LEFT, "handle": zoo.RIGHT}
-    filtered(to_polydata(scene()[0]), n_regions=1, targets=targets, **held)
+def targets_in_the_filter(targets):
+    selection = {"fixed": zoo.LEFT, "handle": zoo.RIGHT}
+    filtered(to_polydata(scene()[0]), n_regions=1, targets=targets, **selection)
 
 
 def motion_of_a_handle(matrix):
@@ -414,14 +414,14 @@ def motion_of_a_handle(matrix):
 def cage_moved(vertices):
     session = session_of_the_scene()
     unchanged_if_refused(session, lambda: session.move_cage(0, vertices))
-    require_kept(session)
+    require_volume_change(session)
     session.commit()
     session.undo()
     assert np.array_equal(session.vertices, session.mesh.vertices)
 
 
-def require_kept(session):
-    """Assert that a free pose is finite, and that its volume is what is said of it."""
+def require_volume_change(session):
+    """Check that a pose is finite and that the session reports its volume."""
     assert np.isfinite(session.vertices).all()
     now = volume(session.vertices, session.mesh.faces)
     rest = volume(session.mesh.vertices, session.mesh.faces)
@@ -466,7 +466,7 @@ def steps_of_a_drag(value):
 
 
 def named(operation, name):
-    """Return an operation with a name of its own."""
+    """Return *operation* for one option, with its name."""
     run = partial(operation, name=name)
     run.__name__ = f"{operation.__name__}: {name}"
     return run
@@ -477,7 +477,7 @@ def polydata_to_mesh(polydata):
     assert volume(mesh.vertices, mesh.faces) > 0
 
 
-def polydata_in_a_pipeline(polydata):
+def polydata_in_the_filter(polydata):
     filtered(polydata)
 
 
@@ -488,22 +488,23 @@ def polydata_in_a_file(polydata):
 
 def polydata_deformed(polydata):
     write_mesh("zoo.vtp", polydata)
-    held = ["--fixed", "x<12%", "--handle", "x>88%", "--rotate", "y,15", "--regions", "1"]
-    commanded("deform", "zoo.vtp", "-o", "bent.vtp", *held, "--cage-vertices", "40")
+    options = ["--fixed", "x<12%", "--handle", "x>88%", "--rotate", "y,15", "--regions", "1"]
+    commanded("deform", "zoo.vtp", "-o", "bent.vtp", *options, "--cage-vertices", "40")
     require_right(sd.read_mesh("zoo.vtp"), sd.read_mesh("bent.vtp").vertices)
 
 
 OTHERS = {
-    "regions": (zoo.REGIONS, [regions_alone, regions_solved, regions_dragged]),
-    "overlaps": (zoo.OVERLAPS, [overlap_of_labels, overlap_of_segments, overlap_of_halves]),
-    "cages": (zoo.CAGES, [cage_alone, cage_solved, cage_dragged, cage_in_a_pipeline]),
+    "regions": (zoo.REGIONS, [regions_only, regions_in_a_deformer, regions_in_a_session]),
+    "overlaps": (zoo.OVERLAPS, [overlap_of_labels, overlap_of_segments, overlap_of_a_split_region]),
+    "cages": (zoo.CAGES, [cage_only, cage_in_a_deformer, cage_in_a_session, cage_in_the_filter]),
     "cage poses": (zoo.CAGE_POSES, [cage_moved]),
-    "held": (zoo.HELD, [
-        held_by_a_deformer, held_again, held_in_one_call, held_in_a_session, held_in_a_pipeline,
+    "selections": (zoo.SELECTIONS, [
+        selection_in_a_deformer, selection_changed_later, selection_in_deform,
+        selection_in_a_session, selection_in_the_filter,
     ]),
     "targets": (zoo.TARGETS, [
-        targets_solved, targets_in_one_call, targets_dragged, targets_of_all_dragged,
-        targets_in_a_pipeline,
+        targets_in_a_deformer, targets_in_deform, targets_in_a_session, targets_without_names,
+        targets_in_the_filter,
     ]),
     "motions": (zoo.MOTIONS, [motion_of_a_handle]),
     "numbers": (zoo.NUMBERS, [
@@ -517,7 +518,7 @@ OTHERS = {
         )),
     ]),
     "PolyData": (zoo.POLYDATA, [
-        polydata_to_mesh, polydata_in_a_pipeline, polydata_in_a_file, polydata_deformed,
+        polydata_to_mesh, polydata_in_the_filter, polydata_in_a_file, polydata_deformed,
     ]),
 }  # fmt: skip
-TAKE_PAIRS = {"cages", "held"}
+TAKE_PAIRS = {"cages", "selections"}

@@ -62,7 +62,7 @@ def cases():
         for name, operation in OPERATIONS.items():
             if not creature.is_soup and name not in TAKE_ANY_ARRAYS:
                 continue  # a file or a PolyData cannot contain it
-            fault = None if name == "repair" and creature.mended else creature.fault
+            fault = None if name == "repair" and creature.repairable else creature.fault
             yield creature.name, name, partial(_run_pair, creature, operation), fault
 
     for kind, (creatures, operations) in OTHERS.items():
