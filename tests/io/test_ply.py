@@ -162,7 +162,7 @@ def test_keywords_of_the_header_are_valid_names(tmp_path):
         (
             "element face 1000000000000\nproperty list uchar int vertex_indices\n",
             [],
-            "more than the rest",
+            "which the rest of the file cannot hold",
         ),
         ("element nothing 1000000000000\n" + FACES.format(m=1), ["3 0 1 2"], None),
         (FACES.format(m=-1), [], "line: 'element face -1'"),
