@@ -41,7 +41,7 @@ SIZE = (260, 200)
 LONGEST = 30.0  # seconds that any action may take, on a busy machine
 SAME_POSE = 2e-3  # of the diagonal: the same pose reached in two ways
 STEPS = {Mode.REGIONS: "paint region 1", Mode.CAGES: "drag the cage of region 1",
-         Mode.HANDLES: "mark tip", Mode.DEFORM: "drag tip"}  # fmt: skip
+         Mode.HANDLES: "set tip", Mode.DEFORM: "drag tip"}  # fmt: skip
 
 
 def table(*modes: Mode, campaign: bool = False) -> list:

@@ -214,11 +214,11 @@ def test_the_title_has_a_star_exactly_while_changes_are_unsaved(
     assert hand.title == "ball.vtp* - segdeform"
     assert len(slots(tmp_path)) == 1
     assert [can for can, _ in hand.reads("Edit").values()] == [True, False]
-    hand.choose("Edit", "Undo mark knob")
+    hand.choose("Edit", "Undo set knob")
     hand.settle()
     assert hand.title == "ball.vtp - segdeform"
     assert slots(tmp_path) == []
-    hand.choose("Edit", "Redo mark knob")
+    hand.choose("Edit", "Redo set knob")
     hand.settle()
     assert hand.title == "ball.vtp* - segdeform"
     choose_file(monkeypatch, tmp_path / "knob")

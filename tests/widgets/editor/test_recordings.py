@@ -106,7 +106,7 @@ def test_two_files_are_replayed_from_the_command_line(bench, tmp_path, capsys): 
     text, start = (str(tmp_path / f"work.recording.{end}") for end in ("txt", "segdeform"))
     assert main(["replay", text, start, "--film", str(film), "-o", str(mesh)]) == 0
     told = capsys.readouterr().out
-    assert "pictures" in told
+    assert "frames" in told
     assert "said" not in told
     assert np.allclose(read_mesh(mesh).vertices, bench.session.vertices, atol=1e-9)
     with Image.open(film) as pictures:

@@ -128,7 +128,7 @@ def test_a_replay_gives_the_same_pose_bit_by_bit_and_the_same_picture(recorded, 
     assert not again.hand.failures
     assert same(desk, again)
     assert np.array_equal(picture(again.view), picture(desk.view))
-    for step in ("drag handle 1", "drag handle 1", "drag handle 1", "mark handle 1"):
+    for step in ("drag handle 1", "drag handle 1", "drag handle 1", "set handle 1"):
         assert again.session.undo() == step
 
 
