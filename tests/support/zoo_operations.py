@@ -511,7 +511,8 @@ OTHERS = {
         number_of_regions, number_of_cage_vertices, offset_of_cages, smoothness_of_regions,
         distance_of_welding, largest_hole, steps_of_a_drag,
         *(named(option_of_a_deformer, name) for name in (
-            "stretch", "tolerance", "max_steps", "acceleration", "rotation_groups", "hold_tolerance",
+            "stretch", "tolerance", "max_steps", "acceleration", "rotation_groups",
+            "hold_tolerance",
         )),
         *(named(option_of_a_session, name) for name in (
             "n_cage_vertices", "offset", "stretch", "rotation_groups",
