@@ -36,7 +36,7 @@ for n_regions in (1, 5):
     distortions.append(distortion(mesh, solution.vertices))
     other_arm = np.linalg.norm(solution.vertices - mesh.vertices, axis=1)[x < -0.15].max()
     print(
-        f"{n_regions} cage(s): distortion {distortions[-1]:.3f}, {solution.steps} steps, "
+        f"cages: {n_regions}, distortion {distortions[-1]:.3f}, {solution.steps} steps, "
         f"other arm moved by {other_arm:.2f}"
     )
     if len(sys.argv) > 1:

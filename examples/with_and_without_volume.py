@@ -33,7 +33,7 @@ for preserve in (True, False):
     solution = deformer.solve(targets)
     changes[preserve] = solution.volume_change
     name = "with" if preserve else "without"
-    print(f"{name} the constraint: volume change {100 * solution.volume_change:+.2g} %")
+    print(f"{name} the constraint: relative volume change {solution.volume_change:+.1e}")
     if len(sys.argv) > 1:
         from vtk_segdeform.pictures import picture_before_after
 
