@@ -1,12 +1,12 @@
 # One command each, on a fresh clone as well as on an old one:
 #
-#   make demo       bend the cactus; mesh and pictures land in demo-output/
+#   make demo       bend the cactus; mesh and pictures are written to demo-output/
 #   make test       the whole suite            make campaign   the minutes-long runs
-#   make soak       random hands for an hour; SECONDS=900 for less
+#   make soak       random input for an hour; SECONDS=900 for less
 #   make lint       ruff, nothing changed      make format     ruff, files rewritten
 #   make test-paraview   the plugin in a real ParaView
 #   make docs       the documentation, docs/build/html/index.html
-#   make drag-film  the moving picture of the README
+#   make drag-film  the animation of the README
 #   make types      mypy --strict              make bench      a report of timings
 #   make bench-history   plot the timings of earlier runs of make bench
 #
@@ -40,9 +40,9 @@ HISTORY ?= bench-history.jsonl
 bench-history: $(VENV)/installed
 	$(BIN)/segdeform bench -o bench-output --history $(HISTORY)
 
-# Each worker takes the next tests when it has done its own: files stay together, and what is made
-# once for a file is.  Where the environment forbids to keep bytecode, every worker, and every
-# program that a test starts, would compile all anew.
+# Workers keep the tests of a file together, so that its fixtures are created once, and take over
+# tests of others when they have finished.  Without bytecode files, every worker and every child
+# process would compile all modules again.
 test: export PYTHONDONTWRITEBYTECODE :=
 test: $(VENV)/installed-test
 	$(BIN)/python -m pytest -n 2 --dist worksteal

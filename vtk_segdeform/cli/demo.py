@@ -98,7 +98,7 @@ def demo(options: Namespace, say: Say, progress: Progress) -> bool:
     solution = deformer.solve(pose.targets)
     report_solution(solution, time.perf_counter() - start, say)
     change = local_volume_change(mesh, solution.vertices)
-    say(f"local volume    {1 + change.min():.2f} to {1 + change.max():.2f} times the original")
+    say(f"local volume    {100 * change.min():+.0f} % to {100 * change.max():+.0f} %")
 
     folder.mkdir(parents=True, exist_ok=True)
     after = mesh.with_vertices(solution.vertices)

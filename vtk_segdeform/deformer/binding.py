@@ -32,7 +32,7 @@ _FORMAT = 9  # increment whenever the content of a binding changes
 
 @dataclass(frozen=True, eq=False)
 class BindingInputs:
-    """All that a binding depends on.
+    """The inputs of a binding.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class BindingInputs:
 
     @property
     def is_reduced(self) -> bool:
-        """Whether the energy is in the subspace completely, without operators on the mesh."""
+        """Whether the energy has reduced operators only, none on the mesh."""
         return self.n_clusters is not None and self.stretch > 0.0
 
     @property

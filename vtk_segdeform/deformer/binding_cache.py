@@ -87,7 +87,7 @@ def read_binding(path: Path, n_vertices: int) -> Binding | None:
 
 
 def write_binding(path: Path, binding: Binding) -> None:
-    """Write a binding to a file, completely or not at all; without room for it, not at all."""
+    """Write a binding to a file, atomically; if the disk is full, do without the file."""
     energy, coarse = binding.energy, binding.coarse_volume
     arrays: dict[str, Any] = {
         "key": np.array(_key(path)),

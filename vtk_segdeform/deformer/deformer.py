@@ -14,9 +14,10 @@ A solve does the following; `gauss_newton` has the steps.
 2. For each of them take the steps (21) to the minimum, starting from the last p.
 3. Raise the weights omega of handles and fixed vertices that miss their places, and solve again
    (`weights`).
-4. Map the cages to the mesh, x = W~ p, and restore its exact volume (`exact_volume`): moved along
-   the solver's directions, or, for a large mesh, scaled.  Scaling moves handles a little; if it is
-   by more than 3e-5, go back to 3 with the coarse volumes of the scaled mesh as targets.
+4. Map the cages to the mesh, x = W~ p, and restore its exact volume (`exact_volume`).  A small mesh
+   moves along Z, as in the steps.  For a large one the steps preserved the volume of a coarse
+   surface only, so the mesh is scaled to V_0; if by more than 3e-5, step 3 is repeated with the
+   coarse volumes of the scaled mesh as targets, at most 4 times.
 
 Positions are in the coordinates of the solver, where the mesh has size 1; see `frame`.
 
@@ -80,8 +81,10 @@ from .frame import Frame
 
 _POSITION_WEIGHT = 90.0  # of a handle or fixed patch, times the scale of the shape energy
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
-_SOLVES_PER_SCALING, _SCALED, _ROUNDING = 4, 3e-5, 1e-7  # solves at most; relative sizes
-_MET = 1e-3  # diagonals within which a vertex counts as in its place
+_SOLVES_PER_SCALING = 4  # at most
+_SCALED = 3e-5  # relative scale from which another solve follows
+_ROUNDING = 1e-7  # relative scale that counts as rounding
+_MET = 1e-3  # position error, in diagonals, below which a target is met
 _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))

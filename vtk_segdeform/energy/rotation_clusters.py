@@ -60,7 +60,7 @@ _TIE_BREAK = 1e-6  # as in `kmeans`
 
 
 class _Response(NamedTuple):
-    """How k patches of surface move while the body is pulled, c times in all."""
+    """Responses of k surface patches to c test loads."""
 
     metric: FloatArray  # (k, 3, 3), M
     torques: FloatArray  # (k, 3, c), b

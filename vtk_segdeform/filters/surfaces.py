@@ -16,7 +16,7 @@ from ..errors import MeshError
 
 
 def surface(polydata: Any) -> tuple[FloatArray, IntArray]:
-    """Return vertices (n, 3) and faces (m, 3) of a vtkPolyData; polygons and strips are cut.
+    """Return vertices (n, 3) and faces (m, 3) of a vtkPolyData; its polygons are triangulated.
 
     Raises
     ------

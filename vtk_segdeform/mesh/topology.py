@@ -158,7 +158,7 @@ class HalfEdges:
         return np.flatnonzero(several)
 
     def _has_one_fan_each(self) -> bool:
-        """Return whether every vertex has one fan, as far as the twins can tell; may be too strict.
+        """Return whether every vertex has one fan, judged by twins; may be False for a valid mesh.
 
         Crossing the half-edge that ends at a corner leads to the next corner of its fan.  The
         walk goes around all vertices at once, each from one of its corners until it returns;

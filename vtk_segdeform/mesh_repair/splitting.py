@@ -1,4 +1,4 @@
-"""Separate surfaces that touch in a vertex or along an edge, by copying vertices.
+"""Separate surfaces that touch at a vertex or along an edge, by copying vertices.
 
 At a vertex of a two-manifold the faces form one fan; each further fan gets a copy of the vertex.
 Fans that end at a border count as one: closing the holes between them joins them.

@@ -332,7 +332,7 @@ class Session(Timeline):
         self._set_cages(self.fitted_cages(progress), "fit cages")
 
     def bind(self, progress: Progress | None = None) -> None:
-        """Bind the cages and constraints ahead of the first move, which would otherwise wait."""
+        """Bind the cages and constraints in advance, so that the first move does not wait."""
         self._pose_solver.prepare(self._state, progress)
 
     # Fixed vertices and handles.
@@ -457,7 +457,7 @@ class Session(Timeline):
     def refine(self, *, max_steps: int | None = None) -> Solution:
         """Continue solving for the current targets, for example after a drag with *max_steps*.
 
-        This is no undo step of its own: it belongs to the ongoing drag, or else to the last step.
+        Adds no undo step: the result becomes part of the ongoing drag, or else of the last step.
         """
         pose, solution = self._solve(self.targets, max_steps)
         if solution.steps == 0:  # converged already: keep the same pose object

@@ -1,12 +1,12 @@
-"""Exact volume: move a pose onto its volumes, to rounding.
+"""Exact volume: restore the volumes of a pose, to rounding.
 
     along directions    x + sum_k t_k z_k     the root of a cubic; Newton's method for several
     by scaling          c + s (x - c)         s^3 = V_0 / V; for large meshes, whose map takes long
 
 The first is the last operation of every step of the solver, and of a solve; the second, for one
 volume of a large mesh, is the last of a solve only: its steps take the volume over a coarse surface
-(`coarse_volume`), so a little is missing.  Mean value coordinates scale with the cages: the caller
-scales these alike, and x = W~ p still.
+(`coarse_volume`), which leaves a small error.  Mean value coordinates scale with the cages, so the
+caller scales these alike, and x = W~ p still holds.
 """
 
 from __future__ import annotations

@@ -3,7 +3,9 @@
     minimise  E(p) + sum_i omega_i |x_i - u_i|^2    subject to  g(x) = 0,   x = W~ p    (20)
 
 E is the shape energy (5), u_i are the places of fixed vertices (6) and handles (7), and g are the
-volume constraints (9).  The paper's step, with J_f replaced by A, is eq. (21):
+volume constraints (9).  E = |A x - b(x)|^2 with the linear operators A of detail and stretch, and
+b(x) the detail at rest, rotated by the local rotations R(x).  The paper replaces J_f = A - db/dx by
+A, so that R is constant within a step and refitted at each new pose.  Its step is eq. (21):
 
     h = -H^-1 (d + G^T lambda),   lambda = (G H^-1 G^T)^-1 (g - G H^-1 d)
 
@@ -12,6 +14,7 @@ volume constraints (9).  The paper's step, with J_f replaced by A, is eq. (21):
 
 (The paper prints a minus before its lambda; then G h = -g would not hold.)
 
+    `GaussNewton._evaluate`   the rotations R, and with them E, d and G at a pose
     `GaussNewton._step`       h, lambda and Z = H^-1 G^T: eq. (21), line by line
     `GaussNewton._retract`    p + h, moved along Z onto g = 0
     `GaussNewton.minimise`    the iteration
@@ -19,7 +22,9 @@ volume constraints (9).  The paper's step, with J_f replaced by A, is eq. (21):
 Four things are added; the numbers are of the cactus bent by 60 degrees:
 
 1. *Exact volume.*  Along Z the volume is a cubic of the step length; its root is the last operation
-   of every step (`exact_volume`).  |dV| / V is then about 1e-15; (21) alone leaves 1e-4.
+   of every step (`exact_volume`).  |dV| / V is then about 1e-15; (21) alone leaves 1e-4.  For a
+   large mesh this is the volume of a coarse surface (`coarse_volume`), and `Deformer` restores that
+   of the mesh itself at the end.
 2. *Exact Hessian* (`hessian`).  In (21) rotations follow one step behind: hundreds of steps are
    needed, and a small step does not mean that the minimum is near.  With the derivatives of the
    rotations and of the volumes in H, h is Newton's step, about as long as the remaining distance.
@@ -324,6 +329,7 @@ class GaussNewton:
         return self.volumes.surface.map(p) if needed else _NO_SURFACE
 
     def _evaluate(self, p: FloatArray, x: FloatArray, term: TargetTerm) -> _Iterate:
+        """Fit the local rotations; return E, d and G at *p*, where the volumes' surface is *x*."""
         load = self.energy.rotation_load(p, x)
         gradients = [constraint.gradient(x) for constraint in self.volumes.constraints]
         if self.energy.has_vertex_rotations:  # the load is on the surface, too: one pass over W~

@@ -1,4 +1,4 @@
-"""The passes over a whole mesh on a GPU: the map, the volume and the normals.
+"""Operations on the whole mesh on a GPU: the map, the volume and the normals.
 
     arrays = gpu_arrays()             cupy, or else torch, if a GPU works with it; or None
 
@@ -67,7 +67,7 @@ def _faults_named() -> Iterator[None]:
     except GPUError:
         raise
     except (MemoryError, RuntimeError) as fault:  # raised by cupy and torch
-        raise GPUError(f"the GPU gave up: {fault}") from fault
+        raise GPUError(f"GPU computation failed: {fault}") from fault
 
 
 class GPUSurface:

@@ -39,7 +39,7 @@ class StartPage(QtWidgets.QWidget):
         self.open.setDefault(True)
         self.open.clicked.connect(self.open_wanted)
         self.sample.clicked.connect(self.sample_wanted)
-        self.sample.setToolTip("A cactus to try the editor on; no file is needed")
+        self.sample.setToolTip("Try the editor on a built-in model")
         self.target = _Target()
         self.recent: list[Any] = []
         self._heading = QtWidgets.QLabel("Recent")

@@ -230,14 +230,14 @@ class Controller:
         self.refresh()
 
     def prepare(self) -> None:
-        """Start in the background what the first drag, or the overlay, would wait for."""
+        """Precompute the data of the first drag, or of the overlay, in the background."""
         widgets, session = self.widgets, self.session
         if not self._is_on or self.is_busy:
             return
         if self._mode is Mode.DEFORM and session.is_ready and not session.is_bound:
             self.start("Binding mesh to cages", widgets.bind, lambda _: None)
         elif widgets.wants_overlay(self._mode) and not widgets.overlay.is_prepared:
-            self.start("Measuring local volume change", widgets.measure, lambda _: None)
+            self.start("Computing local volume change", widgets.measure, lambda _: None)
 
     def _job_changed(self) -> None:
         if not self.is_busy:

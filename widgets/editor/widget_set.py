@@ -63,7 +63,7 @@ class WidgetSet:
         self.selector.region = min(region, self.n_regions) if self.n_regions else 1
 
     def enter(self, mode: Mode) -> None:
-        """Switch on the widget of *mode*, and show what belongs to that mode."""
+        """Activate the widget of *mode* and show its actors."""
         if mode is Mode.REGIONS:
             self.selector.paints = Paint.REGION
         elif mode is Mode.HANDLES and self.selector.paints is Paint.REGION:
@@ -108,12 +108,12 @@ class WidgetSet:
         return after
 
     def bind(self, progress: Progress) -> None:
-        """Compute what the first drag would wait for; in any thread, while all widgets are off."""
+        """Precompute the data of the first drag; in any thread, while all widgets are off."""
         self.session.bind(part(progress, 0.0, 0.9))
         self.overlay.prepare()
 
     def measure(self, progress: Progress) -> None:
-        """Compute what the overlay would wait for; in any thread, as `bind`."""
+        """Precompute the data of the overlay; in any thread, as `bind`."""
         progress(0.0, "")
         self.overlay.prepare()
 

@@ -68,7 +68,7 @@ class DeformPart(QtWidgets.QGroupBox):
         super().__init__("Deform")
         self._editor = editor
         self.volume = QtWidgets.QLabel()
-        self.volume.setToolTip("(V - V0) / V0 of the whole mesh")
+        self.volume.setToolTip("Relative volume change of the whole mesh")
         self.overlay = check_box(
             "Show local volume change", "Colour the mesh by its local volume change (O)"
         )

@@ -668,7 +668,7 @@ def test_local_volumes_are_measured_in_a_job_in_cage_mode_too(bench, monkeypatch
     bench.type("2")
     bench.hand.key("o")
     assert bench.editor.is_busy
-    assert "Measuring local volume change" in bench.editor.status
+    assert "Computing local volume change" in bench.editor.status
     assert not bench.editor.widgets.overlay.is_shown
     bench.settle()
     assert bench.editor.widgets.overlay.is_shown
