@@ -45,7 +45,7 @@ def as_faces(faces: ArrayLike, n_points: int, name: str) -> IntArray:
     if array.ndim != 2 or array.shape[1] != 3:
         raise ArgumentError(f"{name} must have shape (m, 3), triangles; got {array.shape}")
     if array.dtype.kind not in "iu":
-        raise ArgumentError(f"{name} must hold integers; got {array.dtype}")
+        raise ArgumentError(f"{name} must contain integers; got {array.dtype}")
     if len(array) and (array.min() < 0 or array.max() >= n_points):
         low, high = array.min(), array.max()
         raise ArgumentError(f"{name} must index 0..{n_points - 1}; got {low}..{high}")
@@ -65,7 +65,7 @@ def as_ids(ids: ArrayLike, n_points: int, name: str) -> IntArray:
     if array.size == 0:
         return np.empty(0, dtype=np.int64)
     if array.dtype.kind not in "iu":
-        raise ArgumentError(f"{name} must hold vertex numbers or be a mask; got {array.dtype}")
+        raise ArgumentError(f"{name} must contain vertex numbers or be a mask; got {array.dtype}")
     array = np.atleast_1d(array).astype(np.int64)
     if array.ndim != 1:
         raise ArgumentError(f"{name} must be a list of vertex numbers; got shape {array.shape}")
@@ -98,14 +98,14 @@ def as_numbers(values: ArrayLike, name: str) -> FloatArray:
     """Return *values* as floats of any shape, or raise an ArgumentError."""
     array = plain(values, name)
     if array.dtype.kind == "c":
-        raise ArgumentError(f"{name} must hold real numbers; got {array.dtype}")
+        raise ArgumentError(f"{name} must contain real numbers; got {array.dtype}")
     if array.dtype.kind == "O":  # the conversion checks each entry
         try:
             return array.astype(np.float64)
         except Exception as fault:
-            raise ArgumentError(f"{name} must hold numbers; got {array.dtype}") from fault
+            raise ArgumentError(f"{name} must contain numbers; got {array.dtype}") from fault
     if array.dtype.kind not in "biuf":
-        raise ArgumentError(f"{name} must hold numbers; got {array.dtype}")
+        raise ArgumentError(f"{name} must contain numbers; got {array.dtype}")
     return array.astype(np.float64, copy=False)
 
 

@@ -102,7 +102,7 @@ def test_two_fans_in_one_vertex_are_found():
     other = np.array([0, 4, 5, 6])
     mirror = 2 * vertices[0] - vertices[1:]
     (fault,) = cage_faults(np.vstack([vertices, mirror]), np.vstack([faces, other[faces[:, ::-1]]]))
-    assert "1 vertex joins several surfaces in a point" in fault
+    assert "1 vertex joins several surfaces at one point" in fault
 
 
 def test_a_vertex_in_no_face_is_found():

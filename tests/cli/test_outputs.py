@@ -105,7 +105,7 @@ def test_a_mesh_that_exceeds_memory_is_an_error_that_names_it(folder, monkeypatc
     monkeypatch.setitem(convert._READERS, ".obj", read)
     assert main(["check", "vast.obj"]) == 1
     told = capsys.readouterr().err
-    assert told == "segdeform check: vast.obj: too large for the memory of this machine (45 GB)\n"
+    assert told == "segdeform check: vast.obj: not enough memory to read this file (45 GB)\n"
 
 
 def test_work_that_exceeds_memory_is_an_error_in_one_line(folder, monkeypatch, capsys):

@@ -323,7 +323,7 @@ def test_an_empty_file_is_called_empty(tmp_path, suffix):
 
 def test_a_file_without_polygons_says_what_it_holds(tmp_path):
     pv.PolyData().save(tmp_path / "a.vtp")
-    with pytest.raises(MeshError, match="holds no surface: 0 points, 0 polygons"):
+    with pytest.raises(MeshError, match="contains no surface: 0 points, 0 polygons"):
         read_polydata(tmp_path / "a.vtp")
 
 

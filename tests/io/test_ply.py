@@ -226,5 +226,5 @@ def test_a_truncated_file_says_so_wherever_it_ends(tmp_path, kind):
 def test_a_word_among_numbers_is_shown(tmp_path):
     whole = text(TETRAHEDRON[0], ["3 0 1 2"], FACES.format(m=1))
     (tmp_path / "a.ply").write_text(whole.replace("3 0 1 2", "3 0 one 2"))
-    with pytest.raises(MeshError, match="'one' where a number must be"):
+    with pytest.raises(MeshError, match="'one' where a number is expected"):
         read_polydata(tmp_path / "a.ply")

@@ -560,7 +560,7 @@ def test_what_to_do_next_is_said_at_every_stage():
         assert session.is_ready == (len(said) > 3)
         step()
         said.append(session.what_next)
-    assert [words.split()[0] for words in said] == ["make", "fit", "add", "drag", "drag"]
+    assert [words.split()[0] for words in said] == ["create", "fit", "add", "drag", "drag"]
     assert "fixed" in said[3]
 
 

@@ -210,11 +210,11 @@ def test_a_failure_of_the_gpu_raises_a_gpu_error(fault):
         raise fault
 
     full = types.SimpleNamespace(**{**vars(np), "empty": fails})
-    with pytest.raises(GPUError, match=f"the GPU gave up: {fault}"):
+    with pytest.raises(GPUError, match=f"GPU computation failed: {fault}"):
         GPUSurface(SUBSPACE, SCENE.mesh.vertices, SCENE.mesh.faces, full)
     lost = still(*BEAD, types.SimpleNamespace(**{**vars(np), "take": fails}))
     for call in (lost.volume, lost.normals, lambda x: lost.scale_to_volume(x, 1.0, np.zeros(3))):
-        with pytest.raises(GPUError, match=f"^the GPU gave up: {fault}$"):
+        with pytest.raises(GPUError, match=f"^GPU computation failed: {fault}$"):
             call(BEAD[0])
 
 

@@ -67,7 +67,7 @@ def test_passengers_are_bound_once_for_many_poses(bent):
     deformer, solution = bent
     passengers = deformer.passengers(INSIDE)
     assert_allclose(passengers.moved(solution.cage_vertices), deformer.carry(INSIDE), atol=1e-12)
-    with pytest.raises(CageError, match=r"must hold \[66, 66, 66\] points"):
+    with pytest.raises(CageError, match=r"must contain \[66, 66, 66\] points"):
         passengers.moved(solution.cage_vertices[:2])
 
 

@@ -246,9 +246,9 @@ FAULTY = [
     Creature("so small that volumes underflow", lambda: moved(body(), 1e-150), "too small", False),
     Creature("points with two coordinates", lambda: (body()[0][:, :2], body()[1]), r"vertices must have shape \(n, 3\)", False, False),
     Creature("quadrilaterals", lambda: (body()[0], np.arange(256).reshape(-1, 4)), "triangles", False, False),
-    Creature("fractional indices", lambda: (body()[0], body()[1] + 0.5), "faces must hold integers", False, False),
-    Creature("text", lambda: (body()[0].astype(str), body()[1]), "vertices must hold numbers", False, False),
-    Creature("complex numbers", lambda: (body()[0] + 1j, body()[1]), "vertices must hold numbers", False, False),
+    Creature("fractional indices", lambda: (body()[0], body()[1] + 0.5), "faces must contain integers", False, False),
+    Creature("text", lambda: (body()[0].astype(str), body()[1]), "vertices must contain numbers", False, False),
+    Creature("complex numbers", lambda: (body()[0] + 1j, body()[1]), "vertices must contain numbers", False, False),
     Creature("ragged lists", lambda: ([[0, 0, 0], [1, 0]], [[0, 1, 1]]), "rows differ in length", False, False),
     Creature("None", lambda: (None, None), "vertices must", False, False),
 ]  # fmt: skip
@@ -360,8 +360,8 @@ CAGES = [
     Creature("NaN", lambda: moved(ball(), [1.0, np.nan, 1.0]), "NaN"),
     Creature("empty", lambda: (np.empty((0, 3)), np.empty((0, 3), int)), "needs at least 4 faces|no surface"),
     Creature("faces of another mesh", lambda: (ball()[0], body()[1]), "must index|use vertices"),
-    Creature("text", lambda: (ball()[0].astype(str), ball()[1]), "must hold numbers", but={"cage in the filter": None}),
-    Creature("huge, 1e200", lambda: ball(1e200), "too large to compute"),
+    Creature("text", lambda: (ball()[0].astype(str), ball()[1]), "must contain numbers", but={"cage in the filter": None}),
+    Creature("huge, 1e200", lambda: ball(1e200), "too large to compute|coordinates exceed"),
     Creature("tiny, 1e-200", lambda: ball(1e-200), "no area|too small|outside"),
 ]  # fmt: skip
 
@@ -477,7 +477,7 @@ CAGE_POSES = [  # of the tight cage, 66 vertices
     Creature("1e30 away", lambda: _cage() * 1e30, "at most 10 are allowed"),
     Creature("too few", lambda: _cage()[1:], "must be 66 points"),
     Creature("with two coordinates", lambda: _cage()[:, :2], "shape"),
-    Creature("text", lambda: _cage().astype(str), "must hold numbers"),
+    Creature("text", lambda: _cage().astype(str), "must contain numbers"),
 ]
 
 NUMBERS = [

@@ -127,7 +127,7 @@ def cage_faults(vertices: ArrayLike, faces: ArrayLike) -> tuple[str, ...]:
     points = as_points(vertices, "vertices")
     triangles = as_faces(faces, len(points), "faces")
     if np.abs(points).max(initial=0.0) > _LARGEST:
-        return (f"its vertices are too large to compute with, above {_LARGEST:.0e}: scale it down",)
+        return (f"its coordinates exceed {_LARGEST:.0e}; scale it down",)
     faults = connectivity_faults(len(points), triangles)
     return tuple(faults or _flat_faults(points, triangles) or _solid_faults(points, triangles))
 

@@ -47,7 +47,7 @@ def stacked_cages(cages: Sequence[Cage], cage_vertices: Sequence[ArrayLike]) -> 
     poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
     expected, got = [cage.n_vertices for cage in cages], [len(pose) for pose in poses]
     if got != expected:
-        raise CageError(f"cage_vertices must hold {expected} points, cage by cage; got {got}")
+        raise CageError(f"cage_vertices must contain {expected} points, cage by cage; got {got}")
     return np.concatenate(poses)
 
 

@@ -9,8 +9,8 @@ from rest to x.  The paper has the first term only, and weights all its rows ali
 the vertex area A_i makes the energy independent of how finely the surface is meshed.  The second
 term is ours: with bending alone limbs are almost unconstrained and triangles shear (area-weighted
 distortion 0.16 on a 70 degree bend against 0.09).  It compares each triangle with the rotations of
-its three corners ("spokes and rims"), which is never negative, however bad the triangle; the edge form
-sum cot_ij |x_ij - R_i v_ij|^2 is not.
+its three corners ("spokes and rims"), which is never negative, however bad the triangle; the edge
+form sum cot_ij |x_ij - R_i v_ij|^2 is not.
 
 For given R the energy is quadratic.  Both terms depend on R through one 3 x 3 matrix per cluster:
 

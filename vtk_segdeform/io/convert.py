@@ -125,10 +125,10 @@ def read_polydata(path: str | Path) -> pv.PolyData:
         raise MeshError(f"{path}: is not a readable {suffix} file ({error})") from None
     except MemoryError:
         size = f"{status.st_size / 1e9:.2g} GB"
-        raise MeshError(f"{path}: too large for the memory of this machine ({size})") from None
+        raise MeshError(f"{path}: not enough memory to read this file ({size})") from None
     if not surface.n_points or not surface.n_cells:
         raise MeshError(
-            f"{path}: holds no surface: {surface.n_points} points, {surface.n_cells} polygons; "
+            f"{path}: contains no surface: {surface.n_points} points, {surface.n_cells} polygons; "
             "export the mesh itself"
         )
     return surface

@@ -123,7 +123,7 @@ def _doubles(words: list[bytes]) -> Any:
     except ValueError:
         wrong = next(word for word in words if not _is_number(word))
         raise MeshError(
-            f"the PLY file has {decoded(wrong)[:40]!r} where a number must be; export it again"
+            f"the PLY file has {decoded(wrong)[:40]!r} where a number is expected; export it again"
         ) from None
 
 

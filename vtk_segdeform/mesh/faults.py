@@ -95,9 +95,9 @@ def as_soup(vertices: ArrayLike, faces: ArrayLike) -> tuple[FloatArray, IntArray
     if triangles.ndim != 2 or triangles.shape[1] != 3:
         raise ArgumentError(f"faces must have shape (m, 3), triangles; got {triangles.shape}")
     if points.dtype.kind not in "iuf":
-        raise ArgumentError(f"vertices must hold numbers; got {points.dtype}")
+        raise ArgumentError(f"vertices must contain numbers; got {points.dtype}")
     if triangles.dtype.kind not in "iu":
-        raise ArgumentError(f"faces must hold integers; got {triangles.dtype}")
+        raise ArgumentError(f"faces must contain integers; got {triangles.dtype}")
     return (
         np.ascontiguousarray(points, dtype=np.float64),
         np.ascontiguousarray(triangles, dtype=np.int64),
@@ -135,7 +135,7 @@ def connectivity_faults(n_points: int, faces: IntArray) -> list[str]:
         pinched = len(np.unique(fans)) - n_points
         if pinched:
             vertices = counted(pinched, "vertex joins", "vertices join")
-            faults.append(f"{vertices} several surfaces in a point")
+            faults.append(f"{vertices} several surfaces at one point")
     return faults
 
 

@@ -69,7 +69,7 @@ class Kind(enum.Enum):
         "non-manifold vertex",
         "non-manifold vertices",
         "vertex ",
-        "surfaces touch there in a point; `repair` separates them",
+        "surfaces touch there at a point; `repair` separates them",
     )
     TURNED_EDGE = (
         "inconsistently oriented edge",

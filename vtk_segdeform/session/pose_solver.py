@@ -123,7 +123,7 @@ class PoseSolver:
         self._current = None  # in case the solve fails
         solution = deformer.solve(_stacked(targets), max_steps=max_steps)
         if not np.isfinite(solution.vertices).all():
-            raise ConstraintError("these targets lead to no finite pose; move handles less far")
+            raise ConstraintError("no finite pose for these targets; move the handles less")
         for vertices in solution.cage_vertices:
             frozen(vertices)
         pose = Pose(solution.cage_vertices, targets)

@@ -83,7 +83,7 @@ class Session(Timeline):
     >>> from vtk_segdeform import models
     >>> session = Session(models.sphere(300))
     >>> session.what_next
-    'make regions: segment the mesh, or paint them'
+    'create regions: segment the mesh or paint them'
     >>> session.set_regions(Regions.single(session.mesh))
     >>> session.change_options(n_cage_vertices=30)
     >>> session.fit_cages()
@@ -218,7 +218,7 @@ class Session(Timeline):
     def what_next(self) -> str:
         """The next thing to do, as text for a status bar."""
         if self.regions is None:
-            return "make regions: segment the mesh, or paint them"
+            return "create regions: segment the mesh or paint them"
         if not self.cages:
             return "fit cages to the regions"
         if not self.handles:

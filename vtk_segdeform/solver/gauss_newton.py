@@ -204,7 +204,7 @@ class GaussNewton:
         factor = quadratic_factor(self._hessian)
         if factor is None:
             raise CageError(
-                "the cages hardly move the mesh, so no pose can be computed; fit them more tightly"
+                "the cages have almost no influence on the mesh; refit them closer to the surface"
             )
         self._factor = factor
 

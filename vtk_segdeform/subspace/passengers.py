@@ -67,7 +67,9 @@ class Passengers(Frozen):
         poses = [as_points(vertices, "cage_vertices") for vertices in cage_vertices]
         expected, got = [b.shape[1] for b in self.subspace.blocks], [len(p) for p in poses]
         if got != expected:
-            raise CageError(f"cage_vertices must hold {expected} points, cage by cage; got {got}")
+            raise CageError(
+                f"cage_vertices must contain {expected} points, cage by cage; got {got}"
+            )
         p = np.concatenate(poses)
         centre = p.mean(axis=0)  # moved about it, no digits are lost far from the origin
         return np.asarray(centre + self.subspace.map(p - centre))

@@ -367,7 +367,7 @@ def _checked_blend(blend: ArrayLike, regions: Regions) -> FloatArray:
 
 def _check_cages(regions: Regions, cages: Sequence[Cage]) -> None:
     if not all(isinstance(cage, Cage) for cage in cages):
-        raise CageError("cages must hold Cage objects; make one by Cage(vertices, faces)")
+        raise CageError("cages must contain Cage objects; make one by Cage(vertices, faces)")
     if len(cages) != regions.n_regions:
         raise CageError(f"{regions.n_regions} regions need as many cages; got {len(cages)}")
     total = sum(cage.n_vertices for cage in cages)
