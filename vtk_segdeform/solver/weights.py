@@ -46,6 +46,7 @@ class _Weighted:
         return self.solver.positions.strength
 
     def solve(self, places: FloatArray, options: SolverOptions) -> SolverResult:
+        """Minimise from the last pose, and keep the new one."""
         result = self.solver.minimise(self.p, places, options)
         self.p = result.p
         return result
@@ -123,6 +124,7 @@ class _Run:
         self._options = options
 
     def solve(self, weighted: _Weighted) -> SolverResult:
+        """Solve with *weighted*, and count its steps."""
         result = weighted.solve(self.places, self._options)
         self.used.append(weighted)
         self.steps += result.steps
