@@ -36,8 +36,8 @@ def check_distance(targets: FloatArray) -> None:
     """Raise a ConstraintError if *targets*, in units of the mesh's size, are absurdly far away."""
     if max(targets.max(initial=0.0), -targets.min(initial=0.0)) > _FARTHEST:
         raise ConstraintError(
-            f"a target is {np.abs(targets).max():.0e} times the mesh's size away from it; "
-            "are both in the same unit?"
+            f"a target is {np.abs(targets).max():.0e} mesh sizes away; "
+            "check that targets and mesh are in the same unit"
         )
 
 
@@ -97,5 +97,5 @@ def require_together(mesh: Mesh, *places: FloatArray) -> None:
     if not apart <= FARTHEST_APART:
         raise ConstraintError(
             f"targets and fixed vertices are {apart:.3g} diagonals of the mesh apart; at most "
-            f"{FARTHEST_APART:.0f} are allowed: are both in the same unit?"
+            f"{FARTHEST_APART:.0f} are allowed; check that both are in the same unit"
         )

@@ -24,8 +24,8 @@ from .solution import Status
 
 _FACTOR = 10.0  # by which a weight is raised
 _HIGHEST = 1e4  # times the initial weight
-# A higher weight must reduce the errors to this share and raise the energy by no more than this
-# factor; beyond it, poses begin to fold.
+# A higher weight is accepted if it multiplies the errors by at most _GAIN and the energy by at most
+# _COST; at a higher cost, poses begin to fold.
 _GAIN, _COST = 0.7, 1.75
 _AIM = 0.95  # of the tolerance; closer to it, interpolation too often fails
 _TRIES = 3
