@@ -70,7 +70,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     if solution.handle_error > HANDLE_TOLERANCE:
         raise MeshError(
             f"{options.output} was written, but a handle misses its target by "
-            f"{solution.handle_error:.1e} of the mesh diagonal: {solution.status}"
+            f"{100 * solution.handle_error:.3f} % of model size: {solution.status}"
         )
     return True
 

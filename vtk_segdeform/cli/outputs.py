@@ -39,7 +39,7 @@ def report_solution(solution: Solution, seconds: float, say: Say) -> None:
     """Print the volume change, the handle error, the time and the status of a solution."""
     each = 1e3 * seconds / max(solution.steps, 1)
     report_volume(solution.volume_change, say)
-    say(f"handle error    {solution.handle_error:.1e} of the mesh diagonal")
+    say(f"handle error    {100 * solution.handle_error:.3f} % of model size")
     say(f"solve           {solution.steps} steps, {1e3 * seconds:.0f} ms, {each:.1f} ms per step")
     say(f"status          {solution.status}")
 
