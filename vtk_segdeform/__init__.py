@@ -54,7 +54,7 @@ if _TYPE_CHECKING:
     from .cages import Cage, fit_cages, mean_value_coordinates
     from .deformer import Deformer, deform
     from .geometry import local_volume_change
-    from .io import read_mesh, write_mesh
+    from .io import Surface, read_mesh, write_mesh
     from .mesh import Mesh, find_faults
     from .mesh_repair import repair
     from .regions import Regions, segment
@@ -73,6 +73,7 @@ _MODULE_OF = {
     "Session": "session",
     "Solution": "solver",
     "Status": "solver",
+    "Surface": "io",
     "deform": "deformer",
     "edit": "widgets.plugin",
     "find_faults": "mesh",
@@ -101,6 +102,7 @@ __all__ = [
     "Session",
     "Solution",
     "Status",
+    "Surface",
     "deform",
     "edit",
     "errors",

@@ -23,7 +23,7 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 ROOMS = [
     "version", "errors", "sizes", "checks", "arrays", "progress", "freezing", "files", "kernels",
     "mesh", "mesh_repair", "geometry", "regions", "cages", "subspace", "energy", "solver",
-    "deformer", "session", "models", "io", "pictures", "filters",
+    "deformer", "io", "session", "models", "pictures", "filters",
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
     "widgets.handle_dragger", "widgets.volume_overlay", "widgets.recording", "widgets.editor",
     "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "benchmarks", "cli", "__main__",
@@ -47,6 +47,7 @@ GRANTED = {
     "io.meshlab": {"pymeshlab"},
     "io.polygons": VTK,
     "io.vtk_formats": VTK,
+    "session.session": {"pyvista"},
     "pictures": VTK | {"pyvista"},
     "filters": VTK,
     "filters.paraview_plugin": {"paraview"},

@@ -148,7 +148,8 @@ def _twins(faces: IntArray, n_vertices: int) -> IntArray:
     Here corner h = 3 f + c stands for the edge opposite it.
     """
     # A half-edge runs from its corner to the next one, opposite the last corner.
-    pairs = HalfEdges(faces, n_vertices).pairs
+    half_edges = HalfEdges(faces, n_vertices)
+    pairs = half_edges.pairs[~half_edges.inconsistent]  # those of a one-sided surface stay
     one, other = next_half_edge(next_half_edge(pairs)).T
     twin = np.arange(faces.size)
     twin[one], twin[other] = other, one

@@ -2,6 +2,7 @@
 
 The files, in reading order:
 
+    surface            `Surface`: what is given, and the mesh that is deformed
     convert            `read_mesh`, `write_mesh`, `from_polydata`, `to_polydata`
     polygons           polygons as two flat arrays
     off                OFF
@@ -34,8 +35,10 @@ from .meshlab import from_meshset, simplify, to_meshset
 from .meshlab_project import read_project, write_project
 from .polygons import polydata_of, triangles_of
 from .repaired import repair_surface
+from .surface import Surface
 
 __all__ = [
+    "Surface",
     "from_meshset",
     "from_polydata",
     "is_mesh_file",

@@ -33,9 +33,16 @@ from ..arrays import FloatArray, IntArray, is_whole
 from ..checks import all_of, as_path, require, shown
 from ..errors import ArgumentError, MeshError, MissingDependencyError
 from ..mesh import Mesh, require_mesh
-from ..session import Session
 from .isolated import read_isolated
-from .meshlab_layers import Surface, add_attributes, as_layers, free_name, layer_data, surface_of
+from .meshlab_layers import (
+    HasLayers,
+    Surface,
+    add_attributes,
+    as_layers,
+    free_name,
+    layer_data,
+    surface_of,
+)
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -54,7 +61,7 @@ def available() -> bool:
     return True
 
 
-def to_meshset(what: Surface | Session | Mapping[str, Surface]) -> Any:
+def to_meshset(what: Surface | HasLayers | Mapping[str, Surface]) -> Any:
     """Convert surfaces to a ``pymeshlab.MeshSet``; its first layer is the current one.
 
     Parameters

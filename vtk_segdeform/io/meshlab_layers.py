@@ -23,18 +23,25 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Container, Iterable, Mapping
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 import pyvista as pv
 
 from ..errors import MeshError
 from ..mesh import Mesh
-from ..session import Session
 from .polygons import polydata_of
 
 Surface: TypeAlias = Mesh | pv.PolyData
 _CORNERS, _TEXTURE = "TextureCorners", "TextureCoordinates"
+
+
+@runtime_checkable
+class HasLayers(Protocol):
+    """A session, or another object made of several surfaces."""
+
+    def layers(self) -> dict[str, pv.PolyData]:
+        """Return its surfaces by name."""
 
 
 class LayerData(NamedTuple):
@@ -47,29 +54,10 @@ class LayerData(NamedTuple):
     of_faces: dict[str, Any]
 
 
-def layers_of(session: Session) -> dict[str, pv.PolyData]:
-    """Return the layers of a session, "mesh" and "cage 1", "cage 2" ..., in the current pose.
-
-    Vertices of handles are selected; the quality of a vertex is the index of its region.
-    """
-    mesh = as_surface(session.mesh.with_vertices(session.vertices))
-    if session.handles:
-        selection = np.zeros(session.mesh.n_vertices, dtype=np.uint8)
-        selection[np.concatenate(list(session.handles.values()))] = 1
-        mesh.point_data["selection"] = selection
-    if session.regions is not None:
-        mesh.point_data["quality"] = session.regions.labels.astype(np.float64)
-    layers = {"mesh": mesh}
-    for k, (cage, vertices) in enumerate(zip(session.cages, session.cage_vertices, strict=True)):
-        counts = np.full(len(cage.faces), 3)
-        layers[f"cage {k + 1}"] = polydata_of(vertices, counts, cage.faces.ravel())
-    return layers
-
-
-def as_layers(what: Surface | Session | Mapping[str, Surface]) -> dict[str, pv.PolyData]:
+def as_layers(what: Surface | HasLayers | Mapping[str, Surface]) -> dict[str, pv.PolyData]:
     """Return one surface, a session, or several surfaces by name, as layers."""
-    if isinstance(what, Session):
-        return layers_of(what)
+    if isinstance(what, HasLayers):
+        return what.layers()
     layers = what if isinstance(what, Mapping) else {"mesh": what}
     return {str(name): as_surface(surface) for name, surface in layers.items()}
 

@@ -29,9 +29,8 @@ from ..arrays import FloatArray
 from ..checks import as_path
 from ..errors import MeshError
 from ..files import open_regular, replacing, require_place
-from ..session import Session
 from .convert import read_polydata, with_vertices, write_mesh
-from .meshlab_layers import Surface, as_layers, free_name
+from .meshlab_layers import HasLayers, Surface, as_layers, free_name
 from .referenced_files import file_inside
 
 _SELECTED = 0x20  # of MeshLab's flags
@@ -87,7 +86,7 @@ def read_project(path: str | Path) -> dict[str, pv.PolyData]:
     return layers
 
 
-def write_project(path: str | Path, what: Surface | Session | Mapping[str, Surface]) -> None:
+def write_project(path: str | Path, what: Surface | HasLayers | Mapping[str, Surface]) -> None:
     """Write layers as a MeshLab project.
 
     Parameters

@@ -1,4 +1,4 @@
-"""The mesh: closed, oriented triangle surfaces, and the search for their faults.
+"""The mesh: oriented triangle surfaces, closed or with borders, and the search for their faults.
 
 The files, in reading order:
 
@@ -6,6 +6,7 @@ The files, in reading order:
     faults           search for the faults of a mesh
     report           kinds of faults, counted and described
     topology         half-edges, edges, fans, shells and boundaries
+    soup             a mesh from any triangles, and the map between both
     shells           orientation of closed shells
     inside           winding numbers, points inside a surface, distance to it
     intersections    pairs of triangles that cross or touch
@@ -18,16 +19,20 @@ from .grouping import connected, first_equal_row, first_of_group, ragged_arange
 from .inside import distance_to_surface, inside_nodes, inside_points, winding_number
 from .intersections import flat_faces, intersections_of, self_intersections
 from .mesh import Mesh, require_mesh
-from .report import MeshReport, counted
+from .report import Kind, MeshReport, counted
 from .shells import misoriented_shells
+from .soup import Soup, Workaround, mesh_of
 from .topology import HalfEdges, components, edge_keys, face_edges, next_half_edge, repeats_vertex
 from .triangles import corner_angles, least_angle, normals
 
 __all__ = [
     "UNREPAIRABLE",
     "HalfEdges",
+    "Kind",
     "Mesh",
     "MeshReport",
+    "Soup",
+    "Workaround",
     "as_soup",
     "components",
     "connected",
@@ -45,6 +50,7 @@ __all__ = [
     "inside_points",
     "intersections_of",
     "least_angle",
+    "mesh_of",
     "misoriented_shells",
     "next_half_edge",
     "normals",

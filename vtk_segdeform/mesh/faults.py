@@ -1,4 +1,4 @@
-"""Search for the faults that prevent triangles from being a closed, oriented two-manifold.
+"""Search for the faults that prevent triangles from being a `Mesh`, and for open edges and the like.
 
 The checks run in this order: coordinates, indices, single faces, edges, vertices, and last the
 orientation of shells.  Each check skips everything that earlier ones rejected, so that a fault is
@@ -53,9 +53,9 @@ def find_faults(vertices: ArrayLike, faces: ArrayLike) -> MeshReport:
 
     >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
     >>> report = find_faults(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]])
-    >>> report.ok, report.count(Kind.OPEN_EDGE), report.count(Kind.HOLE)
-    (False, 3, 1)
-    >>> print(report.faults[0])
+    >>> report.ok, report.is_closed, report.count(Kind.OPEN_EDGE), report.count(Kind.HOLE)
+    (True, False, 3, 1)
+    >>> print(report.notes[0])
     3 open edges (1-2, 1-3, 2-3)
     """
     points, triangles = as_soup(vertices, faces)
@@ -215,7 +215,14 @@ def _edge_faults(half_edges: HalfEdges) -> Iterator[Fault]:
     non_manifold = half_edges.order[half_edges.first[half_edges.counts > 2]]
     yield from _some(Kind.NON_MANIFOLD_EDGE, non_manifold, edges)
     yield from _some(Kind.NON_MANIFOLD_VERTEX, half_edges.pinched)
-    yield from _some(Kind.TURNED_EDGE, half_edges.pairs[half_edges.inconsistent, 0], edges)
+    turned = half_edges.pairs[half_edges.inconsistent, 0]
+    if len(turned):
+        one_sided = half_edges.one_sided
+        yield from _some(
+            Kind.TURNED_EDGE, turned[~one_sided[half_edges.shells[turned // 3]]], edges
+        )
+        _, first = np.unique(half_edges.shells, return_index=True)
+        yield from _some(Kind.ONE_SIDED, half_edges.faces[first[one_sided], 0])
 
 
 def _inward_shells(points: FloatArray, half_edges: HalfEdges) -> Iterator[Fault]:

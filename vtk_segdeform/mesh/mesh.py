@@ -1,8 +1,11 @@
-"""`Mesh`: a closed, outward oriented triangle mesh.
+"""`Mesh`: an oriented triangle mesh, closed or with borders.
 
-Volume, and with it the whole method, is only defined for a closed, oriented two-manifold
-(section 3.2 of the paper), so `Mesh` rejects everything else; `find_faults` lists the faults and
-`repair` fixes what it can.
+The paper deforms closed two-manifolds (section 3.2).  A `Mesh` may also have borders, and edges
+with three or more faces.  The *boundary* of its faces, the sum of their directed edges, is empty
+exactly if the mesh encloses a volume; otherwise lids over it can (`geometry`).
+
+`Mesh` rejects everything that a flip or a removal of faces would correct; `find_faults` lists such
+faults, `repair` corrects them in the mesh, and `Surface` deforms any polygons without it.
 """
 
 from __future__ import annotations
@@ -20,39 +23,43 @@ from ..errors import MeshError
 from ..freezing import Frozen, read_only
 from ..kernels import in_parallel
 from .faults import as_soup, find_faults
+from .topology import boundary_edges, edge_keys, loops_of
 
 _PIECE = 20_000  # faces per task; their data fit into the cache
 
 
 @dataclass(frozen=True, init=False, eq=False)
 class Mesh(Frozen):
-    """A closed, outward oriented triangle mesh; immutable.
+    """An oriented triangle mesh, closed or with borders; immutable.
 
     Parameters
     ----------
     vertices : (n, 3) float
         In any length unit.
     faces : (m, 3) int
-        Counter-clockwise seen from outside.
+        Counter-clockwise seen from outside.  Every vertex is in a face.
 
     Raises
     ------
     ValueError
         If an array has the wrong shape or type.
     MeshError
-        If the mesh is not a closed, oriented two-manifold; the message counts every fault.
+        If the mesh has faults, such as neighbouring faces of opposite orientation; the message
+        counts each.
 
     Examples
     --------
     >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
     >>> mesh = Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    >>> mesh.n_faces, len(mesh.edges), mesh.components
-    (4, 6, array([0, 0, 0, 0]))
-    >>> Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]])
+    >>> mesh.n_faces, len(mesh.edges), mesh.components, mesh.is_closed
+    (4, 6, array([0, 0, 0, 0]), True)
+    >>> Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]]).borders
+    (array([1, 3, 2]),)
+    >>> Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 2, 3], [1, 2, 3]])
     Traceback (most recent call last):
     ...
-    vtk_segdeform.errors.MeshError: not a closed, outward oriented two-manifold: 3 open edges
-    (1-2, 1-3, 2-3), 1 hole (at vertex 1); see find_faults and repair
+    vtk_segdeform.errors.MeshError: not an oriented mesh: 3 inconsistently oriented edges
+    (0-2, 0-3, 2-3); see find_faults, repair and Surface
     """
 
     vertices: FloatArray
@@ -62,11 +69,10 @@ class Mesh(Frozen):
         report = find_faults(vertices, faces)
         if not report.ok:
             faults = ", ".join(map(str, report.faults))
-            raise MeshError(
-                f"not a closed, outward oriented two-manifold: {faults}; see find_faults and repair"
-            )
+            raise MeshError(f"not an oriented mesh: {faults}; see find_faults, repair and Surface")
         points, triangles = as_soup(vertices, faces)
         self.__setstate__({"vertices": points.copy(), "faces": triangles.copy()})
+        self.__dict__["is_two_manifold"] = report.is_two_manifold
 
     @property
     def n_vertices(self) -> int:
@@ -83,12 +89,41 @@ class Mesh(Frozen):
         """Length of the bounding box diagonal, the reference length of tolerances."""
         return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether the faces enclose a volume: every edge has as many of them on both sides."""
+        return not len(self.boundary)
+
+    @cached_property
+    def is_two_manifold(self) -> bool:
+        """Whether the mesh is a closed two-manifold."""
+        return find_faults(self.vertices, self.faces).is_two_manifold
+
+    @cached_property
+    def boundary(self) -> IntArray:
+        """(b, 2) int: the boundary of the faces: directed edges that have no opposite.
+
+        An edge with k more faces in one direction occurs k times.  Every vertex has as many edges
+        that begin there as end there.
+        """
+        if self.is_two_manifold:
+            return read_only(np.empty((0, 2), dtype=np.int64))
+        return read_only(boundary_edges(self.faces, self.n_vertices))
+
+    @cached_property
+    def borders(self) -> tuple[IntArray, ...]:
+        """The boundary as loops: the vertices (k,) of each, in order, faces on the left."""
+        return read_only(tuple(loops_of(self.boundary)))
+
     @cached_property
     def edges(self) -> IntArray:
         """(e, 2) int: the edges, smaller vertex first, in lexicographic order."""
         tails, heads = self.faces.ravel(), self.faces[:, [1, 2, 0]].ravel()
-        once = tails < heads  # an edge occurs once in each direction
-        keys = np.sort(tails[once] * self.n_vertices + heads[once])
+        if self.is_two_manifold:
+            once = tails < heads  # an edge occurs once in each direction
+            keys = np.sort(tails[once] * self.n_vertices + heads[once])
+        else:
+            keys = np.unique(edge_keys(tails, heads, self.n_vertices))
         return read_only(np.stack(np.divmod(keys, self.n_vertices), axis=1))
 
     @cached_property
@@ -138,7 +173,14 @@ class Mesh(Frozen):
         posed = object.__new__(Mesh)
         posed.__setstate__({"vertices": points.copy(), "faces": self.faces})
         # The same for every pose: pass on the cached values.
-        for name in ("edges", "components", "_edge_numbers"):
+        for name in (
+            "is_two_manifold",
+            "boundary",
+            "borders",
+            "edges",
+            "components",
+            "_edge_numbers",
+        ):
             if name in self.__dict__:
                 posed.__dict__[name] = self.__dict__[name]
         return posed

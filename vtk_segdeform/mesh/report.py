@@ -1,6 +1,7 @@
 """Kinds of mesh faults, and the report that counts them.
 
-A fault prevents triangles from being a `Mesh`; a note does not.  `find_faults` finds both.
+A fault prevents triangles from being a `Mesh`; a note, such as a border, does not.  `find_faults`
+finds both; `repair` repairs both.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ Id = int | tuple[int, ...]  # a vertex or face by its number, an edge by its two
 
 
 class Kind(enum.Enum):
-    """A kind of fault, or of note (the last three): its name, its location and what to do."""
+    """A kind of fault, or of note (those with False): its name, its location and what to do."""
 
     EMPTY = "empty mesh", "empty meshes", "", "give at least four triangles"
     NON_FINITE = (
@@ -56,26 +57,42 @@ class Kind(enum.Enum):
         "open edge",
         "open edges",
         "",
-        "`repair` welds coincident vertices along them, then fills holes",
+        "allowed; `repair` welds coincident vertices along them, then fills holes",
+        False,
     )
-    HOLE = "hole", "holes", "at vertex ", "`repair` fills holes of up to `largest_hole` edges"
+    HOLE = (
+        "hole",
+        "holes",
+        "at vertex ",
+        "allowed; `repair` fills holes of up to `largest_hole` edges",
+        False,
+    )
     NON_MANIFOLD_EDGE = (
         "non-manifold edge",
         "non-manifold edges",
         "",
-        "three or more faces meet there; `repair` separates closed bodies that touch",
+        "allowed; three or more faces meet there; `repair` separates closed bodies that touch",
+        False,
     )
     NON_MANIFOLD_VERTEX = (
         "non-manifold vertex",
         "non-manifold vertices",
         "vertex ",
-        "surfaces touch there at a point; `repair` separates them",
+        "allowed; surfaces touch there at a point; `repair` separates them",
+        False,
     )
     TURNED_EDGE = (
         "inconsistently oriented edge",
         "inconsistently oriented edges",
         "",
         "the two faces there have opposite orientation; `repair` flips the minority",
+    )
+    ONE_SIDED = (
+        "one-sided component",
+        "one-sided components",
+        "at vertex ",
+        "allowed; it has no outside, like a Moebius strip",
+        False,
     )
     INWARD = (
         "inside-out component",
@@ -87,7 +104,8 @@ class Kind(enum.Enum):
         "component that encloses no volume",
         "components that enclose no volume",
         "at vertex ",
-        "thicken it or remove it; if it is far from the origin, move it there",
+        "allowed; if it is a body far from the origin, move it there",
+        False,
     )
     ZERO_AREA = "face without area", "faces without area", "face ", "allowed", False
     COINCIDENT = (
@@ -101,6 +119,14 @@ class Kind(enum.Enum):
 
     def __init__(self, one: str, many: str, place: str, advice: str, fatal: bool = True) -> None:
         self.one, self.many, self.place, self.advice, self.fatal = one, many, place, advice, fatal
+
+
+_OPEN = (
+    Kind.OPEN_EDGE,
+    Kind.NON_MANIFOLD_EDGE,
+    Kind.NON_MANIFOLD_VERTEX,
+    Kind.ONE_SIDED,
+)  # notes on surfaces that are not closed two-manifolds
 
 
 @dataclass(frozen=True)
@@ -135,6 +161,16 @@ class MeshReport:
         """Whether the triangles can be a `Mesh`; notes do not matter."""
         return not self.faults
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether the triangles are a closed, outward oriented two-manifold with a volume."""
+        return self.is_two_manifold and not self.count(Kind.NO_VOLUME)
+
+    @property
+    def is_two_manifold(self) -> bool:
+        """Whether the triangles are a closed, oriented two-manifold."""
+        return self.ok and not any(note.kind in _OPEN for note in self.notes)
+
     def count(self, kind: Kind) -> int:
         """Return the number of occurrences of *kind*."""
         return sum(f.count for f in self.faults + self.notes if f.kind is kind)
@@ -142,7 +178,9 @@ class MeshReport:
     def __str__(self) -> str:
         parts = "component" if self.n_components == 1 else "components"
         size = f"{self.n_vertices} vertices, {self.n_faces} faces, {self.n_components} {parts}"
-        verdict = "a closed, outward oriented two-manifold" if self.ok else "has faults"
+        verdict = "a closed, outward oriented two-manifold"
+        if not self.is_closed:
+            verdict = "can be deformed" if self.ok else "has faults"
         lines = [f"{size}: {verdict}"]
         lines += [f"  fault: {fault}; {fault.kind.advice}" for fault in self.faults]
         lines += [f"  note: {note}; {note.kind.advice}" for note in self.notes]

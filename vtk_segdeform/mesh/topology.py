@@ -133,6 +133,36 @@ class HalfEdges:
         one, other = self.order[:-1][same_edge] // 3, self.order[1:][same_edge] // 3
         return connected(m, one, other)
 
+    @cached_property
+    def sides(self) -> tuple[IntArray, BoolArray]:
+        """The side that each face shares with its neighbours, (m,) int, and whether to flip it.
+
+        A graph has two nodes for each face, unchanged and flipped, and links between nodes of
+        neighbours across pairs that agree.  Faces of one side are connected by such links; if both
+        nodes of a face are, its surface has one side only, and no face of it is flipped.
+        """
+        m = len(self.faces)
+        one, other = self.pairs.T // 3
+        across = np.where(self.inconsistent, other + m, other)
+        group = connected(
+            2 * m,
+            np.concatenate([one, one + m]),
+            np.concatenate([across, (across + m) % (2 * m)]),
+        )
+        unchanged, flipped = group[:m], group[m:]
+        side = np.minimum(unchanged, flipped)
+        return side, (flipped == side) & (unchanged != flipped)
+
+    @cached_property
+    def one_sided(self) -> BoolArray:
+        """(k,) bool: for each shell, whether it contains a surface that has one side only."""
+        one, other = self.pairs.T // 3
+        _, flip = self.sides
+        left = (flip[one] ^ flip[other]) != self.inconsistent
+        found = np.zeros(int(self.shells.max(initial=-1)) + 1, dtype=bool)
+        found[self.shells[one[left]]] = True
+        return found
+
     def fans(self, pairs: IntArray) -> IntArray:
         """Return the fan of each corner, (3m,) int, connected across *pairs* (p, 2) only."""
         one, other = pairs.T
@@ -184,6 +214,45 @@ class HalfEdges:
 def edge_keys(one: IntArray, other: IntArray, n_vertices: int) -> IntArray:
     """Return one number for each pair of vertices, the same for (a, b) and (b, a)."""
     return np.minimum(one, other) * n_vertices + np.maximum(one, other)
+
+
+def boundary_edges(faces: IntArray, n_vertices: int) -> IntArray:
+    """Return the boundary of triangles (m, 3): their directed edges without opposites, (b, 2).
+
+    An edge that k more faces have in one direction than in the other occurs k times.
+    """
+    tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    keys, edge = np.unique(edge_keys(tail, head, n_vertices), return_inverse=True)
+    net = np.rint(np.bincount(edge, np.where(tail < head, 1, -1))).astype(np.int64)
+    edges = np.stack(np.divmod(keys, n_vertices), axis=1)
+    edges[net < 0] = edges[net < 0, ::-1]
+    return np.repeat(edges, np.abs(net), axis=0)
+
+
+def loops_of(boundary: IntArray) -> list[IntArray]:
+    """Return the directed edges (b, 2) of a boundary as loops, the vertices (k,) of each in order.
+
+    At a vertex that several loops pass, the walk closes the shortest one first, so that no loop
+    passes a vertex twice.
+    """
+    following: dict[int, list[int]] = {}
+    for tail, head in boundary[::-1].tolist():
+        following.setdefault(tail, []).append(head)
+    loops = []
+    for start in boundary[:, 0].tolist():
+        path, place = [start], {start: 0}
+        while following.get(path[-1]):
+            vertex = following[path[-1]].pop()
+            if vertex in place:  # a loop is closed
+                loop = path[place[vertex] :]
+                loops.append(np.array(loop))
+                del path[place[vertex] + 1 :]
+                for each in loop[1:]:
+                    del place[each]
+            else:
+                place[vertex] = len(path)
+                path.append(vertex)
+    return loops
 
 
 def next_half_edge(half_edges: IntArray) -> IntArray:

@@ -216,23 +216,13 @@ def split(draft: Draft) -> tuple[Draft, str]:
 def orient(draft: Draft) -> tuple[Draft, str]:
     """Flip the minority of faces in each shell so that all neighbours agree.
 
-    A graph has two nodes for each face, unchanged and flipped, and links between nodes of
-    neighbours that agree.  If both nodes of a face are connected, the shell is one-sided and
-    remains unchanged.
+    One-sided surfaces remain unchanged.
     """
     half_edges, m = draft.half_edges, len(draft.faces)
-    one, other = half_edges.pairs.T // 3
-    across = np.where(half_edges.inconsistent, other + m, other)
-    group = connected(
-        2 * m,
-        np.concatenate([one, one + m]),
-        np.concatenate([across, (across + m) % (2 * m)]),
-    )
-    unchanged, flipped = group[:m], group[m:]
-    shell = np.minimum(unchanged, flipped)
-    n_flipped = np.bincount(shell, flipped == shell, minlength=2 * m)
-    n_unchanged = np.bincount(shell, unchanged == shell, minlength=2 * m)
-    flip = ((flipped == shell) != (n_flipped > n_unchanged)[shell]) & (unchanged != flipped)
+    side, other_side = half_edges.sides
+    n_other = np.bincount(side, other_side, minlength=2 * m)
+    is_minority = n_other > np.bincount(side, minlength=2 * m) - n_other
+    flip = other_side != is_minority[side]
     if not flip.any() or len(half_edges.non_manifold):
         return draft, ""
     return draft.flip(flip), f"flip {_n(flip, 'face')} to agree with the neighbours"

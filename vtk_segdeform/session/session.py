@@ -24,7 +24,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,6 +44,11 @@ from .listeners import Change
 from .pose_solver import PoseSolver
 from .state import Options, Pose, State, checked_state, fitting_cages, of_mesh
 
+if TYPE_CHECKING:
+    import pyvista as pv
+
+    from ..io import Surface
+
 
 class Effort(NamedTuple):
     """Total effort of solving so far; subtract two values for the effort in between."""
@@ -59,7 +64,7 @@ class Session(Timeline):
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Mesh or Surface
         n vertices; neither changed nor copied.
     state : State, optional
         Initial state: the `state` of another session of the same mesh.  By default there are no
@@ -99,8 +104,11 @@ class Session(Timeline):
     ('drag handle 1', True)
     """
 
-    def __init__(self, mesh: Mesh, *, state: State | None = None, history: int = 100) -> None:
-        require_mesh(mesh)
+    def __init__(
+        self, mesh: Mesh | Surface, *, state: State | None = None, history: int = 100
+    ) -> None:
+        self._surface = None if isinstance(mesh, Mesh) else _surface(mesh)
+        mesh = mesh if isinstance(mesh, Mesh) else mesh.mesh
         super().__init__(State() if state is None else checked_state(mesh, state), history)
         self._mesh = mesh
         self._pose_solver = PoseSolver(mesh)
@@ -116,6 +124,7 @@ class Session(Timeline):
     def __getstate__(self) -> dict[str, Any]:
         return {
             "_mesh": self._mesh,
+            "_surface": self._surface,
             "_state": self._state,
             "_drag_start": self._drag_start,
             "_dragged": dict(self._dragged),
@@ -133,6 +142,23 @@ class Session(Timeline):
     def mesh(self) -> Mesh:
         """The mesh at rest."""
         return self._mesh
+
+    @property
+    def surface(self) -> Surface | None:
+        """The surface of which the session deforms the mesh, if it was made from one."""
+        return self._surface
+
+    @property
+    def deformed(self) -> pv.PolyData:
+        """The surface in the current pose, as it was given apart from coordinates and normals.
+
+        Without a surface, the triangles of the mesh.
+        """
+        if self._surface is not None:
+            return self._surface.moved(self.vertices)
+        from ..io import to_polydata  # imports pyvista
+
+        return to_polydata(self.mesh.with_vertices(self.vertices))
 
     @property
     def regions(self) -> Regions | None:
@@ -230,6 +256,27 @@ class Session(Timeline):
         if self.solution.status is Status.STEP_LIMIT:
             return "not fully converged: keep dragging, or refine the pose"
         return str(self.solution.status)
+
+    def layers(self) -> dict[str, pv.PolyData]:
+        """Return the mesh and its cages as PolyData, "mesh", "cage 1", ..., in the current pose.
+
+        Vertices of handles are selected, as the array "selection"; the array "quality" of the mesh
+        is the region of each vertex.
+        """
+        from ..io import polydata_of, to_polydata  # imports pyvista
+
+        mesh = to_polydata(self.mesh.with_vertices(self.vertices))
+        if self.handles:
+            selection = np.zeros(self.mesh.n_vertices, dtype=np.uint8)
+            selection[np.concatenate(list(self.handles.values()))] = 1
+            mesh.point_data["selection"] = selection
+        if self.regions is not None:
+            mesh.point_data["quality"] = self.regions.labels.astype(np.float64)
+        layers = {"mesh": mesh}
+        for k, (cage, vertices) in enumerate(zip(self.cages, self.cage_vertices, strict=True), 1):
+            counts = np.full(cage.n_faces, 3)
+            layers[f"cage {k}"] = polydata_of(vertices, counts, cage.faces.ravel())
+        return layers
 
     # Regions.
 
@@ -537,3 +584,11 @@ def _still_fit(old: Regions, new: Regions, cages: Sequence[Cage]) -> bool:
         for cage, more in zip(cages, added, strict=False)
         if more.any()
     )
+
+
+def _surface(surface: Any) -> Surface:
+    from ..io import Surface  # imports pyvista
+
+    if not isinstance(surface, Surface):
+        require_mesh(surface)
+    return surface  # type: ignore[no-any-return]

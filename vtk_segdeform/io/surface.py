@@ -1,0 +1,111 @@
+"""`Surface`: a surface as it was given, and the mesh that is deformed in its place.
+
+    file, PolyData  -->  Surface  --mesh-->  Mesh
+    PolyData, file  <--moved, write--  Surface  <--  vertices of a pose (n, 3)
+
+What is given may have polygons, seams of doubled points, holes, faces of any orientation, lines and
+arrays.  All of it is kept: `moved` changes nothing but coordinates, and normals where there are
+some.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import ArrayLike
+
+from ..arrays import IntArray, as_ids, as_points, plain
+from ..checks import require
+from ..mesh import Mesh, Soup, Workaround, mesh_of
+from .convert import read_polydata, with_vertices, write_mesh
+from .polygons import triangles_of
+
+
+class Surface:
+    """A surface as it was given, and its mesh.
+
+    Parameters
+    ----------
+    polydata : pyvista.PolyData
+        Not changed.  It needs one face that is not flat, and finite coordinates.
+
+    Raises
+    ------
+    MeshError
+        If it has no faces, coordinates that are NaN, or flat faces only.
+
+    Examples
+    --------
+    >>> import pyvista as pv
+    >>> cube = Surface(pv.Cube())  # 24 points, since normals differ at its edges
+    >>> cube.mesh.n_vertices, cube.mesh.is_closed
+    (8, True)
+    >>> cube.moved(cube.mesh.vertices + [0, 0, 1]).n_points
+    24
+    """
+
+    def __init__(self, polydata: pv.PolyData) -> None:
+        self._given = require(polydata, pv.PolyData, "polydata").copy(deep=False)
+
+    @classmethod
+    def read(cls, path: str | Path) -> Surface:
+        """Read a surface from a file of any format of `read_mesh`."""
+        return cls(read_polydata(path))
+
+    @property
+    def given(self) -> pv.PolyData:
+        """What was given; a shallow copy, not to be changed."""
+        return self._given
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh that is deformed."""
+        return self._soup.mesh
+
+    @property
+    def vertex_of(self) -> IntArray:
+        """(p,) int: the vertex of the mesh that each given point follows."""
+        return self._soup.vertex_of
+
+    @property
+    def workarounds(self) -> tuple[Workaround, ...]:
+        """What the mesh has differently, as sentences with the given points concerned."""
+        return self._soup.workarounds
+
+    def vertices_at(self, points: ArrayLike) -> IntArray:
+        """Return the vertices (k,) of the mesh, sorted, that given *points* (mask or ids) follow."""
+        ids = as_ids(points, self._given.n_points, "points")
+        return np.unique(self.vertex_of[ids])
+
+    def at_points(self, values: ArrayLike) -> Any:
+        """Return *values* (n, ...) of the vertices of the mesh at the given points (p, ...)."""
+        return plain(values, "values")[self.vertex_of]
+
+    def at_vertices(self, values: ArrayLike) -> Any:
+        """Return *values* (p, ...) of the given points at the vertices (n, ...).
+
+        Of several points that follow a vertex, the first one counts.
+        """
+        _, first = np.unique(self.vertex_of, return_index=True)
+        return plain(values, "values")[first]
+
+    def moved(self, vertices: ArrayLike) -> pv.PolyData:
+        """Return what was given for the mesh at *vertices* (n, 3): coordinates and normals differ.
+
+        Points, cells and arrays are the same, in the same order.
+        """
+        x = as_points(vertices, "vertices", self.mesh.n_vertices)
+        return with_vertices(self._given, self._soup.moved(x))
+
+    def write(self, path: str | Path, vertices: ArrayLike) -> None:
+        """Write `moved` to a file, as `write_mesh` does."""
+        write_mesh(path, self.moved(vertices))
+
+    @cached_property
+    def _soup(self) -> Soup:
+        points = np.asarray(self._given.points, dtype=np.float64)
+        return mesh_of(points, triangles_of(self._given))
