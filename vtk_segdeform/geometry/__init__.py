@@ -3,6 +3,7 @@
 The files, in reading order:
 
     volume          enclosed volume, eqs. (8) and (9)
+    lids            lids over the borders of an open mesh, for its volume
     differential    mean-curvature normals, eq. (5)
     intrinsic       intrinsic triangulation: the surface without bad triangles
     rotations       local rotations
@@ -17,6 +18,7 @@ from .differential import area_gradients, cotangent_laplacian, mixed_voronoi_are
 from .distortion import distortion, triangle_distortion
 from .intrinsic import IntrinsicTriangulation
 from .kmeans import cluster_positions, cluster_within_parts, farthest_points
+from .lids import Lids, lids_of
 from .local_volume import LocalVolume, local_volume_change
 from .normals import VertexNormals
 from .rotations import closest_rotations, rigid_fit
@@ -25,6 +27,7 @@ from .volume import signed_volume, step_to_volume, volume_along, volume_along_pa
 
 __all__ = [
     "IntrinsicTriangulation",
+    "Lids",
     "LocalVolume",
     "VertexNormals",
     "area_gradients",
@@ -36,6 +39,7 @@ __all__ = [
     "distortion",
     "faces_between",
     "farthest_points",
+    "lids_of",
     "local_volume_change",
     "mixed_voronoi_areas",
     "nearest_source",
