@@ -139,9 +139,8 @@ def _welded(points: FloatArray, found: Search) -> tuple[IntArray, IntArray, Half
     """Return the point that each point (p,) is welded to, the faces kept, and their half-edges."""
     target, half_edges = np.arange(len(points)), found.half_edges
     kept = np.flatnonzero(~found.degenerate & ~found.duplicate)
-    coinciding = _coinciding_sheets(half_edges, found.first_at)
     while True:  # a face that is dropped may leave a border
-        weld = coinciding
+        weld = _coinciding_sheets(half_edges, found.first_at)
         weld[half_edges.tail[half_edges.boundary]] = True
         weld[half_edges.head[half_edges.boundary]] = True
         some = np.flatnonzero(weld)
@@ -153,16 +152,16 @@ def _welded(points: FloatArray, found: Search) -> tuple[IntArray, IntArray, Half
         target = number[target]
         degenerate, duplicate, half_edges = distinct_faces(number[half_edges.faces], len(points))
         kept = kept[~degenerate & ~duplicate]
-        coinciding = np.zeros_like(weld)
 
 
 def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
     """Return the vertices (p,) of faces of open shells with all positions of another such face."""
     found = np.zeros(len(first_at), dtype=bool)
-    shared = first_at != np.arange(len(first_at))
-    if not shared.any() or not len(half_edges.boundary):
+    if not len(half_edges.boundary) or (first_at == np.arange(len(first_at))).all():
         return found
-    shared[first_at[shared]] = True
+    used = np.zeros_like(found)
+    used[half_edges.faces] = True
+    shared = used & (np.bincount(first_at[used], minlength=len(first_at)) > 1)[first_at]
     border = np.zeros_like(found)
     border[half_edges.tail[half_edges.boundary]] = True
     border[half_edges.head[half_edges.boundary]] = True
