@@ -77,7 +77,7 @@ class Surface:
         return self._soup.workarounds
 
     def vertices_at(self, points: ArrayLike) -> IntArray:
-        """Return the vertices (k,) of the mesh, sorted, that given *points* (mask or ids) follow."""
+        """Return the vertices (k,) that given *points* (mask or ids) follow, sorted."""
         ids = as_ids(points, self._given.n_points, "points")
         return np.unique(self.vertex_of[ids])
 
