@@ -122,6 +122,8 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
 
 
 def _require_usable(found: Search) -> None:
+    if not len(found.triangles):
+        raise MeshError("this surface cannot be deformed: it has no faces; give at least one")
     faults = [
         f"{fault}; {fault.kind.advice}" for fault in found.number_faults if fault.kind in _REFUSED
     ]
