@@ -40,9 +40,9 @@ def closed_shells(half_edges: HalfEdges) -> BoolArray:
     return closed
 
 
-def misoriented_shells(vertices: FloatArray, faces: IntArray, shells: IntArray) -> BoolArray:
-    """Return which shells, all closed, are inside-out or enclose no volume; see `shell_faults`."""
-    closed = np.ones(int(shells.max(initial=-1)) + 1, dtype=bool)
+def misoriented_shells(vertices: FloatArray, half_edges: HalfEdges) -> BoolArray:
+    """Return which closed shells are inside-out or enclose no volume, (k,) bool."""
+    faces, shells, closed = half_edges.faces, half_edges.shells, closed_shells(half_edges)
     return shell_faults(vertices, faces, shells, closed)[0]
 
 
