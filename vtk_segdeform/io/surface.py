@@ -108,7 +108,7 @@ class Surface:
         return self._soup.workarounds
 
     def vertices_at(self, points: ArrayLike) -> IntArray:
-        """Return the vertices (k,) of the mesh, sorted, that given *points* (mask or ids) follow."""
+        """Return the vertices (k,) of the mesh, sorted, that *points* (mask or ids) follow."""
         ids = as_ids(points, self._given.n_points, "points")
         return np.unique(self.vertex_of[ids])
 
