@@ -74,9 +74,9 @@ def bent_top(mesh: Mesh, angle: float, *, pivot_height: float = _PIVOT_HEIGHT) -
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     pivot = 0.5 * (low + high)
     pivot[2] = low[2] + pivot_height * (high[2] - low[2])
-    handle = parse_selection(HANDLE, mesh)
+    handle = parse_selection(HANDLE, mesh.vertices)
     turned = motion.transform(mesh.vertices[handle], motion.rotation([0, 1, 0], angle, pivot))
-    return Pose(parse_selection(FIXED, mesh), handle, turned)
+    return Pose(parse_selection(FIXED, mesh.vertices), handle, turned)
 
 
 def demo(options: Namespace, say: Say, progress: Progress) -> bool:

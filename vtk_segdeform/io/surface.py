@@ -54,8 +54,19 @@ class Surface:
 
     @classmethod
     def read(cls, path: str | Path) -> Surface:
-        """Read a surface from a file of any format of `read_mesh`."""
-        return cls(read_polydata(path))
+        """Read a surface from a file of any format of `read_mesh`, and make its mesh.
+
+        Raises
+        ------
+        MeshError
+            As `read_mesh`, but only if no mesh can be made of it; the message names the file.
+        """
+        surface = cls(read_polydata(path))
+        try:
+            _ = surface.mesh
+        except MeshError as fault:
+            raise MeshError(f"{path}: {fault}") from None
+        return surface
 
     @classmethod
     def of(cls, polydata: pv.PolyData, soup: Soup) -> Surface:
