@@ -102,7 +102,7 @@ def demo(options: Namespace, say: Say, progress: Progress) -> bool:
 
     folder.mkdir(parents=True, exist_ok=True)
     after = mesh.with_vertices(solution.vertices)
-    bent = coloured_regions(io.to_polydata(after), regions)
+    bent = coloured_regions(io.Surface(io.to_polydata(after)), regions)
     bent.point_data["local_volume_change"] = change
     io.write_mesh(folder / "cactus-bent.vtp", bent)
     io.write_mesh(folder / "cages-bent.vtp", coloured_cages(cages, solution.cage_vertices))
