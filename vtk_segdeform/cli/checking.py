@@ -111,7 +111,8 @@ def _counted(fault: Any) -> dict[str, Any]:
 
 
 def _print(found: dict[str, Any], say: Say) -> None:
-    given = f"{found['file']}: {found['points']} points, {counted(found['polygons'], 'polygon', 'polygons')}"
+    polygons = counted(found["polygons"], "polygon", "polygons")
+    given = f"{found['file']}: {found['points']} points, {polygons}"
     if not found["can_be_deformed"]:
         say(f"{given}: cannot be deformed: {found['reason']}")
         return

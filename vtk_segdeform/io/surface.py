@@ -49,11 +49,7 @@ def read_mesh(path: str | Path) -> Mesh:
     MissingDependencyError
         If only PyMeshLab reads this format and it is not installed.
     """
-    surface = Surface.read(path)
-    try:
-        return surface.mesh
-    except ValueError as error:
-        raise MeshError(f"{path}: {error}") from None
+    return Surface.read(path).mesh
 
 
 class Surface:
@@ -133,7 +129,7 @@ class Surface:
         return self._soup.workarounds
 
     def vertices_at(self, points: ArrayLike) -> IntArray:
-        """Return the vertices (k,) of the mesh, sorted, that given *points* (mask or ids) follow."""
+        """Return the vertices (k,) of the mesh that given *points* (mask or ids) follow, sorted."""
         return self._soup.vertices_at(points)
 
     def at_points(self, values: ArrayLike) -> Any:
