@@ -20,10 +20,10 @@ Long because it is the interface of one class; the implementation is in the othe
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -162,7 +162,7 @@ class Session(Timeline):
 
         return to_polydata(self.mesh.with_vertices(self.vertices))
 
-    def write_deformed(self, path: str | os.PathLike[str]) -> None:
+    def write_deformed(self, path: str | Path) -> None:
         """Write `deformed` to a mesh file, as `write_mesh` does."""
         from ..io import write_mesh  # imports pyvista
 
