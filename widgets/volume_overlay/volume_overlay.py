@@ -34,7 +34,7 @@ from vtk_segdeform.freezing import read_only
 from vtk_segdeform.geometry import LocalVolume
 from vtk_segdeform.session import Change, Session, region_name
 
-from ..scene import Stop, SurfaceDisplay, View
+from ..scene import NO_VOLUME, Stop, SurfaceDisplay, View, enclosure_of
 from .diverging import colours_of, half_range_for
 from .legend import Legend, brief, percent, signed
 from .region_volumes import RegionVolumes
@@ -181,8 +181,9 @@ class VolumeOverlay:
 
     def _lines(self, change: FloatArray) -> list[tuple[str, int | None]]:
         low, high = (signed(100.0 * float(share), 0) for share in (change.min(), change.max()))
+        has_volume = enclosure_of(self.session).has_volume
         lines: list[tuple[str, int | None]] = [
-            (f"Volume: {percent(self.session.volume_change)}", None),
+            (f"Volume: {percent(self.session.volume_change)}" if has_volume else NO_VOLUME, None),
             (f"Local: {low} to {high} %", None),
         ]
         regions = self._regions.changes()
