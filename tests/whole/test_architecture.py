@@ -48,6 +48,7 @@ GRANTED = {
     "io.polygons": VTK,
     "io.vtk_formats": VTK,
     "session.session": {"pyvista"},
+    "session.surface_store": VTK | {"pyvista"},
     "pictures": VTK | {"pyvista"},
     "filters": VTK,
     "filters.paraview_plugin": {"paraview"},

@@ -11,11 +11,12 @@ what was given, with the same points in the same order.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import FloatArray, IntArray, as_ids, as_points
 from .faults import as_soup
 from .grouping import first_equal_row, first_of_group
 from .mesh import Mesh
@@ -53,6 +54,31 @@ class Soup:
     mesh: Mesh
     vertex_of: IntArray
     workarounds: tuple[Workaround, ...] = ()
+
+    def vertices_at(self, points: ArrayLike) -> IntArray:
+        """Return the vertices (k,) of the mesh, sorted, that given *points* (mask or ids) follow."""
+        return np.unique(self.vertex_of[as_ids(points, len(self.points), "points")])
+
+    def at_vertices(self, values: Any) -> Any:
+        """Return *values* (p, ...) of the given points at the vertices (n, ...).
+
+        Of several points that follow a vertex, the first one counts.
+        """
+        _, first = np.unique(self.vertex_of, return_index=True)
+        return values[first]
+
+    def targets_at(self, points: ArrayLike, targets: ArrayLike) -> tuple[IntArray, FloatArray]:
+        """Return the vertices (k,) that given *points* follow, and where they must be, (k, 3).
+
+        A vertex that several points with *targets* (q, 3) follow goes to the mean.
+        """
+        ids = as_ids(points, len(self.points), "points")
+        ends = as_points(targets, "targets", len(ids))
+        ends = ends - (self.points[ids] - self.mesh.vertices[self.vertex_of[ids]])
+        vertices, number = np.unique(self.vertex_of[ids], return_inverse=True)
+        sums = np.zeros((len(vertices), 3))
+        np.add.at(sums, number, ends)
+        return vertices, sums / np.bincount(number, minlength=len(vertices))[:, None]
 
     def moved(self, vertices: FloatArray) -> FloatArray:
         """Return the given points (p, 3) for the mesh at *vertices* (n, 3)."""

@@ -20,6 +20,7 @@ Long because it is the interface of one class; the implementation is in the othe
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -159,6 +160,15 @@ class Session(Timeline):
         from ..io import to_polydata  # imports pyvista
 
         return to_polydata(self.mesh.with_vertices(self.vertices))
+
+    def write_deformed(self, path: str | os.PathLike[str]) -> None:
+        """Write `deformed` to a mesh file, as `write_mesh` does."""
+        from ..io import write_mesh  # imports pyvista
+
+        if self._surface is not None:
+            self._surface.write(path, self.vertices)
+        else:
+            write_mesh(path, self.mesh.with_vertices(self.vertices))
 
     @property
     def regions(self) -> Regions | None:
