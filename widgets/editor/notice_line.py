@@ -72,7 +72,8 @@ class NoticeLine:
     def remove(self) -> None:
         """Remove it from the view, permanently."""
         self._stop()
-        for each in (self._paper, *self._texts, *self._buttons):
+        parts: list[Panel | Text | _Button] = [self._paper, *self._texts, *self._buttons]
+        for each in parts:
             each.remove()
 
     def _set(self, text: str, buttons: tuple[str, ...]) -> None:

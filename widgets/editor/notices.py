@@ -49,7 +49,10 @@ def _of_borders(session: Session) -> list[Notice]:
         lids = "a lid" if len(found.holes) == 1 else "lids"
         text = f"{counted(len(found.holes), 'hole', 'holes')}: volume kept under {lids}"
         said.append(Notice(text, found.holes))
-    if found.sheets:
+    if found.sheets and session.options.lids is False:
+        holes = counted(len(found.sheets), "hole", "holes")
+        said.append(Notice(f"{holes}: no volume without lids", found.sheets))
+    elif found.sheets:
         sheets = "open sheet" if found.n_sheets == 1 else f"{found.n_sheets} open sheets"
         volume = "not part of the volume" if found.has_volume else "no volume to preserve"
         said.append(Notice(f"{sheets}: {volume}", found.sheets))

@@ -131,7 +131,7 @@ class DeformPart(QtWidgets.QGroupBox):
         put(self.per_region, options.preserve_region_volumes and has_volume)
         for box in (self.preserve, self.per_region):
             box.setEnabled(has_volume)
-        put(self.lids, list(_LIDS.values()).index(getattr(options, "lids", None)))
+        put(self.lids, list(_LIDS.values()).index(options.lids))
         self.lids.setEnabled(not session.mesh.is_closed)
         put(self.overlay, widgets.overlay_wanted)
         put(self.range, 100.0 * (widgets.overlay.wanted_range or 0.0))

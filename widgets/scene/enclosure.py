@@ -26,7 +26,7 @@ class Enclosure:
     holes, sheets : tuple of (k,) int
         The border loops of components that enclose a volume, and of those that do not.
     n_sheets : int
-        Number of components without a volume.
+        Number of open components that enclose no volume.
     """
 
     has_volume: bool
@@ -41,7 +41,7 @@ _known: WeakKeyDictionary[Mesh, dict[bool | None, Enclosure]] = WeakKeyDictionar
 
 def enclosure_of(session: Session) -> Enclosure:
     """Return the enclosure of the mesh of *session*, computed once for each of its options."""
-    mesh, wanted = session.mesh, getattr(session.options, "lids", None)
+    mesh, wanted = session.mesh, session.options.lids
     if mesh.is_closed:
         return _CLOSED
     known = _known.setdefault(mesh, {})
@@ -52,11 +52,10 @@ def enclosure_of(session: Session) -> Enclosure:
 
 def _enclosure(mesh: Mesh, wanted: bool | None) -> Enclosure:
     lids = lids_of(mesh, wanted)
-    is_hole = lids.encloses[lids.component]
-    pairs = list(zip(mesh.borders, is_hole.tolist(), strict=True))
+    pairs = list(zip(mesh.borders, lids.used.tolist(), strict=True))
     return Enclosure(
-        bool(lids.encloses.any()),
-        tuple(loop for loop, hole in pairs if hole),
-        tuple(loop for loop, hole in pairs if not hole),
-        int(np.count_nonzero(~lids.encloses)),
+        lids.has_volume,
+        tuple(loop for loop, is_hole in pairs if is_hole),
+        tuple(loop for loop, is_hole in pairs if not is_hole),
+        len(np.unique(lids.component[~lids.used])),
     )
