@@ -14,7 +14,8 @@ from solids import icosphere, torus
 from vtk_segdeform.errors import MeshError, MissingDependencyError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io import meshlab
-from vtk_segdeform.io.convert import from_polydata, read_mesh, to_polydata, write_mesh
+from vtk_segdeform.io.convert import from_polydata, to_polydata, write_mesh
+from vtk_segdeform.io.surface import read_mesh
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.session.session import Session
 

@@ -118,7 +118,7 @@ def check(options: Namespace, say: Say, progress: Progress) -> bool:
         return False
     io.write_mesh(options.output, closed)
     say(f"written: {options.output}")
-    return repair.report.ok
+    return repair.report.is_closed
 
 
 def regions(options: Namespace, say: Say, progress: Progress) -> bool:

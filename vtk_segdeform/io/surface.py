@@ -20,9 +20,40 @@ from numpy.typing import ArrayLike
 
 from ..arrays import IntArray, as_ids, as_points, plain
 from ..checks import require
+from ..errors import MeshError
 from ..mesh import Mesh, Soup, Workaround, mesh_of
-from .convert import read_polydata, with_vertices, write_mesh
+from .convert import read_polydata, write_mesh
+from .moving import MovingSurface
 from .polygons import triangles_of
+
+
+def read_mesh(path: str | Path) -> Mesh:
+    """Read the mesh of a file: ``Surface.read(path).mesh``.
+
+    Parameters
+    ----------
+    path : str or Path
+        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .vtkhdf, .glb, .gltf; with PyMeshLab also .3ds,
+        .dae, .x3d, .wrl and others.
+
+    Returns
+    -------
+    mesh : Mesh
+        Vertices and faces in the order of the file, where these can be a mesh; seams are welded
+        and polygons cut into triangles.
+
+    Raises
+    ------
+    MeshError
+        If the file does not exist or cannot be read, or has no face that can be deformed.
+    MissingDependencyError
+        If only PyMeshLab reads this format and it is not installed.
+    """
+    surface = Surface.read(path)
+    try:
+        return surface.mesh
+    except ValueError as error:
+        raise MeshError(f"{path}: {error}") from None
 
 
 class Surface:
@@ -99,11 +130,15 @@ class Surface:
         Points, cells and arrays are the same, in the same order.
         """
         x = as_points(vertices, "vertices", self.mesh.n_vertices)
-        return with_vertices(self._given, self._soup.moved(x))
+        return self._moving.at(self._soup.moved(x))
 
     def write(self, path: str | Path, vertices: ArrayLike) -> None:
         """Write `moved` to a file, as `write_mesh` does."""
         write_mesh(path, self.moved(vertices))
+
+    @cached_property
+    def _moving(self) -> MovingSurface:
+        return MovingSurface(self._given)
 
     @cached_property
     def _soup(self) -> Soup:
