@@ -15,7 +15,13 @@ The files, in reading order:
     local_volume    volume change below the surface at each vertex
 """
 
-from .differential import area_gradients, cotangent_laplacian, mixed_voronoi_areas, with_least_areas
+from .differential import (
+    area_gradients,
+    cotangent_laplacian,
+    inner_vertices,
+    mixed_voronoi_areas,
+    with_least_areas,
+)
 from .distortion import distortion, triangle_distortion
 from .intrinsic import IntrinsicTriangulation
 from .kmeans import cluster_positions, cluster_within_parts, farthest_points
@@ -42,6 +48,7 @@ __all__ = [
     "distortion",
     "faces_between",
     "farthest_points",
+    "inner_vertices",
     "lids_of",
     "local_volume_change",
     "mixed_voronoi_areas",
