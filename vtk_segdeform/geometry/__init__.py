@@ -25,7 +25,7 @@ from .differential import (
 from .distortion import distortion, triangle_distortion
 from .intrinsic import IntrinsicTriangulation
 from .kmeans import cluster_positions, cluster_within_parts, farthest_points
-from .lids import Lids, lids_of
+from .lids import Lids, lids_of, volume_summary
 from .local_volume import LocalVolume, local_volume_change
 from .normal_transport import NormalTransport
 from .normals import VertexNormals
@@ -61,6 +61,7 @@ __all__ = [
     "volume_along",
     "volume_along_path",
     "volume_gradient",
+    "volume_summary",
     "voronoi_cells",
     "with_least_areas",
 ]

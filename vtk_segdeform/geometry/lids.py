@@ -22,6 +22,7 @@ q = a / 2 pi, so that of a long half pipe is 1/2; above 1 the surface is rolled 
     any other open one                          no: a sheet, a cloth, a shallow cap, a roll
     one-sided, such as a Moebius strip          no
     its volume, with lids, is 0 to rounding     no: a closed shell that is folded flat
+    the sum of all volumes is 0 to rounding     no
 
 The absolute value is taken because an open surface may be turned inside out.
 
@@ -47,6 +48,7 @@ _VIEWPOINTS = 50, 400  # fewest and most points x; by default one for each face
 _SEEN = 10  # points y for each of them
 _NEAREST = 0.3  # distances of neighbouring points y, below which |y - x| is replaced by this
 _NO_VOLUME = 1e-11  # of the area to the power 3/2
+_NOTHING = "no volume to preserve"
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +67,8 @@ class Lids:
         The component of the mesh that each loop bounds.
     encloses : (c,) bool
         Whether each component of the mesh encloses a volume.
+    option : bool or None
+        As in `lids_of`.
     """
 
     faces: IntArray
@@ -72,6 +76,7 @@ class Lids:
     extension: sparse.csr_array
     component: IntArray
     encloses: BoolArray
+    option: bool | None = None
 
     @property
     def has_volume(self) -> bool:
@@ -82,6 +87,33 @@ class Lids:
     def used(self) -> BoolArray:
         """(k,) bool: the loops whose lids close an enclosed volume."""
         return self.encloses[self.component]
+
+    @property
+    def is_open(self) -> BoolArray:
+        """(c,) bool: the components of the mesh that have borders."""
+        return np.bincount(self.component, minlength=len(self.encloses)) > 0
+
+    def summary(self, *, preserved: bool = True) -> str:
+        """Return in one line what has a volume, and whether it is *preserved*."""
+        is_open, holes = self.is_open, int(self.used.sum())
+        if not self.has_volume:
+            if not is_open.any() or self.option:
+                return "No enclosed volume: nothing to preserve"
+            many = int(is_open.sum())
+            if self.option is False:
+                return "Open surface, lids off: no volume to preserve"
+            return f"{_counted(many, 'open sheet') if many > 1 else 'Open sheet'}: {_NOTHING}"
+        done = "preserved" if preserved else "measured"
+        parts = [f"Closed surface: volume {done}"]
+        if holes:
+            lids = "its lid" if holes == 1 else "lids"
+            parts = [f"{_counted(holes, 'hole')}: volume {done} under {lids}"]
+        without = int((~self.encloses).sum())
+        if without:
+            name = "open sheet" if is_open[~self.encloses].all() and self.option is None else "part"
+            has = "has" if without == 1 else "have"
+            parts.append(f"{_counted(without, name)} {has} no volume")
+        return "; ".join(parts)
 
     def closed(self, mesh: Mesh) -> IntArray:
         """Return the faces of *mesh* and of lids around the enclosed volumes, (m', 3)."""
@@ -122,8 +154,29 @@ def lids_of(mesh: Mesh, lids: bool | None = None) -> Lids:
     extension = sparse.csr_array(sparse.vstack([sparse.eye_array(n), means]))
     component = mesh.components[[each[0] for each in mesh.borders]].astype(np.int64)
     every = np.ones(int(mesh.components.max()) + 1, dtype=bool)
-    found = Lids(faces, loop, extension, component, every)
+    found = Lids(faces, loop, extension, component, every, lids)
     return replace(found, encloses=_enclosing(mesh, found, lids))
+
+
+def volume_summary(mesh: Mesh, lids: bool | None = None) -> str:
+    """Return in one line whether *mesh* has a volume that is preserved, for status lines.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Closed, or with borders.
+    lids : bool or None
+        The option of `Deformer`.
+
+    Examples
+    --------
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> volume_summary(Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]]))
+    '1 hole: volume preserved under its lid'
+    >>> volume_summary(Mesh(corners[:3], [[0, 1, 2]]))
+    'Open sheet: no volume to preserve'
+    """
+    return lids_of(mesh, lids).summary()
 
 
 def mean_winding(points: FloatArray, faces: IntArray) -> float:
@@ -163,7 +216,7 @@ def mean_winding(points: FloatArray, faces: IntArray) -> float:
 def _enclosing(mesh: Mesh, lids: Lids, wanted: bool | None) -> BoolArray:
     """Return which components enclose a volume, (c,) bool."""
     count, component = len(lids.encloses), mesh.components[mesh.faces[:, 0]]
-    is_open = np.bincount(lids.component, minlength=count) > 0
+    is_open = lids.is_open
     encloses = ~is_open | (wanted is not False)
     if is_open.any():
         half_edges = HalfEdges(mesh.faces, mesh.n_vertices)
@@ -185,4 +238,10 @@ def _enclosing(mesh: Mesh, lids: Lids, wanted: bool | None) -> BoolArray:
             faces = mesh.faces[order[starts[c] : starts[c + 1]]]
             q = mean_winding(mesh.vertices - mesh.vertices[first[c]], faces)
             encloses[c] = _LEAST <= abs(q) <= _MOST
+    if abs(volumes[encloses].sum()) <= _NO_VOLUME * areas.sum() ** 1.5:
+        encloses[:] = False  # they cancel: no change could be relative to their sum
     return encloses
+
+
+def _counted(count: int, name: str) -> str:
+    return f"{count} {name}{'s' * (count != 1)}"
