@@ -26,7 +26,6 @@ NO_VOLUME = 1e-14  # relative to area times size: about the rounding error for a
 _INSIDE = 0.5 + 1e-6  # at a flat part of a shell it is 0.5: not inside
 
 
-
 def closed_shells(half_edges: HalfEdges) -> BoolArray:
     """Return which shells are closed and consistently oriented, every edge a pair, (k,) bool."""
     closed = np.ones(int(half_edges.shells.max(initial=-1)) + 1, dtype=bool)
@@ -137,14 +136,21 @@ def shell_depths(
         within = ((low[near] > low[outer]) & (high[near] < high[outer])).all(axis=1)
         if not within.any():
             continue
-        its_faces = faces[by_shell[starts[outer] : ends[outer]]]
-        owned, its_faces = np.unique(its_faces, return_inverse=True)
+        owned, its_faces = _owned(faces[by_shell[starts[outer] : ends[outer]]])
+        if its_faces[0, 1] > its_faces[0, 2]:  # the same rounding for both orientations
+            its_faces = its_faces[:, [0, 2, 1]]
         for one in near[within]:
-            points = corners[starts[one] : ends[one]].reshape(-1, 3)
+            points = vertices[_owned(faces[by_shell[starts[one] : ends[one]]])[0]]
             extremes = np.unique([points.argmin(axis=0), points.argmax(axis=0)])
-            w = winding_number(points[extremes], vertices[owned], its_faces.reshape(-1, 3))
+            w = winding_number(points[extremes], vertices[owned], its_faces)
             depth[one] += bool((np.abs(w) > _INSIDE).all())
     return depth
+
+
+def _owned(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the vertices of *faces* (k, 3), sorted, and the faces over these."""
+    owned, numbers = np.unique(faces, return_inverse=True)
+    return owned, numbers.reshape(-1, 3)
 
 
 def _beginning_within(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray, IntArray]:

@@ -16,12 +16,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from ..arrays import BoolArray, FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray, as_ids, as_points
 from ..errors import MeshError
 from .faults import UNREPAIRABLE, Search, as_soup, distinct_faces, search
 from .grouping import connected, first_equal_row
@@ -69,6 +70,31 @@ class Soup:
     vertex_of: IntArray
     loose: IntArray
     workarounds: tuple[Workaround, ...] = ()
+
+    def vertices_at(self, points: ArrayLike) -> IntArray:
+        """Return the vertices (k,) of the mesh that given *points* (mask or ids) follow, sorted."""
+        return np.unique(self.vertex_of[as_ids(points, len(self.points), "points")])
+
+    def at_vertices(self, values: Any) -> Any:
+        """Return *values* (p, ...) of the given points at the vertices (n, ...).
+
+        Of several points that follow a vertex, the first one counts.
+        """
+        _, first = np.unique(self.vertex_of, return_index=True)
+        return values[first]
+
+    def targets_at(self, points: ArrayLike, targets: ArrayLike) -> tuple[IntArray, FloatArray]:
+        """Return the vertices (k,) that given *points* follow, and where they must be, (k, 3).
+
+        A vertex that several points with *targets* (q, 3) follow goes to the mean.
+        """
+        ids = as_ids(points, len(self.points), "points")
+        ends = as_points(targets, "targets", len(ids))
+        ends = ends - (self.points[ids] - self.mesh.vertices[self.vertex_of[ids]])
+        vertices, number = np.unique(self.vertex_of[ids], return_inverse=True)
+        sums = np.zeros((len(vertices), 3))
+        np.add.at(sums, number, ends)
+        return vertices, sums / np.bincount(number, minlength=len(vertices))[:, None]
 
     def moved(self, vertices: FloatArray) -> FloatArray:
         """Return the given points (p, 3) for the mesh at *vertices* (n, 3)."""
@@ -139,9 +165,8 @@ def _welded(points: FloatArray, found: Search) -> tuple[IntArray, IntArray, Half
     """Return the point that each point (p,) is welded to, the faces kept, and their half-edges."""
     target, half_edges = np.arange(len(points)), found.half_edges
     kept = np.flatnonzero(~found.degenerate & ~found.duplicate)
-    coinciding = _coinciding_sheets(half_edges, found.first_at)
     while True:  # a face that is dropped may leave a border
-        weld = coinciding
+        weld = _coinciding_sheets(half_edges, found.first_at)
         weld[half_edges.tail[half_edges.boundary]] = True
         weld[half_edges.head[half_edges.boundary]] = True
         some = np.flatnonzero(weld)
@@ -153,16 +178,16 @@ def _welded(points: FloatArray, found: Search) -> tuple[IntArray, IntArray, Half
         target = number[target]
         degenerate, duplicate, half_edges = distinct_faces(number[half_edges.faces], len(points))
         kept = kept[~degenerate & ~duplicate]
-        coinciding = np.zeros_like(weld)
 
 
 def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
     """Return the vertices (p,) of faces of open shells with all positions of another such face."""
     found = np.zeros(len(first_at), dtype=bool)
-    shared = first_at != np.arange(len(first_at))
-    if not shared.any() or not len(half_edges.boundary):
+    if not len(half_edges.boundary) or (first_at == np.arange(len(first_at))).all():
         return found
-    shared[first_at[shared]] = True
+    used = np.zeros_like(found)
+    used[half_edges.faces] = True
+    shared = used & (np.bincount(first_at[used], minlength=len(first_at)) > 1)[first_at]
     border = np.zeros_like(found)
     border[half_edges.tail[half_edges.boundary]] = True
     border[half_edges.head[half_edges.boundary]] = True

@@ -23,6 +23,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -160,6 +161,15 @@ class Session(Timeline):
         from ..io import to_polydata  # imports pyvista
 
         return to_polydata(self.mesh.with_vertices(self.vertices))
+
+    def write_deformed(self, path: str | Path) -> None:
+        """Write `deformed` to a mesh file, as `write_mesh` does."""
+        from ..io import write_mesh  # imports pyvista
+
+        if self._surface is not None:
+            self._surface.write(path, self.vertices)
+        else:
+            write_mesh(path, self.mesh.with_vertices(self.vertices))
 
     @property
     def regions(self) -> Regions | None:

@@ -39,7 +39,7 @@ from .panel_actions import (
     showing_cage,
     with_radius,
 )
-from .session_file import SessionFile, is_mesh, read_bound
+from .session_file import SessionFile, is_mesh, read_session
 
 __all__ = [
     "Action",
@@ -62,7 +62,7 @@ __all__ = [
     "naming_region",
     "opening",
     "painting",
-    "read_bound",
+    "read_session",
     "renaming",
     "save",
     "saving",
