@@ -16,12 +16,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from ..arrays import BoolArray, FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray, as_ids, as_points
 from ..errors import MeshError
 from .faults import UNREPAIRABLE, Search, as_soup, distinct_faces
 from .grouping import connected, first_equal_row
@@ -37,10 +39,10 @@ _REFUSED = (*UNREPAIRABLE, Kind.NON_FINITE)
 class Workaround:
     """A difference between the given triangles and the mesh: a sentence, and where it is."""
 
-    kind: Kind
-    count: int
     text: str
     points: IntArray  # (k,) int: the given points there
+    kind: Kind | None = None
+    count: int = 1  # of that kind
 
     def __str__(self) -> str:
         return self.text
@@ -58,8 +60,6 @@ class Soup:
         What is deformed.
     vertex_of : (p,) int
         The vertex that each given point follows: its own, or the nearest one if it is in no face.
-    loose : (k,) int
-        The given points that are in no face of the mesh.
     workarounds : tuple of Workaround
         What differs between the two.
     """
@@ -67,8 +67,38 @@ class Soup:
     points: FloatArray
     mesh: Mesh
     vertex_of: IntArray
-    loose: IntArray
     workarounds: tuple[Workaround, ...] = ()
+
+    def vertices_at(self, points: ArrayLike) -> IntArray:
+        """Return the vertices (k,) of the mesh that given *points* (mask or ids) follow, sorted."""
+        return np.unique(self.vertex_of[as_ids(points, len(self.points), "points")])
+
+    def at_vertices(self, values: Any) -> Any:
+        """Return *values* (p, ...) of the given points at the vertices (n, ...).
+
+        Of several points that follow a vertex, the first one in a face counts.
+        """
+        in_face = np.delete(np.arange(len(self.points)), self.loose)
+        _, first = np.unique(self.vertex_of[in_face], return_index=True)
+        return values[in_face[first]]
+
+    def targets_at(self, points: ArrayLike, targets: ArrayLike) -> tuple[IntArray, FloatArray]:
+        """Return the vertices (k,) that given *points* follow, and where they must be, (k, 3).
+
+        A vertex that several points with *targets* (q, 3) follow goes to the mean.
+        """
+        ids = as_ids(points, len(self.points), "points")
+        ends = as_points(targets, "targets", len(ids))
+        ends = ends - (self.points[ids] - self.mesh.vertices[self.vertex_of[ids]])
+        vertices, number = np.unique(self.vertex_of[ids], return_inverse=True)
+        sums = np.zeros((len(vertices), 3))
+        np.add.at(sums, number, ends)
+        return vertices, sums / np.bincount(number, minlength=len(vertices))[:, None]
+
+    @cached_property
+    def loose(self) -> IntArray:
+        """(k,) int: the given points that are not at a vertex of the mesh, and only follow one."""
+        return np.flatnonzero((self.points != self.mesh.vertices[self.vertex_of]).any(axis=1))
 
     def moved(self, vertices: FloatArray) -> FloatArray:
         """Return the given points (p, 3) for the mesh at *vertices* (n, 3)."""
@@ -101,7 +131,7 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
     _require_usable(found)
     if found.half_edges.twin is not None and found.report.is_closed:
         mesh = Mesh.reported(points, triangles, found.report)
-        return Soup(points, mesh, np.arange(len(points)), np.empty(0, np.int64))
+        return Soup(points, mesh, np.arange(len(points)))
     target, kept, half_edges = _welded(valid, found)
     flip = faces_to_flip(valid, half_edges)
     left = np.zeros(len(points), dtype=bool)
@@ -118,7 +148,7 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
     vertex_of = number[target]
     vertex_of[loose] = _nearest(points[loose], mesh.vertices)
     workarounds = tuple(_workarounds(triangles, kept, target, loose, flip, half_edges))
-    return Soup(points, mesh, vertex_of, loose, workarounds)
+    return Soup(points, mesh, vertex_of, workarounds)
 
 
 def _require_usable(found: Search) -> None:
@@ -219,7 +249,7 @@ def _workarounds(
             yield _workaround(kind, int(some.sum()), text, np.unique(faces[some]))
     if len(loose):
         text = f"{counted(len(loose), 'point is', 'points are')} in no face"
-        yield Workaround(Kind.UNREFERENCED, len(loose), text, loose)
+        yield Workaround(text, loose, Kind.UNREFERENCED, len(loose))
     ends = np.stack([half_edges.tail, half_edges.head])[:, half_edges.boundary]
     corners, ends = np.unique(ends, return_inverse=True)
     if len(corners):
@@ -229,7 +259,7 @@ def _workarounds(
     if len(crowded):
         text = f"{counted(len(crowded), 'edge', 'edges')} with three or more faces"
         there = at(np.append(half_edges.tail[crowded], half_edges.head[crowded]))
-        yield Workaround(Kind.NON_MANIFOLD_EDGE, len(crowded), text, there)
+        yield Workaround(text, there, Kind.NON_MANIFOLD_EDGE, len(crowded))
     if half_edges.inconsistent.any() and half_edges.one_sided.any():
         one_sided = half_edges.one_sided
         there = at(half_edges.faces[one_sided[half_edges.shells]])
@@ -238,4 +268,4 @@ def _workarounds(
 
 def _workaround(kind: Kind, count: int, text: str, points: IntArray) -> Workaround:
     """Return a workaround whose *text* has "#" for its count and ends with a noun."""
-    return Workaround(kind, count, text.replace("#", str(count)) + "s" * (count != 1), points)
+    return Workaround(text.replace("#", str(count)) + "s" * (count != 1), points, kind, count)
