@@ -102,13 +102,14 @@ class GPUSurface:
         arrays: Any,
         extension: sparse.csr_array | None = None,
     ) -> None:
-        in_lid = (faces >= len(rest_vertices)).any(axis=1)
-        lids, faces = faces[in_lid], faces[~in_lid]
+        self._lids: tuple[IntArray, sparse.csr_array, IntArray] | None = None
+        if extension is not None:
+            in_lid = (faces >= len(rest_vertices)).any(axis=1)
+            ends, lids = np.unique(faces[in_lid], return_inverse=True)
+            border = np.unique(extension[ends].indices)
+            self._lids = lids.reshape(-1, 3), extension[ends][:, border], border
+            faces = faces[~in_lid]
         self._arrays, self._host_faces, self._columns = arrays, faces, subspace.columns
-        ends = np.unique(lids)
-        self._lids = np.searchsorted(ends, lids)
-        self._lid_rows = None if extension is None else extension[ends]
-        self._border = np.unique(self._lid_rows.indices) if extension is not None else ends
         with _faults_named():
             self._rest = arrays.asarray(np.asarray(rest_vertices, dtype=np.float64))
             self._corners = [self._ids(corner) for corner in faces.T]
@@ -136,11 +137,11 @@ class GPUSurface:
 
     def _volume_of_lids(self, x: GPUArray) -> float:
         """Return the volume between the lids and the first vertex."""
-        if self._lid_rows is None:
+        if self._lids is None:
             return 0.0
-        near = self._arrays.take(x, self._ids(self._border), axis=0) - x[0]
-        points = self._lid_rows[:, self._border] @ self.host(near)
-        a, b, c = points[self._lids.T]
+        lids, ends, border = self._lids
+        near = self._arrays.take(x, self._ids(border), axis=0) - x[0]
+        a, b, c = (ends @ self.host(near))[lids.T]
         return float(np.einsum("ij,ij", a, np.cross(b - a, c - a)) / 6.0)
 
     @_faults_named()
