@@ -10,16 +10,24 @@ The files, in reading order:
     kmeans          clusters of points, and points far from each other
     sampling        even samples of the vertices, and their Voronoi cells
     normals         vertex normals for drawing
+    normal_transport   given normals and tangents, carried along by a deformation
     distortion      stretch and shear of each triangle
     local_volume    volume change below the surface at each vertex
 """
 
-from .differential import area_gradients, cotangent_laplacian, mixed_voronoi_areas, with_least_areas
+from .differential import (
+    area_gradients,
+    cotangent_laplacian,
+    inner_vertices,
+    mixed_voronoi_areas,
+    with_least_areas,
+)
 from .distortion import distortion, triangle_distortion
 from .intrinsic import IntrinsicTriangulation
 from .kmeans import cluster_positions, cluster_within_parts, farthest_points
 from .lids import Lids, lids_of, volume_summary
 from .local_volume import LocalVolume, local_volume_change
+from .normal_transport import NormalTransport
 from .normals import VertexNormals
 from .rotations import closest_rotations, rigid_fit
 from .sampling import distinct_lengths, faces_between, nearest_source, unique_edges, voronoi_cells
@@ -29,6 +37,7 @@ __all__ = [
     "IntrinsicTriangulation",
     "Lids",
     "LocalVolume",
+    "NormalTransport",
     "VertexNormals",
     "area_gradients",
     "closest_rotations",
@@ -39,6 +48,7 @@ __all__ = [
     "distortion",
     "faces_between",
     "farthest_points",
+    "inner_vertices",
     "lids_of",
     "local_volume_change",
     "mixed_voronoi_areas",
