@@ -140,11 +140,11 @@ def lids_of(mesh: Mesh, lids: bool | None = None) -> Lids:
 
     Examples
     --------
-    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    >>> open_corner = Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]])
-    >>> lids = lids_of(open_corner)
-    >>> lids.encloses, lids.closed(open_corner).tolist()
-    (array([ True]), [[0, 2, 1], [0, 1, 3], [0, 3, 2], [3, 1, 4], [2, 3, 4], [1, 2, 4]])
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 4]]
+    >>> spike = Mesh(corners, [[0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> lids = lids_of(spike)
+    >>> lids.encloses, len(lids.faces), (lids.extension @ spike.vertices)[4].round(3)
+    (array([ True]), 3, array([0.333, 0.333, 0.   ]))
     >>> lids_of(Mesh(corners[:3], [[0, 1, 2]])).encloses
     array([False])
     """
@@ -181,8 +181,8 @@ def volume_summary(mesh: Mesh, lids: bool | None = None) -> str:
 
     Examples
     --------
-    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    >>> volume_summary(Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]]))
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 4]]
+    >>> volume_summary(Mesh(corners, [[0, 1, 3], [0, 3, 2], [1, 2, 3]]))
     '1 hole: volume kept under a lid'
     >>> volume_summary(Mesh(corners[:3], [[0, 1, 2]]))
     'Open sheet: no volume to preserve'
