@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from open_meshes import bottle
 from scenes import sausage
 from scipy.spatial.transform import Rotation
 
 from vtk_segdeform import models, sizes
+from vtk_segdeform.geometry import voronoi_cells
 from vtk_segdeform.regions.coarse import coarsen
-from vtk_segdeform.solver.coarse_volume import CoarseVolume
+from vtk_segdeform.solver.coarse_volume import CoarseVolume, _coarse, _matrix
 from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.solver.volume_constraints import region_volumes, total_volume
 from vtk_segdeform.subspace.subspace import cage_subspace
@@ -154,3 +156,16 @@ def test_cells_are_the_same_in_every_frame_even_at_equal_distances():
         turned = mesh.with_vertices(3.7 * mesh.vertices @ turn.T + [1.0, -2.0, 5.0])
         again, _ = coarsen(turned, 300, np.random.default_rng(0))
         assert_array_equal(again, cells)
+
+
+@pytest.mark.parametrize("per_region", [False, True])
+def test_the_coarse_surface_of_an_open_mesh_is_closed_by_coarse_lids(per_region):
+    mesh = bottle(40, 40)
+    labels = (mesh.vertices[:, 2] > 1.5).astype(int)
+    held = region_volumes(mesh, labels) if per_region else (total_volume(mesh),)
+    _, cells = voronoi_cells(mesh, 500, np.random.default_rng(0))
+    means = _matrix(cells, 1.0 / np.bincount(cells)[cells]) @ mesh.vertices
+    for fine in held:
+        rough = replace(_coarse(fine, cells), target=0.0)
+        assert rough.violation(means) == pytest.approx(fine.target, rel=0.1)
+        assert_allclose(rough.violation(means + [3, -2, 5]), rough.violation(means), rtol=1e-12)

@@ -35,13 +35,14 @@ outside segmentation using generalized winding numbers", SIGGRAPH 2013.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy import sparse
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..mesh import HalfEdges, Mesh
-from .volume import corner_and_edges
+from .volume import corner_and_edges, signed_volume
 
 _LEAST, _MOST = 0.48, 1.3  # abs(q) of an open component that encloses a volume
 _VIEWPOINTS = 50, 400  # fewest and most points x; by default one for each face
@@ -49,6 +50,7 @@ _SEEN = 10  # points y for each of them
 _NEAREST = 0.3  # distances of neighbouring points y, below which |y - x| is replaced by this
 _NO_VOLUME = 1e-11  # of the area to the power 3/2
 _NOTHING = "no volume to preserve"
+_known: WeakKeyDictionary[Mesh, dict[bool | None, Lids]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,10 +105,10 @@ class Lids:
             if self.option is False:
                 return "Open surface, lids off: no volume to preserve"
             return f"{_counted(many, 'open sheet') if many > 1 else 'Open sheet'}: {_NOTHING}"
-        done = "preserved" if preserved else "measured"
+        done = "kept" if preserved else "measured"
         parts = [f"Closed surface: volume {done}"]
         if holes:
-            lids = "its lid" if holes == 1 else "lids"
+            lids = "a lid" if holes == 1 else "lids"
             parts = [f"{_counted(holes, 'hole')}: volume {done} under {lids}"]
         without = int((~self.encloses).sum())
         if without:
@@ -126,6 +128,8 @@ class Lids:
 def lids_of(mesh: Mesh, lids: bool | None = None) -> Lids:
     """Return the lids of *mesh*, and which of its components enclose a volume.
 
+    They are computed once for each mesh and option.
+
     Parameters
     ----------
     mesh : Mesh
@@ -136,14 +140,21 @@ def lids_of(mesh: Mesh, lids: bool | None = None) -> Lids:
 
     Examples
     --------
-    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    >>> open_corner = Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]])
-    >>> lids = lids_of(open_corner)
-    >>> lids.encloses, lids.closed(open_corner).tolist()
-    (array([ True]), [[0, 2, 1], [0, 1, 3], [0, 3, 2], [3, 1, 4], [2, 3, 4], [1, 2, 4]])
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 4]]
+    >>> spike = Mesh(corners, [[0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> lids = lids_of(spike)
+    >>> lids.encloses, len(lids.faces), (lids.extension @ spike.vertices)[4].round(3)
+    (array([ True]), 3, array([0.333, 0.333, 0.   ]))
     >>> lids_of(Mesh(corners[:3], [[0, 1, 2]])).encloses
     array([False])
     """
+    known = _known.setdefault(mesh, {})
+    if lids not in known:
+        known[lids] = _lids_of(mesh, lids)
+    return known[lids]
+
+
+def _lids_of(mesh: Mesh, wanted: bool | None) -> Lids:
     n, k = mesh.n_vertices, len(mesh.borders)
     sizes = np.array([len(loop) for loop in mesh.borders], dtype=np.int64)
     tail = np.concatenate([np.empty(0, np.int64), *mesh.borders])
@@ -154,8 +165,8 @@ def lids_of(mesh: Mesh, lids: bool | None = None) -> Lids:
     extension = sparse.csr_array(sparse.vstack([sparse.eye_array(n), means]))
     component = mesh.components[[each[0] for each in mesh.borders]].astype(np.int64)
     every = np.ones(int(mesh.components.max()) + 1, dtype=bool)
-    found = Lids(faces, loop, extension, component, every, lids)
-    return replace(found, encloses=_enclosing(mesh, found, lids))
+    found = Lids(faces, loop, extension, component, every, wanted)
+    return replace(found, encloses=_enclosing(mesh, found, wanted))
 
 
 def volume_summary(mesh: Mesh, lids: bool | None = None) -> str:
@@ -170,9 +181,9 @@ def volume_summary(mesh: Mesh, lids: bool | None = None) -> str:
 
     Examples
     --------
-    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    >>> volume_summary(Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]]))
-    '1 hole: volume preserved under its lid'
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 4]]
+    >>> volume_summary(Mesh(corners, [[0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    '1 hole: volume kept under a lid'
     >>> volume_summary(Mesh(corners[:3], [[0, 1, 2]]))
     'Open sheet: no volume to preserve'
     """
@@ -218,17 +229,9 @@ def _enclosing(mesh: Mesh, lids: Lids, wanted: bool | None) -> BoolArray:
     count, component = len(lids.encloses), mesh.components[mesh.faces[:, 0]]
     is_open = lids.is_open
     encloses = ~is_open | (wanted is not False)
-    if is_open.any():
-        half_edges = HalfEdges(mesh.faces, mesh.n_vertices)
-        encloses[component[half_edges.one_sided[half_edges.shells]]] = False
-    # Volumes with the first vertex of each component as the origin.
-    owner = np.concatenate([component, lids.component[lids.loop]])
+    encloses[component[_one_sided(mesh)]] = False
     _, first = np.unique(mesh.components, return_index=True)
-    a, e, f = corner_and_edges(
-        lids.extension @ mesh.vertices, np.concatenate([mesh.faces, lids.faces])
-    )
-    determinants = np.einsum("ij,ij->i", a - mesh.vertices[first][owner], np.cross(e, f))
-    volumes = np.bincount(owner, determinants, count) / 6.0
+    volumes = _volumes(mesh, lids, component, mesh.vertices[first])
     areas = np.bincount(component, mesh.face_areas, count)
     encloses &= np.abs(volumes) > _NO_VOLUME * areas**1.5
     if wanted is None:
@@ -241,6 +244,27 @@ def _enclosing(mesh: Mesh, lids: Lids, wanted: bool | None) -> BoolArray:
     if abs(volumes[encloses].sum()) <= _NO_VOLUME * areas.sum() ** 1.5:
         encloses[:] = False  # they cancel: no change could be relative to their sum
     return encloses
+
+
+def _one_sided(mesh: Mesh) -> BoolArray:
+    """Return which faces are part of a shell with one side, (m,) bool."""
+    # Such a shell has edges whose two faces have the same direction: twice in the boundary.
+    keys = np.sort(mesh.boundary @ [mesh.n_vertices, 1])
+    if not (keys[1:] == keys[:-1]).any():
+        return np.zeros(mesh.n_faces, dtype=bool)
+    half_edges = HalfEdges(mesh.faces, mesh.n_vertices)
+    return half_edges.one_sided[half_edges.shells]
+
+
+def _volumes(mesh: Mesh, lids: Lids, component: IntArray, origins: FloatArray) -> FloatArray:
+    """Return the volume of each component under lids, (c,), with its origin of *origins* (c, 3)."""
+    if mesh.is_closed and len(origins) == 1:
+        return np.array([signed_volume(mesh.vertices, mesh.faces)])
+    owner = np.concatenate([component, lids.component[lids.loop]])
+    faces = np.concatenate([mesh.faces, lids.faces])
+    a, e, f = corner_and_edges(lids.extension @ mesh.vertices, faces)
+    determinants = np.einsum("ij,ij->i", a - origins[owner], np.cross(e, f))
+    return np.bincount(owner, determinants, len(origins)) / 6.0
 
 
 def _counted(count: int, name: str) -> str:

@@ -11,8 +11,6 @@ from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
 from vtk_segdeform.solver import VolumeConstraint, region_volumes
 
-from ..scene import enclosure_of
-
 
 class RegionVolumes:
     """The volume changes of the current regions in the current pose of a session.
@@ -34,8 +32,6 @@ class RegionVolumes:
         mesh encloses no volume.
         """
         session = self._session
-        if not enclosure_of(session).has_volume:
-            return []
         owned = self._owned()
         if not owned:
             return []
