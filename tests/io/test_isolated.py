@@ -15,7 +15,8 @@ from vtkmodules.vtkCommonCore import vtkOutputWindow
 from vtk_segdeform import Mesh
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.io import isolated, meshlab
-from vtk_segdeform.io.convert import read_mesh, read_polydata, to_polydata, write_mesh
+from vtk_segdeform.io.convert import read_polydata, to_polydata, write_mesh
+from vtk_segdeform.io.surface import read_mesh
 
 NAMES = ["<&\">'", "a\nb", "100%", "%3C", "Größe", "身体", "a b"]
 

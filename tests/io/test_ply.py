@@ -13,13 +13,8 @@ from vtk_segdeform import Mesh
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.geometry.volume import signed_volume
-from vtk_segdeform.io.convert import (
-    from_polydata,
-    read_mesh,
-    read_polydata,
-    to_polydata,
-    write_mesh,
-)
+from vtk_segdeform.io.convert import from_polydata, read_polydata, to_polydata, write_mesh
+from vtk_segdeform.io.surface import read_mesh
 
 HEADER = (
     "ply\nformat {kind} 1.0\nelement vertex {n}\nproperty float x\nproperty float y\n"

@@ -73,7 +73,7 @@ def test_a_surface_without_faults_is_unchanged():
 def test_polygons_and_arrays_of_kept_faces_are_kept():
     surface = box(drop=[5, 6, 9, 10, 40])
     closed, done = repair_surface(surface)
-    assert done.report.ok
+    assert done.report.is_closed
     kept = surface.n_cells
     counts, corners = polygons_of(closed)
     assert (counts[:kept] == 4).all()
@@ -126,7 +126,7 @@ def test_a_flipped_polygon_stays_a_polygon_with_flipped_corners():
     surface.cell_data["Normals"] = np.tile([1.0, 0.0, 0.0], (surface.n_cells, 1))
     surface.cell_data.active_normals_name = "Normals"
     fixed, done = repair_surface(surface)
-    assert done.report.ok
+    assert done.report.is_closed
     assert done.steps == ("flip 4 faces to agree with the neighbours",)
     assert np.flatnonzero(done.face_turned).size == 4
     assert (polygons_of(fixed)[0] == 4).all()
@@ -147,7 +147,7 @@ def test_a_polygon_that_loses_a_part_becomes_triangles_and_is_reported():
     double = polydata_of(points, np.append(3, counts), np.append(extra, corners))
     double.cell_data["material"] = np.arange(double.n_cells)
     closed, done = repair_surface(double)
-    assert done.report.ok
+    assert done.report.is_closed
     assert done.steps == (
         "remove 1 duplicate face", "cut 1 polygon into triangles where the repair changed a part",
     )  # fmt: skip
@@ -175,7 +175,7 @@ def test_strips_and_loose_cells_are_reported():
     strip.strips = np.array([4, 0, 1, 2, 3])
     strip.cell_data["tag"] = np.array([5, 6, 8])
     closed, done = repair_surface(strip)
-    assert done.report.ok
+    assert done.report.is_closed
     assert_array_equal(closed.cell_data["tag"], [8, 8, 0, 0])
     for step in ("remove 1 vertex cell", "remove 1 line", "cut 1 strip into triangles"):
         assert step in done.steps
@@ -185,12 +185,12 @@ def test_the_accessor_repairs_a_copy_and_logs_each_step(caplog):
     surface = box(drop=[5])
     with caplog.at_level(logging.INFO, logger="vtk_segdeform"):
         closed = surface.segdeform.repair()
-    assert closed.segdeform.check().ok
+    assert closed.segdeform.check().is_closed
     assert closed.n_cells > surface.n_cells == 6 * N * N - 1
     assert "fill 1 hole of 4 edges" in caplog.text
     caplog.clear()
     left = surface.segdeform.repair(largest_hole=3)
-    assert not left.segdeform.check().ok
+    assert not left.segdeform.check().is_closed
     assert "largest_hole=4 (--largest-hole 4 on the command line)" in caplog.text
 
 

@@ -12,13 +12,8 @@ from test_round_trips import Warnings, prism
 from vtk_segdeform import Mesh
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.io.array_names import get_names, set_names
-from vtk_segdeform.io.convert import (
-    read_mesh,
-    read_polydata,
-    to_polydata,
-    with_vertices,
-    write_mesh,
-)
+from vtk_segdeform.io.convert import read_polydata, to_polydata, with_vertices, write_mesh
+from vtk_segdeform.io.surface import read_mesh
 
 BLENDER = """# Blender 4.2
 mtllib Körper.mtl

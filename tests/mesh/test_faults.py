@@ -19,11 +19,17 @@ from vtk_segdeform.mesh.topology import HalfEdges
 
 SPHERE = icosphere(2)
 N = len(SPHERE[0])
+HARMLESS = (Kind.ZERO_AREA, Kind.COINCIDENT, Kind.COMPONENTS)  # of any closed mesh too
 
 
 def kinds(vertices, faces):
-    """Return the faults of a mesh as {kind: count}."""
-    return {fault.kind: fault.count for fault in find_faults(vertices, faces).faults}
+    """Return the faults of a mesh and the notes on its topology as {kind: count}."""
+    report = find_faults(vertices, faces)
+    assert all(fault.kind.fatal for fault in report.faults)
+    assert not any(note.kind.fatal for note in report.notes)
+    found = {fault.kind: fault.count for fault in report.faults + report.notes}
+    assert len(found) == len(report.faults + report.notes)  # each kind once
+    return {kind: n for kind, n in found.items() if kind not in HARMLESS}
 
 
 def together(*solids):
@@ -55,7 +61,7 @@ def test_a_missing_face_leaves_three_open_edges_around_one_hole():
     report = find_faults(vertices, faces[1:])
     assert kinds(vertices, faces[1:]) == {Kind.OPEN_EDGE: 3, Kind.HOLE: 1}
     a, b, c = sorted(faces[0].tolist())
-    assert sorted(report.faults[0].examples) == [(a, b), (a, c), (b, c)]
+    assert sorted(report.notes[0].examples) == [(a, b), (a, c), (b, c)]
 
 
 def test_separate_holes_are_counted_separately():
@@ -86,6 +92,25 @@ def test_a_flipped_face_is_inconsistent_along_three_edges():
     turned = faces.copy()
     turned[3] = turned[3, ::-1]
     assert kinds(vertices, turned) == {Kind.TURNED_EDGE: 3}
+
+
+def test_borders_and_branches_are_allowed_and_turned_faces_are_not():
+    vertices, faces = SPHERE
+    fin = np.append(faces, [[faces[0, 0], faces[0, 1], 40]], axis=0)
+    for allowed in (faces, faces[1:], fin, faces[:1]):
+        used = np.unique(allowed)
+        report = find_faults(vertices[used], np.searchsorted(used, allowed))
+        assert report.ok
+        assert report.is_closed == report.is_two_manifold == (allowed is faces)
+    for wrong in (
+        np.append(faces[1:], faces[:1, ::-1], axis=0),
+        np.append(faces[2:], faces[:1, ::-1], axis=0),
+        np.append(fin[1:], fin[:1, ::-1], axis=0),
+    ):
+        report = find_faults(vertices, wrong)
+        assert not report.ok
+        assert not report.is_closed
+        assert not report.is_two_manifold
 
 
 def test_an_inside_out_mesh_is_found_at_any_position_and_scale():
@@ -200,7 +225,7 @@ def test_the_text_of_a_report_has_the_size_the_faults_and_advice():
     text = str(find_faults(np.append(vertices, [[9, 9, 9]], axis=0), faces[1:]))
     assert text.splitlines()[0] == "67 vertices, 127 faces, 1 component: has faults"
     assert "fault: 1 unreferenced vertex (vertex 66); `repair` removes" in text
-    assert "fault: 3 open edges (" in text
+    assert "note: 3 open edges (" in text
     assert str(find_faults(*CUBE)).endswith(": a closed, outward oriented two-manifold")
 
 

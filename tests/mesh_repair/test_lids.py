@@ -73,7 +73,7 @@ def closed(vertices, faces, least, largest=10_000):
     """Repair, check that all angles of the lids are at least *least* degrees; return the result."""
     assert not len(self_intersections(vertices, faces))
     result = repair(vertices, faces, largest_hole=largest)
-    assert result.report.ok, str(result.report)
+    assert result.report.is_closed, str(result.report)
     lids = result.faces[result.face_map < 0]
     assert np.rad2deg(least_angle(result.vertices[lids])).min() > least
     assert not len(self_intersections(result.vertices, result.faces))
@@ -173,7 +173,7 @@ def test_thousands_of_touching_holes_are_filled_together():
     vertices, faces = icosphere(5)
     keep = np.random.default_rng(3).random(len(faces)) > 0.05
     result = repair(vertices, faces[keep])
-    assert result.report.ok, str(result.report)
+    assert result.report.is_closed, str(result.report)
     assert len(result.vertices) == len(vertices)
     assert len(result.faces) == len(faces)
     volume = signed_volume(result.vertices, result.faces)
@@ -184,7 +184,7 @@ def test_an_unavoidable_intersection_is_reported():
     knot = np.array([np.sin(TURN) + 2 * np.sin(2 * TURN), np.cos(TURN) - 2 * np.cos(2 * TURN),
                      -np.sin(3 * TURN)]).T  # fmt: skip
     result = repair(*tube(knot, 0.3))
-    assert result.report.ok
+    assert result.report.is_closed
     assert (
         "2 lids cross the surface or another lid; no better triangulation was found" in result.steps
     )

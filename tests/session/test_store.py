@@ -305,7 +305,7 @@ def rewritten(content: bytes, *, compress: bool = False, **changes) -> bytes:
 
 HUGE = 1 << 61
 WRONG = [
-    ({"header": {"version": 2}}, "version 2 is newer than 1; update vtk_segdeform"),
+    ({"header": {"version": 3}}, "version 3 is newer than 2; update vtk_segdeform"),
     ({"header": {"version": 0}}, "version must be at least 1; got 0"),
     ({"header": {"version": "1"}}, "version must be a whole number"),
     ({"header": {"format": "something else"}}, "does not contain the format"),

@@ -32,6 +32,13 @@ def check_options(hold_tolerance: float, stretch: float, rotation_groups: int | 
         )
 
 
+def as_lids(lids: object) -> bool | None:
+    """Return the option *lids*, or raise an ArgumentError unless it is True, False or None."""
+    if lids is not None and not isinstance(lids, bool | np.bool_):
+        raise ArgumentError(f"lids must be True, False or None; got {shown(lids)}")
+    return None if lids is None else bool(lids)
+
+
 def check_distance(targets: FloatArray) -> None:
     """Raise a ConstraintError if *targets*, in units of the mesh's size, are absurdly far away."""
     if max(targets.max(initial=0.0), -targets.min(initial=0.0)) > _FARTHEST:

@@ -10,7 +10,7 @@ from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part
 from ..regions import segment
 from ..solver import Solution
-from .arguments import checked_constraints, checked_targets
+from .arguments import as_lids, checked_constraints, checked_targets
 from .deformer import Deformer
 
 
@@ -23,6 +23,7 @@ def deform(
     n_regions: int | None = 3,
     n_cage_vertices: int = 155,
     preserve_volume: bool = True,
+    lids: bool | None = None,
     progress: Progress | None = None,
 ) -> Solution:
     """Return *mesh* deformed so that its handle vertices are at *targets*.
@@ -44,6 +45,9 @@ def deform(
         Total number of cage vertices.
     preserve_volume : bool
         Preserve the enclosed volume exactly.
+    lids : bool or None
+        Whether an open surface encloses a volume under lids over its borders; None decides it for
+        each connected part, as `Deformer` does.
     progress : Progress, optional
         Called while cages are fitted and bound, and before every step; may cancel.
 
@@ -58,6 +62,7 @@ def deform(
     """
     require_mesh(mesh)
     as_flag(preserve_volume, "preserve_volume")
+    as_lids(lids)
     _, held = checked_constraints(mesh, fixed, handle)
     checked_targets(targets, len(held))
     regions = segment(mesh, n_regions, progress=part(progress, 0.0, 0.2))
@@ -69,6 +74,7 @@ def deform(
         fixed=fixed,
         handle=handle,
         preserve_volume=preserve_volume,
+        lids=lids,
         progress=part(progress, 0.7, 0.9),
     )
     return deformer.solve(targets, progress=part(progress, 0.9, 1.0))

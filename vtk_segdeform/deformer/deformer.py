@@ -31,6 +31,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from types import EllipsisType
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,7 @@ from ..cages import Cage
 from ..checks import all_of, as_callable, as_flag, as_path
 from ..errors import Cancelled
 from ..freezing import read_only
+from ..geometry import Lids, lids_of
 from ..kernels import compiled_kernels, one_blas_thread
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, tell
@@ -68,6 +70,7 @@ from ..solver import (
 )
 from ..subspace import Passengers, Subspace, bind_passengers
 from .arguments import (
+    as_lids,
     check_distance,
     check_options,
     checked_constraints,
@@ -128,6 +131,11 @@ class Deformer:
         Preserve the enclosed volume exactly, eq. (9).
     preserve_region_volumes : bool
         Preserve the volume of every region as well.
+    lids : bool or None
+        Whether an open surface encloses a volume, under lids over its borders.  None decides it for
+        each connected part: a bottle does, a sheet does not (`geometry.lids`).  True: all do.
+        False: only closed ones do.  Without any volume, as `has_volume` tells, nothing is
+        preserved and volume changes are 0.
     stretch : float
         Strength of the stretch term relative to the detail term; 0 is the paper's energy.
     rotation_groups : int or None
@@ -164,6 +172,9 @@ class Deformer:
         If *regions* belong to another mesh, or *blend* is no partition of unity over them.
     """
 
+    _lids: Lids
+    _total_volume: VolumeConstraint
+    _scaled_surface: ScaledSurface
     _constraints: _Constraints
     _continuation: WeightContinuation
     _p: FloatArray  # (m, 3), the cages of the last pose, in solver coordinates
@@ -180,6 +191,7 @@ class Deformer:
         handle: ArrayLike = (),
         preserve_volume: bool = True,
         preserve_region_volumes: bool = False,
+        lids: bool | None = None,
         stretch: float = 10.0,
         rotation_groups: int | None = 300,
         tolerance: float = 1e-7,
@@ -202,6 +214,7 @@ class Deformer:
         self._hold_tolerance = hold_tolerance
         self._preserve_volume = as_flag(preserve_volume, "preserve_volume")
         self._preserve_region_volumes = as_flag(preserve_region_volumes, "preserve_region_volumes")
+        self._lids_option = as_lids(lids)
         self._own_blend = None if blend is None else as_numbers(blend, "blend")
         folder = None if cache is None else as_path(cache, "cache")
 
@@ -218,14 +231,7 @@ class Deformer:
         at_origin = self._frame.about_origin(mesh.vertices)
         self._rest_pose = mesh.with_vertices(at_origin) if self._frame.is_far else mesh
         self._base = self._binding.mapping.base(self._rest_pose.vertices)
-        self._total_volume = total_volume(self._rest_pose)
-        self._scaled_surface = ScaledSurface(
-            self.subspace,
-            self._binding.mapping,
-            self._rest_pose.vertices,
-            self._total_volume,
-            base=self._base,
-        )
+        self._enclose()
         self._constrain(fixed, handle)
         if compiled_kernels(mesh.n_vertices):
             tell(progress, 0.99, "taking a trial step")
@@ -240,10 +246,12 @@ class Deformer:
         handle: ArrayLike = (),
         preserve_volume: bool | None = None,
         preserve_region_volumes: bool | None = None,
+        lids: bool | EllipsisType | None = ...,
     ) -> Deformer:
         """Return a deformer at rest with other constraints, which shares the binding of this one.
 
-        None preserves the volumes that this deformer preserves.
+        ``preserve_volume=None``, ``preserve_region_volumes=None`` and ``lids=...`` are the values
+        of this deformer.
         """
         other = self._shared()
         if preserve_volume is not None:
@@ -252,6 +260,9 @@ class Deformer:
             other._preserve_region_volumes = as_flag(
                 preserve_region_volumes, "preserve_region_volumes"
             )
+        if lids is not ... and as_lids(lids) is not self._lids_option:
+            other._lids_option = as_lids(lids)
+            other._enclose()
         other._constrain(fixed, handle)
         return other
 
@@ -277,6 +288,11 @@ class Deformer:
     def subspace(self) -> Subspace:
         """W~; ``subspace.map`` computes mesh vertices from stacked cage vertices."""
         return self._binding.energy.subspace
+
+    @property
+    def has_volume(self) -> bool:
+        """Whether the mesh encloses a volume, with its lids if it is open."""
+        return self._total_volume.has_volume
 
     @property
     def step_volumes(self) -> Volumes:
@@ -421,13 +437,28 @@ class Deformer:
 
     @property
     def _preserved_volumes(self) -> tuple[VolumeConstraint, ...]:
+        if not self.has_volume:
+            return ()
         if self._preserve_region_volumes:
             return self._region_volumes
         return (self._total_volume,) if self._preserve_volume else ()
 
     @cached_property
     def _region_volumes(self) -> tuple[VolumeConstraint, ...]:
-        return region_volumes(self._rest_pose, self.regions.labels)
+        return region_volumes(self._rest_pose, self.regions.labels, self._lids)
+
+    def _enclose(self) -> None:
+        """Compute the enclosed volume with the lids of now."""
+        vars(self).pop("_region_volumes", None)
+        self._lids = lids_of(self._rest_pose, self._lids_option)
+        self._total_volume = total_volume(self._rest_pose, self._lids)
+        self._scaled_surface = ScaledSurface(
+            self.subspace,
+            self._binding.mapping,
+            self._rest_pose.vertices,
+            self._total_volume,
+            base=self._base,
+        )
 
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:
         return np.array([each.relative(x) for each in self._region_volumes])
@@ -460,7 +491,10 @@ class Deformer:
             fixed_box=box[: 2 * len(self.fixed)],
             anchor=fixed_at.mean(axis=0) * self._frame.size,
             volumes=volumes,
-            is_scaled=only_total and is_large and binding.coarse_volume.cells is not None,
+            is_scaled=only_total
+            and self.has_volume
+            and is_large
+            and binding.coarse_volume.cells is not None,
             solver=GaussNewton(binding.energy, positions, volumes),
         )
         self.reset()

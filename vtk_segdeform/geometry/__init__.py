@@ -10,6 +10,7 @@ The files, in reading order:
     kmeans          clusters of points, and points far from each other
     sampling        even samples of the vertices, and their Voronoi cells
     normals         vertex normals for drawing
+    normal_transport   given normals and tangents, carried along by a deformation
     distortion      stretch and shear of each triangle
     local_volume    volume change below the surface at each vertex
 """
@@ -24,8 +25,9 @@ from .differential import (
 from .distortion import distortion, triangle_distortion
 from .intrinsic import IntrinsicTriangulation
 from .kmeans import cluster_positions, cluster_within_parts, farthest_points
-from .lids import Lids, lids_of
+from .lids import Lids, lids_of, volume_summary
 from .local_volume import LocalVolume, local_volume_change
+from .normal_transport import NormalTransport
 from .normals import VertexNormals
 from .rotations import closest_rotations, rigid_fit
 from .sampling import distinct_lengths, faces_between, nearest_source, unique_edges, voronoi_cells
@@ -35,6 +37,7 @@ __all__ = [
     "IntrinsicTriangulation",
     "Lids",
     "LocalVolume",
+    "NormalTransport",
     "VertexNormals",
     "area_gradients",
     "closest_rotations",
@@ -58,6 +61,7 @@ __all__ = [
     "volume_along",
     "volume_along_path",
     "volume_gradient",
+    "volume_summary",
     "voronoi_cells",
     "with_least_areas",
 ]

@@ -3,13 +3,14 @@
 The files, in reading order:
 
     surface            `Surface`: what is given, and the mesh that is deformed
-    convert            `read_mesh`, `write_mesh`, `from_polydata`, `to_polydata`
+    convert            `read_polydata`, `write_mesh`, `from_polydata`, `to_polydata`
     polygons           polygons as two flat arrays
+    moving             a PolyData at other positions, with its normals and tangents
     off                OFF
     ply ply_tables     PLY, and the tables of its elements
     wavefront          OBJ
     stl                STL
-    gltf gltf_buffers  glTF, and the numbers in its buffers
+    gltf               glTF: a folder with its own contents
     vtk_formats        other formats, by VTK
     isolated reading_child
                        native readers in a child process
@@ -18,13 +19,13 @@ The files, in reading order:
     repaired           repair of PolyData with its polygons and arrays
     meshlab            PyMeshLab: conversion, simplification, file formats
     meshlab_layers     MeshLab's layers as PolyData
+    meshlab_shown      colours of layers, and cages as wires
     meshlab_project    MeshLab projects: a mesh and its cages
 """
 
 from .convert import (
     from_polydata,
     is_mesh_file,
-    read_mesh,
     read_polydata,
     require_writable,
     to_polydata,
@@ -35,7 +36,7 @@ from .meshlab import from_meshset, simplify, to_meshset
 from .meshlab_project import read_project, write_project
 from .polygons import polydata_of, triangles_of
 from .repaired import repair_surface
-from .surface import Surface
+from .surface import Surface, read_mesh
 
 __all__ = [
     "Surface",

@@ -3,6 +3,8 @@
     file  --read_polydata-->  PolyData  --from_polydata-->  Mesh
     file  <---write_mesh----  PolyData  <--with_vertices--  new positions (n, 3)
 
+`surface.Surface` does both for any surface; `from_polydata` takes only what a `Mesh` may be.
+
 The order and number of vertices and faces and all digits of coordinates are preserved.  OBJ, OFF
 and PLY are read and written by this package, because VTK's readers round to seven digits (PLY),
 split vertices at texture seams (OBJ) or do not exist (OFF); glTF is read by this package, because
@@ -30,7 +32,8 @@ from ..errors import MeshError
 from ..files import fault_of, replacing, require_place
 from ..mesh import Mesh
 from . import meshlab
-from .gltf import read_gltf
+from .gltf import read_gltf, write_gltf
+from .moving import MovingSurface
 from .off import read_off, write_off
 from .ply import read_ply, write_ply
 from .polygons import polydata_of, triangles_of
@@ -45,44 +48,18 @@ _READERS: dict[str, Callable[[Path], pv.PolyData]] = {
     ".stl": read_stl,
 }  # fmt: skip
 _WRITERS: dict[str, Callable[[Path, pv.PolyData], None]] = {
-    ".obj": write_obj, ".off": write_off, ".ply": write_ply,
+    ".glb": write_gltf, ".gltf": write_gltf, ".obj": write_obj, ".off": write_off,
+    ".ply": write_ply,
 }  # fmt: skip
 _VTK_READS = frozenset({".vtk", ".vtp", ".vtu", ".vtkhdf"})
 _VTK_WRITES = frozenset({".stl", ".vtk", ".vtp", ".vtkhdf"})
+# Formats of point arrays of any name and colours.
 _STORE_ARRAYS = frozenset({".ply", ".vtk", ".vtp", ".vtkhdf"})
 
 
 def is_mesh_file(path: str | Path) -> bool:
-    """Return whether *path* has the suffix of a format that `read_mesh` supports."""
+    """Return whether *path* has the suffix of a format that can be read."""
     return as_path(path).suffix.lower() in {*_READERS, *_VTK_READS, *meshlab.READS}
-
-
-def read_mesh(path: str | Path) -> Mesh:
-    """Read a closed mesh from a file.
-
-    Parameters
-    ----------
-    path : str or Path
-        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .vtkhdf, .glb, .gltf; with PyMeshLab also .3ds,
-        .dae, .x3d, .wrl and others.
-
-    Returns
-    -------
-    mesh : Mesh
-        Vertices and faces in the order of the file; polygons are cut into triangles.
-
-    Raises
-    ------
-    MeshError
-        If the file does not exist, cannot be read, or has no closed, outward oriented two-manifold.
-    MissingDependencyError
-        If only PyMeshLab reads this format and it is not installed.
-    """
-    surface = read_polydata(path)
-    try:
-        return from_polydata(surface)
-    except ValueError as error:
-        raise MeshError(f"{path}: {error}") from None
 
 
 def read_polydata(path: str | Path) -> pv.PolyData:
@@ -90,6 +67,12 @@ def read_polydata(path: str | Path) -> pv.PolyData:
 
     Polygons are not cut into triangles, so that `write_mesh` can write them again.  Point, cell and
     field arrays and texture coordinates are kept.
+
+    Parameters
+    ----------
+    path : str or Path
+        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .vtkhdf, .glb, .gltf; with PyMeshLab also .3ds,
+        .dae, .x3d, .wrl and others.
 
     Raises
     ------
@@ -167,6 +150,8 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
                 write_with_vtk(draft, surface)
             else:
                 _write_with_meshlab(draft, mesh if isinstance(mesh, Mesh) else from_polydata(mesh))
+    except MeshError as fault:
+        raise MeshError(f"{path}: {str(fault).removeprefix(f'{path}: ')}") from None
     except OSError as fault:
         reason = fault.strerror or str(fault)
         raise MeshError(
@@ -210,14 +195,15 @@ def to_polydata(mesh: Mesh | Cage) -> pv.PolyData:
 
 
 def from_polydata(polydata: pv.PolyData) -> Mesh:
-    """Return the closed mesh of a PolyData; polygons and strips are cut into triangles.
+    """Return the mesh of a PolyData; polygons and strips are cut into triangles.
 
-    Vertices keep their number and order, so `with_vertices` accepts positions of the mesh.
+    Vertices keep their number and order, so `with_vertices` accepts positions of the mesh.  For a
+    surface with seams or other faults there is `Surface`.
 
     Raises
     ------
     MeshError
-        If the surface is not a closed, outward oriented two-manifold.
+        If the surface cannot be a `Mesh` as it is.
     """
     require(polydata, pv.PolyData, "polydata")
     faces = triangles_of(polydata)
@@ -230,7 +216,7 @@ def with_vertices(polydata: pv.PolyData, vertices: ArrayLike) -> pv.PolyData:
     """Return a copy of *polydata* with other positions.
 
     Cells, point, cell and field arrays and texture coordinates are kept; points become float64.
-    Arrays of normals are computed again.
+    Normals and tangents follow the surface (`moving`).
 
     Parameters
     ----------
@@ -241,25 +227,7 @@ def with_vertices(polydata: pv.PolyData, vertices: ArrayLike) -> pv.PolyData:
     """
     require(polydata, pv.PolyData, "polydata")
     points = as_points(vertices, "vertices", polydata.n_points)
-    moved = polydata.copy(deep=True)
-    moved.points = points.copy()
-    for attributes, of_points in ((moved.point_data, True), (moved.cell_data, False)):
-        stale = {"Normals", attributes.active_normals_name} & set(attributes.keys())
-        if not stale:
-            continue
-        # VTK would return existing normals, so it gets a copy without arrays.
-        bare = pv.PolyData()
-        bare.copy_structure(moved)
-        bare = bare.compute_normals(
-            point_normals=of_points,
-            cell_normals=not of_points,
-            split_vertices=False,
-            consistent_normals=False,
-        )
-        fresh = (bare.point_data if of_points else bare.cell_data)["Normals"]
-        for name in stale:
-            attributes[name] = np.asarray(fresh, dtype=attributes[name].dtype)
-    return moved
+    return MovingSurface(polydata).at(points)
 
 
 def _files(suffix: str) -> str:

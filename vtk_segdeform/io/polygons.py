@@ -96,23 +96,23 @@ def cells_of(polydata: pv.PolyData) -> IntArray:
     return cells
 
 
-def padded_corners(counts: IntArray, pairs: FloatArray) -> FloatArray:
-    """Return *pairs* (k, 2) per corner as rows (m, 2 * most corners), padded with NaN."""
-    most = int(counts.max(initial=0))
-    wide = np.full((len(counts), most, 2), np.nan)
-    wide[np.arange(most) < counts[:, None]] = pairs
-    return wide.reshape(len(counts), 2 * most)
+def padded_corners(counts: IntArray, values: FloatArray) -> FloatArray:
+    """Return *values* (k, w) per corner as rows (m, w * most corners), padded with NaN."""
+    most, width = int(counts.max(initial=0)), values.shape[1]
+    wide = np.full((len(counts), most, width), np.nan)
+    wide[np.arange(most) < counts[:, None]] = values
+    return wide.reshape(len(counts), width * most)
 
 
-def corner_values(wide: FloatArray | None, counts: IntArray) -> FloatArray | None:
-    """Return the inverse of `padded_corners`, (k, 2); None if *wide* does not fit *counts*."""
-    if wide is None or wide.ndim != 2 or wide.dtype.kind != "f" or wide.shape[1] % 2:
+def corner_values(wide: FloatArray | None, counts: IntArray, width: int = 2) -> FloatArray | None:
+    """Return the inverse of `padded_corners`, (k, *width*); None if it does not fit *counts*."""
+    if wide is None or wide.ndim != 2 or wide.dtype.kind != "f" or wide.shape[1] % width:
         return None
-    most = wide.shape[1] // 2
+    most = wide.shape[1] // width
     if len(wide) != len(counts) or most < counts.max(initial=0):
         return None
-    pairs: FloatArray = wide.reshape(len(counts), most, 2)[np.arange(most) < counts[:, None]]
-    return pairs
+    each: FloatArray = wide.reshape(len(counts), most, width)[np.arange(most) < counts[:, None]]
+    return each
 
 
 def triangles_of(polydata: pv.PolyData) -> IntArray:

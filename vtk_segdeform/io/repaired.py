@@ -48,8 +48,8 @@ def repair_surface(
     Returns
     -------
     repaired : pyvista.PolyData
-        The original points and polygons in their order, then the new ones.  Without faults only if
-        ``done.report.ok``.
+        The original points and polygons in their order, then the new ones.  It is closed only if
+        ``done.report.is_closed``.
     done : Repair
         The repair of the triangulated surface; its last steps list the losses.
 

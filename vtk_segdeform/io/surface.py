@@ -18,11 +18,38 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike
 
-from ..arrays import IntArray, as_ids, as_points, plain
+from ..arrays import FloatArray, IntArray, as_points, plain
 from ..checks import require
+from ..errors import MeshError
 from ..mesh import Mesh, Soup, Workaround, mesh_of
-from .convert import read_polydata, with_vertices, write_mesh
+from .convert import read_polydata, write_mesh
+from .moving import MovingSurface
 from .polygons import triangles_of
+
+
+def read_mesh(path: str | Path) -> Mesh:
+    """Read the mesh of a file: ``Surface.read(path).mesh``.
+
+    Parameters
+    ----------
+    path : str or Path
+        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .vtkhdf, .glb, .gltf; with PyMeshLab also .3ds,
+        .dae, .x3d, .wrl and others.
+
+    Returns
+    -------
+    mesh : Mesh
+        Vertices and faces in the order of the file, where these can be a mesh; seams are welded
+        and polygons cut into triangles.
+
+    Raises
+    ------
+    MeshError
+        If the file does not exist or cannot be read, or has no face that can be deformed.
+    MissingDependencyError
+        If only PyMeshLab reads this format and it is not installed.
+    """
+    return Surface.read(path).mesh
 
 
 class Surface:
@@ -53,8 +80,33 @@ class Surface:
 
     @classmethod
     def read(cls, path: str | Path) -> Surface:
-        """Read a surface from a file of any format of `read_mesh`."""
-        return cls(read_polydata(path))
+        """Read a surface from a file of any format of `read_mesh`, and make its mesh.
+
+        Raises
+        ------
+        MeshError
+            As `read_mesh`, but only if no mesh can be made of it; the message names the file.
+        """
+        surface = cls(read_polydata(path))
+        try:
+            _ = surface.mesh
+        except MeshError as fault:
+            raise MeshError(f"{path}: {fault}") from None
+        return surface
+
+    @classmethod
+    def of(cls, polydata: pv.PolyData, soup: Soup) -> Surface:
+        """Return the surface *polydata* with the mesh of *soup*, which was made of it before.
+
+        MeshError if the numbers of their points differ.
+        """
+        surface = cls(polydata)
+        if len(soup.points) != polydata.n_points:
+            raise MeshError(
+                f"the mesh of {len(soup.points)} points is not one of {polydata.n_points} points"
+            )
+        surface.__dict__["_soup"] = soup  # in place of the cached property
+        return surface
 
     @property
     def given(self) -> pv.PolyData:
@@ -77,9 +129,8 @@ class Surface:
         return self._soup.workarounds
 
     def vertices_at(self, points: ArrayLike) -> IntArray:
-        """Return the vertices (k,) of the mesh, sorted, that given *points* (mask or ids) follow."""
-        ids = as_ids(points, self._given.n_points, "points")
-        return np.unique(self.vertex_of[ids])
+        """Return the vertices (k,) of the mesh that given *points* (mask or ids) follow, sorted."""
+        return self._soup.vertices_at(points)
 
     def at_points(self, values: ArrayLike) -> Any:
         """Return *values* (n, ...) of the vertices of the mesh at the given points (p, ...)."""
@@ -90,8 +141,19 @@ class Surface:
 
         Of several points that follow a vertex, the first one counts.
         """
-        _, first = np.unique(self.vertex_of, return_index=True)
-        return plain(values, "values")[first]
+        return self._soup.at_vertices(plain(values, "values"))
+
+    def targets_at(self, points: ArrayLike, targets: ArrayLike) -> tuple[IntArray, FloatArray]:
+        """Return the vertices (k,) that given points follow, and where they must be, (k, 3).
+
+        Parameters
+        ----------
+        points : (q,) int or (p,) bool
+            Given points.
+        targets : (q, 3) float
+            Their targets.  Where several points follow one vertex, it goes to the mean.
+        """
+        return self._soup.targets_at(points, targets)
 
     def moved(self, vertices: ArrayLike) -> pv.PolyData:
         """Return what was given for the mesh at *vertices* (n, 3): coordinates and normals differ.
@@ -99,11 +161,15 @@ class Surface:
         Points, cells and arrays are the same, in the same order.
         """
         x = as_points(vertices, "vertices", self.mesh.n_vertices)
-        return with_vertices(self._given, self._soup.moved(x))
+        return self._moving.at(self._soup.moved(x))
 
     def write(self, path: str | Path, vertices: ArrayLike) -> None:
         """Write `moved` to a file, as `write_mesh` does."""
         write_mesh(path, self.moved(vertices))
+
+    @cached_property
+    def _moving(self) -> MovingSurface:
+        return MovingSurface(self._given)
 
     @cached_property
     def _soup(self) -> Soup:

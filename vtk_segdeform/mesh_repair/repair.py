@@ -23,16 +23,17 @@ from . import repair_steps as steps
 
 @dataclass(frozen=True)
 class Repair(Frozen):
-    """A repaired mesh and the steps that led to it; *report* lists the remaining faults.
+    """A repaired mesh and the steps that led to it; *report* lists what remains.
 
     Vertices and faces that are kept keep their order; new ones come after them.
 
     Attributes
     ----------
     vertices, faces : (n, 3) float, (m, 3) int
-        The result.  It can be a `Mesh` if ``report.ok``.
+        The result.  It is closed, oriented outward and a two-manifold if ``report.is_closed``, and
+        can be a `Mesh`, with borders or not, if ``report.ok``.
     steps : tuple of str
-        The steps taken, one sentence each; empty if there were no faults.
+        The steps taken, one sentence each; empty if the mesh was closed already.
     vertex_map, face_map : (n,) int, (m,) int
         The original index of each vertex and face; -1 if it fills a hole or is part of a face
         that was split to close a crack.
@@ -111,7 +112,7 @@ def repair(
     >>> fixed = repair(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]])
     >>> fixed.steps
     ('fill 1 hole of 3 edges with 1 triangle',)
-    >>> fixed.face_map, fixed.report.ok
+    >>> fixed.face_map, fixed.report.is_closed
     (array([ 0,  1,  2, -1]), True)
     """
     if not is_number(weld_distance, 0.0):
@@ -131,7 +132,7 @@ def repair(
         raise MeshError(f"the mesh cannot be repaired: {'; '.join(unrepairable)}")
     draft = steps.Draft.of(points, triangles)
     done: list[str] = []
-    if not report.ok:
+    if not report.is_closed:
         for step in (
             steps.remove_non_finite,
             steps.remove_degenerate,
@@ -154,7 +155,7 @@ def repair(
                     "check how the mesh was made"
                 )
         report = find_faults(draft.vertices, draft.faces)
-    left = steps.remaining_holes(draft, largest_hole) if not report.ok else ()
+    left = steps.remaining_holes(draft, largest_hole) if not report.is_closed else ()
     found = Repair(
         draft.vertices, draft.faces, tuple(done), draft.vertex_map, draft.face_map, report,
         draft.weights, draft.flipped, left,

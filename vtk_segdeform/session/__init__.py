@@ -11,6 +11,7 @@ The files, in reading order:
     listeners      notification of changes
     naming         names of regions and handles
     store          saving and loading sessions
+    surface_store  the given surface in a file
     archive        the file format
 """
 

@@ -2,7 +2,7 @@
 
 Files may be damaged or malicious.  An array is read only if it has the shape and type that the
 caller expects and its bytes are in the file; all arrays together have at most two gigabytes.
-Checksums are verified, and nothing is unpickled.
+Texts are stored as UTF-8 and their ends.  Checksums are verified, and nothing is unpickled.
 """
 
 from __future__ import annotations
@@ -20,16 +20,32 @@ from numpy.lib import format as npy
 _HEADER = "header.json"
 _LONGEST_HEADER = 1 << 20  # bytes
 _LONGEST_NPY_HEADER = 1 << 12  # bytes
-_LONGEST_DIRECTORY = 1 << 16  # bytes
+_LONGEST_DIRECTORY = 1 << 20  # bytes
 _LARGEST = 2 << 30  # bytes of a file; a million vertices take about 80 million
 _END = b"PK\5\6"  # start of the last 22 bytes of a zip file without a comment
 _END_64 = b"PK\6\7"  # start of the 20 bytes before them in a zip64 file, which is too large
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # a constant date makes equal sessions equal files
 _TYPES = {"f": np.dtype("<f8"), "i": np.dtype("<i8"), "b": np.dtype("|b1")}
+_OTHERS = ("f4", "i4", "i2", "i1", "u8", "u4", "u2", "u1", "c8", "c16")
+_TYPES |= {name: np.dtype(f"<{name}") for name in _OTHERS}
+_NAMES = {dtype.newbyteorder("="): name for name, dtype in _TYPES.items()}
+
+
+def type_of(array: Any) -> str:
+    """Return the name under which an archive stores the type of *array*.
+
+    Raises
+    ------
+    OSError
+        If it cannot be stored.
+    """
+    if array.dtype not in _NAMES:
+        raise OSError(f"arrays of {array.dtype} cannot be stored")
+    return _NAMES[array.dtype]
 
 
 def write_archive(file: IO[bytes], header: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
-    """Write a *header* for JSON and *arrays* of float64, int64 or bool.
+    """Write a *header* for JSON and *arrays* of numbers.
 
     Raises
     ------
@@ -43,7 +59,7 @@ def write_archive(file: IO[bytes], header: Mapping[str, Any], arrays: Mapping[st
         archive.writestr(zipfile.ZipInfo(_HEADER, _EPOCH), json.dumps(header, indent=1))
         for name, array in arrays.items():
             content = BytesIO()
-            npy.write_array(content, array.astype(_TYPES[array.dtype.kind]), allow_pickle=False)
+            npy.write_array(content, array.astype(_TYPES[type_of(array)]), allow_pickle=False)
             archive.writestr(zipfile.ZipInfo(f"{name}.npy", _EPOCH), content.getbuffer())
 
 
@@ -73,13 +89,15 @@ class Archive:
             return json.loads(content.read())
 
     def array(self, name: str, kind: str, shape: tuple[int, ...]) -> Any:
-        """Return the array *name*, of *kind* "f", "i" or "b" and of the given *shape*.
+        """Return the array *name* of the given *shape*, of a *kind* that `type_of` returns.
 
         Raises
         ------
         ValueError, OSError, zipfile.BadZipFile
             If there is no such array, its type or shape differs, or it is damaged.
         """
+        if kind not in _TYPES:
+            raise ValueError(f"{name} must have a type of {', '.join(_TYPES)}; got {kind!r}")
         dtype = _TYPES[kind]
         size = dtype.itemsize
         for count in shape:  # Python integers do not overflow
@@ -103,9 +121,9 @@ class Archive:
         return array.astype(dtype.newbyteorder("="))
 
     def _open(self, name: str, limit: int) -> IO[bytes]:
-        if name not in self._archive.namelist():
+        info = self._archive.NameToInfo.get(name)
+        if info is None:
             raise ValueError(f"{name} is missing")
-        info = self._archive.getinfo(name)
         if info.compress_type != zipfile.ZIP_STORED:
             raise ValueError(f"{name} is compressed, which is not supported")
         size = max(info.file_size, info.compress_size)

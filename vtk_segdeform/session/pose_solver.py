@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache, cached_property, partial
+from functools import cache, partial
 from types import MappingProxyType
 
 import numpy as np
@@ -23,7 +23,7 @@ from ..arrays import FloatArray, frozen
 from ..deformer import Deformer
 from ..errors import CageError, ConstraintError
 from ..files import cache_folder
-from ..geometry import signed_volume, volume_gradient
+from ..geometry import Lids, lids_of, volume_gradient
 from ..mesh import Mesh
 from ..progress import Progress, part, tell
 from ..solver import Solution, VolumeConstraint, region_volumes, total_volume
@@ -35,7 +35,11 @@ _MAX_BOUND = 3  # bound deformers in memory: undo of new cages or options needs 
 _BIND_SHARE = 0.95  # share of binding in the progress of `prepare`; the rest adds constraints
 _VOLUME_TOLERANCE = 1e-9  # relative; a pose with a larger error does not meet a new constraint
 _BINDING_OPTIONS = "stretch", "rotation_groups"  # fixed once a deformer is bound
-_CONSTRAINT_OPTIONS = "preserve_volume", "preserve_region_volumes"  # changed by `Deformer.hold`
+_CONSTRAINT_OPTIONS = (
+    "preserve_volume",
+    "preserve_region_volumes",
+    "lids",
+)  # changed by `Deformer.hold`
 _NO_TARGETS = np.empty((0, 3))
 
 
@@ -53,15 +57,20 @@ class PoseSolver:
         self._bound: tuple[tuple[State, Deformer], ...] = ()  # newest first
         self._constrained: tuple[Deformer, State, Deformer] | None = None
         self._current: Pose | None = None  # pose of the constrained deformer; None if unknown
-        self._evaluated: tuple[Pose, FloatArray, Callable[[], float]] | None = None
+        self._evaluated: tuple[Pose, bool | None, FloatArray, Callable[[], float]] | None = None
+        self._volumes: dict[bool | None, tuple[Lids, VolumeConstraint]] = {}
 
-    @cached_property
-    def _rest_volume(self) -> float:
-        return signed_volume(self._mesh.vertices, self._mesh.faces)
+    def lids(self, state: State) -> Lids:
+        """Return the lids of the mesh with the option of *state*."""
+        return self._enclosed(state)[0]
 
-    @cached_property
-    def _total_volume(self) -> VolumeConstraint:
-        return total_volume(self._mesh)
+    def _enclosed(self, state: State) -> tuple[Lids, VolumeConstraint]:
+        """Return the lids and the total volume with the option of *state*."""
+        wanted = state.options.lids
+        if wanted not in self._volumes:
+            lids = lids_of(self._mesh, wanted)
+            self._volumes[wanted] = lids, total_volume(self._mesh, lids)
+        return self._volumes[wanted]
 
     def is_bound(self, state: State) -> bool:
         """Return whether a deformer for *state* is bound already."""
@@ -150,18 +159,21 @@ class PoseSolver:
         pose = Pose(p, MappingProxyType({}))
         x, change = self._evaluate(state, pose)
         pose = replace(pose, targets=targets_at(state.handles, x))
-        self._evaluated = pose, x, change  # targets do not change the vertices
+        self._evaluated = pose, state.options.lids, x, change  # targets do not change the vertices
         return pose
 
     def _restore_volume(
         self, state: State, cage_vertices: tuple[FloatArray, ...]
     ) -> tuple[FloatArray, ...]:
+        _, volume = self._enclosed(state)
+        if not volume.has_volume:
+            return cage_vertices
         pairs = zip(cage_vertices, state.cages, strict=True)
         outward = np.concatenate([volume_gradient(p, cage.faces) for p, cage in pairs])
         outward /= max(np.abs(outward).max(), np.finfo(float).tiny)
         deformer = self.bind(state)
         path = np.hstack([deformer.surface(cage_vertices), deformer.subspace.map(outward)])
-        p = np.concatenate(cage_vertices) + self._total_volume.exact_step(path) * outward
+        p = np.concatenate(cage_vertices) + volume.exact_step(path) * outward
         require_near(self._mesh, p, "cage vertices that preserve the volume")
         return tuple(p[columns] for columns in deformer.subspace.columns)
 
@@ -177,6 +189,7 @@ class PoseSolver:
             handle=state.handle,
             preserve_volume=state.options.preserve_volume,
             preserve_region_volumes=state.options.preserve_region_volumes,
+            lids=state.options.lids,
         )
         constraints = State(fixed=state.fixed, handles=state.handles, options=state.options)
         self._constrained = bound, constraints, deformer
@@ -196,20 +209,20 @@ class PoseSolver:
     def _meets_constraints(self, state: State, pose: Pose) -> bool:
         x, change = self._evaluate(state, pose)
         if state.options.preserve_region_volumes and state.regions is not None:
-            constraints = region_volumes(self._mesh, state.regions.labels)
+            constraints = region_volumes(self._mesh, state.regions.labels, self.lids(state))
             return all(abs(c.relative(x)) <= _VOLUME_TOLERANCE for c in constraints)
         return not state.options.preserve_volume or abs(change()) <= _VOLUME_TOLERANCE
 
     def _evaluate(self, state: State, pose: Pose) -> tuple[FloatArray, Callable[[], float]]:
         """Return x = W~ p, and a function that returns its volume change."""
-        if self._evaluated is None or self._evaluated[0] is not pose:
-            x = self.bind(state).surface(pose.cage_vertices)
+        lids, before = state.options.lids, self._evaluated
+        if before is None or before[0] is not pose or before[1] is not lids:
+            same = before is not None and before[0] is pose
+            x = before[2] if before and same else self.bind(state).surface(pose.cage_vertices)
             frozen(x)
-            self._evaluated = pose, x, cache(partial(self._volume_change, x))
-        return self._evaluated[1:]
-
-    def _volume_change(self, x: FloatArray) -> float:
-        return signed_volume(x, self._mesh.faces) / self._rest_volume - 1.0
+            _, volume = self._enclosed(state)
+            before = self._evaluated = pose, lids, x, cache(partial(volume.relative, x))
+        return before[2:]
 
 
 def _stacked(targets: Mapping[str, FloatArray]) -> FloatArray:

@@ -44,6 +44,9 @@ class Options:
         chosen automatically.
     preserve_volume, preserve_region_volumes : bool
         Preserve the enclosed volume exactly; preserve the volume of every region as well.
+    lids : bool, optional
+        Whether an open surface encloses a volume under lids over its borders; None decides it for
+        each connected part, as `Deformer` does.
     stretch : float
         Stretch resistance relative to detail preservation; 0 is the paper's energy.
     rotation_groups : int, optional
@@ -59,6 +62,7 @@ class Options:
     offset: float | None = None
     preserve_volume: bool = True
     preserve_region_volumes: bool = False
+    lids: bool | None = None
     stretch: float = 10.0
     rotation_groups: int | None = 300
 
@@ -67,6 +71,8 @@ class Options:
             value = getattr(self, name)
             if not isinstance(value, bool):
                 raise SessionError(f"{name} must be True or False; got {shown(value)}")
+        if self.lids is not None and not isinstance(self.lids, bool):
+            raise SessionError(f"lids must be True, False or None; got {shown(self.lids)}")
         _require_number("n_cage_vertices", self.n_cage_vertices, 8, whole=True)
         _require_number("stretch", self.stretch, 0.0)
         if self.offset is not None:

@@ -8,9 +8,13 @@ The file is an `archive`, which ``numpy.load`` reads as an .npz file:
     cage_vertices.npy     (c, 3) float     cage_faces.npy   (k, 3) int             if any
     fixed.npy             (f,) int         handle.npy       (h,) int
     pose.npy              (c, 3) float     targets.npy      (h, 3) float           if not at rest
+    surface_...npy        the given surface, as in `surface_store`                 if any
 
 The arrays of cages and of handles are concatenated; the header has their counts.  A loaded session
 is bitwise identical to the saved one, but has no history.
+
+Version 1 has closed meshes without a given surface; such sessions are still written in it, so that
+earlier programs can read them.  Of all others they say that the version is newer.
 
 Files may be damaged or malicious: `archive` checks the arrays, and the mesh, regions, cages,
 handles and pose are checked like arguments of a caller.
@@ -23,12 +27,12 @@ import struct
 import zipfile
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..cages import Cage
-from ..checks import as_path, require
+from ..checks import as_flag, as_path, require
 from ..errors import SessionError
 from ..files import open_regular, replacing
 from ..mesh import Mesh
@@ -37,15 +41,20 @@ from .archive import Archive, write_archive
 from .session import Session
 from .state import Options, Pose, State, split_rows
 
+if TYPE_CHECKING:
+    from ..io import Surface
+
 FORMAT = "vtk_segdeform session"
-VERSION = 1
+VERSION = 2
+
+_LATER = {"lids": None}  # options that version 1 does not have, and their defaults
 
 # Errors of zipfile, numpy and json on invalid content.
 _ERRORS = (zipfile.BadZipFile, ValueError, KeyError, TypeError, EOFError, OverflowError,
            RuntimeError, NotImplementedError, struct.error, OSError)  # fmt: skip
 
 
-def save_session(path: str | os.PathLike[str], session: Session) -> None:
+def save_session(path: str | os.PathLike[str], session: Session, *, surface: bool = True) -> None:
     """Save *session*; if writing fails, an existing file remains unchanged.
 
     Parameters
@@ -54,6 +63,8 @@ def save_session(path: str | os.PathLike[str], session: Session) -> None:
         An existing file is replaced.  The folder must exist.
     session : Session
         The current state, including an ongoing drag, is saved; the history is not.
+    surface : bool
+        Save the given surface as well.  Without it, the file has a session of the mesh alone.
 
     Raises
     ------
@@ -63,9 +74,10 @@ def save_session(path: str | os.PathLike[str], session: Session) -> None:
     """
     path = as_path(path)
     require(session, Session, "session")
+    given = session.surface if as_flag(surface, "surface") else None
     try:
         with replacing(path) as draft, open(draft, "wb") as file:
-            _write(file, session)
+            _write(file, session, given)
     except OSError as fault:
         raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
 
@@ -74,7 +86,7 @@ def load_session(path: str | os.PathLike[str]) -> Session:
     """Load a session from a file written by `save_session`.
 
     The vertices, regions, cages, fixed vertices, handles, targets and options are bitwise identical
-    to the saved ones.  The history is empty.
+    to the saved ones, and so is the given surface, if there is one.  The history is empty.
 
     Raises
     ------
@@ -96,12 +108,15 @@ def load_session(path: str | os.PathLike[str]) -> Session:
         raise SessionError(f"{path}: is not a readable session file: {reason}") from fault
 
 
-def _write(file: Any, session: Session) -> None:
+def _write(file: Any, session: Session, given: Surface | None) -> None:
     mesh, state = session.mesh, session.state
     regions, pose = state.regions, state.pose
-    header = {
+    options = {name: _plain(value) for name, value in asdict(state.options).items()}
+    options = {k: v for k, v in options.items() if k not in _LATER or v != _LATER[k]}
+    is_simple = given is None and mesh.is_closed and not _LATER.keys() & options.keys()
+    header: dict[str, Any] = {
         "format": FORMAT,
-        "version": VERSION,
+        "version": 1 if is_simple else VERSION,
         "n_vertices": mesh.n_vertices,
         "n_faces": mesh.n_faces,
         "n_regions": 0 if regions is None else regions.n_regions,
@@ -110,7 +125,7 @@ def _write(file: Any, session: Session) -> None:
         "n_fixed": len(state.fixed),
         "handles": [[name, len(ids)] for name, ids in state.handles.items()],
         "posed": pose is not None,
-        "options": {name: _plain(value) for name, value in asdict(state.options).items()},
+        "options": options,
     }
     if state.region_names:  # optional: earlier versions ignore it
         header["region_names"] = list(state.region_names)
@@ -124,10 +139,15 @@ def _write(file: Any, session: Session) -> None:
     if pose is not None:
         arrays["pose"] = np.concatenate(pose.cage_vertices)
         arrays["targets"] = np.concatenate([np.empty((0, 3)), *pose.targets.values()])
+    if given is not None:
+        from .surface_store import surface_parts  # imports pyvista
+
+        header["surface"], more = surface_parts(given)
+        arrays |= more
     write_archive(file, header, arrays)
 
 
-def _read(archive: Archive) -> tuple[Mesh, State]:
+def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
     header = _checked_header(archive.header())
     n, r = _count(header, "n_vertices"), _count(header, "n_regions")
     mesh = Mesh(
@@ -163,7 +183,12 @@ def _read(archive: Archive) -> tuple[Mesh, State]:
     options = Options(**header["options"])
     names = tuple(_list(header, "region_names")) if "region_names" in header else ()
     handles = dict(zip(sizes, ids, strict=True))
-    return mesh, State(regions, cages, fixed, handles, pose, options, names)
+    state = State(regions, cages, fixed, handles, pose, options, names)
+    if "surface" not in header:
+        return mesh, state
+    from .surface_store import read_surface  # imports pyvista
+
+    return read_surface(archive, header["surface"], mesh), state
 
 
 def _checked_header(header: Any) -> Mapping[str, Any]:

@@ -132,7 +132,7 @@ class ScaledSurface:
     @cached_property
     def _gpu(self) -> GPUSurface | None:
         arrays = gpu_arrays()
-        if arrays is None:
+        if arrays is None or self._constraint.extension is not None:
             return None
         try:
             return GPUSurface(self._subspace, self._rest, self._constraint.faces, arrays)

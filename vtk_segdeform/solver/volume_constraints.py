@@ -7,6 +7,9 @@ spanned by a fan of triangles around its centre, which the regions on both sides
 volumes are then volumes of closed surfaces, do not depend on an origin, and add up to the volume of
 the mesh.  The centres are means of mesh vertices, so V_c is the volume (8) of a few more triangles
 over ``extension @ x`` instead of x.
+
+An open mesh is closed by lids (`geometry.lids`) in the same way, and borders between regions then
+run over the lids too.  Parts of the mesh that enclose nothing, such as sheets, have no volume.
 """
 
 from __future__ import annotations
@@ -19,7 +22,14 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..geometry import signed_volume, step_to_volume, volume_along_path, volume_gradient
+from ..geometry import (
+    Lids,
+    lids_of,
+    signed_volume,
+    step_to_volume,
+    volume_along_path,
+    volume_gradient,
+)
 from ..mesh import Mesh
 from ..subspace import Subspace
 
@@ -28,7 +38,7 @@ from ..subspace import Subspace
 class VolumeConstraint:
     """The volume enclosed by *faces* over the points ``extension @ x`` is equal to *target*.
 
-    These points are *x* and the centres of the fans.
+    These points are *x* and the centres of lids and fans.
     """
 
     faces: IntArray
@@ -40,8 +50,13 @@ class VolumeConstraint:
         return signed_volume(self._extended(x), self.faces) - self.target
 
     def relative(self, x: FloatArray) -> float:
-        """Return g(x) / target."""
-        return self.violation(x) / self.target
+        """Return g(x) / target; 0 if nothing is enclosed."""
+        return self.violation(x) / self.target if self.target else 0.0
+
+    @property
+    def has_volume(self) -> bool:
+        """Whether a volume is enclosed."""
+        return bool(self.target)
 
     def gradient(self, x: FloatArray) -> FloatArray:
         """Return J_g, (n, 3): the derivative of g by each vertex."""
@@ -95,36 +110,41 @@ class Volumes:
         return replace(self, constraints=tuple(now))
 
 
-def total_volume(mesh: Mesh) -> VolumeConstraint:
-    """Return the constraint that *mesh* keeps its enclosed volume."""
-    faces = _in_order(mesh.faces)
-    return VolumeConstraint(faces, signed_volume(mesh.vertices, faces))
+def total_volume(mesh: Mesh, lids: Lids | None = None) -> VolumeConstraint:
+    """Return the constraint that *mesh* keeps its enclosed volume.
+
+    An open mesh encloses it together with its *lids*, by default `geometry.lids_of` the mesh.  If
+    nothing is enclosed the constraint has no faces.
+    """
+    lids = lids_of(mesh) if lids is None else lids
+    extension = lids.extension if lids.used.any() else None
+    free = VolumeConstraint(_in_order(lids.closed(mesh)), 0.0, extension)
+    return replace(free, target=free.violation(mesh.vertices))
 
 
-def region_volumes(mesh: Mesh, labels: IntArray) -> tuple[VolumeConstraint, ...]:
+def region_volumes(
+    mesh: Mesh, labels: IntArray, lids: Lids | None = None
+) -> tuple[VolumeConstraint, ...]:
     """Return one constraint for each region 0..r-1 of vertex *labels* (n,).
 
-    A face belongs to the region of two of its corners, or to its first corner's.  A region that
-    owns no face has no constraint.
+    A face belongs to the region of two of its corners, or to its first corner's, and a face of a
+    lid to the region of the face at its border edge.  A region that owns no face around an enclosed
+    volume has no constraint.
     """
-    face_labels = _face_labels(labels[mesh.faces])
-    n = mesh.n_vertices
-    of_several = _of_several(face_labels, mesh.faces, n)
-    near = of_several[mesh.faces].any(axis=1)
-    halves = mesh.faces[near][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)  # directed edges, 3 a face
-    inner = of_several[halves].all(axis=1)  # includes all border edges and their opposites
-    halves, owner = halves[inner], np.repeat(face_labels[near], 3)[inner]
-    key, opposite = halves[:, 0] * n + halves[:, 1], halves[:, 1] * n + halves[:, 0]
-    order = np.argsort(key)
-    across = owner[order[np.searchsorted(key, opposite, sorter=order)]]
-    border = across != owner
-
-    extension, centre = _with_centres(halves[border], n)
+    lids = lids_of(mesh) if lids is None else lids
+    faces, face_labels = lids.closed(mesh), _labels_of_faces(mesh, labels, lids)
+    if not len(faces):
+        return ()
+    n = mesh.n_vertices + len(lids.component)
+    halves, owner = _borders(faces, face_labels, n)
+    extension, centre = _with_centres(halves, n)
+    if lids.used.any():
+        extension = sparse.csr_array(extension @ lids.extension)
     constraints = []
     for label in np.unique(face_labels):
-        u, v = halves[border & (owner == label)].T
-        faces = np.concatenate([mesh.faces[face_labels == label], np.stack([v, u, centre[u]], 1)])
-        free = VolumeConstraint(faces, 0.0, extension)
+        u, v = halves[owner == label].T
+        own = np.concatenate([faces[face_labels == label], np.stack([v, u, centre[u]], 1)])
+        free = VolumeConstraint(own, 0.0, extension)
         constraints.append(replace(free, target=free.violation(mesh.vertices)))
     return tuple(constraints)
 
@@ -140,8 +160,43 @@ def _in_order(faces: IntArray) -> IntArray:
     return np.take(short, key & 0xFFFFFFFF, axis=0)
 
 
-def _face_labels(corners: IntArray) -> IntArray:
-    return np.where(corners[:, 1] == corners[:, 2], corners[:, 1], corners[:, 0])
+def _labels_of_faces(mesh: Mesh, labels: IntArray, lids: Lids) -> IntArray:
+    """Return the label of each face of ``lids.closed(mesh)``."""
+    b, c = labels[mesh.faces[:, 1]], labels[mesh.faces[:, 2]]
+    of_mesh = np.where(b == c, b, labels[mesh.faces[:, 0]])
+    if not len(lids.component) and lids.encloses.all():
+        return of_mesh
+    n = mesh.n_vertices
+    head, tail, _ = lids.faces[lids.used[lids.loop]].T
+    keys = (mesh.faces * n + np.roll(mesh.faces, -1, axis=1)).ravel()
+    order = np.argsort(keys)
+    beside = order[np.searchsorted(keys, tail * n + head, sorter=order)] // 3
+    around = lids.encloses[mesh.components[mesh.faces[:, 0]]]
+    return np.concatenate([of_mesh[around], of_mesh[beside]])
+
+
+def _borders(faces: IntArray, face_labels: IntArray, n: int) -> tuple[IntArray, IntArray]:
+    """Return the directed border edges (b, 2) of all labels of faces, and the label of each.
+
+    An edge that k more faces of a label have in one direction occurs k times.
+    """
+    of_several = _of_several(face_labels, faces, n)
+    near = of_several[faces].any(axis=1)
+    halves = faces[near][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)  # directed edges, 3 a face
+    inner = of_several[halves].all(axis=1)  # includes all border edges and their opposites
+    halves, owner = halves[inner], np.repeat(face_labels[near], 3)[inner]
+    forward = halves[:, 0] < halves[:, 1]
+    key = (owner * n + halves.min(axis=1)) * n + halves.max(axis=1)
+    _, edge = np.unique(key, return_inverse=True)
+    net = np.rint(np.bincount(edge, np.where(forward, 1, -1))).astype(np.int64)
+    excess = np.where(forward, net[edge], -net[edge])
+    order = np.lexsort((forward, edge))
+    place = np.arange(len(order))
+    begins = np.diff(2 * edge[order] + forward[order], prepend=-1) != 0
+    rank = np.empty_like(place)  # among the half-edges of a label with this direction
+    rank[order] = place - np.maximum.accumulate(np.where(begins, place, 0))
+    border = rank < excess
+    return halves[border], owner[border]
 
 
 def _of_several(face_labels: IntArray, faces: IntArray, n: int) -> BoolArray:

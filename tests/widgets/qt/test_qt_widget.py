@@ -30,7 +30,8 @@ from qtpy import QtGui
 import pyvistaqt  # isort: skip
 from vtk_segdeform import Session, models
 from vtk_segdeform.errors import SegDeformError
-from vtk_segdeform.io.convert import read_mesh, read_polydata, to_polydata
+from vtk_segdeform.io.convert import read_polydata, to_polydata
+from vtk_segdeform.io.surface import read_mesh
 from vtk_segdeform.session.store import load_session
 from vtk_segdeform.widgets import Mode, Paint, Tool
 from vtk_segdeform.widgets.qt.widget import DeformDock, DeformWidget, deform_dock

@@ -1,0 +1,189 @@
+"""Normals and tangents given with a surface, carried along by a deformation.
+
+Normals that a file stores are not those of its faces: they are smooth across seams, sharp at
+edges, or painted.  So they are not recomputed, but transported.  With the faces f around n,
+
+    A_f, A'_f        area vectors of the triangles at rest and deformed
+    F_f              deformation gradient of a triangle, its normal scaled by sqrt(|A'_f| / |A_f|)
+    n  = sum_f c_f A_f + r                  c of least norm; r is normal to all A_f
+    n' = sum_f c_f A'_f + mean of cof(F_f) r                    area-weighted mean
+    t' = mean of F_f t                                          at the same angle to n' as t to n
+
+Area vectors transform by the cofactor matrix, so n' is exact for rotations, and for every affine
+map where n is a combination of the normals around it, as all computed normals are.  Where it is not
+(sum |c_f A_f| > 2 |n|), the combination would amplify bending and is replaced by the mean of
+cof(F_f) n.  Lengths are preserved; what is at rest stays the same to rounding.
+
+The faces around n are those of all normals at the same position that agree with it: hard edges
+remain hard, and both sides of a texture seam stay alike.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import connected_components
+
+from ..arrays import FloatArray, IntArray
+
+_AGREE = 1e-3  # distance of two unit normals that are the same one, stored in few bits
+_RANK = 1e-6  # relative eigenvalue below which area vectors around a normal do not span
+_LARGEST = 1e100
+_MOST = 2.0  # largest sum |c_f A_f| / |n| of a combination
+
+
+class NormalTransport:
+    """Transport of normals and tangents by deformations of one surface.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Positions at rest.
+    counts, corners : (m,) int, (k,) int
+        Polygons: their numbers of corners, and these one after another.
+    normals : (j, 3) float
+        Normals at rest, of any length; one that is zero or NaN remains as it is.
+    of_corner : (k,) int
+        The normal of each corner; points, corners and cells may have normals.
+    place : (j,) int or None
+        The point at which each normal is: those at equal positions that agree are transported
+        alike.  None if every normal has its own faces only.
+    """
+
+    def __init__(
+        self, points: FloatArray, counts: IntArray, corners: IntArray, normals: FloatArray,
+        *, of_corner: IntArray, place: IntArray | None,
+    ) -> None:  # fmt: skip
+        self._given = np.asarray(normals, dtype=float)
+        usable = (np.abs(self._given) < _LARGEST).all(axis=1)  # not NaN either
+        self._normals = np.where(usable[:, None], self._given, 0.0)
+        group = np.arange(len(self._normals))
+        if place is not None:
+            group = _agreeing(points[place], self._normals)
+        starts = np.cumsum(counts) - counts
+        polygon = np.repeat(np.arange(len(counts)), counts - 2)
+        rank = np.arange(len(polygon)) - np.repeat(np.cumsum(counts - 2) - (counts - 2), counts - 2)
+        at = starts[polygon]
+        cut = np.stack([at, at + rank + 1, at + rank + 2], axis=1)  # corners of triangles of a fan
+        self._triangles = corners[cut]
+        first, second = self._edges(points)
+        self._area_vectors = np.cross(first, second)
+        areas = np.linalg.norm(self._area_vectors, axis=1)
+        sound = np.isfinite(areas) & (areas > 0)
+        self._areas = np.where(sound, areas, 1.0)
+        # A polygon counts as a whole, with all its triangles, for the normals at its corners.
+        width = counts[polygon]
+        triangle = np.repeat(np.arange(len(cut)), width)
+        offset = np.arange(len(triangle)) - np.repeat(np.cumsum(width) - width, width)
+        owner = group[of_corner[starts[polygon][triangle] + offset]]
+        here = sound[triangle]
+        count, shape = len(self._normals), (len(self._normals), len(cut))
+        around = csr_array((np.ones(here.sum()), (owner[here], triangle[here])), shape=shape)
+        self._pairs = np.stack(around[group].nonzero(), axis=1)  # (normal, triangle around it)
+        self._frames = np.stack([first, second, self._area_vectors / self._areas[:, None]], axis=2)
+        self._around = np.bincount(self._pairs[:, 0], self._areas[self._pairs[:, 1]], count)
+        self._by_area, self._by_frame = self._weights()
+
+    def _edges(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        a, b, c = (points[each] for each in self._triangles.T)
+        return b - a, c - a
+
+    def _weights(self) -> tuple[csr_array, list[csr_array]]:
+        """Return the matrices by which triangles contribute to normals."""
+        owner, triangle = self._pairs.T
+        count = len(self._normals)
+        n = _unit(self._normals)
+        vectors, areas = self._area_vectors[triangle], self._areas[triangle]
+        outer = vectors[:, :, None] * (vectors / areas[:, None])[:, None, :]
+        moments = np.zeros((count, 9))
+        for k, entry in enumerate(outer.reshape(-1, 9).T):
+            moments[:, k] = np.bincount(owner, entry, count)
+        values, axes = np.linalg.eigh(moments.reshape(-1, 3, 3))
+        spans = values > _RANK * np.maximum(values[:, 2:], np.finfo(float).tiny)
+        inverse = np.where(spans, 1.0 / np.where(spans, values, 1.0), 0.0)
+        local = np.einsum("gij,gi->gj", axes, n)
+        dual = np.einsum("gij,gj->gi", axes, inverse * local)
+        c = np.einsum("pi,pi->p", vectors, dual[owner]) / areas
+        c[np.bincount(owner, np.abs(c) * areas, count)[owner] > _MOST] = 0.0
+        combined = np.stack([np.bincount(owner, c * v, count) for v in vectors.T], axis=1)
+        rest = n - combined
+        shape = count, len(self._triangles)
+        matrices = []
+        # cof(F) r in terms of the cross products of the columns of F
+        u, v, w = np.moveaxis(self._frames[triangle], 2, 0)
+        share = (areas / self._around[owner])[:, None] * rest[owner] / areas[:, None]
+        for column in (w, u, v):  # r = (r.w) u x v / |A| + (r.u) v x w / |A| + (r.v) w x u / |A|
+            entries = np.einsum("pi,pi->p", share, column)
+            matrices.append(csr_array((entries, (owner, triangle)), shape=shape))
+        by_area = csr_array((c, (owner, triangle)), shape=shape)
+        return by_area, matrices
+
+    def _moved_frames(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        first, second = self._edges(points)
+        third = np.cross(first, second)
+        area = np.linalg.norm(third, axis=1)
+        third /= np.sqrt(np.where(area > 0, area * self._areas, 1.0))[:, None]
+        return first, second, third
+
+    def normals(self, points: FloatArray) -> FloatArray:
+        """Return the normals (j, 3) for the points at other positions (n, 3)."""
+        u, v, w = self._moved_frames(points)
+        result = self._by_area @ np.cross(u, v)
+        for matrix, product in zip(self._by_frame, ((u, v), (v, w), (w, u)), strict=True):
+            if matrix.nnz:
+                result += matrix @ np.cross(*product)
+        length, unit = np.linalg.norm(self._normals, axis=1, keepdims=True), _unit(result)
+        good = np.isfinite(unit).all(axis=1) & (np.linalg.norm(unit, axis=1) > 0.5)
+        return np.where(good[:, None] & (length > 0), length * unit, self._given)
+
+    def tangents(self, tangents: FloatArray, points: FloatArray) -> FloatArray:
+        """Return *tangents* (j, 3), given at the same places as the normals, transported."""
+        t, n = np.asarray(tangents, dtype=float), _unit(self._normals)
+        t = np.where((np.abs(t) < _LARGEST).all(axis=1, keepdims=True), t, 0.0)
+        owner, triangle = self._pairs.T
+        areas = self._areas[triangle]
+        # sum of F, by area
+        dual = np.linalg.inv(self._safe_frames())[triangle] * areas[:, None, None]
+        moved = np.stack(self._moved_frames(points), axis=2)[triangle]
+        gradient = np.zeros((len(t), 9))
+        for k, entry in enumerate((moved @ dual).reshape(-1, 9).T):
+            gradient[:, k] = np.bincount(owner, entry, len(t))
+        moved_t = np.einsum("jik,jk->ji", gradient.reshape(-1, 3, 3), t)
+        along = np.einsum("ji,ji->j", t, n)
+        length = np.linalg.norm(t - along[:, None] * n, axis=1, keepdims=True)
+        n = _unit(self.normals(points))
+        flat = _unit(moved_t - np.einsum("ji,ji->j", moved_t, n)[:, None] * n)
+        good = (np.linalg.norm(flat, axis=1) > 0.5) & np.isfinite(flat).all(axis=1)
+        return np.where(good[:, None], length * flat + along[:, None] * n, tangents)
+
+    def _safe_frames(self) -> FloatArray:
+        frames = self._frames.copy()
+        bad = ~np.isfinite(frames).all(axis=(1, 2)) | (np.abs(np.linalg.det(frames)) == 0)
+        frames[bad] = np.eye(3)
+        return frames
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    result: FloatArray = vectors / np.where(length > 0, length, 1.0)
+    return result
+
+
+def _agreeing(positions: FloatArray, normals: FloatArray) -> IntArray:
+    """Return the group of each normal: the first one at the same position that agrees with it."""
+    order = np.lexsort(positions.T)
+    ordered, n = positions[order], _unit(normals)[order]
+    place = np.cumsum(np.insert((ordered[1:] != ordered[:-1]).any(axis=1), 0, False))
+    pairs = []
+    for step in range(1, int(np.bincount(place).max(initial=1))):
+        k = np.flatnonzero(place[step:] == place[:-step])
+        k = k[((n[k] - n[k + step]) ** 2).sum(axis=1) < _AGREE**2]
+        pairs.append(np.stack([order[k], order[k + step]]))
+    if not pairs:
+        return np.arange(len(normals))
+    tail, head = np.concatenate(pairs, axis=1)
+    graph = coo_array((np.ones(len(tail)), (tail, head)), shape=(len(normals),) * 2)
+    labels = connected_components(graph, directed=False)[1]
+    _, first = np.unique(labels, return_index=True)
+    groups: IntArray = first[labels]
+    return groups
