@@ -43,6 +43,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import sparse
 
 from ..arrays import FloatArray, IntArray
 from ..errors import SegDeformError
@@ -83,6 +84,9 @@ class GPUSurface:
         Closed and outward oriented.
     arrays : module or TorchArrays
         The array library: `gpu_arrays`, or numpy for comparison.
+    extension : (n + c, n) sparse, optional
+        With it, faces are over the vertices and c centres of lids, ``extension @ x``.  These faces
+        are few, and the processor computes their volume.
 
     Raises
     ------
@@ -91,9 +95,20 @@ class GPUSurface:
     """
 
     def __init__(
-        self, subspace: Subspace, rest_vertices: FloatArray, faces: IntArray, arrays: Any
+        self,
+        subspace: Subspace,
+        rest_vertices: FloatArray,
+        faces: IntArray,
+        arrays: Any,
+        extension: sparse.csr_array | None = None,
     ) -> None:
+        in_lid = (faces >= len(rest_vertices)).any(axis=1)
+        lids, faces = faces[in_lid], faces[~in_lid]
         self._arrays, self._host_faces, self._columns = arrays, faces, subspace.columns
+        ends = np.unique(lids)
+        self._lids = np.searchsorted(ends, lids)
+        self._lid_rows = None if extension is None else extension[ends]
+        self._border = np.unique(self._lid_rows.indices) if extension is not None else ends
         with _faults_named():
             self._rest = arrays.asarray(np.asarray(rest_vertices, dtype=np.float64))
             self._corners = [self._ids(corner) for corner in faces.T]
@@ -116,7 +131,17 @@ class GPUSurface:
         determinants = self._arrays.zeros((n_sums * _SUMMED,))
         for piece, a, e, f in self._corners_and_edges(x):
             determinants[piece] = ((a - x[0]) * self._arrays.cross(e, f)).sum(1)
-        return float(self.host(determinants.reshape(n_sums, _SUMMED).sum(1)).sum() / 6.0)
+        of_mesh = float(self.host(determinants.reshape(n_sums, _SUMMED).sum(1)).sum() / 6.0)
+        return of_mesh + self._volume_of_lids(x)
+
+    def _volume_of_lids(self, x: GPUArray) -> float:
+        """Return the volume between the lids and the first vertex."""
+        if self._lid_rows is None:
+            return 0.0
+        near = self._arrays.take(x, self._ids(self._border), axis=0) - x[0]
+        points = self._lid_rows[:, self._border] @ self.host(near)
+        a, b, c = points[self._lids.T]
+        return float(np.einsum("ij,ij", a, np.cross(b - a, c - a)) / 6.0)
 
     @_faults_named()
     def scale_to_volume(self, x: GPUArray, target: float, centre: ArrayLike) -> float:
