@@ -115,7 +115,7 @@ def write_off(path: Path, surface: pv.PolyData) -> None:
 
 
 def _colour(attributes: Any) -> tuple[str, Any]:
-    """Return the name and the bytes of the colours in point or cell data; None if there are none."""
+    """Return the name and the bytes of colours in point or cell data; None if there are none."""
     for name, width in (("RGBA", 4), ("RGB", 3)):
         values = attributes.get(name)
         if values is not None and values.dtype == np.uint8 and values.shape[1:] == (width,):

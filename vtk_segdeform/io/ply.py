@@ -6,10 +6,11 @@ VTK's reader and writer keep 7 digits.  A surface consists of these elements and
     face       vertex_indices or vertex_index, a list; texcoord, a list of (u, v) per corner
     tristrips  vertex_indices, a list: any three in sequence are a triangle, -1 ends a strip
 
-Normals become "Normals", colours arrays "RGB" or "RGBA", texture coordinates "TextureCoordinates" of vertices and
-"TextureCorners" of corners, all other numbers arrays of the same name.  Arrays are written as
-properties of the same name, unless the name is listed here or contains white space.  Numbers of
-any other element are field arrays "element.property", comments the field array "Comments".
+Normals become "Normals", colours arrays "RGB" or "RGBA", texture coordinates "TextureCoordinates"
+of vertices and "TextureCorners" of corners, all other numbers arrays of the same name.  Arrays are
+written as properties of the same name, unless the name is listed here or contains white space.
+Numbers of any other element are field arrays "element.property", comments the field array
+"Comments".
 """
 
 from __future__ import annotations
@@ -133,8 +134,11 @@ def write_ply(path: Path, surface: pv.PolyData) -> None:
     texture, texture_name = surface.active_texture_coordinates, ""
     if texture is not None and texture.ndim == 2 and texture.shape[1] >= 2:
         # MeshLab reads these names in double precision
-        columns |= dict(zip(_TEXTURE[-1], np.asarray(texture, dtype="f8").T, strict=False))
-        texture_name = surface.point_data.active_texture_coordinates_name
+        pairs = np.array(texture, dtype="f8")
+        texture_name = str(surface.point_data.active_texture_coordinates_name)
+        if texture_name.startswith("TEXCOORD_"):  # v of glTF begins at the top
+            pairs[:, 1] = 1.0 - pairs[:, 1]
+        columns |= dict(zip(_TEXTURE[-1], pairs.T, strict=False))
     arrays = {name: v for name, v in surface.point_data.items() if name != texture_name}
     normals = arrays.get("Normals")
     if normals is not None and normals.shape[1:] == (3,) and normals.dtype.str[1:] in ("f4", "f8"):
