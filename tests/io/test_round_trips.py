@@ -177,7 +177,7 @@ def test_a_surface_with_any_arrays_is_read_back_or_losses_are_reported(tmp_path,
     assert not lost_in(tmp_path / f"a{suffix}", surface)
 
 
-@pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".vtk", ".vtp", ".vtkhdf"])
+@pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".vtk", ".vtp", ".vtu", ".vtkhdf"])
 def test_every_special_name_is_read_back_or_losses_are_reported(tmp_path, suffix):
     surface = prism(4)
     for k, name in enumerate(SPECIAL):
