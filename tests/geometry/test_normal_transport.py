@@ -59,6 +59,17 @@ def test_any_normals_and_tangents_follow_a_rotation_and_a_scale():
     assert_allclose(carried.tangents(tangents, moved), tangents @ TURN.T, atol=1e-12)
 
 
+def test_any_normals_of_cells_follow_a_rotation():
+    points, faces = bumpy()
+    normals = RNG.normal(size=faces.shape)
+    carried = NormalTransport(
+        points, np.full(len(faces), 3), faces.ravel(), normals,
+        of_corner=np.repeat(np.arange(len(faces)), 3), place=None,
+    )  # fmt: skip
+    assert_allclose(carried.normals(points), normals, atol=1e-13)
+    assert_allclose(carried.normals(points @ TURN.T), normals @ TURN.T, atol=1e-12)
+
+
 def test_smooth_normals_follow_an_affine_map_as_its_cofactor_matrix_says():
     points, faces = bumpy()
     normals = smooth(points, faces)

@@ -21,7 +21,7 @@ from vtk_segdeform.io.convert import (
 from vtk_segdeform.io.surface import read_mesh
 from vtk_segdeform.mesh.mesh import Mesh
 
-EXACT = [".obj", ".off", ".ply", ".vtk", ".vtp", ".vtkhdf"]
+EXACT = [".obj", ".off", ".ply", ".vtk", ".vtp", ".vtu", ".vtkhdf"]
 
 
 def shuffled(seed: int = 1) -> Mesh:

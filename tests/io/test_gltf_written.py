@@ -186,7 +186,7 @@ def test_positions_that_are_interleaved_sparse_or_shared_are_moved(tmp_path):
               "values": {"bufferView": values}}  # fmt: skip
     pointed = document.add("accessors", **common, type="VEC3", **bounds, sparse=sparse)
     indices = document.array(OCTAHEDRON[1].ravel(), "u1")
-    for k, number in enumerate((position, pointed, pointed)):
+    for k, number in enumerate((position, pointed, position)):
         attributes = {"POSITION": number, "NORMAL": normal, "TEXCOORD_0": texture}
         primitive = {"attributes": attributes, "indices": indices}
         mesh = document.add("meshes", primitives=[primitive])

@@ -40,7 +40,18 @@ WRITERS = {
     "project.mlp": lambda path: write_project(path, MESH),
     **{
         f"mesh{suffix}": lambda path: write_mesh(path, MESH)
-        for suffix in (".ply", ".obj", ".off", ".stl", ".vtk", ".vtp", ".vtkhdf")
+        for suffix in (
+            ".ply",
+            ".obj",
+            ".off",
+            ".stl",
+            ".vtk",
+            ".vtp",
+            ".vtu",
+            ".vtkhdf",
+            ".glb",
+            ".gltf",
+        )
     },
 }
 

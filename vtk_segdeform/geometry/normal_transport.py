@@ -29,6 +29,7 @@ from ..arrays import FloatArray, IntArray
 _AGREE = 1e-3  # distance of two unit normals that are the same one, stored in few bits
 _RANK = 1e-6  # relative eigenvalue below which area vectors around a normal do not span
 _LARGEST = 1e100
+_ROUNDING = 1e-14
 _MOST = 2.0  # largest sum |c_f A_f| / |n| of a combination
 
 
@@ -50,6 +51,7 @@ class NormalTransport:
         alike.  None if every normal has its own faces only.
     """
 
+    @np.errstate(over="ignore", invalid="ignore")  # faces of infinite area do not count
     def __init__(
         self, points: FloatArray, counts: IntArray, corners: IntArray, normals: FloatArray,
         *, of_corner: IntArray, place: IntArray | None,
@@ -77,11 +79,12 @@ class NormalTransport:
         offset = np.arange(len(triangle)) - np.repeat(np.cumsum(width) - width, width)
         owner = group[of_corner[starts[polygon][triangle] + offset]]
         here = sound[triangle]
-        count, shape = len(self._normals), (len(self._normals), len(cut))
+        shape = len(self._normals), len(cut)
         around = csr_array((np.ones(here.sum()), (owner[here], triangle[here])), shape=shape)
-        self._pairs = np.stack(around[group].nonzero(), axis=1)  # (normal, triangle around it)
+        around.sum_duplicates()
+        around.data[:] = 1.0
+        self._around = around[group]  # of each normal
         self._frames = np.stack([first, second, self._area_vectors / self._areas[:, None]], axis=2)
-        self._around = np.bincount(self._pairs[:, 0], self._areas[self._pairs[:, 1]], count)
         self._by_area, self._by_frame = self._weights()
 
     def _edges(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -90,33 +93,38 @@ class NormalTransport:
 
     def _weights(self) -> tuple[csr_array, list[csr_array]]:
         """Return the matrices by which triangles contribute to normals."""
-        owner, triangle = self._pairs.T
-        count = len(self._normals)
-        n = _unit(self._normals)
-        vectors, areas = self._area_vectors[triangle], self._areas[triangle]
+        around, triangle = self._around, self._around.indices
+        owner = np.repeat(np.arange(len(self._normals)), np.diff(around.indptr))
+        n, vectors, areas = _unit(self._normals), self._area_vectors, self._areas
         outer = vectors[:, :, None] * (vectors / areas[:, None])[:, None, :]
-        moments = np.zeros((count, 9))
-        for k, entry in enumerate(outer.reshape(-1, 9).T):
-            moments[:, k] = np.bincount(owner, entry, count)
-        values, axes = np.linalg.eigh(moments.reshape(-1, 3, 3))
+        moments = (around @ (outer / areas.max(initial=0.0)).reshape(-1, 9)).reshape(-1, 3, 3)
+        values, axes = np.linalg.eigh(moments)
         spans = values > _RANK * np.maximum(values[:, 2:], np.finfo(float).tiny)
-        inverse = np.where(spans, 1.0 / np.where(spans, values, 1.0), 0.0)
+        inverse = np.where(spans, 1.0 / np.where(spans, values, 1.0), 0.0) / areas.max(initial=0.0)
         local = np.einsum("gij,gi->gj", axes, n)
         dual = np.einsum("gij,gj->gi", axes, inverse * local)
-        c = np.einsum("pi,pi->p", vectors, dual[owner]) / areas
-        c[np.bincount(owner, np.abs(c) * areas, count)[owner] > _MOST] = 0.0
-        combined = np.stack([np.bincount(owner, c * v, count) for v in vectors.T], axis=1)
-        rest = n - combined
-        shape = count, len(self._triangles)
-        matrices = []
-        # cof(F) r in terms of the cross products of the columns of F
-        u, v, w = np.moveaxis(self._frames[triangle], 2, 0)
-        share = (areas / self._around[owner])[:, None] * rest[owner] / areas[:, None]
-        for column in (w, u, v):  # r = (r.w) u x v / |A| + (r.u) v x w / |A| + (r.v) w x u / |A|
-            entries = np.einsum("pi,pi->p", share, column)
-            matrices.append(csr_array((entries, (owner, triangle)), shape=shape))
-        by_area = csr_array((c, (owner, triangle)), shape=shape)
+        c = np.einsum("pi,pi->p", (vectors / areas[:, None])[triangle], dual[owner])
+        amplified = np.bincount(owner, np.abs(c) * areas[triangle], len(n)) > _MOST
+        c[amplified[owner]] = 0.0
+        by_area = self._matrix(c)
+        rest = n - by_area @ vectors
+        rest[np.abs(rest).max(axis=1) < _ROUNDING] = 0.0
+        if not rest.any():
+            return by_area, []
+        # cof(F) r in terms of the cross products of the columns u, v, w of F:
+        # r = (r.w) u x v / |A| + (r.u) v x w / |A| + (r.v) w x u / |A|, area-weighted
+        share = rest / np.maximum(around @ areas, np.finfo(float).tiny)[:, None]
+        u, v, w = np.moveaxis(self._frames, 2, 0)
+        matrices = [
+            self._matrix(np.einsum("pi,pi->p", share[owner], column[triangle]))
+            for column in (w, u, v)
+        ]
         return by_area, matrices
+
+    def _matrix(self, entries: FloatArray) -> csr_array:
+        """Return a matrix of normals by triangles, with an entry per triangle around a normal."""
+        around = self._around
+        return csr_array((entries, around.indices, around.indptr), shape=around.shape)
 
     def _moved_frames(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         first, second = self._edges(points)
@@ -129,9 +137,8 @@ class NormalTransport:
         """Return the normals (j, 3) for the points at other positions (n, 3)."""
         u, v, w = self._moved_frames(points)
         result = self._by_area @ np.cross(u, v)
-        for matrix, product in zip(self._by_frame, ((u, v), (v, w), (w, u)), strict=True):
-            if matrix.nnz:
-                result += matrix @ np.cross(*product)
+        for matrix, product in zip(self._by_frame, ((u, v), (v, w), (w, u)), strict=False):
+            result += matrix @ np.cross(*product)
         length, unit = np.linalg.norm(self._normals, axis=1, keepdims=True), _unit(result)
         good = np.isfinite(unit).all(axis=1) & (np.linalg.norm(unit, axis=1) > 0.5)
         return np.where(good[:, None] & (length > 0), length * unit, self._given)
@@ -140,14 +147,9 @@ class NormalTransport:
         """Return *tangents* (j, 3), given at the same places as the normals, transported."""
         t, n = np.asarray(tangents, dtype=float), _unit(self._normals)
         t = np.where((np.abs(t) < _LARGEST).all(axis=1, keepdims=True), t, 0.0)
-        owner, triangle = self._pairs.T
-        areas = self._areas[triangle]
-        # sum of F, by area
-        dual = np.linalg.inv(self._safe_frames())[triangle] * areas[:, None, None]
-        moved = np.stack(self._moved_frames(points), axis=2)[triangle]
-        gradient = np.zeros((len(t), 9))
-        for k, entry in enumerate((moved @ dual).reshape(-1, 9).T):
-            gradient[:, k] = np.bincount(owner, entry, len(t))
+        moved = np.stack(self._moved_frames(points), axis=2)
+        weighted = moved @ np.linalg.inv(self._safe_frames()) * self._areas[:, None, None]
+        gradient = self._around @ weighted.reshape(-1, 9)
         moved_t = np.einsum("jik,jk->ji", gradient.reshape(-1, 3, 3), t)
         along = np.einsum("ji,ji->j", t, n)
         length = np.linalg.norm(t - along[:, None] * n, axis=1, keepdims=True)

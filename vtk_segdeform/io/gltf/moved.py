@@ -111,7 +111,9 @@ def _directions(
             of_corner=corners, place=np.arange(rest.n_points),
         )  # fmt: skip
         points = np.asarray(surface.points, dtype=float)
-        fresh = [carried.normals(points), carried.tangents(olds[1], points)]
+        fresh = [carried.normals(points), olds[1]]
+        if olds[1].any() and found[1] is None:
+            fresh[1] = carried.tangents(olds[1], points)
         found = [a if b is None else b for a, b in zip(fresh, found, strict=True)]
     return [(old, old if new is None else new) for old, new in zip(olds, found, strict=True)]
 
