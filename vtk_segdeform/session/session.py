@@ -35,6 +35,7 @@ from ..cages import Cage, fit_cages
 from ..checks import require, shown
 from ..deformer import checked_constraints
 from ..errors import CageError, RegionError, SessionError
+from ..geometry import Lids, local_volume_change
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress
 from ..regions import Regions, segment
@@ -224,9 +225,26 @@ class Session(Timeline):
 
     @property
     def volume_change(self) -> float:
-        """Relative volume change (V - V0) / V0 of `vertices`, signed."""
+        """Relative volume change (V - V0) / V0 of `vertices`, signed; 0 if `has_volume` is False."""
         pose = self._state.pose
         return 0.0 if pose is None else self._pose_solver.volume_change(self._state, pose)
+
+    @property
+    def volume_summary(self) -> str:
+        """Whether the mesh has a volume that is preserved, in one line; see `volume_summary`."""
+        options = self._state.options
+        preserved = options.preserve_volume or options.preserve_region_volumes
+        return self.lids.summary(preserved=preserved)
+
+    @property
+    def has_volume(self) -> bool:
+        """Whether the mesh encloses a volume, with its lids if it is open."""
+        return self.lids.has_volume
+
+    @property
+    def lids(self) -> Lids:
+        """The lids over the borders of the mesh, with ``options.lids``."""
+        return self._pose_solver.lids(self._state)
 
     @property
     def solution(self) -> Solution | None:
@@ -268,25 +286,35 @@ class Session(Timeline):
         return str(self.solution.status)
 
     def layers(self) -> dict[str, pv.PolyData]:
-        """Return the mesh and its cages as PolyData, "mesh", "cage 1", ..., in the current pose.
+        """Return the surface and its cages as PolyData, in the current pose.
 
-        Vertices of handles are selected, as the array "selection"; the array "quality" of the mesh
-        is the region of each vertex.
+        "mesh" is `deformed` with vertices of handles selected, as the array "selection", and the
+        region of each vertex as "quality", unless it has a quality.  "local volume change" is the
+        same surface with that as its quality, if there is a pose.  "cage 1", "cage 2" ... follow.
         """
-        from ..io import polydata_of, to_polydata  # imports pyvista
+        from ..io import polydata_of  # imports pyvista
 
-        mesh = to_polydata(self.mesh.with_vertices(self.vertices))
+        mesh = self.deformed.copy(deep=False)
+        layers = {"mesh": mesh}
         if self.handles:
             selection = np.zeros(self.mesh.n_vertices, dtype=np.uint8)
             selection[np.concatenate(list(self.handles.values()))] = 1
-            mesh.point_data["selection"] = selection
-        if self.regions is not None:
-            mesh.point_data["quality"] = self.regions.labels.astype(np.float64)
-        layers = {"mesh": mesh}
+            mesh.point_data["selection"] = self._at_points(selection)
+        if self.regions is not None and "quality" not in mesh.point_data:
+            mesh.point_data["quality"] = self._at_points(self.regions.labels.astype(np.float64))
+        if self.state.pose is not None:
+            change = local_volume_change(self.mesh, self.vertices)
+            layers["local volume change"] = self.deformed.copy(deep=False)
+            layers["local volume change"].clear_data()
+            layers["local volume change"].point_data["quality"] = self._at_points(change)
         for k, (cage, vertices) in enumerate(zip(self.cages, self.cage_vertices, strict=True), 1):
             counts = np.full(cage.n_faces, 3)
             layers[f"cage {k}"] = polydata_of(vertices, counts, cage.faces.ravel())
         return layers
+
+    def _at_points(self, values: Any) -> Any:
+        """Return values of vertices at the points of `deformed`."""
+        return values if self._surface is None else self._surface.at_points(values)
 
     # Regions.
 
