@@ -37,7 +37,7 @@ def holed() -> pv.PolyData:
 def soup() -> pv.PolyData:
     """Return a closed body of triangles that share no points, in single precision."""
     body = pv.Cylinder(center=(0, 0, 1.5), direction=(0, 0, 1), radius=0.4, height=3.0)
-    body = body.triangulate().subdivide(3).clean()
+    body = body.triangulate().subdivide(2).clean()
     corners = body.points[body.regular_faces.ravel()].astype(np.float32)
     faces = np.arange(len(corners)).reshape(-1, 3)
     return pv.PolyData(corners, faces=np.insert(faces, 0, 3, axis=1).ravel())

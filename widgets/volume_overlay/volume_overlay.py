@@ -34,7 +34,7 @@ from vtk_segdeform.freezing import read_only
 from vtk_segdeform.geometry import LocalVolume
 from vtk_segdeform.session import Change, Session, region_name
 
-from ..scene import NO_VOLUME, Stop, SurfaceDisplay, View, enclosure_of
+from ..scene import Stop, SurfaceDisplay, View
 from .diverging import colours_of, half_range_for
 from .legend import Legend, brief, percent, signed
 from .region_volumes import RegionVolumes
