@@ -29,7 +29,7 @@ from qt_hands import (
 from qtpy import QtGui
 
 import pyvistaqt  # isort: skip
-from vtk_segdeform import Session, models
+from vtk_segdeform import Regions, Session, models
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.io.convert import read_polydata, to_polydata
 from vtk_segdeform.io.surface import read_mesh
@@ -575,6 +575,8 @@ def test_any_surface_is_edited_and_given_back_only_moved(make, name, tmp_path, m
     given = GIVEN[name]()
     seen = make(given)
     session = seen.session
+    session.change_options(n_cage_vertices=40)
+    session.set_regions(Regions.single(session.mesh))
     session.fit_cages()
     session.set_fixed(session.mesh.vertices[:, 2] < 0.3)
     session.add_handle(session.mesh.vertices[:, 2] > 2.7)
