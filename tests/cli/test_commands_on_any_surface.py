@@ -137,3 +137,5 @@ def test_a_surface_of_several_parts_has_its_stray_points_unselected(tmp_path):
     moved = read_polydata(out).points - parts().points
     right = (parts().points[:, 0] > 1) & (parts().points[:, 0] < 5) & (parts().points[:, 2] > 2.6)
     assert_allclose(moved[right][:, 0], 0.2, atol=5e-3)  # the stray at x = 9 does not count
+    stray = parts().n_points - 1
+    assert_array_equal(Surface(parts()).vertices_at([stray]), [])

@@ -100,5 +100,5 @@ def _cell_of(polydata: Any) -> IntArray:
     bare = vtkPolyData()
     bare.CopyStructure(polydata)
     add_array(bare.GetCellData(), "cell", np.arange(polydata.GetNumberOfCells()))
-    cells = _triangulated(bare).GetCellData().GetArray("cell")
-    return vtk_to_numpy(cells).astype(np.int64)
+    cells: IntArray = vtk_to_numpy(_triangulated(bare).GetCellData().GetArray("cell"))
+    return cells.astype(np.int64)

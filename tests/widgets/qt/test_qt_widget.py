@@ -583,6 +583,7 @@ def test_any_surface_is_edited_and_given_back_only_moved(make, name, tmp_path, m
     up = np.eye(4)
     up[0, 3] = 0.2
     session.move_handle("handle 1", up)
+    session.commit()
     now = seen.widget.deformed_polydata()
     require_only_moved(given, now)
     assert np.abs(now.points - given.points).max() > 0.15
