@@ -53,7 +53,7 @@ if _TYPE_CHECKING:
     )
     from .cages import Cage, fit_cages, mean_value_coordinates
     from .deformer import Deformer, deform
-    from .geometry import local_volume_change
+    from .geometry import local_volume_change, volume_summary
     from .io import Surface, read_mesh, write_mesh
     from .mesh import Mesh, find_faults
     from .mesh_repair import repair
@@ -85,6 +85,7 @@ _MODULE_OF = {
     "repair": "mesh_repair",
     "save_session": "session",
     "segment": "regions",
+    "volume_summary": "geometry",
     "write_mesh": "io",
 }
 _SUBPACKAGES = {
@@ -116,6 +117,7 @@ __all__ = [
     "repair",
     "save_session",
     "segment",
+    "volume_summary",
     "write_mesh",
 ]
 

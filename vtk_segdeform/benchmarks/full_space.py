@@ -17,14 +17,8 @@ from scipy.sparse.linalg import splu
 
 from ..arrays import FloatArray
 from ..energy import reduced_operators, surface_operators
-from ..geometry import (
-    IntrinsicTriangulation,
-    closest_rotations,
-    signed_volume,
-    step_to_volume,
-    volume_along,
-    volume_gradient,
-)
+from ..geometry import IntrinsicTriangulation, closest_rotations
+from ..solver import total_volume
 from ..subspace import Subspace
 from .measuring import timed
 from .programs import Answer, iterate_to_convergence
@@ -40,16 +34,16 @@ def full_space(task: Task, subspace: Subspace, most: int) -> Answer:
     (pull, solve_for, weight), set_up = timed(lambda: _factored(task, subspace))
     constrained = np.concatenate([task.fixed, task.handle])
     positions = np.concatenate([mesh.vertices[task.fixed], task.targets])
-    volume = signed_volume(mesh.vertices, mesh.faces)
+    volume = total_volume(mesh)
 
     def iterate(x: FloatArray) -> FloatArray:
         turned = closest_rotations((pull @ x).reshape(-1, 3, 3)).swapaxes(1, 2).reshape(-1, 3)
         right = pull.T @ turned
         right[constrained] += weight * positions
         ahead = solve_for(right)
-        direction = solve_for(volume_gradient(ahead, mesh.faces))
-        path = volume_along(ahead, direction, mesh.faces)
-        return np.asarray(ahead + step_to_volume(path, volume) * direction)
+        direction = solve_for(volume.gradient(ahead))
+        step = volume.exact_step(np.hstack([ahead, direction]))
+        return np.asarray(ahead + step * direction)
 
     start = np.array(mesh.vertices)
     near = CONVERGED * mesh.diagonal

@@ -12,8 +12,9 @@ from functools import partial
 import numpy as np
 
 from ..errors import SegDeformError
-from ..geometry import distortion, signed_volume
+from ..geometry import distortion
 from ..progress import Progress
+from ..solver import total_volume
 from .experiments import distortion_percentile
 from .full_space import full_space
 from .measuring import run_in, timed
@@ -99,7 +100,6 @@ def without_cages(task: Task, most: int, *, n_vertices: int) -> Answer:
 def row_of(method: str, task: Task, answer: Answer) -> tuple[Cell, ...]:
     """Return a row of `COLUMNS`."""
     mesh, x = task.mesh, answer.vertices
-    volume = signed_volume(mesh.vertices, mesh.faces)
     away = np.linalg.norm(x[task.handle] - task.targets, axis=1).max(initial=0.0)
     return (
         method,
@@ -108,7 +108,7 @@ def row_of(method: str, task: Task, answer: Answer) -> tuple[Cell, ...]:
         answer.iterations,
         1e3 * answer.solve / max(answer.iterations, 1),
         float(away / mesh.diagonal),
-        (signed_volume(x, mesh.faces) - volume) / volume,
+        total_volume(mesh).relative(x),
         distortion(mesh, x),
         distortion_percentile(mesh, x),
     )

@@ -5,6 +5,9 @@ as a *solid* also has the points inside the mesh whose nearest vertex is in the 
 
     S = surface of the region  u  {y inside the mesh : the vertex nearest to y is in the region}
 
+Inside means under lids over the borders, for the components of an open mesh that enclose a volume
+(`geometry.Lids`).  A sheet has no inside: S is its surface, and the cage is offset on both sides.
+
 On the nodes y of a regular grid, with its spacing as the unit of length:
 
     f(y) = distance to S, negative inside                            `SolidField.distance`
@@ -27,6 +30,7 @@ from scipy import ndimage
 from scipy.spatial import ConvexHull, cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from ..geometry import lids_of
 from ..kernels import in_parallel
 from ..mesh import Mesh, inside_nodes, ragged_arange
 
@@ -40,12 +44,25 @@ _SPACING = 0.7  # steps between samples of a face: less than 1, to leave no gaps
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """The mesh relative to its centre; computed once for all regions."""
+    """The mesh relative to its centre; computed once for all regions.
+
+    Attributes
+    ----------
+    points, faces : (n, 3) float, (m, 3) int
+        The mesh.
+    walls : (n', 3) float, (m', 3) int
+        The closed surface of its enclosed volumes: those of its faces and lids over its borders.
+    face_areas, longest : (m,) float
+        The area and the longest edge of each face.
+    centre : (3,) float
+        Mean of the vertices.
+    """
 
     points: FloatArray
     faces: IntArray
+    walls: tuple[FloatArray, IntArray]
     face_areas: FloatArray
-    longest: FloatArray  # (m,): the longest edge of each face
+    longest: FloatArray
     centre: FloatArray
 
     @classmethod
@@ -60,7 +77,12 @@ class Surface:
             longest[start:stop] = np.sqrt(square)
 
         in_parallel(work, mesh.n_faces, _PIECE)
-        return cls(mesh.vertices - centre, mesh.faces, mesh.face_areas, longest, centre)
+        points = mesh.vertices - centre
+        walls = points, mesh.faces
+        if not mesh.is_closed:
+            lids = lids_of(mesh)
+            walls = lids.extension @ points, lids.closed(mesh)
+        return cls(points, mesh.faces, walls, mesh.face_areas, longest, centre)
 
     @cached_property
     def tree(self) -> cKDTree:
@@ -188,7 +210,8 @@ def solid_field(patch: Patch, offset: float, step: float, *, most_nodes: float) 
     nodes = grid.to_nodes(surface.points)
     large = surface.faces[surface.longest > 0.99 * _SPACING * step]  # smaller faces need no samples
     samples = np.concatenate([nodes[members], _samples(nodes[large[members[large].all(axis=1)]])])
-    inside = np.argwhere(inside_nodes(nodes, surface.faces, grid.shape))
+    corners, faces = surface.walls
+    inside = np.argwhere(inside_nodes(grid.to_nodes(corners), faces, grid.shape))
     inside = inside[((inside >= pad / step) & (inside <= np.array(grid.shape) - pad / step)).all(1)]
     if not members.all():
         inside = inside[members[surface.tree.query(grid.to_points(inside))[1]]]

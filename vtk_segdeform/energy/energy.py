@@ -49,7 +49,7 @@ from scipy import sparse
 
 from ..arrays import FloatArray, IntArray, is_number
 from ..errors import ArgumentError
-from ..geometry import IntrinsicTriangulation, closest_rotations
+from ..geometry import IntrinsicTriangulation, closest_rotations, inner_vertices
 from ..mesh import Mesh
 from ..progress import Progress, tell
 from ..subspace import Subspace
@@ -198,17 +198,18 @@ def shape_energy(
         raise ArgumentError(f"stretch must be a number, 0 or more; got {stretch!r}")
     tell(progress, 0.0, "sampling vertices")
     surface = IntrinsicTriangulation.of(mesh.vertices, mesh.faces)
-    rows, own, weights = subspace, clusters, None
+    rows, own, weights, inner = subspace, clusters, None, inner_vertices(mesh)
     if clusters is not None and (sample := Sample.of(surface, clusters)):
         surface, weights = sample.surface, sample.weights
-        rows, own = sample.rows(subspace), clusters[sample.ids]
-    shape = surface_operators(surface, np.arange(mesh.n_vertices) if own is None else own, weights)
+        rows, own, inner = sample.rows(subspace), clusters[sample.ids], inner[sample.ids]
+    vertices = np.arange(mesh.n_vertices)
+    shape = surface_operators(surface, vertices if own is None else own, weights, inner=inner)
     tell(progress, 0.5, "computing the energy")
     areas = shape.weights * shape.areas
     bending, stretching, mass, traces = reduced_operators(
         rows,
         shape.laplacian,
-        0.25 * shape.weights / shape.areas,
+        0.25 * shape.bends / shape.areas,
         areas / areas.sum(),
         stiffness=shape.stiffness,
         clusters=own,
@@ -222,7 +223,7 @@ def shape_energy(
         is_exact = covariance is load
         covariance = rows.premultiplied(covariance)
         load = covariance if is_exact else rows.premultiplied(load)
-    bent = float(areas @ (shape.delta**2).sum(axis=1))
+    bent = float((shape.bends * shape.areas) @ (shape.delta**2).sum(axis=1))
     flat = float(np.vdot(surface.vertices, shape.stiffness @ surface.vertices))  # twice the area
     return Energy(
         quadratic=bending + stretch * unit * stretching,

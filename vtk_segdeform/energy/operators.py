@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import (
     IntrinsicTriangulation,
     area_gradients,
@@ -35,6 +35,7 @@ class SurfaceOperators(NamedTuple):
     """Operators of n vertices, for E = detail + s stretch."""
 
     weights: FloatArray  # c, (n,): of the vertices in the sums over a sample; 1 over a whole mesh
+    bends: FloatArray  # c in the sum of the detail, (n,): 0 where a vertex has none
     areas: FloatArray  # A, (n,)
     delta: FloatArray  # (n, 3), eq. (5)
     laplacian: sparse.csr_array  # C, (n, n)
@@ -44,11 +45,16 @@ class SurfaceOperators(NamedTuple):
 
 
 def surface_operators(
-    surface: IntrinsicTriangulation, clusters: IntArray, weights: FloatArray | None = None
+    surface: IntrinsicTriangulation,
+    clusters: IntArray,
+    weights: FloatArray | None = None,
+    *,
+    inner: BoolArray | None = None,
 ) -> SurfaceOperators:
     """Return the operators of *surface* for the rotation cluster of each vertex, *clusters* (n,).
 
-    For a `Sample`, *surface* has its triangles, and *weights* (n,) are its weights.
+    For a `Sample`, *surface* has its triangles, and *weights* (n,) are its weights.  *inner* (n,)
+    are the vertices that have a detail (`geometry.inner_vertices`); None means all.
     """
     n, faces = len(surface.vertices), surface.faces
     areas = with_least_areas(mixed_voronoi_areas(surface), faces)
@@ -59,13 +65,15 @@ def surface_operators(
         shared = surface.cotangents * weights[faces].mean(axis=1, keepdims=True)
         stiffness = cotangent_laplacian(faces, shared, n)
     delta = (laplacian @ surface.vertices) / (2.0 * areas)[:, None]  # eq. (5)
+    bends = weights if inner is None else weights * inner
     return SurfaceOperators(
         weights=weights,
+        bends=bends,
         areas=areas,
         delta=delta,
         laplacian=laplacian,
         stiffness=stiffness,
-        detail=_summed(0.5 * weights[:, None] * delta, clusters) @ laplacian,
+        detail=_summed(0.5 * bends[:, None] * delta, clusters) @ laplacian,
         fans=_fans(area_gradients(surface) / 3.0, faces, clusters, weights),
     )
 

@@ -15,11 +15,17 @@ The files, in reading order:
     local_volume    volume change below the surface at each vertex
 """
 
-from .differential import area_gradients, cotangent_laplacian, mixed_voronoi_areas, with_least_areas
+from .differential import (
+    area_gradients,
+    cotangent_laplacian,
+    inner_vertices,
+    mixed_voronoi_areas,
+    with_least_areas,
+)
 from .distortion import distortion, triangle_distortion
 from .intrinsic import IntrinsicTriangulation
 from .kmeans import cluster_positions, cluster_within_parts, farthest_points
-from .lids import Lids, lids_of
+from .lids import Lids, lids_of, volume_summary
 from .local_volume import LocalVolume, local_volume_change
 from .normal_transport import NormalTransport
 from .normals import VertexNormals
@@ -42,6 +48,7 @@ __all__ = [
     "distortion",
     "faces_between",
     "farthest_points",
+    "inner_vertices",
     "lids_of",
     "local_volume_change",
     "mixed_voronoi_areas",
@@ -54,6 +61,7 @@ __all__ = [
     "volume_along",
     "volume_along_path",
     "volume_gradient",
+    "volume_summary",
     "voronoi_cells",
     "with_least_areas",
 ]

@@ -10,8 +10,16 @@ delta_i = (C x)_i / (2 A_i).
 Cotangents and areas come from an intrinsic triangulation (`intrinsic`), which equals the mesh where
 its triangles are well shaped; C is therefore positive semi-definite for any triangles.
 
+*At a border* (C x)_i is the integral of the Laplacian over the one-sided cell of the vertex plus
+the conormal of the cut, of the length of an edge; divided by A_i it grows like 1 / edge.  It is no
+curvature, so only *inner vertices* have a detail (`inner_vertices`): the natural boundary
+condition of eq. (5).  The same holds where three or more sheets meet, since their conormals do not
+cancel.  C, areas and triangles at a border remain, one-sided.
+
 Source
 ------
+O. Stein, E. Grinspun, M. Wardetzky, A. Jacobson, "Natural boundary conditions for smoothing in
+geometry processing", ACM Trans. Graph. 37(2), 2018: boundary rows of the Laplacian energy.
 M. Meyer, M. Desbrun, P. Schroeder, A. H. Barr, "Discrete differential-geometry operators for
 triangulated 2-manifolds", Visualization and Mathematics III, 35-57, 2003.  Eqs. (7), (8), Fig. 4.
 """
@@ -21,8 +29,9 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from ..kernels import in_parallel
+from ..mesh import HalfEdges, Mesh
 from .intrinsic import IntrinsicTriangulation
 
 _PIECE = 50_000  # faces per task
@@ -73,8 +82,27 @@ def with_least_areas(areas: FloatArray, faces: IntArray) -> FloatArray:
     return np.asarray(np.maximum(np.maximum(areas, floor), np.finfo(float).tiny))
 
 
+def inner_vertices(mesh: Mesh) -> BoolArray:
+    """Return which vertices have a detail (5), (n,) bool: those whose edges all have two faces.
+
+    In a component without any, such as a strip one face wide, every vertex has, from its one-sided
+    row: it would have no resistance to bending otherwise.
+    """
+    if mesh.is_two_manifold:
+        return np.ones(mesh.n_vertices, dtype=bool)
+    half_edges = HalfEdges(mesh.faces, mesh.n_vertices)
+    ends = half_edges.order[half_edges.first[half_edges.counts != 2]]
+    inner = np.ones(mesh.n_vertices, dtype=bool)
+    inner[half_edges.tail[ends]] = inner[half_edges.head[ends]] = False
+    count = np.bincount(mesh.components, inner)
+    return np.asarray(inner | (count == 0.0)[mesh.components])
+
+
 def mean_curvature_normals(surface: IntrinsicTriangulation) -> FloatArray:
-    """Return delta of eq. (5), (n, 3), in 1/length; on a sphere, outward and of length 1/r."""
+    """Return delta of eq. (5), (n, 3), in 1/length; on a sphere, outward and of length 1/r.
+
+    Only at `inner_vertices` is it a curvature.
+    """
     x = surface.vertices
     areas = with_least_areas(mixed_voronoi_areas(surface), surface.faces)
     laplacian = cotangent_laplacian(surface.faces, surface.cotangents, len(x))

@@ -6,21 +6,23 @@ have no boundary, so their volume (8) does not depend on an origin, and a centre
 function of the mesh: its volume, gradient and cubic along a direction are computed as for a closed
 mesh, over the points ``extension @ x``.
 
-Which components of a mesh enclose a volume is decided by their mean winding number.  The solid
-angle under which an oriented surface S is seen from a point x just inside it is 4 pi w(x),
+Which components of a mesh enclose a volume is decided by their mean winding number.  An oriented
+surface S, seen from a point x just inside it, covers the share w(x) of all directions,
 
-    w(x) = 1/2 + (1 / 4 pi) integral over S of n(y) . (y - x) / |y - x|^3 dA(y)
+    w(x) = 1/2 + q(x) / 2,    q(x) = (1 / 2 pi) integral over S of n . (y - x) / |y - x|^3 dA(y)
 
-and w = 1 on a closed surface: no line of sight leads out.  On a plane w = 1/2, half of them do.
-A wrinkled sheet has the same mean as a flat one, while a closed surface with a small hole has a
-mean close to 1.  In two dimensions an arc of the angle a has the mean 1/2 + a / 4 pi.
+with n the unit normal at y.  Let q be the mean of q(x) over S.  It is 1 on a closed surface, from
+whose inside nothing else is seen, and close to 1 if the holes are small.  It is 0 on a plane, and
+on a sheet however wrinkled: ridges and valleys cancel.  In two dimensions an arc of the angle a has
+q = a / 2 pi, so that of a long half pipe is 1/2; above 1 the surface is rolled up.
 
-    component                                        encloses a volume
-    closed                                           yes
-    open, | 2 mean(w) - 1 | >= 0.45                  yes: a bottle, a tube, half of a ball
-    open, below                                      no: a sheet, a cloth, a shallow cap
-    one-sided, such as a Moebius strip               no
-    volume under lids is 0 to rounding               no: a closed shell around nothing
+    component                                   encloses a volume
+    closed                                      yes
+    open, 0.48 <= abs(q) <= 1.3                 yes: a bottle, a tube, half of a ball
+    any other open one                          no: a sheet, a cloth, a shallow cap, a roll
+    one-sided, such as a Moebius strip          no
+    its volume, with lids, is 0 to rounding     no: a closed shell that is folded flat
+    the sum of all volumes is 0 to rounding     no
 
 The absolute value is taken because an open surface may be turned inside out.
 
@@ -39,12 +41,14 @@ from scipy import sparse
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..mesh import HalfEdges, Mesh
-from .volume import signed_volume
+from .volume import corner_and_edges
 
-_LEAST = 0.45  # |2 mean(w) - 1| of an open component that encloses a volume
-_SAMPLES = 1000  # points on a component
+_LEAST, _MOST = 0.48, 1.3  # abs(q) of an open component that encloses a volume
+_VIEWPOINTS = 50, 400  # fewest and most points x; by default one for each face
+_SEEN = 10  # points y for each of them
+_NEAREST = 0.3  # distances of neighbouring points y, below which |y - x| is replaced by this
 _NO_VOLUME = 1e-11  # of the area to the power 3/2
-_GOLDEN = 0.6180339887498949
+_NOTHING = "no volume to preserve"
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +67,8 @@ class Lids:
         The component of the mesh that each loop bounds.
     encloses : (c,) bool
         Whether each component of the mesh encloses a volume.
+    option : bool or None
+        As in `lids_of`.
     """
 
     faces: IntArray
@@ -70,6 +76,7 @@ class Lids:
     extension: sparse.csr_array
     component: IntArray
     encloses: BoolArray
+    option: bool | None = None
 
     @property
     def has_volume(self) -> bool:
@@ -80,6 +87,33 @@ class Lids:
     def used(self) -> BoolArray:
         """(k,) bool: the loops whose lids close an enclosed volume."""
         return self.encloses[self.component]
+
+    @property
+    def is_open(self) -> BoolArray:
+        """(c,) bool: the components of the mesh that have borders."""
+        return np.bincount(self.component, minlength=len(self.encloses)) > 0
+
+    def summary(self, *, preserved: bool = True) -> str:
+        """Return in one line what has a volume, and whether it is *preserved*."""
+        is_open, holes = self.is_open, int(self.used.sum())
+        if not self.has_volume:
+            if not is_open.any() or self.option:
+                return "No enclosed volume: nothing to preserve"
+            many = int(is_open.sum())
+            if self.option is False:
+                return "Open surface, lids off: no volume to preserve"
+            return f"{_counted(many, 'open sheet') if many > 1 else 'Open sheet'}: {_NOTHING}"
+        done = "preserved" if preserved else "measured"
+        parts = [f"Closed surface: volume {done}"]
+        if holes:
+            lids = "its lid" if holes == 1 else "lids"
+            parts = [f"{_counted(holes, 'hole')}: volume {done} under {lids}"]
+        without = int((~self.encloses).sum())
+        if without:
+            name = "open sheet" if is_open[~self.encloses].all() and self.option is None else "part"
+            has = "has" if without == 1 else "have"
+            parts.append(f"{_counted(without, name)} {has} no volume")
+        return "; ".join(parts)
 
     def closed(self, mesh: Mesh) -> IntArray:
         """Return the faces of *mesh* and of lids around the enclosed volumes, (m', 3)."""
@@ -120,54 +154,94 @@ def lids_of(mesh: Mesh, lids: bool | None = None) -> Lids:
     extension = sparse.csr_array(sparse.vstack([sparse.eye_array(n), means]))
     component = mesh.components[[each[0] for each in mesh.borders]].astype(np.int64)
     every = np.ones(int(mesh.components.max()) + 1, dtype=bool)
-    found = Lids(faces, loop, extension, component, every)
+    found = Lids(faces, loop, extension, component, every, lids)
     return replace(found, encloses=_enclosing(mesh, found, lids))
 
 
-def mean_winding(points: FloatArray, faces: IntArray) -> float:
-    """Return the mean winding number just inside the surface of *points* (n, 3), *faces* (m, 3).
+def volume_summary(mesh: Mesh, lids: bool | None = None) -> str:
+    """Return in one line whether *mesh* has a volume that is preserved, for status lines.
 
-    From a thousand points y_i that share its area: the integral above is a sum over pairs, with
-    distances below that of neighbouring points replaced by it.  The error is about 0.01.
+    Parameters
+    ----------
+    mesh : Mesh
+        Closed, or with borders.
+    lids : bool or None
+        The option of `Deformer`.
+
+    Examples
+    --------
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> volume_summary(Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]]))
+    '1 hole: volume preserved under its lid'
+    >>> volume_summary(Mesh(corners[:3], [[0, 1, 2]]))
+    'Open sheet: no volume to preserve'
     """
-    corner = points[faces[:, 0]]
-    e, f = points[faces[:, 1]] - corner, points[faces[:, 2]] - corner
+    return lids_of(mesh, lids).summary()
+
+
+def mean_winding(points: FloatArray, faces: IntArray) -> float:
+    """Return q, the mean over the surface of *points* (n, 3), *faces* (m, 3); see above.
+
+    It is computed from at most 400 points x and 4,000 points y, with a standard error of 0.01; the
+    result is the same every time.
+    """
+    rng = np.random.default_rng(0)
+    corner, e, f = corner_and_edges(points, faces)
     normals = np.cross(e, f)
-    areas = np.linalg.norm(normals, axis=1)  # twice the area
-    total = float(areas.sum())
-    if not total > 0.0:
-        return 0.5
-    ends = np.cumsum(areas)
-    place = (np.arange(_SAMPLES) + 0.5) / _SAMPLES * ends[-1]
-    own = np.searchsorted(ends, place).clip(max=len(faces) - 1)
-    u, v = np.arange(_SAMPLES) * _GOLDEN % 1.0, (np.arange(_SAMPLES) + 0.5) * _GOLDEN**2 % 1.0
-    u, v = np.where(u + v > 1.0, [1.0 - u, 1.0 - v], [u, v])
-    y = corner[own] + u[:, None] * e[own] + v[:, None] * f[own]
-    unit = normals[own] / areas[own, None]
-    share = 0.5 * total / _SAMPLES
-    apart = y[None] - y[:, None]
-    distance = np.sqrt(np.einsum("ijk,ijk->ij", apart, apart)).clip(min=np.sqrt(share))
-    seen = np.einsum("ijk,jk->ij", apart, unit) / distance**3
-    return 0.5 + float(seen.sum()) * share / (4.0 * np.pi * _SAMPLES)
+    twice = np.linalg.norm(normals, axis=1)
+    ends = np.cumsum(twice)
+    if not ends[-1] > 0.0:
+        return 0.0
+
+    def sample(count: int) -> tuple[FloatArray, FloatArray]:
+        """Return points, one in each of *count* equal shares of the area, and their normals."""
+        place = (np.arange(count) + rng.random(count)) / count * ends[-1]
+        own = np.searchsorted(ends, place).clip(max=len(faces) - 1)
+        u, v = rng.random((2, count))
+        u, v = np.where(u + v > 1.0, [1.0 - u, 1.0 - v], [u, v])
+        y = corner[own] + u[:, None] * e[own] + v[:, None] * f[own]
+        return y, normals[own] / np.maximum(twice[own, None], np.finfo(float).tiny)
+
+    count = int(np.clip(len(faces), *_VIEWPOINTS))
+    y, n = sample(_SEEN * count)
+    x, _ = sample(count)
+    area = 0.5 * float(ends[-1]) / len(y)
+    nearest = _NEAREST * np.sqrt(area)
+    heights = np.einsum("ij,ij->i", y, n) - x @ n.T
+    square = np.square(x)[:, None].sum(axis=2) - 2.0 * x @ y.T + np.square(y).sum(axis=1)
+    distances = np.sqrt(square.clip(min=nearest**2))
+    return float((heights / distances**3).sum()) * area / (2.0 * np.pi * len(x))
 
 
 def _enclosing(mesh: Mesh, lids: Lids, wanted: bool | None) -> BoolArray:
     """Return which components enclose a volume, (c,) bool."""
-    count = len(lids.encloses)
-    is_open = np.bincount(lids.component, minlength=count) > 0
-    of_face = mesh.components[mesh.faces[:, 0]]
+    count, component = len(lids.encloses), mesh.components[mesh.faces[:, 0]]
+    is_open = lids.is_open
     encloses = ~is_open | (wanted is not False)
     if is_open.any():
         half_edges = HalfEdges(mesh.faces, mesh.n_vertices)
-        one_sided = half_edges.one_sided[half_edges.shells]
-        encloses[of_face[one_sided]] = False
-    x = lids.extension @ (mesh.vertices - mesh.vertices[0])
-    of_lid = lids.component[lids.loop]
-    for c in np.flatnonzero(encloses):
-        own = mesh.faces if count == 1 else mesh.faces[of_face == c]
-        closed = np.concatenate([own, lids.faces[of_lid == c]])
-        area = float(mesh.face_areas.sum() if count == 1 else mesh.face_areas[of_face == c].sum())
-        encloses[c] = abs(signed_volume(x, closed)) > _NO_VOLUME * area**1.5
-        if encloses[c] and is_open[c] and wanted is None:
-            encloses[c] = abs(2.0 * mean_winding(mesh.vertices, own) - 1.0) >= _LEAST
+        encloses[component[half_edges.one_sided[half_edges.shells]]] = False
+    # Volumes with the first vertex of each component as the origin.
+    owner = np.concatenate([component, lids.component[lids.loop]])
+    _, first = np.unique(mesh.components, return_index=True)
+    a, e, f = corner_and_edges(
+        lids.extension @ mesh.vertices, np.concatenate([mesh.faces, lids.faces])
+    )
+    determinants = np.einsum("ij,ij->i", a - mesh.vertices[first][owner], np.cross(e, f))
+    volumes = np.bincount(owner, determinants, count) / 6.0
+    areas = np.bincount(component, mesh.face_areas, count)
+    encloses &= np.abs(volumes) > _NO_VOLUME * areas**1.5
+    if wanted is None:
+        order = np.argsort(component, kind="stable")
+        starts = np.searchsorted(component[order], np.arange(count + 1))
+        for c in np.flatnonzero(encloses & is_open):
+            faces = mesh.faces[order[starts[c] : starts[c + 1]]]
+            q = mean_winding(mesh.vertices - mesh.vertices[first[c]], faces)
+            encloses[c] = _LEAST <= abs(q) <= _MOST
+    if abs(volumes[encloses].sum()) <= _NO_VOLUME * areas.sum() ** 1.5:
+        encloses[:] = False  # they cancel: no change could be relative to their sum
     return encloses
+
+
+def _counted(count: int, name: str) -> str:
+    return f"{count} {name}{'s' * (count != 1)}"

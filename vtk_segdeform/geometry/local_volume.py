@@ -13,6 +13,7 @@ volume
 
 with k a smoothing over the surface about a quarter as wide as the body is thick, because o(i)
 varies irregularly at edges and in creases.  s is signed and relative: +0.1 is an expansion by 10 %.
+A part of the mesh that encloses nothing, such as an open sheet (`lids`), has no local volume: s is 0.
 As a quotient of determinants it is 0 under any rigid motion, and det(M) - 1 under any affine map M;
 it is below -1 where the tetrahedra are inverted.
 
@@ -29,9 +30,10 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from .. import sizes
-from ..arrays import FloatArray, IntArray, as_points
+from ..arrays import BoolArray, FloatArray, IntArray, as_points
 from ..kernels import in_parallel
 from ..mesh import Mesh, require_mesh
+from .lids import lids_of
 from .sampling import faces_between, unique_edges, voronoi_cells
 from .volume import corner_and_edges, volume_gradient
 
@@ -54,12 +56,20 @@ class LocalVolume:
         thousand cells of neighbouring vertices and interpolated to the vertices.
     """
 
+    _means: sparse.csr_array | None
+    _interpolation: list[sparse.csr_array]
+
     def __init__(self, mesh: Mesh) -> None:
         require_mesh(mesh)
         self._shape = mesh.vertices.shape
+        encloses = lids_of(mesh).encloses
+        self._inside: IntArray | None = None
+        if not encloses.all():
+            mesh, self._inside = _part(mesh, encloses[mesh.components])
+        self._means, self._interpolation = None, []
+        if not encloses.any():
+            return
         points, faces = mesh.vertices, mesh.faces
-        self._means: sparse.csr_array | None = None
-        self._interpolation: list[sparse.csr_array] = []
         if mesh.n_vertices > sizes.LOCAL_VOLUME_CELLS:
             _, cells = voronoi_cells(mesh, sizes.LOCAL_VOLUME_POINTS, np.random.default_rng(0))
             between = faces_between(cells, faces)
@@ -77,9 +87,18 @@ class LocalVolume:
     def change(self, vertices: FloatArray) -> FloatArray:
         """Return s, (n,), of the pose *vertices* (n, 3): 0.1 where the body expanded by 10 %.
 
-        It is 0 at vertices with almost no volume at rest, such as on the rim of a thin plate.
+        It is 0 at vertices with almost no volume at rest, such as on the rim of a thin plate, and
+        on open sheets.
         """
         x = as_points(vertices, "vertices", self._shape[0])
+        if self._inside is None:
+            return self._change(x)
+        out = np.zeros(len(x))
+        if len(self._inside):
+            out[self._inside] = self._change(x[self._inside])
+        return out
+
+    def _change(self, x: FloatArray) -> FloatArray:
         now = self._volumes.smoothed(x if self._means is None else self._means @ x)
         s = np.divide(now - self._rest, self._rest, where=self._reliable, out=np.zeros(len(now)))
         if self._means is None:
@@ -95,7 +114,7 @@ class LocalVolume:
 
 
 class _Volumes:
-    """The smoothed volumes L over a closed surface, *points* (k, 3) and *faces* (m, 3)."""
+    """The smoothed volumes L over a surface, *points* (k, 3) and *faces* (m, 3)."""
 
     def __init__(self, points: FloatArray, faces: IntArray) -> None:
         self._faces = faces
@@ -139,6 +158,18 @@ def local_volume_change(mesh: Mesh, vertices: FloatArray) -> FloatArray:
     array([0.1, 0.1, 0.1, 0.1])
     """
     return LocalVolume(mesh).change(vertices)
+
+
+def _part(mesh: Mesh, inside: BoolArray) -> tuple[Mesh, IntArray]:
+    """Return the components of *mesh* whose vertices are *inside* (n,), and their vertices (k,).
+
+    If there are none, the mesh is returned as it is.
+    """
+    ids = np.flatnonzero(inside)
+    if not len(ids):
+        return mesh, ids
+    place = np.cumsum(inside) - 1
+    return Mesh(mesh.vertices[ids], place[mesh.faces[inside[mesh.faces[:, 0]]]]), ids
 
 
 def _means(cells: IntArray) -> sparse.csr_array:

@@ -6,6 +6,7 @@ The files, in reading order:
     faults           search for the faults of a mesh
     report           kinds of faults, counted and described
     topology         half-edges, edges, fans, shells and boundaries
+    orientation      which faces of any triangles to flip
     soup             a mesh from any triangles, and the map between both
     shells           orientation of closed shells
     inside           winding numbers, points inside a surface, distance to it

@@ -8,6 +8,7 @@ reported once and under its own name.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +18,7 @@ from ..errors import ArgumentError
 from ..kernels import in_parallel
 from .grouping import connected, first_equal_row
 from .report import Fault, Id, Kind, MeshReport, counted
-from .shells import shell_faults
+from .shells import closed_shells, shell_faults
 from .topology import HalfEdges, repeats_face, repeats_vertex
 from .triangles import corner_columns, cross, norm
 
@@ -58,11 +59,42 @@ def find_faults(vertices: ArrayLike, faces: ArrayLike) -> MeshReport:
     >>> print(report.notes[0])
     3 open edges (1-2, 1-3, 2-3)
     """
-    points, triangles = as_soup(vertices, faces)
-    n_components = 0
+    return search(*as_soup(vertices, faces)).report
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """The faults of triangles and, unless some are in `UNREPAIRABLE`, what was computed for that.
+
+    Attributes
+    ----------
+    report : MeshReport
+        The faults and notes.
+    degenerate, duplicate : (m,) bool
+        Which faces contain a vertex twice, and which repeat an earlier face.
+    half_edges : HalfEdges
+        Of all other faces.
+    first_at : (n,) int
+        The first vertex at the position of each vertex.
+    """
+
+    report: MeshReport
+    degenerate: BoolArray
+    duplicate: BoolArray
+    half_edges: HalfEdges
+    first_at: IntArray
+
+
+def search(points: FloatArray, triangles: IntArray) -> Search:
+    """Search *triangles* (m, 3) over *points* (n, 3) for faults; arrays as of `as_soup`."""
     found = list(_number_faults(points, triangles))
-    if not any(fault.kind in UNREPAIRABLE for fault in found):
-        degenerate, duplicate, half_edges = _distinct_faces(triangles, len(points))
+    usable = not any(fault.kind in UNREPAIRABLE for fault in found)
+    degenerate, duplicate, half_edges = distinct_faces(
+        triangles if usable else triangles[:0], len(points)
+    )
+    first_at = np.arange(len(points))
+    n_components = 0
+    if usable:
         n_components = int(half_edges.shells.max(initial=-1)) + 1
         found += _some(Kind.DEGENERATE, np.flatnonzero(degenerate))
         found += _some(Kind.DUPLICATE_FACE, np.flatnonzero(duplicate & ~degenerate))
@@ -70,17 +102,18 @@ def find_faults(vertices: ArrayLike, faces: ArrayLike) -> MeshReport:
         found += _some(Kind.ZERO_AREA, flat[~degenerate[flat]])
         found += _edge_faults(half_edges)
         found += _inward_shells(points, half_edges)
-        coincident = first_equal_row(points) != np.arange(len(points))
-        found += _some(Kind.COINCIDENT, np.flatnonzero(coincident))
+        first_at = first_equal_row(points)
+        found += _some(Kind.COINCIDENT, np.flatnonzero(first_at != np.arange(len(points))))
         if n_components > 1:
             found.append(Fault(Kind.COMPONENTS, n_components))
-    return MeshReport(
+    report = MeshReport(
         n_vertices=len(points),
         n_faces=len(triangles),
         n_components=n_components,
         faults=tuple(fault for fault in found if fault.kind.fatal),
         notes=tuple(fault for fault in found if not fault.kind.fatal),
     )
+    return Search(report, degenerate, duplicate, half_edges, first_at)
 
 
 def as_soup(vertices: ArrayLike, faces: ArrayLike) -> tuple[FloatArray, IntArray]:
@@ -165,7 +198,7 @@ def _finite(points: FloatArray) -> BoolArray:
     return np.asarray(np.isfinite(points).all(axis=1))
 
 
-def _distinct_faces(faces: IntArray, n_vertices: int) -> tuple[BoolArray, BoolArray, HalfEdges]:
+def distinct_faces(faces: IntArray, n_vertices: int) -> tuple[BoolArray, BoolArray, HalfEdges]:
     """Return which faces are degenerate, which repeat an earlier face, and the others' half-edges.
 
     Two faces on the same three vertices share three edges.  If every edge has two faces, a face
@@ -226,24 +259,20 @@ def _edge_faults(half_edges: HalfEdges) -> Iterator[Fault]:
 
 
 def _inward_shells(points: FloatArray, half_edges: HalfEdges) -> Iterator[Fault]:
-    """Yield the faults of orientation of the shells that are closed and consistently oriented."""
-    checked = np.ones(len(half_edges.faces), dtype=bool)
-    if half_edges.twin is None:
-        good = np.ones(int(half_edges.shells.max(initial=-1)) + 1, dtype=bool)
-        good[half_edges.shells[half_edges.boundary // 3]] = False
-        good[half_edges.shells[half_edges.order[half_edges.first[half_edges.counts > 2]] // 3]] = (
-            False
-        )
-        good[half_edges.shells[half_edges.pairs[half_edges.inconsistent, 0] // 3]] = False
-        checked = good[half_edges.shells]
-    if not (finite := _finite(points)).all():
-        checked &= finite[half_edges.faces].all(axis=1)
+    """Yield the faults of orientation of the shells that are closed and consistently oriented.
+
+    Others may be around them.
+    """
     faces, shells = half_edges.faces, half_edges.shells
-    if not checked.all():
-        faces = faces[checked]
-        _, shells = np.unique(shells[checked], return_inverse=True)
-    if len(faces):
-        wrong, flat, first = shell_faults(points, faces, shells)
+    closed = closed_shells(half_edges)
+    if not (finite := _finite(points)).all():
+        valid = finite[faces].all(axis=1)
+        closed[shells[~valid]] = False
+        faces = faces[valid]
+        left, shells = np.unique(shells[valid], return_inverse=True)
+        closed = closed[left]
+    if closed.any():
+        wrong, flat, first = shell_faults(points, faces, shells, closed)
         yield from _some(Kind.INWARD, faces[first[wrong & ~flat], 0])
         yield from _some(Kind.NO_VOLUME, faces[first[flat], 0])
 

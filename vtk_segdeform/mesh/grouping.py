@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from ..arrays import IntArray
+from ..arrays import BoolArray, IntArray
 
 _MIX = np.uint64(0x9E3779B97F4A7C15)  # odd, with irregular bits: a multiplicative hash
 
@@ -48,15 +48,17 @@ def first_equal_row(rows: NDArray[np.generic]) -> IntArray:
     >>> first_equal_row(np.array([[0, 1], [2, 3], [0, 1]]))
     array([0, 1, 0])
     """
-    suspects = _equal_hashes(rows)  # usually none: nothing to sort
-    some = rows[suspects]
-    # lexsort is stable: equal rows keep their order.
-    order = np.lexsort(some.T) if len(some) else np.empty(0, np.int64)
-    ordered = some[order]
-    new = np.ones(len(some), dtype=bool)
-    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    first = np.arange(len(rows))
-    first[suspects[order]] = suspects[order[np.flatnonzero(new)][np.cumsum(new) - 1]]
+    hashes = _hashes(rows)
+    ordered = np.sort(hashes)  # faster than to find the order, and usually all that is needed
+    if not (ordered[1:] == ordered[:-1]).any():
+        return np.arange(len(rows))
+    order = np.argsort(hashes, kind="stable")  # equal rows keep their order
+    new = _begins(hashes[order])
+    if (_begins(rows[order]) & ~new).any():  # different rows of equal hash
+        order = np.lexsort(rows.T)
+        new = _begins(rows[order])
+    first = np.empty(len(rows), dtype=np.int64)
+    first[order] = order[np.flatnonzero(new)][np.cumsum(new) - 1]
     return first
 
 
@@ -97,15 +99,20 @@ def ragged_arange(counts: IntArray) -> tuple[IntArray, IntArray]:
     return i, np.arange(len(i)) - np.repeat(counts.cumsum() - counts, counts)
 
 
-def _equal_hashes(rows: NDArray[np.generic]) -> IntArray:
-    """Return the rows (k,) that share their hash with another row, as equal rows do."""
-    if rows.dtype not in (np.float64, np.int64):
-        return np.arange(len(rows))
+def _begins(ordered: NDArray[np.generic]) -> BoolArray:
+    """Return which items (k, ...) differ from the one before, (k,) bool."""
+    begins = np.ones(len(ordered), dtype=bool)
+    differ = ordered[1:] != ordered[:-1]
+    begins[1:] = differ if differ.ndim == 1 else differ.any(axis=1)
+    return begins
+
+
+def _hashes(rows: NDArray[np.generic]) -> NDArray[np.uint64]:
+    """Return a hash of each row, (n,), the same for equal rows."""
     mixed = np.zeros(len(rows), dtype=np.uint64)
     for column in rows.T:
-        mixed ^= (column + 0).view(np.uint64)  # 0 and -0 are equal
+        wide = np.ascontiguousarray(column, np.float64 if rows.dtype.kind == "f" else np.int64)
+        mixed ^= (wide + 0).view(np.uint64)  # 0 and -0 are equal
         mixed *= _MIX
         mixed ^= mixed >> np.uint64(29)
-    ordered = np.sort(mixed)
-    twice = ordered[1:][ordered[1:] == ordered[:-1]]
-    return np.flatnonzero(np.isin(mixed, twice)) if len(twice) else np.empty(0, np.int64)
+    return mixed

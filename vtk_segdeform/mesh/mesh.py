@@ -23,6 +23,7 @@ from ..errors import MeshError
 from ..freezing import Frozen, read_only
 from ..kernels import in_parallel
 from .faults import as_soup, find_faults
+from .report import MeshReport
 from .topology import boundary_edges, edge_keys, loops_of
 
 _PIECE = 20_000  # faces per task; their data fit into the cache
@@ -70,8 +71,18 @@ class Mesh(Frozen):
         if not report.ok:
             faults = ", ".join(map(str, report.faults))
             raise MeshError(f"not an oriented mesh: {faults}; see find_faults, repair and Surface")
-        points, triangles = as_soup(vertices, faces)
-        self.__setstate__({"vertices": points.copy(), "faces": triangles.copy()})
+        self._set(*as_soup(vertices, faces), report)
+
+    @classmethod
+    def reported(cls, vertices: FloatArray, faces: IntArray, report: MeshReport) -> Mesh:
+        """Return a mesh whose *report* is known, and without faults, from arrays of `as_soup`."""
+        assert report.ok
+        mesh = object.__new__(cls)
+        mesh._set(vertices, faces, report)
+        return mesh
+
+    def _set(self, vertices: FloatArray, faces: IntArray, report: MeshReport) -> None:
+        self.__setstate__({"vertices": vertices.copy(), "faces": faces.copy()})
         self.__dict__["is_two_manifold"] = report.is_two_manifold
 
     @property

@@ -15,7 +15,7 @@ Id = int | tuple[int, ...]  # a vertex or face by its number, an edge by its two
 class Kind(enum.Enum):
     """A kind of fault, or of note (those with False): its name, its location and what to do."""
 
-    EMPTY = "empty mesh", "empty meshes", "", "give at least four triangles"
+    EMPTY = "empty mesh", "empty meshes", "", "give at least one face"
     NON_FINITE = (
         "vertex with NaN or infinite coordinates",
         "vertices with NaN or infinite coordinates",

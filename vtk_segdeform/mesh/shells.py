@@ -2,7 +2,7 @@
 
 A shell inside an even number of other shells bounds a body, so its volume must be positive; inside
 an odd number it bounds a cavity, so its volume must be negative.  A point is inside a shell if the
-shell's generalized winding number there is 1 or -1.
+shell's generalized winding number there is 1 or -1, so shells with small holes count too.
 
 Source
 ------
@@ -18,19 +18,36 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from ..kernels import in_parallel
 from .grouping import first_members
 from .inside import winding_number
+from .topology import HalfEdges
 from .triangles import corner_columns, cross, norm
 
 _PIECE = 10_000  # faces per task; their data fit into the cache
-_NO_VOLUME = 1e-14  # relative to area times size: about the rounding error for a flat shell
+NO_VOLUME = 1e-14  # relative to area times size: about the rounding error for a flat shell
+_INSIDE = 0.5 + 1e-6  # at a flat part of a shell it is 0.5: not inside
+
+
+def closed_shells(half_edges: HalfEdges) -> BoolArray:
+    """Return which shells are closed and consistently oriented, every edge a pair, (k,) bool."""
+    closed = np.ones(int(half_edges.shells.max(initial=-1)) + 1, dtype=bool)
+    if half_edges.twin is None:
+        crowded = np.repeat(half_edges.counts > 2, half_edges.counts)
+        for some in (
+            half_edges.boundary,
+            half_edges.order[crowded],
+            half_edges.pairs[half_edges.inconsistent, 0],
+        ):
+            closed[half_edges.shells[some // 3]] = False
+    return closed
 
 
 def misoriented_shells(vertices: FloatArray, faces: IntArray, shells: IntArray) -> BoolArray:
-    """Return which shells are inside-out or enclose no volume, (k,) bool; see `shell_faults`."""
-    return shell_faults(vertices, faces, shells)[0]
+    """Return which shells, all closed, are inside-out or enclose no volume; see `shell_faults`."""
+    closed = np.ones(int(shells.max(initial=-1)) + 1, dtype=bool)
+    return shell_faults(vertices, faces, shells, closed)[0]
 
 
 def shell_faults(
-    vertices: FloatArray, faces: IntArray, shells: IntArray
+    vertices: FloatArray, faces: IntArray, shells: IntArray, closed: BoolArray
 ) -> tuple[BoolArray, BoolArray, IntArray]:
     """Return which shells are inside-out or enclose no volume.
 
@@ -39,9 +56,11 @@ def shell_faults(
     vertices : (n, 3) float
         Finite.
     faces : (m, 3) int
-        Every shell closed and consistently oriented.
+        Of all shells.
     shells : (m,) int
         The shell of each face, 0..k-1.
+    closed : (k,) bool
+        The shells to test, closed and consistently oriented.  Others may be around them.
 
     Returns
     -------
@@ -53,18 +72,31 @@ def shell_faults(
         Its first face.
     """
     first = first_members(shells)
-    volume, scale = _volumes(vertices, faces, shells, vertices[faces[first, 0]])
-    depth = _depths(vertices, faces, shells)
-    wrong = np.where(depth % 2 == 0, volume, -volume) <= _NO_VOLUME * scale
-    if len(volume) and not wrong.any() and volume.sum() <= 0.0:
-        wrong[:] = True  # only overlapping shells get here
-    return wrong, np.asarray(np.abs(volume) <= _NO_VOLUME * scale), first
+    volume, area, size = shell_volumes(vertices, faces, shells)
+    tiny = NO_VOLUME * (area * size)
+    outward = outward_signs(volume, shell_depths(vertices, faces, shells, closed), closed)
+    wrong = outward * volume <= tiny
+    flat = np.abs(volume) <= tiny
+    return np.asarray(wrong & closed), np.asarray(flat & closed), first
 
 
-def _volumes(
-    vertices: FloatArray, faces: IntArray, shells: IntArray, origins: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the volume of each shell, relative to its *origin* (k, 3), and its area times size."""
+def outward_signs(volume: FloatArray, depth: IntArray, closed: BoolArray) -> IntArray:
+    """Return the sign that the *volume* (k,) of each shell must have: 1 for bodies, -1 for cavities.
+
+    Cavities that are together as large as the bodies overlap each other; then all *closed* (k,)
+    shells count as bodies.  *depth* (k,) is the number of shells around each.
+    """
+    outward = np.where(depth % 2 == 0, 1, -1)
+    if (outward * np.abs(volume))[closed].sum() <= 0.0:
+        outward[closed] = 1
+    return outward
+
+
+def shell_volumes(
+    vertices: FloatArray, faces: IntArray, shells: IntArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the volume, area and size of each shell, (k,) each, from its first vertex."""
+    origins = vertices[faces[first_members(shells), 0]]
     volumes, areas, radii = np.empty((3, len(faces)))
 
     def work(start: int, stop: int) -> None:
@@ -77,34 +109,48 @@ def _volumes(
     in_parallel(work, len(faces), _PIECE)
     size = np.zeros(len(origins))
     np.maximum.at(size, shells, radii)
-    return np.bincount(shells, volumes) / 6.0, np.bincount(shells, areas) / 2.0 * size
+    return np.bincount(shells, volumes) / 6.0, np.bincount(shells, areas) / 2.0, size
 
 
-def _depths(vertices: FloatArray, faces: IntArray, shells: IntArray) -> IntArray:
-    """Return the number of other shells around each shell, (k,) int.
+def shell_depths(
+    vertices: FloatArray, faces: IntArray, shells: IntArray, inner: BoolArray
+) -> IntArray:
+    """Return the number of other shells around each of the shells *inner* (k,), (k,) int.
 
     All extreme vertices of a shell must be inside the other one, so that a shell which only
     reaches into another, such as a limb pushed into a body, does not count as a cavity.
     """
-    n_shells = int(shells.max(initial=-1)) + 1
-    depth = np.zeros(n_shells, dtype=np.int64)
-    if n_shells < 2:
+    depth = np.zeros(len(inner), dtype=np.int64)
+    if len(inner) < 2 or not inner.any():
         return depth
-    by_shell = np.split(np.argsort(shells, kind="stable"), np.cumsum(np.bincount(shells))[:-1])
-    owned = [np.unique(faces[mine]) for mine in by_shell]
-    low = np.array([vertices[ids].min(axis=0) for ids in owned])
-    high = np.array([vertices[ids].max(axis=0) for ids in owned])
-    order, starts, stops = _beginning_within(low, high)
-    for outer, its_faces in enumerate(by_shell):
-        near = order[starts[outer] : stops[outer]]
+    by_shell = np.argsort(shells, kind="stable")
+    ends = np.cumsum(np.bincount(shells))
+    starts = ends - np.bincount(shells)
+    corners = vertices[faces[by_shell]]
+    low = np.minimum.reduceat(corners.min(axis=1), starts)
+    high = np.maximum.reduceat(corners.max(axis=1), starts)
+    order, begin, end = _beginning_within(low, high)
+    for outer in np.flatnonzero(end > begin):
+        near = order[begin[outer] : end[outer]]
+        near = near[inner[near]]
         within = ((low[near] > low[outer]) & (high[near] < high[outer])).all(axis=1)
-        for inner in near[within]:
-            points = vertices[owned[inner]]
+        if not within.any():
+            continue
+        owned, its_faces = _owned(faces[by_shell[starts[outer] : ends[outer]]])
+        if its_faces[0, 1] > its_faces[0, 2]:  # the same rounding for both orientations
+            its_faces = its_faces[:, [0, 2, 1]]
+        for one in near[within]:
+            points = vertices[_owned(faces[by_shell[starts[one] : ends[one]]])[0]]
             extremes = np.unique([points.argmin(axis=0), points.argmax(axis=0)])
-            corners = np.searchsorted(owned[outer], faces[its_faces])
-            w = winding_number(points[extremes], vertices[owned[outer]], corners)
-            depth[inner] += bool((np.abs(w) > 0.5).all())
+            w = winding_number(points[extremes], vertices[owned], its_faces)
+            depth[one] += bool((np.abs(w) > _INSIDE).all())
     return depth
+
+
+def _owned(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the vertices of *faces* (k, 3), sorted, and the faces over these."""
+    owned, numbers = np.unique(faces, return_inverse=True)
+    return owned, numbers.reshape(-1, 3)
 
 
 def _beginning_within(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray, IntArray]:

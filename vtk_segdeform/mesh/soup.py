@@ -1,34 +1,47 @@
 """A `Mesh` from any triangles, and the map between both: what is given and what is deformed.
 
-    weld       border points at the same position become one vertex
     drop       faces without three different vertices, repeated faces, points in no face
+    weld       points of borders at exactly the same position, and open sheets that coincide
     orient     neighbouring faces alike, closed surfaces and nearly closed ones outward
 
+Points that a file rounded differently on both sides of a seam remain apart: no distance separates
+them safely from a narrow gap.  Vertices within a surface are not welded, so a closed surface
+remains as it is.  Of a face that is given twice, in any orientation, the mesh has the first.
+
 Nothing is lost: every given point follows a vertex of the mesh, so a pose of the mesh is one of
-what was given, with the same points in the same order.
+the given triangles, with the same points in the same order.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
-from ..arrays import FloatArray, IntArray, as_ids, as_points
-from .faults import as_soup
-from .grouping import first_equal_row, first_of_group
+from ..arrays import BoolArray, FloatArray, IntArray, as_ids, as_points
+from ..errors import MeshError
+from .faults import UNREPAIRABLE, Search, as_soup, distinct_faces, search
+from .grouping import connected, first_equal_row
 from .mesh import Mesh
-from .topology import HalfEdges, repeats_face, repeats_vertex
+from .orientation import faces_to_flip
+from .report import Kind, counted
+from .topology import HalfEdges, repeats_vertex
+
+_REFUSED = (*UNREPAIRABLE, Kind.NON_FINITE)
 
 
 @dataclass(frozen=True)
 class Workaround:
-    """Something in the given triangles that the mesh does not have: a sentence, and where it is."""
+    """A difference between the given triangles and the mesh: a sentence, and where it is."""
 
+    kind: Kind
+    count: int
     text: str
-    points: IntArray  # (k,) int: given points there
+    points: IntArray  # (k,) int: the given points there
 
     def __str__(self) -> str:
         return self.text
@@ -46,6 +59,8 @@ class Soup:
         What is deformed.
     vertex_of : (p,) int
         The vertex that each given point follows: its own, or the nearest one if it is in no face.
+    loose : (k,) int
+        The given points that are in no face of the mesh.
     workarounds : tuple of Workaround
         What differs between the two.
     """
@@ -53,6 +68,7 @@ class Soup:
     points: FloatArray
     mesh: Mesh
     vertex_of: IntArray
+    loose: IntArray
     workarounds: tuple[Workaround, ...] = ()
 
     def vertices_at(self, points: ArrayLike) -> IntArray:
@@ -82,24 +98,169 @@ class Soup:
 
     def moved(self, vertices: FloatArray) -> FloatArray:
         """Return the given points (p, 3) for the mesh at *vertices* (n, 3)."""
-        offsets = self.points - self.mesh.vertices[self.vertex_of]  # 0 for all points of faces
-        return np.asarray(vertices[self.vertex_of] + offsets)
+        points: FloatArray = vertices[self.vertex_of]
+        followed = self.vertex_of[self.loose]
+        step = vertices[followed] - self.mesh.vertices[followed]
+        points[self.loose] = self.points[self.loose] + step
+        return points
 
 
 def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
-    """Return the mesh of any triangles *faces* (m, 3) over *vertices* (p, 3)."""
+    """Return the mesh of any triangles *faces* (m, 3) over *vertices* (p, 3).
+
+    Raises
+    ------
+    ValueError
+        If an array has the wrong shape or type.
+    MeshError
+        If there are no faces, all faces are flat, an index is out of range, or a point of a face is
+        not finite, or too far or too near for computing volumes.
+    """
     points, triangles = as_soup(vertices, faces)
-    half_edges = HalfEdges(triangles[~repeats_vertex(triangles)], len(points))
-    border = np.union1d(half_edges.tail[half_edges.boundary], half_edges.head[half_edges.boundary])
-    vertex_of = np.arange(len(points))
-    vertex_of[border] = border[first_equal_row(points[border])]
-    welded = vertex_of[triangles]
-    kept = welded[~repeats_vertex(welded)]
-    kept = kept[~repeats_face(kept)]
-    _, flip = HalfEdges(kept, len(points)).sides
-    kept[flip] = kept[flip][:, [0, 2, 1]]
-    used, faces = np.unique(kept, return_inverse=True)
-    number = np.zeros(len(points), dtype=np.int64)
-    number[used] = np.arange(len(used))
-    mesh = Mesh(points[used], faces.reshape(-1, 3))
-    return Soup(points, mesh, number[first_of_group(vertex_of)])
+    valid = points
+    if len(triangles) and triangles.min() >= 0 and triangles.max() < len(points):
+        used = np.zeros(len(points), dtype=bool)
+        used[triangles[~repeats_vertex(triangles)]] = True
+        if not used.all():  # points in no face must not matter
+            valid = np.where(used[:, None], points, points[used.argmax()] if used.any() else 0.0)
+    found = search(valid, triangles)
+    _require_usable(found)
+    if found.report.is_closed:
+        mesh = Mesh.reported(points, triangles, found.report)
+        return Soup(points, mesh, np.arange(len(points)), np.empty(0, np.int64))
+    target, kept, half_edges = _welded(valid, found)
+    flip = faces_to_flip(valid, half_edges)
+    left = np.zeros(len(points), dtype=bool)
+    left[half_edges.faces] = True
+    number = np.cumsum(left) - 1
+    triangles_left = half_edges.faces
+    if flip.any():
+        triangles_left = np.where(flip[:, None], triangles_left[:, [0, 2, 1]], triangles_left)
+    if found.report.ok and left.all() and not flip.any():
+        mesh = Mesh.reported(points, triangles, found.report)
+    else:
+        mesh = Mesh(points[left], number[triangles_left])
+    loose = np.flatnonzero(~left[target])
+    vertex_of = number[target]
+    vertex_of[loose] = _nearest(points[loose], mesh.vertices)
+    workarounds = tuple(_workarounds(triangles, kept, target, loose, flip, half_edges))
+    return Soup(points, mesh, vertex_of, loose, workarounds)
+
+
+def _require_usable(found: Search) -> None:
+    faults = [
+        f"{fault}; {fault.kind.advice}" for fault in found.report.faults if fault.kind in _REFUSED
+    ]
+    if faults:
+        raise MeshError(f"this surface cannot be deformed: {'; '.join(faults)}")
+    flat = found.report.count(Kind.ZERO_AREA) + found.report.count(Kind.DEGENERATE)
+    if flat == found.report.n_faces:
+        raise MeshError(
+            "this surface cannot be deformed: all faces are flat; "
+            "give at least one whose three corners are not on a line"
+        )
+
+
+def _welded(points: FloatArray, found: Search) -> tuple[IntArray, IntArray, HalfEdges]:
+    """Return the point that each point (p,) is welded to, the faces kept, and their half-edges."""
+    target, half_edges = np.arange(len(points)), found.half_edges
+    kept = np.flatnonzero(~found.degenerate & ~found.duplicate)
+    while True:  # a face that is dropped may leave a border
+        weld = _coinciding_sheets(half_edges, found.first_at)
+        weld[half_edges.tail[half_edges.boundary]] = True
+        weld[half_edges.head[half_edges.boundary]] = True
+        some = np.flatnonzero(weld)
+        first = some[first_equal_row(points[some])]
+        if (first == some).all():
+            return target, kept, half_edges
+        number = np.arange(len(points))
+        number[some] = first
+        target = number[target]
+        degenerate, duplicate, half_edges = distinct_faces(number[half_edges.faces], len(points))
+        kept = kept[~degenerate & ~duplicate]
+
+
+def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
+    """Return the vertices (p,) of faces of open shells with all positions of another such face."""
+    found = np.zeros(len(first_at), dtype=bool)
+    if not len(half_edges.boundary) or (first_at == np.arange(len(first_at))).all():
+        return found
+    used = np.zeros_like(found)
+    used[half_edges.faces] = True
+    shared = used & (np.bincount(first_at[used], minlength=len(first_at)) > 1)[first_at]
+    border = np.zeros_like(found)
+    border[half_edges.tail[half_edges.boundary]] = True
+    border[half_edges.head[half_edges.boundary]] = True
+    shells = half_edges.shells
+    is_open = np.zeros(int(shells.max()) + 1, dtype=bool)
+    is_open[shells[half_edges.boundary // 3]] = True
+    faces = half_edges.faces[is_open[shells] & shared[half_edges.faces].all(axis=1)]
+    if border[faces].all():
+        return found
+    first = first_equal_row(np.sort(first_at[faces], axis=1))
+    again = first != np.arange(len(first))
+    found[faces[again]] = found[faces[first[again]]] = True
+    return found
+
+
+def _nearest(points: FloatArray, vertices: FloatArray) -> IntArray:
+    """Return the nearest of *vertices* to each of *points* (k, 3), or the first if not finite."""
+    nearest = np.zeros(len(points), dtype=np.int64)
+    finite = (np.abs(points) < 1e100).all(axis=1)
+    if finite.any():
+        nearest[finite] = cKDTree(vertices).query(points[finite])[1]
+    return nearest
+
+
+def _workarounds(
+    triangles: IntArray,
+    kept: IntArray,
+    target: IntArray,
+    loose: IntArray,
+    flip: BoolArray,
+    half_edges: HalfEdges,
+) -> Iterator[Workaround]:
+    """Yield the sentences, from what was changed to what was left as it is."""
+
+    def at(vertices: IntArray) -> IntArray:
+        """Return the given points that follow *vertices*."""
+        marked = np.zeros(len(target), dtype=bool)
+        marked[vertices] = True
+        return np.flatnonzero(marked[target])
+
+    members = np.bincount(target, minlength=len(target))[target]
+    if len(seam := np.flatnonzero(members > 1)):
+        yield _workaround(Kind.COINCIDENT, len(seam), "welded # seam point", seam)
+    if flip.any():
+        faces = triangles[kept[flip]]
+        yield _workaround(Kind.TURNED_EDGE, len(faces), "flipped # face", np.unique(faces))
+    dropped = np.ones(len(triangles), dtype=bool)
+    dropped[kept] = False
+    faces = triangles[dropped]
+    degenerate = repeats_vertex(target[faces])
+    for kind, some in ((Kind.DUPLICATE_FACE, ~degenerate), (Kind.DEGENERATE, degenerate)):
+        if some.any():
+            text = f"ignored # {kind.one}"
+            yield _workaround(kind, int(some.sum()), text, np.unique(faces[some]))
+    if len(loose):
+        text = f"{counted(len(loose), 'point is', 'points are')} in no face"
+        yield Workaround(Kind.UNREFERENCED, len(loose), text, loose)
+    ends = np.stack([half_edges.tail, half_edges.head])[:, half_edges.boundary]
+    corners, ends = np.unique(ends, return_inverse=True)
+    if len(corners):
+        n_holes = int(connected(len(corners), *ends.reshape(2, -1)).max()) + 1
+        yield _workaround(Kind.HOLE, n_holes, "# hole", at(corners))
+    crowded = half_edges.order[half_edges.first[half_edges.counts > 2]]
+    if len(crowded):
+        text = f"{counted(len(crowded), 'edge', 'edges')} with three or more faces"
+        there = at(np.append(half_edges.tail[crowded], half_edges.head[crowded]))
+        yield Workaround(Kind.NON_MANIFOLD_EDGE, len(crowded), text, there)
+    if half_edges.inconsistent.any() and half_edges.one_sided.any():
+        one_sided = half_edges.one_sided
+        there = at(half_edges.faces[one_sided[half_edges.shells]])
+        yield _workaround(Kind.ONE_SIDED, int(one_sided.sum()), "# one-sided component", there)
+
+
+def _workaround(kind: Kind, count: int, text: str, points: IntArray) -> Workaround:
+    """Return a workaround whose *text* has "#" for its count and ends with a noun."""
+    return Workaround(kind, count, text.replace("#", str(count)) + "s" * (count != 1), points)

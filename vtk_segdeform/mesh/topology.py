@@ -137,21 +137,9 @@ class HalfEdges:
     def sides(self) -> tuple[IntArray, BoolArray]:
         """The side that each face shares with its neighbours, (m,) int, and whether to flip it.
 
-        A graph has two nodes for each face, unchanged and flipped, and links between nodes of
-        neighbours across pairs that agree.  Faces of one side are connected by such links; if both
-        nodes of a face are, its surface has one side only, and no face of it is flipped.
+        Neighbours are those across pairs; see `two_sides`.
         """
-        m = len(self.faces)
-        one, other = self.pairs.T // 3
-        across = np.where(self.inconsistent, other + m, other)
-        group = connected(
-            2 * m,
-            np.concatenate([one, one + m]),
-            np.concatenate([across, (across + m) % (2 * m)]),
-        )
-        unchanged, flipped = group[:m], group[m:]
-        side = np.minimum(unchanged, flipped)
-        return side, (flipped == side) & (unchanged != flipped)
+        return two_sides(len(self.faces), *(self.pairs.T // 3), self.inconsistent)
 
     @cached_property
     def one_sided(self) -> BoolArray:
@@ -209,6 +197,26 @@ class HalfEdges:
             going = at != start
             start, at = start[going], at[going]
         return visited == len(step)
+
+
+def two_sides(
+    n: int, one: IntArray, other: IntArray, opposite: BoolArray
+) -> tuple[IntArray, BoolArray]:
+    """Return the group of each of *n* items, (n,) int, and whether to flip it for all to agree.
+
+    Items one[i] and other[i] are neighbours, of different orientation if opposite[i].  A graph has
+    two nodes for each item, unchanged and flipped, and links between nodes of neighbours that
+    agree.  If both nodes of an item are connected, its group is one-sided, and none is flipped.
+    """
+    across = np.where(opposite, other + n, other)
+    group = connected(
+        2 * n,
+        np.concatenate([one, one + n]),
+        np.concatenate([across, (across + n) % max(2 * n, 1)]),
+    )
+    unchanged, flipped = group[:n], group[n:]
+    side = np.minimum(unchanged, flipped)
+    return side, (flipped == side) & (unchanged != flipped)
 
 
 def edge_keys(one: IntArray, other: IntArray, n_vertices: int) -> IntArray:

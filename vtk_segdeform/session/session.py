@@ -35,6 +35,7 @@ from ..cages import Cage, fit_cages
 from ..checks import require, shown
 from ..deformer import checked_constraints
 from ..errors import CageError, RegionError, SessionError
+from ..geometry import Lids
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress
 from ..regions import Regions, segment
@@ -224,9 +225,26 @@ class Session(Timeline):
 
     @property
     def volume_change(self) -> float:
-        """Relative volume change (V - V0) / V0 of `vertices`, signed."""
+        """Relative volume change (V - V0) / V0 of `vertices`, signed; 0 if `has_volume` is False."""
         pose = self._state.pose
         return 0.0 if pose is None else self._pose_solver.volume_change(self._state, pose)
+
+    @property
+    def volume_summary(self) -> str:
+        """Whether the mesh has a volume that is preserved, in one line; see `volume_summary`."""
+        options = self._state.options
+        preserved = options.preserve_volume or options.preserve_region_volumes
+        return self.lids.summary(preserved=preserved)
+
+    @property
+    def has_volume(self) -> bool:
+        """Whether the mesh encloses a volume, with its lids if it is open."""
+        return self.lids.has_volume
+
+    @property
+    def lids(self) -> Lids:
+        """The lids over the borders of the mesh, with ``options.lids``."""
+        return self._pose_solver.lids(self._state)
 
     @property
     def solution(self) -> Solution | None:

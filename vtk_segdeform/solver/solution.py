@@ -86,6 +86,9 @@ class Solution:
     def volume_change(self) -> float:
         """(V - V0) / V0 of `vertices`, signed; computed on first access.
 
+        The volume of an open surface is that under lids over its borders.  If nothing is enclosed
+        the change is 0.
+
         The solver reaches about 1e-15.  Far from the origin float64 coordinates are too coarse for
         that: rounding changes V by at most eps m A, where eps = 2.2e-16, m is the largest
         coordinate and A the surface area, and typically by a hundredth of that.  At 1e4 to 1e5
@@ -95,7 +98,7 @@ class Solution:
 
     @cached_property
     def region_volume_change(self) -> FloatArray:
-        """(V - V0) / V0 of each region that has a face, closed at its border."""
+        """(V - V0) / V0 of each region that has a face around a volume, closed at its border."""
         return read_only(self.region_volumes(self.vertices))
 
 

@@ -5,6 +5,7 @@ A region is closed at its border as in `vtk_segdeform.solver.volume_constraints`
 
 from __future__ import annotations
 
+from vtk_segdeform.geometry import Lids
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
@@ -24,10 +25,10 @@ class RegionVolumes:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._volumes: tuple[Regions, list[tuple[int, VolumeConstraint]]] | None = None
+        self._volumes: tuple[Regions, Lids, list[tuple[int, VolumeConstraint]]] | None = None
 
     def changes(self) -> list[tuple[int, float]]:
-        """Return the number and the volume change of each region that owns a face.
+        """Return the number and the volume change of each region that owns a face around a volume.
 
         The list is empty if there is only one region, whose volume is that of the mesh, or if the
         mesh encloses no volume.
@@ -45,7 +46,7 @@ class RegionVolumes:
             shares = session.solution.region_volume_change.tolist()
         else:
             x = session.vertices
-            shares = [volume.violation(x) / volume.target for volume in volumes]
+            shares = [volume.relative(x) for volume in volumes]
         return list(zip(owners, shares, strict=True))
 
     def prepare(self) -> None:
@@ -56,16 +57,18 @@ class RegionVolumes:
         mesh, regions = self._session.mesh, self._session.regions
         if regions is None or regions.n_regions == 1:
             return []
-        if self._volumes is None or self._volumes[0] is not regions:
-            self._volumes = regions, _owned_volumes(mesh, regions)
-        return self._volumes[1]
+        lids = self._session.lids
+        known = self._volumes
+        if known is None or known[0] is not regions or known[1] is not lids:
+            known = self._volumes = regions, lids, _owned_volumes(mesh, regions, lids)
+        return known[2]
 
 
-def _owned_volumes(mesh: Mesh, regions: Regions) -> list[tuple[int, VolumeConstraint]]:
+def _owned_volumes(mesh: Mesh, regions: Regions, lids: Lids) -> list[tuple[int, VolumeConstraint]]:
     """Return the volume of each region that owns a face, with the region's number."""
     labels = regions.labels
     owned = []
-    for volume in region_volumes(mesh, labels):
+    for volume in region_volumes(mesh, labels, lids):
         a, b, c = labels[volume.faces[0]].tolist()  # the rule of `volume_constraints` for owners
         owned.append((b if b == c else a, volume))
     return owned

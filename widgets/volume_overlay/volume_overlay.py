@@ -11,7 +11,7 @@ surface at i touches it again:
 with a smoothing kernel k on the surface.  Under a rigid motion s is 0 and the mesh has exactly one
 colour.  `vtk_segdeform.geometry.local_volume` computes s, only while the overlay is shown.
 
-The lines of text are, from the top: (V - V0) / V0 of the whole mesh; the smallest and the largest
+The lines of text are, from the top: for an open mesh, what encloses a volume; (V - V0) / V0 of the whole mesh; the smallest and the largest
 s; (V - V0) / V0 of each region, closed at its border as in
 `vtk_segdeform.solver.volume_constraints`; the number of steps of the last solve, and the time from
 the event that changed the pose to the end of rendering.
@@ -40,7 +40,7 @@ from .legend import Legend, brief, percent, signed
 from .region_volumes import RegionVolumes
 
 _LAYER = "volume"
-_OF_REGIONS = Change.REGIONS | Change.NAMES
+_IN_LINES = Change.REGIONS | Change.NAMES | Change.OPTIONS
 _FIRST = 100.0  # priority: called before the widgets that change the pose
 _MOST_REGIONS = 8  # more lines would cover the mesh
 # Ambient, diffuse and specular light: strong shading would be confused with the colour scale.
@@ -158,7 +158,7 @@ class VolumeOverlay:
         if change & Change.POSE:
             self._clock.note()
             self._update()
-        elif change & _OF_REGIONS and self._change is not None and self._half_range is not None:
+        elif change & _IN_LINES and self._change is not None and self._half_range is not None:
             self._legend.show(self._half_range, self._lines(self._change))
             self.view.request_render()
 
@@ -181,11 +181,13 @@ class VolumeOverlay:
 
     def _lines(self, change: FloatArray) -> list[tuple[str, int | None]]:
         low, high = (signed(100.0 * float(share), 0) for share in (change.min(), change.max()))
-        has_volume = enclosure_of(self.session).has_volume
-        lines: list[tuple[str, int | None]] = [
-            (f"Volume: {percent(self.session.volume_change)}" if has_volume else NO_VOLUME, None),
-            (f"Local: {low} to {high} %", None),
-        ]
+        lines: list[tuple[str, int | None]] = []
+        if not (self.session.mesh.is_closed and self.session.has_volume):
+            lines.append((self.session.volume_summary, None))
+        if self.session.has_volume:
+            lines.append((f"Volume: {percent(self.session.volume_change)}", None))
+        if self.session.has_volume or low != high:
+            lines.append((f"Local: {low} to {high} %", None))
         regions = self._regions.changes()
         lines += [
             (f"{self._name(region)}: {signed(100.0 * share, 1)} %", region)

@@ -1,0 +1,186 @@
+"""Which faces to flip so that any triangles become consistently oriented, outward if possible.
+
+    patch    faces that are connected across pairs; they get the orientation of their majority
+    unit     patches that are connected across non-manifold edges.  Around such an edge, bodies are
+             entered and left in turn, so neighbouring faces have opposite directions.  If two or
+             more patches without border meet there, they are a body and the others its fins
+    outward  a unit that encloses a volume, by itself or under lids, gets a positive volume; within
+             another one a negative volume
+
+A lid is a cone over a part of the boundary of a unit, from the mean of its vertices.  A unit whose
+lids are as large as itself is a sheet, which has no outside.  One-sided patches are not changed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from ..arrays import BoolArray, FloatArray, IntArray
+from .grouping import connected, first_members
+from .shells import NO_VOLUME, outward_signs, shell_depths, shell_volumes
+from .topology import HalfEdges, two_sides
+
+_LARGEST = 0.6  # area of the lids of a unit that encloses a volume, relative to its own
+
+
+def faces_to_flip(points: FloatArray, half_edges: HalfEdges) -> BoolArray:
+    """Return which faces (m,) to flip; those of a second call are none.
+
+    Afterwards all pairs agree, except on one-sided patches, and no closed shell is inside-out.
+    """
+    patch, flip, two_sided = _patches(half_edges)
+    unit = patch
+    if len(patch) and (half_edges.counts > 2).any():
+        group, turned = _linked(points, half_edges, patch, flip, two_sided)
+        flip, unit = flip ^ turned[patch], group[patch]
+    n_flipped = np.bincount(unit, flip)
+    minority = n_flipped > np.bincount(unit) - n_flipped
+    flip ^= minority[unit] & two_sided[patch]
+    one_sided = np.zeros(len(minority), dtype=bool)
+    one_sided[unit[~two_sided[patch]]] = True
+    wrong = _inside_out(points, half_edges, flip, unit, one_sided)
+    return np.asarray(flip ^ wrong[unit])
+
+
+def _patches(half_edges: HalfEdges) -> tuple[IntArray, BoolArray, BoolArray]:
+    """Return the patch of each face, (m,), which faces to flip, and which patches have two sides."""
+    if not half_edges.inconsistent.any() and not (half_edges.counts > 2).any():
+        patch = half_edges.shells
+        flip = np.zeros(len(patch), dtype=bool)
+        return patch, flip, np.ones(int(patch.max(initial=-1)) + 1, dtype=bool)
+    side, flip = half_edges.sides
+    _, patch = np.unique(side, return_inverse=True)
+    one, other = half_edges.pairs.T
+    left = (flip[one // 3] ^ flip[other // 3]) != half_edges.inconsistent
+    two_sided = np.ones(int(patch.max(initial=-1)) + 1, dtype=bool)
+    two_sided[patch[one[left] // 3]] = False
+    return patch, flip, two_sided
+
+
+def _linked(
+    points: FloatArray,
+    half_edges: HalfEdges,
+    patch: IntArray,
+    flip: BoolArray,
+    two_sided: BoolArray,
+) -> tuple[IntArray, BoolArray]:
+    """Return the unit of each patch, (q,) int from 0, and which patches to flip.
+
+    Each pair of faces that are neighbours around an edge votes for the relative orientation of
+    their patches, by the angle between them; the strongest votes connect all patches of a unit.
+    """
+    q = len(two_sided)
+    bordered = np.zeros(q, dtype=bool)
+    bordered[patch[half_edges.boundary // 3]] = True
+    edge = np.repeat(np.arange(len(half_edges.counts)), half_edges.counts)
+    crowded = half_edges.counts[edge] > 2
+    edge, half = edge[crowded], half_edges.order[crowded]
+    of_body = ~bordered[patch[half // 3]]
+    n_of_bodies = np.bincount(edge, of_body, minlength=len(half_edges.counts))
+    used = of_body | (n_of_bodies[edge] < 2)
+    edge, half = edge[used], half[used]
+    angle = _angles(points, half_edges, half, edge)
+    order = np.lexsort((angle, edge))
+    begin = np.flatnonzero(np.diff(edge, prepend=-1))  # of each edge
+    following = np.arange(1, len(order) + 1)
+    following[np.append(begin[1:], len(order)) - 1] = begin
+    one, other = order, order[following]
+    wedge = (angle[other] - angle[one]) % (2.0 * np.pi)
+    forth = (half_edges.tail < half_edges.head)[half] ^ flip[half // 3]
+    vote = np.where(forth[one] != forth[other], 1.0, -1.0) * (wedge + 1e-3)
+    p, r = patch[half[one] // 3], patch[half[other] // 3]
+    counts = (p != r) & two_sided[p] & two_sided[r]
+    keys, which = np.unique(
+        np.minimum(p, r)[counts] * q + np.maximum(p, r)[counts], return_inverse=True
+    )
+    total = np.bincount(which, vote[counts], len(keys))
+    cost = 2.0 - np.abs(total) / np.abs(total).max(initial=1.0)
+    graph = sparse.coo_array((cost, np.divmod(keys, q)), (q, q)).tocsr()
+    tree = csgraph.minimum_spanning_tree(graph).tocoo()
+    agree = total[np.searchsorted(keys, tree.row.astype(np.int64) * q + tree.col)] >= 0.0
+    group, turned = two_sides(q, tree.row.astype(np.int64), tree.col.astype(np.int64), ~agree)
+    return np.unique(group, return_inverse=True)[1], turned
+
+
+def _angles(
+    points: FloatArray, half_edges: HalfEdges, half: IntArray, edge: IntArray
+) -> FloatArray:
+    """Return the angle of the faces of half-edges (h,) around their *edge*, from the first one."""
+    tail, head = half_edges.tail[half], half_edges.head[half]
+    start = points[np.minimum(tail, head)]
+    axis = points[np.maximum(tail, head)] - start
+    arm = points[half_edges.faces[half // 3].sum(axis=1) - tail - head] - start
+    axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), np.finfo(float).tiny)
+    arm -= np.einsum("hx,hx->h", arm, axis)[:, None] * axis
+    first = np.flatnonzero(np.diff(edge, prepend=-1))
+    reference = np.repeat(arm[first], np.diff(first, append=len(edge)), axis=0)
+    x = np.einsum("hx,hx->h", arm, reference)
+    y = np.einsum("hx,hx->h", arm, np.cross(axis, reference))
+    return np.asarray(np.arctan2(y, x))
+
+
+def _inside_out(
+    points: FloatArray,
+    half_edges: HalfEdges,
+    flip: BoolArray,
+    unit: IntArray,
+    one_sided: BoolArray,
+) -> BoolArray:
+    """Return which units enclose a volume of the wrong sign, (u,) bool, with faces flipped."""
+    shells = half_edges.shells
+    of_shell = unit[first_members(shells)]
+    alone = np.ones(len(of_shell), dtype=bool)  # whether the shell is a unit
+    crowded = np.repeat(half_edges.counts > 2, half_edges.counts)
+    alone[shells[half_edges.order[crowded] // 3]] = False
+    closed = alone & ~one_sided[of_shell]
+    closed[shells[half_edges.boundary // 3]] = False
+    faces = np.where(flip[:, None], half_edges.faces[:, [0, 2, 1]], half_edges.faces)
+    volume, area, size = shell_volumes(points, faces, unit)
+    under_lids, lids = _lids(points, half_edges, flip, unit)
+    volume = volume + under_lids
+    encloses = (lids <= _LARGEST * area) & ~one_sided
+    tiny = NO_VOLUME * (area * size)
+    wrong = encloses & (volume < -tiny)
+    wrong[of_shell[alone]] = False  # first those on which the winding numbers of shells depend
+    faces = np.where(wrong[unit][:, None], faces[:, [0, 2, 1]], faces)
+    depth = shell_depths(points, faces, shells, alone & encloses[of_shell])
+    outward = outward_signs(volume[of_shell], depth, closed)[alone]
+    of_shell = of_shell[alone]
+    wrong[of_shell] = encloses[of_shell] & (outward * volume[of_shell] < -tiny[of_shell])
+    return np.asarray(wrong)
+
+
+def _lids(
+    points: FloatArray, half_edges: HalfEdges, flip: BoolArray, unit: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the volume and the area of the lids of each unit, (u,) float each."""
+    n_units, n_edges = int(unit.max(initial=-1)) + 1, len(half_edges.counts)
+    edge = np.repeat(np.arange(n_edges), half_edges.counts)
+    at_border = half_edges.counts[edge] != 2
+    half, edge = half_edges.order[at_border], edge[at_border]
+    forth = (half_edges.tail < half_edges.head)[half] ^ flip[half // 3]
+    keys, first, which = np.unique(
+        unit[half // 3] * n_edges + edge, return_index=True, return_inverse=True
+    )
+    times = np.bincount(which, np.where(forth, 1.0, -1.0), len(keys))
+    keys, half, times = (each[times != 0.0] for each in (keys, half[first], times))
+    if not len(keys):
+        return np.zeros(n_units), np.zeros(n_units)
+    owner = keys // n_edges
+    ends = np.sort(np.stack([half_edges.tail[half], half_edges.head[half]]), axis=0)
+    tail, head = np.where(times > 0.0, ends, ends[::-1])
+    nodes, ends = np.unique(owner * len(points) + [tail, head], return_inverse=True)
+    ends = ends.reshape(2, -1)
+    lid = connected(len(nodes), *ends)[ends[0]]
+    weight = np.abs(times)
+    origin = points[half_edges.faces[first_members(unit), 0]][owner]
+    a, b = points[head] - origin, points[tail] - origin
+    centre = np.stack([np.bincount(lid, weight * x) for x in b.T], axis=1)
+    c = (centre / np.bincount(lid, weight)[:, None])[lid]
+    volume = np.einsum("bx,bx->b", a, np.cross(b, c)) / 6.0
+    area = np.linalg.norm(np.cross(a - c, b - c), axis=1) / 2.0
+    volumes: FloatArray = np.bincount(owner, weight * volume, n_units)
+    areas: FloatArray = np.bincount(owner, weight * area, n_units)
+    return volumes, areas
