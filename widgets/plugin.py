@@ -2,10 +2,10 @@
 
     plotter.segdeform.edit(mesh)                     the editor, in an existing plotter
     plotter.segdeform.add_volume_overlay(session)    the local volume change, in colours
-    mesh.segdeform(fixed, handle, targets)    a deformed copy with all arrays
+    mesh.segdeform.deform(fixed, handle, targets)    a deformed copy with all arrays
     mesh.segdeform.regions(3)                        a copy with arrays of its regions
-    mesh.segdeform.check()                           the faults that prevent deforming it
-    mesh.segdeform.repair()                          a repaired copy, with its arrays
+    mesh.segdeform.check()                           its faults and borders
+    mesh.segdeform.repair()                          a closed copy, with its arrays
 
 pyvista finds this module by its entry points when ``segdeform`` is first used.  pyvistaqt hides
 those of plotters: there, and if the package is not installed, ``import vtk_segdeform`` after
@@ -22,11 +22,10 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike
 
-from vtk_segdeform import io
-from vtk_segdeform.checks import as_path, as_text, require, shown
+from vtk_segdeform.checks import as_path, as_text, shown
 from vtk_segdeform.deformer import deform
 from vtk_segdeform.errors import ArgumentError
-from vtk_segdeform.io import repair_surface, triangles_of
+from vtk_segdeform.io import Surface, repair_surface, triangles_of
 from vtk_segdeform.mesh import Mesh, MeshReport, find_faults
 from vtk_segdeform.pictures import require_screen
 from vtk_segdeform.progress import Progress
@@ -48,14 +47,14 @@ def edit(mesh: Mesh, *, path: _Path = None, title: str = ...) -> Mesh: ...
 @overload
 def edit(mesh: Session, *, path: _Path = None, title: str = ...) -> Session: ...
 @overload
-def edit(mesh: pv.PolyData, *, path: _Path = None, title: str = ...) -> pv.PolyData: ...
+def edit(mesh: pv.PolyData | Surface, *, path: _Path = None, title: str = ...) -> pv.PolyData: ...
 def edit(mesh: Any, *, path: _Path = None, title: str = "segdeform") -> Any:
     """Open a window to deform *mesh*; return the deformed mesh when the window closes.
 
     Parameters
     ----------
-    mesh : Mesh, pyvista.PolyData or Session
-        A closed surface, or a session to continue.
+    mesh : pyvista.PolyData, Surface, Mesh or Session
+        Any surface, or a session to continue.
     path : path, optional
         The file that the editor's keys save and open.
     title : str
@@ -64,14 +63,14 @@ def edit(mesh: Any, *, path: _Path = None, title: str = "segdeform") -> Any:
     Returns
     -------
     deformed : of the type of *mesh*
-        A deformed copy; a PolyData with all its arrays.  A session is returned itself, unless
-        another one was opened in the editor.  With pyvista's OFF_SCREEN the window closes at
-        once.
+        A deformed copy.  Of a PolyData or a Surface it is what was given, apart from coordinates
+        and normals.  A session is returned itself, unless another one was opened in the editor.
+        With pyvista's OFF_SCREEN the window closes at once.
 
     Raises
     ------
     MeshError
-        If *mesh* is a PolyData but not a closed, outward oriented two-manifold.
+        If no mesh can be made of a PolyData: it has no faces, flat ones only, or NaN.
     MissingDependencyError
         If there is no screen.
     """
@@ -90,16 +89,7 @@ def edit(mesh: Any, *, path: _Path = None, title: str = "segdeform") -> Any:
         return editor.session
     if isinstance(mesh, Mesh):
         return editor.session.mesh.with_vertices(editor.session.vertices)
-    return deformed(mesh, editor.session)
-
-
-def deformed(surface: pv.PolyData, session: Session) -> pv.PolyData:
-    """Return a deformed copy of *surface*, or the session's mesh if that is another one."""
-    require(surface, pv.PolyData, "surface")
-    require(session, Session, "session")
-    if surface.n_points == session.mesh.n_vertices:
-        return io.with_vertices(surface, session.vertices)
-    return io.to_polydata(session.mesh.with_vertices(session.vertices))
+    return editor.session.deformed
 
 
 @pv.register_plotter_component("segdeform")
@@ -118,16 +108,17 @@ class PlotterTools:
         self._plotter = plotter
         self.added: list[DeformEditor | VolumeOverlay] = []
 
-    def edit(self, mesh: Mesh | pv.PolyData | Session, *, path: _Path = None) -> DeformEditor:
+    def edit(
+        self, mesh: pv.PolyData | Surface | Mesh | Session, *, path: _Path = None
+    ) -> DeformEditor:
         """Add the editor to the current subplot of the plotter, and switch it on.
 
         Actors of *mesh* in the plotter are hidden, because the editor draws the mesh itself.
 
         Parameters
         ----------
-        mesh : Mesh, pyvista.PolyData or Session
-            What to edit.  A mesh is not changed; the editor's session has the deformed vertices,
-            in the same order.
+        mesh : pyvista.PolyData, Surface, Mesh or Session
+            What to edit; not changed.  ``editor.session.deformed`` is the deformed surface.
         path : path, optional
             The file that the editor's keys save and open.
         """
@@ -140,7 +131,6 @@ class PlotterTools:
                 if getattr(getattr(actor, "mapper", None), "dataset", None) is mesh:
                     actor.visibility = False
         editor = DeformEditor(self._plotter, session)
-        editor.controller.file.surface = surface_of(mesh)
         self.added.append(editor)
         if path is not None:
             editor.path = path
@@ -167,7 +157,9 @@ class PlotterTools:
 
 @pv.register_dataset_accessor("segdeform", pv.PolyData)
 class PolyDataTools:
-    """Deformation of a surface; ``mesh.segdeform``.  The surface itself is not changed.
+    """Deformation of any surface; ``mesh.segdeform``.  The surface itself is not changed.
+
+    Points are numbered as in the surface.  Points at a seam follow one vertex of its mesh.
 
     Parameters
     ----------
@@ -176,7 +168,7 @@ class PolyDataTools:
     """
 
     def __init__(self, surface: pv.PolyData) -> None:
-        self._surface = surface
+        self._given = surface
 
     def deform(
         self,
@@ -187,28 +179,45 @@ class PolyDataTools:
         n_regions: int | None = 3,
         n_cage_vertices: int = 155,
         preserve_volume: bool = True,
+        lids: bool | None = None,
         progress: Progress | None = None,
     ) -> pv.PolyData:
-        """Return a deformed copy with the handle points at *targets* and all arrays.
+        """Return a copy with the handle points at *targets*: coordinates and normals differ.
 
-        Normals are recomputed.  Parameters and exceptions are those of `vtk_segdeform.deform`,
-        which also returns the solver's status; here a missed target is only logged.
+        Parameters
+        ----------
+        fixed : (f,) int or (p,) bool
+            Points that do not move.
+        handle : (h,) int or (p,) bool
+            Points of the handle.
+        targets : (h, 3) float
+            Where they go.  If several of them follow one vertex, at a seam, it goes to the mean.
+        n_regions, n_cage_vertices, preserve_volume, lids, progress
+            As in `vtk_segdeform.deform`, which also returns the solver's status; here a missed
+            target is only logged.
+
+        Raises
+        ------
+        MeshError, ConstraintError
+            As in `vtk_segdeform.deform`; MeshError if no mesh can be made of the surface.
         """
+        surface = Surface(self._given)
+        vertices, ends = surface.targets_at(handle, targets)
         solution = deform(
-            io.from_polydata(self._surface), fixed, handle, targets,
+            surface.mesh, surface.vertices_at(fixed), vertices, ends,
             n_regions=n_regions, n_cage_vertices=n_cage_vertices,
-            preserve_volume=preserve_volume, progress=progress,
+            preserve_volume=preserve_volume, lids=lids, progress=progress,
         )  # fmt: skip
         if solution.handle_error > _HANDLE_MET:
             error = 100.0 * solution.handle_error
             _log.warning("handle error %.2g %% of model size: %s", error, solution.status)
-        return io.with_vertices(self._surface, solution.vertices)
+        return surface.moved(solution.vertices)
 
     def regions(self, n_regions: int | None = 3, progress: Progress | None = None) -> pv.PolyData:
         """Return a copy with the regions used by a deformation, as point arrays.
 
-        ``region`` (n,) int is the region with the largest weight, ``regions_here`` (n,) int the
-        number of regions at a point, ``region_weights`` (n, r) float their weights, which sum to 1.
+        ``region`` (p,) int is the region with the largest weight, ``regions_here`` (p,) int the
+        number of regions at a point, ``region_weights`` (p, r) float their weights, which sum to 1.
 
         Parameters
         ----------
@@ -217,17 +226,24 @@ class PolyDataTools:
         progress : Progress, optional
             Progress callback; may cancel.
         """
-        found = segment(io.from_polydata(self._surface), n_regions, progress=progress)
-        copy = self._surface.copy()
-        copy.point_data["regions_here"] = found.membership.sum(axis=0)
-        copy.point_data["region_weights"] = np.ascontiguousarray(found.weights.T)
-        copy.point_data["region"] = found.labels
+        surface, copy = Surface(self._given), self._given.copy()
+        found = segment(surface.mesh, n_regions, progress=progress)
+        for name, values in (
+            ("regions_here", found.membership.sum(axis=0)),
+            ("region_weights", found.weights.T),
+            ("region", found.labels),
+        ):
+            copy.point_data[name] = surface.at_points(values)
         return copy
 
     def check(self) -> MeshReport:
-        """Return the faults that prevent deforming the surface: ``.ok``, ``.faults``."""
-        points = np.asarray(self._surface.points, dtype=np.float64)
-        return find_faults(points, triangles_of(self._surface))
+        """Return what prevents the surface from being a `Mesh` as it is: ``.ok``, ``.faults``.
+
+        A surface with faults can be deformed as well, see ``Surface(polydata).workarounds``; a
+        closed one, ``.is_closed``, preserves its volume without lids.
+        """
+        points = np.asarray(self._given.points, dtype=np.float64)
+        return find_faults(points, triangles_of(self._given))
 
     def repair(self, *, weld_distance: float = 0.0, largest_hole: int = 100) -> pv.PolyData:
         """Return a repaired copy with the polygons and arrays of all remaining faces.
@@ -236,7 +252,7 @@ class PolyDataTools:
         those of `vtk_segdeform.repair`.
         """
         closed, done = repair_surface(
-            self._surface, weld_distance=weld_distance, largest_hole=largest_hole
+            self._given, weld_distance=weld_distance, largest_hole=largest_hole
         )
         for step in done.steps:
             _log.info("repair: %s", step)
@@ -245,15 +261,14 @@ class PolyDataTools:
         return closed
 
 
-def surface_of(mesh: object) -> pv.PolyData | None:
-    """Return a shallow copy of *mesh* if it is a PolyData, to save its arrays with the pose."""
-    return mesh.copy(deep=False) if isinstance(mesh, pv.PolyData) else None
-
-
-def session_of(mesh: Mesh | pv.PolyData | Session) -> Session:
+def session_of(mesh: pv.PolyData | Surface | Mesh | Session) -> Session:
     """Return a session over *mesh*; a session is returned itself."""
-    if isinstance(mesh, Session | Mesh):
-        return mesh if isinstance(mesh, Session) else Session(mesh)
+    if isinstance(mesh, Session):
+        return mesh
+    if isinstance(mesh, Mesh | Surface):
+        return Session(mesh)
     if isinstance(mesh, pv.PolyData):
-        return Session(io.from_polydata(mesh))
-    raise ArgumentError(f"mesh must be a Mesh, a PolyData or a Session; got {shown(mesh)}")
+        return Session(Surface(mesh))
+    raise ArgumentError(
+        f"mesh must be a PolyData, a Surface, a Mesh or a Session; got {shown(mesh)}"
+    )

@@ -18,8 +18,7 @@ from vtk_segdeform.benchmarks import report
 from vtk_segdeform.benchmarks.sections import Ratio, Section
 from vtk_segdeform.cli.main import ProgressBar, main
 from vtk_segdeform.geometry.volume import signed_volume
-from vtk_segdeform import io
-from vtk_segdeform.io import convert
+from vtk_segdeform.io import convert, read_mesh
 from vtk_segdeform.mesh.mesh import Mesh
 
 QUICK = ["--regions", "2", "--cage-vertices", "60"]
@@ -83,7 +82,7 @@ def test_each_handle_has_its_own_motion_and_a_shift_may_begin_with_a_minus(bar, 
          "--handle", "z>95%", "--rotate", "-1,0,0,10", "--translate", "0.05,0,0"]
     )  # fmt: skip
     assert code == 0
-    moved = io.read_mesh(out).vertices - bar.vertices
+    moved = read_mesh(out).vertices - bar.vertices
     close = 1e-3 * bar.diagonal
     assert_allclose(moved[bar.vertices[:, 2] < 0.05], [[-0.05, 0, 0]] * 25, atol=close)
     top = bar.vertices[:, 2] > 0.95
@@ -101,7 +100,7 @@ def test_a_matrix_file_says_how_the_handle_moves(bar, bar_file, tmp_path):
          "--matrix", str(tmp_path / "pose.def"), "--regions", "half", "--cage-vertices", "60"]
     )  # fmt: skip
     assert code == 0
-    moved = io.read_mesh(out).vertices - bar.vertices
+    moved = read_mesh(out).vertices - bar.vertices
     top = moved[bar.vertices[:, 2] > 0.9]
     assert_allclose(top, np.broadcast_to(matrix[:3, 3], top.shape), atol=1e-3 * bar.diagonal)
 
@@ -114,7 +113,7 @@ def test_a_turn_about_the_fixed_centre_is_asked_for_by_name(bar, bar_file, tmp_p
     )  # fmt: skip
     bottom, top = bar.vertices[:, 2] < 0.1, bar.vertices[:, 2] >= 1.0
     arm = bar.vertices[top].mean(axis=0) - bar.vertices[bottom].mean(axis=0)
-    found = io.read_mesh(out).vertices[top].mean(axis=0)
+    found = read_mesh(out).vertices[top].mean(axis=0)
     angle = np.radians(20)
     expected = [
         0,
@@ -190,7 +189,7 @@ def test_the_demo_leaves_meshes_whose_volume_is_the_same(tmp_path, capsys):
     assert {"cactus", "regions", "cages", "volume", "solve"} <= set(report)
     assert "= 155 vertices" in report["cages"]
     rest = models.cactus(1500)
-    bent = io.read_mesh(folder / "cactus-bent.vtp")
+    bent = read_mesh(folder / "cactus-bent.vtp")
     before, after = (signed_volume(m.vertices, m.faces) for m in (rest, bent))
     assert after == pytest.approx(before, rel=1e-12)
     tip = rest.vertices[:, 2] > 0.92

@@ -74,10 +74,10 @@ def test_a_picture_that_fails_after_the_solve_is_an_error_too(folder, monkeypatc
 def test_a_selection_may_be_longer_than_a_name_of_a_file(folder):
     long = "&".join([f"z>{k}%" for k in range(90)])
     assert len(long) > 255
-    assert_array_equal(parse_selection(long, BAR), parse_selection("z>89%", BAR))
+    assert_array_equal(parse_selection(long, BAR.vertices), parse_selection("z>89%", BAR.vertices))
     many = {LONG: np.arange(BAR.n_vertices) == 5}
-    assert_array_equal(parse_selection(LONG, BAR, point_arrays=many), [5])
-    assert_array_equal(parse_selection(f"{LONG} = 1", BAR, point_arrays=many), [5])
+    assert_array_equal(parse_selection(LONG, BAR.vertices, point_arrays=many), [5])
+    assert_array_equal(parse_selection(f"{LONG} = 1", BAR.vertices, point_arrays=many), [5])
     handles = [word if word != "z>90%" else long for word in POSE]
     assert main(["deform", "bar.ply", "-o", "out.ply", *handles]) == 0
 
@@ -85,7 +85,7 @@ def test_a_selection_may_be_longer_than_a_name_of_a_file(folder):
 @pytest.mark.parametrize("text", [LONG, f"{LONG}=2", "z<0%&" * 200 + "x<0%", "a\0b", "/" * 5000])
 def test_a_long_invalid_selection_is_named_and_truncated(text):
     with pytest.raises(ConstraintError, match=r"cannot read the selection|selects none") as error:
-        parse_selection(text, BAR)
+        parse_selection(text, BAR.vertices)
     assert len(str(error.value)) < 700
 
 
@@ -93,7 +93,7 @@ def test_a_file_of_the_selection_of_many_gigabytes_is_refused(folder):
     with open("ids.txt", "wb") as file:
         file.truncate(45_000_000_000)
     with pytest.raises(ConstraintError, match=r"ids\.txt .*more than 268,435,456 bytes"):
-        parse_selection("ids.txt", BAR)
+        parse_selection("ids.txt", BAR.vertices)
 
 
 def test_a_mesh_that_exceeds_memory_is_an_error_that_names_it(folder, monkeypatch, capsys):

@@ -15,7 +15,7 @@ from solids import CUBE, OCTAHEDRON, icosphere
 
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.io.convert import read_polydata
-from vtk_segdeform.io.gltf_buffers import Document
+from vtk_segdeform.io.gltf.buffers import Document
 from vtk_segdeform.io.polygons import triangles_of
 from vtk_segdeform.io.surface import read_mesh
 

@@ -12,8 +12,9 @@ from scenes import sausage
 from solids import icosphere, torus
 
 from vtk_segdeform.errors import MeshError, MissingDependencyError
+from vtk_segdeform.geometry import local_volume_change
 from vtk_segdeform.geometry.volume import signed_volume
-from vtk_segdeform.io import meshlab
+from vtk_segdeform.io import Surface, meshlab
 from vtk_segdeform.io.convert import from_polydata, to_polydata, write_mesh
 from vtk_segdeform.io.surface import read_mesh
 from vtk_segdeform.mesh.mesh import Mesh
@@ -163,11 +164,29 @@ def test_a_session_becomes_layers_of_its_mesh_and_cages_in_their_pose():
     meshset = meshlab.to_meshset(session)
     assert_array_equal(meshlab.selected_vertices(meshset), scene.handle)
     layers = meshlab.layers_from_meshset(meshset)
-    assert list(layers) == ["mesh", "cage 1", "cage 2"]
+    assert list(layers) == ["mesh", "local volume change", "cage 1", "cage 2"]
     assert_array_equal(layers["mesh"].points, session.vertices)
+    change = local_volume_change(scene.mesh, session.vertices)
+    assert_array_equal(layers["local volume change"]["quality"], change)
     assert_array_equal(layers["mesh"]["quality"], scene.regions.labels)
     for name, vertices in zip(("cage 1", "cage 2"), session.cage_vertices, strict=True):
         assert_array_equal(layers[name].points, vertices)
+
+
+@pytest.mark.usefixtures("with_pymeshlab")
+def test_a_surface_and_its_session_are_converted_as_given_but_for_the_pose():
+    surface = Surface(pv.Cube(x_length=4.0).triangulate().subdivide(3))
+    surface.given.point_data["heat"] = np.arange(float(surface.given.n_points))
+    again = meshlab.from_meshset(meshlab.to_meshset(surface), ["heat"])
+    assert_array_equal(again.points, surface.given.points)
+    assert_array_equal(again.regular_faces, surface.given.regular_faces)
+    assert_array_equal(again["heat"], surface.given["heat"])
+    assert Surface(again).mesh.is_closed
+    session = Session(surface)
+    session.add_handle(session.mesh.vertices[:, 0] > 1.9)
+    layer = meshlab.from_meshset(meshlab.to_meshset(session))
+    assert_array_equal(layer.points, surface.given.points)
+    assert_array_equal(layer["selection"] > 0, surface.given.points[:, 0] > 1.9)
 
 
 @pytest.mark.usefixtures("with_pymeshlab")
@@ -190,7 +209,9 @@ def test_quadrangles_are_cut_and_other_types_are_errors():
     assert again.n_cells == 12
     assert_array_equal(np.sort(again.cell_data["quality"]), np.repeat(np.arange(6.0), 2))
     for wrong in (3, {"a": "b"}, pv.ImageData()):
-        with pytest.raises(MeshError, match="expected a Mesh, a PolyData, a Session or a dict"):
+        with pytest.raises(
+            MeshError, match="expected a Mesh, a Surface, a PolyData, a Session"
+        ):
             meshlab.to_meshset(wrong)
     for ask in (meshlab.from_meshset, meshlab.selected_vertices):
         with pytest.raises(MeshError, match="has no layer"):

@@ -6,16 +6,19 @@ import os
 
 import numpy as np
 import pytest
+from any_surface import capsule, polygons, split
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from solids import icosphere, rotation
 from test_meshlab import painted, same, with_pymeshlab, without_pymeshlab  # noqa: F401
+from zoo_operations import bent, ends
 
 from vtk_segdeform.errors import MeshError
-from vtk_segdeform.io import meshlab, meshlab_project
+from vtk_segdeform.io import Surface, meshlab, meshlab_project
 from vtk_segdeform.io.convert import to_polydata, write_mesh
 from vtk_segdeform.io.meshlab_project import read_project, write_project
 from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.pictures import palette
 from vtk_segdeform.session.session import Session
 
 BALL = Mesh(*icosphere(1))
@@ -64,6 +67,80 @@ def test_meshlab_opens_the_mesh_and_its_cages_unchanged(tmp_path):
     assert_array_equal(layers["mesh"].points, scene.mesh.vertices)
     assert_array_equal(np.flatnonzero(layers["mesh"]["selection"]), scene.handle)
     assert_array_equal(layers["cage 2"].points, scene.cages[1].vertices)
+
+
+def posed_session():
+    """Return a session of a surface of quadrilaterals with a seam, bent, with two cages."""
+    points, quads = capsule()
+    group = (points[quads].mean(axis=1)[:, 1] > 0).astype(int)
+    (points, faces), _ = split((points, quads), group)
+    session = Session(Surface(polygons(points, faces)))
+    session.segment(2)
+    session.change_options(n_cage_vertices=60)
+    session.fit_cages()
+    fixed, handle = ends(session.mesh)
+    session.set_fixed(fixed)
+    session.add_handle(handle, "end")
+    session.drag({"end": bent(session.mesh, handle)}, max_steps=2)
+    return session
+
+
+def test_the_layer_of_the_mesh_is_what_was_given_in_the_pose(tmp_path):
+    session = posed_session()
+    write_project(tmp_path / "work.mlp", session)
+    layers = read_project(tmp_path / "work.mlp")
+    assert list(layers) == ["mesh", "local volume change", "cage 1", "cage 2"]
+    mesh, given = layers["mesh"], session.surface.given
+    assert mesh.n_points > session.mesh.n_vertices  # the seam is still there
+    assert_array_equal(mesh.faces, given.faces)
+    assert_array_equal(mesh.points, session.deformed.points)
+    assert_array_equal(mesh["selection"] > 0, given.points[:, 0] > 2.2)
+    assert_array_equal(mesh["quality"], session.surface.at_points(session.regions.labels))
+    for k, vertices in enumerate(session.cage_vertices):
+        cage = layers[f"cage {k + 1}"]
+        assert_array_equal(cage.points, vertices)
+        assert_array_equal(cage.regular_faces, session.cages[k].faces)
+        assert cage.n_open_edges == 0
+
+
+def test_colours_show_regions_and_local_volume_change_and_none_are_replaced(tmp_path):
+    session = posed_session()
+    write_project(tmp_path / "work.mlp", session)
+    layers = read_project(tmp_path / "work.mlp")
+    labels = session.surface.at_points(session.regions.labels)
+    expected = [[*palette.of_region(k), 255] for k in labels]
+    assert_array_equal(layers["mesh"]["RGBA"], expected)
+    change = layers["local volume change"]["quality"]
+    colour = layers["local volume change"]["RGBA"].astype(int)
+    swollen = change > 0.2 * np.abs(change).max()
+    shrunken = change < -0.2 * np.abs(change).max()
+    assert swollen.any()
+    assert (colour[swollen, 0] > colour[swollen, 2]).all()  # red
+    assert (colour[shrunken, 0] < colour[shrunken, 2]).all()  # blue
+    own = painted()
+    own.point_data["quality"] = np.arange(float(own.n_points))
+    write_project(tmp_path / "own.mlp", own)
+    assert_array_equal(read_project(tmp_path / "own.mlp")["mesh"]["RGBA"], own["RGBA"])
+
+
+@pytest.mark.usefixtures("with_pymeshlab")
+def test_meshlab_shows_cages_as_wires_that_hide_nothing(tmp_path):
+    import pymeshlab
+
+    session = posed_session()
+    write_project(tmp_path / "work.mlp", session)
+    meshset = pymeshlab.MeshSet(verbose=False)
+    meshset.load_project(str(tmp_path / "work.mlp"))
+    shown = {layer.label(): layer for layer in meshset if layer.is_visible()}
+    hidden = {layer.label() for layer in meshset if not layer.is_visible()}
+    assert set(shown) == {"mesh", "cage 1, wires", "cage 2, wires"}
+    assert hidden == {"local volume change", "cage 1", "cage 2"}
+    assert shown["mesh"].has_vertex_color()
+    for k, cage in enumerate(session.cages, 1):
+        wires = shown[f"cage {k}, wires"]
+        assert wires.face_number() == 0
+        assert wires.edge_number() == 3 * cage.n_faces // 2
+        assert_array_equal(wires.vertex_matrix(), session.cage_vertices[k - 1])
 
 
 @pytest.mark.usefixtures("with_pymeshlab")

@@ -38,7 +38,7 @@ READERS = {
     "project": read_project,
     "recording": read_recording,
     "matrix": read_matrix,
-    "selection": lambda path: parse_selection(path, MESH, role="handle"),
+    "selection": lambda path: parse_selection(path, MESH.vertices, role="handle"),
 }
 CODES = {0: "read", 3: "refused", 4: "other", 5: "memory", 6: "refused without a name"}
 

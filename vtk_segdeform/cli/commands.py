@@ -1,4 +1,4 @@
-"""The commands ``deform``, ``edit``, ``check``, ``regions`` and ``cages``.
+"""The commands ``deform``, ``edit``, ``regions`` and ``cages``.
 
 A command takes its parsed options, a function `say` that prints one line of its report, and a
 progress callback.  It returns True, or False if it found faults; errors are raised.  `main` sets
@@ -19,8 +19,7 @@ from ..arrays import FloatArray, IntArray
 from ..cages import Cage, fit_cages
 from ..deformer import Deformer
 from ..errors import ConstraintError, MeshError
-from ..io import repair_surface, triangles_of
-from ..mesh import Mesh, find_faults
+from ..io import Surface
 from ..pictures import picture_before_after, require_picture, require_screen
 from ..progress import Progress, part
 from ..regions import Regions, segment
@@ -35,22 +34,25 @@ from .outputs import (
     report_cages,
     report_regions,
     report_solution,
+    report_surface,
     report_volume,
 )
-from .selection import parse_selection
+from .selection import Role, parse_selection
 
 SESSION = ".segdeform"  # suffix of session files
 
 
 def deform(options: Namespace, say: Say, progress: Progress) -> bool:
-    """Move the handles of a mesh and write it with all its arrays and texture coordinates."""
+    """Move the handles of a surface and write it as it was given, apart from coordinates."""
     io.require_writable(options.output)
     if options.picture is not None:
         require_picture(options.picture)
-    surface, mesh = _read(options.input)
-    fixed = parse_selection(options.fixed, mesh, point_arrays=surface.point_data, role="fixed")
-    handle, targets = _handles(options.handles, surface, mesh, fixed)
-    regions, cages = _subspace(options, surface, mesh, part(progress, 0.0, 0.6))
+    surface = Surface.read(options.input)
+    mesh = surface.mesh
+    report_surface(surface, say)
+    fixed = _selected(options.fixed, surface, "fixed")
+    handle, targets = _handles(options.handles, surface, fixed)
+    regions, cages = _subspace(options, surface, part(progress, 0.0, 0.6))
     report_regions(regions, say)
     report_cages(cages, say)
     deformer = Deformer(
@@ -61,8 +63,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     start = time.perf_counter()
     solution = deformer.solve(targets, progress=part(progress, 0.9, 1.0))
     report_solution(solution, time.perf_counter() - start, say)
-    deformed = io.with_vertices(surface, solution.vertices)
-    io.write_mesh(options.output, deformed)
+    surface.write(options.output, solution.vertices)
     say(f"written         {options.output}")
     if options.picture is not None:
         picture_before_after(options.picture, mesh, solution.vertices, fixed=fixed, handle=handle)
@@ -80,53 +81,25 @@ def edit(options: Namespace, say: Say, progress: Progress) -> bool:
     del progress  # the window shows progress itself
     if options.output is not None:
         io.require_writable(options.output)
-    surface, session = opened(options.input)
+    session = opened(options.input)
     require_screen()
     session = plugin.edit(
         session, path=options.input.with_suffix(SESSION), title=f"segdeform {options.input.name}"
     )
     report_volume(session.volume_change, say)
     if options.output is not None:
-        io.write_mesh(options.output, plugin.deformed(surface, session))
+        session.write_deformed(options.output)
         say(f"written         {options.output}")
     return True
-
-
-def check(options: Namespace, say: Say, progress: Progress) -> bool:
-    """Report the faults of a mesh and the steps of a repair; with --repair, write the result."""
-    if options.repair != (options.output is not None):
-        raise ConstraintError("--repair and -o OUT require each other: -o is the repaired mesh")
-    surface = io.read_polydata(options.input)
-    vertices, faces = np.asarray(surface.points, dtype=float), triangles_of(surface)
-    progress(0.1, "checking mesh")
-    report = find_faults(vertices, faces)
-    say(f"{options.input}: {report}")
-    if report.ok and not options.repair:
-        return True
-    progress(0.4, "repairing mesh")
-    closed, repair = repair_surface(surface, largest_hole=options.largest_hole)
-    progress(1.0, "done")
-    did, then = ("repaired", "result") if options.repair else ("--repair would", "result")
-    for step in repair.steps:
-        say(f"{did}: {step}")
-    if not repair.steps:
-        say("nothing to repair")
-    say(f"{then}: {repair.report}")
-    if repair.advice:
-        say(repair.advice)
-    if not options.repair:
-        return False
-    io.write_mesh(options.output, closed)
-    say(f"written: {options.output}")
-    return repair.report.is_closed
 
 
 def regions(options: Namespace, say: Say, progress: Progress) -> bool:
     """Divide a mesh into regions; print their sizes and write them as a point array "region"."""
     if options.output is not None:
         io.require_writable(options.output, arrays=True)
-    surface, mesh = _read(options.input)
-    found = _regions(options, surface, mesh, progress)
+    surface = Surface.read(options.input)
+    report_surface(surface, say)
+    found = _regions(options, surface, progress)
     report_regions(found, say)
     if options.output is not None:
         io.write_mesh(options.output, coloured_regions(surface, found))
@@ -138,8 +111,9 @@ def cages(options: Namespace, say: Say, progress: Progress) -> bool:
     """Fit cages to a mesh; print their sizes and write them as one coloured surface."""
     if options.output is not None:
         io.require_writable(options.output, arrays=True)
-    surface, mesh = _read(options.input)
-    found, made = _subspace(options, surface, mesh, progress)
+    surface = Surface.read(options.input)
+    report_surface(surface, say)
+    found, made = _subspace(options, surface, progress)
     report_regions(found, say)
     report_cages(made, say)
     if options.output is not None:
@@ -148,45 +122,40 @@ def cages(options: Namespace, say: Say, progress: Progress) -> bool:
     return True
 
 
-def opened(path: Path) -> tuple[Any, Session]:
-    """Return the surface in a file, with all its arrays, and its session, new or saved."""
-    if path.suffix == SESSION:
-        session = load_session(path)
-        return io.to_polydata(session.mesh), session
-    surface, mesh = _read(path)
-    return surface, Session(mesh)
+def opened(path: Path) -> Session:
+    """Return the session in a file, or a new one of the surface in it."""
+    return load_session(path) if path.suffix == SESSION else Session(Surface.read(path))
 
 
-def _read(path: Path) -> tuple[Any, Mesh]:
-    """Return a surface with all its arrays, and the same surface as a closed mesh."""
-    surface = io.read_polydata(path)
-    try:
-        return surface, io.from_polydata(surface)
-    except MeshError as fault:
-        raise MeshError(f"{path}: {fault}; see 'segdeform check {path}'") from None
-
-
-def _regions(options: Namespace, surface: Any, mesh: Mesh, progress: Progress | None) -> Regions:
-    wanted = options.regions
-    if wanted in surface.point_data:
-        return Regions.from_labels(mesh, surface.point_data[wanted], overlap=options.overlap)
+def _regions(options: Namespace, surface: Surface, progress: Progress | None) -> Regions:
+    wanted, arrays = options.regions, surface.given.point_data
+    if wanted in arrays:
+        labels = surface.at_vertices(np.asarray(arrays[wanted]))
+        return Regions.from_labels(surface.mesh, labels, overlap=options.overlap)
     if wanted == "1":
-        return Regions.single(mesh)
+        return Regions.single(surface.mesh)
     if wanted != "auto" and not (wanted.isdecimal() and int(wanted) > 0):
         raise ConstraintError(
             f"--regions must be a number from 1, 'auto' or a point array of the mesh "
-            f"({', '.join(surface.point_data.keys()) or 'it has none'}); got {wanted!r}"
+            f"({', '.join(arrays.keys()) or 'it has none'}); got {wanted!r}"
         )
     number = None if wanted == "auto" else int(wanted)
-    return segment(mesh, n_regions=number, progress=progress)
+    return segment(surface.mesh, n_regions=number, progress=progress)
 
 
 def _subspace(
-    options: Namespace, surface: Any, mesh: Mesh, progress: Progress | None
+    options: Namespace, surface: Surface, progress: Progress | None
 ) -> tuple[Regions, tuple[Cage, ...]]:
-    found = _regions(options, surface, mesh, part(progress, 0.0, 0.3))
-    number = options.cage_vertices
-    return found, fit_cages(mesh, found, n_vertices=number, progress=part(progress, 0.3, 1.0))
+    found, number = _regions(options, surface, part(progress, 0.0, 0.3)), options.cage_vertices
+    fitting = part(progress, 0.3, 1.0)
+    return found, fit_cages(surface.mesh, found, n_vertices=number, progress=fitting)
+
+
+def _selected(text: str, surface: Surface, role: Role) -> IntArray:
+    """Return the vertices (k,) of the mesh that the selected points follow."""
+    points = np.asarray(surface.given.points, dtype=np.float64)
+    ids = parse_selection(text, points, point_arrays=surface.given.point_data, role=role)
+    return surface.vertices_at(ids)
 
 
 def _settings(options: Namespace) -> dict[str, Any]:
@@ -200,10 +169,10 @@ def _settings(options: Namespace) -> dict[str, Any]:
 
 
 def _handles(
-    handles: list[dict[str, str]], surface: Any, mesh: Mesh, fixed: IntArray
+    handles: list[dict[str, str]], surface: Surface, fixed: IntArray
 ) -> tuple[IntArray, FloatArray]:
     """Return the vertices (k,) of all handles and their targets (k, 3)."""
-    ids, targets = [], []
+    ids, targets, mesh = [], [], surface.mesh
     fixed_centre = mesh.vertices[fixed].mean(axis=0)
     for handle in handles:
         if len(handle) == 1:
@@ -211,8 +180,7 @@ def _handles(
                 f"handle {handle['select']!r} does not move; add --translate, --rotate or --matrix "
                 "after it"
             )
-        arrays = surface.point_data
-        ids.append(parse_selection(handle["select"], mesh, point_arrays=arrays, role="handle"))
+        ids.append(_selected(handle["select"], surface, "handle"))
         targets.append(_moved(mesh.vertices[ids[-1]], handle, fixed_centre))
     together = np.concatenate(ids)
     if len(np.unique(together)) < len(together):

@@ -74,9 +74,9 @@ def bent_top(mesh: Mesh, angle: float, *, pivot_height: float = _PIVOT_HEIGHT) -
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     pivot = 0.5 * (low + high)
     pivot[2] = low[2] + pivot_height * (high[2] - low[2])
-    handle = parse_selection(HANDLE, mesh)
+    handle = parse_selection(HANDLE, mesh.vertices)
     turned = motion.transform(mesh.vertices[handle], motion.rotation([0, 1, 0], angle, pivot))
-    return Pose(parse_selection(FIXED, mesh), handle, turned)
+    return Pose(parse_selection(FIXED, mesh.vertices), handle, turned)
 
 
 def demo(options: Namespace, say: Say, progress: Progress) -> bool:
@@ -102,7 +102,7 @@ def demo(options: Namespace, say: Say, progress: Progress) -> bool:
 
     folder.mkdir(parents=True, exist_ok=True)
     after = mesh.with_vertices(solution.vertices)
-    bent = coloured_regions(io.to_polydata(after), regions)
+    bent = coloured_regions(io.Surface(io.to_polydata(after)), regions)
     bent.point_data["local_volume_change"] = change
     io.write_mesh(folder / "cactus-bent.vtp", bent)
     io.write_mesh(folder / "cages-bent.vtp", coloured_cages(cages, solution.cage_vertices))

@@ -1,7 +1,7 @@
 """The ``segdeform`` command: options, help and exit codes.
 
-    0   success
-    1   the mesh has faults, or the command failed; stderr gives the reason
+    0   success; of check: the surface can be deformed, or is repaired to a closed mesh
+    1   it cannot, or the command failed; stderr gives the reason
     2   usage error: unknown option, invalid selection or motion
     130 interrupted by Ctrl+C
 
@@ -36,7 +36,7 @@ COMMANDS = {
     "edit": "commands",
     "app": "application",
     "replay": "replaying",
-    "check": "commands",
+    "check": "checking",
     "regions": "commands",
     "cages": "commands",
     "bench": "bench",
@@ -47,10 +47,10 @@ EXPERIMENTS = ("drag", "table1", "segmentation", "figures", "peers", "cages")
 _SELECTION = """\
 selections (SEL):
   z>80%, x<=0.25   half-space: percentage of the bounding box, or model units
-  ids.txt          text file of vertex ids, counted from 0
-  pose.sel         text file with one number per vertex: 0 fixed, 1 free, 2 handle
+  ids.txt          text file of point ids, counted from 0
+  pose.sel         text file with one number per point: 0 fixed, 1 free, 2 handle
   name, name=2     point array: non-zero values, or values equal to 2
-  z>80%&x<10%      vertices in both selections
+  z>80%&x<10%      points in both selections
 """
 
 _REPLAYS = """\
@@ -73,7 +73,8 @@ examples:
   segdeform regions horse.ply -o regions.vtp --regions 6
   segdeform cages horse.ply -o cages.vtp --regions 6 --cage-vertices 300
 
-exit codes: 0 success; 1 the mesh has faults or the command failed; 2 usage error
+exit codes: 0 success, and of check: the surface can be deformed; 1 it cannot, or the command
+failed; 2 usage error
 """
 
 
@@ -244,9 +245,11 @@ def _parser() -> argparse.ArgumentParser:
     text = "time limit in seconds (default: 300)"
     sub.add_argument("--seconds", type=_count, default=300, metavar="S", help=text)
 
-    sub = add_command("check", "report the faults of a mesh; optionally repair them")
+    sub = add_command("check", "report how a surface can be deformed; optionally repair it")
     _input_output(sub, "the repaired mesh; requires --repair")
-    sub.add_argument("--repair", action="store_true", help="repair the mesh; requires -o OUT")
+    sub.add_argument("--json", action="store_true", help="report as JSON")
+    text = "write a closed mesh; requires -o OUT"
+    sub.add_argument("--repair", action="store_true", help=text)
     text = "fill holes of at most this many edges (default: 100)"
     sub.add_argument("--largest-hole", type=_count, default=100, metavar="EDGES", help=text)
 
@@ -310,7 +313,7 @@ def _cages(parser: argparse.ArgumentParser) -> None:
 
 def _handles(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("--fixed", required=True, metavar="SEL", help="fixed vertices")
+    add("--fixed", required=True, metavar="SEL", help="fixed points")
     handle = parser.add_argument_group("handles (motion options follow the handle they apply to)")
     for name, metavar, text in [
         ("handle", "SEL", "handle vertices; may be repeated"),

@@ -10,7 +10,9 @@ import pyvista as pv
 
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage
-from ..io import polydata_of
+from ..geometry import lids_of
+from ..io import Surface, polydata_of
+from ..mesh import Mesh, counted
 from ..pictures import COLOURS, rgb
 from ..regions import Regions
 from ..solver import Solution
@@ -20,6 +22,31 @@ Say = Callable[[str], None]
 
 HANDLE_TOLERANCE = 1e-3  # handle error, in mesh diagonals, above which a command fails
 _PALETTE = np.array([rgb(colour) for colour in COLOURS])
+
+
+def report_surface(surface: Surface, say: Say) -> None:
+    """Print what the mesh of *surface* has differently, and its volume if it has borders."""
+    for workaround in surface.workarounds:
+        say(f"input           {workaround}")
+    if not surface.mesh.is_closed:
+        say(f"volume          {volume_sentence(surface.mesh)}")
+
+
+def volume_sentence(mesh: Mesh) -> str:
+    """Return whether the volume of *mesh* is preserved by default, and under how many lids."""
+    if mesh.is_closed:
+        return "preserved"
+    lids = lids_of(mesh)
+    if not lids.encloses.any():
+        return "none to preserve: the surface is an open sheet"
+    holes = int(lids.encloses[lids.component].sum())
+    under = f"preserved under {counted(holes, 'lid over a hole', 'lids over holes')}"
+    sheets = int((~lids.encloses).sum())
+    return (
+        f"{under}; {counted(sheets, 'open sheet has', 'open sheets have')} none"
+        if sheets
+        else under
+    )
 
 
 def report_regions(regions: Regions, say: Say) -> None:
@@ -49,16 +76,19 @@ def report_volume(change: float, say: Say) -> None:
     say(f"volume change   {change:+.1e} of the original volume")
 
 
-def coloured_regions(surface: pv.PolyData, regions: Regions) -> pv.PolyData:
-    """Return a copy of *surface* with point arrays ``region`` (n,), ``regions_here`` and ``RGB``.
+def coloured_regions(surface: Surface, regions: Regions) -> pv.PolyData:
+    """Return the given surface with point arrays ``region`` (p,), ``regions_here`` and ``RGB``.
 
     Colours are mixed by the blend weights, so that overlaps are visible.
     """
-    coloured = surface.copy()
+    coloured = surface.given.copy()
     colours = regions.weights.T @ _colours(np.arange(regions.n_regions)).astype(float)
-    coloured.point_data["region"] = regions.labels
-    coloured.point_data["regions_here"] = regions.membership.sum(axis=0)
-    coloured.point_data["RGB"] = np.rint(colours).clip(0, 255).astype(np.uint8)
+    for name, values in (
+        ("region", regions.labels),
+        ("regions_here", regions.membership.sum(axis=0)),
+        ("RGB", np.rint(colours).clip(0, 255).astype(np.uint8)),
+    ):
+        coloured.point_data[name] = surface.at_points(values)
     return coloured
 
 

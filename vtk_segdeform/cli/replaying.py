@@ -17,7 +17,6 @@ from .. import io
 from ..pictures import require_offscreen, require_screen
 from ..progress import Progress
 from ..session import Session
-from ..widgets import plugin
 from .commands import opened
 from .outputs import Say, report_volume
 
@@ -34,7 +33,7 @@ def replay(options: Namespace, say: Say, progress: Progress) -> bool:
         io.require_writable(options.output)
     if options.film is not None:
         require_film(options.film)
-    surface, session = opened(options.input)
+    session = opened(options.input)
     if options.folder is not None:
         options.folder.mkdir(parents=True, exist_ok=True)
     progress(0.0, "replaying")
@@ -48,7 +47,7 @@ def replay(options: Namespace, say: Say, progress: Progress) -> bool:
     if options.film is not None:
         say(f"written         {options.film}, {pictures} frames")
     if options.output is not None:
-        io.write_mesh(options.output, plugin.deformed(surface, session))
+        session.write_deformed(options.output)
         say(f"written         {options.output}")
     return True
 

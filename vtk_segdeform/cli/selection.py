@@ -1,12 +1,12 @@
-"""Vertex selections as text: ``z>80%``, ``handle.sel``, a file of vertex ids.
+"""Point selections as text: ``z>80%``, ``handle.sel``, a file of point ids.
 
-    selection   =  term { "&" term }             vertices in all terms
+    selection   =  term { "&" term }             points in all terms
     term        =  half-space | array | file
     half-space  =  axis ("<" | "<=" | ">" | ">=") number ["%"]
     axis        =  "x" | "y" | "z"               %: percentage of the bounding box along this axis
     array       =  name ["=" number]             point array: non-zero, or equal to the number
-    file        =  path ["=" number]             vertex ids from 0, separated by blanks or commas;
-                                                 a .sel file has one number per vertex instead
+    file        =  path ["=" number]             point ids from 0, separated by blanks or commas;
+                                                 a .sel file has one number per point instead
 
 In a ``.sel`` file 0 means fixed, 1 free and 2 handle, as in the benchmark poses of [BS08].  The
 selected number follows from the role of the selection, or from "=".  Text is parsed, never
@@ -33,12 +33,11 @@ from numpy.typing import ArrayLike
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..errors import ConstraintError
 from ..files import open_regular
-from ..mesh import Mesh
 
 Role = Literal["fixed", "handle"]
 
 GRAMMAR = (
-    "use a half-space (z>80%, x<=0.25), a point array (name or name=2), a file of vertex ids "
+    "use a half-space (z>80%, x<=0.25), a point array (name or name=2), a file of point ids "
     "or a .sel file, joined by & to intersect"
 )
 _ROLE_NUMBER = {"fixed": 0, "handle": 2}
@@ -51,19 +50,19 @@ _COMPARE = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operato
 
 def parse_selection(
     text: str,
-    mesh: Mesh,
+    points: FloatArray,
     *,
     point_arrays: Mapping[str, ArrayLike] | None = None,
     role: Role | None = None,
 ) -> IntArray:
-    """Return the ids of the vertices selected by *text*.
+    """Return the ids of the points selected by *text*.
 
     Parameters
     ----------
     text : str
         In the grammar above.
-    mesh : Mesh
-        n vertices.
+    points : (n, 3) float
+        As given, and numbered as in their file.
     point_arrays : mapping of str to (n,) numbers, optional
         The arrays that *text* may name.
     role : "fixed" or "handle", optional
@@ -77,34 +76,35 @@ def parse_selection(
     Raises
     ------
     ConstraintError
-        If the text does not follow the grammar, or selects no vertex.
+        If the text does not follow the grammar, or selects no point.
 
     Examples
     --------
-    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    >>> mesh = Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    >>> parse_selection("z<50%", mesh)
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> parse_selection("z<50%", corners)
     array([0, 1, 2])
-    >>> parse_selection("z<50% & x>=1", mesh)
+    >>> parse_selection("z<50% & x>=1", corners)
     array([1])
     """
-    chosen = np.ones(mesh.n_vertices, dtype=bool)
+    chosen = np.ones(len(points), dtype=bool)
     whole_is_a_file = os.path.isfile(text.strip())  # False for text of any length
     for term in [text] if whole_is_a_file else text.split("&"):
-        chosen &= _term(term.strip(), mesh, dict(point_arrays or {}), role)
+        chosen &= _term(term.strip(), points, dict(point_arrays or {}), role)
     if not chosen.any():
         raise ConstraintError(
-            f"{role or 'selection'} {_short(text)} selects none of the {mesh.n_vertices} vertices; "
-            f"the mesh spans {_extent(mesh)}"
+            f"{role or 'selection'} {_short(text)} selects none of the {len(points)} points; "
+            f"the mesh spans {_extent(points)}"
         )
     return np.flatnonzero(chosen).astype(np.int64)
 
 
-def _term(term: str, mesh: Mesh, arrays: Mapping[str, ArrayLike], role: Role | None) -> BoolArray:
+def _term(
+    term: str, points: FloatArray, arrays: Mapping[str, ArrayLike], role: Role | None
+) -> BoolArray:
     half_space = _HALF_SPACE.fullmatch(term)
     if half_space:
         axis, sign, number, per_cent = half_space.groups()
-        along = mesh.vertices[:, "xyz".index(axis.lower())]
+        along = points[:, "xyz".index(axis.lower())]
         limit = float(number)
         if per_cent:
             limit = along.min() + limit / 100.0 * np.ptp(along)
@@ -114,9 +114,9 @@ def _term(term: str, mesh: Mesh, arrays: Mapping[str, ArrayLike], role: Role | N
     if equals and term not in arrays and not os.path.isfile(term):
         name, wanted = equals[1], float(equals[2])
     if name in arrays:
-        return _array(name, arrays[name], wanted, mesh.n_vertices)
+        return _array(name, arrays[name], wanted, len(points))
     if os.path.isfile(name):
-        return _file(Path(name), wanted, mesh.n_vertices, role)
+        return _file(Path(name), wanted, len(points), role)
     known = f"; point arrays here: {', '.join(sorted(arrays))}" if arrays else ""
     raise ConstraintError(f"cannot read the selection {_short(term)}: {GRAMMAR}{known}")
 
@@ -125,7 +125,7 @@ def _array(name: str, values: ArrayLike, wanted: float | None, n: int) -> BoolAr
     array = np.asarray(values)
     if array.shape != (n,) or array.dtype.kind not in "biuf":
         raise ConstraintError(
-            f"point array {name!r} must have one number per vertex, shape ({n},); "
+            f"point array {name!r} must have one number per point, shape ({n},); "
             f"got {array.shape} {array.dtype}"
         )
     return np.asarray(array != 0 if wanted is None else array == wanted)
@@ -136,7 +136,7 @@ def _file(path: Path, wanted: float | None, n: int, role: Role | None) -> BoolAr
     if path.suffix == ".sel":
         if len(numbers) != n:
             raise ConstraintError(
-                f"{path} must have one number per vertex, {n} numbers; got {len(numbers)}"
+                f"{path} must have one number per point, {n} numbers; got {len(numbers)}"
             )
         if wanted is None:
             if role is None:
@@ -146,10 +146,10 @@ def _file(path: Path, wanted: float | None, n: int, role: Role | None) -> BoolAr
     if wanted is not None:
         raise ConstraintError(f"{path}={wanted:g}: '=' applies to .sel files only")
     if not np.array_equal(numbers, np.rint(numbers)):  # NaN is unequal to itself
-        raise ConstraintError(f"{path} must contain vertex ids, which are whole numbers")
+        raise ConstraintError(f"{path} must contain point ids, which are whole numbers")
     if len(numbers) and (numbers.min() < 0 or numbers.max() >= n):
         low, high = numbers.min(), numbers.max()
-        raise ConstraintError(f"vertex ids in {path} must be 0..{n - 1}; got {low:g}..{high:g}")
+        raise ConstraintError(f"point ids in {path} must be 0..{n - 1}; got {low:g}..{high:g}")
     chosen = np.zeros(n, dtype=bool)
     chosen[numbers.astype(np.int64)] = True
     return chosen
@@ -174,8 +174,8 @@ def _short(text: str) -> str:
     return repr(text if len(text) <= 200 else f"{text[:200]}...")
 
 
-def _extent(mesh: Mesh) -> str:
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+def _extent(points: FloatArray) -> str:
+    low, high = points.min(axis=0), points.max(axis=0)
     return ", ".join(
         f"{axis} {a:.6g}..{b:.6g}" for axis, a, b in zip("xyz", low, high, strict=True)
     )

@@ -10,7 +10,7 @@ The files, in reading order:
     ply ply_tables     PLY, and the tables of its elements
     wavefront          OBJ
     stl                STL
-    gltf gltf_buffers  glTF, and the numbers in its buffers
+    gltf               glTF: a folder with its own contents
     vtk_formats        other formats, by VTK
     isolated reading_child
                        native readers in a child process
@@ -19,6 +19,7 @@ The files, in reading order:
     repaired           repair of PolyData with its polygons and arrays
     meshlab            PyMeshLab: conversion, simplification, file formats
     meshlab_layers     MeshLab's layers as PolyData
+    meshlab_shown      colours of layers, and cages as wires
     meshlab_project    MeshLab projects: a mesh and its cages
 """
 

@@ -32,7 +32,7 @@ from ..errors import MeshError
 from ..files import fault_of, replacing, require_place
 from ..mesh import Mesh
 from . import meshlab
-from .gltf import read_gltf
+from .gltf import read_gltf, write_gltf
 from .moving import MovingSurface
 from .off import read_off, write_off
 from .ply import read_ply, write_ply
@@ -48,10 +48,12 @@ _READERS: dict[str, Callable[[Path], pv.PolyData]] = {
     ".stl": read_stl,
 }  # fmt: skip
 _WRITERS: dict[str, Callable[[Path, pv.PolyData], None]] = {
-    ".obj": write_obj, ".off": write_off, ".ply": write_ply,
+    ".glb": write_gltf, ".gltf": write_gltf, ".obj": write_obj, ".off": write_off,
+    ".ply": write_ply,
 }  # fmt: skip
 _VTK_READS = frozenset({".vtk", ".vtp", ".vtu", ".vtkhdf"})
 _VTK_WRITES = frozenset({".stl", ".vtk", ".vtp", ".vtkhdf"})
+# Formats of point arrays of any name and colours.
 _STORE_ARRAYS = frozenset({".ply", ".vtk", ".vtp", ".vtkhdf"})
 
 
@@ -148,6 +150,8 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
                 write_with_vtk(draft, surface)
             else:
                 _write_with_meshlab(draft, mesh if isinstance(mesh, Mesh) else from_polydata(mesh))
+    except MeshError as fault:
+        raise MeshError(f"{path}: {str(fault).removeprefix(f'{path}: ')}") from None
     except OSError as fault:
         reason = fault.strerror or str(fault)
         raise MeshError(

@@ -1,8 +1,8 @@
 """PyMeshLab, if it is installed: conversion, simplification and its file formats.
 
-    Mesh, PolyData, Session  --to_meshset-->        MeshSet
-    PolyData                 <--from_meshset------  MeshSet       the current layer
-    fixed, handle, region    <--selected_vertices-  MeshSet       its selected vertices
+    Mesh, Surface, PolyData, Session  --to_meshset-->  MeshSet
+    PolyData               <--from_meshset-----------  MeshSet     the current layer
+    fixed, handle, region  <--selected_vertices------  MeshSet     its selected vertices
 
 Selection, quality, colours and texture coordinates are converted both ways, as arrays of the
 PolyData (`meshlab_layers`); so are other arrays of numbers, as custom attributes, whose names must
@@ -36,7 +36,7 @@ from ..mesh import Mesh, require_mesh
 from .isolated import read_isolated
 from .meshlab_layers import (
     HasLayers,
-    Surface,
+    Layer,
     add_attributes,
     as_layers,
     free_name,
@@ -61,12 +61,12 @@ def available() -> bool:
     return True
 
 
-def to_meshset(what: Surface | HasLayers | Mapping[str, Surface]) -> Any:
+def to_meshset(what: Layer | HasLayers | Mapping[str, Layer]) -> Any:
     """Convert surfaces to a ``pymeshlab.MeshSet``; its first layer is the current one.
 
     Parameters
     ----------
-    what : Mesh, pyvista.PolyData, Session, or dict of str to Mesh or PolyData
+    what : Mesh, Surface, pyvista.PolyData, Session, or dict of str to one of the first three
         A surface, for one layer; a session, for layers of its mesh and cages in their pose; or
         layers by name.  Polygons are cut into triangles; vertices and faces keep their order.
 

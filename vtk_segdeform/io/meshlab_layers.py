@@ -32,7 +32,17 @@ from ..errors import MeshError
 from ..mesh import Mesh
 from .polygons import polydata_of
 
-Surface: TypeAlias = Mesh | pv.PolyData
+
+@runtime_checkable
+class HasGiven(Protocol):
+    """A `Surface`."""
+
+    @property
+    def given(self) -> pv.PolyData:
+        """The surface as it was given."""
+
+
+Layer: TypeAlias = Mesh | pv.PolyData | HasGiven
 _CORNERS, _TEXTURE = "TextureCorners", "TextureCoordinates"
 
 
@@ -54,25 +64,25 @@ class LayerData(NamedTuple):
     of_faces: dict[str, Any]
 
 
-def as_layers(what: Surface | HasLayers | Mapping[str, Surface]) -> dict[str, pv.PolyData]:
+def as_layers(what: Layer | HasLayers | Mapping[str, Layer]) -> dict[str, pv.PolyData]:
     """Return one surface, a session, or several surfaces by name, as layers."""
     if isinstance(what, HasLayers):
         return what.layers()
     layers = what if isinstance(what, Mapping) else {"mesh": what}
-    return {str(name): as_surface(surface) for name, surface in layers.items()}
+    return {str(name): as_polydata(surface) for name, surface in layers.items()}
 
 
-def as_surface(surface: Surface) -> pv.PolyData:
-    """Return a surface as triangles; polygons are cut, arrays are kept."""
+def as_polydata(surface: Layer) -> pv.PolyData:
+    """Return a mesh or a surface as PolyData, with its polygons and arrays."""
+    if isinstance(surface, HasGiven):
+        return surface.given
     if isinstance(surface, Mesh):
         return polydata_of(surface.vertices, np.full(surface.n_faces, 3), surface.faces.ravel())
     if not isinstance(surface, pv.PolyData):
         raise MeshError(
-            "expected a Mesh, a PolyData, a Session or a dict of surfaces; "
+            "expected a Mesh, a Surface, a PolyData, a Session or a dict of surfaces; "
             f"got {type(surface).__name__}"
         )
-    if not surface.is_all_triangles:
-        surface = surface.triangulate()
     return surface
 
 
@@ -84,6 +94,8 @@ def free_name(name: str, taken: Container[str]) -> str:
 
 def layer_data(surface: pv.PolyData) -> LayerData:
     """Return the data for a ``pymeshlab.Mesh``."""
+    if not surface.is_all_triangles:
+        surface = surface.triangulate()
     points, cells = surface.point_data, surface.cell_data
     arrays: dict[str, Any] = {
         "vertex_matrix": np.asarray(surface.points, dtype=np.float64),

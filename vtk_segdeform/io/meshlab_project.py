@@ -3,6 +3,10 @@
     work.mlp              list of the layers and their matrices, in XML
     work.layers/*.ply     the layers, with selection, quality, colours and texture coordinates
 
+A layer with quality and without colours is coloured by it, since MeshLab shows the quality only in
+colours.  The cages of a session are hidden, and shown as wires by a layer beside each
+(`meshlab_shown`); its local volume change is hidden as well.
+
 PyMeshLab is not required.  MeshLab stores a selection in a PLY file as bit 32 of the property
 ``flags``; here it is the array "selection", as in `meshlab_layers`.
 
@@ -30,11 +34,13 @@ from ..checks import as_path
 from ..errors import MeshError
 from ..files import open_regular, replacing, require_place
 from .convert import read_polydata, with_vertices, write_mesh
-from .meshlab_layers import HasLayers, Surface, as_layers, free_name
+from .meshlab_layers import HasLayers, Layer, as_layers, free_name
+from .meshlab_shown import coloured, is_cage, wires_of
 from .referenced_files import file_inside
 
 _SELECTED = 0x20  # of MeshLab's flags
-_GENERATED = re.compile(r"\d+-[0-9a-f]{12}\.ply")
+_GENERATED = re.compile(r"\d+-[0-9a-f]{12}(-wires)?\.ply")
+_WIRES = "-wires.ply"  # the end of the name of a file that only shows the edges of another layer
 _HEAD = "<!DOCTYPE MeshLabDocument>\n"
 _LARGEST = 10_000_000  # bytes of the .mlp
 _DEEPEST = 32  # nesting levels; MeshLab's projects have four
@@ -44,6 +50,8 @@ _IDENTITY = "\n1 0 0 0 \n0 1 0 0 \n0 0 1 0 \n0 0 0 1 \n"
 
 def read_project(path: str | Path) -> dict[str, pv.PolyData]:
     """Read the layers of a MeshLab project, by name, transformed by their matrices.
+
+    Wires that `write_project` added to show cages are left out.
 
     Parameters
     ----------
@@ -60,7 +68,11 @@ def read_project(path: str | Path) -> dict[str, pv.PolyData]:
     """
     path = as_path(path)
     layers: dict[str, pv.PolyData] = {}
-    elements = _parsed(path).findall("MeshGroup/MLMesh")
+    elements = [
+        element
+        for element in _parsed(path).findall("MeshGroup/MLMesh")
+        if not element.get("filename", "").endswith(_WIRES)
+    ]
     if len(elements) > _MOST_LAYERS:
         raise MeshError(f"{path}: has {len(elements)} layers; the limit is {_MOST_LAYERS}")
     files = [_layer_file(path, element.get("filename", "")) for element in elements]
@@ -86,15 +98,16 @@ def read_project(path: str | Path) -> dict[str, pv.PolyData]:
     return layers
 
 
-def write_project(path: str | Path, what: Surface | HasLayers | Mapping[str, Surface]) -> None:
+def write_project(path: str | Path, what: Layer | HasLayers | Mapping[str, Layer]) -> None:
     """Write layers as a MeshLab project.
 
     Parameters
     ----------
     path : str or Path
         For example ``work.mlp``; the layers are written to a folder ``work.layers`` beside it.
-    what : Mesh, pyvista.PolyData, Session, or dict of str to Mesh or PolyData
-        As in `meshlab.to_meshset`.
+    what : Mesh, Surface, pyvista.PolyData, Session, or dict of str to one of the first three
+        As in `meshlab.to_meshset`, but polygons are kept.  Layers of a session with the names
+        "cage 1", "cage 2" ... are shown as wires.
 
     Raises
     ------
@@ -119,12 +132,16 @@ def write_project(path: str | Path, what: Surface | HasLayers | Mapping[str, Sur
         names = set()
         for number, (label, surface) in enumerate(layers.items()):
             name = f"{number}-{_digest(surface)}.ply"
-            write_mesh(folder / name, _with_flags(surface))
+            write_mesh(folder / name, _with_flags(coloured(surface)))
+            shown = not isinstance(what, HasLayers) or label == "mesh"
+            _add(group, label, f"{folder.name}/{name}", visible=shown)
             names.add(name)
-            entry = {"label": _printable(label), "visible": "1"}
-            entry["filename"] = f"{folder.name}/{name}"
-            mesh = ElementTree.SubElement(group, "MLMesh", entry)
-            ElementTree.SubElement(mesh, "MLMatrix44").text = _IDENTITY
+            if not shown and is_cage(label):
+                name = name.removesuffix(".ply") + _WIRES
+                with replacing(folder / name) as draft:
+                    draft.write_bytes(wires_of(surface))
+                _add(group, f"{label}, wires", f"{folder.name}/{name}", visible=True)
+                names.add(name)
         ElementTree.SubElement(project, "RasterGroup")
         ElementTree.indent(project, " ")
         text = _HEAD + ElementTree.tostring(project, encoding="unicode") + "\n"
@@ -138,6 +155,13 @@ def write_project(path: str | Path, what: Surface | HasLayers | Mapping[str, Sur
         raise MeshError(
             f"{path}: cannot be written ({reason}); free disk space or choose another folder"
         ) from fault
+
+
+def _add(group: ElementTree.Element, label: str, file: str, *, visible: bool) -> None:
+    """Add a layer to a project."""
+    entry = {"label": _printable(label), "visible": "1" if visible else "0", "filename": file}
+    mesh = ElementTree.SubElement(group, "MLMesh", entry)
+    ElementTree.SubElement(mesh, "MLMatrix44").text = _IDENTITY
 
 
 def _digest(surface: pv.PolyData) -> str:

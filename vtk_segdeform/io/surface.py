@@ -49,11 +49,7 @@ def read_mesh(path: str | Path) -> Mesh:
     MissingDependencyError
         If only PyMeshLab reads this format and it is not installed.
     """
-    surface = Surface.read(path)
-    try:
-        return surface.mesh
-    except ValueError as error:
-        raise MeshError(f"{path}: {error}") from None
+    return Surface.read(path).mesh
 
 
 class Surface:
@@ -84,8 +80,19 @@ class Surface:
 
     @classmethod
     def read(cls, path: str | Path) -> Surface:
-        """Read a surface from a file of any format of `read_mesh`."""
-        return cls(read_polydata(path))
+        """Read a surface from a file of any format of `read_mesh`, and make its mesh.
+
+        Raises
+        ------
+        MeshError
+            As `read_mesh`, but only if no mesh can be made of it; the message names the file.
+        """
+        surface = cls(read_polydata(path))
+        try:
+            _ = surface.mesh
+        except MeshError as fault:
+            raise MeshError(f"{path}: {fault}") from None
+        return surface
 
     @classmethod
     def of(cls, polydata: pv.PolyData, soup: Soup) -> Surface:
@@ -122,7 +129,7 @@ class Surface:
         return self._soup.workarounds
 
     def vertices_at(self, points: ArrayLike) -> IntArray:
-        """Return the vertices (k,) of the mesh, sorted, that given *points* (mask or ids) follow."""
+        """Return the vertices (k,) of the mesh that given *points* (mask or ids) follow, sorted."""
         return self._soup.vertices_at(points)
 
     def at_points(self, values: ArrayLike) -> Any:

@@ -72,7 +72,7 @@ class Soup:
     workarounds: tuple[Workaround, ...] = ()
 
     def vertices_at(self, points: ArrayLike) -> IntArray:
-        """Return the vertices (k,) of the mesh, sorted, that given *points* (mask or ids) follow."""
+        """Return the vertices (k,) of the mesh that given *points* (mask or ids) follow, sorted."""
         return np.unique(self.vertex_of[as_ids(points, len(self.points), "points")])
 
     def at_vertices(self, values: Any) -> Any:

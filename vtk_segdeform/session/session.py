@@ -20,10 +20,10 @@ Long because it is the interface of one class; the implementation is in the othe
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -35,7 +35,7 @@ from ..cages import Cage, fit_cages
 from ..checks import require, shown
 from ..deformer import checked_constraints
 from ..errors import CageError, RegionError, SessionError
-from ..geometry import Lids
+from ..geometry import Lids, local_volume_change
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress
 from ..regions import Regions, segment
@@ -162,7 +162,7 @@ class Session(Timeline):
 
         return to_polydata(self.mesh.with_vertices(self.vertices))
 
-    def write_deformed(self, path: str | os.PathLike[str]) -> None:
+    def write_deformed(self, path: str | Path) -> None:
         """Write `deformed` to a mesh file, as `write_mesh` does."""
         from ..io import write_mesh  # imports pyvista
 
@@ -286,25 +286,35 @@ class Session(Timeline):
         return str(self.solution.status)
 
     def layers(self) -> dict[str, pv.PolyData]:
-        """Return the mesh and its cages as PolyData, "mesh", "cage 1", ..., in the current pose.
+        """Return the surface and its cages as PolyData, in the current pose.
 
-        Vertices of handles are selected, as the array "selection"; the array "quality" of the mesh
-        is the region of each vertex.
+        "mesh" is `deformed` with vertices of handles selected, as the array "selection", and the
+        region of each vertex as "quality", unless it has a quality.  "local volume change" is the
+        same surface with that as its quality, if there is a pose.  "cage 1", "cage 2" ... follow.
         """
-        from ..io import polydata_of, to_polydata  # imports pyvista
+        from ..io import polydata_of  # imports pyvista
 
-        mesh = to_polydata(self.mesh.with_vertices(self.vertices))
+        mesh = self.deformed.copy(deep=False)
+        layers = {"mesh": mesh}
         if self.handles:
             selection = np.zeros(self.mesh.n_vertices, dtype=np.uint8)
             selection[np.concatenate(list(self.handles.values()))] = 1
-            mesh.point_data["selection"] = selection
-        if self.regions is not None:
-            mesh.point_data["quality"] = self.regions.labels.astype(np.float64)
-        layers = {"mesh": mesh}
+            mesh.point_data["selection"] = self._at_points(selection)
+        if self.regions is not None and "quality" not in mesh.point_data:
+            mesh.point_data["quality"] = self._at_points(self.regions.labels.astype(np.float64))
+        if self.state.pose is not None:
+            change = local_volume_change(self.mesh, self.vertices)
+            layers["local volume change"] = self.deformed.copy(deep=False)
+            layers["local volume change"].clear_data()
+            layers["local volume change"].point_data["quality"] = self._at_points(change)
         for k, (cage, vertices) in enumerate(zip(self.cages, self.cage_vertices, strict=True), 1):
             counts = np.full(cage.n_faces, 3)
             layers[f"cage {k}"] = polydata_of(vertices, counts, cage.faces.ravel())
         return layers
+
+    def _at_points(self, values: Any) -> Any:
+        """Return values of vertices at the points of `deformed`."""
+        return values if self._surface is None else self._surface.at_points(values)
 
     # Regions.
 

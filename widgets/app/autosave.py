@@ -2,14 +2,15 @@
 
     folder/8f31.../lock                 locked while the program that owns the slot runs
                    about.json           the document
-                   session.segdeform    the work, written atomically as every session
+                   surface.segdeform    the given surface, written once: a session without edits
+                   session.segdeform    the work, without the surface; each is written atomically
 
 Each document has a slot from its first change until it is saved or discarded.  A slot without a
 lock is abandoned: its program has crashed or was killed.  `Autosaves.abandoned` locks the slots
 that it returns, so that only one of several programs offers to recover them.
 
 A folder is a slot only if its name has 16 hexadecimal digits and its lock contains the mark of this
-program.  Only these three files and their drafts (`files.replacing`) are ever deleted in it, and
+program.  Only these four files and their drafts (`files.replacing`) are ever deleted in it, and
 the folder itself once it is empty.  Symbolic links are not followed.
 """
 
@@ -25,6 +26,9 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from vtk_segdeform.errors import SessionError
 from vtk_segdeform.files import (
@@ -36,12 +40,15 @@ from vtk_segdeform.files import (
     open_regular,
     replacing,
 )
+from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.progress import Progress
-from vtk_segdeform.session import Session, save_session
+from vtk_segdeform.session import Session, load_session, save_session
 
-from ..editor import read_bound
+if TYPE_CHECKING:
+    from vtk_segdeform.io import Surface
 
 _LOCK, _ABOUT, _SESSION = "lock", "about.json", "session.segdeform"
+_SURFACE = "surface.segdeform"
 _NAME = re.compile(r"[0-9a-f]{16}")
 _MARK = b"vtk_segdeform: unsaved work, held while the program runs\n"
 _LONGEST_ABOUT = 1 << 20  # bytes
@@ -77,6 +84,7 @@ class Slot:
         self.about = about
         self.path = folder / _SESSION
         self._folder = folder
+        self._surface: Surface | None = None  # the one in the slot
         self._handle: int | None = handle
 
     @property
@@ -92,13 +100,29 @@ class Slot:
         SessionError
             If it cannot be written; the previous autosave is then unchanged.
         """
-        if self.path.is_symlink():
-            raise SessionError(f"{self.path}: is a symbolic link; remove it to enable autosave")
-        save_session(self.path, session)
+        given = self._folder / _SURFACE
+        for path in (given, self.path):
+            if path.is_symlink():
+                raise SessionError(f"{path}: is a symbolic link; remove it to enable autosave")
+        if session.surface is not None and session.surface is not self._surface:
+            save_session(given, Session(session.surface))
+            self._surface = session.surface
+        save_session(self.path, session, surface=False)
 
     def read(self, progress: Progress) -> Session:
-        """Return the autosaved session, bound if it has a pose."""
-        return read_bound(self.path, progress)
+        """Return the autosaved session, bound if it has a pose.
+
+        It has its surface, unless the file of that is damaged.
+        """
+        session, given = load_session(self.path), None
+        if _is_file(self._folder / _SURFACE):
+            with suppress(SessionError):
+                given = load_session(self._folder / _SURFACE).surface
+        if session.surface is None and given is not None and _same(given.mesh, session.mesh):
+            session, self._surface = Session(given, state=session.state), given
+        if session.state.pose is not None:
+            session.bind(progress)
+        return session
 
     def release(self) -> None:
         """Unlock the slot, so that any program may recover it."""
@@ -113,7 +137,9 @@ class Slot:
         self.release()  # some systems cannot delete open files
         with suppress(OSError):  # another process may have deleted it, or it is not empty
             for path in list(self._folder.iterdir()):
-                if (path.name in (_LOCK, _ABOUT) or is_draft(path.name)) and _is_file(path):
+                if (path.name in (_LOCK, _ABOUT, _SURFACE) or is_draft(path.name)) and _is_file(
+                    path
+                ):
                     path.unlink(missing_ok=True)
             self._folder.rmdir()
 
@@ -210,6 +236,11 @@ def _hold(folder: Path) -> int | None:
         return handle
     os.close(handle)
     return None
+
+
+def _same(one: Mesh, other: Mesh) -> bool:
+    vertices = np.array_equal(one.vertices, other.vertices)
+    return vertices and np.array_equal(one.faces, other.faces)
 
 
 def _is_file(path: Path) -> bool:

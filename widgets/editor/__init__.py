@@ -43,7 +43,7 @@ from .panel_actions import (
     showing_cage,
     with_radius,
 )
-from .session_file import SessionFile, is_mesh, read_bound
+from .session_file import SessionFile, is_mesh, read_session
 
 __all__ = [
     "Action",
@@ -69,7 +69,7 @@ __all__ = [
     "notices_of",
     "opening",
     "painting",
-    "read_bound",
+    "read_session",
     "renaming",
     "save",
     "saving",

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from vtk_segdeform.kernels import advice
 from vtk_segdeform.progress import Progress
@@ -26,7 +26,7 @@ from .messages import Messages
 from .mode import Mode
 from .notices import Notices
 from .recordings import Recordings
-from .session_file import SessionFile, read_all
+from .session_file import SessionFile, read_session
 from .widget_set import WidgetSet
 
 T = TypeVar("T")
@@ -281,13 +281,12 @@ class Controller:
     def open(self, path: Path) -> None:
         """Read the session or the mesh in *path* as a job, and then edit that."""
 
-        def replace(opened: tuple[Session, Any]) -> str:
-            session, surface = opened
+        def replace(session: Session) -> str:
             self.widgets = self.widgets.replaced_by(session)
             self._stop_listening()
             self._listen()
             self.notices.follow(session)
-            self.file.opened(path, session, surface)
+            self.file.opened(path, session)
             return f"Opened {path}"
 
-        self.start(f"Opening {path}", lambda progress: read_all(path, progress), replace)
+        self.start(f"Opening {path}", lambda progress: read_session(path, progress), replace)

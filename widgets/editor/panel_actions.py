@@ -125,18 +125,16 @@ def saving(path: Path) -> Action:
 
 
 def exporting(path: Path) -> Action:
-    """Return the action that writes the posed mesh with its original arrays.
+    """Return the action that writes the surface in the pose, otherwise as it was given.
 
     The suffix selects the format, which may not support all arrays: see `io.write_mesh`.
     """
 
     def export(controller: Controller) -> None:
-        from vtk_segdeform.io import write_mesh  # which imports pyvista
-
         session = controller.session
         if session.is_dragging:
             raise SessionError("Finish the drag before saving the mesh")
-        write_mesh(path, controller.file.deformed(session))
+        session.write_deformed(path)
         controller.say(f"Mesh saved to {path}")
 
     return export

@@ -31,7 +31,7 @@ class DeformWidget(QtWidgets.QWidget):
 
     Parameters
     ----------
-    mesh : Mesh, pyvista.PolyData or Session
+    mesh : pyvista.PolyData, Surface, Mesh or Session
         What to edit.
     parent : QWidget, optional
         The parent widget.
@@ -55,7 +55,6 @@ class DeformWidget(QtWidgets.QWidget):
         self.plotter = pyvistaqt.QtInteractor(self, auto_update=False, off_screen=False)
         self.plotter.setAcceptDrops(False)  # it would add a second mesh to the view
         self.editor: DeformEditor = self.plotter.segdeform.edit(session)
-        self.editor.controller.file.surface = plugin.surface_of(mesh)
         self._camera_position: tuple[float, ...] | None = tuple(self.plotter.camera.position)
         self.panel = DeformPanel(self.editor, self)
         self.deformed, self.regions_changed = self.panel.deformed, self.panel.regions_changed
@@ -79,11 +78,11 @@ class DeformWidget(QtWidgets.QWidget):
         return self.editor.session
 
     def deformed_polydata(self) -> pyvista.PolyData:
-        """Return the deformed mesh with the arrays and polygons of the original PolyData or file.
+        """Return the surface in the current pose, as it was given apart from coordinates.
 
-        Normals are recomputed.
+        Normals follow.  For a `Mesh` it has the triangles of that.
         """
-        return self.editor.controller.file.deformed(self.session)
+        return self.session.deformed
 
     def showEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
         """Reset the camera once the size of the view is known, unless it has been moved."""
@@ -135,8 +134,8 @@ class DeformDock(QtWidgets.QDockWidget):
         return self.editor.session
 
     def deformed_polydata(self) -> pyvista.PolyData:
-        """Return the deformed mesh; see `DeformWidget.deformed_polydata`."""
-        return self.editor.controller.file.deformed(self.session)
+        """Return the deformed surface; see `DeformWidget.deformed_polydata`."""
+        return self.session.deformed
 
 
 def deform_dock(view: Any, mesh: Any, parent: Any = None) -> DeformDock:
@@ -147,7 +146,7 @@ def deform_dock(view: Any, mesh: Any, parent: Any = None) -> DeformDock:
     view : pyvistaqt.QtInteractor, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
         Where to edit.  A plotter removes the editor when it closes; for any other view call
         ``dock.editor.remove()`` before its window closes.
-    mesh : Mesh, pyvista.PolyData or Session
+    mesh : pyvista.PolyData, Surface, Mesh or Session
         What to edit.
     parent : QWidget, optional
         The parent widget.
@@ -158,7 +157,6 @@ def deform_dock(view: Any, mesh: Any, parent: Any = None) -> DeformDock:
         editor = view.segdeform.edit(mesh)
     else:
         editor = DeformEditor(view, plugin.session_of(mesh))
-        editor.controller.file.surface = plugin.surface_of(mesh)
         editor.On()
     return DeformDock(editor, parent)
 

@@ -31,6 +31,7 @@ from qtpy import QtGui
 from vtk_segdeform import Session, models
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.io import convert
+from vtk_segdeform.io.surface import Surface
 from vtk_segdeform.session.store import load_session, save_session
 from vtk_segdeform.widgets.app import documents
 from vtk_segdeform.widgets.app.autosave import About, Autosaves, Slot
@@ -153,15 +154,15 @@ def test_the_start_page_opens_the_sample_model(start, monkeypatch, tmp_path):
 
 
 def test_a_file_from_the_menu_is_opened_in_another_thread(start, ball_file, monkeypatch):
-    hand, read, threads = start(), documents.read_polydata, []
+    hand, read, threads = start(), documents.read_session, []
     go_on = threading.Event()
 
-    def slowly(path):
+    def slowly(path, progress):
         threads.append(threading.current_thread())
         assert go_on.wait(30.0)
-        return read(path)
+        return read(path, progress)
 
-    monkeypatch.setattr(documents, "read_polydata", slowly)
+    monkeypatch.setattr(documents, "read_session", slowly)
     choose_file(monkeypatch, ball_file)
     hand.choose("File", "Open ...")
     until(lambda: hand.page is hand.window.pages.waiting, "the page that says so")
@@ -352,15 +353,16 @@ def test_a_mesh_dropped_anywhere_on_the_window_is_opened(start, ball_file, arm_f
 
 def bad_files(tmp_path):
     """Yield invalid files, each with a word of its error message."""
-    open_ball = convert.to_polydata(BALL).remove_cells([0, 1])
-    convert.write_mesh(tmp_path / "open.ply", open_ball)
+    lost = convert.to_polydata(BALL)
+    lost.points[7] = np.nan
+    convert.write_mesh(tmp_path / "lost.ply", lost)
     save_session(tmp_path / "cut.segdeform", Session(BALL))
     whole = (tmp_path / "cut.segdeform").read_bytes()
     (tmp_path / "cut.segdeform").write_bytes(whole[: len(whole) // 2])
     (tmp_path / "noise.stl").write_bytes(np.random.default_rng(3).bytes(400))
     (tmp_path / "letter.txt").write_text("Dear mesh,")
     (tmp_path / "folder.ply").mkdir()
-    yield "open.ply", "segdeform check open.ply --repair"
+    yield "lost.ply", "NaN"
     yield "cut.segdeform", "readable"
     yield "noise.stl", "noise.stl"
     yield "letter.txt", "letter.txt"
@@ -494,7 +496,7 @@ def test_abandoned_work_is_offered_and_recovered(start, arm, arm_file, tmp_path,
 
 
 def test_recovering_work_later_or_never(start, arm, ball_file, tmp_path, boxes):
-    slot = left(tmp_path, Session(BALL), About("ball.vtp", "", str(ball_file)))
+    slot = left(tmp_path, Session(Surface.read(ball_file)), About("ball.vtp", "", str(ball_file)))
     for answer, path in (("Escape", None), ("Later", ball_file)):
         boxes.answers.append(answer)
         hand = start(path)
@@ -504,7 +506,7 @@ def test_recovering_work_later_or_never(start, arm, ball_file, tmp_path, boxes):
     assert hand.reads("File")["Recover unsaved work ..."] == (True, False)
     hand.choose("File", "Recover unsaved work")
     hand.settle()
-    assert hand.window.document.surface.point_data["height"][7] == BALL.vertices[7, 2]
+    assert hand.window.session.deformed.point_data["height"][7] == BALL.vertices[7, 2]
     assert hand.title == "ball.vtp* - segdeform"
     assert "Recovered" in hand.window.editor.status
     assert hand.reads("File")["Recover unsaved work ..."] == (False, False)

@@ -1,14 +1,12 @@
-"""glTF and GLB: reader for the meshes of a scene in world coordinates, as one surface.
+"""The triangles that the scene of a glTF document shows, and how its numbers lead to them.
 
     nodes        a forest; the world matrix of a node is that of its parent @ its own
     mesh         primitives: triangles, strips or fans; lines and points are ignored
     morphs       targets are added with the weights of the node or mesh
     skins        a skinned vertex follows its joints and not the transform of its node
-    attributes   NORMAL and TEXCOORD_0 (active), COLOR_0 as "RGB" or "RGBA", further TEXCOORD_k
-                 and _NAMES become point arrays if all primitives have them
 
-Animations, materials and images are not read.  Only buffers in the folder of the model are read
-from other files.
+A block is the vertices of one or more primitives of a node, a piece the triangles of a primitive.
+The frame of a vertex is the matrix from its local position, morphs included, to the world.
 
 Source
 ------
@@ -17,84 +15,78 @@ The Khronos Group, "glTF 2.0 Specification", ISO/IEC 12113:2022, sections 3.5 an
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from pathlib import Path
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
-import pyvista as pv
 
-from ..arrays import FloatArray, IntArray
-from ..errors import MeshError
-from .gltf_buffers import Document, numbers, object_, objects, whole
-from .polygons import polydata_of, unstripped
+from ...arrays import FloatArray, IntArray
+from ...errors import MeshError
+from ..polygons import unstripped
+from .buffers import Document, numbers, object_, objects, whole
 
-# Extensions that do not affect the surface, and a supported one.
-_IGNORED = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_xmp")
-_SUPPORTED = "KHR_mesh_quantization"
-_COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _PRIMITIVE = 1000  # cost of a primitive, as a number of elements
 
 
-class _Part(NamedTuple):
-    points: FloatArray  # (n, 3)
-    faces: IntArray  # (m, 3)
-    arrays: dict[str, Any]  # (n, ...)
+class Block(NamedTuple):
+    """Vertices of a mesh, as a node of the scene shows them."""
+
+    node: int | None  # None: a document without nodes
+    mesh: int
+    attributes: dict[str, Any]  # accessors by name
+    local: FloatArray  # (n, 3) positions, morphs included
+    frames: FloatArray  # (4, 4), or (n, 4, 4) if there is a skin
+    morphed: bool
+
+    @property
+    def points(self) -> FloatArray:
+        """Return the positions (n, 3) in the world."""
+        linear, shift = self.frames[..., :3, :3], self.frames[..., :3, 3]
+        result: FloatArray = np.einsum("...ij,...j->...i", linear, self.local) + shift
+        return result
 
 
-@np.errstate(over="ignore", invalid="ignore")  # overflows are reported when the mesh is checked
-def read_gltf(path: Path) -> pv.PolyData:
-    """Read the triangles of the scene in a .gltf or .glb file.
+class Piece(NamedTuple):
+    """Triangles of a primitive."""
+
+    block: int
+    faces: IntArray  # (m, 3) of the vertices of its block
+    material: int | None
+
+
+class _Shown(NamedTuple):
+    """A mesh shown by a node."""
+
+    number: int | None
+    node: dict[str, Any]
+    world: FloatArray
+    joints: list[FloatArray]
+
+
+def scene_of(document: Document) -> tuple[list[Block], list[Piece]]:
+    """Return what the scene of a document shows, in the order of its nodes.
 
     Raises
     ------
     MeshError
-        If a number is out of range, the nodes do not form a forest, a required extension is not
-        supported, or a buffer is outside the folder of the model.
+        If a number is out of range, or the nodes do not form a forest.
     """
-    document = Document(path)
-    _require_supported_extensions(document.json)
-    parts = list(_parts(document))
-    if not parts:
-        raise MeshError("contains no triangles")
-    starts = np.cumsum([0, *(len(part.points) for part in parts)])
-    faces = np.concatenate([p.faces + start for p, start in zip(parts, starts, strict=False)])
-    points = np.concatenate([part.points for part in parts])
-    surface = polydata_of(points, np.full(len(faces), 3), faces.ravel())
-    for name in parts[0].arrays:
-        arrays = [part.arrays[name] for part in parts if name in part.arrays]
-        if len(arrays) == len(parts) and len({each.shape[1:] for each in arrays}) == 1:
-            surface.point_data[name] = np.concatenate(arrays)
-    if "TEXCOORD_0" in surface.point_data:
-        surface.point_data.active_texture_coordinates_name = "TEXCOORD_0"
-    if "NORMAL" in surface.point_data:
-        surface.point_data.active_normals_name = "NORMAL"
-    return surface
-
-
-def _require_supported_extensions(head: dict[str, Any]) -> None:
-    needed = head.get("extensionsRequired", [])
-    if not isinstance(needed, list):
-        raise MeshError("extensionsRequired must be a list")
-    for name in map(str, needed):
-        if name != _SUPPORTED and not name.startswith(_IGNORED):
-            raise MeshError(f"needs the glTF extension {name[:80]}, which is not supported")
-
-
-def _parts(document: Document) -> Iterator[_Part]:
-    """Yield the primitives of every node in the scene, in world coordinates."""
+    blocks: list[Block] = []
+    pieces: list[Piece] = []
     nodes = document.items("nodes")
     children = [_indices(node, "children", f"node {k}", len(nodes)) for k, node in enumerate(nodes)]
     worlds = _worlds(nodes, children)
     if not nodes:
         for k in range(len(document.items("meshes"))):
-            yield from _primitives(document, {"mesh": k}, np.eye(4), [])
+            _add(document, _Shown(None, {"mesh": k}, np.eye(4), []), blocks, pieces)
     for k in _in_scene(document, children):
         node = nodes[k]
         if "mesh" in node:
             matrices = _joints(document, node["skin"], worlds) if "skin" in node else []
-            yield from _primitives(document, node, worlds[k], matrices)
+            _add(document, _Shown(k, node, worlds[k], matrices), blocks, pieces)
+    return blocks, pieces
 
 
 def _indices(where: dict[str, Any], key: str, name: str, end: int) -> list[int]:
@@ -168,37 +160,46 @@ def _joints(document: Document, index: object, worlds: list[FloatArray]) -> list
     return [worlds[k] @ inverse.T for k, inverse in zip(joints, columns, strict=False)]
 
 
-def _primitives(
-    document: Document, node: dict[str, Any], world: FloatArray, joints: list[FloatArray]
-) -> Iterator[_Part]:
-    mesh, name = document.item("meshes", node["mesh"]), f"mesh {node['mesh']}"
+def _add(document: Document, shown: _Shown, blocks: list[Block], pieces: list[Piece]) -> None:
+    """Append the blocks and pieces of a mesh; primitives with the same vertices share a block."""
+    node, index = shown.node, document.index("meshes", shown.node["mesh"])
+    mesh, name = document.item("meshes", index), f"mesh {index}"
+    known: dict[str, int] = {}
     for primitive in objects(mesh, "primitives", name):
         document.spend(_PRIMITIVE)
         mode = whole(primitive, "mode", name, default=_TRIANGLES, most=_FAN)
         attributes = object_(primitive, "attributes", name)
         if mode < _TRIANGLES or "POSITION" not in attributes:
             continue
-        if any(key in object_(primitive, "extensions", name) for key in _COMPRESSED):
+        if any(key in object_(primitive, "extensions", name) for key in COMPRESSED):
             position = document.item("accessors", attributes["POSITION"])
             if "bufferView" not in position:
                 raise MeshError(f"{name} is compressed, which is not supported")
-        points = document.array(attributes["POSITION"], "VEC3").astype(float)
-        faces = _faces(document, primitive, mode, len(points), name)
         targets = objects(primitive, "targets", name)
-        if targets:
+        key = repr((sorted(attributes.items()), targets))
+        if key not in known:
+            known[key] = len(blocks)
+            local = document.array(attributes["POSITION"], "VEC3").astype(float)
             owner = node if "weights" in node else mesh
-            weights = numbers(owner, "weights", name, [0.0] * len(targets))
+            weights = numbers(owner, "weights", name, [0.0] * len(targets)) if targets else []
             for weight, target in zip(weights, targets, strict=True):
                 if weight and "POSITION" in target:
-                    points = points + weight * _attribute(document, target, "POSITION", points)
-        arrays = _arrays(document, attributes, points, world)
-        if joints:
-            points = _skinned(document, attributes, points, joints)
+                    local = local + weight * attribute(document, target, "POSITION", len(local))
+            frames = shown.world
+            if shown.joints:
+                frames = _skinned(document, attributes, len(local), shown.joints)
+            blocks.append(Block(shown.number, index, attributes, local, frames, bool(targets)))
         else:
-            points = points @ world[:3, :3].T + world[:3, 3]
-            if np.linalg.det(world[:3, :3]) < 0:
-                faces = faces[:, ::-1]  # mirrored
-        yield _Part(points, faces, arrays)
+            document.spend(len(blocks[known[key]].local))
+        number = known[key]
+        faces = _faces(document, primitive, mode, len(blocks[number].local), name)
+        if not shown.joints and np.linalg.det(shown.world[:3, :3]) < 0:
+            faces = faces[:, ::-1]  # mirrored
+        material = None
+        if "material" in primitive and document.items("materials"):
+            most = len(document.items("materials")) - 1
+            material = whole(primitive, "material", name, most=most)
+        pieces.append(Piece(number, faces, material))
 
 
 def _faces(
@@ -222,53 +223,31 @@ def _faces(
     return corners.reshape(-1, 3)
 
 
-def _attribute(document: Document, attributes: dict[str, Any], key: str, points: FloatArray) -> Any:
-    """Return the array of an attribute, one row per point."""
+def attribute(document: Document, attributes: dict[str, Any], key: str, count: int) -> Any:
+    """Return the array of an attribute, one row for each of *count* vertices."""
     array = document.array(attributes[key], "SCALAR", "VEC2", "VEC3", "VEC4")
-    if len(array) != len(points):
-        raise MeshError(f"{key} has {len(array)} elements for {len(points)} vertices")
+    if len(array) != count:
+        raise MeshError(f"{key} has {len(array)} elements for {count} vertices")
     if key == "POSITION" and array.shape[1] != 3:
         raise MeshError("a morph target has positions that are not VEC3")
     return array
 
 
-def _arrays(
-    document: Document, attributes: dict[str, Any], points: FloatArray, world: FloatArray
-) -> dict[str, Any]:
-    arrays = {}
-    for key in attributes:
-        if not key.startswith(("NORMAL", "TEXCOORD_", "COLOR_", "_")):
-            continue
-        values = _attribute(document, attributes, key, points)
-        if key == "COLOR_0" and values.shape[1] in (3, 4):
-            colour = np.nan_to_num(values.astype(float)).clip(0.0, 1.0)
-            arrays["RGB" if values.shape[1] == 3 else "RGBA"] = np.rint(255 * colour).astype("u1")
-        elif key == "NORMAL" and values.shape[1] == 3:
-            if abs(np.linalg.det(world[:3, :3])) > 0:
-                rotated = values @ np.linalg.inv(world[:3, :3])
-                length = np.linalg.norm(rotated, axis=1, keepdims=True)
-                arrays[key] = rotated / np.where(length > 0, length, 1.0)
-        elif not key.startswith("NORMAL"):
-            arrays[key] = np.ascontiguousarray(values[:, 0] if values.shape[1] == 1 else values)
-    return arrays
-
-
 def _skinned(
-    document: Document, attributes: dict[str, Any], points: FloatArray, joints: list[FloatArray]
+    document: Document, attributes: dict[str, Any], count: int, joints: list[FloatArray]
 ) -> FloatArray:
-    """Return *points* transformed by the weighted joints."""
-    matrices, result, total = np.array(joints), np.zeros_like(points), np.zeros(len(points))
+    """Return the frames (n, 4, 4) of vertices that follow weighted joints."""
+    matrices, result, total = np.array(joints), np.zeros((count, 4, 4)), np.zeros(count)
     for k in range(len(attributes)):
         keys = f"JOINTS_{k}", f"WEIGHTS_{k}"
         if not set(keys) <= set(attributes):
             break
-        which, weights = (_attribute(document, attributes, key, points) for key in keys)
+        which, weights = (attribute(document, attributes, key, count) for key in keys)
         if which.dtype.kind != "u" or which.shape != weights.shape or which.max() >= len(joints):
             raise MeshError("a skinned mesh refers to joints that do not exist")
         for joint, weight in zip(which.T, weights.astype(float).T, strict=True):
-            moved = np.einsum("nij,nj->ni", matrices[joint, :3, :3], points)
-            result += weight[:, None] * (moved + matrices[joint, :3, 3])
+            result += weight[:, None, None] * matrices[joint]
             total += weight
     if not total.all():
         raise MeshError("a skinned mesh has vertices without a joint")
-    return result / total[:, None]
+    return result / total[:, None, None]

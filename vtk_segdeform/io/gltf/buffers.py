@@ -24,8 +24,8 @@ from urllib.parse import unquote, unquote_to_bytes
 
 import numpy as np
 
-from ..errors import MeshError
-from .referenced_files import file_inside
+from ...errors import MeshError
+from ..referenced_files import file_inside
 
 _TYPES = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -38,8 +38,10 @@ class Document:
 
     Parameters
     ----------
-    path : Path
-        A .gltf or .glb file.
+    data : bytes
+        Content of a .gltf or .glb file.
+    folder : Path, optional
+        Folder of the model, for buffers and images in other files.
 
     Raises
     ------
@@ -47,8 +49,7 @@ class Document:
         If it is not glTF 2.0.
     """
 
-    def __init__(self, path: Path) -> None:
-        data = path.read_bytes()
+    def __init__(self, data: bytes, folder: Path | None = None) -> None:
         text, self._binary = _chunks(data) if data.startswith(_MAGIC) else (data, None)
         try:
             self.json = json.loads(text)
@@ -58,11 +59,16 @@ class Document:
         if not isinstance(asset, dict) or not str(asset.get("version")).startswith("2."):
             raise MeshError("is not glTF 2.0: its asset version is missing or different")
         self.size = len(data)  # total number of bytes read
-        self._folder = path.parent
+        self.data, self._folder = data, folder  # as given
         self._buffers: dict[int, bytes] = {}
         self._arrays: dict[tuple[int, tuple[str, ...]], Any] = {}  # by accessor and allowed types
         self._lists: dict[str, list[dict[str, Any]]] = {}
         self._spent = 0
+
+    @property
+    def is_binary(self) -> bool:
+        """Whether it is a .glb file with a buffer of its own."""
+        return self._binary is not None and "uri" not in (self.items("buffers") or [{}])[0]
 
     def spend(self, elements: int) -> None:
         """Count generated elements; MeshError if they far exceed the size of the file.
@@ -184,13 +190,40 @@ class Document:
                 raise MeshError(f"buffer {number} has a data: URI without data")
             coded = kind.endswith(";base64")
             return base64.b64decode(payload) if coded else unquote_to_bytes(payload)
-        file = file_inside(self._folder, unquote(uri))
+        file = self.file_of(uri)
         if file is None:
             raise MeshError(
                 f"buffer {number} refers to {uri[:200]!r}, which is not a file in the "
                 "model's folder; copy it there"
             )
         return file.read_bytes()
+
+    def file_of(self, uri: str) -> Path | None:
+        """Return the file in the model's folder to which a URI refers; None if there is none."""
+        return file_inside(self._folder, unquote(uri)) if self._folder is not None else None
+
+    def buffer(self, index: int) -> bytes:
+        """Return the bytes of a buffer."""
+        return self._buffer(index)
+
+
+def copied(value: Any) -> Any:
+    """Return a copy of JSON values; MeshError if they are nested too deeply."""
+    try:
+        return json.loads(json.dumps(value))
+    except RecursionError:
+        raise MeshError("its JSON is nested too deeply") from None
+
+
+def glb_of(head: dict[str, Any], binary: bytes) -> bytes:
+    """Return the bytes of a .glb file from its JSON and its only buffer."""
+    text = json.dumps(head, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    binary += b"\0" * (-len(binary) % 4)
+    chunks = struct.pack("<I4s", len(text), _JSON) + text
+    if binary:
+        chunks += struct.pack("<I4s", len(binary), _BINARY) + binary
+    return struct.pack("<4sII", _MAGIC, 2, 12 + len(chunks)) + chunks
 
 
 def _chunks(data: bytes) -> tuple[bytes, bytes | None]:

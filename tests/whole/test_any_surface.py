@@ -1,0 +1,351 @@
+"""Any surface is bent as it is: what was given and what comes back differ in coordinates only.
+
+Seventy surfaces of `any_surface` are bent through a session and compared with what was given, cell
+by cell and array by array.  Doubled points still coincide, the volume is the same wherever there is
+one, and a surface whose mesh is that of a clean original has the pose of the original.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import any_surface
+import numpy as np
+import pytest
+import pyvista as pv
+from any_surface import SPECIMENS, Specimen, triangles
+from numpy.testing import assert_allclose, assert_array_equal
+from solids import rotation
+from zoo import ball, body
+from zoo_operations import bent, ends
+
+import vtk_segdeform as sd
+from vtk_segdeform.geometry import lids_of
+from vtk_segdeform.io.polygons import polygons_of
+
+NAMED = {each.name: each for each in SPECIMENS}
+EACH = pytest.mark.parametrize("specimen", SPECIMENS, ids=[each.name for each in SPECIMENS])
+
+
+@cache
+def surface_of(name: str) -> sd.Surface:
+    return sd.Surface(NAMED[name].make())
+
+
+@cache
+def bent_session(name: str) -> sd.Session:
+    """Return a session of a surface, bent by 30 degrees, with two regions and few cage vertices."""
+    session = sd.Session(surface_of(name))
+    bend(session, min(2, session.mesh.n_vertices))
+    return session
+
+
+def bend(session: sd.Session, n_regions: int, degrees: float = 30.0) -> None:
+    mesh = session.mesh
+    session.segment(n_regions)
+    session.change_options(n_cage_vertices=30 * session.regions.n_regions)
+    session.fit_cages()
+    fixed, handle = ends(mesh)
+    session.set_fixed(np.setdiff1d(fixed, handle))
+    session.add_handle(handle, "end")
+    session.drag({"end": bent(mesh, handle, degrees)}, max_steps=8)
+    session.commit()
+
+
+# Comparison of what was given and what comes back.
+
+
+def same_values(one, two) -> bool:
+    """Return whether two arrays have the same type, shape and values, bit by bit."""
+    one, two = np.asarray(one), np.asarray(two)
+    return (one.dtype, one.shape, one.tobytes()) == (two.dtype, two.shape, two.tobytes())
+
+
+def differences(given: pv.PolyData, moved: pv.PolyData) -> list[str]:
+    """Return all that differs apart from coordinates and the values of normals."""
+    found = [
+        what for what in ("n_points", "n_cells") if getattr(given, what) != getattr(moved, what)
+    ]
+    for what in ("verts", "lines", "faces", "strips"):
+        if not same_values(getattr(given, what), getattr(moved, what)):
+            found.append(what)
+    for kind in ("point_data", "cell_data", "field_data"):
+        one, two = getattr(given, kind), getattr(moved, kind)
+        if list(one.keys()) != list(two.keys()):
+            found.append(f"names of {kind}: {list(one.keys())}, {list(two.keys())}")
+            continue
+        normals = {"Normals", getattr(one, "active_normals_name", None)}
+        for name in one.keys():  # noqa: SIM118 - not a dict
+            a, b = np.asarray(one[name]), np.asarray(two[name])
+            alike = (
+                (a.dtype, a.shape) == (b.dtype, b.shape) if name in normals else same_values(a, b)
+            )
+            if not alike:
+                found.append(f"{kind}[{name!r}]")
+        for active in ("scalars", "vectors", "normals", "texture_coordinates"):
+            name = f"active_{active}_name"
+            if kind != "field_data" and getattr(one, name, None) != getattr(two, name, None):
+                found.append(f"{kind}.{name}")
+    return found
+
+
+def groups(keys) -> np.ndarray:
+    """Return a number for each row, the same for equal rows; NaN equal nothing."""
+    return np.unique(np.asarray(keys), axis=0, return_inverse=True, equal_nan=False)[1].reshape(-1)
+
+
+def used_points(surface: pv.PolyData) -> np.ndarray:
+    """Return the points that polygons and strips use."""
+    return np.unique(polygons_of(surface)[1])
+
+
+def exact_volume(mesh: sd.Mesh, vertices) -> tuple[float, float, float]:
+    """Return the volume under lids at rest and now, and how much rounding may change it."""
+    lids = lids_of(mesh)
+    faces = lids.closed(mesh)
+    if not len(faces):
+        return 0.0, 0.0, 0.0
+    volumes = []
+    for x in (mesh.vertices, vertices):
+        x = lids.extension @ np.asarray(x)
+        x = np.asarray(x, np.longdouble) - x[faces].reshape(-1, 3).mean(axis=0)
+        a, b, c = x[faces].transpose(1, 0, 2)
+        volumes.append((a * np.cross(b, c)).sum() / 6)
+    far = max(np.abs(mesh.vertices).max(), np.abs(vertices).max())
+    return volumes[0], volumes[1], 8 * np.finfo(float).eps * far * mesh.face_areas.sum()
+
+
+# At rest.
+
+
+@EACH
+def test_every_surface_has_a_mesh_and_at_rest_it_is_what_was_given(specimen: Specimen):
+    given = specimen.make()
+    surface = sd.Surface(given)
+    again = surface.moved(surface.mesh.vertices)
+    assert differences(given, again) == []
+    assert_array_equal(np.asarray(again.points, given.points.dtype), given.points)
+    assert differences(specimen.make(), given) == []  # which is not changed
+    if specimen.borders is not None:
+        assert len(surface.mesh.borders) == specimen.borders
+        assert surface.mesh.is_closed == (specimen.borders == 0)
+
+
+def by_position(mesh: sd.Mesh) -> np.ndarray:
+    """Return the triangles as sorted positions (m, 9), each from its lowest corner."""
+    order = np.lexsort((mesh.vertices + 0.0).T[::-1])
+    rank = np.empty(mesh.n_vertices, int)
+    rank[order] = np.arange(mesh.n_vertices)
+    faces = rank[mesh.faces]
+    faces = np.stack([np.roll(row, -row.argmin()) for row in faces])
+    return (mesh.vertices + 0.0)[order][faces[np.lexsort(faces.T[::-1])]].reshape(-1, 9)
+
+
+CLEAN = [each for each in SPECIMENS if each.clean is not None]
+
+
+@pytest.mark.parametrize("specimen", CLEAN, ids=[each.name for each in CLEAN])
+def test_the_mesh_is_that_of_the_clean_original(specimen: Specimen):
+    mesh = surface_of(specimen.name).mesh
+    assert_array_equal(by_position(mesh), by_position(sd.Mesh(*specimen.clean())))
+
+
+# Bent.
+
+
+@EACH
+def test_bent_it_differs_in_coordinates_and_normals_only(specimen: Specimen):
+    session = bent_session(specimen.name)
+    given, moved = surface_of(specimen.name).given, session.deformed
+    assert differences(given, moved) == []
+    assert np.isfinite(session.vertices).all()
+    used = used_points(given)
+    change = np.linalg.norm(moved.points[used] - given.points[used], axis=1)
+    assert np.isfinite(change).all()
+    assert change.max() > 0.02 * session.mesh.diagonal
+    undefined = ~np.isfinite(given.points)
+    assert_array_equal(~np.isfinite(moved.points), undefined)
+    # Points that follow one vertex and were equal are still equal, and so are those of seams.
+    follows = np.column_stack([given.points + 0.0, surface_of(specimen.name).vertex_of])[used]
+    before, after = groups(follows), groups(moved.points[used] + 0.0)
+    assert len(np.unique(np.stack([before, after]), axis=1).T) == before.max() + 1
+    # What a file with triangles would show has no new gap: working vertices at the same place.
+    if specimen in CLEAN:
+        assert groups(given.points[used] + 0.0).max() == before.max() == session.mesh.n_vertices - 1
+
+
+@EACH
+def test_bent_it_has_its_volume_where_it_encloses_one(specimen: Specimen):
+    session = bent_session(specimen.name)
+    rest, now, rounding = exact_volume(session.mesh, session.vertices)
+    assert abs(now - rest) <= max(1e-12 * abs(rest), rounding)
+    assert abs(session.volume_change) <= max(1e-12, float(rounding / rest)) if rest else True
+
+
+@EACH
+def test_no_piece_is_left_behind_or_thrown_out(specimen: Specimen):
+    """Edges change moderately: nothing is torn apart at a seam, fin, wall or border."""
+    session = bent_session(specimen.name)
+    mesh = session.mesh
+    before, after = (
+        np.linalg.norm(x[mesh.edges[:, 0]] - x[mesh.edges[:, 1]], axis=1)
+        for x in (mesh.vertices, session.vertices)
+    )
+    assert after.max() <= 3.0 * before.max() + 0.1 * mesh.diagonal
+    assert np.abs(session.vertices - session.vertices.mean(axis=0)).max() <= 2.0 * mesh.diagonal
+
+
+@cache
+def pose_in_the_common_cage(soup_or_name) -> tuple[sd.Mesh, np.ndarray]:
+    """Return a mesh and its pose, bent by a handle and one cage around the body of the zoo."""
+    if isinstance(soup_or_name, str):
+        mesh = surface_of(soup_or_name).mesh
+    else:
+        mesh = sd.Mesh(*soup_or_name())
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    cage_points, cage_faces = ball()
+    extent = np.maximum(high - low, 0.2 * mesh.diagonal)  # a sheet is flat
+    cage = cage_points / np.ptp(cage_points, axis=0) * 2.0 * extent + 0.5 * (low + high)
+    fixed, handle = ends(mesh)
+    deformer = sd.Deformer(
+        mesh, sd.Regions.single(mesh), [sd.Cage(cage, cage_faces)], fixed=fixed, handle=handle
+    )
+    middle = 0.5 * (low + high)  # unlike the mean of vertices the same to the last bit
+    turned = (mesh.vertices[handle] - middle) @ rotation([0.0, 1.0, 0.0], 0.5).T + middle
+    return mesh, deformer.solve(turned).vertices
+
+
+@pytest.mark.parametrize("specimen", CLEAN, ids=[each.name for each in CLEAN])
+def test_the_pose_is_that_of_the_clean_original_to_rounding(specimen: Specimen):
+    mesh, pose = pose_in_the_common_cage(specimen.name)
+    original, expected = pose_in_the_common_cage(specimen.clean)
+    order, other = (np.lexsort((m.vertices + 0.0).T) for m in (mesh, original))
+    far = np.abs(mesh.vertices).max() / mesh.diagonal
+    assert_allclose(pose[order], expected[other], atol=mesh.diagonal * (1e-7 + 1e-12 * far))
+
+
+# Normals.
+
+SMOOTH = [
+    "texture seam",
+    "quadrilaterals with normals",
+    "inside out, with normals",
+    "seam with normals and fins",
+]
+
+
+@pytest.mark.parametrize("name", [*SMOOTH, "split normals", "cylinder with sharp edges"])
+def test_normals_turn_with_a_rigid_motion(name: str):
+    """Each keeps its side, splits and smoothing, whatever the order and orientation of faces."""
+    surface = surface_of(name)
+    turn = rotation([1.0, 2.0, 3.0], 0.7)
+    moved = surface.moved(surface.mesh.vertices @ turn.T)
+    before, after = (np.asarray(x.point_data["Normals"], float) for x in (surface.given, moved))
+    assert_allclose(np.linalg.norm(after, axis=1), 1.0, atol=1e-6)
+    cosines = np.einsum("ij,ij->i", before @ turn.T, after)
+    assert cosines.min() > 0.9, f"{np.degrees(np.arccos(cosines.min())):.0f} degrees"
+    key = np.column_stack([surface.given.points, np.round(before, 5)]) + 0.0
+    where = groups(key)  # one place and one normal: still one normal
+    for pick in np.unique(where):
+        assert np.ptp(after[where == pick], axis=0).max() < 1e-5
+    if "Normals" in surface.given.cell_data:
+        faces = surface.given.cell_data["Normals"] @ turn.T
+        assert_allclose(moved.cell_data["Normals"], faces, atol=1e-5)
+
+
+# Ids of what was given.
+
+
+@EACH
+def test_values_at_given_points_and_at_vertices_are_inverse(specimen: Specimen):
+    surface = surface_of(specimen.name)
+    values = np.random.default_rng(0).normal(size=surface.mesh.n_vertices)
+    assert_array_equal(surface.at_vertices(surface.at_points(values)), values)
+    some = np.arange(surface.given.n_points) % 3 == 0
+    assert_array_equal(surface.vertices_at(some), np.unique(surface.vertex_of[some]))
+
+
+@EACH
+def test_workarounds_are_sentences_about_points_of_what_was_given(specimen: Specimen):
+    surface = surface_of(specimen.name)
+    for each in surface.workarounds:
+        assert 5 < len(each.text) < 120
+        assert each.text == str(each)
+        assert len(each.points)
+        assert each.points.min() >= 0
+        assert each.points.max() < surface.given.n_points
+    given = surface.given
+    used = len(used_points(given))
+    changed = surface.mesh.n_vertices != given.n_points or used != given.n_points or specimen.turned
+    assert bool(surface.workarounds) or not changed
+
+
+# Files.
+
+DOUBLE = [".ply", ".obj", ".off", ".vtp", ".vtk", ".vtkhdf"]
+FILED = [
+    "triangle soup", "concave polygons", "12 holes", "row of fins", "several parts, some open",
+    "seam, flipped patch, holes and quadrilaterals",
+]  # fmt: skip
+# Points in no cell, NaN, strips and lines cannot be stored by every format.
+NOT_FILED = {
+    "strips", "lines and vertices", "NaN in unused points", "polygons, strips, lines and vertices",
+    "seams, arrays, holes and unused points", "flat and degenerate faces",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("suffix", DOUBLE)
+@pytest.mark.parametrize("name", FILED)
+def test_a_file_has_the_same_polygons_and_the_same_mesh(tmp_path, name, suffix):
+    written_and_read(tmp_path, name, suffix)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("suffix", DOUBLE)
+@pytest.mark.parametrize("name", sorted(NAMED.keys() - NOT_FILED))
+def test_a_file_of_any_surface_has_the_same_mesh(tmp_path, name, suffix):
+    written_and_read(tmp_path, name, suffix)
+
+
+def written_and_read(tmp_path, name: str, suffix: str) -> None:
+    surface = surface_of(name)
+    path = tmp_path / f"a{suffix}"
+    surface.write(path, surface.mesh.vertices)
+    again = sd.Surface.read(path)
+    assert_array_equal(again.given.points, surface.given.points)
+    assert_array_equal(again.given.faces, surface.given.faces)
+    assert_array_equal(by_position(again.mesh), by_position(surface.mesh))
+    assert again.mesh.is_closed == surface.mesh.is_closed
+    session = bent_session(name)
+    again.write(path, session.vertices)
+    assert_array_equal(sd.Surface.read(path).given.points, session.deformed.points)
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".glb"])
+@pytest.mark.parametrize("name", FILED)
+def test_a_file_in_single_precision_has_the_same_triangles(tmp_path, name, suffix):
+    surface = surface_of(name)
+    path = tmp_path / f"a{suffix}"
+    surface.write(path, surface.mesh.vertices)
+    again = sd.Surface.read(path)
+    assert again.mesh.n_vertices == surface.mesh.n_vertices
+    assert again.mesh.n_faces == surface.mesh.n_faces
+    assert len(again.mesh.borders) == len(surface.mesh.borders)
+    session = bent_session(name)
+    surface.write(path, session.vertices)
+    assert sd.Surface.read(path).mesh.n_faces == surface.mesh.n_faces
+
+
+def test_planted_differences_are_found():
+    given = any_surface.with_arrays(triangles(body()))
+    for name, plant in {
+        "faces": lambda x: setattr(x, "faces", x.faces[4:]),
+        "a value": lambda x: x.point_data.__setitem__("a i4", x.point_data["a i4"] + 1),
+        "an array": lambda x: x.cell_data.remove("a f4"),
+        "a type": lambda x: x.cell_data.__setitem__("a f4", x.cell_data["a f4"].astype(float)),
+        "active": lambda x: setattr(x.point_data, "active_scalars_name", "a i4"),
+    }.items():
+        other = given.copy()
+        plant(other)
+        assert differences(given, other), name
+    assert not differences(given, given.copy())

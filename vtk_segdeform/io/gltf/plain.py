@@ -1,0 +1,168 @@
+"""A new glTF document of any surface.
+
+points      positions in single precision; normals, texture coordinates, "RGB" or "RGBA", and
+arrays whose names begin with "_"
+corners     "TextureCorners" and "NormalCorners": points are doubled where these differ
+cells       triangles; those of one "Material" are one primitive
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from ...arrays import IntArray
+from ...errors import MeshError
+from ..array_names import get_names, warn_left_out
+from ..moving import CORNER_NORMALS
+from ..polygons import cells_of, corner_values, cut_into_triangles, polygons_of
+from .reading import DOCUMENT
+
+_log = logging.getLogger(__name__)
+_CORNER_TEXTURE = "TextureCorners"
+_FLOAT, _BYTE, _INDEX = 5126, 5121, 5125
+_TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+_LARGEST = 3e38
+
+
+def plain_document(surface: pv.PolyData) -> tuple[dict[str, Any], bytes]:
+    """Return the JSON and the buffer of a document with one node that shows *surface*."""
+    counts, corners = polygons_of(surface)
+    points = np.asarray(surface.points, dtype=float)
+    if not (np.abs(points) < _LARGEST).all():
+        raise MeshError("has positions that glTF cannot store: NaN, infinite or over 3e38")
+    kept: dict[str, list[str]] = {"point": [], "cell": [], "field": [DOCUMENT]}
+    attributes, of_corner = _vertices(surface, counts, corners, points, kept)
+    slots, polygon = cut_into_triangles(points[corners], counts, np.arange(len(corners)))
+    if len(polygon) > len(counts):
+        _log.warning("glTF has no polygons: they are cut into triangles")
+    material, names = _materials(surface, kept)
+    warn_left_out("glTF", surface, kept)
+    numbers = material[cells_of(surface)][polygon] if names else np.zeros(len(slots), dtype=int)
+    document = _Document()
+    accessors = {name: document.vertices(name, values) for name, values in attributes.items()}
+    primitives = []
+    for number in np.unique(numbers):
+        faces = of_corner[slots[numbers == number]]
+        primitive = {"attributes": accessors, "indices": document.indices(faces)}
+        primitives.append(primitive | ({"material": int(number)} if names else {}))
+    document.head["meshes"] = [{"primitives": primitives}]
+    if names:
+        document.head["materials"] = [{"name": name} for name in names]
+    return document.head, bytes(document.binary)
+
+
+def _vertices(
+    surface: pv.PolyData, counts: IntArray, corners: IntArray, points: Any, kept: Any
+) -> tuple[dict[str, Any], IntArray]:
+    """Return the attributes of the vertices, by name, and the vertex of each corner."""
+    attributes = {"POSITION": points.astype("f4"), **_point_arrays(surface, kept["point"])}
+    rows = cells_of(surface)
+    each = {}
+    for key, name, width in ((_CORNER_TEXTURE, "TEXCOORD_0", 2), (CORNER_NORMALS, "NORMAL", 3)):
+        wide = surface.cell_data.get(key)
+        values = None if wide is None else corner_values(np.asarray(wide)[rows], counts, width)
+        if values is not None:
+            each[name] = np.nan_to_num(values).astype("f4")
+            kept["cell"].append(key)
+    if not each:
+        return attributes, corners
+    if "TEXCOORD_0" in each:
+        each["TEXCOORD_0"][:, 1] = 1.0 - each["TEXCOORD_0"][:, 1]
+    table = np.column_stack([corners, *each.values()])
+    _, first, of_corner = np.unique(table, axis=0, return_index=True, return_inverse=True)
+    attributes = {name: values[corners[first]] for name, values in attributes.items()}
+    attributes |= {name: values[first] for name, values in each.items()}
+    return attributes, of_corner.ravel()
+
+
+def _point_arrays(surface: pv.PolyData, kept: list[str]) -> dict[str, Any]:
+    data, found = surface.point_data, dict[str, Any]()
+    for name in dict.fromkeys((data.active_normals_name, "Normals", "NORMAL")):
+        values = data.get(name) if name else None
+        if "NORMAL" not in found and values is not None and values.shape[1:] == (3,):
+            lengths = np.linalg.norm(np.asarray(values, dtype=float), axis=1)
+            if np.isfinite(lengths).all() and (lengths > 0).all():  # as glTF requires
+                found["NORMAL"] = (np.asarray(values) / lengths[:, None]).astype("f4")
+                kept.append(str(name))
+    texture = surface.active_texture_coordinates
+    if texture is not None and texture.ndim == 2 and texture.shape[1] >= 2:
+        name = str(data.active_texture_coordinates_name)
+        pairs = np.nan_to_num(np.asarray(texture, dtype=float)[:, :2])
+        if not name.startswith("TEXCOORD_"):  # of which v begins at the top
+            pairs = np.stack([pairs[:, 0], 1.0 - pairs[:, 1]], axis=1)
+        found["TEXCOORD_0"] = pairs.astype("f4")
+        kept.append(name)
+    for name, width in (("RGBA", 4), ("RGB", 3)):
+        values = data.get(name)
+        if values is None or values.dtype != np.uint8 or values.shape[1:] != (width,):
+            continue
+        if "COLOR_0" not in found:
+            found["COLOR_0"] = np.asarray(values)
+            kept.append(name)
+    for name in list(data.keys()):
+        values = np.asarray(data[name])
+        if not name.startswith("_") or name in kept or values.dtype.kind not in "biuf":
+            continue
+        numbers = values.reshape(len(values), -1).astype("f4")
+        if numbers.shape[1] in _TYPES and np.array_equal(numbers, values.reshape(numbers.shape)):
+            found[name] = numbers
+            kept.append(name)
+    return found
+
+
+def _materials(surface: pv.PolyData, kept: dict[str, list[str]]) -> tuple[Any, list[str]]:
+    """Return the material of each cell, and the names; none if there are no materials."""
+    names, values = get_names(surface, "MaterialNames"), surface.cell_data.get("Material")
+    if not names or values is None or values.ndim != 1 or values.dtype.kind not in "iu":
+        return None, []
+    if len(values) and not 0 <= values.min() <= values.max() < len(names):
+        return None, []
+    kept["cell"].append("Material")
+    kept["field"].append("MaterialNames")
+    return np.asarray(values), names
+
+
+class _Document:
+    """A document in the making."""
+
+    def __init__(self) -> None:
+        self.binary = bytearray()
+        self.head: dict[str, Any] = {
+            "asset": {"version": "2.0", "generator": "vtk_segdeform"},
+            "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+            "buffers": [{}], "bufferViews": [], "accessors": [],
+        }  # fmt: skip
+
+    def vertices(self, name: str, values: Any) -> int:
+        """Append an attribute; return its accessor."""
+        accessor: dict[str, Any] = {"componentType": _FLOAT}
+        view, stored = {"target": 34962}, values
+        if values.dtype == np.uint8:
+            accessor = {"componentType": _BYTE, "normalized": True}
+            stored = np.zeros((len(values), 4), dtype="u1")  # rows of four bytes
+            stored[:, : values.shape[1]] = values
+            view["byteStride"] = 4
+        if name == "POSITION":
+            accessor |= {"min": values.min(axis=0).astype(float).tolist()}
+            accessor |= {"max": values.max(axis=0).astype(float).tolist()}
+        accessor |= {"type": _TYPES[values.shape[1]], "count": len(values)}
+        return self._add(accessor, view, stored)
+
+    def indices(self, faces: IntArray) -> int:
+        """Append triangles; return their accessor."""
+        corners = faces.ravel().astype("<u4")
+        accessor = {"componentType": _INDEX, "type": "SCALAR", "count": len(corners)}
+        return self._add(accessor, {"target": 34963}, corners)
+
+    def _add(self, accessor: dict[str, Any], view: dict[str, Any], values: Any) -> int:
+        view |= {"buffer": 0, "byteOffset": len(self.binary), "byteLength": values.nbytes}
+        self.binary += values.tobytes()
+        self.head["buffers"][0]["byteLength"] = len(self.binary)
+        self.head["bufferViews"].append(view)
+        accessor["bufferView"] = len(self.head["bufferViews"]) - 1
+        self.head["accessors"].append(accessor)
+        return len(self.head["accessors"]) - 1
