@@ -6,9 +6,6 @@ import numpy as np
 import pyvista as pv
 from solids import icosphere
 
-from vtk_segdeform import Surface
-from vtk_segdeform.mesh import Workaround
-
 
 def polydata(points, triangles) -> pv.PolyData:
     """Return triangles as a PolyData."""
@@ -43,24 +40,3 @@ def split_at_seam(level: int = 3) -> pv.PolyData:
     halves = np.where(upper[:, None], faces, faces + len(points))
     used, halves = np.unique(halves, return_inverse=True)
     return polydata(np.concatenate([points, points])[used], halves.reshape(-1, 3))
-
-
-class Told(Surface):
-    """A surface with one more workaround: a sentence and the given points concerned."""
-
-    def __init__(self, given: pv.PolyData, text: str, points: np.ndarray) -> None:
-        super().__init__(given)
-        self._told = Workaround(text, points)
-
-    @property
-    def workarounds(self) -> tuple[Workaround, ...]:
-        return (*super().workarounds, self._told)
-
-
-def seam() -> Told:
-    """Return a ball of two halves whose doubled points are said to be welded."""
-    given = split_at_seam()
-    surface = Surface(given)
-    count = np.bincount(surface.vertex_of)
-    points = np.flatnonzero(count[surface.vertex_of] > 1)
-    return Told(given, f"welded {len(points)} seam points", points)
