@@ -93,7 +93,7 @@ def test_a_mesh_without_area_has_zero_normals(coordinate):
 
 def cut_ball() -> Mesh:
     """Return a ball with five holes."""
-    points, faces = icosphere(4)
+    points, faces = icosphere(5)
     spots = points[[0, 1, 2, 3, 700]]
     near = np.linalg.norm(points[faces].mean(axis=1)[:, None] - spots, axis=2).min(axis=1) < 0.3
     used, kept = np.unique(faces[~near], return_inverse=True)

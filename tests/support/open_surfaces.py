@@ -40,3 +40,19 @@ def split_at_seam(level: int = 3) -> pv.PolyData:
     halves = np.where(upper[:, None], faces, faces + len(points))
     used, halves = np.unique(halves, return_inverse=True)
     return polydata(np.concatenate([points, points])[used], halves.reshape(-1, 3))
+
+
+def moebius(n: int = 160, m: int = 8) -> pv.PolyData:
+    """Return a strip with one side: *n* quadrilaterals around, *m* points across."""
+    around, across = np.meshgrid(
+        np.arange(n) / n * 2.0 * np.pi, np.linspace(-0.4, 0.4, m), indexing="ij"
+    )
+    out = 1.0 + across * np.cos(0.5 * around)
+    points = np.stack(
+        [out * np.cos(around), out * np.sin(around), across * np.sin(0.5 * around)], axis=-1
+    )
+    ids = np.arange(n * m).reshape(n, m)
+    ids = np.vstack([ids, ids[:1, ::-1]])  # the last row is the first one, turned over
+    a, b, c, d = ids[:-1, :-1], ids[:-1, 1:], ids[1:, 1:], ids[1:, :-1]
+    triangles = np.stack([a, d, b, b, d, c], axis=-1).reshape(-1, 3)
+    return polydata(points.reshape(-1, 3), triangles)
