@@ -89,3 +89,39 @@ def test_a_mesh_without_area_has_zero_normals(coordinate):
     mesh = MESHES["sphere"]
     normals = VertexNormals(mesh).of(np.full(mesh.vertices.shape, coordinate))
     assert_array_equal(normals, np.zeros(mesh.vertices.shape))
+
+
+def cut_ball() -> Mesh:
+    """Return a ball with five holes."""
+    points, faces = icosphere(5)
+    spots = points[[0, 1, 2, 3, 700]]
+    near = np.linalg.norm(points[faces].mean(axis=1)[:, None] - spots, axis=2).min(axis=1) < 0.3
+    used, kept = np.unique(faces[~near], return_inverse=True)
+    return Mesh(points[used], kept.reshape(-1, 3))
+
+
+def finned_ball() -> Mesh:
+    """Return a ball with a fin, at an edge with three faces, and another ball at one vertex."""
+    points, faces = icosphere(4)
+    n, edge = len(points), faces[0, :2]
+    fin = [[edge[0], edge[1], 2 * n - 1]]
+    top, bottom = points[:, 2].argmax(), points[:, 2].argmin()
+    other = np.arange(n) + n
+    other[bottom], other[np.arange(n) > bottom] = top, other[np.arange(n) > bottom] - 1
+    aside = (points - points[bottom]) @ rotation((1.0, 0.0, 0.0), 1.5).T + points[top]
+    apart = np.delete(aside, bottom, axis=0)
+    tip = 1.5 * points[edge].mean(axis=0)
+    return Mesh(np.vstack([points, apart, tip]), np.vstack([faces, other[faces], fin]))
+
+
+@pytest.mark.usefixtures("either")
+@pytest.mark.parametrize("make", [cut_ball, finned_ball])
+def test_at_borders_and_non_manifold_vertices_they_are_sums_over_the_faces(make):
+    mesh = make()
+    x = posed(mesh)
+    expected = np.zeros_like(x)
+    a, b, c = x[mesh.faces.T]
+    for corner in mesh.faces.T:
+        np.add.at(expected, corner, np.cross(b - a, c - a))
+    expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+    assert_allclose(VertexNormals(mesh).of(x), expected, atol=1e-6)

@@ -10,10 +10,12 @@ import hashlib
 import os
 import signal
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
 from qt_hands import Qt, QtCore, QtHand, QtTest, QtWidgets, application, until
+from qtpy import QtGui
 from scenes import sausage
 
 import pyvistaqt  # isort: skip
@@ -185,6 +187,23 @@ def _click(menu, action):
 def slots(folder: Path) -> list[Path]:
     """Return the current autosave files beside the settings in *folder*."""
     return sorted((folder / "unsaved").glob("*/session.segdeform"))
+
+
+def drop(hand, *paths):
+    """Drag files over the centre of the window and drop them, by system events."""
+    mime, window = QtCore.QMimeData(), hand.window.windowHandle()
+    mime.setUrls([QtCore.QUrl.fromLocalFile(str(path)) for path in paths])
+    place = QtCore.QPoint(window.width() // 3, window.height() // 2)
+    about = Qt.CopyAction, mime, Qt.LeftButton, Qt.NoModifier
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # Qt prefers a QPointF
+        enter = QtGui.QDragEnterEvent(place, *about)
+    application().sendEvent(window, enter)
+    if enter.isAccepted():
+        assert hand.window.pages.start.target.is_highlighted
+        application().sendEvent(window, QtGui.QDropEvent(QtCore.QPointF(place), *about))
+    application().processEvents()
+    return enter.isAccepted()
 
 
 def settings_in(folder: Path):

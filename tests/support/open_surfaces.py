@@ -6,9 +6,6 @@ import numpy as np
 import pyvista as pv
 from solids import icosphere
 
-from vtk_segdeform import Surface
-from vtk_segdeform.mesh import Workaround
-
 
 def polydata(points, triangles) -> pv.PolyData:
     """Return triangles as a PolyData."""
@@ -45,22 +42,17 @@ def split_at_seam(level: int = 3) -> pv.PolyData:
     return polydata(np.concatenate([points, points])[used], halves.reshape(-1, 3))
 
 
-class Told(Surface):
-    """A surface with one more workaround: a sentence and the given points concerned."""
-
-    def __init__(self, given: pv.PolyData, text: str, points: np.ndarray) -> None:
-        super().__init__(given)
-        self._told = Workaround(text, points)
-
-    @property
-    def workarounds(self) -> tuple[Workaround, ...]:
-        return (*super().workarounds, self._told)
-
-
-def seam() -> Told:
-    """Return a ball of two halves whose doubled points are said to be welded."""
-    given = split_at_seam()
-    surface = Surface(given)
-    count = np.bincount(surface.vertex_of)
-    points = np.flatnonzero(count[surface.vertex_of] > 1)
-    return Told(given, f"welded {len(points)} seam points", points)
+def moebius(n: int = 160, m: int = 8) -> pv.PolyData:
+    """Return a strip with one side: *n* quadrilaterals around, *m* points across."""
+    around, across = np.meshgrid(
+        np.arange(n) / n * 2.0 * np.pi, np.linspace(-0.4, 0.4, m), indexing="ij"
+    )
+    out = 1.0 + across * np.cos(0.5 * around)
+    points = np.stack(
+        [out * np.cos(around), out * np.sin(around), across * np.sin(0.5 * around)], axis=-1
+    )
+    ids = np.arange(n * m).reshape(n, m)
+    ids = np.vstack([ids, ids[:1, ::-1]])  # the last row is the first one, turned over
+    a, b, c, d = ids[:-1, :-1], ids[:-1, 1:], ids[1:, 1:], ids[1:, :-1]
+    triangles = np.stack([a, d, b, b, d, c], axis=-1).reshape(-1, 3)
+    return polydata(points.reshape(-1, 3), triangles)

@@ -57,6 +57,7 @@ GRANTED = {
     "widgets.qt": VTK | {"qtpy"},
     "widgets.qt.widget": {"pyvista", "pyvistaqt"},
     "widgets.app": VTK | {"qtpy"},
+    "widgets.app.repair_preview": {"pyvista", "pyvistaqt"},
     "benchmarks.cage_making": VTK | {"igl", "gpytoolbox"},
     "benchmarks.charts": {"matplotlib"},
     "benchmarks.drawing": VTK,

@@ -7,7 +7,8 @@ it is the direction of
     sum_k (x_k - x) x (x_{k+1} - x)
 
 The rings of neighbours are computed once.  Each vertex depends on its own ring only, so the loop
-over vertices runs in parallel.
+over vertices runs in parallel.  At borders and non-manifold vertices, which have no such ring, the
+normals of the faces are summed.
 """
 
 from __future__ import annotations
@@ -53,12 +54,28 @@ class VertexNormals:
                 kernels.ring_normals(out, *arguments, self._scale, first, last)
 
             in_parallel(work, self._n, size)
+            vertices, faces, around = self._open
+            if len(vertices):
+                out[vertices] = self._summed(x, faces, around)
             return out
-        a, b, c = (np.take(x, corner, axis=0) * self._scale for corner in self._faces.T)
-        normals = self._around @ np.cross(b - a, c - a)
-        length = np.linalg.norm(normals, axis=1, keepdims=True)
-        out[:] = np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), 0.0)
+        out[:] = self._summed(x, self._faces, self._around)
         return out
+
+    def _summed(self, x: FloatArray, faces: IntArray, around: sparse.csr_array) -> FloatArray:
+        """Return the unit sums of the normals of *faces*, as *around* has them at vertices."""
+        a, b, c = (np.take(x, corner, axis=0) * self._scale for corner in faces.T)
+        normals = around @ np.cross(b - a, c - a)
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        return np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), 0.0)
+
+    @cached_property
+    def _open(self) -> tuple[IntArray, IntArray, sparse.csr_array]:
+        """The vertices without a closed ring, the faces at them, and `_around` of both."""
+        ring, starts = self._rings
+        vertices = np.flatnonzero(ring[starts[:-1]] == np.arange(self._n))
+        around = self._around[vertices] if len(vertices) else sparse.csr_array((0, 0))
+        faces = np.unique(around.indices)
+        return vertices, self._faces[faces], around[:, faces]
 
     @cached_property
     def _rings(self) -> tuple[NDArray[np.int32], IntArray]:

@@ -11,6 +11,8 @@ The files, in reading order:
     saving        saving, and the questions asked before
     dialogs       the dialogs
     menus         the menus
+    repairing repair_dialog repair_preview
+                  repair and open: a closed copy of the surface as a new document
     drops         files dropped on the window
     recent        recent files
     autosaver     when to autosave

@@ -9,27 +9,22 @@ from __future__ import annotations
 import gc
 from typing import Any
 
-import numpy as np
-import pyvista as pv
-import pyvistaqt
 from qtpy import QtCore, QtWidgets
 
 from vtk_segdeform.io import repair_surface
 from vtk_segdeform.mesh import Mesh, counted
 from vtk_segdeform.mesh_repair import Repair
-from vtk_segdeform.pictures import BODY, COLOURS, PAPER, rgb
 from vtk_segdeform.progress import Progress
 
 from ..editor import Job, error_text
-from ..scene import Highlights, View
 from .qt_timer import qt_timer
+from .repair_preview import Preview
 
 _DELAY = 300  # milliseconds between a change of the settings and the repair
 _PERIOD = 30  # milliseconds between two polls of the job
 _MOST_EDGES, _USUAL_EDGES = 1_000_000, 100
-_NEW = COLOURS[0]  # of faces that fill holes
 _DELETE = QtCore.QEvent.Type.DeferredDelete
-_Result = tuple[pv.PolyData, Repair]
+_Result = tuple[Any, Repair]  # the surface is a pyvista.PolyData
 
 
 class RepairDialog(QtWidgets.QDialog):
@@ -52,13 +47,13 @@ class RepairDialog(QtWidgets.QDialog):
         The result, once it has been computed.
     """
 
-    def __init__(self, given: pv.PolyData, mesh: Mesh, camera: Any, parent: Any) -> None:
+    def __init__(self, given: Any, mesh: Mesh, camera: Any, parent: Any) -> None:
         super().__init__(parent)
         self.setWindowTitle("Repair and open")
-        self.repaired: pv.PolyData | None = None
+        self.repaired: Any = None
         self._given = given
         self._job: Job[_Result] | None = None
-        self.preview = _Preview(given, mesh, camera, self)
+        self.preview = Preview(given, mesh, camera, self)
         self.before, self.after = (QtWidgets.QRadioButton(text) for text in ("Before", "After"))
         self.before.setChecked(True)
         self.after.setEnabled(False)
@@ -174,7 +169,7 @@ class RepairDialog(QtWidgets.QDialog):
         self.bar.show()
         self.accepting.setEnabled(False)
 
-    def _show(self, repaired: pv.PolyData, done: Repair) -> None:
+    def _show(self, repaired: Any, done: Repair) -> None:
         self._job, self.repaired = None, repaired
         self.bar.hide()
         self.steps.clear()
@@ -197,63 +192,6 @@ class RepairDialog(QtWidgets.QDialog):
         self.steps.addItem(error_text(error))
         self.before.setChecked(True)
         self.after.setEnabled(False)
-
-
-class _Preview:
-    """A view of the surface before and after, with the holes outlined."""
-
-    def __init__(self, given: pv.PolyData, mesh: Mesh, camera: Any, parent: Any) -> None:
-        self.plotter = pyvistaqt.QtInteractor(parent, auto_update=False, off_screen=False)
-        self.plotter.setAcceptDrops(False)
-        self.plotter.set_background(PAPER)
-        self._mesh = mesh
-        self._before = self._add(given, None)
-        self._after: Any = None
-        self._is_after = False
-        self._marks = Highlights(View.of(self.plotter))
-        self._outline()
-        mine = self.plotter.camera
-        mine.SetPosition(*camera.GetPosition())
-        mine.SetFocalPoint(*camera.GetFocalPoint())
-        mine.SetViewUp(*camera.GetViewUp())
-        self.plotter.reset_camera()
-
-    def set_result(self, done: Repair) -> None:
-        """Set the surface after the repair; the faces that fill holes have another colour."""
-        if self._after is not None:
-            self.plotter.remove_actor(self._after, reset_camera=False)
-        colours = np.tile(rgb(BODY), (len(done.faces), 1))
-        colours[done.face_map < 0] = rgb(_NEW)
-        self._after = self._add(pv.PolyData.from_regular_faces(done.vertices, done.faces), colours)
-        self.show_after(self._is_after)
-
-    def show_after(self, is_after: bool) -> None:
-        """Show the surface after or before the repair."""
-        self._is_after = is_after
-        self._before.visibility = not is_after
-        if self._after is not None:
-            self._after.visibility = is_after
-        self._outline()
-        self.plotter.render()
-
-    def close(self) -> None:
-        """Release the view."""
-        self._marks.hide()
-        self._marks.view.remove_foreground()
-        self.plotter.close()
-
-    def _outline(self) -> None:
-        if self._is_after:
-            self._marks.hide()
-        else:
-            none = np.empty(0, dtype=np.int64)
-            self._marks.show(self._mesh.vertices, self._mesh.borders, none)
-
-    def _add(self, surface: pv.PolyData, colours: Any) -> Any:
-        return self.plotter.add_mesh(
-            surface, color=BODY, scalars=colours, rgb=colours is not None, ambient=0.25,
-            smooth_shading=False, reset_camera=False, show_scalar_bar=False,
-        )  # fmt: skip
 
 
 def _remaining(holes: tuple[int, ...]) -> str:

@@ -8,8 +8,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import pyvista as pv
-
 from vtk_segdeform.io import Surface, to_polydata
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
@@ -33,7 +31,7 @@ def ask_repair(window: Any) -> Request | None:
     return None if repaired is None else _request(window.document, repaired)
 
 
-def _request(document: Document, repaired: pv.PolyData) -> Request:
+def _request(document: Document, repaired: Any) -> Request:
     stem = Path(document.name).stem.removesuffix(" (repaired)")
     name = f"{stem} (repaired)"
     source = document.source

@@ -16,7 +16,6 @@ from vtk_segdeform.regions import Regions
 from vtk_segdeform.regions import segment as segment_mesh
 
 from ..region_selector import Paint, Tool
-from ..scene import enclosure_of
 from .controller import Controller
 from .mode import Mode
 
@@ -138,8 +137,8 @@ def toggle_overlay(controller: Controller) -> None:
 def toggle_volume(controller: Controller) -> None:
     """Turn volume preservation on or off."""
     session = controller.session
-    if not enclosure_of(session).has_volume:
-        raise SessionError("An open sheet encloses no volume: there is none to preserve")
+    if not session.has_volume:
+        raise SessionError(session.volume_summary)
     session.change_options(preserve_volume=not session.options.preserve_volume)
     is_on = session.options.preserve_volume
     controller.say(f"Volume preservation {'on from the next move' if is_on else 'off'}")

@@ -9,7 +9,6 @@ from vtk_segdeform.session import Session, region_name
 from vtk_segdeform.solver import Status
 
 from ..region_selector import Paint, Tool
-from ..scene import NO_VOLUME, enclosure_of
 from ..volume_overlay import brief, signed
 from .mode import Mode
 from .widget_set import WidgetSet
@@ -65,11 +64,10 @@ def _deform_hint(widgets: WidgetSet) -> str:
     session = widgets.session
     if session.is_dragging:
         volume = f"Volume {signed(100.0 * session.volume_change, 2)} %"
-        if not enclosure_of(session).has_volume:
-            volume = NO_VOLUME
+        if not session.has_volume:
+            volume = "No volume to preserve"
         return f"{volume} · Esc to cancel"
-    has_volume = enclosure_of(session).has_volume
-    if has_volume and not (
+    if session.has_volume and not (
         session.options.preserve_volume or session.options.preserve_region_volumes
     ):
         return "Move or rotate a handle · Volume preservation off (P to turn on)"

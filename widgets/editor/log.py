@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from vtk_segdeform.session import Change, Effort, Session
 from vtk_segdeform.solver import Solution
 
-from ..scene import enclosure_of
 from ..volume_overlay import percent
 
 LIMIT = 200
@@ -140,7 +139,7 @@ class Log:
 
 
 def _volume_change(session: Session) -> float | None:
-    return session.volume_change if enclosure_of(session).has_volume else None
+    return session.volume_change if session.has_volume else None
 
 
 def _percent(share: float) -> str:

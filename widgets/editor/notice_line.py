@@ -14,6 +14,7 @@ from .wrapping import letter_size, wrapped
 _PAPER, _LETTERS = "#2B2F36", "#FFFFFF"  # contrast 13 to 1
 _BUTTON, _POINTED, _INK = "#8CC4EA", "#FFFFFF", "#14181D"  # contrasts above 9 to 1
 _LINES = 2
+_SMALLER = 0.85  # than the status line
 _MOST = 0.96  # of the width of the window
 
 
@@ -90,7 +91,7 @@ class NoticeLine:
         text, labels = self._content
         for button in self._buttons:
             button.remove()
-        size = letter_size(width, height)
+        size = max(11.0, _SMALLER * letter_size(width, height))
         self._buttons = [_Button(self.view.foreground, label, size) for label in labels]
         gap, left, bottom = 0.5 * size, 0.6 * size, self._foot() + 0.6 * size
         aside = sum(button.width + gap for button in self._buttons)

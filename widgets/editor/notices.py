@@ -1,6 +1,6 @@
 """Notices: how the mesh that is deformed differs from what was given, and where.
 
-    12 holes: volume kept under lids · welded 242 seam points    [Show] [x]
+    12 holes: volume preserved under lids; welded 242 seam points    [Show] [x]
 
 The line is drawn at the lower left of a view, above the status line.  A click on Show marks the
 places on the model, a second one removes the marks; x closes the line.  It also disappears with the
@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from vtk_segdeform.arrays import IntArray
-from vtk_segdeform.mesh import counted
+from vtk_segdeform.mesh import Kind
 from vtk_segdeform.session import Change, Session
 
-from ..scene import Highlights, Stop, View, enclosure_of
+from ..scene import Highlights, Stop, View
 from .notice_line import NoticeLine
 
 _ABOVE_WIDGETS = 1.5  # priority: our widgets have 1
@@ -44,19 +44,8 @@ def notices_of(session: Session) -> tuple[Notice, ...]:
 
 
 def _of_borders(session: Session) -> list[Notice]:
-    found, said = enclosure_of(session), []
-    if found.holes:
-        lids = "a lid" if len(found.holes) == 1 else "lids"
-        text = f"{counted(len(found.holes), 'hole', 'holes')}: volume kept under {lids}"
-        said.append(Notice(text, found.holes))
-    if found.sheets and session.options.lids is False:
-        holes = counted(len(found.sheets), "hole", "holes")
-        said.append(Notice(f"{holes}: no volume without lids", found.sheets))
-    elif found.sheets:
-        sheets = "open sheet" if found.n_sheets == 1 else f"{found.n_sheets} open sheets"
-        volume = "not part of the volume" if found.has_volume else "no volume to preserve"
-        said.append(Notice(f"{sheets}: {volume}", found.sheets))
-    return said
+    borders = session.mesh.borders
+    return [Notice(session.volume_summary, tuple(borders))] if len(borders) else []
 
 
 def _of_workarounds(session: Session) -> list[Notice]:
@@ -64,7 +53,9 @@ def _of_workarounds(session: Session) -> list[Notice]:
     if surface is None:
         return []
     return [
-        Notice(each.text, dots=surface.vertices_at(each.points)) for each in surface.workarounds
+        Notice(each.text, dots=surface.vertices_at(each.points))
+        for each in surface.workarounds
+        if each.kind is not Kind.HOLE  # see above
     ]
 
 
@@ -97,7 +88,7 @@ class Notices:
     @property
     def text(self) -> str:
         """All notices in one line; "" if there are none."""
-        return " · ".join(_sentence(notice.text, k) for k, notice in enumerate(self._notices))
+        return "; ".join(_sentence(notice.text, k) for k, notice in enumerate(self._notices))
 
     @property
     def is_open(self) -> bool:

@@ -7,7 +7,6 @@ from typing import Any
 from qtpy import QtWidgets
 
 from ..editor import DeformEditor, Mode, setting, setting_colour_range, toggle_cages, toggle_overlay
-from ..scene import NO_VOLUME, enclosure_of
 from ..volume_overlay import percent
 from .controls import check_box, choice_box, column, form, key_button, number_box, put, row
 
@@ -125,8 +124,10 @@ class DeformPart(QtWidgets.QGroupBox):
         """Show the current options and the volume change."""
         session, widgets = self._editor.session, self._editor.widgets
         options = session.options
-        has_volume = enclosure_of(session).has_volume
-        self.volume.setText(percent(session.volume_change) if has_volume else NO_VOLUME)
+        has_volume = session.has_volume
+        self.volume.setText(
+            percent(session.volume_change) if has_volume else "No volume to preserve"
+        )
         put(self.preserve, options.preserve_volume and has_volume)
         put(self.per_region, options.preserve_region_volumes and has_volume)
         for box in (self.preserve, self.per_region):

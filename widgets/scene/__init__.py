@@ -11,11 +11,9 @@ The files, in reading order:
     labels             rectangles and text in display coordinates
     wireframe          edges and vertices of a mesh
     highlights         loops and vertices of a mesh, marked
-    enclosure          which borders are holes in a volume
     step_budget        solver steps per event, recorded and replayed
 """
 
-from .enclosure import NO_VOLUME, Enclosure, enclosure_of
 from .gestures import Gesture, Phase, Pointer
 from .highlights import Highlights
 from .labels import Panel, Text
@@ -27,8 +25,6 @@ from .widget import Widget
 from .wireframe import Wireframe
 
 __all__ = [
-    "NO_VOLUME",
-    "Enclosure",
     "Gesture",
     "Highlights",
     "Panel",
@@ -42,7 +38,6 @@ __all__ = [
     "View",
     "Widget",
     "Wireframe",
-    "enclosure_of",
     "observe_steps",
     "prescribe_steps",
 ]

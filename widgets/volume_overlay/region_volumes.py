@@ -28,8 +28,7 @@ class RegionVolumes:
     def changes(self) -> list[tuple[int, float]]:
         """Return the number and the volume change of each region that owns a face around a volume.
 
-        The list is empty if there is only one region, whose volume is that of the mesh, or if the
-        mesh encloses no volume.
+        The list is empty if there is only one region, whose volume is that of the mesh.
         """
         session = self._session
         owned = self._owned()

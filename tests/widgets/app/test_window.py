@@ -6,7 +6,6 @@ import gc
 import os
 import sys
 import threading
-import warnings
 import weakref
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from app_hands import (
     Window,
     delete,
     digest,
+    drop,
     ready_session,
     settings_in,
     slots,
@@ -26,7 +26,6 @@ from app_hands import (
 from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 from qt_hands import Qt, QtCore, QtTest, QtWidgets, application, until
-from qtpy import QtGui
 
 from vtk_segdeform import Session, models
 from vtk_segdeform.cli.main import main
@@ -115,23 +114,6 @@ def change(hand):
     """Make an unsaved change."""
     hand.window.session.add_handle([40, 41], "knob")
     hand.settle()
-
-
-def drop(hand, *paths):
-    """Drag files over the centre of the window and drop them, by system events."""
-    mime, window = QtCore.QMimeData(), hand.window.windowHandle()
-    mime.setUrls([QtCore.QUrl.fromLocalFile(str(path)) for path in paths])
-    place = QtCore.QPoint(window.width() // 3, window.height() // 2)
-    about = Qt.CopyAction, mime, Qt.LeftButton, Qt.NoModifier
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # Qt prefers a QPointF
-        enter = QtGui.QDragEnterEvent(place, *about)
-    application().sendEvent(window, enter)
-    if enter.isAccepted():
-        assert hand.window.pages.start.target.is_highlighted
-        application().sendEvent(window, QtGui.QDropEvent(QtCore.QPointF(place), *about))
-    application().processEvents()
-    return enter.isAccepted()
 
 
 # Starting.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hands import Hand, picture, plain_view
-from open_surfaces import bottle, polydata, seam, sheet
+from open_surfaces import bottle, polydata, sheet, split_at_seam
 from solids import icosphere
 
 from vtk_segdeform import Options, Session, Surface
@@ -76,10 +76,10 @@ def two_parts():
 @pytest.mark.parametrize(
     ("given", "text"),
     [
-        (lambda: bottle(12), "12 holes: volume kept under lids"),
-        (lambda: bottle(1, 3), "1 hole: volume kept under a lid"),
-        (lambda: sheet(8), "open sheet: no volume to preserve"),
-        (two_parts, "3 holes: volume kept under lids · open sheet: not part of the volume"),
+        (lambda: bottle(12), "12 holes: volume preserved under lids"),
+        (lambda: bottle(1, 3), "1 hole: volume preserved under its lid"),
+        (lambda: sheet(8), "Open sheet: no volume to preserve"),
+        (two_parts, "3 holes: volume preserved under lids; 1 open sheet has no volume"),
     ],
 )
 def test_borders_are_counted_and_what_happens_to_the_volume_is_said(given, text):
@@ -91,7 +91,7 @@ def test_borders_are_counted_and_what_happens_to_the_volume_is_said(given, text)
 
 
 def test_a_workaround_is_told_as_it_is_and_its_points_are_vertices_of_the_mesh():
-    session = Session(seam())
+    session = Session(Surface(split_at_seam()))
     (notice,) = notices_of(session)
     assert notice.text == "welded 64 seam points"
     heights = session.mesh.vertices[notice.dots, 2]
@@ -137,7 +137,7 @@ def test_marks_lie_on_the_borders_and_holes_at_the_back_show_through(open_editor
 
 
 def test_welded_points_are_dots(open_editor):
-    scene = open_editor(Session(seam()))
+    scene = open_editor(Session(Surface(split_at_seam())))
     scene.click("Show")
     assert scene.shade(DOT_RGB).sum() > 100
     assert not scene.shade(LOOP_RGB).any()
@@ -238,4 +238,6 @@ def test_the_back_of_a_sheet_is_lit_as_its_front(open_editor):
 def test_a_mesh_without_a_surface_has_notices_of_its_borders():
     given = bottle(2)
     mesh = Mesh(given.points, given.regular_faces)
-    assert [each.text for each in notices_of(Session(mesh))] == ["2 holes: volume kept under lids"]
+    assert [each.text for each in notices_of(Session(mesh))] == [
+        "2 holes: volume preserved under lids"
+    ]

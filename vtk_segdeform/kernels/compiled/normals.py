@@ -11,7 +11,10 @@ _compile = kernel()
 
 @_compile
 def rings(ring, faces, starts):
-    """Put the neighbours of each vertex into *ring* (3m,), in cyclic order."""
+    """Put the neighbours of each vertex into *ring* (3m,), in cyclic order.
+
+    Where its faces are not one closed fan, at a border for example, put the vertex itself.
+    """
     n = len(starts) - 1
     fill, pairs, after = (
         starts[:-1].copy(),
@@ -25,11 +28,17 @@ def rings(ring, faces, starts):
             pairs[fill[i], 1] = faces[f, (corner + 2) % 3]
             fill[i] += 1
     for i in range(n):
-        for t in range(starts[i], starts[i + 1]):
+        first, last = starts[i], starts[i + 1] - 1
+        for t in range(first, last + 1):
+            after[pairs[t, 1]] = -1
+        for t in range(first, last + 1):
             after[pairs[t, 0]] = pairs[t, 1]
-        j = pairs[starts[i], 0]
-        for t in range(starts[i], starts[i + 1]):
+        j = pairs[first, 0]
+        for t in range(first, last + 1):
             j = after[j]
+            if j < 0 or (j == pairs[first, 0]) != (t == last):
+                ring[first : last + 1] = i
+                break
             ring[t] = j
 
 

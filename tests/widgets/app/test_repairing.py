@@ -1,0 +1,273 @@
+"""Any surface in the desktop program: dropped, shown, and repaired if the user wants that."""
+
+from __future__ import annotations
+
+import gc
+
+import numpy as np
+import pytest
+import pyvista as pv
+from app_hands import AppHand, Boxes, Window, delete, drop, settings_in
+from open_surfaces import bottle, polydata, sheet, split_at_seam
+from qt_hands import Qt, QtCore, QtHand, QtTest, application, until
+
+from vtk_segdeform import load_session
+from vtk_segdeform.io import read_polydata
+from vtk_segdeform.widgets.app.autosave import Autosaves
+from vtk_segdeform.widgets.app.repair_dialog import RepairDialog
+
+
+@pytest.fixture(scope="module", autouse=True)
+def in_haste():
+    """Save time on antialiasing, and collect garbage in Qt's thread only."""
+    smooth = pv.global_theme.anti_aliasing
+    pv.global_theme.anti_aliasing = None
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    yield
+    gc.enable()
+    gc.unfreeze()
+    pv.global_theme.anti_aliasing = smooth
+
+
+@pytest.fixture
+def boxes():
+    gc.collect()  # objects of a failed test
+    application()
+    made = Boxes()
+    yield made
+    assert made.unexpected == []
+    assert made.answers == []
+
+
+@pytest.fixture
+def hand(tmp_path, boxes):
+    """Return a hand on the program."""
+    window = Window(settings_in(tmp_path), Autosaves(tmp_path / "unsaved"), interval=1000.0)
+    hand = AppHand(window)
+    yield hand
+    window._is_new = False
+    if window.has_mesh:
+        window.editor.controller.file.mark_saved(window.session)
+    delete(window)
+    window = hand = None
+    gc.collect()
+
+
+class Reader(QtCore.QObject):
+    """A user who does *steps* with the next repair dialog, as soon as it is computed."""
+
+    def __init__(self, steps):
+        super().__init__()
+        self.steps, self.failure, self.is_done = steps, None, False
+        QtCore.QTimer.singleShot(10, self, self._look)
+
+    def _look(self):
+        dialog = application().activeModalWidget()
+        if not isinstance(dialog, RepairDialog) or dialog.is_computing:
+            QtCore.QTimer.singleShot(10, self, self._look)
+            return
+        try:
+            self.steps(dialog)
+        except AssertionError as failure:
+            self.failure = failure
+        self.is_done = True
+        if dialog.isVisible():
+            dialog.reject()
+
+    def check(self):
+        assert self.is_done
+        if self.failure is not None:
+            raise self.failure
+
+
+def click(button):
+    place = QtCore.QPoint(8, button.height() // 2)
+    QtTest.QTest.mouseClick(button, Qt.LeftButton, Qt.NoModifier, place)
+
+
+def lines(dialog):
+    return [dialog.steps.item(k).text() for k in range(dialog.steps.count())]
+
+
+def repair(hand, steps):
+    """Open the repair dialog from the menu, and do *steps* with it."""
+    reader = Reader(steps)
+    hand.choose("File", "Repair and open")
+    reader.check()
+    hand.settle()
+
+
+def opened(hand, given, path):
+    given.save(path)
+    hand.window.open(path)
+    hand.settle()
+    return path
+
+
+def soup():
+    """Return a ball whose triangles share no points, as in an STL file."""
+    ball = split_at_seam(2)
+    corners = ball.points[ball.regular_faces].reshape(-1, 3)
+    return polydata(corners, np.arange(len(corners)).reshape(-1, 3))
+
+
+@pytest.mark.parametrize(
+    ("given", "name", "text"),
+    [
+        (bottle, "bottle.ply", "12 holes: volume preserved under lids"),
+        (lambda: sheet(6), "sheet.obj", "Open sheet: no volume to preserve"),
+        (split_at_seam, "seam.ply", "Welded 64 seam points"),
+        (soup, "soup.stl", ""),
+    ],
+)
+def test_a_dropped_surface_opens_at_once_and_one_line_says_how(hand, given, name, text, tmp_path):
+    given().save(tmp_path / name)
+    assert drop(hand, tmp_path / name)
+    hand.settle()
+    assert hand.title == f"{name} - segdeform"
+    notices = hand.window.editor.controller.notices
+    assert notices.text == text or name == "soup.stl"  # which PyVista may weld when it reads
+    assert notices.is_open is bool(notices.text)
+
+
+def test_show_is_clicked_in_the_view_of_qt(hand, tmp_path):
+    opened(hand, bottle(), tmp_path / "bottle.ply")
+    editor, plotter = hand.window.editor, hand.window.editor_widget.plotter
+    notices = editor.controller.notices
+    plotter.render()
+    pointer = QtHand(plotter.interactor, editor.view)
+    for marked, button in ((True, "Show"), (False, "Hide")):
+        plotter.render()
+        pointer.drag([notices._line.centre_of(button)])
+        assert notices.are_marked is marked
+    assert pointer.failures == []
+    assert hand.title == "bottle.ply - segdeform"  # nothing was painted
+
+
+def test_repair_is_offered_beside_the_notice(hand, tmp_path):
+    opened(hand, bottle(2), tmp_path / "bottle.ply")
+    editor, plotter = hand.window.editor, hand.window.editor_widget.plotter
+    plotter.render()
+    reader = Reader(lambda dialog: click(dialog.cancelling))
+    pointer = QtHand(plotter.interactor, editor.view)
+    pointer.drag([editor.controller.notices._line.centre_of("Repair ...")])
+    until(lambda: reader.is_done, "the dialog")
+    reader.check()
+    application().processEvents()
+    assert hand.title == "bottle.ply - segdeform"
+
+
+def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, boxes, tmp_path):
+    path = opened(hand, bottle(3), tmp_path / "bottle.ply")
+    content = path.read_bytes()
+
+    def accept(dialog):
+        assert lines(dialog)[0].startswith("Fill 3 holes of ")
+        assert dialog.after.isChecked()
+        click(dialog.accepting)
+
+    repair(hand, accept)
+    assert hand.title == "bottle (repaired)* - segdeform"
+    session = hand.window.session
+    assert session.mesh.is_closed
+    assert hand.window.editor.controller.notices.text == ""
+    given = read_polydata(path)
+    kept = np.asarray(session.surface.given.points)[: given.n_points]
+    assert np.abs(kept - given.points).max() == 0.0
+    assert path.read_bytes() == content
+    assert sorted(p.suffix for p in tmp_path.iterdir() if p.is_file()) == [".ini", ".ply"]
+    boxes.answers += ["Cancel", "Discard"]
+    hand.window.open(path)  # the first answer is to stay
+    assert hand.title == "bottle (repaired)* - segdeform"
+    hand.choose("File", "Open recent", "1  bottle.ply")
+    hand.settle()
+    assert hand.title == "bottle.ply - segdeform"
+    assert len(hand.window.session.mesh.borders) == 3
+
+
+def test_a_saved_repaired_copy_is_no_longer_new(hand, tmp_path, monkeypatch):
+    opened(hand, bottle(2), tmp_path / "bottle.ply")
+    repair(hand, lambda dialog: click(dialog.accepting))
+    proposals = []
+
+    def choose(_, __, proposed, *___):
+        proposals.append(proposed)
+        return proposed, ""
+
+    monkeypatch.setattr("qtpy.QtWidgets.QFileDialog.getSaveFileName", choose)
+    hand.choose("File", "Save session as")
+    assert proposals == [str(tmp_path / "bottle (repaired).segdeform")]
+    assert hand.title == "bottle (repaired).segdeform - segdeform"
+    assert load_session(proposals[0]).mesh.is_closed
+
+
+def test_cancelling_changes_nothing(hand, tmp_path):
+    path = opened(hand, bottle(2), tmp_path / "bottle.ply")
+    before = hand.window.session
+    repair(hand, lambda dialog: QtTest.QTest.keyClick(dialog, Qt.Key_Escape))
+    assert hand.window.session is before
+    assert hand.title == f"{path.name} - segdeform"
+
+
+def test_settings_start_the_repair_again_without_blocking(hand, tmp_path):
+    opened(hand, bottle(3), tmp_path / "bottle.ply")
+
+    def limit(dialog):
+        dialog.edges.setValue(3)
+        assert dialog.is_computing
+        assert not dialog.accepting.isEnabled()
+        until(lambda: not dialog.is_computing, "the repair")
+        assert lines(dialog) == ["Nothing to repair with these settings"]
+        assert not dialog.accepting.isEnabled()
+        dialog.edges.setValue(100)
+        until(lambda: not dialog.is_computing, "the repair")
+        assert dialog.accepting.isEnabled()
+        click(dialog.fill)
+        until(lambda: not dialog.is_computing, "the repair")
+        assert not dialog.accepting.isEnabled()
+
+    repair(hand, limit)
+
+
+def test_the_view_of_the_dialog_outlines_holes_before_and_colours_lids_after(hand, tmp_path):
+    opened(hand, bottle(3), tmp_path / "bottle.ply")
+    hand.window.editor.view.camera.SetPosition(0.0, 0.0, 10.0)  # the first hole is at the top
+    shades = {}
+
+    def look(dialog):
+        for name, button in (("before", dialog.before), ("after", dialog.after)):
+            click(button)
+            application().processEvents()
+            picture = np.asarray(dialog.preview.plotter.screenshot()).astype(int)
+            shades[name] = picture.reshape(-1, picture.shape[-1])[:, :3]
+
+    repair(hand, look)
+    vermilion, orange = [213, 94, 0], [230, 159, 0]
+
+    def count(name, colour):
+        there = shades[name]
+        parts = there / np.maximum(there.sum(axis=1, keepdims=True), 1)
+        return int((np.abs(parts - np.array(colour) / sum(colour)).max(axis=1) < 0.05).sum())
+
+    assert count("before", vermilion) > 50
+    assert count("before", orange) < 20
+    assert count("after", orange) > 200
+    assert count("after", vermilion) < 20
+
+
+def test_a_surface_that_cannot_be_repaired_says_why(hand, tmp_path, monkeypatch):
+    opened(hand, bottle(2), tmp_path / "bottle.ply")
+
+    def refuse(*_, **__):
+        raise ValueError("no faces are left")
+
+    monkeypatch.setattr("vtk_segdeform.widgets.app.repair_dialog.repair_surface", refuse)
+
+    def read(dialog):
+        assert lines(dialog) == ["no faces are left"]
+        assert not dialog.accepting.isEnabled()
+        assert not dialog.after.isEnabled()
+
+    repair(hand, read)

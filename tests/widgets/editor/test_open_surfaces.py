@@ -1,0 +1,174 @@
+"""The widgets on surfaces with borders, fins and one side: painting, cages, handles, shading."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hands import Hand, picture, plain_view
+from open_surfaces import bottle, moebius, polydata, sheet
+from solids import icosphere
+
+from vtk_segdeform import Regions, Session, Surface
+from vtk_segdeform.cages.cage import Cage
+from vtk_segdeform.widgets import DeformEditor, Mode, Paint, Tool
+
+
+def finned():
+    """Return a ball of more than 1000 vertices with a fin: an edge with three faces."""
+    points, faces = icosphere(4)
+    edge = faces[0, :2]
+    tip = 1.5 * points[edge].mean(axis=0)
+    return polydata(np.vstack([points, tip]), np.vstack([faces, [[*edge, len(points)]]]))
+
+
+class Scene:
+    """An editor over a surface in one cage, seen from the front, and a hand."""
+
+    def __init__(self, given):
+        self.session = session = Session(Surface(given))
+        mesh = session.mesh
+        session.set_regions(Regions.single(mesh))
+        ball, faces = icosphere(2)
+        middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
+        session.set_cages([Cage(ball * 0.8 * mesh.diagonal + middle, faces)])
+        self.view = plain_view((300, 300))
+        self.view.camera.SetPosition(0.0, -10.0, 4.0)
+        self.view.camera.SetViewUp(0.0, 0.0, 1.0)
+        self.editor = DeformEditor(self.view, session)
+        self.view.renderer.ResetCamera()
+        self.editor.On()
+        self.editor.controller.notices.close()
+        self.hand = Hand(self.view)
+        self.view.render()
+
+    def paint(self, what, point, tool=Tool.BRUSH, *, through=False):
+        """Paint at a point of the surface; return the vertices painted."""
+        self.editor.mode = Mode.HANDLES
+        selector = self.editor.widgets.selector
+        selector.tool, selector.through, selector.paints = tool, through, what
+        self.hand.click(self.hand.at(point))
+        assert self.hand.failures == []
+        return self.session.fixed if what is Paint.FIXED else self.session.state.handle
+
+    def lasso(self, *, through):
+        """Mark everything by a lasso around the middle of the window; return the vertices."""
+        self.editor.mode = Mode.HANDLES
+        selector = self.editor.widgets.selector
+        selector.tool, selector.through, selector.paints = Tool.LASSO, through, Paint.FIXED
+        angle = np.linspace(0.0, 6.0, 30)
+        self.hand.drag(150.0 + 145.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+        return self.session.fixed
+
+    def front(self):
+        """Return which vertices no face hides, by a ray from the camera to each of them."""
+        x, faces = self.session.vertices, self.session.mesh.faces
+        eye = np.array(self.view.camera.GetPosition())
+        a, b, c = (x[corner] - eye for corner in faces.T)
+        areas = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
+        volume = np.einsum("ij,ij->i", a, areas[0])
+        seen = np.ones(len(x), dtype=bool)
+        for i, ray in enumerate(x - eye):
+            u, v, w = areas @ ray / volume  # the ray times u + v + w is in the plane of the face
+            hides = (np.minimum(np.minimum(u, v), w) > 0.0) & (u + v + w > 1.0 + 1e-9)
+            seen[i] = not hides[(faces != i).all(axis=1)].any()
+        return seen
+
+
+@pytest.fixture
+def open_editor():
+    made = []
+
+    def start(given):
+        made.append(Scene(given))
+        return made[-1]
+
+    yield start
+    for scene in made:
+        scene.editor.remove()
+
+
+SURFACES = {
+    "bottle": lambda: bottle(4),
+    "sheet": lambda: sheet(32),
+    "one-sided": moebius,
+    "finned": finned,
+}
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_a_brush_paints_around_the_point_that_is_seen(open_editor, name):
+    scene = open_editor(SURFACES[name]())
+    x = scene.session.mesh.vertices
+    front = np.flatnonzero(scene.front())
+    start = x[front[np.linalg.norm(x[front] - x[front].mean(axis=0), axis=1).argsort()[5]]]
+    radius = scene.editor.widgets.selector.radius
+    painted = scene.paint(Paint.FIXED, start)
+    assert 0 < len(painted) < len(x)
+    assert np.linalg.norm(x[painted] - start, axis=1).max() < 1.5 * radius
+
+
+def test_the_visible_surface_includes_the_inside_seen_through_a_hole(open_editor):
+    scene = open_editor(bottle(1, radius=0.8))  # a cup, open at the top
+    scene.view.camera.SetPosition(0.0, -4.0, 10.0)
+    scene.view.renderer.ResetCamera()
+    scene.view.render()
+    seen, front = scene.lasso(through=False), scene.front()
+    is_seen = np.zeros(len(front), dtype=bool)
+    is_seen[seen] = True
+    assert (is_seen == front).mean() > 0.95
+    x = scene.session.mesh.vertices
+    outward = x[seen] / [1.0, 1.0, 1.6**2]
+    away = np.einsum("ij,ij->i", outward, x[seen] - scene.view.camera.GetPosition()) > 0.0
+    assert away.sum() > 20  # of these only the inside is seen
+    scene.session.undo()
+    assert len(scene.lasso(through=True)) == len(x)
+
+
+def test_a_connected_part_ends_at_its_border(open_editor):
+    one, other = sheet(8), sheet(8)
+    faces = np.asarray(one.regular_faces)
+    points = np.vstack([one.points, other.points + [0.0, 0.0, 2.0]])
+    scene = open_editor(polydata(points, np.vstack([faces, faces + one.n_points])))
+    painted = scene.paint(Paint.FIXED, [0.1, 0.1, 2.0], Tool.COMPONENT)
+    assert np.array_equal(painted, np.arange(81, 162))
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_a_handle_is_dragged_and_an_enclosed_volume_stays_exact(open_editor, name):
+    scene = open_editor(SURFACES[name]())
+    session, x = scene.session, scene.session.mesh.vertices
+    along = int(np.ptp(x, axis=0).argmax())
+    low, high = np.quantile(x[:, along], [0.1, 0.9])
+    session.set_fixed(x[:, along] < low)
+    session.add_handle(x[:, along] > high)
+    scene.editor.mode = Mode.DEFORM
+    scene.editor.wait()
+    scene.editor.widgets.dragger.refine_while_resting = False
+    start = np.array(scene.hand.at(scene.editor.widgets.dragger.gizmo.centre))
+    scene.hand.press(start)
+    for k in range(1, 6):
+        scene.hand.move(start + k * np.array([3.0, 4.0]))
+    said = scene.editor.status
+    scene.hand.release()
+    assert scene.hand.failures == []
+    moved = np.linalg.norm(session.vertices - x, axis=1)
+    assert moved[session.handles["handle 1"]].mean() > 0.02 * session.mesh.diagonal
+    assert moved[session.fixed].mean() < 0.02 * session.mesh.diagonal
+    assert abs(session.volume_change) < 1e-12
+    assert session.has_volume is (name in ("bottle", "finned"))
+    assert ("No volume to preserve" in said) is not session.has_volume
+    entry = scene.editor.controller.log.entries[-1]
+    assert (entry.volume_change is None) is not session.has_volume
+    deformed = session.deformed
+    assert deformed.n_points == session.surface.given.n_points
+
+
+@pytest.mark.parametrize("name", ["bottle", "sheet", "finned"])
+def test_nothing_is_black_from_either_side(open_editor, name):
+    scene = open_editor(SURFACES[name]())
+    for height in (6.0, -6.0):
+        scene.view.camera.SetPosition(0.0, -8.0, height)
+        scene.view.renderer.ResetCamera()
+        with scene.editor.controller.clean_view():
+            dark = picture(scene.view).max(axis=2) < 60
+        assert dark.mean() < 0.002
