@@ -191,7 +191,7 @@ class PolyDataTools:
         handle : (h,) int or (p,) bool
             Points of the handle.
         targets : (h, 3) float
-            Where they go.  If several of them follow one vertex, at a seam, it goes to the mean.
+            Where they go.  Points at a seam that are one vertex go to the mean.
         n_regions, n_cage_vertices, preserve_volume, lids, progress
             As in `vtk_segdeform.deform`, which also returns the solver's status; here a missed
             target is only logged.

@@ -162,7 +162,7 @@ def test_polygons_are_kept_and_normals_computed_again():
         (lambda f, s: f.SetHandle(FIXED), "both fixed and handle"),
         (lambda f, s: f.SetTargets([[0.0, 0.0, np.nan]]), "targets"),
         (lambda f, s: f.SetRotationAxis(0.0, 0.0, 0.0), "axis"),
-        (lambda f, s: f.SetInputDataObject(0, pv.Plane().triangulate()), "open"),
+        (lambda f, s: f.SetInputDataObject(0, pv.Plane().triangulate()), "no point array"),
         (lambda f, s: f.SetInputDataObject(0, pv.PolyData()), "no surface"),
         (lambda f, s: f.SetInputDataObject(1, pv.Sphere(radius=0.1).triangulate()), "cage"),
         (lambda f, s: f.SetInputDataObject(1, pv.MultiBlock([s, s])), "2 cages need regions"),

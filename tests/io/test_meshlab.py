@@ -209,9 +209,7 @@ def test_quadrangles_are_cut_and_other_types_are_errors():
     assert again.n_cells == 12
     assert_array_equal(np.sort(again.cell_data["quality"]), np.repeat(np.arange(6.0), 2))
     for wrong in (3, {"a": "b"}, pv.ImageData()):
-        with pytest.raises(
-            MeshError, match="expected a Mesh, a Surface, a PolyData, a Session"
-        ):
+        with pytest.raises(MeshError, match="expected a Mesh, a Surface, a PolyData, a Session"):
             meshlab.to_meshset(wrong)
     for ask in (meshlab.from_meshset, meshlab.selected_vertices):
         with pytest.raises(MeshError, match="has no layer"):

@@ -327,7 +327,7 @@ def test_public_functions_take_at_most_four_positional_arguments():
 
 # They write to a draft from their caller, to the growing log of a recording, or to /proc.
 WRITE_DIRECTLY = {
-    "io.gltf.writing", "io.off", "io.ply", "io.wavefront", "io.vtk_formats", "io.reading_child",
+    "io.gltf.writing", "io.off", "io.ply", "io.stl", "io.wavefront", "io.vtk_formats", "io.reading_child",
     "widgets.recording.film_files", "widgets.recording.recording",
     "benchmarks.measuring",
 }  # fmt: skip

@@ -8,8 +8,8 @@ With ``--json`` it prints one object with these keys:
     holes                       number of edges of each border
     encloses                    whether each component encloses a volume
     volume_under_lids           whether some volume is preserved under lids over holes
-    workarounds                 what the mesh has differently: objects with kind, text and count,
-                                the number of given points there
+    workarounds                 what the mesh has differently: objects with kind, text, count, and
+                                points, the number of given points there
     faults, notes               of the triangles as given: objects with kind, text and count
     self_intersections          pairs of faces of the mesh that intersect
     can_be_deformed, reason     whether there is a mesh, and otherwise why not
@@ -83,8 +83,7 @@ def described(given: Any, name: str) -> dict[str, Any]:
         **found,
         **_of_mesh(mesh),
         "workarounds": [
-            {"kind": getattr(each, "kind", ""), "text": str(each), "count": len(each.points)}
-            for each in surface.workarounds
+            {**_counted(each), "points": len(each.points)} for each in surface.workarounds
         ],
         "can_be_deformed": True,
     }
@@ -121,7 +120,8 @@ def _print(found: dict[str, Any], say: Say) -> None:
     what = "a closed surface" if found["closed"] else "an open surface"
     say(f"can be deformed as it is: {what}; volume {found['volume']}")
     for each in found["workarounds"]:
-        say(f"  worked around: {each['text']}")
+        if each["kind"] != "hole":
+            say(f"  worked around: {each['text']}")
     holes = found["holes"]
     if holes:
         most = ", ".join(map(str, holes[:_MOST_HOLES])) + (

@@ -152,8 +152,8 @@ def _subspace(
 
 
 def _selected(text: str, surface: Surface, role: Role) -> IntArray:
-    """Return the vertices (k,) of the mesh that the selected points follow."""
-    points = np.asarray(surface.given.points, dtype=np.float64)
+    """Return the vertices (k,) of the mesh that the selected points are."""
+    points = surface.at_points(surface.mesh.vertices)
     ids = parse_selection(text, points, point_arrays=surface.given.point_data, role=role)
     return surface.vertices_at(ids)
 

@@ -12,7 +12,7 @@ from ..arrays import FloatArray, IntArray
 from ..cages import Cage
 from ..geometry import lids_of
 from ..io import Surface, polydata_of
-from ..mesh import Mesh, counted
+from ..mesh import Kind, Mesh, counted
 from ..pictures import COLOURS, rgb
 from ..regions import Regions
 from ..solver import Solution
@@ -27,7 +27,8 @@ _PALETTE = np.array([rgb(colour) for colour in COLOURS])
 def report_surface(surface: Surface, say: Say) -> None:
     """Print what the mesh of *surface* has differently, and its volume if it has borders."""
     for workaround in surface.workarounds:
-        say(f"input           {workaround}")
+        if workaround.kind is not Kind.HOLE:  # the volume tells of them
+            say(f"input           {workaround}")
     if not surface.mesh.is_closed:
         say(f"volume          {volume_sentence(surface.mesh)}")
 

@@ -1,14 +1,16 @@
 """The deformation as a filter of a VTK pipeline, for VTK, pyvista and ParaView.
 
-    port 0   the surface: closed, of triangles or polygons, which are only cut for the solver
+    port 0   any surface: of polygons or strips, closed or open, with seams
     port 1   cages, optional: a composite dataset with a surface for each region, or one surface
              for a single region; without cages, the filter fits them
-    output   the deformed surface with all its arrays, and also
-             "LocalVolumeChange" (points), "VolumeChange", "HandleError", "Steps", "Status" (field)
+    output   the same points, cells and arrays, moved, and also
+             "LocalVolumeChange" (points), "VolumeChange", "HandleError", "Steps", "Status" (field),
+             "HasVolume" (field), 1 if it encloses a volume, and "Lids" (field), the number of
+             holes whose lids enclose it
 
-Regions come from a point array of labels or from automatic segmentation.  Fixed vertices and the
+Regions come from a point array of labels or from automatic segmentation.  Fixed points and the
 handle are point arrays, where nonzero, or point indices.  The handle moves to given targets, or is
-rotated about its centre and translated.
+rotated about its centre and translated.  Points at a seam follow one vertex of the mesh.
 
 The output depends on inputs and settings only, not on earlier executions; it equals that of
 `vtk_segdeform.deform`.  Only the parts that changed are computed again: new targets need a solve, a
@@ -34,8 +36,8 @@ from ..arrays import FloatArray, as_ids
 from ..cages import Cage, fit_cages
 from ..deformer import Deformer
 from ..errors import CageError, Cancelled, ConstraintError, SegDeformError
-from ..geometry import local_volume_change
-from ..mesh import Mesh
+from ..geometry import lids_of, local_volume_change
+from ..mesh import Mesh, mesh_of
 from ..progress import Progress, part
 from ..regions import Regions, segment
 from . import surfaces
@@ -43,7 +45,7 @@ from .settings import FilterSettings
 
 
 class SegmentedCageDeformFilter(FilterSettings):
-    """Deform a closed surface by a handle, preserving detail and volume.
+    """Deform a surface by a handle, preserving detail and volume.
 
     Attributes
     ----------
@@ -85,33 +87,40 @@ class SegmentedCageDeformFilter(FilterSettings):
         return 1
 
     def _deform(self, source: Any, cages: Any, output: Any) -> None:
-        vertices, faces = surfaces.surface(source)
-        settings = self._settings
-        labels = None
+        soup, settings, labels = mesh_of(*surfaces.surface(source)), self._settings, None
         if settings.region_array:
             labels = _required(source, settings.region_array, "SetRegionArrayName")
-        deformer = self._binding(Mesh(vertices, faces), labels, _cages_of(cages))
+            labels = soup.at_vertices(labels)
+        deformer = self._binding(soup.mesh, labels, _cages_of(cages))
         fixed = _marked(source, settings.fixed, settings.fixed_array)
         handle = _marked(source, settings.handle, settings.handle_array)
         if handle is None:
             handle = np.flatnonzero(_required(source, settings.handle_array, "SetHandleArrayName"))
+        if settings.targets is not None:
+            targets = np.array(settings.targets).reshape(-1, 3)
+            vertices, targets = soup.targets_at(handle, targets)
+        else:
+            vertices = soup.vertices_at(handle)
+            targets = self._moved(soup.mesh.vertices[vertices])
         constrained = deformer.hold(
-            fixed=np.zeros(0, np.int64) if fixed is None else fixed,
-            handle=handle,
+            fixed=soup.vertices_at(np.zeros(0, np.int64) if fixed is None else fixed),
+            handle=vertices,
             preserve_volume=settings.preserve_volume,
         )
-        solving = part(self._progress(), 0.95, 1.0)
-        solution = constrained.solve(self._targets(vertices[constrained.handle]), progress=solving)
+        solution = constrained.solve(targets, progress=part(self._progress(), 0.95, 1.0))
         output.ShallowCopy(source)
-        surfaces.move(output, solution.vertices, faces)
+        surfaces.move(output, soup.moved(solution.vertices))
         if settings.local_volume:
-            change = local_volume_change(constrained.mesh, solution.vertices)
+            change = local_volume_change(constrained.mesh, solution.vertices)[soup.vertex_of]
             surfaces.add_array(output.GetPointData(), "LocalVolumeChange", change)
+        lids = lids_of(soup.mesh)
         for name, value in (
             ("VolumeChange", [solution.volume_change]),
             ("HandleError", [solution.handle_error]),
             ("Steps", [solution.steps]),
             ("Status", str(solution.status)),
+            ("HasVolume", [int(constrained.has_volume)]),
+            ("Lids", [int(lids.encloses[lids.component].sum())]),
         ):
             surfaces.add_array(output.GetFieldData(), name, value)
         self.UpdateProgress(1.0)
@@ -151,10 +160,9 @@ class SegmentedCageDeformFilter(FilterSettings):
         binding = part(progress, 0.7, 0.95)
         return Deformer(mesh, regions, cages, stretch=settings.stretch, progress=binding)
 
-    def _targets(self, points: FloatArray) -> FloatArray:
+    def _moved(self, points: FloatArray) -> FloatArray:
+        """Return *points* (k, 3) rotated about their centre and translated."""
         settings = self._settings
-        if settings.targets is not None:
-            return np.array(settings.targets).reshape(-1, 3)
         axis = np.array(settings.axis)
         length = np.linalg.norm(axis)
         if not length > 0.0:

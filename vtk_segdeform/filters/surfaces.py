@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkPoints, vtkStringArray
-from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkCompositeDataSet, vtkPolyData
-from vtkmodules.vtkFiltersCore import vtkTriangleFilter, vtkTriangleMeshPointNormals
+from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkPolyData
+from vtkmodules.vtkFiltersCore import vtkTriangleFilter
 
 from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
+from ..geometry import NormalTransport
 
 
 def surface(polydata: Any) -> tuple[FloatArray, IntArray]:
@@ -27,12 +28,7 @@ def surface(polydata: Any) -> tuple[FloatArray, IntArray]:
         polydata.GetNumberOfPolys() or polydata.GetNumberOfStrips()
     ):
         raise MeshError("the input has no surface; it must have points and polygons")
-    cut = vtkTriangleFilter()
-    cut.PassVertsOff()
-    cut.PassLinesOff()
-    cut.SetInputData(polydata)
-    cut.Update()
-    faces = vtk_to_numpy(cut.GetOutput().GetPolys().GetConnectivityArray())
+    faces = vtk_to_numpy(_triangulated(polydata).GetPolys().GetConnectivityArray())
     vertices = vtk_to_numpy(polydata.GetPoints().GetData())
     return vertices.astype(np.float64), faces.astype(np.int64).reshape(-1, 3)
 
@@ -55,23 +51,28 @@ def pieces(data: Any) -> Iterator[Any]:
         item.GoToNextItem()
 
 
-def move(polydata: Any, vertices: FloatArray, faces: IntArray) -> None:
-    """Replace the points (n, 3) of a vtkPolyData, and compute point normals again if it has any."""
-    points = vtkPoints()
-    points.SetData(numpy_to_vtk(np.ascontiguousarray(vertices), deep=True))
-    polydata.SetPoints(points)
-    normals = polydata.GetPointData().GetNormals()
-    if normals is None:
-        return
-    bare = vtkPolyData()
-    bare.SetPoints(points)
-    bare.SetPolys(_triangles(faces))
-    computed = vtkTriangleMeshPointNormals()
-    computed.SetInputData(bare)
-    computed.Update()
-    fresh = computed.GetOutput().GetPointData().GetNormals()
-    fresh.SetName(normals.GetName())
-    polydata.GetPointData().SetNormals(fresh)
+def move(polydata: Any, points: FloatArray) -> None:
+    """Replace the points (n, 3) of a vtkPolyData; its point and cell normals follow the surface."""
+    rest, faces = surface(polydata)
+    cells = _cell_of(polydata)
+    for data, of_corner, place in (
+        (polydata.GetPointData(), faces.ravel(), np.arange(len(rest))),
+        (polydata.GetCellData(), np.repeat(cells, 3), None),
+    ):
+        given = data.GetNormals()
+        if given is None:
+            continue
+        corners, counts = faces.ravel(), np.full(len(faces), 3)
+        carried = NormalTransport(
+            rest, counts, corners, vtk_to_numpy(given), of_corner=of_corner, place=place
+        )
+        normals = carried.normals(points).astype(vtk_to_numpy(given).dtype)
+        fresh = numpy_to_vtk(normals, deep=True)
+        fresh.SetName(given.GetName())
+        data.SetNormals(fresh)
+    moved = vtkPoints()
+    moved.SetData(numpy_to_vtk(np.ascontiguousarray(points), deep=True))
+    polydata.SetPoints(moved)
 
 
 def add_array(attributes: Any, name: str, values: Any) -> None:
@@ -85,8 +86,19 @@ def add_array(attributes: Any, name: str, values: Any) -> None:
     attributes.AddArray(array)
 
 
-def _triangles(faces: IntArray) -> Any:
-    cells = vtkCellArray()
-    starts = np.arange(0, 3 * len(faces) + 1, 3)
-    cells.SetData(numpy_to_vtk(starts, deep=True), numpy_to_vtk(faces.ravel(), deep=True))
-    return cells
+def _triangulated(polydata: Any) -> Any:
+    cut = vtkTriangleFilter()
+    cut.PassVertsOff()
+    cut.PassLinesOff()
+    cut.SetInputData(polydata)
+    cut.Update()
+    return cut.GetOutput()
+
+
+def _cell_of(polydata: Any) -> IntArray:
+    """Return the cell of each triangle of `surface`, (m,) int."""
+    bare = vtkPolyData()
+    bare.CopyStructure(polydata)
+    add_array(bare.GetCellData(), "cell", np.arange(polydata.GetNumberOfCells()))
+    cells = _triangulated(bare).GetCellData().GetArray("cell")
+    return vtk_to_numpy(cells).astype(np.int64)

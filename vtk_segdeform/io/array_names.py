@@ -88,7 +88,9 @@ def warn_renamed(what: str, names: dict[str, str]) -> None:
             _log.warning("%s %r is written as %r", what, name, written)
 
 
-def warn_left_out(format_: str, surface: pv.PolyData, kept: Mapping[str, Sequence[str]]) -> None:
+def warn_left_out(
+    format_: str, surface: pv.PolyData, kept: Mapping[str, Sequence[str]], *, cells: bool = False
+) -> None:
     """Log a warning that lists the arrays and cells of *surface* that the format cannot store.
 
     Parameters
@@ -99,6 +101,8 @@ def warn_left_out(format_: str, surface: pv.PolyData, kept: Mapping[str, Sequenc
         The surface that is written.
     kept : mapping
         Names of the arrays that are written, for "point", "cell" and "field".
+    cells : bool
+        Whether vertex and line cells are written.
     """
     lost = [
         f"{sort} array {name!r}"
@@ -107,7 +111,7 @@ def warn_left_out(format_: str, surface: pv.PolyData, kept: Mapping[str, Sequenc
         if name not in kept.get(sort, ())
     ]
     for count, sort in ((surface.n_verts, "vertex"), (surface.n_lines, "line")):
-        if count:
+        if count and not cells:
             lost.append(f"{count} {sort} cell{'s' if count > 1 else ''}")
     if lost:
         _log.warning("%s cannot store %s: left out", format_, ", ".join(lost))

@@ -37,7 +37,7 @@ from .moving import MovingSurface
 from .off import read_off, write_off
 from .ply import read_ply, write_ply
 from .polygons import polydata_of, triangles_of
-from .stl import read_stl
+from .stl import read_stl, write_stl
 from .vtk_formats import read_with_vtk, write_with_vtk
 from .wavefront import read_obj, write_obj
 
@@ -49,12 +49,12 @@ _READERS: dict[str, Callable[[Path], pv.PolyData]] = {
 }  # fmt: skip
 _WRITERS: dict[str, Callable[[Path, pv.PolyData], None]] = {
     ".glb": write_gltf, ".gltf": write_gltf, ".obj": write_obj, ".off": write_off,
-    ".ply": write_ply,
+    ".ply": write_ply, ".stl": write_stl,
 }  # fmt: skip
 _VTK_READS = frozenset({".vtk", ".vtp", ".vtu", ".vtkhdf"})
-_VTK_WRITES = frozenset({".stl", ".vtk", ".vtp", ".vtkhdf"})
+_VTK_WRITES = frozenset({".vtk", ".vtp", ".vtu", ".vtkhdf"})
 # Formats of point arrays of any name and colours.
-_STORE_ARRAYS = frozenset({".ply", ".vtk", ".vtp", ".vtkhdf"})
+_STORE_ARRAYS = frozenset({".ply", ".vtk", ".vtp", ".vtu", ".vtkhdf"})
 
 
 def is_mesh_file(path: str | Path) -> bool:
@@ -125,11 +125,13 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
     Parameters
     ----------
     path : str or Path
-        .obj, .off, .ply, .stl, .vtk, .vtp, .vtkhdf; with PyMeshLab .3ds, .dae, .x3d, .wrl, .ctm.
-        All formats except .stl and those of PyMeshLab store every digit; .vtk, .vtp and .vtkhdf
-        store every array.  A warning is logged for each array that is left out or renamed.
+        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .vtkhdf, .glb, .gltf; with PyMeshLab .3ds, .dae,
+        .x3d, .wrl, .ctm.  All formats except .stl, .glb, .gltf and those of PyMeshLab store every
+        digit; .vtk, .vtp, .vtu and .vtkhdf store every array.  A warning is logged for each array
+        that is left out or renamed.
     mesh : Mesh or pyvista.PolyData
-        The mesh to write.
+        The mesh to write.  A surface that was read from glTF is written to glTF with the nodes,
+        materials and textures of that file.
 
     Raises
     ------

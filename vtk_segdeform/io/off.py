@@ -1,30 +1,33 @@
 """OFF, the Object File Format of Geomview: reader and writer in full precision.
 
-OFF             or COFF, NOFF, STOFF, ...: the values after each position
+OFF             or STCNOFF, some of its letters: what comes after each position
 n m e           numbers of vertices, faces and edges (the last is not used)
-x y z [...]     n lines
+x y z [...]     n lines: normal (N), colour (C), texture coordinates (ST)
 k i j l [...]   m lines: a polygon with k corners, numbered from 0, possibly a colour
+
+Normals become the point array "Normals", texture coordinates "TextureCoordinates", colours of
+vertices "RGBA" or "RGB", colours of faces cell arrays of these names if all faces have them.
 """
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyvista as pv
 
-from ..arrays import IntArray
+from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
 from .array_names import text_of, warn_left_out
-from .polygons import polydata_of, polygons_of, rows
+from .polygons import cells_of, polydata_of, polygons_of, rows
 
 _KIND = re.compile(r"(ST)?(C)?(N)?OFF\b", re.IGNORECASE)
-_WIDTHS = {"N": 3, "C": 4, "ST": 2}
 
 
 def read_off(path: Path) -> pv.PolyData:
-    """Read a surface from an OFF file; colours of vertices become "RGBA", normals are ignored."""
+    """Read a surface from an OFF file; with normals, texture coordinates and colours."""
     text = re.sub(r"#[^\r\n]*", "", text_of(path.read_bytes()))
     lines = [line for line in re.split(r"[\r\n]+", text) if line.strip()]
     kind = _KIND.match(lines[0].strip()) if lines else None
@@ -44,25 +47,80 @@ def read_off(path: Path) -> pv.PolyData:
     )
     counts, corners = _polygons(lines[1 + n : 1 + n + m])
     surface = polydata_of(table[:, :3], counts, corners)
-    extra = table[:, 3:]
-    if kind[3]:
-        extra = extra[:, 3:]
+    extra, first = table[:, 3:], lines[1] if n else ""
+    if kind[3] and extra.shape[1] >= 3:
+        surface.point_data["Normals"], extra = extra[:, :3], extra[:, 3:]
+        surface.point_data.active_normals_name = "Normals"
+    if kind[1] and extra.shape[1] >= 2:
+        surface.point_data["TextureCoordinates"], extra = extra[:, -2:], extra[:, :-2]
+        surface.point_data.active_texture_coordinates_name = "TextureCoordinates"
     if kind[2] and extra.shape[1] >= 3:
         colour = extra[:, : min(extra.shape[1], 4)]
-        scale = 255.0 if colour.max(initial=0.0) <= 1.0 and "." in lines[1] else 1.0
-        colour = np.nan_to_num(scale * colour).clip(0.0, 255.0)
-        surface.point_data["RGBA"] = np.round(colour).astype(np.uint8)
+        _keep_colour(surface.point_data, colour, "." in first)
+    _keep_colours_of_faces(surface, lines[1 + n : 1 + n + m], counts)
     return surface
 
 
+def _keep_colour(attributes: Any, colour: FloatArray, fractions: bool) -> None:
+    scale = 255.0 if colour.max(initial=0.0) <= 1.0 and fractions else 1.0
+    colour = np.nan_to_num(scale * colour).clip(0.0, 255.0)
+    attributes["RGB" if colour.shape[1] == 3 else "RGBA"] = np.round(colour).astype(np.uint8)
+
+
+def _keep_colours_of_faces(surface: pv.PolyData, lines: list[str], counts: IntArray) -> None:
+    words = [line.split()[k + 1 :] for line, k in zip(lines, counts.tolist(), strict=True)]
+    widths = {len(row) for row in words}
+    if widths != {3} and widths != {4}:
+        return
+    try:
+        colour = np.array(words, dtype=float)
+    except ValueError:
+        return
+    _keep_colour(surface.cell_data, colour, any("." in word for row in words for word in row))
+
+
 def write_off(path: Path, surface: pv.PolyData) -> None:
-    """Write positions in full precision, and polygons; OFF stores no other arrays."""
-    polygons = rows(*polygons_of(surface))
-    warn_left_out("OFF", surface, {})
+    """Write positions in full precision, polygons, normals, texture coordinates and colours."""
+    counts, corners = polygons_of(surface)
+    polygons = rows(counts, corners)
+    kept: dict[str, list[str]] = {"point": [], "cell": []}
+    columns, kind = [np.asarray(surface.points, dtype=float)], ""
+    data = surface.point_data
+    normals = data.get("Normals")
+    if normals is not None and normals.shape[1:] == (3,) and normals.dtype.kind == "f":
+        columns, kind = [*columns, np.asarray(normals, dtype=float)], "N"
+        kept["point"].append("Normals")
+    name, colour = _colour(data)
+    if colour is not None:
+        columns, kind = [*columns, colour], f"C{kind}"
+        kept["point"].append(name)
+    texture = surface.active_texture_coordinates
+    if texture is not None and texture.ndim == 2 and texture.shape[1] >= 2:
+        columns, kind = [*columns, np.asarray(texture, dtype=float)[:, :2]], f"ST{kind}"
+        kept["point"].append(str(data.active_texture_coordinates_name))
+    name, of_faces = _colour(surface.cell_data)
+    tails = [""] * len(polygons)
+    if of_faces is not None:
+        tails = [f" {' '.join(map(str, row))}" for row in of_faces[cells_of(surface)].tolist()]
+        kept["cell"].append(name)
+    warn_left_out("OFF", surface, kept)
+    table = zip(*(column.tolist() for column in columns), strict=True)
     with path.open("w", newline="\n") as file:
-        file.write(f"OFF\n{surface.n_points} {len(polygons)} 0\n")
-        file.writelines(f"{x!r} {y!r} {z!r}\n" for x, y, z in surface.points.tolist())
-        file.writelines(f"{len(row)} {' '.join(map(str, row))}\n" for row in polygons)
+        file.write(f"{kind}OFF\n{surface.n_points} {len(polygons)} 0\n")
+        file.writelines(f"{' '.join(repr(v) for each in row for v in each)}\n" for row in table)
+        file.writelines(
+            f"{len(row)} {' '.join(map(str, row))}{tail}\n"
+            for row, tail in zip(polygons, tails, strict=True)
+        )
+
+
+def _colour(attributes: Any) -> tuple[str, Any]:
+    """Return the name and the bytes of colours in point or cell data; None if there are none."""
+    for name, width in (("RGBA", 4), ("RGB", 3)):
+        values = attributes.get(name)
+        if values is not None and values.dtype == np.uint8 and values.shape[1:] == (width,):
+            return name, np.asarray(values)
+    return "", None
 
 
 def _polygons(lines: list[str]) -> tuple[IntArray, IntArray]:

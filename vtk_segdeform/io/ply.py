@@ -2,18 +2,21 @@
 
 VTK's reader and writer keep 7 digits.  A surface consists of these elements and properties:
 
-    vertex     x y z; red green blue (alpha); s t, u v or texture_u texture_v
+    vertex     x y z; nx ny nz; red green blue (alpha); s t, u v or texture_u texture_v
     face       vertex_indices or vertex_index, a list; texcoord, a list of (u, v) per corner
     tristrips  vertex_indices, a list: any three in sequence are a triangle, -1 ends a strip
 
-Colours become arrays "RGB" or "RGBA", texture coordinates "TextureCoordinates" of vertices and
-"TextureCorners" of corners, all other numbers arrays of the same name.  Arrays are written as
-properties of the same name, unless the name is listed here or contains white space.
+Normals become "Normals", colours arrays "RGB" or "RGBA", texture coordinates "TextureCoordinates"
+of vertices and "TextureCorners" of corners, all other numbers arrays of the same name.  Arrays are
+written as properties of the same name, unless the name is listed here or contains white space.
+Numbers of any other element are field arrays "element.property", comments the field array
+"Comments".
 """
 
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -23,8 +26,8 @@ import pyvista as pv
 
 from ..arrays import IntArray
 from ..errors import MeshError
-from .array_names import plain_names, warn_left_out, warn_renamed
-from .ply_tables import Lists, Table, tables_of
+from .array_names import get_names, plain_names, set_names, warn_left_out, warn_renamed
+from .ply_tables import Lists, Table, comments_of, tables_of
 from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of, unstripped
 
 _log = logging.getLogger(__name__)
@@ -38,6 +41,7 @@ _WIDTHS = {"RGB": 3, "RGBA": 4}
 _NORMAL = ("nx", "ny", "nz")
 _CORNERS = ("vertex_indices", "vertex_index")
 _POINT_TEXTURE, _CORNER_TEXTURE = "TextureCoordinates", "TextureCorners"
+_COMMENTS, _PLAIN = "Comments", re.compile(r"[!-~]+")
 _COMMON = 255  # corners of a face; VTK and MeshLab store the number in a byte
 _NO_NUMBERS = np.empty(0, dtype=np.int64)
 _OF_POINTS = frozenset({*"xyz", *_NORMAL, *_COLOUR, *(name for pair in _TEXTURE for name in pair)})
@@ -46,7 +50,8 @@ _OF_FACES = frozenset({*_CORNERS, "texcoord", *_COLOUR})
 
 def read_ply(path: Path) -> pv.PolyData:
     """Read a surface from a PLY file, with colours as "RGB"(A) and other properties by name."""
-    tables = tables_of(path.read_bytes())
+    data = path.read_bytes()
+    tables = tables_of(data)
     vertex, face = tables.get("vertex", {}), tables.get("face", {})
     if not _has_numbers(vertex, "xyz"):
         raise MeshError("the PLY file has no vertices with x, y, z")
@@ -62,7 +67,8 @@ def read_ply(path: Path) -> pv.PolyData:
         corners = np.concatenate([corners, triangles.ravel()])
     surface = polydata_of(points, counts, corners)
     if _has_numbers(vertex, _NORMAL):
-        vertex = {name: values for name, values in vertex.items() if name not in _NORMAL}
+        surface.point_data["Normals"] = np.stack([vertex.pop(name) for name in _NORMAL], axis=-1)
+        surface.point_data.active_normals_name = "Normals"
     for pair in _TEXTURE:
         if _has_numbers(vertex, pair):
             texture = np.stack([vertex.pop(name) for name in pair], axis=-1)
@@ -74,6 +80,12 @@ def read_ply(path: Path) -> pv.PolyData:
         surface.cell_data[_CORNER_TEXTURE] = padded_corners(counts, pairs)
     _keep_arrays(vertex, surface.point_data)
     _keep_arrays(face, surface.cell_data)
+    for element in tables.keys() - {"vertex", "face", "tristrips"}:
+        for name, values in tables[element].items():
+            if isinstance(values, np.ndarray) and len(values):
+                surface.field_data[f"{element}.{name}"] = values
+    if comments := comments_of(data):
+        set_names(surface, _COMMENTS, comments)
     return surface
 
 
@@ -118,12 +130,20 @@ def write_ply(path: Path, surface: pv.PolyData) -> None:
     """
     counts, corners = polygons_of(surface)
     points, columns = surface.points, dict[str, Any]()
+    kept: dict[str, list[str]] = {"point": [], "cell": [], "field": []}
     texture, texture_name = surface.active_texture_coordinates, ""
     if texture is not None and texture.ndim == 2 and texture.shape[1] >= 2:
         # MeshLab reads these names in double precision
-        columns |= dict(zip(_TEXTURE[-1], np.asarray(texture, dtype="f8").T, strict=False))
-        texture_name = surface.point_data.active_texture_coordinates_name
+        pairs = np.array(texture, dtype="f8")
+        texture_name = str(surface.point_data.active_texture_coordinates_name)
+        if texture_name.startswith("TEXCOORD_"):  # v of glTF begins at the top
+            pairs[:, 1] = 1.0 - pairs[:, 1]
+        columns |= dict(zip(_TEXTURE[-1], pairs.T, strict=False))
     arrays = {name: v for name, v in surface.point_data.items() if name != texture_name}
+    normals = arrays.get("Normals")
+    if normals is not None and normals.shape[1:] == (3,) and normals.dtype.str[1:] in ("f4", "f8"):
+        columns |= dict(zip(_NORMAL, np.asarray(arrays.pop("Normals")).T, strict=True))
+        kept["point"].append("Normals")
     of_points, written = _columns("point", arrays, _OF_POINTS)
     vertex = dict(zip("xyz", np.asarray(points, dtype="f8").T, strict=True)) | columns | of_points
     cells = cells_of(surface)
@@ -132,25 +152,55 @@ def write_ply(path: Path, surface: pv.PolyData) -> None:
     if seams is not None:
         del arrays[_CORNER_TEXTURE]
     face, written_cells = _columns("cell", arrays, _OF_FACES)
-    kept = {"point": [*written, texture_name], "cell": written_cells}
+    kept["point"] += [*written, texture_name]
+    kept["cell"] += written_cells
     kept["cell"] += [_CORNER_TEXTURE] if seams is not None else []
+    elements = _other_elements(surface, kept["field"])
+    comments = [" ".join(line.split()) for line in get_names(surface, _COMMENTS)]
+    kept["field"] += [_COMMENTS] if comments else []
     warn_left_out("PLY", surface, kept)
     if counts.max(initial=0) > _COMMON:
         _log.warning("PLY faces of over %d corners cannot be read by some programs", _COMMON)
     lists = [("vertex_indices", counts, corners.astype("<i4"))]
     if seams is not None:  # MeshLab reads single precision only
         lists.append(("texcoord", 2 * counts, seams.astype("<f4").ravel()))
-    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]
+    header = ["ply", "format binary_little_endian 1.0"]
+    header += [f"comment {line}" for line in comments]
+    header += [f"element vertex {len(points)}"]
     header += [f"property {_WORDS[c.dtype.str[1:]]} {name}" for name, c in vertex.items()]
     header += [f"element face {len(counts)}"]
     for name, lengths, values in lists:
         words = _WORDS[_length_type(lengths)], _WORDS[values.dtype.str[1:]]
         header += [f"property list {words[0]} {words[1]} {name}"]
     header += [f"property {_WORDS[c.dtype.str[1:]]} {name}" for name, c in face.items()]
+    for element, properties in elements.items():
+        header += [f"element {element} {len(next(iter(properties.values())))}"]
+        header += [f"property {_WORDS[v.dtype.str[1:]]} {name}" for name, v in properties.items()]
     with path.open("wb") as file:
         file.write("\n".join([*header, "end_header", ""]).encode())
         file.write(_packed(len(points), list(vertex.values())).tobytes())
         file.write(_face_rows([(n, v) for _, n, v in lists], list(face.values())))
+        for properties in elements.values():
+            count = len(next(iter(properties.values())))
+            file.write(_packed(count, list(properties.values())).tobytes())
+
+
+def _other_elements(surface: pv.PolyData, kept: list[str]) -> dict[str, dict[str, Any]]:
+    """Return the columns of further elements, from field arrays "element.property"."""
+    elements: dict[str, dict[str, Any]] = {}
+    for name in list(surface.field_data.keys()):
+        element, dot, key = name.partition(".")
+        plain = _PLAIN.fullmatch(element) and _PLAIN.fullmatch(key) and dot
+        if not plain or element in ("vertex", "face", "tristrips"):
+            continue
+        values = _column(np.asarray(surface.field_data[name]))
+        known = elements.get(element, {})
+        if values is not None and all(
+            len(each) == len(values) > 0 for each in (*known.values(), values)
+        ):
+            elements[element] = known | {key: values}
+            kept.append(name)
+    return elements
 
 
 def _columns(

@@ -82,6 +82,14 @@ def tables_of(data: bytes) -> dict[str, Table]:
     return tables
 
 
+def comments_of(data: bytes) -> list[str]:
+    """Return the comments in the header of a PLY file."""
+    end = _END.search(data)
+    lines = _LINE.split(data[: end.start()]) if end else []
+    found = [decoded(line).strip() for line in lines]
+    return [each[7:].strip() for each in found if each.startswith(("comment ", "comment\t"))]
+
+
 def _header(data: bytes) -> tuple[str, list[_Element], int]:
     first, end = _FIRST.match(data), _END.search(data)
     if first is None or end is None:

@@ -1,10 +1,11 @@
-"""STL, a triangle soup in single precision, text or binary: reader that merges equal corners.
+"""STL, a triangle soup in single precision, text or binary: reader and writer of binary files.
 
     binary   80 bytes, the number of triangles, and 50 bytes each: normal, corners, 2 more
     text     solid ... facet normal ... outer loop, vertex x y z three times, endloop ... endsolid
 
-Vertices are numbered in the order of their first corner.  Normals, and triangles with a repeated
-vertex, are ignored.
+Equal corners are merged; vertices are numbered in the order of their first corner.  All triangles
+are kept, in their order.  Normals are ignored and computed again.  The 2 bytes are the cell array
+"Attribute" unless all are 0, the name or the 80 bytes the field array "Header".
 """
 
 from __future__ import annotations
@@ -17,9 +18,13 @@ import numpy as np
 import pyvista as pv
 
 from ..errors import MeshError
-from .polygons import polydata_of
+from .array_names import decoded, get_names, set_names, warn_left_out
+from .polygons import cells_of, cut_into_triangles, polydata_of, polygons_of
 
 _START, _SIZE = 84, 50  # bytes before the triangles, and per triangle
+_ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
+_HEADER = "Header"
+_NAME = re.compile(rb"solid[ \t]*([^\r\n]*)", re.I)
 _VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE | re.I)
 _FACET = re.compile(rb"^[ \t]*facet\b", re.MULTILINE | re.I)
 _END = re.compile(rb"^[ \t]*endsolid\b", re.MULTILINE | re.I)
@@ -30,14 +35,49 @@ def read_stl(path: Path) -> pv.PolyData:
     data = path.read_bytes()
     count = int.from_bytes(data[80:84], "little")
     text = data.lstrip()[:5].lower() == b"solid" and len(data) != _START + _SIZE * count
-    corners = _of_text(data) if text else _of_bytes(data, count)
+    attributes: Any = np.empty(0)
+    if text:
+        corners, name = _of_text(data), _NAME.match(data.lstrip())
+        header = name[1] if name else b""
+    else:
+        rows = _of_bytes(data, count)
+        corners, attributes = rows["corners"].reshape(-1, 3), rows["more"]
+        header = data[:80].partition(b"\0")[0]
     with np.errstate(invalid="ignore"):  # NaN is reported when the mesh is checked
         corners = corners + np.float32(0.0)  # -0 becomes 0
     points, numbers = _merged(corners)
-    faces = numbers.reshape(-1, 3)
-    a, b, c = faces.T
-    faces = faces[(a != b) & (b != c) & (c != a)]
-    return polydata_of(points, np.full(len(faces), 3), faces.ravel())
+    surface = polydata_of(points, np.full(len(corners) // 3, 3), numbers)
+    if attributes.any():
+        surface.cell_data["Attribute"] = attributes
+    if title := decoded(header).strip():
+        set_names(surface, _HEADER, [title])
+    return surface
+
+
+def write_stl(path: Path, surface: pv.PolyData) -> None:
+    """Write the triangles, in their order, to a binary STL file; polygons are cut."""
+    counts, corners = polygons_of(surface)
+    faces, polygon = cut_into_triangles(np.asarray(surface.points, float), counts, corners)
+    kept: dict[str, list[str]] = {"cell": [], "field": []}
+    rows = np.zeros(len(faces), _ROW)
+    rows["corners"] = surface.points[faces]
+    a, b, c = np.moveaxis(rows["corners"].astype(float), 1, 0)
+    with np.errstate(invalid="ignore", over="ignore"):
+        normals = np.cross(b - a, c - a)
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        rows["normal"] = normals / np.where(length > 0, length, 1.0)
+    attributes = surface.cell_data.get("Attribute")
+    if attributes is not None and attributes.dtype == np.uint16 and attributes.ndim == 1:
+        rows["more"] = np.asarray(attributes)[cells_of(surface)][polygon]
+        kept["cell"].append("Attribute")
+    header = " ".join(get_names(surface, _HEADER)).encode("utf-8")[:80]
+    if header.lower().startswith(b"solid"):  # which would be text
+        header = b"_" + header[:79]
+    kept["field"] += [_HEADER] if header else []
+    warn_left_out("STL", surface, kept)
+    with path.open("wb") as file:
+        file.write(header.ljust(80, b"\0") + len(rows).to_bytes(4, "little"))
+        file.write(rows.tobytes())
 
 
 def _of_bytes(data: bytes, count: int) -> Any:
@@ -46,8 +86,7 @@ def _of_bytes(data: bytes, count: int) -> Any:
         raise MeshError(
             f"declares {count} triangles, but its {len(data)} bytes contain {max(stored, 0)}"
         )
-    row = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
-    return np.frombuffer(data, row, count, _START)["corners"].reshape(-1, 3)
+    return np.frombuffer(data, _ROW, count, _START)
 
 
 def _of_text(data: bytes) -> Any:

@@ -124,12 +124,20 @@ class Surface:
         return self._soup.vertex_of
 
     @property
+    def loose(self) -> IntArray:
+        """(k,) int: the given points that are in no face of the mesh."""
+        return self._soup.loose
+
+    @property
     def workarounds(self) -> tuple[Workaround, ...]:
         """What the mesh has differently, as sentences with the given points concerned."""
         return self._soup.workarounds
 
     def vertices_at(self, points: ArrayLike) -> IntArray:
-        """Return the vertices (k,) of the mesh that given *points* (mask or ids) follow, sorted."""
+        """Return the vertices (k,) of the mesh that given *points* (mask or ids) are, sorted.
+
+        Points in no face are no vertices.
+        """
         return self._soup.vertices_at(points)
 
     def at_points(self, values: ArrayLike) -> Any:
@@ -144,14 +152,14 @@ class Surface:
         return self._soup.at_vertices(plain(values, "values"))
 
     def targets_at(self, points: ArrayLike, targets: ArrayLike) -> tuple[IntArray, FloatArray]:
-        """Return the vertices (k,) that given points follow, and where they must be, (k, 3).
+        """Return the vertices (k,) that given points are, and their targets (k, 3).
 
         Parameters
         ----------
         points : (q,) int or (p,) bool
             Given points.
         targets : (q, 3) float
-            Their targets.  Where several points follow one vertex, it goes to the mean.
+            Their targets.  A vertex that is several points, at a seam, goes to the mean.
         """
         return self._soup.targets_at(points, targets)
 

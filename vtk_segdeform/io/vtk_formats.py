@@ -1,4 +1,4 @@
-"""Surfaces through VTK's own readers and writers, for .vtk, .vtp, .vtu, .vtkhdf and .stl.
+"""Surfaces through VTK's own readers and writers, for .vtk, .vtp, .vtu and .vtkhdf.
 
 Reading: the readers of VTK do not validate a file, so they run in a child process (`isolated`);
 afterwards the cells and arrays are checked, and VTK's error messages become a MeshError.
@@ -22,13 +22,12 @@ from urllib.parse import quote, unquote
 import numpy as np
 import pyvista as pv
 from vtkmodules.vtkCommonDataModel import vtkPolyData
-from vtkmodules.vtkIOGeometry import vtkSTLWriter
 from vtkmodules.vtkIOHDF import vtkHDFWriter
 from vtkmodules.vtkIOLegacy import vtkPolyDataWriter
-from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
 from ..errors import MeshError
-from .array_names import plain_names, warn_left_out, warn_renamed
+from .array_names import plain_names, warn_renamed
 from .isolated import read_isolated
 from .polygons import polydata_of
 
@@ -43,9 +42,11 @@ _BEGINS = {
     ".vtu": re.compile(rb"[^<]*<[\s\S]*<?VTKFile\b"),
     ".vtkhdf": re.compile(rb"\x89HDF\r\n\x1a\n"),
 }
-_SURFACE_CELLS = frozenset({5, 7, 9})  # VTK's numbers of triangle, polygon, quadrangle
-_WRITERS = {".stl": vtkSTLWriter, ".vtk": vtkPolyDataWriter, ".vtkhdf": vtkHDFWriter}
-_REFUSED = {".vtk": "{}", ".vtp": '<>&"', ".vtkhdf": "/."}
+# VTK's numbers of the cells of a grid, by where PolyData has them.
+_VERTS, _LINES, _POLYGONS, _STRIPS = (1, 2), (3, 4), (5, 7, 9), (6,)
+_SURFACE_CELLS = frozenset({*_VERTS, *_LINES, *_POLYGONS, *_STRIPS})
+_WRITERS = {".vtk": vtkPolyDataWriter, ".vtkhdf": vtkHDFWriter}
+_REFUSED = {".vtk": "{}", ".vtp": '<>&"', ".vtu": '<>&"', ".vtkhdf": "/."}
 _SCALARS, _MOST = 0, 4  # VTK's attribute index; most components in a legacy file
 
 
@@ -148,15 +149,37 @@ def _surface(data: pv.DataSet) -> pv.PolyData:
         raise MeshError(
             "contains cells other than triangles and polygons; extract its surface first"
         )
-    counts = np.diff(pv.convert_array(data.GetCells().GetOffsetsArray()))
-    surface = polydata_of(np.asarray(data.points, dtype=float), counts, data.cell_connectivity)
+    if not data.n_cells or not set(data.celltypes.tolist()) & {*_POLYGONS, *_STRIPS}:
+        return pv.PolyData()
+    surface, order = pv.PolyData(), []
+    surface.points = np.asarray(data.points, dtype=float)
+    starts = pv.convert_array(data.GetCells().GetOffsetsArray())
+    for name, types in (
+        ("verts", _VERTS), ("lines", _LINES), ("faces", _POLYGONS), ("strips", _STRIPS),
+    ):  # fmt: skip
+        rows = np.flatnonzero(np.isin(data.celltypes, types))
+        parts = [data.cell_connectivity[starts[k] : starts[k + 1]] for k in rows]
+        if name == "faces" and len(rows) == data.n_cells:
+            counts = np.diff(starts)
+            return _with_arrays(polydata_of(surface.points, counts, data.cell_connectivity), data)
+        if parts:
+            setattr(surface, name, np.concatenate([[len(part), *part] for part in parts]))
+        order.append(rows)
+    return _with_arrays(surface, data, np.concatenate(order))
+
+
+def _with_arrays(
+    surface: pv.PolyData, data: pv.UnstructuredGrid, order: Any = slice(None)
+) -> pv.PolyData:
+    """Give a surface the arrays of a grid whose cells have another order."""
+    cells = surface.cell_data
     for mine, theirs in (
         (surface.point_data, data.point_data),
-        (surface.cell_data, data.cell_data),
+        (cells, data.cell_data),
         (surface.field_data, data.field_data),
     ):
         for name, values in theirs.items():
-            mine[name] = values
+            mine[name] = values[order] if mine is cells else values
     return surface
 
 
@@ -174,12 +197,12 @@ def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
     without an error.  So the former writes to memory, and the output of the latter is read back.
     """
     suffix = path.suffix.lower()
-    if suffix == ".stl":
-        warn_left_out("STL", surface, {})
-    plain = surface if suffix == ".stl" else _with_plain_names(surface, suffix)
-    if suffix == ".vtp":
-        writer = vtkXMLPolyDataWriter()
-        writer.SetInputData(plain)
+    plain = _with_plain_names(surface, suffix)
+    if suffix in _XML:
+        writer = vtkXMLPolyDataWriter() if suffix == ".vtp" else vtkXMLUnstructuredGridWriter()
+        writer.SetInputData(
+            plain if suffix == ".vtp" else pv.wrap(plain).cast_to_unstructured_grid()
+        )
         writer.SetDataModeToBinary()
         writer.WriteToOutputStringOn()
         writer.Write()

@@ -6,14 +6,16 @@ its vertices.  Here vertices remain as in the file:
     v  x y z [r g b]    positions; colours become the point array "RGB"
     vt u v              one per vertex: point array "TextureCoordinates".  Else, with seams, cell
                         array "TextureCorners": (u, v) per corner in sequence, NaN if it has none
+    vn x y z            likewise: point array "Normals", or cell array "NormalCorners"
     f  a/t/n ...        polygons; negative indices count back from the last vertex
+    l  a b ...  p a ... lines and points
     o g usemtl          cell arrays "Object", "Group" and "Material": indices into the field arrays
                         "ObjectNames", "GroupNames" and "MaterialNames"
     s                   cell array "Smoothing": smoothing group, 0 is off
     mtllib              field array "MaterialLibrary"
 
-A name is the rest of its line, in UTF-8 or Latin-1; names are written in UTF-8.  Normals (vn),
-lines and points are ignored.
+A name is the rest of its line, in UTF-8 or Latin-1; names are written in UTF-8.  Lines have no
+texture coordinates.
 """
 
 from __future__ import annotations
@@ -28,23 +30,31 @@ import pyvista as pv
 from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
 from .array_names import get_names, plain_names, set_names, text_of, warn_left_out, warn_renamed
-from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of, rows
+from .moving import CORNER_NORMALS
+from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of
 
-_POINT_TEXTURE, _CORNER_TEXTURE = "TextureCoordinates", "TextureCorners"
+_CORNER_TEXTURE = "TextureCorners"
+_OF_CORNERS = {
+    "texture coordinate": ("TextureCoordinates", _CORNER_TEXTURE),
+    "normal": ("Normals", CORNER_NORMALS),
+}
 _NAMED = {"o": "Object", "g": "Group", "usemtl": "Material"}
 _SMOOTHING, _LIBRARY = "Smoothing", "MaterialLibrary"
 _MOST = 2**62  # an index
-# By statement: the first face it applies to, and its value.
-_Runs: TypeAlias = dict[str, list[tuple[int, str]]]
+# By statement: the first point, line and face it applies to, and its value.
+_Runs: TypeAlias = dict[str, list[tuple[tuple[int, int, int], str]]]
 
 
 def read_obj(path: Path) -> pv.PolyData:
     """Read the polygons of an OBJ file."""
     points: list[list[str]] = []
     textures: list[list[str]] = []
+    normals: list[list[str]] = []
     counts: list[int] = []
     corners: list[int] = []
     texture_of: list[int] = []
+    normal_of: list[int] = []
+    others: dict[str, list[list[int]]] = {"p": [], "l": []}
     runs: _Runs = {word: [] for word in (*_NAMED, "s")}
     libraries = []
     text = text_of(path.read_bytes()).replace("\r\n", "\n").replace("\r", "\n")
@@ -59,16 +69,25 @@ def read_obj(path: Path) -> pv.PolyData:
             counts.append(len(face))
             for corner in face:
                 vertex, _, more = corner.partition("/")
-                texture = more.partition("/")[0]
+                texture, _, normal = more.partition("/")
                 corners.append(_number(vertex, len(points)))
                 texture_of.append(_number(texture, len(textures)) if texture else -1)
+                normal_of.append(_number(normal, len(normals)) if normal else -1)
+        elif word == "vn":
+            normals.append(_words(rest))
+        elif word in others:
+            ends = [each.partition("/")[0] for each in _words(rest)]
+            if len(ends) > (word == "l"):
+                others[word].append([_number(each, len(points)) for each in ends])
         elif word in runs:
-            runs[word].append((len(counts), rest.strip()))
+            begun = len(others["p"]), len(others["l"]), len(counts)
+            runs[word].append((begun, rest.strip()))
         elif word == "mtllib":
             libraries.append(rest.strip())
-    if max(corners, default=0) >= len(points):
+    most = max(map(max, (corners or [0], *others["p"], *others["l"])))
+    if most >= len(points) and (corners or others["p"] or others["l"]):
         raise MeshError(
-            f"a face refers to vertex {max(corners) + 1} of {len(points)}; the file is truncated "
+            f"a face refers to vertex {most + 1} of {len(points)}; the file is truncated "
             "or damaged, export it again"
         )
     table = _table("vertex", points, (3, 4, 6, 7))
@@ -78,9 +97,15 @@ def read_obj(path: Path) -> pv.PolyData:
     if table.shape[1] >= 6:
         colour = np.nan_to_num(table[:, 3:6]).clip(0.0, 1.0)
         surface.point_data["RGB"] = np.round(255.0 * colour).astype(np.uint8)
-    _keep_texture(
-        surface, _table("texture coordinate", textures, (2,)), np.array(texture_of, dtype=np.int64)
-    )
+    for name, cells in (("verts", others["p"]), ("lines", others["l"])):
+        if cells:
+            setattr(surface, name, [n for each in cells for n in (len(each), *each)])
+    widths = {"texture coordinate": 2, "normal": 3}
+    for (what, width), listed, of_corner in zip(
+        widths.items(), (textures, normals), (texture_of, normal_of), strict=True
+    ):
+        values = _table(what, listed, (width,))
+        _keep_corners(surface, what, values, np.array(of_corner, dtype=np.int64))
     _keep_runs(surface, runs)
     if libraries:
         set_names(surface, _LIBRARY, libraries)
@@ -124,25 +149,30 @@ def _are_numbers(words: list[str], least: int) -> bool:
         return False
 
 
-def _keep_texture(surface: pv.PolyData, texture: FloatArray, texture_of: IntArray) -> None:
-    """Store texture coordinates per point if every point has a unique one, else per corner."""
-    if not len(texture) or (texture_of < 0).all():
+def _keep_corners(surface: pv.PolyData, what: str, values: FloatArray, of_corner: IntArray) -> None:
+    """Store values of corners per point if every point has a unique one, else per corner."""
+    if not len(values) or (of_corner < 0).all():
         return
-    if texture_of.max() >= len(texture):
-        raise MeshError(
-            f"a face refers to texture coordinate {texture_of.max() + 1} of {len(texture)}"
-        )
+    if of_corner.max() >= len(values):
+        raise MeshError(f"a face refers to {what} {of_corner.max() + 1} of {len(values)}")
+    of_point_name, of_corner_name = _OF_CORNERS[what]
     counts, corners = polygons_of(surface)
     of_point = np.full(surface.n_points, -1)
-    if len(texture) == len(of_point) and (texture_of == corners).all():
+    if len(values) == len(of_point) and (of_corner == corners).all():
         of_point = np.arange(len(of_point))
-    of_point[corners] = texture_of
-    if (of_point[corners] == texture_of).all() and (of_point >= 0).all():
-        surface.point_data[_POINT_TEXTURE] = texture[of_point]
-        surface.point_data.active_texture_coordinates_name = _POINT_TEXTURE
+    of_point[corners] = of_corner
+    if (of_point[corners] == of_corner).all() and (of_point >= 0).all():
+        surface.point_data[of_point_name] = values[of_point]
+        if what == "normal":
+            surface.point_data.active_normals_name = of_point_name
+        else:
+            surface.point_data.active_texture_coordinates_name = of_point_name
         return
-    pairs = np.where(texture_of[:, None] >= 0, texture[texture_of], np.nan)
-    surface.cell_data[_CORNER_TEXTURE] = padded_corners(counts, pairs)
+    each = np.where(of_corner[:, None] >= 0, values[of_corner], np.nan)
+    wide = padded_corners(counts, each)
+    table = np.full((surface.n_cells, wide.shape[1]), np.nan)
+    table[cells_of(surface)] = wide
+    surface.cell_data[of_corner_name] = table
 
 
 def _keep_runs(surface: pv.PolyData, runs: _Runs) -> None:
@@ -150,18 +180,21 @@ def _keep_runs(surface: pv.PolyData, runs: _Runs) -> None:
     for word, statements in runs.items():
         if not statements:
             continue
-        starts = [0, *(at for at, _ in statements), surface.n_cells]
-        lengths = np.diff(starts)
+        sizes = surface.n_verts, surface.n_lines, surface.GetNumberOfPolys()  # VTK's order
+        starts = np.array([(0, 0, 0), *(at for at, _ in statements), sizes])
+        order = [np.repeat(np.arange(len(starts) - 1), each) for each in np.diff(starts, axis=0).T]
+        which = np.concatenate(order)
+        lengths = np.bincount(which, minlength=len(starts) - 1)
         texts = ["", *(text for _, text in statements)]
         if word == "s":
-            groups = [_smoothing_group(text) for text in texts]
-            surface.cell_data[_SMOOTHING] = np.repeat(groups, lengths)
+            groups = np.array([_smoothing_group(text) for text in texts])
+            surface.cell_data[_SMOOTHING] = groups[which]
             continue
         texts = [text or "default" for text in texts]
         names = dict.fromkeys(t for t, n in zip(texts, lengths, strict=True) if n)
         numbers = {name: k for k, name in enumerate(names)}
         key = _NAMED[word]
-        surface.cell_data[key] = np.repeat([numbers.get(text, 0) for text in texts], lengths)
+        surface.cell_data[key] = np.array([numbers.get(text, 0) for text in texts])[which]
         set_names(surface, f"{key}Names", names)
 
 
@@ -177,10 +210,13 @@ def write_obj(path: Path, surface: pv.PolyData) -> None:
     Warnings are logged for arrays that are left out and names that are changed.
     """
     counts, corners = polygons_of(surface)
-    cells = cells_of(surface)
-    polygons = rows(counts, corners + 1)
+    lines, verts = _cells(surface.lines), _cells(surface.verts)
+    elements = [*(("l", row) for row in lines), *(("p", row) for row in verts)]
+    n, k = len(verts), len(lines)
+    cells = np.concatenate([cells_of(surface), np.arange(n, n + k), np.arange(n)])
     kept: dict[str, list[str]] = {"point": [], "cell": [], "field": []}
     texture, texture_of = _texture(surface, counts, corners, kept)
+    normals, normal_of = _normals(surface, counts, corners, kept)
     tags = _tags(surface, cells, kept)
     libraries = plain_names(get_names(surface, _LIBRARY))
     warn_renamed("material library", libraries)
@@ -190,18 +226,67 @@ def write_obj(path: Path, surface: pv.PolyData) -> None:
     if colour is not None and colour.dtype == np.uint8 and colour.shape == table.shape:
         table = np.hstack([table, np.asarray(colour) / 255.0])
         kept["point"].append("RGB")
-    warn_left_out("OBJ", surface, kept)
+    warn_left_out("OBJ", surface, kept, cells=True)
+    words = _corner_words(corners, texture_of, normal_of)
+    ends = np.cumsum(counts).tolist()
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.writelines(f"mtllib {name}\n" for name in libraries.values())
         file.writelines(f"v {' '.join(map(repr, row))}\n" for row in table.tolist())
         file.writelines(f"vt {u!r} {v!r}\n" for u, v in texture.tolist())
-        at = 0
-        for k, row in enumerate(polygons):
-            file.write(tags.get(k, ""))
-            slots = texture_of[at : at + len(row)]
-            words = [f"{v}/{t}" if t else str(v) for v, t in zip(row, slots, strict=False)]
-            file.write(f"f {' '.join(words or map(str, row))}\n")
-            at += len(row)
+        file.writelines(f"vn {x!r} {y!r} {z!r}\n" for x, y, z in normals.tolist())
+        for face, (start, end) in enumerate(pairwise([0, *ends])):
+            file.write(f"{tags.get(face, '')}f {' '.join(words[start:end])}\n")
+        for number, (word, row) in enumerate(elements, start=len(counts)):
+            file.write(f"{tags.get(number, '')}{word} {' '.join(str(v + 1) for v in row)}\n")
+
+
+def _cells(flat: Any) -> list[list[int]]:
+    """Return cells of pyvista, each preceded by its number of points, as lists."""
+    values, found, at = np.asarray(flat).tolist(), [], 0
+    while at < len(values):
+        found.append(values[at + 1 : at + 1 + values[at]])
+        at += 1 + values[at]
+    return found
+
+
+def _corner_words(corners: IntArray, texture_of: list[int], normal_of: list[int]) -> list[str]:
+    """Return the words for the corners of faces: vertex/texture/normal."""
+    words = [str(v + 1) for v in corners.tolist()]
+    if not texture_of and not normal_of:
+        return words
+    textures = [str(t) if t else "" for t in texture_of or [0] * len(words)]
+    normals = [f"/{n}" if n else "" for n in normal_of or [0] * len(words)]
+    return [
+        f"{v}/{t}{n}" if t or n else v for v, t, n in zip(words, textures, normals, strict=True)
+    ]
+
+
+def _normals(
+    surface: pv.PolyData, counts: IntArray, corners: IntArray, kept: dict[str, list[str]]
+) -> tuple[FloatArray, list[int]]:
+    """Return normals (k, 3) and the index of each corner's one from 1; 0 for none."""
+    wide = surface.cell_data.get(CORNER_NORMALS)
+    each = None
+    if wide is not None:
+        each = corner_values(np.asarray(wide)[cells_of(surface)], counts, 3)
+    if each is not None:
+        kept["cell"].append(CORNER_NORMALS)
+        return _unique(each)
+    for name in dict.fromkeys(("Normals", "NORMAL", surface.point_data.active_normals_name)):
+        values = surface.point_data.get(name) if name else None
+        if values is not None and values.shape[1:] == (3,) and values.dtype.kind == "f":
+            kept["point"].append(str(name))
+            return np.asarray(values, dtype=float), (corners + 1).tolist()
+    return np.empty((0, 3)), []
+
+
+def _unique(each: FloatArray) -> tuple[FloatArray, list[int]]:
+    """Return the different rows of *each*, and the number of each row from 1; 0 for NaN."""
+    known = ~np.isnan(each).any(axis=1)
+    values, which = np.unique(each[known], axis=0, return_inverse=True)
+    slots = np.zeros(len(each), dtype=np.int64)
+    slots[known] = which.ravel() + 1
+    return values.astype(float), slots.tolist()
 
 
 def _texture(
@@ -212,16 +297,15 @@ def _texture(
     each = None if wide is None else corner_values(np.asarray(wide)[cells_of(surface)], counts)
     if each is not None:
         kept["cell"].append(_CORNER_TEXTURE)
-        known = ~np.isnan(each).any(axis=1)
-        texture, which = np.unique(each[known], axis=0, return_inverse=True)
-        slots = np.zeros(len(corners), dtype=np.int64)
-        slots[known] = which.ravel() + 1
-        return texture.astype(float), slots.tolist()
+        return _unique(each)
     texture = surface.active_texture_coordinates
     if texture is None or texture.ndim != 2 or texture.shape[1] < 2:
         return np.empty((0, 2)), []
     kept["point"].append(surface.point_data.active_texture_coordinates_name)
-    return np.asarray(texture, dtype=float)[:, :2], (corners + 1).tolist()
+    pairs = np.asarray(texture, dtype=float)[:, :2]
+    if str(surface.point_data.active_texture_coordinates_name).startswith("TEXCOORD_"):
+        pairs = np.stack([pairs[:, 0], 1.0 - pairs[:, 1]], axis=1)  # v of glTF begins at the top
+    return pairs, (corners + 1).tolist()
 
 
 def _tags(surface: pv.PolyData, cells: IntArray, kept: dict[str, list[str]]) -> dict[int, str]:

@@ -72,25 +72,31 @@ class Soup:
     workarounds: tuple[Workaround, ...] = ()
 
     def vertices_at(self, points: ArrayLike) -> IntArray:
-        """Return the vertices (k,) of the mesh that given *points* (mask or ids) follow, sorted."""
-        return np.unique(self.vertex_of[as_ids(points, len(self.points), "points")])
+        """Return the vertices (k,) of the mesh that given *points* (mask or ids) are, sorted.
+
+        Points in no face are no vertices.
+        """
+        ids = as_ids(points, len(self.points), "points")
+        return np.unique(self.vertex_of[ids[~np.isin(ids, self.loose)]])
 
     def at_vertices(self, values: Any) -> Any:
         """Return *values* (p, ...) of the given points at the vertices (n, ...).
 
         Of several points that follow a vertex, the first one counts.
         """
-        _, first = np.unique(self.vertex_of, return_index=True)
-        return values[first]
+        own = np.setdiff1d(np.arange(len(self.points)), self.loose)
+        _, first = np.unique(self.vertex_of[own], return_index=True)
+        return values[own[first]]
 
     def targets_at(self, points: ArrayLike, targets: ArrayLike) -> tuple[IntArray, FloatArray]:
-        """Return the vertices (k,) that given *points* follow, and where they must be, (k, 3).
+        """Return the vertices (k,) that given *points* are, and their targets (k, 3).
 
-        A vertex that several points with *targets* (q, 3) follow goes to the mean.
+        A vertex that is several points with *targets* (q, 3) goes to the mean.
         """
         ids = as_ids(points, len(self.points), "points")
         ends = as_points(targets, "targets", len(ids))
-        ends = ends - (self.points[ids] - self.mesh.vertices[self.vertex_of[ids]])
+        is_vertex = ~np.isin(ids, self.loose)
+        ids, ends = ids[is_vertex], ends[is_vertex]
         vertices, number = np.unique(self.vertex_of[ids], return_inverse=True)
         sums = np.zeros((len(vertices), 3))
         np.add.at(sums, number, ends)

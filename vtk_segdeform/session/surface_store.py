@@ -6,6 +6,8 @@
     surface_7.npy              any shape    a point, cell or field array; of texts, their UTF-8,
     surface_7_ends.npy         (t,) int     and where each text ends
     surface_vertex_of.npy      (p,) int     the vertex of the mesh that each point follows
+    surface_loose.npy          (l,) int     the points in no face
+    surface_workarounds.npy    (w,) int     the points of all workarounds, one after another
 
 The header has their sizes and types, the names of arrays and which of them are active, and the
 workarounds.  All of it is checked when it is read, since files may be damaged or malicious.
@@ -24,7 +26,7 @@ from vtkmodules.vtkCommonDataModel import vtkCellArray
 
 from ..arrays import IntArray
 from ..io import Surface
-from ..mesh import Mesh, Soup, Workaround
+from ..mesh import Kind, Mesh, Soup, Workaround
 from .archive import Archive, type_of
 
 _CELLS = ("Verts", "Lines", "Polys", "Strips")
@@ -42,8 +44,9 @@ def surface_parts(surface: Surface) -> tuple[dict[str, Any], dict[str, Any]]:
     """
     given = surface.given
     points = np.asarray(given.points)
-    arrays: dict[str, Any] = {"points": points, "vertex_of": surface.vertex_of}
-    header: dict[str, Any] = {"points": [type_of(points), len(points)], "cells": {}}
+    loose = surface.loose
+    arrays: dict[str, Any] = {"points": points, "vertex_of": surface.vertex_of, "loose": loose}
+    header: dict[str, Any] = {"points": [type_of(points), len(points), len(loose)], "cells": {}}
     for kind in _CELLS:
         cells = getattr(given, f"Get{kind}")()
         if cells.GetNumberOfCells():
@@ -73,7 +76,9 @@ def surface_parts(surface: Surface) -> tuple[dict[str, Any], dict[str, Any]]:
             of_kind = map(data.VTKObject.GetAbstractAttribute, range(data.VTKObject.NUM_ATTRIBUTES))
             header["active"][place] = [None if each is None else each.GetName() for each in of_kind]
     workarounds = surface.workarounds
-    header["workarounds"] = [[each.text, len(each.points)] for each in workarounds]
+    header["workarounds"] = [
+        [each.kind.name, each.count, each.text, len(each.points)] for each in workarounds
+    ]
     of_all = [np.empty(0, dtype=np.int64), *(each.points for each in workarounds)]
     arrays["workarounds"] = np.concatenate(of_all)
     return header, {f"surface_{name}": array for name, array in arrays.items()}
@@ -88,7 +93,7 @@ def read_surface(archive: Archive, header: Any, mesh: Mesh) -> Surface:
         If it is damaged.
     """
     require(isinstance(header, dict), "the surface must be described by names")
-    kind, p = header["points"]
+    kind, p, n_loose = header["points"]
     given = pv.PolyData()
     given.SetPoints(pv.vtk_points(_array(archive, "points", kind, (p, 3)), deep=True))
     for name, (n_cells, n_corners) in header["cells"].items():
@@ -110,10 +115,14 @@ def read_surface(archive: Archive, header: Any, mesh: Mesh) -> Surface:
             require(name is None or isinstance(name, str), "names of arrays must be text")
             data.SetActiveAttribute(-1 if name is None else name, attribute)
     vertex_of = _array(archive, "vertex_of", "i", (p,))
-    followed = np.unique(vertex_of)
-    require(np.array_equal(followed, np.arange(mesh.n_vertices)), "points do not follow the mesh")
+    in_mesh = ((vertex_of >= 0) & (vertex_of < mesh.n_vertices)).all()
+    require(in_mesh, "a point follows no vertex of the mesh")
+    loose = _array(archive, "loose", "i", (n_loose,))
+    require(((loose >= 0) & (loose < p)).all(), "a point in no face is not a point")
+    own = np.unique(np.delete(vertex_of, loose))
+    require(len(own) == mesh.n_vertices, "a vertex of the mesh is not a point")
     points = np.asarray(given.points, dtype=np.float64)
-    return Surface.of(given, Soup(points, mesh, vertex_of, _workarounds(archive, header, p)))
+    return Surface.of(given, Soup(points, mesh, vertex_of, loose, _workarounds(archive, header, p)))
 
 
 def require(condition: Any, text: str) -> None:
@@ -123,12 +132,15 @@ def require(condition: Any, text: str) -> None:
 
 
 def _workarounds(archive: Archive, header: Mapping[str, Any], p: int) -> tuple[Workaround, ...]:
-    sizes = [_whole(size) for _, size in header["workarounds"]]
+    entries = header["workarounds"]
+    sizes = [_whole(size) for *_, size in entries]
     points = _array(archive, "workarounds", "i", (sum(sizes),))
     require(((points >= 0) & (points < p)).all(), "a workaround is not at a point")
     parts = np.split(points, np.cumsum(sizes))
-    texts = [str(text) for text, _ in header["workarounds"]]
-    return tuple(Workaround(text, part) for text, part in zip(texts, parts, strict=False))
+    return tuple(
+        Workaround(Kind[kind], _whole(count), str(text), part)
+        for (kind, count, text, _), part in zip(entries, parts, strict=False)
+    )
 
 
 def _add(data: Any, name: Any, values: Any, parts: Any) -> None:

@@ -47,6 +47,8 @@ class Menus:
         self._add(menu, "&Open ...", window.ask_and_open, _Keys.Open)
         self.recent = menu.addMenu("Open &recent")
         self.recent.aboutToShow.connect(self._update_recent)
+        repair = self._add(menu, "Re&pair and open ...", window.repair)
+        self._need_mesh.append(repair)
         recover = self._add(menu, "Recover &unsaved work ...", window.recover)
         menu.aboutToShow.connect(lambda: recover.setEnabled(window.autosaves.has_abandoned))
         menu.addSeparator()

@@ -25,6 +25,8 @@ class Request:
     """The file, if the user chose one."""
     slot: Slot | None = None
     """Where it was autosaved, if it is recovered work."""
+    is_new: bool = False
+    """Whether it has been made by the program, and is to be saved."""
 
 
 class WaitingPage(QtWidgets.QWidget):

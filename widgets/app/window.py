@@ -30,6 +30,7 @@ from .opening import Request
 from .pages import Pages
 from .qt_timer import qt_timer
 from .recent import Recent
+from .repairing import ask_repair
 from .saving import may_discard
 
 _SIZE = 1200, 800
@@ -74,6 +75,7 @@ class Window(QtWidgets.QMainWindow):
         self.autosaver.failed.connect(self._say)
         self.document = Document("")
         self.mesh_state: object = None
+        self._is_new = False  # made by the program and not saved yet
         self.editor_widget: Any = None
         self._request: Request | None = None
         self._job: Job[Opened] | None = None
@@ -112,11 +114,14 @@ class Window(QtWidgets.QMainWindow):
     @property
     def is_modified(self) -> bool:
         """Whether the document has unsaved changes."""
-        return self.has_mesh and self.editor.controller.file.is_modified(self.session)
+        if not self.has_mesh:
+            return False
+        return self._is_new or self.editor.controller.file.is_modified(self.session)
 
     def set_document(self, document: Document) -> None:
         """Change the files of the open document; the session is unchanged."""
         self.document = document
+        self._is_new &= document.session_path is None and document.mesh_path is None
         self.autosaver.about = document.about
         self._update_title()
 
@@ -142,6 +147,16 @@ class Window(QtWidgets.QMainWindow):
     def open_sample(self) -> None:
         """Open the sample model."""
         self._open(Request("sample model", sample_model))
+
+    def repair(self) -> None:
+        """Show what a repair would do; open the result as a new document if the user accepts."""
+        request = ask_repair(self)
+        if request is not None:
+            self._open(request)
+
+    def _repair_soon(self) -> None:
+        """Repair once the current event of the view has been handled."""
+        QtCore.QTimer.singleShot(0, self, self.repair)
 
     def recover(self) -> bool:
         """Offer to recover autosaved work; return whether the user accepts."""
@@ -184,10 +199,11 @@ class Window(QtWidgets.QMainWindow):
         self._close_document()
         self.pages.delete_views()
         self.document, session = opened
-        self.mesh_state = None
+        self.mesh_state, self._is_new = None, request.is_new
         widget = self.editor_widget = DeformWidget(session, self)
         widget.editor.controller.file = self.document.file(session, is_unsaved=bool(request.slot))
         connect_panel(self)
+        widget.editor.controller.notices.offer("Repair ...", self._repair_soon)
         self._stops.append(widget.editor.controller.messages.on_change(self._update_title))
         widget.session_changed.connect(lambda _: self._autosave())
         self._autosave(request.slot)

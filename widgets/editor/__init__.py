@@ -13,6 +13,9 @@ The files, in reading order:
     recordings       recordings of input and video
     messages hints status_line help_card log
                      messages, hints, the help card and the history
+    notices notice_line
+                     how the mesh differs from what was given, and where
+    wrapping         text that fits into a window
 """
 
 from . import actions
@@ -24,6 +27,7 @@ from .job import Job, Timer
 from .log import Entry
 from .messages import error_text
 from .mode import Mode
+from .notices import Notice, Notices, notices_of
 from .panel_actions import (
     choosing_handle,
     choosing_region,
@@ -48,6 +52,8 @@ __all__ = [
     "Entry",
     "Job",
     "Mode",
+    "Notice",
+    "Notices",
     "SessionFile",
     "Timer",
     "actions",
@@ -60,6 +66,7 @@ __all__ = [
     "key_cap",
     "merging",
     "naming_region",
+    "notices_of",
     "opening",
     "painting",
     "read_session",

@@ -10,12 +10,13 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from vtk_segdeform.cages import Cage
-from vtk_segdeform.errors import CageError, ConstraintError, RegionError
+from vtk_segdeform.errors import CageError, ConstraintError, RegionError, SessionError
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.regions import segment as segment_mesh
 
 from ..region_selector import Paint, Tool
+from ..scene import enclosure_of
 from .controller import Controller
 from .mode import Mode
 
@@ -137,9 +138,17 @@ def toggle_overlay(controller: Controller) -> None:
 def toggle_volume(controller: Controller) -> None:
     """Turn volume preservation on or off."""
     session = controller.session
+    if not enclosure_of(session).has_volume:
+        raise SessionError("An open sheet encloses no volume: there is none to preserve")
     session.change_options(preserve_volume=not session.options.preserve_volume)
     is_on = session.options.preserve_volume
     controller.say(f"Volume preservation {'on from the next move' if is_on else 'off'}")
+
+
+def toggle_notices(controller: Controller) -> None:
+    """Show or hide where the mesh differs from what was given, and its holes."""
+    if not controller.notices.toggle():
+        controller.say("The mesh is closed and exactly as given: nothing to show")
 
 
 def toggle_help(controller: Controller) -> None:

@@ -51,6 +51,7 @@ BINDINGS = (
     Binding(("0", "home"), ALL, "Reset pose", actions.reset),
     Binding(("c",), ALL, "Show cages in all modes", actions.toggle_cages),
     Binding(("p",), ALL, "Preserve volume", actions.toggle_volume),
+    Binding(("i",), ALL, "Show holes and changed places", actions.toggle_notices, while_busy=True),
     Binding(("ctrl+s",), ALL, "Save", actions.save),
     Binding(("ctrl+o",), ALL, "Open", actions.open_file),
     Binding(("ctrl+r",), ALL, "Record input", recording_actions.record_input),

@@ -24,6 +24,7 @@ from .job import Worker, view_timer
 from .log import Log
 from .messages import Messages
 from .mode import Mode
+from .notices import Notices
 from .recordings import Recordings
 from .session_file import SessionFile, read_session
 from .widget_set import WidgetSet
@@ -53,6 +54,8 @@ class Controller:
         The card with the keys.
     messages : Messages
         The status line.
+    notices : Notices
+        How the mesh differs from what was given, and where; above the status line.
     log : Log
         The drags and jobs so far, and how they ended.
     recordings : Recordings
@@ -64,6 +67,7 @@ class Controller:
         self.help = HelpCard(view, keys)
         self.messages = Messages(view)
         self.messages.note(advice())
+        self.notices = Notices(view, lambda: self.messages.height)
         self.recordings = Recordings(view)
         self._mode = Mode.REGIONS
         self._is_on = False
@@ -71,6 +75,7 @@ class Controller:
         self._worker = Worker(view_timer(view), self.log, self._job_changed)
         self.widgets = WidgetSet(view, session)
         self._listen()
+        self.notices.follow(session)
         self.file = SessionFile(Path("session.segdeform"), session)
         self._stop_failures = view.on_failure(self._show_error)
 
@@ -116,6 +121,7 @@ class Controller:
         self.recordings.remove()
         self.widgets.remove()
         self.help.remove()
+        self.notices.remove()
         self.messages.remove()
         self.view.remove_foreground()
 
@@ -143,12 +149,14 @@ class Controller:
             self.messages.show(mode, hint(self.widgets, self._mode))
         else:
             self.messages.hide()
+        self.notices.enable(self._is_on)
 
     @contextmanager
     def clean_view(self) -> Iterator[None]:
-        """Draw the view without status line and gizmos inside a ``with`` block."""
+        """Draw the view without status line, notices and gizmos inside a ``with`` block."""
         self.widgets.switch_off()
         self.messages.hide()
+        self.notices.enable(False)
         self.view.render()
         try:
             yield
@@ -173,6 +181,7 @@ class Controller:
     def _session_changed(self, change: Change) -> None:
         if change & Change.HISTORY:
             self.messages.clear()
+        self.notices.changed(change)
         replaced = change & Change.POSE and change & (Change.REGIONS | Change.CAGES)
         if replaced and self.session.state.pose is None:
             self.messages.note("Pose reset: the regions or cages have changed")
@@ -276,6 +285,7 @@ class Controller:
             self.widgets = self.widgets.replaced_by(session)
             self._stop_listening()
             self._listen()
+            self.notices.follow(session)
             self.file.opened(path, session)
             return f"Opened {path}"
 

@@ -9,6 +9,7 @@ from vtk_segdeform.session import Session, region_name
 from vtk_segdeform.solver import Status
 
 from ..region_selector import Paint, Tool
+from ..scene import NO_VOLUME, enclosure_of
 from ..volume_overlay import brief, signed
 from .mode import Mode
 from .widget_set import WidgetSet
@@ -63,8 +64,14 @@ def _painting_hint(widgets: WidgetSet) -> str:
 def _deform_hint(widgets: WidgetSet) -> str:
     session = widgets.session
     if session.is_dragging:
-        return f"Volume {signed(100.0 * session.volume_change, 2)} % · Esc to cancel"
-    if not (session.options.preserve_volume or session.options.preserve_region_volumes):
+        volume = f"Volume {signed(100.0 * session.volume_change, 2)} %"
+        if not enclosure_of(session).has_volume:
+            volume = NO_VOLUME
+        return f"{volume} · Esc to cancel"
+    has_volume = enclosure_of(session).has_volume
+    if has_volume and not (
+        session.options.preserve_volume or session.options.preserve_region_volumes
+    ):
         return "Move or rotate a handle · Volume preservation off (P to turn on)"
     solution = session.solution
     if solution is not None and solution.status not in (Status.CONVERGED, Status.STEP_LIMIT):

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from vtk_segdeform.session import Change, Effort, Session
 from vtk_segdeform.solver import Solution
 
+from ..scene import enclosure_of
 from ..volume_overlay import percent
 
 LIMIT = 200
@@ -40,7 +41,7 @@ class Entry:
     handle_error: float | None = None
     """As `Solution.handle_error`."""
     volume_change: float | None = None
-    """As `Session.volume_change`."""
+    """As `Session.volume_change`; None without a volume."""
 
     @property
     def text(self) -> str:
@@ -71,7 +72,7 @@ class Log:
         self._count = 0
         self._session: Session | None = None
         self._stop: Callable[[], None] | None = None
-        self._drag: tuple[str, Solution | None, float] | None = None  # the ongoing one
+        self._drag: tuple[str, Solution | None, float | None] | None = None  # the ongoing one
         self._before = Effort(0, 0.0)  # the ongoing drag, or the next one
         self._refinable = False  # whether the last entry is that of the current pose
 
@@ -108,7 +109,7 @@ class Log:
 
     def _changed(self, session: Session, change: Change) -> None:
         if session.is_dragging:
-            self._drag = session.undo_label or "", session.solution, session.volume_change
+            self._drag = session.undo_label or "", session.solution, _volume_change(session)
             return
         if self._drag is not None:
             if change & Change.HISTORY:  # otherwise the drag was cancelled
@@ -116,7 +117,7 @@ class Log:
             self._refinable, self._drag = not change & Change.POSE, None
         elif self._refinable and change == Change.POSE and session.solution is not None:
             last = self._entries.pop()
-            now = self._entry(session.effort, last.title, session.solution, session.volume_change)
+            now = self._entry(session.effort, last.title, session.solution, _volume_change(session))
             more = Effort((last.steps or 0) + (now.steps or 0), last.seconds + now.seconds)
             now = replace(now, number=last.number, steps=more.steps, seconds=more.seconds)
             self._entries.append(now)
@@ -125,7 +126,7 @@ class Log:
         self._before = session.effort
 
     def _entry(
-        self, effort: Effort, title: str, solution: Solution | None, volume_change: float
+        self, effort: Effort, title: str, solution: Solution | None, volume_change: float | None
     ) -> Entry:
         seconds, steps = effort.seconds - self._before.seconds, effort.steps - self._before.steps
         if solution is None:
@@ -136,6 +137,10 @@ class Log:
     def _append(self, entry: Entry) -> None:
         self._count += 1
         self._entries.append(replace(entry, number=self._count))
+
+
+def _volume_change(session: Session) -> float | None:
+    return session.volume_change if enclosure_of(session).has_volume else None
 
 
 def _percent(share: float) -> str:

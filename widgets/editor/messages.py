@@ -45,6 +45,11 @@ class Messages:
         return self._line.text
 
     @property
+    def height(self) -> float:
+        """Height of the status line in the last picture, in pixels."""
+        return self._line.height
+
+    @property
     def last_note(self) -> str:
         """Result of the last action, or ""."""
         return self._note

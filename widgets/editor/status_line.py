@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from ..scene import Panel, Text, View
+from .wrapping import letter_size, wrapped
 
 _CALM, _WARNING = "#2B2F36", "#8A2B06"  # white on them has a contrast above 7 to 1
 _LETTERS, _TAG, _BAR = "#FFFFFF", "#FFD27F", "#4FA3D9"
@@ -36,6 +35,7 @@ class StatusLine:
         self._lines = [Text(front, _LETTERS, layer=4) for _ in range(_LINES_OF_WARNING)]
         self._content: tuple[str, str, bool, float | None] = "", "", False, None
         self._laid_out: tuple[Any, ...] = ()
+        self._height = 0.0
         self._stop = self.view.before_render(self._lay_out)
 
     @property
@@ -52,6 +52,11 @@ class StatusLine:
     def fraction(self) -> float | None:
         """Completed fraction of the job that is shown, 0..1; or None."""
         return self._content[3]
+
+    @property
+    def height(self) -> float:
+        """Its height in the last picture, in pixels."""
+        return self._height
 
     def say(self, text: str, tag: str = "") -> None:
         """Show *text* after *tag*, a word or two."""
@@ -89,7 +94,9 @@ class StatusLine:
         self._tag.set_text(tag, size)
         left = margin + (self._tag.width() + size if tag else 0.0)
         room, most = width - margin - left, _LINES_OF_WARNING if warning else _LINES
-        lines = self._wrapped(f"! {text}" if warning else text, size, room, most)
+        lines = wrapped(
+            self._lines[0], f"! {text}" if warning else text, size, room=room, most=most
+        )
         foot = 0.35 * size if fraction is None else 0.8 * size  # room for the bar
         high = foot + leading * len(lines) + 0.35 * size
         for k, words in enumerate(self._lines):
@@ -99,34 +106,6 @@ class StatusLine:
         self._strip.set_colour(_WARNING if warning else _CALM)
         self._strip.show(bool(tag or text))
         self._strip.place(0.0, 0.0, width, high)
+        self._height = high if tag or text else 0.0
         self._bar.show(fraction is not None)
         self._bar.place(0.0, 0.0, width * (fraction or 0.0), 0.35 * size)
-
-    def _wrapped(self, text: str, size: float, room: float, most: int) -> list[str]:
-        """Return *text* in at most *most* lines, each no wider than *room* pixels."""
-        lines = list[str]()
-        while text and len(lines) < most:
-            cut = self._fitting(text, size, room)
-            lines.append(text[:cut].rstrip())
-            text = text[cut:].lstrip()
-        if text:
-            cut = self._fitting(f"{lines[-1]}...", size, room)
-            lines[-1] = lines[-1][: min(cut, len(lines[-1])) - 3].rstrip() + "..."
-        return lines
-
-    def _fitting(self, text: str, size: float, room: float) -> int:
-        """Return the index at which to break *text*, between two words if possible."""
-        probe = self._lines[0]
-        low, high = 1, len(text)  # the first `low` letters fit, or none
-        while low < high:
-            middle = (low + high + 1) // 2
-            probe.set_text(text[:middle], size)
-            low, high = (middle, high) if probe.width() <= room else (low, middle - 1)
-        space = text.rfind(" ", 0, low + 1)
-        # Prefer a break in a long word to a line with only the sign of a warning.
-        return space if low < len(text) and space > low // 3 else low
-
-
-def letter_size(width: int, height: int) -> float:
-    """Return the font size for a window, in pixels."""
-    return float(np.clip(min(height / 36.0, width / 48.0), 11.0, 26.0))

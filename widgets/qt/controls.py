@@ -64,6 +64,15 @@ def check_box(text: str, tip: str) -> Any:
     return box
 
 
+def choice_box(choices: list[str], tip: str) -> Any:
+    """Return a combo box with a tooltip."""
+    box = QtWidgets.QComboBox()
+    box.addItems(choices)
+    box.setToolTip(tip)
+    box.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+    return box
+
+
 def table(columns: list[str], tip: str, rows: int) -> Any:
     """Return an empty table, *rows* rows high or at least half of that, its last columns narrow.
 
@@ -132,13 +141,15 @@ def shortcut(keys: Any, parent: Any, do: Callable[[], object], *, alone: bool = 
 
 
 def put(widget: Any, value: Any) -> None:
-    """Show *value* in a checkable button, a check box or a spin box, without emitting signals."""
+    """Show *value* in a checkable button, check box, combo box or spin box; emit no signals."""
     if isinstance(widget, QtWidgets.QPushButton):
         widget.setChecked(value)  # only clicks trigger its action
         return
     quiet = QtCore.QSignalBlocker(widget)
     if isinstance(widget, QtWidgets.QCheckBox):
         widget.setChecked(value)
+    elif isinstance(widget, QtWidgets.QComboBox):
+        widget.setCurrentIndex(value)
     elif not widget.hasFocus() or not widget.lineEdit().isModified():  # else the user types
         widget.setValue(value)
     quiet.unblock()

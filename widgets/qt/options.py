@@ -7,10 +7,12 @@ from typing import Any
 from qtpy import QtWidgets
 
 from ..editor import DeformEditor, Mode, setting, setting_colour_range, toggle_cages, toggle_overlay
+from ..scene import NO_VOLUME, enclosure_of
 from ..volume_overlay import percent
-from .controls import check_box, column, form, key_button, number_box, put, row
+from .controls import check_box, choice_box, column, form, key_button, number_box, put, row
 
 _MOST = 100_000
+_LIDS = {"Auto": None, "Under lids": True, "Off": False}
 
 
 class CagesPart(QtWidgets.QGroupBox):
@@ -87,6 +89,10 @@ class DeformPart(QtWidgets.QGroupBox):
         self.preserve.clicked.connect(lambda on: editor.do(setting(preserve_volume=on)))
         self.per_region = check_box("Per region", "Preserve the volume of each region as well")
         self.per_region.clicked.connect(lambda on: editor.do(setting(preserve_region_volumes=on)))
+        self.lids = choice_box(
+            list(_LIDS), "How the volume of open parts is preserved: Auto is under lids unless flat"
+        )
+        self.lids.activated.connect(lambda row: editor.do(setting(lids=list(_LIDS.values())[row])))
         self.stretch = number_box(
             QtWidgets.QDoubleSpinBox(),
             "Weight of the stretch energy relative to the detail energy; 0 is the paper's energy",
@@ -107,6 +113,7 @@ class DeformPart(QtWidgets.QGroupBox):
             row(self.preserve, self.per_region),
             self.overlay,
             form(
+                ("Open parts", self.lids),
                 ("Colour range", self.range),
                 ("Stretch resistance", self.stretch),
                 ("Rotation clusters", self.clusters),
@@ -118,9 +125,14 @@ class DeformPart(QtWidgets.QGroupBox):
         """Show the current options and the volume change."""
         session, widgets = self._editor.session, self._editor.widgets
         options = session.options
-        self.volume.setText(percent(session.volume_change))
-        put(self.preserve, options.preserve_volume)
-        put(self.per_region, options.preserve_region_volumes)
+        has_volume = enclosure_of(session).has_volume
+        self.volume.setText(percent(session.volume_change) if has_volume else NO_VOLUME)
+        put(self.preserve, options.preserve_volume and has_volume)
+        put(self.per_region, options.preserve_region_volumes and has_volume)
+        for box in (self.preserve, self.per_region):
+            box.setEnabled(has_volume)
+        put(self.lids, list(_LIDS.values()).index(options.lids))
+        self.lids.setEnabled(not session.mesh.is_closed)
         put(self.overlay, widgets.overlay_wanted)
         put(self.range, 100.0 * (widgets.overlay.wanted_range or 0.0))
         self.range.setEnabled(widgets.overlay_wanted)

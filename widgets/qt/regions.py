@@ -17,6 +17,7 @@ from ..editor import (
     showing_cage,
     split_region,
 )
+from ..scene import enclosure_of
 from ..volume_overlay import RegionVolumes, percent
 from .controls import RIGHT, column, key_button, push_button, row, swatch, table
 
@@ -83,7 +84,7 @@ class RegionsPart(QtWidgets.QGroupBox):
     def _current_rows(self) -> list[_Row]:
         editor, widgets = self._editor, self._editor.widgets
         volumes = dict(self._volumes.changes())
-        if widgets.n_regions == 1:
+        if widgets.n_regions == 1 and enclosure_of(editor.session).has_volume:
             volumes = {0: editor.session.volume_change}
         cages = editor.session.cages
         rows = [

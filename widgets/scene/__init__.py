@@ -10,10 +10,14 @@ The files, in reading order:
     foreground         a renderer that draws over another one
     labels             rectangles and text in display coordinates
     wireframe          edges and vertices of a mesh
+    highlights         loops and vertices of a mesh, marked
+    enclosure          which borders are holes in a volume
     step_budget        solver steps per event, recorded and replayed
 """
 
+from .enclosure import NO_VOLUME, Enclosure, enclosure_of
 from .gestures import Gesture, Phase, Pointer
+from .highlights import Highlights
 from .labels import Panel, Text
 from .projection import Projection
 from .step_budget import StepBudget, observe_steps, prescribe_steps
@@ -23,7 +27,10 @@ from .widget import Widget
 from .wireframe import Wireframe
 
 __all__ = [
+    "NO_VOLUME",
+    "Enclosure",
     "Gesture",
+    "Highlights",
     "Panel",
     "Phase",
     "Pointer",
@@ -35,6 +42,7 @@ __all__ = [
     "View",
     "Widget",
     "Wireframe",
+    "enclosure_of",
     "observe_steps",
     "prescribe_steps",
 ]

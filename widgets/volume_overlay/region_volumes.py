@@ -11,6 +11,8 @@ from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
 from vtk_segdeform.solver import VolumeConstraint, region_volumes
 
+from ..scene import enclosure_of
+
 
 class RegionVolumes:
     """The volume changes of the current regions in the current pose of a session.
@@ -28,9 +30,12 @@ class RegionVolumes:
     def changes(self) -> list[tuple[int, float]]:
         """Return the number and the volume change of each region that owns a face around a volume.
 
-        The list is empty if there is only one region, whose volume is that of the mesh.
+        The list is empty if there is only one region, whose volume is that of the mesh, or if the
+        mesh encloses no volume.
         """
         session = self._session
+        if not enclosure_of(session).has_volume:
+            return []
         owned = self._owned()
         if not owned:
             return []

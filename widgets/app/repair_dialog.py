@@ -1,0 +1,267 @@
+"""The dialog before a repair: the surface before and after, and what each step would do.
+
+Every change of the settings starts the repair again, in another thread; a repair that is no longer
+wanted ends in the background, and its result is dropped.
+"""
+
+from __future__ import annotations
+
+import gc
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+import pyvistaqt
+from qtpy import QtCore, QtWidgets
+
+from vtk_segdeform.io import repair_surface
+from vtk_segdeform.mesh import Mesh, counted
+from vtk_segdeform.mesh_repair import Repair
+from vtk_segdeform.pictures import BODY, COLOURS, PAPER, rgb
+from vtk_segdeform.progress import Progress
+
+from ..editor import Job, error_text
+from ..scene import Highlights, View
+from .qt_timer import qt_timer
+
+_DELAY = 300  # milliseconds between a change of the settings and the repair
+_PERIOD = 30  # milliseconds between two polls of the job
+_MOST_EDGES, _USUAL_EDGES = 1_000_000, 100
+_NEW = COLOURS[0]  # of faces that fill holes
+_DELETE = QtCore.QEvent.Type.DeferredDelete
+_Result = tuple[pv.PolyData, Repair]
+
+
+class RepairDialog(QtWidgets.QDialog):
+    """Show what a repair would do; call `release` after it was closed.
+
+    Parameters
+    ----------
+    given : pyvista.PolyData
+        The surface; not changed.
+    mesh : Mesh
+        The mesh of it, whose borders are outlined.
+    camera : vtkCamera
+        Where to look from at first.
+    parent : QWidget
+        The window of the document.
+
+    Attributes
+    ----------
+    repaired : pyvista.PolyData or None
+        The result, once it has been computed.
+    """
+
+    def __init__(self, given: pv.PolyData, mesh: Mesh, camera: Any, parent: Any) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Repair and open")
+        self.repaired: pv.PolyData | None = None
+        self._given = given
+        self._job: Job[_Result] | None = None
+        self.preview = _Preview(given, mesh, camera, self)
+        self.before, self.after = (QtWidgets.QRadioButton(text) for text in ("Before", "After"))
+        self.before.setChecked(True)
+        self.after.setEnabled(False)
+        self.after.toggled.connect(self.preview.show_after)
+        self.fill = QtWidgets.QCheckBox("Close holes up to")
+        self.fill.setChecked(True)
+        self.edges = QtWidgets.QSpinBox()
+        self.edges.setRange(3, _MOST_EDGES)
+        self.edges.setValue(_USUAL_EDGES)
+        self.edges.setSuffix(" edges")
+        self.distance = QtWidgets.QDoubleSpinBox()
+        self.distance.setDecimals(6)
+        self.distance.setRange(0.0, 0.1 * mesh.diagonal)
+        self.distance.setSingleStep(1e-4 * mesh.diagonal)
+        self.distance.setSpecialValueText("Equal points only")
+        self.distance.setToolTip("Largest distance of border points that are joined, in its unit")
+        self.steps = QtWidgets.QListWidget()
+        self.steps.setWordWrap(True)
+        self.steps.setSelectionMode(QtWidgets.QAbstractItemView.SelectionMode.NoSelection)
+        self.bar = QtWidgets.QProgressBar()
+        self.bar.setRange(0, 0)
+        self.bar.setTextVisible(False)
+        policy = self.bar.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self.bar.setSizePolicy(policy)
+        roles = QtWidgets.QDialogButtonBox.ButtonRole
+        buttons = QtWidgets.QDialogButtonBox()
+        self.accepting = buttons.addButton("Open repaired", roles.AcceptRole)
+        self.cancelling = buttons.addButton("Cancel", roles.RejectRole)
+        buttons.accepted.connect(self.accept)
+        buttons.rejected.connect(self.reject)
+        self._lay_out(buttons)
+        self._delay = QtCore.QTimer(self)
+        self._delay.setSingleShot(True)
+        self._delay.setInterval(_DELAY)
+        self._delay.timeout.connect(self._start)
+        self.fill.toggled.connect(self.edges.setEnabled)
+        for signal in (self.fill.toggled, self.edges.valueChanged, self.distance.valueChanged):
+            signal.connect(self._changed)
+        self._start()
+
+    @property
+    def is_computing(self) -> bool:
+        """Whether a repair is being computed, or will be in a moment."""
+        return self._job is not None or bool(self._delay.isActive())
+
+    def release(self) -> None:
+        """Drop a repair that is still running, and delete the dialog with its view."""
+        self._delay.stop()
+        self._cancel()
+        self.preview.close()
+        self.setParent(None)
+        self.deleteLater()
+        QtCore.QCoreApplication.sendPostedEvents(self, getattr(_DELETE, "value", _DELETE))
+        gc.collect()  # as `Pages.delete_views`
+
+    def _lay_out(self, buttons: Any) -> None:
+        choice = QtWidgets.QHBoxLayout()
+        for each in (self.before, self.after):
+            choice.addWidget(each)
+        choice.addStretch(1)
+        settings = QtWidgets.QFormLayout()
+        settings.addRow(self.fill, self.edges)
+        settings.addRow("Weld points within", self.distance)
+        side = QtWidgets.QVBoxLayout()
+        side.addLayout(settings)
+        side.addWidget(QtWidgets.QLabel("Steps"))
+        side.addWidget(self.steps, 1)
+        side.addWidget(self.bar)
+        side.addWidget(buttons)
+        view = QtWidgets.QVBoxLayout()
+        view.addWidget(self.preview.plotter, 1)
+        view.addLayout(choice)
+        layout = QtWidgets.QHBoxLayout(self)
+        layout.addLayout(view, 3)
+        layout.addLayout(side, 2)
+        self.resize(860, 520)
+
+    # The repair.
+
+    def _changed(self, *_: object) -> None:
+        self._cancel()
+        self._show_busy()
+        self._delay.start()
+
+    def _cancel(self) -> None:
+        if self._job is not None:
+            self._job.cancel()
+        self._job = None
+
+    def _start(self) -> None:
+        given, weld = self._given, self.distance.value()
+        largest = self.edges.value() if self.fill.isChecked() else 0
+
+        def work(progress: Progress) -> _Result:
+            progress(0.0, "Repairing")
+            return repair_surface(given, weld_distance=weld, largest_hole=largest)
+
+        self._show_busy()
+        job: Job[_Result] = Job(
+            qt_timer(self, _PERIOD),
+            work,
+            done=lambda result: self._show(*result) if self._is_wanted(job) else None,
+            failed=lambda error: self._fail(error) if self._is_wanted(job) else None,
+        )
+        self._job = job
+
+    def _is_wanted(self, job: Job[_Result]) -> bool:
+        return job is self._job
+
+    def _show_busy(self) -> None:
+        self.repaired = None
+        self.bar.show()
+        self.accepting.setEnabled(False)
+
+    def _show(self, repaired: pv.PolyData, done: Repair) -> None:
+        self._job, self.repaired = None, repaired
+        self.bar.hide()
+        self.steps.clear()
+        self.steps.addItems([f"{step[:1].upper()}{step[1:]}" for step in done.steps])
+        if not done.steps:
+            self.steps.addItem("Nothing to repair with these settings")
+        elif done.open_holes:
+            self.steps.addItem(_remaining(done.open_holes))
+        self.accepting.setEnabled(bool(done.steps))
+        self.accepting.setDefault(bool(done.steps))
+        self.preview.set_result(done)
+        self.after.setEnabled(True)
+        if done.steps:
+            self.after.setChecked(True)
+
+    def _fail(self, error: BaseException) -> None:
+        self._job = None
+        self.bar.hide()
+        self.steps.clear()
+        self.steps.addItem(error_text(error))
+        self.before.setChecked(True)
+        self.after.setEnabled(False)
+
+
+class _Preview:
+    """A view of the surface before and after, with the holes outlined."""
+
+    def __init__(self, given: pv.PolyData, mesh: Mesh, camera: Any, parent: Any) -> None:
+        self.plotter = pyvistaqt.QtInteractor(parent, auto_update=False, off_screen=False)
+        self.plotter.setAcceptDrops(False)
+        self.plotter.set_background(PAPER)
+        self._mesh = mesh
+        self._before = self._add(given, None)
+        self._after: Any = None
+        self._is_after = False
+        self._marks = Highlights(View.of(self.plotter))
+        self._outline()
+        mine = self.plotter.camera
+        mine.SetPosition(*camera.GetPosition())
+        mine.SetFocalPoint(*camera.GetFocalPoint())
+        mine.SetViewUp(*camera.GetViewUp())
+        self.plotter.reset_camera()
+
+    def set_result(self, done: Repair) -> None:
+        """Set the surface after the repair; the faces that fill holes have another colour."""
+        if self._after is not None:
+            self.plotter.remove_actor(self._after, reset_camera=False)
+        colours = np.tile(rgb(BODY), (len(done.faces), 1))
+        colours[done.face_map < 0] = rgb(_NEW)
+        self._after = self._add(pv.PolyData.from_regular_faces(done.vertices, done.faces), colours)
+        self.show_after(self._is_after)
+
+    def show_after(self, is_after: bool) -> None:
+        """Show the surface after or before the repair."""
+        self._is_after = is_after
+        self._before.visibility = not is_after
+        if self._after is not None:
+            self._after.visibility = is_after
+        self._outline()
+        self.plotter.render()
+
+    def close(self) -> None:
+        """Release the view."""
+        self._marks.hide()
+        self._marks.view.remove_foreground()
+        self.plotter.close()
+
+    def _outline(self) -> None:
+        if self._is_after:
+            self._marks.hide()
+        else:
+            none = np.empty(0, dtype=np.int64)
+            self._marks.show(self._mesh.vertices, self._mesh.borders, none)
+
+    def _add(self, surface: pv.PolyData, colours: Any) -> Any:
+        return self.plotter.add_mesh(
+            surface, color=BODY, scalars=colours, rgb=colours is not None, ambient=0.25,
+            smooth_shading=False, reset_camera=False, show_scalar_bar=False,
+        )  # fmt: skip
+
+
+def _remaining(holes: tuple[int, ...]) -> str:
+    """Say which holes are left, and up to which limit all of them would be closed.
+
+    >>> _remaining((120, 300))
+    '2 holes remain open; the largest one has 300 edges'
+    """
+    return f"{counted(len(holes), 'hole remains', 'holes remain')} open; " + (
+        f"the largest one has {max(holes)} edges" if len(holes) > 1 else f"it has {holes[0]} edges"
+    )
