@@ -210,6 +210,12 @@ def surface() -> pv.PolyData:
 
 
 @functools.cache
+def given() -> sd.Surface:
+    """Return a surface with seams."""
+    return sd.Surface(pv.Cube(x_length=3.0))
+
+
+@functools.cache
 def view() -> Any:
     from hands import plain_view
 
@@ -263,6 +269,7 @@ def instance(cls: type) -> Any:
         "Cage": lambda: cages()[0],
         "Deformer": lambda: bound().copy(),
         "Session": session,
+        "Surface": given,
         "Passengers": passengers,
         "Solution": lambda: bound().copy().solve(_targets()),
         "Options": sd.Options,
@@ -287,11 +294,13 @@ def _plotter() -> pv.Plotter:
 
 
 # Classes that callers construct; others are only returned.
-MADE_BY_HAND = {sd.Mesh, sd.Regions, sd.Cage, sd.Deformer, sd.Session, sd.Options}
+MADE_BY_HAND = {
+    sd.Mesh, sd.Surface, sd.Regions, sd.Cage, sd.Deformer, sd.Session, sd.Options,
+}  # fmt: skip
 EXTRA = {
     "Session.change_options": (
         "n_cage_vertices", "offset", "preserve_volume", "preserve_region_volumes", "stretch",
-        "rotation_groups",
+        "rotation_groups", "lids",
     ),
 }  # fmt: skip
 
@@ -334,6 +343,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "label": lambda: "a step",
     "labels": lambda: (mesh().vertices[:, 0] > 0).astype(int),
     "largest_hole": lambda: 10,
+    "lids": lambda: None,
     "limits": sd.widgets.ReplayLimits,
     "listener": lambda: lambda _change: None,
     "major": lambda: 1.0,
@@ -378,6 +388,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "tolerance": lambda: 1e-6,
     "vertices": lambda: mesh().vertices,
     "view": view,
+    "values": lambda: np.arange(given().mesh.n_vertices),
     "weights": lambda: regions().weights,
     "weld_distance": lambda: 0.0,
     "what": mesh,
@@ -433,6 +444,12 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "Session.rename_region.name": lambda: "arm",
     "Session.set_fixed.vertices": _left,
     "Session.split_region.vertices": lambda: None,
+    "Surface.at_vertices.values": lambda: np.arange(given().given.n_points),
+    "Surface.moved.vertices": lambda: given().mesh.vertices,
+    "Surface.read.path": lambda: _file("mesh.ply"),
+    "Surface.vertices_at.points": lambda: [0, 5],
+    "Surface.write.path": lambda: Path("written.vtp"),
+    "Surface.write.vertices": lambda: given().mesh.vertices,
     "VolumeOverlay.wanted_range.value": lambda: 0.2,
     "blend_at.points": lambda: mesh().vertices[:4],
     "cactus.n_vertices": lambda: 600,
