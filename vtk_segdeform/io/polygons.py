@@ -11,6 +11,8 @@ import pyvista as pv
 
 from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
+from ..mesh import repeats_vertex
+from ..mesh_repair import triangulate_long_loop
 
 
 def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.PolyData:
@@ -52,6 +54,12 @@ def polygons_of(polydata: pv.PolyData) -> tuple[IntArray, IntArray]:
     MeshError
         If a polygon has fewer than three corners or a vertex index out of range.
     """
+    result = _all_polygons(polydata)
+    _require_polygons(polydata.n_points, *result)
+    return result
+
+
+def _all_polygons(polydata: pv.PolyData) -> tuple[IntArray, IntArray]:
     cells = polydata.GetPolys()
     starts = pv.convert_array(cells.GetOffsetsArray()).astype(np.int64)
     counts, corners = [np.diff(starts)], [pv.convert_array(cells.GetConnectivityArray())]
@@ -62,9 +70,7 @@ def polygons_of(polydata: pv.PolyData) -> tuple[IntArray, IntArray]:
         triangles[1::2] = triangles[1::2, [1, 0, 2]]  # every other triangle is reversed
         counts.append(np.full(len(triangles), 3))
         corners.append(triangles.ravel())
-    result = np.concatenate(counts).astype(np.int64), np.concatenate(corners).astype(np.int64)
-    _require_polygons(polydata.n_points, *result)
-    return result
+    return np.concatenate(counts).astype(np.int64), np.concatenate(corners).astype(np.int64)
 
 
 def unstripped(lengths: IntArray, values: IntArray) -> IntArray:
@@ -116,22 +122,61 @@ def corner_values(wide: FloatArray | None, counts: IntArray, width: int = 2) -> 
 
 
 def triangles_of(polydata: pv.PolyData) -> IntArray:
-    """Return triangles (m, 3) over the same points; polygons are cut by ear clipping, in order."""
-    return cut_into_triangles(np.asarray(polydata.points, float), *polygons_of(polydata))[0]
+    """Return triangles (m, 3) over the same points, polygon by polygon; see `cut_into_triangles`.
+
+    Polygons of one or two corners have none.
+
+    Raises
+    ------
+    MeshError
+        If a vertex index is out of range.
+    """
+    counts, corners = _all_polygons(polydata)
+    enough = counts >= 3
+    if not enough.all():
+        counts, corners = counts[enough], corners[np.repeat(enough, counts)]
+    _require_polygons(polydata.n_points, counts, corners)
+    return cut_into_triangles(np.asarray(polydata.points, float), counts, corners)[0]
 
 
 def cut_into_triangles(
     points: FloatArray, counts: IntArray, corners: IntArray
 ) -> tuple[IntArray, IntArray]:
-    """Return triangles (m, 3), by ear clipping, and the polygon of each, (m,) int."""
+    """Return triangles (m, 3), and the polygon of each, (m,) int, in the order of polygons.
+
+    Polygons are cut by ear clipping, planar ones without overlaps.  Where that fails, as for one
+    that touches or crosses itself, the triangulation has the least area.
+    """
     number = np.arange(len(counts))
     if (counts == 3).all():
         return corners.reshape(-1, 3), number
     surface = polydata_of(points, counts, corners)
     surface.cell_data["polygon"] = number
     cut = surface.triangulate()
-    faces: IntArray = cut.regular_faces.astype(np.int64)
-    return faces, np.asarray(cut.cell_data["polygon"], dtype=np.int64)
+    faces = np.asarray(cut.regular_faces, dtype=np.int64).reshape(-1, 3)
+    polygon = np.asarray(cut.cell_data["polygon"], dtype=np.int64)
+    starts = np.cumsum(counts) - counts
+    following = np.arange(1, len(corners) + 1)
+    following[starts + counts - 1] = starts
+    repeated = np.add.reduceat(corners == corners[following], starts)
+    failed = np.bincount(polygon, minlength=len(counts)) < counts - repeated - 2
+    if not failed.any():
+        return faces, polygon
+    kept = ~failed[polygon]
+    more = [_least_area(points, corners[starts[k] :][: counts[k]]) for k in np.flatnonzero(failed)]
+    faces = np.concatenate([faces[kept], *more])
+    polygon = np.append(polygon[kept], np.repeat(number[failed], [len(each) for each in more]))
+    order = np.argsort(polygon, kind="stable")
+    return faces[order], polygon[order]
+
+
+def _least_area(points: FloatArray, polygon: IntArray) -> IntArray:
+    """Return the triangles of a *polygon*, corner by corner, without those that repeat a corner."""
+    corners = polygon[polygon != np.roll(polygon, -1)]
+    if len(corners) < 3:
+        return np.empty((0, 3), dtype=np.int64)
+    triangles: IntArray = corners[triangulate_long_loop(points[corners])]
+    return triangles[~repeats_vertex(triangles)]
 
 
 def rows(counts: IntArray, corners: IntArray) -> list[list[int]]:

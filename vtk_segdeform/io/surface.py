@@ -10,7 +10,6 @@ some.
 
 from __future__ import annotations
 
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -58,17 +57,19 @@ class Surface:
     Parameters
     ----------
     polydata : pyvista.PolyData
-        Not changed.  It needs one face that is not flat, and finite coordinates.
+        Not changed.  It needs one face that is not flat, and finite coordinates of its faces.
+        Polygons may have any shape; lines and vertex cells follow the faces.
 
     Raises
     ------
     MeshError
-        If it has no faces, coordinates that are NaN, or flat faces only.
+        If it has no faces, only flat ones, or points of faces that are not finite, do not exist,
+        or are too far or too near for computing volumes.
 
     Examples
     --------
     >>> import pyvista as pv
-    >>> cube = Surface(pv.Cube())  # 24 points, since normals differ at its edges
+    >>> cube = Surface(pv.Cube(clean=False))  # 24 points, since normals differ at its edges
     >>> cube.mesh.n_vertices, cube.mesh.is_closed
     (8, True)
     >>> cube.moved(cube.mesh.vertices + [0, 0, 1]).n_points
@@ -77,6 +78,8 @@ class Surface:
 
     def __init__(self, polydata: pv.PolyData) -> None:
         self._given = require(polydata, pv.PolyData, "polydata").copy(deep=False)
+        points = np.asarray(self._given.points, dtype=np.float64)
+        self._soup = mesh_of(points, triangles_of(self._given))
 
     @classmethod
     def read(cls, path: str | Path) -> Surface:
@@ -178,8 +181,3 @@ class Surface:
     @cached_property
     def _moving(self) -> MovingSurface:
         return MovingSurface(self._given)
-
-    @cached_property
-    def _soup(self) -> Soup:
-        points = np.asarray(self._given.points, dtype=np.float64)
-        return mesh_of(points, triangles_of(self._given))

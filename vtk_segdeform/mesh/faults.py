@@ -1,4 +1,4 @@
-"""Search for the faults that prevent triangles from being a `Mesh`, and for open edges and the like.
+"""Search for the faults that prevent triangles from being a `Mesh`, and for borders and the like.
 
 The checks run in this order: coordinates, indices, single faces, edges, vertices, and last the
 orientation of shells.  Each check skips everything that earlier ones rejected, so that a fault is
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,61 +60,73 @@ def find_faults(vertices: ArrayLike, faces: ArrayLike) -> MeshReport:
     >>> print(report.notes[0])
     3 open edges (1-2, 1-3, 2-3)
     """
-    return search(*as_soup(vertices, faces)).report
+    return Search(*as_soup(vertices, faces)).report
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """The faults of triangles and, unless some are in `UNREPAIRABLE`, what was computed for that.
+    """The search for faults of *triangles* (m, 3) over *points* (n, 3), arrays as of `as_soup`."""
 
-    Attributes
-    ----------
-    report : MeshReport
-        The faults and notes.
-    degenerate, duplicate : (m,) bool
-        Which faces contain a vertex twice, and which repeat an earlier face.
-    half_edges : HalfEdges
-        Of all other faces.
-    first_at : (n,) int
-        The first vertex at the position of each vertex.
-    """
+    points: FloatArray
+    triangles: IntArray
 
-    report: MeshReport
-    degenerate: BoolArray
-    duplicate: BoolArray
-    half_edges: HalfEdges
-    first_at: IntArray
+    @cached_property
+    def number_faults(self) -> tuple[Fault, ...]:
+        """Faults of coordinates and indices; nothing else is computed if some are unrepairable."""
+        return tuple(_number_faults(self.points, self.triangles))
 
+    @cached_property
+    def degenerate(self) -> BoolArray:
+        """(m,) bool: which faces contain a vertex twice."""
+        return self._distinct[0]
 
-def search(points: FloatArray, triangles: IntArray) -> Search:
-    """Search *triangles* (m, 3) over *points* (n, 3) for faults; arrays as of `as_soup`."""
-    found = list(_number_faults(points, triangles))
-    usable = not any(fault.kind in UNREPAIRABLE for fault in found)
-    degenerate, duplicate, half_edges = distinct_faces(
-        triangles if usable else triangles[:0], len(points)
-    )
-    first_at = np.arange(len(points))
-    n_components = 0
-    if usable:
-        n_components = int(half_edges.shells.max(initial=-1)) + 1
-        found += _some(Kind.DEGENERATE, np.flatnonzero(degenerate))
-        found += _some(Kind.DUPLICATE_FACE, np.flatnonzero(duplicate & ~degenerate))
-        flat = _flat_faces(points, triangles)
-        found += _some(Kind.ZERO_AREA, flat[~degenerate[flat]])
-        found += _edge_faults(half_edges)
-        found += _inward_shells(points, half_edges)
-        first_at = first_equal_row(points)
-        found += _some(Kind.COINCIDENT, np.flatnonzero(first_at != np.arange(len(points))))
-        if n_components > 1:
-            found.append(Fault(Kind.COMPONENTS, n_components))
-    report = MeshReport(
-        n_vertices=len(points),
-        n_faces=len(triangles),
-        n_components=n_components,
-        faults=tuple(fault for fault in found if fault.kind.fatal),
-        notes=tuple(fault for fault in found if not fault.kind.fatal),
-    )
-    return Search(report, degenerate, duplicate, half_edges, first_at)
+    @cached_property
+    def duplicate(self) -> BoolArray:
+        """(m,) bool: which faces have the vertices of an earlier face."""
+        return self._distinct[1]
+
+    @cached_property
+    def half_edges(self) -> HalfEdges:
+        """Half-edges of the faces that are neither degenerate nor duplicate."""
+        return self._distinct[2]
+
+    @cached_property
+    def _distinct(self) -> tuple[BoolArray, BoolArray, HalfEdges]:
+        return distinct_faces(self.triangles, len(self.points))
+
+    @cached_property
+    def flat(self) -> IntArray:
+        """(k,) int: the faces without area."""
+        return _flat_faces(self.points, self.triangles)
+
+    @cached_property
+    def first_at(self) -> IntArray:
+        """(n,) int: the first vertex at the position of each vertex."""
+        return first_equal_row(self.points)
+
+    @cached_property
+    def report(self) -> MeshReport:
+        """All faults and notes."""
+        n_components = 0
+        found = list(self.number_faults)
+        if not any(fault.kind in UNREPAIRABLE for fault in found):
+            n_components = int(self.half_edges.shells.max(initial=-1)) + 1
+            found += _some(Kind.DEGENERATE, np.flatnonzero(self.degenerate))
+            found += _some(Kind.DUPLICATE_FACE, np.flatnonzero(self.duplicate & ~self.degenerate))
+            found += _some(Kind.ZERO_AREA, self.flat[~self.degenerate[self.flat]])
+            found += _edge_faults(self.half_edges)
+            found += _inward_shells(self.points, self.half_edges)
+            coincident = self.first_at != np.arange(len(self.points))
+            found += _some(Kind.COINCIDENT, np.flatnonzero(coincident))
+            if n_components > 1:
+                found.append(Fault(Kind.COMPONENTS, n_components))
+        return MeshReport(
+            n_vertices=len(self.points),
+            n_faces=len(self.triangles),
+            n_components=n_components,
+            faults=tuple(fault for fault in found if fault.kind.fatal),
+            notes=tuple(fault for fault in found if not fault.kind.fatal),
+        )
 
 
 def as_soup(vertices: ArrayLike, faces: ArrayLike) -> tuple[FloatArray, IntArray]:

@@ -55,7 +55,7 @@ class Mesh(Frozen):
     >>> mesh.n_faces, len(mesh.edges), mesh.components, mesh.is_closed
     (4, 6, array([0, 0, 0, 0]), True)
     >>> Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]]).borders
-    (array([1, 3, 2]),)
+    (array([2, 1, 3]),)
     >>> Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 2, 3], [1, 2, 3]])
     Traceback (most recent call last):
     ...

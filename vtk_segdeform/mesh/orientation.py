@@ -45,7 +45,7 @@ def faces_to_flip(points: FloatArray, half_edges: HalfEdges) -> BoolArray:
 
 
 def _patches(half_edges: HalfEdges) -> tuple[IntArray, BoolArray, BoolArray]:
-    """Return the patch of each face, (m,), which faces to flip, and which patches have two sides."""
+    """Return the patch of each face, (m,), the faces to flip, and which patches have two sides."""
     if not half_edges.inconsistent.any() and not (half_edges.counts > 2).any():
         patch = half_edges.shells
         flip = np.zeros(len(patch), dtype=bool)

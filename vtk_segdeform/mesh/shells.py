@@ -81,7 +81,7 @@ def shell_faults(
 
 
 def outward_signs(volume: FloatArray, depth: IntArray, closed: BoolArray) -> IntArray:
-    """Return the sign that the *volume* (k,) of each shell must have: 1 for bodies, -1 for cavities.
+    """Return the sign that the *volume* (k,) of each shell must have: 1 of bodies, -1 of cavities.
 
     Cavities that are together as large as the bodies overlap each other; then all *closed* (k,)
     shells count as bodies.  *depth* (k,) is the number of shells around each.

@@ -24,7 +24,7 @@ from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray, as_ids, as_points
 from ..errors import MeshError
-from .faults import UNREPAIRABLE, Search, as_soup, distinct_faces, search
+from .faults import UNREPAIRABLE, Search, as_soup, distinct_faces
 from .grouping import connected, first_equal_row
 from .mesh import Mesh
 from .orientation import faces_to_flip
@@ -129,9 +129,9 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
         used[triangles[~repeats_vertex(triangles)]] = True
         if not used.all():  # points in no face must not matter
             valid = np.where(used[:, None], points, points[used.argmax()] if used.any() else 0.0)
-    found = search(valid, triangles)
+    found = Search(valid, triangles)
     _require_usable(found)
-    if found.report.is_closed:
+    if found.half_edges.twin is not None and found.report.is_closed:
         mesh = Mesh.reported(points, triangles, found.report)
         return Soup(points, mesh, np.arange(len(points)), np.empty(0, np.int64))
     target, kept, half_edges = _welded(valid, found)
@@ -142,7 +142,7 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
     triangles_left = half_edges.faces
     if flip.any():
         triangles_left = np.where(flip[:, None], triangles_left[:, [0, 2, 1]], triangles_left)
-    if found.report.ok and left.all() and not flip.any():
+    if left.all() and len(kept) == len(triangles) and not flip.any():
         mesh = Mesh.reported(points, triangles, found.report)
     else:
         mesh = Mesh(points[left], number[triangles_left])
@@ -154,13 +154,14 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
 
 
 def _require_usable(found: Search) -> None:
+    if not len(found.triangles):
+        raise MeshError("this surface cannot be deformed: it has no faces; give at least one")
     faults = [
-        f"{fault}; {fault.kind.advice}" for fault in found.report.faults if fault.kind in _REFUSED
+        f"{fault}; {fault.kind.advice}" for fault in found.number_faults if fault.kind in _REFUSED
     ]
     if faults:
         raise MeshError(f"this surface cannot be deformed: {'; '.join(faults)}")
-    flat = found.report.count(Kind.ZERO_AREA) + found.report.count(Kind.DEGENERATE)
-    if flat == found.report.n_faces:
+    if len(found.flat) == len(found.triangles):
         raise MeshError(
             "this surface cannot be deformed: all faces are flat; "
             "give at least one whose three corners are not on a line"

@@ -12,9 +12,11 @@ The files, in reading order:
     cracks          replacing flat lids by splitting the adjacent face
 """
 
+from .lids import triangulate_long_loop
 from .repair import Repair, repair
 
 __all__ = [
     "Repair",
     "repair",
+    "triangulate_long_loop",
 ]
