@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from open_meshes import bottle, open_box, sheet, together
 from scenes import sausage
 from solids import CUBE, icosphere, rotation, torus
 
@@ -119,3 +120,36 @@ def test_tiny_components_are_handled_and_do_not_affect_a_body_beside_them(monkey
     change = local_volume_change(Mesh(x, faces), x * [1.0, 1.0, 1.1])
     assert np.isfinite(change).all()
     assert_allclose(change[4 * len(places) :] if with_a_body else change, 0.1, atol=1e-9)
+
+
+@pytest.mark.usefixtures("either")
+@pytest.mark.parametrize("mesh", [open_box(), bottle(24, 24)], ids=["box", "bottle"])
+def test_an_open_body_has_local_volume_up_to_its_border(mesh):
+    local, x = LocalVolume(mesh), mesh.vertices
+    assert_allclose(local.change(x @ rotation([1, 2, 3], 1.0).T + [5, 6, 7]), 0.0, atol=1e-12)
+    change = local.change(x * [1.0, 1.0, 1.2])
+    known = np.abs(change) > 0.0
+    assert known.mean() > 0.9
+    assert_allclose(change[known], 0.2, atol=1e-12)
+
+
+def waves(n=20):
+    return sheet(lambda u, v: (u, v, 0.1 * np.sin(9 * u)), n, n)
+
+
+@pytest.mark.usefixtures("either")
+def test_an_open_sheet_has_no_local_volume():
+    mesh = waves()
+    posed = np.random.default_rng(0).normal(size=mesh.vertices.shape)
+    assert not local_volume_change(mesh, posed).any()
+
+
+@pytest.mark.usefixtures("either")
+def test_a_sheet_beside_a_body_does_not_change_its_local_volume():
+    body = Mesh(*MESHES["sphere"])
+    both = together(waves(), body)
+    posed = both.vertices + 0.1 * np.sin(5.0 * both.vertices[:, [1, 2, 0]])
+    change = local_volume_change(both, posed)
+    n = waves().n_vertices
+    assert not change[:n].any()
+    assert_allclose(change[n:], local_volume_change(body, posed[n:]), atol=1e-12)

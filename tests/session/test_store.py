@@ -329,7 +329,7 @@ WRONG = [
     ({"mesh_vertices": OCTAHEDRON[0].astype(np.float32)}, "must be float64 of shape"),
     ({"mesh_vertices": np.array([[None] * 3] * 6)}, "must be float64 of shape"),
     ({"mesh_faces": OCTAHEDRON[1] + 1}, "out of range"),
-    ({"mesh_faces": OCTAHEDRON[1][:, ::-1]}, "outward"),
+    ({"mesh_faces": OCTAHEDRON[1][:, ::-1]}, "inside-out"),
     ({"membership": np.zeros((1, 6), bool)}, "no vertices"),
     ({"membership": np.full((1, 6), 7, np.uint8).view(bool)}, "neither true nor false"),
     ({"cage_vertices": 0.1 * TETRAHEDRON[0]}, "outside the cage"),

@@ -1,11 +1,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
+from open_meshes import bottle, open_box, sheet, together, tube, with_holes
 from scenes import sausage
 from solids import rotation
 
-from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform import models
+from vtk_segdeform.geometry.volume import signed_volume, volume_along_path
+from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.solver.exact_volume import steps_to_volume
 from vtk_segdeform.solver.volume_constraints import region_volumes, total_volume
 
@@ -91,3 +95,126 @@ def test_steps_to_volume_meet_every_constraint():
     assert max(abs(c.violation(x)) for c in constraints) < 1e-12
     (step,) = steps_to_volume([total_volume(MESH)], np.hstack([x, MESH.vertices]))
     assert abs(step) < 1e-12
+
+
+OPEN = {
+    "box without a face": open_box(),
+    "bottle": bottle(24, 24),
+    "tube": tube(6.0, 24, 16),
+    "body with holes": with_holes(models.cactus(2000), 12, 0.03),
+    "box beside a sheet": together(
+        open_box(), sheet(lambda u, v: (4 + u, v, 0.1 * np.sin(9 * u)), 9, 9)
+    ),
+}
+
+
+def thirds(mesh):
+    """Return labels of three slabs, which cut borders along the body."""
+    along = mesh.vertices @ [0.3, 1.0, 0.5]
+    return np.searchsorted(np.quantile(along, [0.33, 0.67]), along)
+
+
+def constraints_of(mesh):
+    return (total_volume(mesh), *region_volumes(mesh, thirds(mesh)))
+
+
+def shaken(mesh, seed=0, size=0.05):
+    return size * np.random.default_rng(seed).normal(size=mesh.vertices.shape)
+
+
+def test_an_open_box_has_the_volume_of_the_box():
+    assert_allclose(total_volume(open_box()).target, 2.0, rtol=1e-14)
+    assert_allclose(total_volume(OPEN["box beside a sheet"]).target, 2.0, rtol=1e-14)
+    wide = tube(6.0, 360, 4)  # a prism over a polygon of 360 sides
+    area = 180 * np.sin(2 * np.pi / 360)
+    assert_allclose(total_volume(wide).target, 6.0 * area, rtol=1e-13)
+
+
+def test_the_volume_of_a_bent_open_box_is_that_under_a_fan_over_its_rim():
+    mesh = open_box(2)
+    x = mesh.vertices + shaken(mesh)
+    rim = mesh.borders[0]
+    closed = Mesh(
+        np.vstack([x, x[rim].mean(axis=0)]),
+        np.vstack(
+            [mesh.faces, [[b, a, len(x)] for a, b in zip(rim, np.roll(rim, -1), strict=True)]]
+        ),
+    )
+    volume = total_volume(mesh)
+    expected = signed_volume(closed.vertices, closed.faces)
+    assert_allclose(volume.violation(x) + volume.target, expected, rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", OPEN)
+def test_region_volumes_of_open_meshes_add_up_to_the_whole(name):
+    mesh = OPEN[name]
+    whole, regions = total_volume(mesh), region_volumes(mesh, thirds(mesh))
+    assert len(regions) == 3
+    for x in (mesh.vertices, mesh.vertices + shaken(mesh)):
+        volumes = [c.violation(x) + c.target for c in regions]
+        assert_allclose(sum(volumes), whole.violation(x) + whole.target, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", OPEN)
+def test_volumes_of_open_meshes_do_not_change_under_a_motion(name):
+    mesh = OPEN[name]
+    moved = mesh.vertices @ rotation([1, 2, 3], 2.0).T + [50.0, -20.0, 3.0]
+    for constraint in constraints_of(mesh):
+        assert abs(constraint.violation(moved)) < 1e-12 * total_volume(mesh).target
+
+
+def test_volumes_of_open_meshes_keep_their_digits_far_from_the_origin():
+    mesh = OPEN["bottle"]
+    mesh = mesh.with_vertices(np.round(mesh.vertices * 2.0**28) / 2.0**28)
+    bent = np.round((mesh.vertices + shaken(mesh)) * 2.0**28) / 2.0**28
+    far = np.array([2.0**22, -(2.0**21), 2.0**22])
+    expected = [each.relative(bent) for each in constraints_of(mesh)]
+    moved = constraints_of(mesh.with_vertices(mesh.vertices + far))
+    assert_allclose([each.relative(bent + far) for each in moved], expected, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", OPEN)
+def test_derivatives_under_lids_are_exact(name):
+    mesh = OPEN[name]
+    x, d = mesh.vertices + shaken(mesh, 1), shaken(mesh, 2, 0.3)
+    for each in constraints_of(mesh):
+        size = total_volume(mesh).target
+        slope = np.vdot(each.gradient(x), d)
+        far, near = (
+            abs(each.violation(x + t * d) - each.violation(x) - t * slope) for t in (2e-3, 1e-3)
+        )
+        assert_allclose(far / near, 4.0, rtol=0.1)
+        # The volume is a cubic along d, and a step along it is exact.
+        cubic = volume_along_path(each._extended(np.hstack([x, d])), each.faces)
+        for t in (-1.5, 0.7, 2.0):
+            value = each.violation(x + t * d) + each.target
+            assert_allclose(np.polyval(cubic[::-1], t), value, atol=1e-12 * size)
+        # The gradient is quadratic: its central difference is no approximation.
+        halves = each.hessian_halves(x).toarray().reshape(3, len(x), -1)
+        bends = [half @ d - half.T @ d for half in halves]
+        product = np.stack(
+            [bends[2][:, 1] - bends[1][:, 2], bends[0][:, 2] - bends[2][:, 0]]
+            + [bends[1][:, 0] - bends[0][:, 1]],
+            axis=1,
+        )
+        exact = 0.5 * (each.gradient(x + d) - each.gradient(x - d))
+        assert_allclose(product, exact, atol=1e-12 * size)
+
+
+def test_a_fin_on_a_ball_adds_no_volume():
+    ball = models.sphere(642)
+    a, b = ball.edges[50]
+    tip = 2.0 * ball.vertices[a]
+    finned = Mesh(np.vstack([ball.vertices, tip]), np.vstack([ball.faces, [a, b, 642]]))
+    whole = total_volume(finned)
+    assert whole.target == pytest.approx(signed_volume(ball.vertices, ball.faces), rel=1e-12)
+    regions = region_volumes(finned, thirds(finned))
+    assert_allclose(sum(each.target for each in regions), whole.target, rtol=1e-12)
+
+
+def test_a_sheet_has_no_volume_and_no_change_of_it():
+    mesh = sheet(lambda u, v: (u, v, 0.1 * np.sin(9 * u)), 9, 9)
+    whole = total_volume(mesh)
+    assert not whole.has_volume
+    assert whole.relative(mesh.vertices * 2.0) == 0.0
+    assert region_volumes(mesh, thirds(mesh)) == ()

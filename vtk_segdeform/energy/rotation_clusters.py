@@ -108,7 +108,8 @@ def join_rotations(
     whole = _response(rows, rest, pulls)
     varied = _sums(one.varied, clusters) - whole.varied
     turned = _sums(one.turned, clusters) - whole.turned
-    share = _SUBTRACTED * np.clip(turned / np.maximum(varied, np.finfo(float).tiny), 0.0, 1.0)
+    with np.errstate(over="ignore"):
+        share = _SUBTRACTED * np.clip(turned / np.maximum(varied, np.finfo(float).tiny), 0.0, 1.0)
     # Of a variation over n vertices, k equal patches show only (1 - 1 / k) / (1 - 1 / n).
     n, k = np.bincount(clusters, counts), np.bincount(clusters).clip(min=2)
     share = np.minimum(share * (1.0 - 1.0 / n) / (1.0 - 1.0 / k), _MOST)

@@ -41,7 +41,7 @@ from scipy import sparse
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..mesh import HalfEdges, Mesh
-from .volume import corner_and_edges
+from .volume import corner_and_edges, signed_volume
 
 _LEAST, _MOST = 0.48, 1.3  # abs(q) of an open component that encloses a volume
 _VIEWPOINTS = 50, 400  # fewest and most points x; by default one for each face
@@ -218,17 +218,9 @@ def _enclosing(mesh: Mesh, lids: Lids, wanted: bool | None) -> BoolArray:
     count, component = len(lids.encloses), mesh.components[mesh.faces[:, 0]]
     is_open = lids.is_open
     encloses = ~is_open | (wanted is not False)
-    if is_open.any():
-        half_edges = HalfEdges(mesh.faces, mesh.n_vertices)
-        encloses[component[half_edges.one_sided[half_edges.shells]]] = False
-    # Volumes with the first vertex of each component as the origin.
-    owner = np.concatenate([component, lids.component[lids.loop]])
+    encloses[component[_one_sided(mesh)]] = False
     _, first = np.unique(mesh.components, return_index=True)
-    a, e, f = corner_and_edges(
-        lids.extension @ mesh.vertices, np.concatenate([mesh.faces, lids.faces])
-    )
-    determinants = np.einsum("ij,ij->i", a - mesh.vertices[first][owner], np.cross(e, f))
-    volumes = np.bincount(owner, determinants, count) / 6.0
+    volumes = _volumes(mesh, lids, component, mesh.vertices[first])
     areas = np.bincount(component, mesh.face_areas, count)
     encloses &= np.abs(volumes) > _NO_VOLUME * areas**1.5
     if wanted is None:
@@ -241,6 +233,27 @@ def _enclosing(mesh: Mesh, lids: Lids, wanted: bool | None) -> BoolArray:
     if abs(volumes[encloses].sum()) <= _NO_VOLUME * areas.sum() ** 1.5:
         encloses[:] = False  # they cancel: no change could be relative to their sum
     return encloses
+
+
+def _one_sided(mesh: Mesh) -> BoolArray:
+    """Return which faces are part of a shell with one side, (m,) bool."""
+    # Such a shell has edges whose two faces have the same direction: twice in the boundary.
+    keys = np.sort(mesh.boundary @ [mesh.n_vertices, 1])
+    if not (keys[1:] == keys[:-1]).any():
+        return np.zeros(mesh.n_faces, dtype=bool)
+    half_edges = HalfEdges(mesh.faces, mesh.n_vertices)
+    return half_edges.one_sided[half_edges.shells]
+
+
+def _volumes(mesh: Mesh, lids: Lids, component: IntArray, origins: FloatArray) -> FloatArray:
+    """Return the volume of each component under lids, (c,), with its origin of *origins* (c, 3)."""
+    if mesh.is_closed and len(origins) == 1:
+        return np.array([signed_volume(mesh.vertices, mesh.faces)])
+    owner = np.concatenate([component, lids.component[lids.loop]])
+    faces = np.concatenate([mesh.faces, lids.faces])
+    a, e, f = corner_and_edges(lids.extension @ mesh.vertices, faces)
+    determinants = np.einsum("ij,ij->i", a - origins[owner], np.cross(e, f))
+    return np.bincount(owner, determinants, len(origins)) / 6.0
 
 
 def _counted(count: int, name: str) -> str:

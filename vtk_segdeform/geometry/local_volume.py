@@ -13,9 +13,9 @@ volume
 
 with k a smoothing over the surface about a quarter as wide as the body is thick, because o(i)
 varies irregularly at edges and in creases.  s is signed and relative: +0.1 is an expansion by 10 %.
-A part of the mesh that encloses nothing, such as an open sheet (`lids`), has no local volume: s is 0.
-As a quotient of determinants it is 0 under any rigid motion, and det(M) - 1 under any affine map M;
-it is below -1 where the tetrahedra are inverted.
+A part of the mesh that encloses nothing, such as an open sheet (`lids`), has no local volume, and
+s is 0 there.  As a quotient of determinants s is 0 under any rigid motion, and det(M) - 1 under any
+affine map M; it is below -1 where the tetrahedra are inverted.
 
 Source
 ------

@@ -225,7 +225,7 @@ class Session(Timeline):
 
     @property
     def volume_change(self) -> float:
-        """Relative volume change (V - V0) / V0 of `vertices`, signed; 0 if `has_volume` is False."""
+        """Relative volume change (V - V0) / V0 of `vertices`, signed; 0 without a volume."""
         pose = self._state.pose
         return 0.0 if pose is None else self._pose_solver.volume_change(self._state, pose)
 

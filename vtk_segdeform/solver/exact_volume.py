@@ -132,10 +132,11 @@ class ScaledSurface:
     @cached_property
     def _gpu(self) -> GPUSurface | None:
         arrays = gpu_arrays()
-        if arrays is None or self._constraint.extension is not None:
+        if arrays is None:
             return None
         try:
-            return GPUSurface(self._subspace, self._rest, self._constraint.faces, arrays)
+            closed = self._constraint.faces, arrays, self._constraint.extension
+            return GPUSurface(self._subspace, self._rest, *closed)
         except GPUError as fault:
             self._turn_off_gpu(fault)
             return None

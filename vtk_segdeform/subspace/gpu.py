@@ -43,6 +43,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import sparse
 
 from ..arrays import FloatArray, IntArray
 from ..errors import SegDeformError
@@ -83,6 +84,9 @@ class GPUSurface:
         Closed and outward oriented.
     arrays : module or TorchArrays
         The array library: `gpu_arrays`, or numpy for comparison.
+    extension : (n + c, n) sparse, optional
+        With it, faces are over the vertices and c centres of lids, ``extension @ x``.  These faces
+        are few, and the processor computes their volume.
 
     Raises
     ------
@@ -91,8 +95,20 @@ class GPUSurface:
     """
 
     def __init__(
-        self, subspace: Subspace, rest_vertices: FloatArray, faces: IntArray, arrays: Any
+        self,
+        subspace: Subspace,
+        rest_vertices: FloatArray,
+        faces: IntArray,
+        arrays: Any,
+        extension: sparse.csr_array | None = None,
     ) -> None:
+        self._lids: tuple[IntArray, sparse.csr_array, IntArray] | None = None
+        if extension is not None:
+            in_lid = (faces >= len(rest_vertices)).any(axis=1)
+            ends, lids = np.unique(faces[in_lid], return_inverse=True)
+            border = np.unique(extension[ends].indices)
+            self._lids = lids.reshape(-1, 3), extension[ends][:, border], border
+            faces = faces[~in_lid]
         self._arrays, self._host_faces, self._columns = arrays, faces, subspace.columns
         with _faults_named():
             self._rest = arrays.asarray(np.asarray(rest_vertices, dtype=np.float64))
@@ -116,7 +132,17 @@ class GPUSurface:
         determinants = self._arrays.zeros((n_sums * _SUMMED,))
         for piece, a, e, f in self._corners_and_edges(x):
             determinants[piece] = ((a - x[0]) * self._arrays.cross(e, f)).sum(1)
-        return float(self.host(determinants.reshape(n_sums, _SUMMED).sum(1)).sum() / 6.0)
+        of_mesh = float(self.host(determinants.reshape(n_sums, _SUMMED).sum(1)).sum() / 6.0)
+        return of_mesh + self._volume_of_lids(x)
+
+    def _volume_of_lids(self, x: GPUArray) -> float:
+        """Return the volume between the lids and the first vertex."""
+        if self._lids is None:
+            return 0.0
+        lids, ends, border = self._lids
+        near = self._arrays.take(x, self._ids(border), axis=0) - x[0]
+        a, b, c = (ends @ self.host(near))[lids.T]
+        return float(np.einsum("ij,ij", a, np.cross(b - a, c - a)) / 6.0)
 
     @_faults_named()
     def scale_to_volume(self, x: GPUArray, target: float, centre: ArrayLike) -> float:

@@ -11,8 +11,8 @@ surface at i touches it again:
 with a smoothing kernel k on the surface.  Under a rigid motion s is 0 and the mesh has exactly one
 colour.  `vtk_segdeform.geometry.local_volume` computes s, only while the overlay is shown.
 
-The lines of text are, from the top: for an open mesh, what encloses a volume; (V - V0) / V0 of the whole mesh; the smallest and the largest
-s; (V - V0) / V0 of each region, closed at its border as in
+The lines of text are, from the top: for an open mesh, what encloses a volume; (V - V0) / V0 of the
+whole mesh; the smallest and the largest s; (V - V0) / V0 of each region, closed at its border as in
 `vtk_segdeform.solver.volume_constraints`; the number of steps of the last solve, and the time from
 the event that changed the pose to the end of rendering.
 

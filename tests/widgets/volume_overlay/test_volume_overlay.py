@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - a plain window needs it
 from hands import Hand, picture, plain_view
+from open_meshes import open_box, sheet
 from scenes import sausage
 from solids import rotation
 from vtkmodules.util.numpy_support import vtk_to_numpy
@@ -397,3 +398,39 @@ def test_remove_restores_the_view(overlay):
     own.show()
     own.remove()
     assert view.renderer.GetViewProps().GetNumberOfItems() == 1
+
+
+def overlay_of(mesh):
+    """Return the overlay of a mesh whose upper end has been moved."""
+    session = Session(mesh)
+    z = mesh.vertices[:, 2]
+    session.set_fixed(z <= z.min() + 1e-9)
+    session.add_handle(z >= z.max() - 1e-9, "end")
+    session.segment(2)
+    session.change_options(n_cage_vertices=40)
+    session.fit_cages()
+    session.drag({"end": session.targets["end"] + [0.1, 0.2, 0.1]})
+    session.commit()
+    return VolumeOverlay(plain_view((400, 300)), session)
+
+
+def test_an_open_body_has_a_line_about_its_lids():
+    overlay = overlay_of(open_box())
+    overlay.show()
+    first, whole, local, *regions = lines_of(overlay)
+    assert (first, whole) == ("1 hole: volume preserved under its lid", "Volume: 0 %")
+    assert local.startswith("Local: -")
+    assert [line.split(":")[0] for line in regions[:2]] == ["region 1", "region 2"]
+    overlay.session.change_options(lids=False)
+    assert lines_of(overlay)[0] == "Open surface, lids off: no volume to preserve"
+    overlay.remove()
+
+
+def test_an_open_sheet_is_neutral_and_the_overlay_says_that_it_has_no_volume():
+    overlay = overlay_of(sheet(lambda u, v: (u, 0.02 * np.sin(5 * u), v), 12, 12))
+    overlay.show()
+    first, *others = lines_of(overlay)
+    assert first == "Open sheet: no volume to preserve"
+    assert not [line for line in others if "%" in line]
+    assert not overlay.change.any()
+    overlay.remove()

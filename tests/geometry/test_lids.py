@@ -1,0 +1,248 @@
+"""Lids over borders, and which open surfaces enclose a volume under them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from open_meshes import (
+    bottle,
+    cut,
+    moebius_strip,
+    open_box,
+    part_of,
+    pipe,
+    revolved,
+    sheet,
+    together,
+    tube,
+    with_holes,
+)
+from solids import rotation
+
+from vtk_segdeform import models
+from vtk_segdeform.geometry.lids import lids_of, mean_winding, volume_summary
+from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.mesh.mesh import Mesh
+
+BALL = models.sphere(1500)
+CACTUS = models.cactus(2500)
+RNG = np.random.default_rng(0)
+
+
+def scaled(mesh: Mesh, *factors: float) -> Mesh:
+    return mesh.with_vertices(mesh.vertices * np.array(factors))
+
+
+def shaken(mesh: Mesh, size: float) -> Mesh:
+    return mesh.with_vertices(mesh.vertices + size * RNG.normal(size=mesh.vertices.shape))
+
+
+BODIES = {
+    "hemisphere": cut(BALL, 2, 0.5),
+    "coarse hemisphere": cut(models.sphere(162), 2, 0.5),
+    "noisy hemisphere": shaken(cut(BALL, 2, 0.5), 0.03),
+    "three quarters of a ball": cut(BALL, 2, 0.75),
+    "ball with a small hole": cut(BALL, 2, 0.97),
+    "egg, cut lengthwise": cut(scaled(BALL, 1, 1, 2), 0, 0.5),
+    "egg, cut across": cut(scaled(BALL, 1, 1, 2), 2, 0.5),
+    "half of a dinosaur": cut(models.dinosaur(3000), 1, 0.5),
+    "half of a ring": cut(models.torus(1500), 0, 0.5),
+    "box without a face": open_box(),
+    "box of five quadrilaterals": open_box(1),
+    "bar without ends": pipe(lambda u, v: (np.cos(u), np.sin(u), 12 * v), 4, 12),
+    "tube": tube(),
+    "tube of 100 radii": tube(100.0, 20, 100),
+    "short tube": tube(2.0),
+    "bent tube": pipe(
+        lambda u, v: ((6 + np.cos(u)) * np.cos(4 * v), (6 + np.cos(u)) * np.sin(4 * v), -np.sin(u))
+    ),
+    "tube turned inside out": pipe(lambda u, v: (np.cos(u), -np.sin(u), 6 * v)),
+    "cup": revolved([0.02, 1.0, 1.0], [0.0, 0.0, 2.0]),
+    "cone": revolved([1.0, 0.02], [0.0, 2.0]),
+    "bottle": bottle(),
+    "bust with an open neck": cut(CACTUS, 2, 0.6),
+    "body with 12 holes": with_holes(CACTUS, 12, 0.03),
+    "body with many holes": with_holes(CACTUS, 40, 0.02),
+    "hollow blade": cut(models.bar((4, 0.1, 4), divisions=(16, 2, 16)), 2, 0.97),
+}
+SHEETS = {
+    "plane": sheet(lambda u, v: (u, v, 0 * u)),
+    "two triangles": sheet(lambda u, v: (u, v, 0 * u), 2, 2),
+    "wavy sheet": sheet(lambda u, v: (u, v, 0.1 * np.sin(9 * u) * np.cos(9 * v))),
+    "wrinkled cloth": sheet(lambda u, v: (u, v, 0.3 * np.sin(15 * u) * np.cos(15 * v)), 90, 90),
+    "pleats": sheet(lambda u, v: (u, v, 0.5 * np.sin(20 * u)), 120, 20),
+    "crumpled paper": sheet(
+        lambda u, v: (
+            u + 0.2 * np.sin(7 * v),
+            v + 0.2 * np.sin(8 * u),
+            0.3 * np.sin(9 * u * v) + 0.2 * np.cos(11 * u),
+        ),
+        90,
+        90,
+    ),
+    "noisy sheet": shaken(sheet(lambda u, v: (u, v, 0 * u)), 0.02),
+    "saddle": sheet(lambda u, v: (u, v, u * u - v * v)),
+    "shallow cap": cut(BALL, 2, 0.07),
+    "cap of 90 degrees": cut(BALL, 2, 0.146),
+    "face scan": cut(scaled(BALL, 1, 1.3, 0.5), 2, 0.5),
+    "quarter of a pipe": sheet(lambda u, v: (np.cos(0.785 * u), np.sin(0.785 * u), 5 * v)),
+    "half of a pipe": sheet(lambda u, v: (np.cos(1.57 * u), np.sin(1.57 * u), 5 * v)),
+    "rolled carpet": sheet(
+        lambda u, v: ((1.2 + u) * np.cos(9 * u), (1.2 + u) * np.sin(9 * u), 5 * v), 120, 20
+    ),
+    "ring": tube(0.2),
+    "wide ring": tube(1.0),
+    "annulus": pipe(lambda u, v: ((1 + v) * np.cos(u), (1 + v) * np.sin(u), 0 * v)),
+    "flag": sheet(lambda u, v: (u, 0.6 * v, 0.15 * np.sin(5 * u) + 0.05 * np.sin(9 * v))),
+    "sheet with holes": with_holes(sheet(lambda u, v: (u, v, 0 * u)), 8, 0.04),
+    "twisted scarf": sheet(
+        lambda u, v: (6 * u, 0.4 * v * np.cos(6 * u), 0.4 * v * np.sin(6 * u)), 120, 10
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_a_body_encloses_a_volume(name):
+    mesh = BODIES[name]
+    print(f"{name}: q = {mean_winding(mesh.vertices, mesh.faces):.3f}")
+    assert not mesh.is_closed
+    assert lids_of(mesh).encloses.all()
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_a_sheet_encloses_nothing(name):
+    mesh = SHEETS[name]
+    print(f"{name}: q = {mean_winding(mesh.vertices, mesh.faces):.3f}")
+    assert not lids_of(mesh).encloses.any()
+
+
+def test_the_mean_winding_of_known_surfaces():
+    def q(mesh):
+        return mean_winding(mesh.vertices, mesh.faces)
+
+    assert q(BALL) == pytest.approx(1.0, abs=0.03)
+    assert q(scaled(BALL, 1, 1, 8)) == pytest.approx(1.0, abs=0.03)
+    assert q(SHEETS["plane"]) == pytest.approx(0.0, abs=1e-12)
+    # An arc of the angle a has a / 2 pi; this gutter is long.
+    for a in (1.0, 2.0, 3.0):
+        half = a / 2
+        gutter = sheet(lambda u, v, h=half: (np.cos(h * u), np.sin(h * u), -40 * v), 20, 200)
+        assert abs(q(gutter)) == pytest.approx(a / (2 * np.pi), abs=0.02)
+
+
+@pytest.mark.parametrize("name", ["bottle", "hemisphere", "body with 12 holes"])
+def test_the_answer_does_not_depend_on_place_size_or_direction(name):
+    mesh = BODIES[name]
+    moved = 1e-3 * mesh.vertices @ rotation([1, 2, 3], 2.0).T + [7.0, -5.0, 3.0]
+    here = mean_winding(mesh.vertices, mesh.faces)
+    there = mesh.with_vertices(moved)
+    assert mean_winding(moved - moved[0], mesh.faces) == pytest.approx(here, abs=1e-6)
+    assert lids_of(there).encloses.all()
+    far = mesh.with_vertices(mesh.vertices + 1e6)
+    assert lids_of(far).encloses.all()
+
+
+def test_a_lid_of_a_flat_border_restores_the_volume_of_the_box():
+    mesh = open_box()
+    lids = lids_of(mesh)
+    x = lids.extension @ mesh.vertices
+    assert signed_volume(x, lids.closed(mesh)) == pytest.approx(2.0, rel=1e-14)
+    assert_allclose(x[mesh.n_vertices :], [[0.0, 0.0, mesh.vertices[:, 2].max()]], atol=1e-14)
+
+
+@pytest.mark.parametrize("name", [*BODIES, "ring", "annulus", "sheet with holes"])
+def test_faces_and_lids_have_no_boundary(name):
+    mesh = {**BODIES, **SHEETS}[name]
+    lids = lids_of(mesh, lids=True)
+    faces = np.concatenate([mesh.faces, lids.faces])
+    ends = np.bincount(faces.ravel(), minlength=lids.extension.shape[0])
+    assert ends.all()
+    tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    forward = np.sort(tails * len(ends) + heads)
+    assert_array_equal(forward, np.sort(heads * len(ends) + tails))
+
+
+def test_a_closed_mesh_has_no_lids_and_its_own_faces():
+    lids = lids_of(BALL)
+    assert lids.encloses.all()
+    assert not len(lids.faces)
+    assert lids.closed(BALL) is BALL.faces
+
+
+def test_the_option_decides_for_open_components():
+    cap = SHEETS["shallow cap"]
+    mesh = together(open_box(), cap.with_vertices(cap.vertices + 5))
+    closed = together(BALL, SHEETS["flag"])
+    assert lids_of(mesh).encloses.tolist() == [True, False]
+    assert lids_of(mesh, True).encloses.tolist() == [True, True]
+    assert lids_of(mesh, False).encloses.tolist() == [False, False]
+    assert lids_of(closed, False).encloses.tolist() == [True, False]
+
+
+def test_nothing_encloses_a_volume_of_zero():
+    flat = Mesh(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]],
+        [[0, 1, 2], [0, 2, 3]],
+    )
+    assert not lids_of(flat, True).has_volume
+    # A closed shell that is folded flat: two sheets with a common border.
+    pillow = BALL.with_vertices(BALL.vertices * [1, 1, 0])
+    assert not lids_of(pillow).has_volume
+    # Two bodies of opposite orientation.
+    inside_out = pipe(lambda u, v: (np.cos(u) + 5, -np.sin(u), 6 * v))
+    cancelling = together(tube(), inside_out)
+    assert not lids_of(cancelling).has_volume
+
+
+@pytest.mark.parametrize("option", [None, True])
+def test_a_one_sided_surface_encloses_nothing(option):
+    strip = moebius_strip()
+    assert not lids_of(strip, option).has_volume
+
+
+def test_several_loops_may_touch_at_a_vertex():
+    mesh = models.sphere(642)
+    rings = [np.flatnonzero((mesh.faces == v).any(axis=1)) for v in (100, *_two_away(mesh, 100))]
+    touching = part_of(mesh, ~np.isin(np.arange(mesh.n_faces), np.concatenate(rings[:2])))
+    assert len(touching.borders) == 2
+    assert set(touching.borders[0]) & set(touching.borders[1])
+    lids = lids_of(touching)
+    volume = signed_volume(lids.extension @ touching.vertices, lids.closed(touching))
+    assert 0.98 < volume / signed_volume(mesh.vertices, mesh.faces) < 1.0
+
+
+def _two_away(mesh: Mesh, vertex: int) -> list[int]:
+    """Return a vertex that shares exactly one neighbour with *vertex*."""
+    near = [set(mesh.faces[(mesh.faces == v).any(axis=1)].ravel()) - {v} for v in range(200)]
+    return [v for v in range(200) if v not in near[vertex] and len(near[v] & near[vertex]) == 1]
+
+
+@pytest.mark.parametrize(
+    ("mesh", "option", "says"),
+    [
+        (BALL, None, "Closed surface: volume preserved"),
+        (open_box(), None, "1 hole: volume preserved under its lid"),
+        (tube(), None, "2 holes: volume preserved under lids"),
+        (tube(), False, "Open surface, lids off: no volume to preserve"),
+        (SHEETS["plane"], None, "Open sheet: no volume to preserve"),
+        (SHEETS["plane"], True, "No enclosed volume: nothing to preserve"),
+        (
+            together(SHEETS["plane"], SHEETS["flag"]),
+            None,
+            "2 open sheets: no volume to preserve",
+        ),
+        (
+            together(tube(), SHEETS["flag"]),
+            None,
+            "2 holes: volume preserved under lids; 1 open sheet has no volume",
+        ),
+        (
+            together(BALL, SHEETS["plane"], SHEETS["flag"]),
+            None,
+            "Closed surface: volume preserved; 2 open sheets have no volume",
+        ),
+    ],
+)
+def test_one_sentence_says_what_has_a_volume(mesh, option, says):
+    assert volume_summary(mesh, option) == says
