@@ -1,0 +1,96 @@
+"""Cages of open, thin and non-manifold surfaces: valid, around their regions, and close to them."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import pytest
+from sheets import SHEETS, bent, bowl, cup, mesh_of, plate
+from solids import rotation
+
+from vtk_segdeform.cages.cage import cage_faults
+from vtk_segdeform.cages.fit import fit_cages
+from vtk_segdeform.cages.region_solid import Surface
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.models import cactus
+from vtk_segdeform.regions.regions import Regions
+from vtk_segdeform.regions.segmentation import segment
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_the_cages_of_any_surface_are_valid_and_enclose_their_regions(name, caplog):
+    mesh = mesh_of(name)
+    regions = segment(mesh, 2)
+    with caplog.at_level(logging.WARNING):
+        cages = fit_cages(mesh, regions, 100)
+    assert not caplog.records  # no ellipsoid
+    assert sum(cage.n_vertices for cage in cages) == 100
+    for r, cage in enumerate(cages):
+        assert cage_faults(cage.vertices, cage.faces) == ()
+        assert cage.contains(mesh.vertices[regions.members(r)]).all()
+
+
+def single_cage(mesh, n=155):
+    return fit_cages(mesh, Regions.single(mesh), n)[0]
+
+
+def test_the_cage_of_a_plate_is_offset_to_both_sides_and_even():
+    mesh = Mesh(plate(30, 30)[0] @ rotation([1, 2, 3], 0.7).T, plate(30, 30)[1])
+    cage = single_cage(mesh)
+    local = cage.vertices @ rotation([1, 2, 3], 0.7)
+    assert local[:, 2].max() > 0.02
+    assert local[:, 2].min() < -0.02
+    assert np.ptp(local[:, 2]) < 0.15
+    for axis in (0, 1):  # on each side, and in every quarter along both axes
+        for side in (local[:, 2] > 0.0, local[:, 2] < 0.0):
+            counts, _ = np.histogram(local[side, axis], bins=4, range=(-0.05, 1.05))
+            assert counts.min() >= 12
+
+
+def test_a_long_ribbon_has_cage_vertices_all_along_it():
+    cage = single_cage(Mesh(*plate(200, 4, 50.0, 1.0)))
+    counts, _ = np.histogram(cage.vertices[:, 0], bins=20, range=(-1.0, 51.0))
+    assert counts.min() >= 4
+    assert np.ptp(cage.vertices[:, 1]) < 3.0
+
+
+def test_the_cage_of_a_sheet_follows_it_and_leaves_its_hollow_side_empty():
+    flat, faces = plate(40, 40)
+    radius = 1.0 / 3.0
+    mesh = Mesh(bent(flat, radius), faces)  # nearly half a cylinder about the y axis
+    cage = single_cage(mesh)
+    assert not cage.contains([[0.0, 0.5, 0.0], [0.08, 0.5, 0.08]]).any()
+    assert cage.volume < 0.2  # about 2 offsets over area 1
+
+
+def test_the_cage_of_a_sheet_does_not_depend_on_its_orientation():
+    flat, faces = plate(40, 40)
+    vertices = bent(flat, 1.0 / 3.0)
+    one, other = (single_cage(Mesh(vertices, f)) for f in (faces, faces[:, ::-1]))
+    np.testing.assert_allclose(one.vertices, other.vertices, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_cage_of_a_pan_is_filled_as_under_a_lid(seed):
+    vertices, faces = cup(40, 10, 1.0, 0.6)
+    order = np.random.default_rng(seed).permutation(len(vertices))  # decides the signs of axes
+    cage = single_cage(Mesh(vertices[order], np.argsort(order)[faces]))
+    assert cage.contains([[0.0, 0.0, 0.3], [0.5, 0.0, 0.4], [0.0, 0.0, 0.55]]).all()
+
+
+def test_the_walls_of_a_closed_mesh_are_its_own_faces():
+    mesh = cactus()
+    surface = Surface.of(mesh)
+    points, faces = surface.walls
+    assert points is surface.points
+    assert faces is mesh.faces
+
+
+@pytest.mark.parametrize("share", [0.0, 0.6])
+def test_cages_turn_with_an_open_mesh(share):
+    vertices, faces = bowl(share)
+    turn = rotation([1, 2, 3], 1.0)
+    one = single_cage(Mesh(vertices, faces), 60)
+    other = single_cage(Mesh(vertices @ turn.T, faces), 60)
+    np.testing.assert_allclose(other.vertices, one.vertices @ turn.T, atol=1e-6)

@@ -1,0 +1,233 @@
+"""The shape energy of open surfaces: natural boundary, refinement, halves of closed bodies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.linalg import cho_factor, cho_solve
+from scipy.spatial import cKDTree
+from sheets import bent, cup, fin, joined, plate, tube, welded
+from solids import icosphere, rotation
+
+from vtk_segdeform import sizes
+from vtk_segdeform.cages.fit import fit_cages
+from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.energy.energy import shape_energy
+from vtk_segdeform.energy.operators import surface_operators
+from vtk_segdeform.geometry.differential import inner_vertices
+from vtk_segdeform.geometry.intrinsic import IntrinsicTriangulation
+from vtk_segdeform.geometry.kmeans import cluster_positions
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.regions.regions import Regions
+from vtk_segdeform.subspace.subspace import Subspace, cage_subspace
+
+BOTH = pytest.mark.parametrize("n_clusters", [None, 12], ids=["per vertex", "clusters"])
+STRETCHES = pytest.mark.parametrize("stretch", [0.0, 10.0])
+
+
+def operators(mesh):
+    surface = IntrinsicTriangulation.of(mesh.vertices, mesh.faces)
+    clusters = np.arange(mesh.n_vertices)
+    return surface_operators(surface, clusters, inner=inner_vertices(mesh))
+
+
+def energy_of(mesh, stretch, n_clusters=None):
+    """Return the energy over the vertices themselves: W~ is the identity."""
+    n = mesh.n_vertices
+    clusters = None if n_clusters is None else cluster_positions(mesh.vertices, n_clusters)
+    return shape_energy(mesh, Subspace(n, (np.arange(n),), (np.eye(n),)), stretch, clusters)
+
+
+def value(energy, x):
+    return energy.local_step(x, x)[0]
+
+
+def on_border(mesh):
+    border = np.zeros(mesh.n_vertices, dtype=bool)
+    border[mesh.boundary] = True
+    return border
+
+
+@pytest.mark.parametrize("solid", [plate(6, 5), tube(), cup()], ids=["plate", "tube", "cup"])
+def test_the_inner_vertices_are_those_that_are_on_no_border(solid):
+    mesh = Mesh(*solid)
+    assert_array_equal(inner_vertices(mesh), ~on_border(mesh))
+
+
+def test_vertices_where_three_sheets_meet_have_no_detail():
+    mesh = Mesh(*fin())
+    inner = inner_vertices(mesh)
+    radius = np.linalg.norm(mesh.vertices, axis=1)
+    assert not inner[radius > 1.1].any()  # the border of the fin
+    seam = on_border(mesh) & (radius < 1.1)
+    assert seam.sum() > 5
+    assert_array_equal(inner[radius < 1.1], ~seam[radius < 1.1])
+
+
+def test_all_vertices_of_a_closed_mesh_and_of_a_strip_have_a_detail():
+    for solid in (icosphere(2), plate(9, 1), (np.eye(3), [[0, 1, 2]])):
+        assert inner_vertices(Mesh(*solid)).all()
+    both = Mesh(*joined(plate(9, 1), (plate(4, 4)[0] + 2.0, plate(4, 4)[1])))
+    assert inner_vertices(both).sum() == 20 + 9
+
+
+def test_inside_its_border_a_mesh_has_the_rows_of_the_body_it_was_cut_from():
+    whole = Mesh(*icosphere(3))
+    kept = (whole.vertices[whole.faces][:, :, 2] > -0.3).all(axis=1)
+    ids, faces = np.unique(whole.faces[kept], return_inverse=True)
+    half = Mesh(whole.vertices[ids], faces.reshape(-1, 3))
+    inner, one, other = inner_vertices(half), operators(half), operators(whole)
+    assert 0 < inner.sum() < half.n_vertices
+    assert_array_equal(one.bends, inner)
+    assert_allclose(one.delta[inner], other.delta[ids[inner]], rtol=0.0, atol=1e-12)
+    assert_allclose(one.areas[inner], other.areas[ids[inner]], rtol=1e-12)
+    rows = (3 * ids[:, None] + np.arange(3)).reshape(-1)
+    for mine, its in ((one.detail, other.detail), (one.fans, other.fans)):
+        of_half = mine.toarray().reshape(-1, 3, half.n_vertices)[inner]
+        of_whole = its.toarray()[rows][:, ids].reshape(-1, 3, half.n_vertices)[inner]
+        assert_allclose(of_half, of_whole, rtol=0.0, atol=1e-12)
+
+
+def test_bending_a_plate_converges_to_the_integral_of_the_squared_curvature():
+    radius, errors = 0.7, []
+    for n in (8, 16, 32):
+        mesh = Mesh(*plate(n, n))
+        found = value(energy_of(mesh, 0.0), bent(mesh.vertices, radius))
+        errors.append(abs(found - 0.25 / radius**2))  # mean curvature 1 / 2 r, over area 1
+    # Of first order: a strip half an edge wide, along the border, has no detail.
+    assert_array_equal(np.divide(errors[:-1], errors[1:]) > 1.8, True)
+    assert errors[-1] < 0.15 * 0.25 / radius**2
+
+
+@pytest.mark.parametrize("shear", [0.0, 0.2])
+def test_deforming_a_plate_in_its_plane_takes_no_bending(shear):
+    mesh = Mesh(*plate(9, 7))
+    x = mesh.vertices @ np.array([[1.1, shear, 0.0], [0.0, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    assert value(energy_of(mesh, 0.0), x) < 1e-20 / mesh.face_areas.mean()
+    assert value(energy_of(mesh, 10.0), x) > 0.0
+
+
+@BOTH
+@STRETCHES
+@pytest.mark.parametrize("solid", [plate(9, 7), cup(10, 6), fin()], ids=["plate", "cup", "fin"])
+def test_it_is_zero_with_no_gradient_under_rigid_motion(solid, stretch, n_clusters):
+    mesh = Mesh(*solid)
+    energy = energy_of(mesh, stretch, n_clusters)
+    size = np.abs(energy.quadratic).max()
+    turn = rotation([1, 2, 3], 2.0)
+    for x in (mesh.vertices, mesh.vertices @ turn.T + [3.0, 2.0, 1.0]):
+        energy_there, slope = energy.local_step(x, x)
+        assert abs(energy_there) < 1e-10 * size
+        assert np.abs(slope).max() < 1e-10 * size
+    moved = mesh.vertices + 0.02 * np.random.default_rng(0).normal(size=mesh.vertices.shape)
+    rotated = value(energy, moved @ turn.T + [3.0, 2.0, 1.0])
+    assert_allclose(rotated, value(energy, moved), rtol=1e-9)
+
+
+@BOTH
+def test_the_slope_is_half_the_gradient(n_clusters):
+    mesh, rng = Mesh(*plate(9, 7)), np.random.default_rng(0)
+    energy = energy_of(mesh, 10.0, n_clusters)
+    x = bent(mesh.vertices, 0.5) + 0.01 * rng.normal(size=mesh.vertices.shape)
+    direction = rng.normal(size=x.shape)
+    here, slope = energy.local_step(x, x)
+    errors = []
+    for t in (2e-4, 1e-4):
+        ahead = value(energy, x + t * direction)
+        errors.append(abs(ahead - here - 2.0 * t * np.vdot(slope, direction)))
+    assert 3.5 < errors[0] / errors[1] < 4.5
+
+
+@STRETCHES
+def test_a_sample_of_all_vertices_has_the_whole_energy(monkeypatch, stretch):
+    mesh = Mesh(*cup(12, 8))
+    whole = energy_of(mesh, stretch, 10)
+    monkeypatch.setattr(sizes, "CUBATURE_SAMPLE", 10**6)
+    monkeypatch.setattr(sizes, "CUBATURE_FACTOR", 0)
+    sampled = energy_of(mesh, stretch, 10)
+    for name in ("quadratic", "covariance_operator", "load_operator", "constant"):
+        expected = getattr(whole, name)
+        atol = 1e-12 * np.abs(expected).max()
+        assert_allclose(getattr(sampled, name), expected, rtol=0.0, atol=atol)
+
+
+@STRETCHES
+def test_a_plate_stays_flat_under_handles_in_its_plane(stretch):
+    """While it is pulled; a plate that is compressed buckles, as it should."""
+    mesh = Mesh(*plate(20, 20))
+    regions = Regions.single(mesh)
+    x = mesh.vertices[:, 0]
+    fixed, handle = np.flatnonzero(x < 0.12), np.flatnonzero(x > 0.88)
+    about = np.array([1.0, 0.5, 0.0])
+    turn = rotation([0, 0, 1], 0.2)
+    targets = (mesh.vertices[handle] - about) @ turn.T + about + [0.3, 0.1, 0.0]
+    solution = Deformer(
+        mesh,
+        regions,
+        fit_cages(mesh, regions, 60),
+        fixed=fixed,
+        handle=handle,
+        stretch=stretch,
+        preserve_volume=False,
+    ).solve(targets)
+    assert solution.handle_error < 1e-3
+    assert np.abs(solution.vertices[:, 2]).max() < 1e-5  # steps of 1e-7
+
+
+def full_pose(mesh, stretch, held, places):
+    """Return the pose of least energy with the vertices *held* in their *places*: no cages."""
+    energy, x, free = energy_of(mesh, stretch), mesh.vertices.copy(), ~held
+    x[held] = places
+    factor = cho_factor(energy.quadratic[np.ix_(free, free)])
+    known = energy.quadratic[np.ix_(free, held)] @ places
+    for _ in range(300):
+        x[free] = cho_solve(factor, energy.rotation_load(x, x)[free] - known)
+    return x
+
+
+@STRETCHES
+def test_half_of_a_symmetric_body_poses_as_its_half_does(stretch):
+    """With its cut and two rings held, so that the same rows of the free part are left.
+
+    Only the strength of the stretch differs: it is relative to the trace of the detail, and the
+    vertices on the cut have none.  They are a thirtieth of the body.
+    """
+    upper, faces = cup(12, 14, radius=0.3)
+    upper = upper * [1.0, 1.0, -1.0] + [0.0, 0.0, 1.0]
+    half, mirror = Mesh(upper, faces[:, ::-1]), np.array([1.0, 1.0, -1.0])
+    whole = Mesh(*welded(*joined((upper, half.faces), (upper * mirror, faces))))
+    assert whole.is_two_manifold
+    turn = rotation([0, 1, 0], 0.5)
+
+    def posed(mesh):
+        z = mesh.vertices[:, 2:]
+        sign = np.where(z > 0.0, 1.0, -1.0) ** [0, 0, 1]
+        places = np.where(abs(z) > 0.9, sign * ((sign * mesh.vertices) @ turn.T), mesh.vertices)
+        held = (abs(z[:, 0]) > 0.9) | (abs(z[:, 0]) < 0.2)
+        return full_pose(mesh, stretch, held, places[held])
+
+    one, both = posed(half), posed(whole)
+    motion = np.abs(one - half.vertices).max()
+    assert motion > 0.2
+    for side in (1.0, mirror):
+        _, match = cKDTree(whole.vertices * side).query(half.vertices)
+        assert np.abs(both[match] * side - one).max() < 0.003 * motion
+
+
+@pytest.mark.parametrize("solid", [plate(60, 1, 30.0, 1.0), plate(40, 2, 20.0, 1.0)])
+def test_narrow_strips_bend_smoothly(solid):
+    mesh = Mesh(*solid)
+    regions = Regions.single(mesh)
+    cages = fit_cages(mesh, regions, 60)
+    assert cage_subspace(regions, cages).n_columns == 60
+    share = mesh.vertices[:, 0] / np.ptp(mesh.vertices[:, 0])
+    fixed, handle = np.flatnonzero(share < 0.1), np.flatnonzero(share > 0.9)
+    turn, about = rotation([0, 1, 0], -1.2), mesh.vertices.mean(axis=0)
+    targets = (mesh.vertices[handle] - about) @ turn.T + about
+    solution = Deformer(
+        mesh, regions, cages, fixed=fixed, handle=handle, preserve_volume=False
+    ).solve(targets)
+    a, b, c = solution.vertices[mesh.faces.T]
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    assert_allclose(area, mesh.face_areas, rtol=0.05)
