@@ -133,12 +133,13 @@ def write_ply(path: Path, surface: pv.PolyData) -> None:
     kept: dict[str, list[str]] = {"point": [], "cell": [], "field": []}
     texture, texture_name = surface.active_texture_coordinates, ""
     if texture is not None and texture.ndim == 2 and texture.shape[1] >= 2:
-        # MeshLab reads these names in double precision
-        pairs = np.array(texture, dtype="f8")
+        # In single precision by the names that Blender reads too, else by those of MeshLab
+        single = texture.dtype == np.float32
+        pairs = np.array(texture, dtype="f4" if single else "f8")
         texture_name = str(surface.point_data.active_texture_coordinates_name)
         if texture_name.startswith("TEXCOORD_"):  # v of glTF begins at the top
             pairs[:, 1] = 1.0 - pairs[:, 1]
-        columns |= dict(zip(_TEXTURE[-1], pairs.T, strict=False))
+        columns |= dict(zip(_TEXTURE[0 if single else -1], pairs.T, strict=False))
     arrays = {name: v for name, v in surface.point_data.items() if name != texture_name}
     normals = arrays.get("Normals")
     if normals is not None and normals.shape[1:] == (3,) and normals.dtype.str[1:] in ("f4", "f8"):

@@ -68,7 +68,13 @@ def read_with_vtk(path: Path) -> pv.PolyData:
     except (MeshError, RuntimeError) as error:
         raise MeshError(f"is not a readable {suffix} file ({_first_message(error)})") from None
     surfaces = [_surface(part) for part in parts]
-    return surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
+    surface = surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
+    for attributes in (surface.point_data, surface.cell_data):  # VTKHDF does not store it
+        normals = attributes.get("Normals")
+        found = normals is not None and normals.shape[1:] == (3,) and normals.dtype.kind == "f"
+        if found and attributes.active_normals_name is None:
+            attributes.active_normals_name = "Normals"
+    return surface
 
 
 def _validated(data: pv.DataSet) -> pv.DataSet:
@@ -180,6 +186,11 @@ def _with_arrays(
     ):
         for name, values in theirs.items():
             mine[name] = values[order] if mine is cells else values
+    for mine, theirs in ((surface.GetPointData(), data.GetPointData()),
+                         (surface.GetCellData(), data.GetCellData())):  # fmt: skip
+        for kind in range(theirs.NUM_ATTRIBUTES):
+            if (active := theirs.GetAbstractAttribute(kind)) is not None:
+                mine.SetActiveAttribute(active.GetName(), kind)
     return surface
 
 
