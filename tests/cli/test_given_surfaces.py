@@ -1,0 +1,145 @@
+"""Commands over surfaces as users have them: the output is the input, only moved."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import pyvista as pv
+from given_surfaces import GIVEN, holed, parts, require_only_moved, tube
+from numpy.testing import assert_allclose, assert_array_equal
+
+from vtk_segdeform.cli.main import main
+from vtk_segdeform.io import Surface, read_polydata, write_mesh
+from vtk_segdeform.models import sphere
+
+QUICK = ["--regions", "1", "--cage-vertices", "40"]
+BEND = ["--fixed", "z<15%", "--handle", "z>85%", "--translate", "0.4,0,0", *QUICK]
+
+
+def file_of(name, folder, suffix=".vtp"):
+    path = folder / f"{name}{suffix}"
+    write_mesh(path, GIVEN[name]())
+    return path
+
+
+@pytest.mark.parametrize("name", GIVEN)
+def test_deform_writes_what_was_given_only_moved(name, tmp_path, capsys):
+    path, out = file_of(name, tmp_path), tmp_path / "out.vtp"
+    words = BEND
+    if name == "parts":  # the middle one has neither
+        words = [
+            "--fixed",
+            "x<-1&z<20%",
+            "--handle",
+            "x<-1&z>80%",
+            "--translate",
+            "0.4,0,0",
+            *QUICK,
+        ]
+    assert main(["deform", str(path), "-o", str(out), *words]) == 0
+    before, after = read_polydata(path), read_polydata(out)
+    require_only_moved(before, after)
+    surface = Surface(before)
+    step = np.asarray(after.points, float) - before.points
+    for vertex in (0, surface.mesh.n_vertices // 2):  # points at a seam remain together
+        assert np.ptp(step[surface.vertex_of == vertex], axis=0).max() < 1e-6
+    assert np.abs(step).max() > 0.3
+    printed = capsys.readouterr().out
+    for workaround in surface.workarounds:
+        assert str(workaround) in printed or "hole" in str(workaround)
+    assert ("volume          preserved under" in printed) == (not surface.mesh.is_closed)
+
+
+def test_both_sides_of_a_seam_follow_a_selection_of_one_of_them(tmp_path):
+    path, ids = file_of("tube", tmp_path), tmp_path / "top.txt"
+    n = 16
+    top = np.arange(24 * (n + 1), 25 * (n + 1))
+    ids.write_text(" ".join(map(str, top[:-1])))  # without the doubled last one
+    out = tmp_path / "out.vtp"
+    words = ["--fixed", "z<10%", "--handle", str(ids), "--translate", "0.2,0,0", *QUICK]
+    assert main(["deform", str(path), "-o", str(out), *words]) == 0
+    moved = read_polydata(out).points[top] - read_polydata(path).points[top]
+    assert_allclose(moved, np.tile([0.2, 0.0, 0.0], (n + 1, 1)), atol=5e-3)
+
+
+def test_a_sel_file_has_one_number_per_given_point(tmp_path):
+    path, sel, out = file_of("tube", tmp_path), tmp_path / "pose.sel", tmp_path / "out.vtp"
+    z = tube().points[:, 2]
+    np.savetxt(sel, np.where(z < 0.3, 0, np.where(z > 2.7, 2, 1)), fmt="%d")
+    words = ["--fixed", str(sel), "--handle", str(sel), "--translate", "0.2,0,0", *QUICK]
+    assert main(["deform", str(path), "-o", str(out), *words]) == 0
+    assert_allclose(read_polydata(out).points[z < 0.3], tube().points[z < 0.3], atol=5e-3)
+
+
+def test_regions_are_written_at_the_given_points_and_read_again(tmp_path, capsys):
+    path, out = file_of("holed", tmp_path), tmp_path / "regions.vtp"
+    assert main(["regions", str(path), "-o", str(out), "--regions", "2"]) == 0
+    written = read_polydata(out)
+    assert written.n_points == holed().n_points
+    assert set(written.point_data["region"]) == {0, 1}
+    surface = Surface(holed())
+    labels = surface.at_vertices(np.asarray(written.point_data["region"]))
+    assert_array_equal(surface.at_points(labels), written.point_data["region"])
+    words = ["deform", str(out), "-o", str(tmp_path / "bent.vtp"), *BEND]
+    words[words.index("--regions") + 1] = "region"
+    assert main(words) == 0
+    assert "regions         2:" in capsys.readouterr().out
+
+
+def checked(path, capsys, code=0):
+    assert main(["check", str(path), "--json"]) == code
+    return json.loads(capsys.readouterr().out)
+
+
+def test_check_tells_a_script_all_about_a_surface(tmp_path, capsys):
+    found = checked(file_of("holed", tmp_path), capsys)
+    assert (found["points"], found["polygons"]) == (holed().n_points, holed().n_cells)
+    assert found["holes"] == [16, 16, 8, 4]
+    assert found["encloses"] == [True]
+    assert (found["closed"], found["volume_under_lids"], found["can_be_deformed"]) == (
+        False, True, True,
+    )  # fmt: skip
+    assert found["self_intersections"] == 0
+    assert [each["kind"] for each in found["workarounds"]][-1] == "hole"
+    assert all(set(each) >= {"kind", "text", "count"} for each in found["workarounds"])
+    found = checked(file_of("parts", tmp_path), capsys)
+    assert found["components"] == 3
+    assert found["encloses"] == [True] * 3
+    write_mesh(tmp_path / "ball.ply", sphere(300))
+    found = checked(tmp_path / "ball.ply", capsys)
+    assert found["closed"]
+    assert (found["holes"], found["workarounds"], found["faults"]) == ([], [], [])
+    assert not found["volume_under_lids"]
+
+
+def test_check_counts_self_intersections_and_does_not_refuse_them(tmp_path, capsys):
+    two = pv.merge([pv.Sphere(radius=1.0), pv.Sphere(radius=1.0, center=(1, 0, 0))])
+    write_mesh(tmp_path / "two.vtp", two.extract_surface())
+    assert checked(tmp_path / "two.vtp", capsys)["self_intersections"] > 10
+    assert main(["check", str(tmp_path / "two.vtp")]) == 0
+    assert "pairs of faces intersect" in capsys.readouterr().out
+
+
+def test_check_names_what_cannot_be_deformed(tmp_path, capsys):
+    lost = tube()
+    lost.points[7] = np.nan
+    flat = pv.PolyData(np.zeros((4, 3)), faces=[4, 0, 1, 2, 3])
+    for name, surface, word in (("lost", lost, "NaN"), ("flat", flat, "flat")):
+        path = tmp_path / f"{name}.vtp"
+        surface.save(path)
+        found = checked(path, capsys, code=1)
+        assert not found["can_be_deformed"]
+        assert word in found["reason"]
+        assert main(["check", str(path)]) == 1
+        assert "cannot be deformed" in capsys.readouterr().out
+
+
+def test_a_surface_of_several_parts_has_its_stray_points_unselected(tmp_path):
+    path, out = file_of("parts", tmp_path), tmp_path / "out.vtp"
+    words = ["--fixed", "z<15%", "--handle", "x>50%&z>85%", "--translate", "0.2,0,0", *QUICK]
+    assert main(["deform", str(path), "-o", str(out), *words]) == 0
+    moved = read_polydata(out).points - parts().points
+    right = (parts().points[:, 0] > 1) & (parts().points[:, 0] < 5) & (parts().points[:, 2] > 2.6)
+    assert_allclose(moved[right][:, 0], 0.2, atol=5e-3)  # the stray at x = 9 does not count
