@@ -53,6 +53,7 @@ WIDGETS = ("vtk_segdeform.widgets", "vtk_segdeform.widgets.recording.film")
 NOT_CALLED = {"on_press", "on_hover", "on_wheel", "on_key"}
 NOT_CALLED |= {"contains", "guarded", "pixel_at", "pointer", "ray", "to_display", "to_world"}
 NOT_CALLED |= {"FillInputPortInformation", "RequestData"}  # by VTK's pipeline
+NOT_CALLED |= {"reported"}  # for meshes whose arrays and report were just checked
 NOT_CALLED |= {"add_surface", "draw_mesh"}  # in a plotter created by `pictures`
 
 
@@ -371,6 +372,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "progress": lambda: lambda _fraction, _message: None,
     "radius": lambda: 1.0,
     "region": lambda: 0,
+    "report": lambda: sd.find_faults(mesh().vertices, mesh().faces),
     "regions": regions,
     "renderer": lambda: view().renderer,
     "rings": lambda: 1,
@@ -445,8 +447,11 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "Session.set_fixed.vertices": _left,
     "Session.split_region.vertices": lambda: None,
     "Surface.at_vertices.values": lambda: np.arange(given().given.n_points),
+    "Surface.of.soup": lambda: sd.mesh.mesh_of(mesh().vertices, mesh().faces),
     "Surface.moved.vertices": lambda: given().mesh.vertices,
     "Surface.read.path": lambda: _file("mesh.ply"),
+    "Surface.targets_at.points": lambda: [0, 5],
+    "Surface.targets_at.targets": lambda: given().given.points[[0, 5]],
     "Surface.vertices_at.points": lambda: [0, 5],
     "Surface.write.path": lambda: Path("written.vtp"),
     "Surface.write.vertices": lambda: given().mesh.vertices,
@@ -466,6 +471,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "picture_volume_change.path": lambda: Path("a.png"),
     "read_project.path": lambda: _file("project.mlp"),
     "write_project.path": lambda: Path("written.mlp"),
+    "Session.write_deformed.path": lambda: Path("written.vtp"),
     "SegmentedCageDeformFilter.SetFixed.points": _left,
     "SegmentedCageDeformFilter.SetHandle.points": _right,
     "read_faces.path": lambda: _file("mesh.ply"),
@@ -498,6 +504,8 @@ SAID_AS: dict[str, tuple[str, ...]] = {
     "Session.rename_handle.name": ("handle",),
     "Session.rename_handle.new_name": ("handle's name",),
     "Session.set_fixed.vertices": ("fixed",),
+    "Surface.targets_at.points": ("points", "targets"),
+    "Surface.targets_at.targets": ("points", "targets"),
     "blend_at.vertices": ("weights",),
     "board.cages": ("weights",),
     "mean_value_coordinates.cage_vertices": ("cage_faces",),

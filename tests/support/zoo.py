@@ -389,7 +389,7 @@ def _crossed() -> Soup:
 
 
 LEFT, RIGHT = np.flatnonzero(_left(-2.4)), np.flatnonzero(~_left(2.4))
-NEED_ONE = {"selection in a session": "needs one vertex or more"}
+NEED_ONE = {"selection in a session": "requires at least one vertex"}
 SELECTIONS = [  # (fixed, handle)
     Creature("both ends", lambda: (LEFT, RIGHT)),
     Creature("masks", lambda: (_mask(*LEFT), _mask(*RIGHT))),

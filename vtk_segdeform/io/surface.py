@@ -10,6 +10,7 @@ some.
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_points, plain
 from ..checks import require
-from ..errors import MeshError
+from ..errors import ArgumentError, MeshError
 from ..mesh import Mesh, Soup, Workaround, mesh_of
 from .convert import read_polydata, write_mesh
 from .moving import MovingSurface
@@ -90,12 +91,11 @@ class Surface:
         MeshError
             As `read_mesh`, but only if no mesh can be made of it; the message names the file.
         """
-        surface = cls(read_polydata(path))
+        given = read_polydata(path)
         try:
-            _ = surface.mesh
+            return cls(given)
         except MeshError as fault:
             raise MeshError(f"{path}: {fault}") from None
-        return surface
 
     @classmethod
     def of(cls, polydata: pv.PolyData, soup: Soup) -> Surface:
@@ -103,12 +103,14 @@ class Surface:
 
         MeshError if the numbers of their points differ.
         """
-        surface = cls(polydata)
+        surface = cls.__new__(cls)
+        surface._given = require(polydata, pv.PolyData, "polydata").copy(deep=False)
+        require(soup, Soup, "soup")
         if len(soup.points) != polydata.n_points:
             raise MeshError(
                 f"the mesh of {len(soup.points)} points is not one of {polydata.n_points} points"
             )
-        surface.__dict__["_soup"] = soup  # in place of the cached property
+        surface._soup = soup
         return surface
 
     @property
@@ -145,14 +147,23 @@ class Surface:
 
     def at_points(self, values: ArrayLike) -> Any:
         """Return *values* (n, ...) of the vertices of the mesh at the given points (p, ...)."""
-        return plain(values, "values")[self.vertex_of]
+        return self._of(values, self.mesh.n_vertices, "vertex of the mesh")[self.vertex_of]
 
     def at_vertices(self, values: ArrayLike) -> Any:
         """Return *values* (p, ...) of the given points at the vertices (n, ...).
 
         Of several points that follow a vertex, the first one counts.
         """
-        return self._soup.at_vertices(plain(values, "values"))
+        return self._soup.at_vertices(self._of(values, self._given.n_points, "given point"))
+
+    @staticmethod
+    def _of(values: ArrayLike, count: int, what: str) -> Any:
+        array = plain(values, "values")
+        if array.ndim < 1 or len(array) != count:
+            raise ArgumentError(
+                f"values must have one row for each {what}, {count}; got shape {array.shape}"
+            )
+        return array
 
     def targets_at(self, points: ArrayLike, targets: ArrayLike) -> tuple[IntArray, FloatArray]:
         """Return the vertices (k,) that given points are, and their targets (k, 3).
