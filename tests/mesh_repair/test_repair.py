@@ -159,6 +159,19 @@ def test_an_outward_shell_within_a_body_becomes_a_cavity():
     )
 
 
+def test_a_cavity_in_a_body_with_a_hole_stays_a_cavity():
+    vertices, faces = SPHERE
+    given = together((vertices, faces[1:]), (0.5 * vertices, faces[:, ::-1]))
+    left = repair(*given, largest_hole=2)
+    assert left.steps == ()
+    assert left.report.ok
+    assert repair(
+        given[0],
+        np.where(np.arange(len(given[1]))[:, None] < M - 1, given[1], given[1][:, ::-1]),
+        largest_hole=2,
+    ).report.ok
+
+
 @pytest.mark.parametrize(
     ("shift", "step"),
     [

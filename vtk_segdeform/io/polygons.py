@@ -11,8 +11,10 @@ import pyvista as pv
 
 from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
-from ..mesh import repeats_vertex
+from ..mesh import normals, repeats_vertex
 from ..mesh_repair import triangulate_long_loop
+
+_PLANAR = 1e-6  # height over size
 
 
 def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.PolyData:
@@ -150,24 +152,65 @@ def cut_into_triangles(
     number = np.arange(len(counts))
     if (counts == 3).all():
         return corners.reshape(-1, 3), number
+    faces, polygon = _clipped_ears(points, counts, corners)
+    failed = _failed(points, counts, corners, faces, polygon)
+    if not len(failed):
+        return faces, polygon
+    kept = ~np.isin(polygon, failed)
+    parts, owners = [faces[kept]], [polygon[kept]]
+    starts = np.cumsum(counts) - counts
+    for each in failed:
+        parts.append(_cut_alone(points, corners[starts[each] :][: counts[each]]))
+        owners.append(np.full(len(parts[-1]), each))
+    faces, polygon = np.concatenate(parts), np.concatenate(owners)
+    order = np.argsort(polygon, kind="stable")
+    return faces[order], polygon[order]
+
+
+def _clipped_ears(
+    points: FloatArray, counts: IntArray, corners: IntArray
+) -> tuple[IntArray, IntArray]:
+    """Return what VTK finds; it leaves out some polygons and parts of others."""
     surface = polydata_of(points, counts, corners)
-    surface.cell_data["polygon"] = number
+    surface.cell_data["polygon"] = np.arange(len(counts))
     cut = surface.triangulate()
     faces = np.asarray(cut.regular_faces, dtype=np.int64).reshape(-1, 3)
-    polygon = np.asarray(cut.cell_data["polygon"], dtype=np.int64)
+    return faces, np.asarray(cut.cell_data["polygon"], dtype=np.int64)
+
+
+def _failed(
+    points: FloatArray, counts: IntArray, corners: IntArray, faces: IntArray, polygon: IntArray
+) -> IntArray:
+    """Return the polygons with too few triangles, or planar with one of them upside down, (k,)."""
     starts = np.cumsum(counts) - counts
     following = np.arange(1, len(corners) + 1)
     following[starts + counts - 1] = starts
     repeated = np.add.reduceat(corners == corners[following], starts)
     failed = np.bincount(polygon, minlength=len(counts)) < counts - repeated - 2
-    if not failed.any():
-        return faces, polygon
-    kept = ~failed[polygon]
-    more = [_least_area(points, corners[starts[k] :][: counts[k]]) for k in np.flatnonzero(failed)]
-    faces = np.concatenate([faces[kept], *more])
-    polygon = np.append(polygon[kept], np.repeat(number[failed], [len(each) for each in more]))
-    order = np.argsort(polygon, kind="stable")
-    return faces[order], polygon[order]
+    with np.errstate(invalid="ignore", over="ignore"):
+        spoke = points[corners] - np.repeat(points[corners[starts]], counts, axis=0)
+        up = np.add.reduceat(np.cross(spoke, spoke[following]), starts)
+        cosine = np.einsum("fx,fx->f", normals(points[faces]), up[polygon])
+        square = np.einsum("cx,cx->c", up, up)
+        down = np.unique(polygon[cosine < -1e-9 * square[polygon]])
+        for each in down:
+            spokes = spoke[starts[each] :][: counts[each]]
+            height = np.abs(spokes @ up[each]).max()
+            failed[each] |= height <= _PLANAR * np.sqrt(square[each]) * np.abs(spokes).max()
+    return np.flatnonzero(failed)
+
+
+def _cut_alone(points: FloatArray, polygon: IntArray) -> IntArray:
+    """Return the triangles of a *polygon*, at the size that VTK's tolerances are made for."""
+    corners = points[polygon]
+    one, number = np.array([len(polygon)]), np.arange(len(polygon))
+    if np.isfinite(corners).all():
+        corners = corners - corners[0]
+        corners /= np.abs(corners).max() or 1.0
+        faces, owner = _clipped_ears(corners, one, number)
+        if not len(_failed(corners, one, number, faces, owner)):
+            return polygon[faces]
+    return _least_area(points, polygon)
 
 
 def _least_area(points: FloatArray, polygon: IntArray) -> IntArray:

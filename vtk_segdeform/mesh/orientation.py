@@ -181,6 +181,6 @@ def _lids(
     c = (centre / np.bincount(lid, weight)[:, None])[lid]
     volume = np.einsum("bx,bx->b", a, np.cross(b, c)) / 6.0
     area = np.linalg.norm(np.cross(a - c, b - c), axis=1) / 2.0
-    volumes: FloatArray = np.bincount(owner, weight * volume, n_units)
-    areas: FloatArray = np.bincount(owner, weight * area, n_units)
-    return volumes, areas
+    volumes = np.bincount(owner, weight * volume, n_units)
+    areas = np.bincount(owner, weight * area, n_units)
+    return np.asarray(volumes, np.float64), np.asarray(areas, np.float64)

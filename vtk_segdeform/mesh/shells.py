@@ -40,9 +40,9 @@ def closed_shells(half_edges: HalfEdges) -> BoolArray:
     return closed
 
 
-def misoriented_shells(vertices: FloatArray, faces: IntArray, shells: IntArray) -> BoolArray:
-    """Return which shells, all closed, are inside-out or enclose no volume; see `shell_faults`."""
-    closed = np.ones(int(shells.max(initial=-1)) + 1, dtype=bool)
+def misoriented_shells(vertices: FloatArray, half_edges: HalfEdges) -> BoolArray:
+    """Return which closed shells are inside-out or enclose no volume, (k,) bool."""
+    faces, shells, closed = half_edges.faces, half_edges.shells, closed_shells(half_edges)
     return shell_faults(vertices, faces, shells, closed)[0]
 
 
@@ -83,12 +83,12 @@ def shell_faults(
 def outward_signs(volume: FloatArray, depth: IntArray, closed: BoolArray) -> IntArray:
     """Return the sign that the *volume* (k,) of each shell must have: 1 of bodies, -1 of cavities.
 
-    Cavities that are together as large as the bodies overlap each other; then all *closed* (k,)
-    shells count as bodies.  *depth* (k,) is the number of shells around each.
+    *depth* (k,) is the number of shells around each.  Cavities that are together as large as the
+    bodies overlap each other; if all shells are *closed* (k,), they count as bodies then.
     """
     outward = np.where(depth % 2 == 0, 1, -1)
-    if (outward * np.abs(volume))[closed].sum() <= 0.0:
-        outward[closed] = 1
+    if closed.all() and (outward * np.abs(volume)).sum() <= 0.0:
+        outward[:] = 1
     return outward
 
 

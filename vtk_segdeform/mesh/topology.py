@@ -139,7 +139,8 @@ class HalfEdges:
 
         Neighbours are those across pairs; see `two_sides`.
         """
-        return two_sides(len(self.faces), *(self.pairs.T // 3), self.inconsistent)
+        one, other = self.pairs.T // 3
+        return two_sides(len(self.faces), one, other, self.inconsistent)
 
     @cached_property
     def one_sided(self) -> BoolArray:

@@ -291,17 +291,12 @@ def orient_outward(draft: Draft) -> tuple[Draft, str]:
     half_edges = draft.half_edges
     if len(half_edges.non_manifold) or half_edges.inconsistent.any():
         return draft, ""
-    closed = np.ones(len(draft.faces), dtype=bool)
-    closed[np.isin(half_edges.shells, half_edges.shells[half_edges.boundary // 3])] = False
-    _, shells = np.unique(half_edges.shells[closed], return_inverse=True)
-    wrong = misoriented_shells(draft.vertices, draft.faces[closed], shells)
-    flip = np.zeros(len(draft.faces), dtype=bool)
-    flip[closed] = wrong[shells]
-    flipped = draft.flip(flip)
-    wrong &= ~misoriented_shells(flipped.vertices, flipped.faces[closed], shells)
+    wrong = misoriented_shells(draft.vertices, half_edges)
+    flipped = draft.flip(wrong[half_edges.shells])
+    wrong &= ~misoriented_shells(flipped.vertices, flipped.half_edges)
     if not wrong.any():
         return draft, ""
-    flip[closed] = wrong[shells]
+    flip = wrong[half_edges.shells]
     return draft.flip(flip), f"flip {_n(wrong, 'inside-out component')} ({_n(flip, 'face')})"
 
 

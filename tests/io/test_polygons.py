@@ -1,0 +1,143 @@
+"""Polygons are cut into triangles without overlaps, and none is lost."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import pyvista as pv
+from numpy.testing import assert_allclose, assert_array_equal
+from solids import rotation
+
+from vtk_segdeform.errors import MeshError
+from vtk_segdeform.io.polygons import cut_into_triangles, polydata_of, triangles_of
+
+TURN = rotation([1.0, 2.0, 3.0], 0.7).T
+
+
+def flat(*corners):
+    return np.column_stack([np.array(corners, float), np.zeros(len(corners))])
+
+
+def star(n=5):
+    angle = np.arange(2 * n) * np.pi / n
+    r = np.where(np.arange(2 * n) % 2, 0.35, 1.0)
+    return flat(*zip(r * np.cos(angle), r * np.sin(angle), strict=True))
+
+
+def comb():
+    teeth = [(x + dx, y) for x in range(6) for dx, y in ((0, 3), (0.5, 3), (0.5, 1), (1, 1))]
+    return flat((0, 0), (6, 0), *teeth[::-1][:-1], (0, 3))
+
+
+SHAPES = {
+    "L": flat((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)),
+    "arrowhead": flat((0, 0), (2, 0), (0.5, 0.5), (0, 2)),
+    "star": star(),
+    "fine star": star(60),
+    "comb": comb(),
+    "corner on a side": flat((0, 0), (1, 0), (2, 0), (0, 3)),
+    "frame": flat(
+        (0, 0), (4, 0), (4, 4), (0, 4), (0, 0), (1, 1), (1, 3), (3, 3), (3, 1), (1, 1)
+    ),
+}  # fmt: skip
+
+
+def cut(points, *polygons):
+    counts = np.array([len(polygon) for polygon in polygons])
+    return cut_into_triangles(points, counts, np.concatenate(polygons))
+
+
+def area_vectors(points, triangles):
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    return 0.5 * np.cross(b - a, c - a)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("scale", [1.0, 1e-6, 1e6])
+def test_a_planar_polygon_is_cut_without_overlaps_from_any_first_corner(name, scale):
+    points = scale * SHAPES[name] @ TURN
+    n = len(points)
+    x, y, _ = SHAPES[name].T
+    area = 0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() * scale**2
+    for first in range(0, n, max(1, n // 7)):
+        polygon = np.roll(np.arange(n), -first)
+        for given in (polygon, polygon[::-1]):
+            triangles, owner = cut(points, given)
+            assert len(triangles) == n - 2
+            assert_array_equal(owner, 0)
+            up = area_vectors(points, triangles)
+            assert_allclose(np.linalg.norm(up, axis=1).sum(), area, rtol=1e-9)
+            sign = 1.0 if given is polygon else -1.0
+            assert_allclose(up.sum(axis=0), sign * area * np.array([0, 0, 1.0]) @ TURN, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_triangles_have_the_boundary_of_the_polygon_also_where_it_is_not_planar(name):
+    rng = np.random.default_rng(2)
+    points = SHAPES[name] + rng.normal(scale=0.3, size=SHAPES[name].shape)
+    polygon = np.arange(len(points))
+    triangles, _ = cut(points, polygon)
+    assert len(triangles) == len(points) - 2
+    total = np.zeros((len(points),) * 2, dtype=int)
+    for tail, head in zip(triangles.ravel(), np.roll(triangles, -1, axis=1).ravel(), strict=True):
+        total[tail, head] += 1
+        total[head, tail] -= 1
+    expected = np.zeros_like(total)
+    expected[polygon, np.roll(polygon, -1)] = 1
+    assert_array_equal(total, expected - expected.T)
+
+
+def test_polygons_that_cannot_be_cut_by_ears_lose_nothing():
+    frame = np.array([0, 1, 2, 3, 0, 4, 5, 6, 7, 4])  # around a hole, with a bridge passed twice
+    points = flat((0, 0), (4, 0), (4, 4), (0, 4), (1, 1), (1, 3), (3, 3), (3, 1))
+    triangles, owner = cut(points, [0, 1, 2, 3], frame, [4, 5, 6])
+    up = area_vectors(points, triangles)[:, 2]
+    assert_allclose(np.bincount(owner, up), [16.0, 12.0, -2.0])
+    assert_allclose(np.bincount(owner, np.abs(up)), [16.0, 12.0, 2.0])
+    assert (np.diff(owner) >= 0).all()
+
+
+@pytest.mark.parametrize(
+    ("polygon", "n"),
+    [
+        ([0, 0, 1, 2, 3], 2), ([0, 1, 1, 1, 2, 3, 3], 2), ([0, 0, 0, 0], 0), ([0, 1, 0, 1], 0),
+        ([0, 1, 2, 0, 1, 2], 4), ([0, 4, 5, 1], 2),
+    ],
+)  # fmt: skip
+def test_repeated_and_collinear_corners(polygon, n):
+    points = flat((0, 0), (3, 0), (3, 3), (0, 3), (1, 0), (2, 0))
+    triangles, owner = cut(points, [0, 1, 2, 3], polygon)
+    whole = triangles[[len(set(face)) == 3 for face in triangles.tolist()]]
+    assert set(triangles.ravel()) <= {0, 1, 2, 3, *polygon}
+    assert_allclose(np.linalg.norm(area_vectors(points, whole[:2]), axis=1).sum(), 9.0)
+    assert len(whole) - 2 <= n
+    assert (owner[:2] == 0).all()
+
+
+def test_strips_become_triangles_and_other_cells_none():
+    points = flat((0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1), (9, 9))
+    polydata = pv.PolyData()
+    polydata.points = points
+    polydata.strips = np.array([6, 0, 1, 2, 3, 4, 5, 3, 0, 1, 6])
+    polydata.lines = np.array([2, 0, 6])
+    polydata.verts = np.array([1, 6])
+    triangles = triangles_of(polydata)
+    assert len(triangles) == 5
+    assert_allclose(area_vectors(points, triangles[:4])[:, 2], -0.5)  # all alike
+    polydata.faces = np.array([4, 0, 2, 3, 1])
+    assert len(triangles_of(polydata)) == 7
+
+
+def test_polygons_of_two_corners_are_ignored_and_bad_indices_are_not():
+    polydata = pv.PolyData()
+    polydata.points = flat((0, 0), (1, 0), (0, 1))
+    polydata.faces = np.array([2, 0, 1, 3, 0, 1, 2, 1, 2])
+    assert_array_equal(triangles_of(polydata), [[0, 1, 2]])
+    polydata.faces = np.array([3, 0, 1, 3])
+    with pytest.raises(MeshError, match="faces use vertices 0 to 3, but there are 3"):
+        triangles_of(polydata)
+
+
+def test_no_polygons_have_no_triangles():
+    assert triangles_of(pv.PolyData()).shape == (0, 3)
+    assert len(triangles_of(polydata_of(np.eye(3), np.array([3]), np.array([0, 1, 2])))) == 1

@@ -1,0 +1,139 @@
+"""`Surface`: any PolyData becomes a mesh, and the differences are told with their places."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import pyvista as pv
+from numpy.testing import assert_array_equal
+from solids import icosphere, torus
+
+import vtk_segdeform as sd
+from vtk_segdeform.errors import MeshError
+from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.io.polygons import polydata_of
+from vtk_segdeform.mesh import Kind
+
+
+def surface_of(points, *polygons):
+    counts = np.array([len(polygon) for polygon in polygons])
+    return polydata_of(np.asarray(points, float), counts, np.concatenate(polygons))
+
+
+def triangles(vertices, faces):
+    return pv.PolyData.from_regular_faces(vertices, faces)
+
+
+def texts(surface):
+    return [str(each) for each in surface.workarounds]
+
+
+def test_a_triangle_mesh_is_its_own_mesh():
+    vertices, faces = icosphere(2)
+    surface = sd.Surface(triangles(vertices, faces))
+    assert_array_equal(surface.mesh.vertices, vertices)
+    assert_array_equal(surface.mesh.faces, faces)
+    assert_array_equal(surface.vertex_of, np.arange(len(vertices)))
+    assert surface.workarounds == ()
+
+
+def test_a_cube_with_seams_is_welded_and_each_workaround_says_where():
+    surface = sd.Surface(pv.Cube(clean=False))
+    assert surface.mesh.is_two_manifold
+    assert signed_volume(surface.mesh.vertices, surface.mesh.faces) == pytest.approx(1.0)
+    (welded,) = surface.workarounds
+    assert (welded.kind, welded.count, welded.text) == (
+        Kind.COINCIDENT, 24, "welded 24 seam points",
+    )  # fmt: skip
+    assert_array_equal(welded.points, np.arange(24))
+    assert_array_equal(surface.mesh.vertices[surface.vertex_of], surface.given.points)
+    assert len(surface.vertices_at(np.arange(4))) == 4
+
+
+def test_concave_polygons_become_a_closed_mesh_of_the_right_volume():
+    angle = np.arange(10) * np.pi / 5
+    r = np.where(np.arange(10) % 2, 0.35, 1.0)
+    rim = np.stack([r * np.cos(angle), r * np.sin(angle), 0.0 * angle], axis=1)
+    i = np.arange(10)
+    walls = np.stack([i, (i + 1) % 10, (i + 1) % 10 + 10, i + 10], axis=1)
+    prism = surface_of([*rim, *(rim + [0, 0, 2])], i[::-1], i + 10, *walls)
+    surface = sd.Surface(prism)
+    area = 0.5 * (rim[:, 0] * np.roll(rim[:, 1], -1) - rim[:, 1] * np.roll(rim[:, 0], -1)).sum()
+    assert surface.workarounds == ()
+    assert surface.mesh.is_two_manifold
+    volume = signed_volume(surface.mesh.vertices, surface.mesh.faces)
+    assert volume == pytest.approx(2.0 * area)
+
+
+def test_all_that_differs_is_told():
+    vertices, faces = torus(12, 8)
+    n = len(vertices)
+    left = np.delete(faces, [0, 100], axis=0)
+    turned = left.copy()
+    turned[7] = turned[7, ::-1]
+    fin = [*faces[50, :2], n]
+    points = np.append(vertices, [[9.0, 9.0, 9.0], [8.0, 8.0, 8.0]], axis=0)
+    surface = sd.Surface(surface_of(points, *turned, turned[3], [5, 5, 6], fin))
+    assert texts(surface) == [
+        "flipped 1 face", "ignored 1 duplicate face", "ignored 1 degenerate face",
+        "1 point is in no face", "3 holes", "1 edge with three or more faces",
+    ]  # fmt: skip
+    places = {each.kind: each.points for each in surface.workarounds}
+    assert_array_equal(places[Kind.TURNED_EDGE], np.sort(left[7]))
+    assert_array_equal(places[Kind.DUPLICATE_FACE], np.sort(left[3]))
+    assert_array_equal(places[Kind.UNREFERENCED], [n + 1])
+    assert_array_equal(places[Kind.NON_MANIFOLD_EDGE], np.sort(fin[:2]))
+    assert_array_equal(places[Kind.HOLE], np.unique([*faces[0], *faces[100], *fin]))
+
+
+def test_lines_vertex_cells_and_strips_are_allowed():
+    vertices, faces = icosphere(1)
+    n = len(vertices)
+    polydata = triangles(np.append(vertices, [[0, 0, 3.0], [np.nan, 0, 0]], axis=0), faces[4:])
+    polydata.lines = np.array([2, 0, n])
+    polydata.verts = np.array([1, n, 1, n + 1])
+    polydata.strips = np.concatenate([[3, *face] for face in faces[:4]])
+    surface = sd.Surface(polydata)
+    assert surface.mesh.is_two_manifold
+    assert texts(surface) == ["2 points are in no face"]
+    assert surface.vertex_of[n] == vertices[:, 2].argmax()
+    moved = surface.moved(2.0 * surface.mesh.vertices)
+    assert_array_equal(moved.points[:n], 2.0 * vertices)
+    assert np.isnan(moved.points[n + 1]).any()
+
+
+def test_single_precision_seams_are_welded_exactly():
+    vertices, faces = icosphere(3)
+    split = vertices[faces].reshape(-1, 3).astype(np.float32)
+    given = pv.PolyData.from_regular_faces(split, np.arange(len(split)).reshape(-1, 3))
+    surface = sd.Surface(given)
+    assert surface.mesh.is_two_manifold
+    assert surface.mesh.n_vertices == len(vertices)
+    assert surface.given.points.dtype == np.float32
+
+
+@pytest.mark.parametrize(
+    ("polydata", "message"),
+    [
+        (pv.PolyData(), "it has no faces"),
+        (pv.PolyData(np.eye(3)), "it has no faces"),
+        (surface_of(np.zeros((4, 3)), [0, 1, 2, 3]), "all faces are flat"),
+        (surface_of([[0, 0, 0], [1, 0, 0], [np.nan, 1, 0]], [0, 1, 2]), r"NaN .*\(vertex 2\)"),
+        (surface_of([[0, 0, 0], [1, 0, 0], [0, np.inf, 0], [0, 1, 0]], [0, 1, 2, 3]), "NaN or inf"),
+    ],
+)
+def test_what_cannot_be_deformed_is_refused_at_once(polydata, message):
+    with pytest.raises(MeshError, match=message):
+        sd.Surface(polydata)
+
+
+def test_the_given_surface_is_not_changed():
+    vertices, faces = icosphere(1)
+    given = triangles(vertices, faces[:, ::-1])
+    given.cell_data["part"] = np.arange(len(faces))
+    before = given.copy()
+    surface = sd.Surface(given)
+    assert texts(surface) == [f"flipped {len(faces)} faces"]
+    assert given == before
+    moved = surface.moved(surface.mesh.vertices)
+    assert_array_equal(moved.regular_faces, given.regular_faces)

@@ -1,0 +1,135 @@
+"""The boundary of a mesh and its loops, on any triangles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from solids import CUBE, SOLIDS, icosphere, torus
+
+from vtk_segdeform.mesh import Mesh, mesh_of
+from vtk_segdeform.mesh.topology import boundary_edges, loops_of
+
+
+def edges_of(loops):
+    """Return the directed edges of loops, sorted."""
+    pairs = [(a, b) for loop in loops for a, b in zip(loop, np.roll(loop, -1), strict=True)]
+    return sorted((int(a), int(b)) for a, b in pairs)
+
+
+def soups():
+    """Yield random faces, most of them with non-manifold edges and loops that share vertices."""
+    rng = np.random.default_rng(4)
+    for _ in range(150):
+        n = int(rng.integers(3, 12))
+        faces = rng.integers(0, n, (rng.integers(1, 14), 3))
+        a, b, c = faces.T
+        yield faces[(a != b) & (b != c) & (c != a)], n
+    for vertices, faces in (icosphere(2), torus(12, 8)):
+        for share in (0.1, 0.5, 0.9):
+            yield faces[rng.random(len(faces)) < share], len(vertices)
+
+
+def test_a_closed_mesh_has_no_border():
+    for solid in SOLIDS.values():
+        mesh = Mesh(*solid)
+        assert mesh.is_closed
+        assert mesh.borders == ()
+        assert mesh.boundary.shape == (0, 2)
+
+
+def test_the_boundary_of_a_boundary_is_zero():
+    for faces, n in soups():
+        tail, head = boundary_edges(faces, n).T
+        assert_array_equal(np.bincount(tail, minlength=n), np.bincount(head, minlength=n))
+
+
+def test_the_boundary_is_the_sum_of_the_edges_of_the_faces():
+    for faces, n in soups():
+        total = np.zeros((n, n), dtype=int)
+        for a, b, c in faces:
+            for tail, head in ((a, b), (b, c), (c, a)):
+                total[tail, head] += 1
+                total[head, tail] -= 1
+        tail, head = boundary_edges(faces, n).T
+        found = np.zeros((n, n), dtype=int)
+        np.add.at(found, (tail, head), 1)
+        assert_array_equal(found, np.maximum(total, 0))
+
+
+def test_loops_cover_the_boundary_once_and_pass_no_vertex_twice():
+    for faces, n in soups():
+        boundary = boundary_edges(faces, n)
+        loops = loops_of(boundary)
+        assert edges_of(loops) == sorted(map(tuple, boundary.tolist()))
+        assert all(len(np.unique(loop)) == len(loop) >= 3 for loop in loops)
+
+
+def test_reversing_the_faces_reverses_the_boundary():
+    for faces, n in soups():
+        forth, back = boundary_edges(faces, n), boundary_edges(faces[:, ::-1], n)
+        assert sorted(map(tuple, forth.tolist())) == sorted(map(tuple, back[:, ::-1].tolist()))
+
+
+def cyclic(loops):
+    """Return loops, each begun at its least vertex, in order."""
+    return sorted(tuple(np.roll(loop, -np.argmin(loop)).tolist()) for loop in loops)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_loops_that_share_no_vertex_do_not_depend_on_numbers_or_order(seed):
+    rng = np.random.default_rng(seed)
+    vertices, faces = icosphere(3)
+    centres = rng.choice(len(vertices), 12, replace=False)
+    faces = faces[~np.isin(faces, centres).any(axis=1)]
+    boundary = boundary_edges(faces, len(vertices))
+    if np.bincount(boundary[:, 0]).max() > 1:
+        crossed = boundary[np.bincount(boundary[:, 0])[boundary[:, 0]] > 1, 0]
+        faces = faces[~np.isin(faces, crossed).any(axis=1)]
+        boundary = boundary_edges(faces, len(vertices))
+    assert np.bincount(boundary[:, 0]).max() == 1
+    number = rng.permutation(len(vertices))
+    other = number[rng.permutation(faces)]
+    found = loops_of(boundary_edges(other, len(vertices)))
+    assert cyclic(found) == cyclic([number[loop] for loop in loops_of(boundary)])
+    assert 2 <= len(found) <= 12
+
+
+def test_faces_are_on_the_left_of_a_border():
+    vertices, faces = CUBE
+    top = (vertices[faces][:, :, 2] == 1.0).all(axis=1)
+    used = np.unique(faces[top])
+    mesh = Mesh(vertices[used], np.searchsorted(used, faces[top]))
+    (loop,) = mesh.borders
+    x, y, _ = mesh.vertices[loop].T
+    assert 0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() == pytest.approx(1.0)
+
+
+def test_two_holes_that_touch_are_two_loops():
+    vertices, faces = icosphere(2)
+    at = np.flatnonzero((faces == 2).any(axis=1))
+    other = next(f for f in at if len(np.intersect1d(faces[f], faces[at[0]])) == 1)
+    mesh = Mesh(vertices, np.delete(faces, [at[0], other], axis=0))
+    assert sorted(map(len, mesh.borders)) == [3, 3]
+    assert {tuple(sorted(loop.tolist())) for loop in mesh.borders} == {
+        tuple(sorted(faces[f].tolist())) for f in (at[0], other)
+    }
+
+
+def test_a_fin_has_a_border_and_its_body_has_none():
+    vertices, faces = CUBE
+    a, b, _ = faces[0]
+    vertices = np.append(vertices, [[3.0, 3.0, 3.0]], axis=0)
+    mesh = mesh_of(vertices, np.append(faces, [[a, b, 8]], axis=0)).mesh
+    assert not mesh.is_closed
+    (loop,) = mesh.borders
+    assert sorted(loop.tolist()) == sorted([a, b, 8])
+
+
+def test_the_order_of_loops_is_that_of_their_first_edges():
+    for faces, n in soups():
+        boundary = boundary_edges(faces, n)
+        if len(boundary) and np.bincount(boundary[:, 0]).max() == 1:
+            begin = [int(loop[0]) for loop in loops_of(boundary)]
+            places = [boundary[:, 0].tolist().index(v) for v in begin]
+            assert places == sorted(places)

@@ -1,0 +1,171 @@
+"""Bodies face outward, whatever the given orientation; sheets and fins keep theirs."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from solids import CUBE, icosphere, rotation, torus
+
+from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.mesh import find_faults, mesh_of
+
+SPHERE = icosphere(2)
+TURN = rotation([1.0, 2.0, 3.0], 0.7).T
+
+
+def together(*solids):
+    """Return solids as one, coincident vertices merged."""
+    starts = np.cumsum([0] + [len(v) for v, _ in solids])
+    faces = np.concatenate([f + start for (_, f), start in zip(solids, starts, strict=False)])
+    vertices, number = np.unique(
+        np.concatenate([v for v, _ in solids]), axis=0, return_inverse=True
+    )
+    return vertices, number.reshape(-1)[faces]
+
+
+def flipped(faces, which):
+    return np.where(which[:, None], faces[:, [0, 2, 1]], faces)
+
+
+def box(open_sides=(), n=4):
+    """Return the surface of n^3 cubes, each side of 2 n^2 triangles, without some sides."""
+    grid = np.stack(np.meshgrid(*3 * [np.arange(n + 1)], indexing="ij"), axis=-1).reshape(-1, 3)
+    step = np.array([(n + 1) ** 2, n + 1, 1])
+    faces = []
+    for axis, end in itertools.product(range(3), (0, 1)):
+        if (axis, end) in open_sides:
+            continue
+        one, other = (axis + 1) % 3, (axis + 2) % 3
+        i, j = (k.ravel() for k in np.meshgrid(np.arange(n), np.arange(n)))
+        at = end * n * step[axis] + i * step[one] + j * step[other]
+        quad = np.stack([at, at + step[one], at + step[one] + step[other], at + step[other]], 1)
+        quad = quad if end else quad[:, ::-1]
+        faces += [quad[:, [0, 1, 2]], quad[:, [0, 2, 3]]]
+    faces = np.concatenate(faces)
+    used = np.unique(faces)
+    return grid[used] / n, np.searchsorted(used, faces)
+
+
+@pytest.mark.parametrize("shift", [[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [1.0, 1.0, 1.0]])
+def test_cubes_that_share_an_edge_or_a_corner_both_face_outward(shift):
+    vertices, faces = together(CUBE, (CUBE[0] + shift, CUBE[1]))
+    for one, other in itertools.product([False, True], repeat=2):
+        mesh = mesh_of(vertices @ TURN, flipped(faces, np.repeat([one, other], 12))).mesh
+        assert_array_equal(mesh.faces, faces)
+        assert mesh.is_closed
+
+
+def test_four_wedges_around_an_axis_face_outward():
+    # Every other one of eight wedges around an axis: eight faces meet there.
+    angle = np.arange(8) * np.pi / 4
+    rim = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    vertices = np.concatenate([rim, rim + [0, 0, 1], [[0.0, 0, 0], [0, 0, 1]]])
+    bodies = []
+    for k in (0, 2, 4, 6):
+        a, b, c, d, o, p = k, k + 1, k + 8, k + 9, 16, 17
+        bodies += [[o, b, a], [p, c, d], [a, b, d], [a, d, c]]
+        bodies += [[o, a, c], [o, c, p], [b, o, p], [b, p, d]]
+    faces = np.array(bodies)
+    wedge = signed_volume(vertices, faces[:8])
+    assert wedge > 0.0
+    for turned in itertools.product([False, True], repeat=4):
+        mesh = mesh_of(vertices @ TURN, flipped(faces, np.repeat(turned, 8))).mesh
+        assert mesh.is_closed
+        assert signed_volume(mesh.vertices, mesh.faces) == pytest.approx(4.0 * wedge)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_body_with_a_fin_faces_outward_and_the_fin_keeps_its_orientation(seed):
+    vertices, faces = SPHERE
+    ring = np.flatnonzero(np.abs(vertices[:, 2]) < 1e-9)  # the fin is a disc around the equator
+    ring = ring[np.argsort(np.arctan2(*vertices[ring, :2].T))]
+    n = len(ring)
+    out = len(vertices) + np.arange(n)
+    fin = np.concatenate(
+        [
+            np.stack([ring, np.roll(ring, -1), out], 1),
+            np.stack([np.roll(ring, -1), np.roll(out, -1), out], 1),
+        ]
+    )
+    vertices = np.concatenate([vertices, 1.5 * vertices[ring]])
+    rng = np.random.default_rng(seed)
+    fin = fin[:, :: rng.choice([1, -1])]
+    some = rng.random(len(faces)) < rng.choice([0.0, 0.3, 1.0])
+    given = np.concatenate([flipped(faces, some), fin])
+    mesh = mesh_of(vertices @ TURN, given).mesh
+    assert_array_equal(mesh.faces[: len(faces)], faces)
+    assert_array_equal(mesh.faces[len(faces) :], fin)
+
+
+def test_a_body_with_an_inner_wall_faces_outward():
+    vertices, faces = SPHERE
+    ring = np.flatnonzero(np.abs(vertices[:, 2]) < 1e-9)
+    ring = ring[np.argsort(np.arctan2(*vertices[ring, :2].T))]
+    wall = np.stack([ring, np.roll(ring, -1), np.full(len(ring), len(vertices))], 1)
+    vertices = np.append(vertices, [[0.0, 0.0, 0.1]], axis=0)
+    upper = (vertices[faces][:, :, 2] > -1e-9).all(axis=1)
+    for which in (upper, ~upper, np.zeros_like(upper), np.ones_like(upper)):
+        given = np.concatenate([flipped(faces, which), wall])
+        mesh = mesh_of(vertices @ TURN, given).mesh
+        assert_array_equal(mesh.faces[: len(faces)], faces)
+
+
+@pytest.mark.parametrize("open_sides", [[(2, 1)], [(2, 0), (2, 1)], [(0, 0)], []])
+def test_a_box_without_some_sides_faces_outward(open_sides):
+    vertices, faces = box(open_sides)
+    outward = mesh_of(vertices @ TURN, faces)
+    assert_array_equal(outward.mesh.faces, faces)
+    assert not any("flipped" in each.text for each in outward.workarounds)
+    inward = mesh_of(vertices @ TURN, faces[:, [0, 2, 1]])
+    assert_array_equal(inward.mesh.faces, faces)
+    assert inward.workarounds[0].text == f"flipped {len(faces)} faces"
+
+
+def test_a_sheet_keeps_its_orientation():
+    vertices, faces = box([(0, 0), (0, 1), (1, 0), (1, 1), (2, 0)])
+    bent = vertices + [0.0, 0.0, 0.2] * np.sin(3.0 * vertices[:, :1])
+    for given in (faces, faces[:, [0, 2, 1]]):
+        assert_array_equal(mesh_of(bent @ TURN, given).mesh.faces, given)
+
+
+@pytest.mark.parametrize("open_hull", [False, True])
+@pytest.mark.parametrize("open_cavity", [False, True])
+def test_a_cavity_faces_inward_also_where_the_shells_have_holes(open_hull, open_cavity):
+    hull, inner = SPHERE, torus(12, 8)
+    size = np.abs(inner[0]).max()
+    inner = 0.4 * inner[0] / size, inner[1][:, [0, 2, 1]]
+    hull = hull[0], hull[1][5:] if open_hull else hull[1]
+    inner = inner[0], inner[1][1:] if open_cavity else inner[1]
+    vertices, faces = together(hull, inner)
+    assert find_faults(vertices, faces).ok
+    m = len(hull[1])
+    for one, other in itertools.product([False, True], repeat=2):
+        turned = np.arange(len(faces)) < m
+        given = flipped(faces, np.where(turned, one, other))
+        assert_array_equal(mesh_of(vertices @ TURN, given).mesh.faces, faces)
+
+
+def test_cavities_that_overlap_each_other_are_bodies():
+    vertices, faces = SPHERE
+    shells = [(vertices, faces)] + [(0.95 * vertices + [0.001 * k, 0, 0], faces) for k in (0, 1)]
+    mesh = mesh_of(*together(*shells)).mesh
+    assert signed_volume(mesh.vertices, mesh.faces) > signed_volume(*SPHERE)
+
+
+def test_sheets_that_meet_along_a_line_agree_where_they_continue_each_other():
+    # A floor in two halves and a wall on it: the halves agree, whatever their given orientation.
+    x, y = (k.ravel() for k in np.meshgrid(np.arange(5.0), np.arange(5.0)))
+    i = (np.arange(4)[:, None] * 5 + np.arange(4)).ravel()
+    plane = np.concatenate([np.stack([i, i + 1, i + 5], 1), np.stack([i + 1, i + 6, i + 5], 1)])
+    floor = np.stack([x, y, 0.0 * x], axis=1)
+    wall = np.stack([2.0 + 0.0 * x, y, x], axis=1)
+    vertices, faces = together((floor, plane), (wall, plane))
+    left = (vertices[faces][:, :, 0] <= 2.0).all(axis=1) & (np.arange(len(faces)) < 32)
+    for which in (left, ~left, np.zeros_like(left)):
+        mesh = mesh_of(vertices @ TURN, flipped(faces, which)).mesh
+        corners = (mesh.vertices @ TURN.T)[mesh.faces[:32]]
+        up = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
+        assert (up > 0.0).all() or (up < 0.0).all()

@@ -1,0 +1,253 @@
+"""`mesh_of`: any triangles become a mesh, and every given point follows a vertex of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from solids import CUBE, SOLIDS, icosphere, torus, two_components
+
+from vtk_segdeform.errors import MeshError
+from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.mesh import Kind, find_faults, mesh_of
+
+SPHERE = icosphere(2)
+BODIES = [*SOLIDS.values(), SPHERE, torus(12, 8), two_components()]
+BODIES = [body for body in BODIES if len(body[1]) < 400]
+
+
+def soup(vertices, faces):
+    """Return the triangles with three points each, as STL has them."""
+    return vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
+
+
+def together(*solids):
+    """Return solids as one, coincident vertices merged."""
+    starts = np.cumsum([0] + [len(v) for v, _ in solids])
+    faces = np.concatenate([f + start for (_, f), start in zip(solids, starts, strict=False)])
+    vertices, number = np.unique(
+        np.concatenate([v for v, _ in solids]), axis=0, return_inverse=True
+    )
+    return vertices, number.reshape(-1)[faces]
+
+
+def checked(vertices, faces):
+    """Return the mesh of triangles, after checks that hold for any."""
+    vertices, faces = np.asarray(vertices, float), np.asarray(faces)
+    before = vertices.copy(), faces.copy()
+    found = mesh_of(vertices, faces)
+    mesh = found.mesh
+    assert_array_equal(found.moved(mesh.vertices), vertices)  # bit for bit
+    in_face = np.setdiff1d(np.arange(len(vertices)), found.loose)
+    assert_array_equal(mesh.vertices[found.vertex_of[in_face]], vertices[in_face])
+    given = {
+        tuple(sorted(found.vertex_of[face].tolist()))
+        for face in faces
+        if not np.isin(face, found.loose).any()
+    }
+    given = {face for face in given if len(set(face)) == 3}
+    assert given == {tuple(sorted(face)) for face in mesh.faces.tolist()}
+    report = find_faults(mesh.vertices, mesh.faces)
+    assert report.ok
+    counts = {each.kind: each.count for each in found.workarounds}
+    for kind in (Kind.HOLE, Kind.NON_MANIFOLD_EDGE, Kind.ONE_SIDED):
+        assert counts.get(kind, 0) == report.count(kind)
+    again = mesh_of(mesh.vertices, mesh.faces)
+    assert_array_equal(again.mesh.faces, mesh.faces)
+    assert_array_equal(again.mesh.vertices, mesh.vertices)
+    assert_array_equal(vertices, before[0])
+    assert_array_equal(faces, before[1])
+    for each in found.workarounds:
+        assert str(each) == each.text
+        assert each.text.startswith((str(each.count), "welded", "flipped", "ignored"))
+        assert 0 < len(each.points) == len(np.unique(each.points)) <= len(vertices)
+    return found
+
+
+def texts(found):
+    return [str(each) for each in found.workarounds]
+
+
+@pytest.mark.parametrize("body", BODIES, ids=len)
+def test_a_mesh_remains_the_same_bit_for_bit(body):
+    found = checked(*body)
+    assert_array_equal(found.mesh.vertices, body[0])
+    assert_array_equal(found.mesh.faces, body[1])
+    assert_array_equal(found.vertex_of, np.arange(len(body[0])))
+    assert found.workarounds == ()
+
+
+def test_an_oriented_sheet_remains_the_same():
+    vertices, faces = SPHERE
+    cap = faces[(vertices[faces][:, :, 2] > 0.3).all(axis=1)]
+    used = np.unique(cap)
+    for some in (cap, cap[:, ::-1]):  # it has no outside
+        some = np.searchsorted(used, some)
+        found = checked(vertices[used], some)
+        assert_array_equal(found.mesh.faces, some)
+        assert texts(found) == ["1 hole"]
+
+
+@pytest.mark.parametrize("body", BODIES, ids=len)
+def test_a_triangle_soup_is_welded_to_the_body(body):
+    found = checked(*soup(*body))
+    assert found.mesh.n_vertices == len(np.unique(body[0], axis=0)) == len(body[0])
+    assert found.mesh.is_two_manifold
+    assert_array_equal(found.mesh.vertices[found.mesh.faces], body[0][body[1]])
+    assert texts(found) == [f"welded {3 * len(body[1])} seam points"]
+
+
+def test_only_border_points_at_exactly_the_same_position_are_welded():
+    vertices, faces = soup(*SPHERE)
+    moved = vertices.copy()
+    moved[7] = np.nextafter(moved[7], 9.0)
+    found = checked(moved, faces)
+    assert found.mesh.n_vertices == len(SPHERE[0]) + 1
+    zero = np.where(np.arange(len(vertices))[:, None] % 2, vertices, np.negative(vertices) * -1.0)
+    assert checked(zero, faces).mesh.is_closed  # -0.0 is 0.0
+
+
+def test_coincident_vertices_of_closed_bodies_are_not_welded():
+    vertices, faces = CUBE
+    touching = np.concatenate([vertices, vertices + [1.0, 0.0, 0.0]])
+    found = checked(touching, np.concatenate([faces, faces + 8]))
+    assert_array_equal(found.mesh.vertices, touching)
+    assert found.workarounds == ()
+
+
+def test_a_sheet_given_twice_becomes_one_sheet():
+    vertices, faces = SPHERE
+    cap = faces[(vertices[faces][:, :, 2] > 0.3).all(axis=1)]
+    used = np.unique(cap)
+    sheet = vertices[used], np.searchsorted(used, cap)
+    n, m = len(used), len(cap)
+    shared = checked(sheet[0], np.concatenate([sheet[1], sheet[1][:, ::-1]]))
+    assert texts(shared) == [f"ignored {m} duplicate faces", "1 hole"]
+    doubled = (
+        np.concatenate([sheet[0], sheet[0]]),
+        np.concatenate([sheet[1], sheet[1][:, ::-1] + n]),
+    )
+    apart = checked(*doubled)
+    assert texts(apart) == [
+        f"welded {2 * n} seam points", f"ignored {m} duplicate faces", "1 hole",
+    ]  # fmt: skip
+    for found in (shared, apart, checked(*soup(*doubled))):
+        assert found.mesh.n_vertices == n
+        assert_array_equal(found.mesh.vertices[found.mesh.faces], sheet[0][sheet[1]])
+
+
+def test_of_a_wall_between_two_bodies_one_side_is_kept():
+    vertices, faces = CUBE
+    found = checked(*together(CUBE, (vertices + [1.0, 0.0, 0.0], faces)))
+    assert texts(found) == ["ignored 2 duplicate faces", "4 edges with three or more faces"]
+    outer = (found.mesh.vertices[found.mesh.faces][:, :, 0] != 1.0).any(axis=1)
+    assert signed_volume(found.mesh.vertices, found.mesh.faces[outer]) == pytest.approx(2.0)
+
+
+def test_degenerate_faces_and_points_in_no_face_are_ignored():
+    vertices, faces = SPHERE
+    more = np.append(vertices, [[9.0, 9.0, 9.0], [np.nan, np.inf, 0.0], [0, 0, 1e90]], axis=0)
+    found = checked(more, np.concatenate([[[0, 0, 1]], faces, faces[:3], [[67, 67, 68]]]))
+    assert texts(found) == [
+        "ignored 3 duplicate faces", "ignored 2 degenerate faces", "3 points are in no face",
+    ]  # fmt: skip
+    assert_array_equal(found.mesh.faces, faces)
+    nearest = np.linalg.norm(vertices - 9.0, axis=1).argmin()
+    assert found.vertex_of[66] == nearest
+    moved = found.moved(found.mesh.vertices + [1.0, 0.0, 0.0])
+    assert_array_equal(moved[:66], vertices + [1.0, 0.0, 0.0])
+    assert_array_equal(moved[66:], more[66:] + [1.0, 0.0, 0.0])
+
+
+def test_faces_without_area_hold_a_mesh_together():
+    vertices = np.array([[0.0, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 0], [1, -1, 0]])
+    found = checked(vertices, [[0, 1, 2], [0, 3, 1], [0, 4, 3], [3, 4, 1]])
+    assert found.mesh.n_faces == 4
+    assert set(found.mesh.components) == {0}
+
+
+def test_the_minority_of_faces_is_flipped():
+    vertices, faces = SPHERE
+    some = np.random.default_rng(1).random(len(faces)) < 0.3
+    found = checked(vertices, np.where(some[:, None], faces[:, [0, 2, 1]], faces))
+    assert_array_equal(found.mesh.faces, faces)
+    assert texts(found) == [f"flipped {some.sum()} faces"]
+    assert_array_equal(found.workarounds[0].points, np.unique(faces[some]))
+    found = checked(vertices, faces[:, [0, 2, 1]])
+    assert_array_equal(found.mesh.faces, faces)
+
+
+def test_a_moebius_strip_is_left_as_it_is():
+    k = np.arange(12)
+    a, t = 2 * np.pi * k / 12, np.pi * k / 12
+    r = np.stack([1 - 0.3 * np.cos(t), 1 + 0.3 * np.cos(t)], axis=1)
+    z = np.stack([-0.3 * np.sin(t), 0.3 * np.sin(t)], axis=1)
+    vertices = np.stack([r * np.cos(a)[:, None], r * np.sin(a)[:, None], z], axis=-1).reshape(-1, 3)
+    here, there = 2 * k, 2 * (k + 1)
+    one, two = np.where(k < 11, there, 1), np.where(k < 11, there + 1, 0)
+    faces = np.concatenate([np.stack([here, here + 1, one], 1), np.stack([here + 1, two, one], 1)])
+    found = checked(vertices, faces)
+    assert_array_equal(found.mesh.faces, faces)
+    assert texts(found) == ["1 hole", "1 one-sided component"]
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "message"),
+    [
+        ([], [], "it has no faces"),
+        (np.eye(3), [], "it has no faces"),
+        (CUBE[0], CUBE[1] + 1, "faces? with a vertex index out of range"),
+        (np.where(CUBE[0] == CUBE[0][3], np.nan, CUBE[0]), CUBE[1], "NaN or infinite coordinates"),
+        (CUBE[0] * 1e80, CUBE[1], "too far from the origin"),
+        (CUBE[0] * 1e-80, CUBE[1], "too small to compute volumes"),
+        (CUBE[0], [[0, 0, 1], [2, 3, 3]], "all faces are flat"),
+        (CUBE[0] * [1.0, 0.0, 0.0], CUBE[1], "all faces are flat"),
+    ],
+)
+def test_the_few_refusals_are_named_and_give_advice(vertices, faces, message):
+    with pytest.raises(MeshError, match=f"this surface cannot be deformed: .*{message}.*; "):
+        mesh_of(vertices, faces)
+
+
+def hostile(rng):
+    """Return random triangles, with every damage that occurs in files."""
+    if rng.random() < 0.25:
+        n = rng.integers(3, 12)
+        vertices = rng.integers(0, 3, (n, 3)) if rng.random() < 0.5 else rng.normal(size=(n, 3))
+        return vertices.astype(float), rng.integers(0, n, (rng.integers(1, 30), 3))
+    parts = []
+    for _ in range(rng.integers(1, 4)):
+        vertices, faces = BODIES[rng.integers(len(BODIES))]
+        vertices = vertices * rng.choice([1.0, 0.5, 2.0]) + rng.choice([0.0, 0.0, 1.0, 3.0], 3)
+        parts.append((vertices, faces[:, :: rng.choice([1, -1])]))
+    starts = np.cumsum([0] + [len(v) for v, _ in parts])
+    vertices = np.concatenate([v for v, _ in parts])
+    faces = np.concatenate([f + start for (_, f), start in zip(parts, starts, strict=False)])
+    if rng.random() < 0.3:
+        vertices = np.round(2.0 * vertices) / 2.0
+    faces = faces[rng.random(len(faces)) >= rng.choice([0.0, 0.02, 0.2, 0.8])]
+    turned = rng.random(len(faces)) < rng.choice([0.0, 0.01, 0.3, 0.9])
+    faces = np.where(turned[:, None], faces[:, ::-1], faces)
+    faces = np.append(faces, rng.integers(0, len(vertices), (rng.integers(0, 4), 3)), axis=0)
+    again = faces[rng.random(len(faces)) < rng.choice([0.0, 0.1, 1.0])]
+    faces = np.concatenate([faces, again[:, :: rng.choice([1, -1])]])
+    merged = np.arange(len(vertices))
+    merged[rng.integers(0, len(vertices), 2)] = rng.integers(0, len(vertices), 2)
+    faces = merged[faces] if rng.random() < 0.3 else faces
+    if rng.random() < 0.4:
+        vertices, faces = soup(vertices, faces)
+    elif rng.random() < 0.3:
+        vertices, faces = together((vertices, faces))
+    return vertices, rng.permutation(faces)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_any_triangles_with_a_face_that_is_not_flat_become_a_mesh(seed):
+    rng = np.random.default_rng(seed)
+    for _ in range(40):
+        vertices, faces = hostile(rng)
+        corners = vertices[faces]
+        sides = corners[:, [1, 2, 0]] - corners
+        areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+        if (areas > 1e-9).any():
+            checked(vertices, faces)
