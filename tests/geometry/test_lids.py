@@ -221,9 +221,9 @@ def _two_away(mesh: Mesh, vertex: int) -> list[int]:
 @pytest.mark.parametrize(
     ("mesh", "option", "says"),
     [
-        (BALL, None, "Closed surface: volume preserved"),
-        (open_box(), None, "1 hole: volume preserved under its lid"),
-        (tube(), None, "2 holes: volume preserved under lids"),
+        (BALL, None, "Closed surface: volume kept"),
+        (open_box(), None, "1 hole: volume kept under a lid"),
+        (tube(), None, "2 holes: volume kept under lids"),
         (tube(), False, "Open surface, lids off: no volume to preserve"),
         (SHEETS["plane"], None, "Open sheet: no volume to preserve"),
         (SHEETS["plane"], True, "No enclosed volume: nothing to preserve"),
@@ -235,12 +235,12 @@ def _two_away(mesh: Mesh, vertex: int) -> list[int]:
         (
             together(tube(), SHEETS["flag"]),
             None,
-            "2 holes: volume preserved under lids; 1 open sheet has no volume",
+            "2 holes: volume kept under lids; 1 open sheet has no volume",
         ),
         (
             together(BALL, SHEETS["plane"], SHEETS["flag"]),
             None,
-            "Closed surface: volume preserved; 2 open sheets have no volume",
+            "Closed surface: volume kept; 2 open sheets have no volume",
         ),
     ],
 )

@@ -184,7 +184,7 @@ def test_a_session_keeps_the_volume_under_lids_and_its_option(tmp_path):
     session = session_of(BODIES["bottle"]())
     dragged(session)
     assert session.has_volume
-    assert session.volume_summary == "2 holes: volume preserved under lids"
+    assert session.volume_summary == "2 holes: volume kept under lids"
     assert abs(session.volume_change) < EXACT
     pose = session.vertices
 

@@ -35,6 +35,7 @@ outside segmentation using generalized winding numbers", SIGGRAPH 2013.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy import sparse
@@ -51,6 +52,7 @@ _SEEN = 10  # points y for each of them
 _NEAREST = 0.3  # distances of neighbouring points y, below which |y - x| is replaced by this
 _NO_VOLUME = 1e-11  # of the area to the power 3/2
 _NOTHING = "no volume to preserve"
+_known: WeakKeyDictionary[Mesh, dict[bool | None, Lids]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,10 +107,10 @@ class Lids:
             if self.option is False:
                 return "Open surface, lids off: no volume to preserve"
             return f"{_counted(many, 'open sheet') if many > 1 else 'Open sheet'}: {_NOTHING}"
-        done = "preserved" if preserved else "measured"
+        done = "kept" if preserved else "measured"
         parts = [f"Closed surface: volume {done}"]
         if holes:
-            lids = "its lid" if holes == 1 else "lids"
+            lids = "a lid" if holes == 1 else "lids"
             parts = [f"{_counted(holes, 'hole')}: volume {done} under {lids}"]
         without = int((~self.encloses).sum())
         if without:
@@ -128,6 +130,8 @@ class Lids:
 def lids_of(mesh: Mesh, lids: bool | None = None) -> Lids:
     """Return the lids of *mesh*, and which of its components enclose a volume.
 
+    They are computed once for each mesh and option.
+
     Parameters
     ----------
     mesh : Mesh
@@ -146,6 +150,13 @@ def lids_of(mesh: Mesh, lids: bool | None = None) -> Lids:
     >>> lids_of(Mesh(corners[:3], [[0, 1, 2]])).encloses
     array([False])
     """
+    known = _known.setdefault(mesh, {})
+    if lids not in known:
+        known[lids] = _lids_of(mesh, lids)
+    return known[lids]
+
+
+def _lids_of(mesh: Mesh, wanted: bool | None) -> Lids:
     n, k = mesh.n_vertices, len(mesh.borders)
     sizes = np.array([len(loop) for loop in mesh.borders], dtype=np.int64)
     tail = np.concatenate([np.empty(0, np.int64), *mesh.borders])
@@ -156,8 +167,8 @@ def lids_of(mesh: Mesh, lids: bool | None = None) -> Lids:
     extension = sparse.csr_array(sparse.vstack([sparse.eye_array(n), means]))
     component = mesh.components[[each[0] for each in mesh.borders]].astype(np.int64)
     every = np.ones(int(mesh.components.max()) + 1, dtype=bool)
-    found = Lids(faces, loop, extension, component, every, lids)
-    return replace(found, encloses=_enclosing(mesh, found, lids))
+    found = Lids(faces, loop, extension, component, every, wanted)
+    return replace(found, encloses=_enclosing(mesh, found, wanted))
 
 
 def volume_summary(mesh: Mesh, lids: bool | None = None) -> str:
@@ -174,7 +185,7 @@ def volume_summary(mesh: Mesh, lids: bool | None = None) -> str:
     --------
     >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
     >>> volume_summary(Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]]))
-    '1 hole: volume preserved under its lid'
+    '1 hole: volume kept under a lid'
     >>> volume_summary(Mesh(corners[:3], [[0, 1, 2]]))
     'Open sheet: no volume to preserve'
     """

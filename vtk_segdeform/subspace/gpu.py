@@ -107,7 +107,8 @@ class GPUSurface:
             in_lid = (faces >= len(rest_vertices)).any(axis=1)
             ends, lids = np.unique(faces[in_lid], return_inverse=True)
             border = np.unique(extension[ends].indices)
-            self._lids = lids.reshape(-1, 3), extension[ends][:, border], border
+            rows = sparse.csr_array(extension[ends][:, border])
+            self._lids = np.asarray(lids.reshape(-1, 3), np.int64), rows, border.astype(np.int64)
             faces = faces[~in_lid]
         self._arrays, self._host_faces, self._columns = arrays, faces, subspace.columns
         with _faults_named():

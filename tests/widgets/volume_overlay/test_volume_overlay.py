@@ -418,7 +418,7 @@ def test_an_open_body_has_a_line_about_its_lids():
     overlay = overlay_of(open_box())
     overlay.show()
     first, whole, local, *regions = lines_of(overlay)
-    assert (first, whole) == ("1 hole: volume preserved under its lid", "Volume: 0 %")
+    assert (first, whole) == ("1 hole: volume kept under a lid", "Volume: 0 %")
     assert local.startswith("Local: -")
     assert [line.split(":")[0] for line in regions[:2]] == ["region 1", "region 2"]
     overlay.session.change_options(lids=False)
