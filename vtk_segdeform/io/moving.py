@@ -91,9 +91,9 @@ class MovingSurface:
 
 
 def _vectors(attributes: Any, names: tuple[str, ...], active: str | None) -> dict[str, Any]:
-    found = {}
-    for name in dict.fromkeys((*names, active)):
-        values = attributes[name] if name in attributes.keys() else None  # noqa: SIM118
+    found: dict[str, Any] = {}
+    for name in dict.fromkeys((*names, active or names[0])):
+        values = attributes.get(name)
         if values is not None and values.shape[1:] == (3,) and values.dtype.kind == "f":
             found[name] = np.array(values)
     return found
@@ -101,10 +101,9 @@ def _vectors(attributes: Any, names: tuple[str, ...], active: str | None) -> dic
 
 def _tangents_of(given: pv.PolyData) -> dict[str, Any]:
     active = given.GetPointData().GetTangents()
-    names = dict.fromkeys((*_TANGENTS, None if active is None else active.GetName()))
-    found = {}
-    for name in names:
-        values = given.point_data.get(name) if name else None
+    found: dict[str, Any] = {}
+    for name in dict.fromkeys((*_TANGENTS, *([] if active is None else [str(active.GetName())]))):
+        values = given.point_data.get(name)
         if values is not None and values.shape[1:] in ((3,), (4,)) and values.dtype.kind == "f":
             found[name] = np.array(values)
     return found

@@ -128,8 +128,8 @@ def _owners(head: dict[str, Any]) -> dict[int, set[Any]]:
         if isinstance(value, dict):
             for key in ("input", "output", "inverseBindMatrices"):
                 _use(owners, value.get(key), "other")
-            attributes = value.get("attributes")
-            for index in attributes.values() if isinstance(attributes, dict) else ():
+            listed = value.get("attributes")
+            for index in listed.values() if isinstance(listed, dict) else ():
                 _use(owners, index, "other")
             pending += value.values()
         elif isinstance(value, list):
