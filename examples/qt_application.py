@@ -37,7 +37,7 @@ class Window(QtWidgets.QMainWindow):
 application = QtWidgets.QApplication.instance() or QtWidgets.QApplication(sys.argv)
 files = [word for word in sys.argv[1:] if not word.startswith("-")]
 picture = files[-1] if "--picture" in sys.argv else None
-window = Window(sd.read_mesh(files[0]) if files and not picture else sd.models.cactus(1500))
+window = Window(sd.Surface.read(files[0]) if files and not picture else sd.models.cactus(1500))
 window.resize(1200, 800)
 window.show()
 if picture is not None:

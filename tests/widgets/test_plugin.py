@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
+from given_surfaces import GIVEN, holed, require_only_moved, tube
 from hands import Hand, picture
 from numpy.testing import assert_array_equal
 from scenes import sausage
@@ -78,6 +79,44 @@ def test_a_surface_is_deformed_into_a_copy_with_its_arrays_and_its_volume(bar):
     faces = bar.regular_faces
     volumes = [signed_volume(np.asarray(s.points, float), faces) for s in (bar, bent)]
     assert volumes[1] == pytest.approx(volumes[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["tube", "soup"])
+def test_any_surface_is_deformed_by_its_own_points(name):
+    given = GIVEN[name]()
+    height = given.points[:, 2]
+    fixed, handle = height < 0.3, np.flatnonzero(height > 2.7)[::-1]
+    targets = given.points[handle] + np.array([0.2, 0.0, 0.0])
+    bent = given.segdeform.deform(fixed, handle, targets, n_regions=1, n_cage_vertices=40)
+    require_only_moved(given, bent)
+    assert np.abs(bent.points[handle] - targets).max() < 5e-3
+    assert np.abs(bent.points[fixed] - given.points[fixed]).max() < 5e-3
+    regions = given.segdeform.regions(2)
+    assert regions["region_weights"].shape == (given.n_points, 2)
+    assert_array_equal(regions["region_weights"].argmax(axis=1), regions["region"])
+
+
+def test_points_at_a_seam_with_different_targets_go_to_the_mean():
+    given = tube()
+    seam, other = 24 * 17, 24 * 17 + 16  # one place
+    assert_array_equal(given.points[seam], given.points[other])
+    targets = given.points[[seam, other]] + [[0.2, 0.0, 0.1], [0.1, 0.1, 0.0]]
+    vertices, ends = sd.Surface(given).targets_at([seam, other], targets)
+    assert len(vertices) == 1
+    assert np.allclose(ends[0] - given.points[seam], [0.15, 0.05, 0.05])
+
+
+@pytest.mark.parametrize("kind", ["polydata", "surface", "mesh", "session"])
+def test_the_editor_takes_any_surface(kind, plotter):
+    given = holed()
+    surface = sd.Surface(given)
+    what = {
+        "polydata": given, "surface": surface, "mesh": surface.mesh, "session": sd.Session(surface)
+    }[kind]  # fmt: skip
+    editor = plotter.segdeform.edit(what)
+    assert_array_equal(editor.session.mesh.vertices, surface.mesh.vertices)
+    if kind != "mesh":
+        require_only_moved(given, editor.session.deformed)
 
 
 def test_a_handle_that_misses_its_target_is_logged(bar, caplog):

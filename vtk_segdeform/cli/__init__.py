@@ -3,8 +3,9 @@
 The files, in reading order:
 
     main            options, help and exit codes
-    commands        ``segdeform deform``, ``edit``, ``check``, ``regions`` and ``cages``
-    selection       vertex selections such as ``z>80%``
+    commands        ``segdeform deform``, ``edit``, ``regions`` and ``cages``
+    checking        ``segdeform check``
+    selection       point selections such as ``z>80%``
     motion          motions such as ``--rotate z,60``
     outputs         printed lines and written surfaces
     demo            ``segdeform demo``

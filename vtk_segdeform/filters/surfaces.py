@@ -69,7 +69,7 @@ def move(polydata: Any, points: FloatArray) -> None:
         normals = carried.normals(points).astype(vtk_to_numpy(given).dtype)
         fresh = numpy_to_vtk(normals, deep=True)
         fresh.SetName(given.GetName())
-        data.SetNormals(fresh)
+        data.AddArray(fresh)  # at the same place: it remains the active array
     moved = vtkPoints()
     moved.SetData(numpy_to_vtk(np.ascontiguousarray(points), deep=True))
     polydata.SetPoints(moved)

@@ -12,9 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from given_surfaces import holed, require_only_moved, tube
 from numpy.testing import assert_array_equal
 
-from vtk_segdeform import Session, models
+import vtk_segdeform as sd
+from vtk_segdeform import Session, Surface, models
 from vtk_segdeform.errors import SessionError
 from vtk_segdeform.files import lock
 from vtk_segdeform.files.lock import hold
@@ -57,6 +59,48 @@ def test_the_autosave_of_a_crashed_program_is_found_unchanged(folder):
     session = slot.read(no_progress)
     assert_array_equal(session.mesh.vertices, BALL.vertices)
     assert_array_equal(session.handles["handle 1"], work().handles["handle 1"])
+
+
+def test_the_given_surface_is_autosaved_once_and_recovered(folder, monkeypatch):
+    session = Session(Surface(tube()))
+    session.add_handle([0, 1, 2])
+    slot = Autosaves(folder).new(ABOUT)
+    slot.write(session)
+    given = slot.path.with_name("surface.segdeform")
+    before = given.stat()
+    session.add_handle([5, 6], "other")
+    slot.write(session)
+    assert given.stat() == before  # neither replaced nor written
+    assert sd.load_session(slot.path).surface is None
+    slot.release()
+    (slot,) = Autosaves(folder).abandoned()
+    found = slot.read(no_progress)
+    require_only_moved(tube(), found.deformed)
+    assert list(found.handles) == ["handle 1", "other"]
+    found.set_fixed([8])
+    before = given.stat()
+    slot.write(found)
+    assert given.stat() == before
+    slot.remove()
+    assert list(folder.iterdir()) == []
+
+
+def test_work_is_recovered_over_the_mesh_if_the_file_of_its_surface_is_damaged(folder):
+    for spoil in (
+        lambda path: path.write_bytes(path.read_bytes()[:-9]),
+        lambda path: path.unlink(),
+        lambda path: sd.save_session(path, Session(Surface(holed()))),
+    ):
+        session = Session(Surface(tube()))
+        session.add_handle([0, 1, 2])
+        place = crash(folder, session)
+        spoil(place / "surface.segdeform")
+        (slot,) = Autosaves(folder).abandoned()
+        found = slot.read(no_progress)
+        assert found.surface is None
+        assert_array_equal(found.mesh.vertices, session.mesh.vertices)
+        assert list(found.handles) == ["handle 1"]
+        slot.remove()
 
 
 def test_the_autosave_of_a_running_program_is_not_offered(folder):

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bad_values import BAD
+from given_surfaces import GIVEN, require_only_moved
 from hands import plain_view
 from numpy.testing import assert_array_equal
 from PIL import Image
@@ -28,7 +29,7 @@ from qt_hands import (
 from qtpy import QtGui
 
 import pyvistaqt  # isort: skip
-from vtk_segdeform import Session, models
+from vtk_segdeform import Regions, Session, models
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.io.convert import read_polydata, to_polydata
 from vtk_segdeform.io.surface import read_mesh
@@ -554,7 +555,7 @@ def test_a_surface_is_written_back_with_all_its_arrays(make, tmp_path, monkeypat
         assert_array_equal(read.active_texture_coordinates, now.point_data["uv"])
     assert seen.errors == []
 
-    # The same from a file; a session file stores its mesh only.
+    # The same from a file, and from a session file.
     answer(monkeypatch, tmp_path / "a.vtp")
     seen.editor.save(tmp_path / "a.segdeform")
     seen.click(seen.panel.toolbar.open)
@@ -565,8 +566,30 @@ def test_a_surface_is_written_back_with_all_its_arrays(make, tmp_path, monkeypat
     seen.editor.load(tmp_path / "b.segdeform")
     assert set(seen.widget.deformed_polydata().point_data.keys()) == everything
     seen.editor.load(tmp_path / "a.segdeform")  # with another mesh
-    assert seen.widget.deformed_polydata().point_data.keys() == []
+    assert set(seen.widget.deformed_polydata().point_data.keys()) == everything
     assert_array_equal(seen.widget.deformed_polydata().points, seen.session.vertices)
+
+
+@pytest.mark.parametrize("name", ["holed", "soup"])
+def test_any_surface_is_edited_and_given_back_only_moved(make, name, tmp_path, monkeypatch):
+    given = GIVEN[name]()
+    seen = make(given)
+    session = seen.session
+    session.change_options(n_cage_vertices=40)
+    session.set_regions(Regions.single(session.mesh))
+    session.fit_cages()
+    session.set_fixed(session.mesh.vertices[:, 2] < 0.3)
+    session.add_handle(session.mesh.vertices[:, 2] > 2.7)
+    up = np.eye(4)
+    up[0, 3] = 0.2
+    session.move_handle("handle 1", up)
+    now = seen.widget.deformed_polydata()
+    require_only_moved(given, now)
+    assert np.abs(now.points - given.points).max() > 0.15
+    answer(monkeypatch, tmp_path / "a.vtp")
+    seen.panel.toolbar.ask_and_export()
+    require_only_moved(now, read_polydata(tmp_path / "a.vtp"))
+    assert seen.errors == []
 
 
 # Hosts.

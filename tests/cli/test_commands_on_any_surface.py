@@ -15,6 +15,7 @@ from vtk_segdeform.io import Surface, read_polydata, write_mesh
 from vtk_segdeform.models import sphere
 
 QUICK = ["--regions", "1", "--cage-vertices", "40"]
+OF_PARTS = ["--regions", "3", "--cage-vertices", "90"]
 BEND = ["--fixed", "z<15%", "--handle", "z>85%", "--translate", "0.4,0,0", *QUICK]
 
 
@@ -29,15 +30,8 @@ def test_deform_writes_what_was_given_only_moved(name, tmp_path, capsys):
     path, out = file_of(name, tmp_path), tmp_path / "out.vtp"
     words = BEND
     if name == "parts":  # the middle one has neither
-        words = [
-            "--fixed",
-            "x<-1&z<20%",
-            "--handle",
-            "x<-1&z>80%",
-            "--translate",
-            "0.4,0,0",
-            *QUICK,
-        ]
+        words = ["--fixed", "x<-1&z<20%", "--handle", "x<-1&z>80%", "--translate", "0.2,0,0"]
+        words += OF_PARTS
     assert main(["deform", str(path), "-o", str(out), *words]) == 0
     before, after = read_polydata(path), read_polydata(out)
     require_only_moved(before, after)
@@ -45,7 +39,7 @@ def test_deform_writes_what_was_given_only_moved(name, tmp_path, capsys):
     step = np.asarray(after.points, float) - before.points
     for vertex in (0, surface.mesh.n_vertices // 2):  # points at a seam remain together
         assert np.ptp(step[surface.vertex_of == vertex], axis=0).max() < 1e-6
-    assert np.abs(step).max() > 0.3
+    assert np.abs(step).max() > 0.15
     printed = capsys.readouterr().out
     for workaround in surface.workarounds:
         assert str(workaround) in printed or "hole" in str(workaround)
@@ -116,7 +110,7 @@ def test_check_tells_a_script_all_about_a_surface(tmp_path, capsys):
 
 def test_check_counts_self_intersections_and_does_not_refuse_them(tmp_path, capsys):
     two = pv.merge([pv.Sphere(radius=1.0), pv.Sphere(radius=1.0, center=(1, 0, 0))])
-    write_mesh(tmp_path / "two.vtp", two.extract_surface())
+    write_mesh(tmp_path / "two.vtp", two.extract_surface(algorithm=None))
     assert checked(tmp_path / "two.vtp", capsys)["self_intersections"] > 10
     assert main(["check", str(tmp_path / "two.vtp")]) == 0
     assert "pairs of faces intersect" in capsys.readouterr().out
@@ -138,7 +132,7 @@ def test_check_names_what_cannot_be_deformed(tmp_path, capsys):
 
 def test_a_surface_of_several_parts_has_its_stray_points_unselected(tmp_path):
     path, out = file_of("parts", tmp_path), tmp_path / "out.vtp"
-    words = ["--fixed", "z<15%", "--handle", "x>50%&z>85%", "--translate", "0.2,0,0", *QUICK]
+    words = ["--fixed", "z<15%", "--handle", "x>50%&z>85%", "--translate", "0.2,0,0", *OF_PARTS]
     assert main(["deform", str(path), "-o", str(out), *words]) == 0
     moved = read_polydata(out).points - parts().points
     right = (parts().points[:, 0] > 1) & (parts().points[:, 0] < 5) & (parts().points[:, 2] > 2.6)
