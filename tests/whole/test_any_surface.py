@@ -74,7 +74,7 @@ def differences(given: pv.PolyData, moved: pv.PolyData) -> list[str]:
         if list(one.keys()) != list(two.keys()):
             found.append(f"names of {kind}: {list(one.keys())}, {list(two.keys())}")
             continue
-        normals = {"Normals", getattr(one, "active_normals_name", None)}
+        normals = {"Normals", "NormalCorners", getattr(one, "active_normals_name", None)}
         for name in one.keys():  # noqa: SIM118 - not a dict
             a, b = np.asarray(one[name]), np.asarray(two[name])
             alike = (
