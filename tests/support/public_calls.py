@@ -53,6 +53,7 @@ WIDGETS = ("vtk_segdeform.widgets", "vtk_segdeform.widgets.recording.film")
 NOT_CALLED = {"on_press", "on_hover", "on_wheel", "on_key"}
 NOT_CALLED |= {"contains", "guarded", "pixel_at", "pointer", "ray", "to_display", "to_world"}
 NOT_CALLED |= {"FillInputPortInformation", "RequestData"}  # by VTK's pipeline
+NOT_CALLED |= {"reported"}  # for meshes whose arrays and report were just checked
 NOT_CALLED |= {"add_surface", "draw_mesh"}  # in a plotter created by `pictures`
 
 
@@ -210,6 +211,12 @@ def surface() -> pv.PolyData:
 
 
 @functools.cache
+def given() -> sd.Surface:
+    """Return a surface with seams."""
+    return sd.Surface(pv.Cube(x_length=3.0))
+
+
+@functools.cache
 def view() -> Any:
     from hands import plain_view
 
@@ -263,6 +270,7 @@ def instance(cls: type) -> Any:
         "Cage": lambda: cages()[0],
         "Deformer": lambda: bound().copy(),
         "Session": session,
+        "Surface": given,
         "Passengers": passengers,
         "Solution": lambda: bound().copy().solve(_targets()),
         "Options": sd.Options,
@@ -287,11 +295,13 @@ def _plotter() -> pv.Plotter:
 
 
 # Classes that callers construct; others are only returned.
-MADE_BY_HAND = {sd.Mesh, sd.Regions, sd.Cage, sd.Deformer, sd.Session, sd.Options}
+MADE_BY_HAND = {
+    sd.Mesh, sd.Surface, sd.Regions, sd.Cage, sd.Deformer, sd.Session, sd.Options,
+}  # fmt: skip
 EXTRA = {
     "Session.change_options": (
         "n_cage_vertices", "offset", "preserve_volume", "preserve_region_volumes", "stretch",
-        "rotation_groups",
+        "rotation_groups", "lids",
     ),
 }  # fmt: skip
 
@@ -334,6 +344,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "label": lambda: "a step",
     "labels": lambda: (mesh().vertices[:, 0] > 0).astype(int),
     "largest_hole": lambda: 10,
+    "lids": lambda: None,
     "limits": sd.widgets.ReplayLimits,
     "listener": lambda: lambda _change: None,
     "major": lambda: 1.0,
@@ -361,6 +372,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "progress": lambda: lambda _fraction, _message: None,
     "radius": lambda: 1.0,
     "region": lambda: 0,
+    "report": lambda: sd.find_faults(mesh().vertices, mesh().faces),
     "regions": regions,
     "renderer": lambda: view().renderer,
     "rings": lambda: 1,
@@ -378,6 +390,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "tolerance": lambda: 1e-6,
     "vertices": lambda: mesh().vertices,
     "view": view,
+    "values": lambda: np.arange(given().mesh.n_vertices),
     "weights": lambda: regions().weights,
     "weld_distance": lambda: 0.0,
     "what": mesh,
@@ -433,6 +446,15 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "Session.rename_region.name": lambda: "arm",
     "Session.set_fixed.vertices": _left,
     "Session.split_region.vertices": lambda: None,
+    "Surface.at_vertices.values": lambda: np.arange(given().given.n_points),
+    "Surface.of.soup": lambda: sd.mesh.mesh_of(mesh().vertices, mesh().faces),
+    "Surface.moved.vertices": lambda: given().mesh.vertices,
+    "Surface.read.path": lambda: _file("mesh.ply"),
+    "Surface.targets_at.points": lambda: [0, 5],
+    "Surface.targets_at.targets": lambda: given().given.points[[0, 5]],
+    "Surface.vertices_at.points": lambda: [0, 5],
+    "Surface.write.path": lambda: Path("written.vtp"),
+    "Surface.write.vertices": lambda: given().mesh.vertices,
     "VolumeOverlay.wanted_range.value": lambda: 0.2,
     "blend_at.points": lambda: mesh().vertices[:4],
     "cactus.n_vertices": lambda: 600,
@@ -449,6 +471,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "picture_volume_change.path": lambda: Path("a.png"),
     "read_project.path": lambda: _file("project.mlp"),
     "write_project.path": lambda: Path("written.mlp"),
+    "Session.write_deformed.path": lambda: Path("written.vtp"),
     "SegmentedCageDeformFilter.SetFixed.points": _left,
     "SegmentedCageDeformFilter.SetHandle.points": _right,
     "read_faces.path": lambda: _file("mesh.ply"),
@@ -481,6 +504,8 @@ SAID_AS: dict[str, tuple[str, ...]] = {
     "Session.rename_handle.name": ("handle",),
     "Session.rename_handle.new_name": ("handle's name",),
     "Session.set_fixed.vertices": ("fixed",),
+    "Surface.targets_at.points": ("points", "targets"),
+    "Surface.targets_at.targets": ("points", "targets"),
     "blend_at.vertices": ("weights",),
     "board.cages": ("weights",),
     "mean_value_coordinates.cage_vertices": ("cage_faces",),

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import pyvista as pv
 from gltf_files import glb, octahedron
 from scenes import sausage
 from solids import OCTAHEDRON, icosphere
@@ -93,6 +94,8 @@ def originals(folder):
     save_raw(files[-1][1], surface)
     sd.save_session(folder / "sound.segdeform", session())
     files.append(("session", folder / "sound.segdeform"))
+    sd.save_session(folder / "surface.segdeform", surface_session())
+    files.append(("session", folder / "surface.segdeform"))
     write_project(folder / "sound.mlp", mesh)
     files.append(("project", folder / "sound.mlp"))
     for name, text, reader in [
@@ -115,6 +118,14 @@ def save_raw(path, surface):
     writer.EncodeAppendedDataOff()
     writer.SetCompressorTypeToNone()
     writer.Write()
+
+
+def surface_session():
+    """Return a session of a surface with seams, a hole, a line, an unused point and arrays."""
+    cube = pv.Cube(x_length=3.0).extract_cells(range(5)).extract_surface(algorithm=None)
+    given = cube + pv.Line((9.0, 9.0, 9.0), (10.0, 9.0, 9.0))
+    given.point_data["weight"] = np.arange(float(given.n_points))
+    return sd.Session(sd.Surface(given))
 
 
 def session():

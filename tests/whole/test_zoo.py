@@ -23,7 +23,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import zoo
-from zoo_operations import OPERATIONS, OTHERS, TAKE_ANY_ARRAYS, TAKE_PAIRS, require_right, scene
+from zoo_operations import (
+    OF_SURFACES,
+    OPERATIONS,
+    OTHERS,
+    TAKE_ANY_ARRAYS,
+    TAKE_PAIRS,
+    require_right,
+    scene,
+)
 from zoo_page import page
 
 from vtk_segdeform.errors import MeshError, SegDeformError
@@ -32,7 +40,8 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "bad-input.rst"
 LONGEST = 120.0  # seconds of processor time for one case
 REMEDY = re.compile(
     r"\b(must|repair|make|add|give|use|take|leave|enlarge|scale|mark|name|choose|move|look|"
-    r"same unit|raise|reverse|pass|fit|segment|count|write|tell|select|check|remove|list each)\b"
+    r"same unit|raise|reverse|pass|fit|segment|count|write|tell|select|check|remove|list each|"
+    r"export)\b"
 )
 
 
@@ -58,11 +67,13 @@ def outcome(run, fault, remedy=REMEDY):
 
 def cases():
     """Yield (exhibit, operation, run, fault) for all cases."""
-    for creature in [*zoo.SOUND, *zoo.FAULTY]:
+    for creature in [*zoo.SOUND, *zoo.OPEN, *zoo.FAULTY]:
         for name, operation in OPERATIONS.items():
             if not creature.is_soup and name not in TAKE_ANY_ARRAYS:
                 continue  # a file or a PolyData cannot contain it
-            fault = None if name == "repair" and creature.repairable else creature.fault
+            fault = creature.given if name in OF_SURFACES else creature.fault
+            if name == "repair" and creature.repairable:
+                fault = None
             yield creature.name, name, partial(_run_pair, creature, operation), fault
 
     for kind, (creatures, operations) in OTHERS.items():

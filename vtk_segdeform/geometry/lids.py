@@ -41,7 +41,9 @@ import numpy as np
 from scipy import sparse
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..mesh import HalfEdges, Mesh
+from ..checks import shown
+from ..errors import ArgumentError
+from ..mesh import HalfEdges, Mesh, require_mesh
 from .volume import corner_and_edges, signed_volume
 
 _LEAST, _MOST = 0.48, 1.3  # abs(q) of an open component that encloses a volume
@@ -187,6 +189,9 @@ def volume_summary(mesh: Mesh, lids: bool | None = None) -> str:
     >>> volume_summary(Mesh(corners[:3], [[0, 1, 2]]))
     'Open sheet: no volume to preserve'
     """
+    require_mesh(mesh)
+    if lids is not None and not isinstance(lids, bool | np.bool_):
+        raise ArgumentError(f"lids must be True, False or None; got {shown(lids)}")
     return lids_of(mesh, lids).summary()
 
 

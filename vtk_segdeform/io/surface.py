@@ -146,14 +146,23 @@ class Surface:
 
     def at_points(self, values: ArrayLike) -> Any:
         """Return *values* (n, ...) of the vertices of the mesh at the given points (p, ...)."""
-        return plain(values, "values")[self.vertex_of]
+        return self._of(values, self.mesh.n_vertices, "vertex of the mesh")[self.vertex_of]
 
     def at_vertices(self, values: ArrayLike) -> Any:
         """Return *values* (p, ...) of the given points at the vertices (n, ...).
 
         Of several points that follow a vertex, the first one counts.
         """
-        return self._soup.at_vertices(plain(values, "values"))
+        return self._soup.at_vertices(self._of(values, self._given.n_points, "given point"))
+
+    @staticmethod
+    def _of(values: ArrayLike, count: int, what: str) -> Any:
+        array = plain(values, "values")
+        if array.ndim < 1 or len(array) != count:
+            raise ArgumentError(
+                f"values must have one row for each {what}, {count}; got shape {array.shape}"
+            )
+        return array
 
     def targets_at(self, points: ArrayLike, targets: ArrayLike) -> tuple[IntArray, FloatArray]:
         """Return the vertices (k,) that given points are, and their targets (k, 3).
