@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_points, plain
 from ..checks import require
-from ..errors import MeshError
+from ..errors import ArgumentError, MeshError
 from ..mesh import Mesh, Soup, Workaround, mesh_of
 from .convert import read_polydata, write_mesh
 from .moving import MovingSurface

@@ -6,7 +6,6 @@
     surface_7.npy              any shape    a point, cell or field array; of texts, their UTF-8,
     surface_7_ends.npy         (t,) int     and where each text ends
     surface_vertex_of.npy      (p,) int     the vertex of the mesh that each point follows
-    surface_loose.npy          (l,) int     the points in no face
     surface_workarounds.npy    (w,) int     the points of all workarounds, one after another
 
 The header has their sizes and types, the names of arrays and which of them are active, and the
@@ -44,9 +43,8 @@ def surface_parts(surface: Surface) -> tuple[dict[str, Any], dict[str, Any]]:
     """
     given = surface.given
     points = np.asarray(given.points)
-    loose = surface.loose
-    arrays: dict[str, Any] = {"points": points, "vertex_of": surface.vertex_of, "loose": loose}
-    header: dict[str, Any] = {"points": [type_of(points), len(points), len(loose)], "cells": {}}
+    arrays: dict[str, Any] = {"points": points, "vertex_of": surface.vertex_of}
+    header: dict[str, Any] = {"points": [type_of(points), len(points)], "cells": {}}
     for kind in _CELLS:
         cells = getattr(given, f"Get{kind}")()
         if cells.GetNumberOfCells():
@@ -94,7 +92,7 @@ def read_surface(archive: Archive, header: Any, mesh: Mesh) -> Surface:
         If it is damaged.
     """
     require(isinstance(header, dict), "the surface must be described by names")
-    kind, p, n_loose = header["points"]
+    kind, p = header["points"]
     given = pv.PolyData()
     given.SetPoints(pv.vtk_points(_array(archive, "points", kind, (p, 3)), deep=True))
     for name, (n_cells, n_corners) in header["cells"].items():
@@ -118,12 +116,11 @@ def read_surface(archive: Archive, header: Any, mesh: Mesh) -> Surface:
     vertex_of = _array(archive, "vertex_of", "i", (p,))
     in_mesh = ((vertex_of >= 0) & (vertex_of < mesh.n_vertices)).all()
     require(in_mesh, "a point follows no vertex of the mesh")
-    loose = _array(archive, "loose", "i", (n_loose,))
-    require(((loose >= 0) & (loose < p)).all(), "a point in no face is not a point")
-    own = np.unique(np.delete(vertex_of, loose))
-    require(len(own) == mesh.n_vertices, "a vertex of the mesh is not a point")
     points = np.asarray(given.points, dtype=np.float64)
-    return Surface.of(given, Soup(points, mesh, vertex_of, loose, _workarounds(archive, header, p)))
+    soup = Soup(points, mesh, vertex_of, _workarounds(archive, header, p))
+    own = np.unique(np.delete(vertex_of, soup.loose))
+    require(len(own) == mesh.n_vertices, "a vertex of the mesh is not a point")
+    return Surface.of(given, soup)
 
 
 def require(condition: Any, text: str) -> None:
