@@ -136,10 +136,10 @@ SMALL = Session(Surface(tube(8, 4)))
 P, N = SMALL.surface.given.n_points, SMALL.mesh.n_vertices
 HUGE = 1 << 61
 WRONG = [
-    ({"points": ["f", HUGE, 0]}, "surface_points must be"),
-    ({"points": ["f", -1, 0]}, "not a size"),
-    ({"points": ["O", P, 0]}, "must have a type"),
-    ({"points": ["f4", P, 0]}, "surface_points must be"),
+    ({"points": ["f", HUGE]}, "surface_points must be"),
+    ({"points": ["f", -1]}, "not a size"),
+    ({"points": ["O", P]}, "must have a type"),
+    ({"points": ["f4", P]}, "surface_points must be"),
     ({"points": 7}, "unpack|iterable"),
     ({"cells": {"Polys": [HUGE, HUGE]}}, "must be int64"),
     ({"cells": {"Boxes": [1, 1]}}, "not a kind of cells"),
