@@ -19,6 +19,12 @@ For given R the energy is quadratic.  Both terms depend on R through one 3 x 3 m
 Q (m, m) and K (3 G, m) are computed once, so the cost of a step does not depend on the size of the
 mesh; those of a large mesh are computed from a weighted sample of its vertices (`cubature`).
 
+*Borders.*  The sum of the detail goes over inner vertices only (`geometry.inner_vertices`), the
+natural boundary condition; the stretch and its rotations go over all.  With one-sided rows at the
+borders instead, the energy of a stretched plate grows like 1 / edge: from 80 to 160 edges along its
+side, the pose of a twisted plate moved by 6.4 thousandths and took 23, then 29 steps; with the
+natural condition it moved by 0.6 thousandths and took 19, then 17.
+
 *Stiffness of the cages.*  The mesh hardly depends on a cage vertex far from it, so the shape energy
 leaves it free, and the solver takes many steps to find where it goes: cages 1.75 times as large as
 their regions, bent by 60 degrees, ended hundreds of mesh sizes away after 86 steps; with this
