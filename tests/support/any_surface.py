@@ -336,10 +336,15 @@ def finned() -> Soup:
 def _flat_faces(soup: Soup) -> pv.PolyData:
     """Return a surface with faces of two corners, of one corner, and of three on a line."""
     vertices, faces = soup
-    more = [[3, 3, 4], [5, 5, 5], [7, 8, 7]]
-    n = len(vertices)
-    line = np.array([[-1.0, 0, 2], [0, 0, 2], [1, 0, 2]])  # beside the body, in a row
-    return triangles((np.vstack([vertices, line]), np.vstack([faces, more, [[n, n + 1, n + 2]]])))
+    a, b, n = *faces[9, :2], len(vertices)
+    middle = 0.5 * (vertices[a] + vertices[b])
+    more = [[3, 3, 4], [5, 5, 5], [7, 8, 7], [a, n, b]]
+    return triangles((np.vstack([vertices, middle]), np.vstack([faces, more])))
+
+
+def _flat_part(soup: Soup) -> pv.PolyData:
+    """Return a surface with a part beside it that is one face of three corners on a line."""
+    return triangles(joined(soup, ([[-1.0, 0, 2], [0, 0, 2], [1, 0, 2]], np.array([[0, 1, 2]]))))
 
 
 def _parts() -> pv.PolyData:
@@ -423,6 +428,7 @@ CLOSED = [
     Specimen("duplicate faces", lambda: triangles(with_face(body(), *body()[1][:40])), body, 0),
     Specimen("duplicate faces, turned", lambda: triangles(with_face(body(), *body()[1][:40, ::-1])), body, 0),
     Specimen("flat and degenerate faces", lambda: _flat_faces(body())),
+    Specimen("a part of flat faces only", lambda: _flat_part(body())),
     Specimen("unused points", lambda: _with_points(triangles(body()), [9, 9, 9], [0, 0, 0], [3, 0, 0]), body, 0),
     Specimen("NaN in unused points", lambda: _with_points(triangles(body()), [np.nan] * 3, [np.inf, 0, 0], [0, 0, 0], [1, np.nan, 1]), body, 0),
     Specimen("lines and vertices", lambda: _with_cells(triangles(body())), body, 0),

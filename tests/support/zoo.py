@@ -424,7 +424,7 @@ def _there() -> Any:
     return body()[0][RIGHT]
 
 
-ONE_EACH = "one point for each|must be 29 points|must be 66 points"
+ONE_EACH = "one point for each|must be 29 points|must be 66 points|must have shape"
 TARGETS = [
     Creature("at rest", _there),
     Creature("a little up", lambda: _there() + [0, 0, 0.1]),
@@ -444,8 +444,8 @@ TARGETS = [
     Creature("NaN", lambda: _there() * [1.0, np.nan, 1.0], "NaN"),
     Creature("one NaN", lambda: np.where(np.arange(len(RIGHT))[:, None] == 3, np.nan, _there()), "points have NaN"),
     Creature("at infinity", lambda: _there() + np.inf, "infinite"),
-    Creature("1e30 away", lambda: _there() + 1e30, "same unit|diagonals of the mesh away"),
-    Creature("1e300 away", lambda: _there() + 1e300, "same unit|diagonals of the mesh away"),
+    Creature("1e30 away", lambda: _there() + 1e30, "same unit|mesh diagonals away|diagonals of the mesh away"),
+    Creature("1e300 away", lambda: _there() + 1e300, "same unit|mesh diagonals away|diagonals of the mesh away"),
     Creature("too few", lambda: _there()[:-1], ONE_EACH),
     Creature("too many", lambda: np.vstack([_there(), [1, 1, 1]]), ONE_EACH),
     Creature("with two coordinates", lambda: _there()[:, :2], "shape"),
@@ -466,7 +466,7 @@ MOTIONS = [  # (4, 4), from rest
     Creature("perspective", lambda: np.eye(4) + 0.2 * np.eye(4, k=-1), "must be 0 0 0 1"),
     Creature("all zero", lambda: np.zeros((4, 4)), "must be 0 0 0 1"),
     Creature("3 by 3", lambda: np.eye(3), ONE_EACH),
-    Creature("1e30 away", lambda: np.diag([1e30, 1.0, 1.0, 1.0]), "same unit|diagonals of the mesh away"),
+    Creature("1e30 away", lambda: np.diag([1e30, 1.0, 1.0, 1.0]), "mesh diagonals away"),
     Creature("text", lambda: np.char.add(np.eye(4).astype(str), "x"), "numbers"),
 ]  # fmt: skip
 

@@ -34,10 +34,9 @@ status that says they are not. Or an error of :mod:`vtk_segdeform.errors` names 
 what to do. There are no other exceptions, no warnings, and no computations of many minutes.
 
 Any surface can be deformed as it is: with holes, branching edges, seams, turned or repeated faces,
-points in no face, and of one side only. A :class:`~vtk_segdeform.Mesh` of triangles may have holes,
-branching edges and triangles without area as well. Repeated and turned faces, which it refuses, are
-accepted by the operations on surfaces: "Surface", "filter", "segdeform check" and "segdeform
-deform".
+points in no face, and of one side only. A :class:`~vtk_segdeform.Mesh` may have holes,
+branching edges and triangles without area as well. What it refuses, the operations on surfaces
+accept: "Surface", "filter", "segdeform check" and "segdeform deform".
 
 Each input is tested with each operation that accepts its type, in {cases} cases: {answered} return
 a result and {refused} raise an error that names the fault.

