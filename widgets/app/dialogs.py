@@ -98,7 +98,8 @@ def show_about(parent: Any, version: str) -> None:
         f"vtk_segdeform {version}",
         "Deforms a dense mesh by moving a few of its vertices. Fine detail rotates with the "
         "surface, and an enclosed volume is preserved exactly.\n\n"
-        "After K. Doba and H. Masuda, Rapid Mesh Deformation with Non-linear Constraints Using Segmentation.\n\nBSD-3-Clause.",
+        "After K. Doba and H. Masuda, Rapid Mesh Deformation with Non-linear Constraints "
+        "Using Segmentation.\n\nBSD-3-Clause.",
     )
     box.addButton(QtWidgets.QMessageBox.StandardButton.Ok)
     _run(box)
