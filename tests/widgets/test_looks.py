@@ -15,10 +15,18 @@ import numpy as np
 import pytest
 import pyvista as pv
 from hands import Hand, picture, plain_view
+from open_surfaces import bottle
 from scenes import sausage
 
-from vtk_segdeform import Options, Session
-from vtk_segdeform.widgets import CageDisplay, HandleDragger, RegionSelector, Tool, VolumeOverlay
+from vtk_segdeform import Options, Session, Surface
+from vtk_segdeform.widgets import (
+    CageDisplay,
+    DeformEditor,
+    HandleDragger,
+    RegionSelector,
+    Tool,
+    VolumeOverlay,
+)
 from vtk_segdeform.widgets.region_selector.region_colours import RegionColours
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 
@@ -59,16 +67,21 @@ class Scene:
 
     def looks(self, name):
         """Compare the view with the reference picture *name*."""
-        assert self.hand.failures == []
-        seen, path = picture(self.view), LOOKS / f"{name}.png"
-        if os.environ.get("SEGDEFORM_NEW_LOOKS"):
-            from PIL import Image
+        looks(name, self.view, self.hand)
 
-            LOOKS.mkdir(exist_ok=True)
-            Image.fromarray(seen).save(path, optimize=True)
-        kept = np.asarray(pv.read(path).active_scalars).reshape(SIZE[1], SIZE[0], -1)[::-1, :, :3]
-        off = np.abs(seen.astype(int) - kept).max(axis=2) > NEAR
-        assert off.mean() <= MOST, f"{name}: {100 * off.mean():.1f} % of the pixels are off"
+
+def looks(name, view, hand):
+    """Compare a view with the reference picture *name*."""
+    assert hand.failures == []
+    seen, path = picture(view), LOOKS / f"{name}.png"
+    if os.environ.get("SEGDEFORM_NEW_LOOKS"):
+        from PIL import Image
+
+        LOOKS.mkdir(exist_ok=True)
+        Image.fromarray(seen).save(path, optimize=True)
+    kept = np.asarray(pv.read(path).active_scalars).reshape(SIZE[1], SIZE[0], -1)[::-1, :, :3]
+    off = np.abs(seen.astype(int) - kept).max(axis=2) > NEAR
+    assert off.mean() <= MOST, f"{name}: {100 * off.mean():.1f} % of the pixels are off"
 
 
 def test_painting(ready):
@@ -144,9 +157,25 @@ def test_volume(ready, preserved):
     overlay.remove()
 
 
+def test_notices():
+    view = plain_view(SIZE)
+    view.camera.SetPosition(0.0, -20.0, 4.0)
+    view.camera.SetViewUp(0.0, 0.0, 1.0)
+    session = Session(Surface(bottle(5)))
+    editor = DeformEditor(view, session)
+    view.renderer.ResetCamera()
+    editor.On()
+    view.render()
+    hand = Hand(view)
+    looks("notices-line", view, hand)
+    hand.types("i")
+    looks("notices-shown", view, hand)
+    editor.remove()
+
+
 def test_no_two_pictures_are_alike():
     kept = {path.stem: np.asarray(pv.read(path).active_scalars) for path in LOOKS.glob("*.png")}
-    assert len(kept) == 13
+    assert len(kept) == 15
     names = sorted(kept)
     for k, name in enumerate(names):
         for other in names[:k]:

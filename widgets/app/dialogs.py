@@ -96,9 +96,10 @@ def show_about(parent: Any, version: str) -> None:
         parent,
         QtWidgets.QMessageBox.Icon.NoIcon,
         f"vtk_segdeform {version}",
-        "Deforms a dense closed mesh by moving a few of its vertices. Fine detail rotates with the "
-        "surface, and the volume is preserved exactly.\n\nAfter K. Doba and H. Masuda, Rapid Mesh "
-        "Deformation with Non-linear Constraints Using Segmentation.\n\nBSD-3-Clause.",
+        "Deforms a dense mesh by moving a few of its vertices. Fine detail rotates with the "
+        "surface, and an enclosed volume is preserved exactly.\n\n"
+        "After K. Doba and H. Masuda, Rapid Mesh Deformation with Non-linear Constraints "
+        "Using Segmentation.\n\nBSD-3-Clause.",
     )
     box.addButton(QtWidgets.QMessageBox.StandardButton.Ok)
     _run(box)

@@ -8,7 +8,8 @@ from hands import Hand, picture, plain_view
 from open_surfaces import bottle, polydata, sheet, split_at_seam
 from solids import icosphere
 
-from vtk_segdeform import Options, Session, Surface
+from vtk_segdeform import Options, Regions, Session, Surface
+from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.widgets import DeformEditor
 from vtk_segdeform.widgets.editor import notices_of
@@ -241,3 +242,23 @@ def test_a_mesh_without_a_surface_has_notices_of_its_borders():
     assert [each.text for each in notices_of(Session(mesh))] == [
         "2 holes: volume preserved under lids"
     ]
+
+
+def test_marks_follow_the_pose(open_editor):
+    session = Session(Surface(bottle(4)))
+    session.set_regions(Regions.single(session.mesh))
+    ball, faces = icosphere(1)
+    session.set_cages([Cage(3.0 * ball, faces)])
+    session.change_options(preserve_volume=False)
+    scene = open_editor(session)
+    session.move_cage(0, 3.0 * ball)  # the first edit
+    session.commit()
+    scene.hand.types("i")
+    before = np.flatnonzero(scene.shade(LOOP_RGB).any(axis=0))
+    session.move_cage(0, 3.0 * ball + [0.5, 0.0, 0.0])
+    after = np.flatnonzero(scene.shade(LOOP_RGB).any(axis=0))
+    there = scene.view.to_display(np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]]))[:, 0]
+    shift = there[1] - there[0]
+    assert shift > 20.0
+    assert after.min() - before.min() == pytest.approx(shift, abs=6)
+    assert after.max() - before.max() == pytest.approx(shift, abs=6)
