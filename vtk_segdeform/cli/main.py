@@ -199,7 +199,7 @@ def _parser() -> argparse.ArgumentParser:
     form = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(
         prog="segdeform",
-        description="Deform closed meshes by moving handles, with detail and volume preserved.",
+        description="Deform a surface by moving handles, with detail and volume preserved.",
         epilog=_EXAMPLES,
         formatter_class=form,
     )
