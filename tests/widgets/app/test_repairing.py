@@ -116,7 +116,7 @@ def soup():
 @pytest.mark.parametrize(
     ("given", "name", "text"),
     [
-        (bottle, "bottle.ply", "12 holes: volume preserved under lids"),
+        (bottle, "bottle.ply", "12 holes: volume kept under lids"),
         (lambda: sheet(6), "sheet.obj", "Open sheet: no volume to preserve"),
         (split_at_seam, "seam.ply", "Welded 64 seam points"),
         (soup, "soup.stl", ""),
