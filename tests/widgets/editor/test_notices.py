@@ -239,9 +239,7 @@ def test_the_back_of_a_sheet_is_lit_as_its_front(open_editor):
 def test_a_mesh_without_a_surface_has_notices_of_its_borders():
     given = bottle(2)
     mesh = Mesh(given.points, given.regular_faces)
-    assert [each.text for each in notices_of(Session(mesh))] == [
-        "2 holes: volume kept under lids"
-    ]
+    assert [each.text for each in notices_of(Session(mesh))] == ["2 holes: volume kept under lids"]
 
 
 def test_marks_follow_the_pose(open_editor):
