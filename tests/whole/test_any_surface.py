@@ -23,6 +23,7 @@ import vtk_segdeform as sd
 from vtk_segdeform.geometry import lids_of
 from vtk_segdeform.io.polygons import polygons_of
 
+pytestmark = pytest.mark.usefixtures("vtk_in_process")
 NAMED = {each.name: each for each in SPECIMENS}
 NOT_YET = {"a part of flat faces only": "a region of flat faces only has no axes for its cage"}
 TURN = rotation([0.0, 1.0, 0.0], 0.5)
@@ -315,7 +316,7 @@ def test_workarounds_are_sentences_about_points_of_what_was_given(specimen: Spec
 # Files.
 
 OWN = [".ply", ".obj", ".off"]
-OF_VTK = [".vtp", ".vtk", ".vtkhdf"]  # read in a child process, which takes its time to start
+OF_VTK = [".vtp", ".vtk", ".vtkhdf"]
 FILED = [
     "triangle soup", "concave polygons", "12 holes", "row of fins", "several parts, some open",
     "seam, flipped patch, holes and quadrilaterals",
