@@ -65,13 +65,13 @@ def test_the_cage_of_a_sheet_follows_it_and_leaves_its_hollow_side_empty():
 
 
 def test_the_cage_of_a_sheet_does_not_depend_on_its_orientation():
-    flat, faces = plate(40, 40)
+    flat, faces = plate(24, 24)
     vertices = bent(flat, 1.0 / 3.0)
     one, other = (single_cage(Mesh(vertices, f)) for f in (faces, faces[:, ::-1]))
     np.testing.assert_allclose(one.vertices, other.vertices, atol=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_cage_of_a_pan_is_filled_as_under_a_lid(seed):
     vertices, faces = cup(40, 10, 1.0, 0.6)
     order = np.random.default_rng(seed).permutation(len(vertices))  # decides the signs of axes
@@ -80,7 +80,7 @@ def test_the_cage_of_a_pan_is_filled_as_under_a_lid(seed):
 
 
 def test_the_walls_of_a_closed_mesh_are_its_own_faces():
-    mesh = cactus()
+    mesh = cactus(1000)
     surface = Surface.of(mesh)
     points, faces = surface.walls
     assert points is surface.points

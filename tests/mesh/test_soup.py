@@ -265,7 +265,7 @@ def hostile(rng):
     return vertices, rng.permutation(faces)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_any_triangles_with_a_face_that_is_not_flat_become_a_mesh(seed):
     rng = np.random.default_rng(seed)
     for _ in range(40):
