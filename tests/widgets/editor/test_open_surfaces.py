@@ -172,3 +172,23 @@ def test_nothing_is_black_from_either_side(open_editor, name):
         with scene.editor.controller.clean_view():
             dark = picture(scene.view).max(axis=2) < 60
         assert dark.mean() < 0.002
+
+
+def test_the_seam_of_a_surface_with_one_side_does_not_show(open_editor):
+    """Where faces differ in orientation depends on which are flipped; the picture does not."""
+    seen = []
+    for flipped in (0, 700):
+        given = moebius()
+        faces = np.array(given.regular_faces)
+        faces[:flipped] = faces[:flipped, ::-1]
+        scene = open_editor(polydata(given.points, faces))
+        assert scene.session.mesh.n_vertices == given.n_points
+        with scene.editor.controller.clean_view():
+            seen.append(picture(scene.view).astype(int))
+        x = scene.session.mesh.vertices @ np.diag([1.0, 1.0, 1.5])
+        scene.editor.widgets.surface.set_colours("test", np.uint8(128 + 60 * np.sin(3 * x)))
+        with scene.editor.controller.clean_view():
+            seen.append(picture(scene.view).astype(int))
+    for one, other in ((0, 2), (1, 3)):
+        assert (np.abs(seen[one] - seen[other]).max(axis=2) > 12).mean() < 2e-4
+    assert (np.abs(seen[0] - seen[1]).max(axis=2) > 12).mean() > 0.1
