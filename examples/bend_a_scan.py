@@ -27,9 +27,9 @@ grid = pv.StructuredGrid(radius * np.cos(angle), -radius * np.sin(angle), 3.0 * 
 scan = grid.extract_surface(algorithm=None, pass_pointid=False, pass_cellid=False)
 scan.active_texture_coordinates = np.stack([u.T.ravel(), v.T.ravel()], axis=1)
 scan.point_data["temperature"] = 20.0 + scan.points[:, 2]
-centres = scan.cell_centers().points
-missing = [np.linalg.norm(centres - at, axis=1) < 0.17 for at in ([0, -0.3, 2.2], [-0.2, -0.2, 1.0])]
-scan = scan.remove_cells(np.any(missing, axis=0))
+for place in ([0.0, -0.3, 2.2], [-0.2, -0.2, 1.0]):
+    centres = scan.cell_centers().points
+    scan = scan.remove_cells(np.linalg.norm(centres - place, axis=1) < 0.17)
 
 surface = sd.Surface(scan)
 for workaround in surface.workarounds:
@@ -55,8 +55,9 @@ if len(sys.argv) > 1:
     plotter.set_background("white", all_renderers=True)
     for column, shown in enumerate((scan, bent)):
         plotter.subplot(0, column)
-        inside = {"color": "#3d6b8f"}
-        plotter.add_mesh(shown, color="#f0d9b5", show_edges=True, line_width=0.5, backface_params=inside)
+        plotter.add_mesh(
+            shown, color="#f0d9b5", show_edges=True, backface_params={"color": "#3d6b8f"}
+        )
     plotter.link_views()
     plotter.camera_position = [(-1.4, -6.0, 3.2), (0.35, 0.0, 1.45), (0.0, 0.0, 1.0)]
     plotter.screenshot(folder / "scan-and-bent.png")
