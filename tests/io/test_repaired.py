@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import vtk_segdeform.widgets.plugin  # noqa: F401  registers mesh.segdeform
 from vtk_segdeform.cli.main import main
+from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.io import convert
 from vtk_segdeform.io.polygons import cut_into_triangles, polydata_of, polygons_of
 from vtk_segdeform.io.repaired import repair_surface
@@ -68,6 +69,28 @@ def test_a_surface_without_faults_is_unchanged():
     assert done.steps == ()
     assert_array_equal(polygons_of(same)[1], polygons_of(surface)[1])
     assert same.array_names == surface.array_names
+
+
+def test_each_stage_is_reported_and_can_be_cancelled():
+    damaged = box(drop=[5, 6, 9, 10, 40], turn=[7])
+    told = []
+    repair_surface(damaged, progress=lambda *what: told.append(what))
+    fractions, messages = zip(*told, strict=True)
+    assert (fractions[0], fractions[-1]) == (0.0, 1.0)
+    assert (np.diff(fractions) >= 0.0).all()
+    assert {"Filling 1 hole of 4 edges", "Filling 1 hole of 8 edges"} <= set(messages)
+    for last in dict.fromkeys(messages):
+
+        def stop(_, message, last=last):
+            if message == last:
+                raise Cancelled(last)
+
+        with pytest.raises(Cancelled, match=last):
+            repair_surface(damaged, progress=stop)
+    told.clear()
+    repair_surface(box(), progress=lambda *what: told.append(what))
+    assert [fraction for fraction, _ in told][-1] == 1.0
+    assert not any("Filling" in message for _, message in told)
 
 
 def test_polygons_and_arrays_of_kept_faces_are_kept():

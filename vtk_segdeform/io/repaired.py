@@ -27,6 +27,7 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from ..checks import require
 from ..mesh import counted, normals
 from ..mesh_repair import Repair, repair
+from ..progress import Progress, part, tell
 from .polygons import cells_of, cut_into_triangles, polydata_of, polygons_of
 
 _CORNERS = "TextureCorners"
@@ -34,7 +35,11 @@ _ATTRIBUTES = ("Scalars", "Vectors", "Normals", "TCoords", "Tensors")
 
 
 def repair_surface(
-    surface: pv.PolyData, *, weld_distance: float = 0.0, largest_hole: int = 100
+    surface: pv.PolyData,
+    *,
+    weld_distance: float = 0.0,
+    largest_hole: int = 100,
+    progress: Progress | None = None,
 ) -> tuple[pv.PolyData, Repair]:
     """Repair *surface* with its polygons and arrays.
 
@@ -42,7 +47,7 @@ def repair_surface(
     ----------
     surface : pyvista.PolyData
         With any faults; not changed.
-    weld_distance, largest_hole
+    weld_distance, largest_hole, progress
         As in `repair`.
 
     Returns
@@ -61,9 +66,17 @@ def repair_surface(
     counts, corners = polygons_of(require(surface, pv.PolyData, "surface"))
     points = np.asarray(surface.points, dtype=np.float64)
     triangles, polygon = cut_into_triangles(points, counts, corners)
-    done = repair(points, triangles, weld_distance=weld_distance, largest_hole=largest_hole)
+    done = repair(
+        points,
+        triangles,
+        weld_distance=weld_distance,
+        largest_hole=largest_hole,
+        progress=part(progress, 0.0, 0.9),
+    )
     if not done.steps:
+        tell(progress, 1.0, "Nothing to repair")
         return surface.copy(deep=True), done
+    tell(progress, 0.9, "Restoring polygons and arrays")
     trace = _traced(_Polygons(counts, corners, triangles, polygon), done)
     whole = polydata_of(done.vertices, trace.counts, trace.corners)
     cells = np.append(cells_of(surface), -1)[trace.polygon]  # -1 for lids
@@ -83,6 +96,7 @@ def repair_surface(
             active = getattr(source, f"Get{attribute}")()
             if active is not None and active.GetName():
                 getattr(target, f"SetActive{attribute}")(active.GetName())
+    tell(progress, 1.0, "Repaired")
     return whole, replace(done, steps=(*done.steps, *losses))
 
 

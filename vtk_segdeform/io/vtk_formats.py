@@ -69,12 +69,17 @@ def read_with_vtk(path: Path) -> pv.PolyData:
         raise MeshError(f"is not a readable {suffix} file ({_first_message(error)})") from None
     surfaces = [_surface(part) for part in parts]
     surface = surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
-    for attributes in (surface.point_data, surface.cell_data):  # VTKHDF does not store it
+    if suffix == ".vtkhdf":  # it does not store which arrays are active
+        _activate_normals(surface)
+    return surface
+
+
+def _activate_normals(surface: pv.PolyData) -> None:
+    for attributes in (surface.point_data, surface.cell_data):
         normals = attributes.get("Normals")
         found = normals is not None and normals.shape[1:] == (3,) and normals.dtype.kind == "f"
         if found and attributes.active_normals_name is None:
             attributes.active_normals_name = "Normals"
-    return surface
 
 
 def _validated(data: pv.DataSet) -> pv.DataSet:

@@ -23,7 +23,7 @@ from .shells import closed_shells, shell_faults
 from .topology import HalfEdges, repeats_face, repeats_vertex
 from .triangles import corner_columns, cross, norm
 
-UNREPAIRABLE = (Kind.EMPTY, Kind.BAD_INDEX, Kind.TOO_LARGE, Kind.TOO_SMALL)  # no further checks
+UNREPAIRABLE = (Kind.EMPTY, Kind.BAD_INDEX, Kind.TOO_LARGE, Kind.TOO_SMALL, Kind.FLAT)
 _EXAMPLES = 4
 _PIECE = 10_000  # faces per task; their data fit into the cache
 _LARGEST, _SMALLEST = 1e70, 1e-70  # fourth powers of lengths must neither overflow nor vanish
@@ -99,6 +99,11 @@ class Search:
         """(k,) int: the faces without area."""
         return _flat_faces(self.points, self.triangles)
 
+    @property
+    def all_flat(self) -> bool:
+        """Whether no face has an area."""
+        return len(self.flat) == len(self.triangles)
+
     @cached_property
     def first_at(self) -> IntArray:
         """(n,) int: the first vertex at the position of each vertex."""
@@ -113,6 +118,8 @@ class Search:
             n_components = int(self.half_edges.shells.max(initial=-1)) + 1
             found += _some(Kind.DEGENERATE, np.flatnonzero(self.degenerate))
             found += _some(Kind.DUPLICATE_FACE, np.flatnonzero(self.duplicate & ~self.degenerate))
+            if self.all_flat and not self.degenerate.all():
+                found.append(Fault(Kind.FLAT, 1))
             found += _some(Kind.ZERO_AREA, self.flat[~self.degenerate[self.flat]])
             found += _edge_faults(self.half_edges)
             found += _inward_shells(self.points, self.half_edges)

@@ -1,6 +1,7 @@
 """A `Mesh` from any triangles, and the map between both: what is given and what is deformed.
 
-    drop       faces without three different vertices, repeated faces, points in no face
+    drop       faces without three different vertices, repeated faces, points in no face, and
+               components without area
     weld       points of borders at exactly the same position, and open sheets that coincide
     orient     neighbouring faces alike, closed surfaces and nearly closed ones outward
 
@@ -29,8 +30,8 @@ from .faults import UNREPAIRABLE, Search, as_soup, distinct_faces
 from .grouping import connected, first_equal_row
 from .mesh import Mesh
 from .orientation import faces_to_flip
-from .report import Kind, counted
-from .topology import HalfEdges, repeats_vertex
+from .report import Fault, Kind, counted
+from .topology import HalfEdges, components, repeats_vertex
 
 _REFUSED = (*UNREPAIRABLE, Kind.NON_FINITE)
 
@@ -138,6 +139,11 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
         mesh = Mesh.reported(points, triangles, found.report)
         return Soup(points, mesh, np.arange(len(points)))
     target, kept, half_edges = _welded(valid, found)
+    without_area = _without_area(found, kept, half_edges)
+    flat = kept[without_area]
+    if len(flat):
+        kept = kept[~without_area]
+        half_edges = HalfEdges(half_edges.faces[~without_area], len(points))
     flip = faces_to_flip(valid, half_edges)
     left = np.zeros(len(points), dtype=bool)
     left[half_edges.faces] = True
@@ -152,23 +158,19 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
     loose = np.flatnonzero(~left[target])
     vertex_of = number[target]
     vertex_of[loose] = _nearest(points[loose], mesh.vertices)
-    workarounds = tuple(_workarounds(triangles, kept, target, loose, flip, half_edges))
+    workarounds = tuple(_workarounds(triangles, kept, flat, target, loose, flip, half_edges))
     return Soup(points, mesh, vertex_of, workarounds)
 
 
 def _require_usable(found: Search) -> None:
     if not len(found.triangles):
         raise MeshError("this surface cannot be deformed: it has no faces; give at least one")
-    faults = [
-        f"{fault}; {fault.kind.advice}" for fault in found.number_faults if fault.kind in _REFUSED
-    ]
+    faults = [fault for fault in found.number_faults if fault.kind in _REFUSED]
+    if not faults and found.all_flat:
+        faults = [Fault(Kind.FLAT, 1)]
     if faults:
-        raise MeshError(f"this surface cannot be deformed: {'; '.join(faults)}")
-    if len(found.flat) == len(found.triangles):
-        raise MeshError(
-            "this surface cannot be deformed: all faces are flat; "
-            "give at least one whose three corners are not on a line"
-        )
+        reasons = "; ".join(f"{fault}; {fault.kind.advice}" for fault in faults)
+        raise MeshError(f"this surface cannot be deformed: {reasons}")
 
 
 def _welded(points: FloatArray, found: Search) -> tuple[IntArray, IntArray, HalfEdges]:
@@ -213,6 +215,19 @@ def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
     return found
 
 
+def _without_area(found: Search, kept: IntArray, half_edges: HalfEdges) -> BoolArray:
+    """Return which faces (m,) are in a component of flat faces only, connected at any vertex."""
+    is_flat = np.zeros(len(found.triangles), dtype=bool)
+    is_flat[found.flat] = True
+    is_flat = is_flat[kept]
+    if not is_flat.any():
+        return is_flat
+    of_vertex = components(half_edges.n_vertices, half_edges.faces)
+    has_area = np.zeros(len(of_vertex), dtype=bool)
+    has_area[of_vertex[half_edges.faces[~is_flat, 0]]] = True
+    return np.asarray(~has_area[of_vertex[half_edges.faces[:, 0]]])
+
+
 def _nearest(points: FloatArray, vertices: FloatArray) -> IntArray:
     """Return the nearest of *vertices* to each of *points* (k, 3), or the first if not finite."""
     nearest = np.zeros(len(points), dtype=np.int64)
@@ -225,6 +240,7 @@ def _nearest(points: FloatArray, vertices: FloatArray) -> IntArray:
 def _workarounds(
     triangles: IntArray,
     kept: IntArray,
+    flat: IntArray,
     target: IntArray,
     loose: IntArray,
     flip: BoolArray,
@@ -245,13 +261,19 @@ def _workarounds(
         faces = triangles[kept[flip]]
         yield _workaround(Kind.TURNED_EDGE, len(faces), "flipped # face", np.unique(faces))
     dropped = np.ones(len(triangles), dtype=bool)
-    dropped[kept] = False
+    dropped[kept] = dropped[flat] = False
     faces = triangles[dropped]
     degenerate = repeats_vertex(target[faces])
-    for kind, some in ((Kind.DUPLICATE_FACE, ~degenerate), (Kind.DEGENERATE, degenerate)):
-        if some.any():
-            text = f"ignored # {kind.one}"
-            yield _workaround(kind, int(some.sum()), text, np.unique(faces[some]))
+    for kind, ignored in (
+        (Kind.DUPLICATE_FACE, faces[~degenerate]),
+        (Kind.DEGENERATE, faces[degenerate]),
+        (Kind.ZERO_AREA, triangles[flat]),
+    ):
+        if len(ignored):
+            text = f"ignored {counted(len(ignored), kind.one, kind.many)}"
+            yield Workaround(text, np.unique(ignored), kind, len(ignored))
+    if len(flat):
+        loose = np.setdiff1d(loose, at(target[triangles[flat]]))
     if len(loose):
         text = f"{counted(len(loose), 'point is', 'points are')} in no face"
         yield Workaround(text, loose, Kind.UNREFERENCED, len(loose))

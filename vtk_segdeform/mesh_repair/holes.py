@@ -21,7 +21,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..mesh import HalfEdges, edge_keys, intersections_of, least_angle, normals
+from ..mesh import HalfEdges, counted, edge_keys, intersections_of, least_angle, normals
+from ..progress import Progress, part, tell
 from .hole_borders import border_loops
 from .lid_refining import Lids, harmonic, joined_twice, refine, split_edges
 from .lids import clip_ears, triangulate_long_loop, triangulate_loops
@@ -77,7 +78,9 @@ class _Scores:
         return np.asarray(fewer_crossings | fewer_flat | rounder)
 
 
-def close_holes(vertices: FloatArray, half_edges: HalfEdges, largest: int) -> Closing:
+def close_holes(
+    vertices: FloatArray, half_edges: HalfEdges, largest: int, progress: Progress | None = None
+) -> Closing:
     """Return lids for the holes of up to *largest* edges.
 
     Parameters
@@ -88,13 +91,15 @@ def close_holes(vertices: FloatArray, half_edges: HalfEdges, largest: int) -> Cl
         Consistently oriented, at most two on each edge.
     largest : int
         Largest number of edges of a hole that is closed.
+    progress : callable, optional
+        Called with the fraction done and a text; may raise to cancel.
     """
     borders = border_loops(vertices, half_edges, largest)
     if not borders:
         none = np.empty((0, 3))
         return Closing([], none, none.astype(int), np.empty((0, _NEAREST), int), none, 0)
     holes = _Holes(vertices, half_edges, borders)
-    return _closing(holes, *_best_lids(holes))
+    return _closing(holes, *_best_lids(holes, progress))
 
 
 class _Holes:
@@ -141,13 +146,14 @@ class _Holes:
         )
 
 
-def _best_lids(holes: _Holes) -> tuple[Lids, _Scores]:
+def _best_lids(holes: _Holes, progress: Progress | None) -> tuple[Lids, _Scores]:
     """Return the best lids found, and their scores."""
-    lids = plain = _least_area(holes)
+    lids = plain = _least_area(holes, part(progress, 0.0, 0.5))
     narrow = _least(holes, lids) < holes.sufficient
     scores = _scores(holes, lids, lids, ~narrow)  # others count as worse than any refined lid
     again = narrow | (scores.crossings > 0)
-    for attempt in (_refined, _clipped, _least_bending, _unrefined):
+    for k, attempt in enumerate((_refined, _clipped, _least_bending, _unrefined)):
+        tell(progress, 0.5 + 0.125 * k, "Refining the lids of holes")
         retried = again & (holes.length > 3)
         if not retried.any():
             break
@@ -167,7 +173,7 @@ def _best_lids(holes: _Holes) -> tuple[Lids, _Scores]:
     return lids, scores
 
 
-def _least_area(holes: _Holes) -> Lids:
+def _least_area(holes: _Holes, progress: Progress | None) -> Lids:
     """Return lids of least area over the corners; fans around a new vertex where none is allowed.
 
     Loops that would share a new edge with an earlier one are triangulated again without it.
@@ -175,9 +181,13 @@ def _least_area(holes: _Holes) -> Lids:
     faces: list[IntArray] = [np.empty((0, 3), int)] * len(holes.length)
     known, todo = holes.known, np.arange(len(holes.length))
     centred: list[int] = []
+    done = 0.0
     while len(todo):
         for n in np.unique(holes.length[todo]):
             some = todo[holes.length[todo] == n]
+            done = max(done, np.count_nonzero(holes.length[todo] < n) / len(todo))
+            message = f"Filling {counted(len(some), 'hole', 'holes')} of {n} edges"
+            tell(progress, done, message)
             triangles, allowed = _over_corners(holes, some, known)
             for loop, lid, good in zip(some.tolist(), triangles, allowed.tolist(), strict=True):
                 faces[loop] = lid + holes.start[loop]

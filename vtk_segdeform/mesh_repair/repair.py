@@ -18,6 +18,7 @@ from ..checks import shown
 from ..errors import ArgumentError, MeshError
 from ..freezing import Frozen
 from ..mesh import UNREPAIRABLE, MeshReport, as_soup, find_faults
+from ..progress import Progress, part, tell
 from . import repair_steps as steps
 
 
@@ -83,6 +84,7 @@ def repair(
     *,
     weld_distance: float = 0.0,
     largest_hole: int = 100,
+    progress: Progress | None = None,
 ) -> Repair:
     """Repair triangles as far as possible without guessing.
 
@@ -97,6 +99,8 @@ def repair(
         are only welded where that closes open edges.
     largest_hole : int
         Holes with more edges than this are not filled; ``open_holes`` has their sizes.
+    progress : callable, optional
+        Called with the fraction done and a text; may raise to cancel.
 
     Raises
     ------
@@ -124,6 +128,7 @@ def repair(
             f"largest_hole must be a number of edges, 0 or more; got {shown(largest_hole)}"
         )
     points, triangles = as_soup(vertices, faces)
+    tell(progress, 0.0, "Searching for faults")
     report = find_faults(points, triangles)
     unrepairable = [
         f"{fault}; {fault.kind.advice}" for fault in report.faults if fault.kind in UNREPAIRABLE
@@ -133,20 +138,22 @@ def repair(
     draft = steps.Draft.of(points, triangles)
     done: list[str] = []
     if not report.is_closed:
-        for step in (
-            steps.remove_non_finite,
-            steps.remove_degenerate,
-            lambda draft: steps.weld(draft, weld_distance),
-            lambda draft: steps.weld_corners(draft, weld_distance),
-            steps.remove_duplicates,
-            steps.remove_unreferenced,
-            steps.split,
-            steps.orient,
-            lambda draft: steps.fill(draft, largest_hole),
-            steps.close_flat,
-            steps.split,
-            steps.orient_outward,
+        filling = part(progress, 0.3, 0.8)
+        for fraction, message, step in (
+            (0.05, "Removing invalid faces", steps.remove_non_finite),
+            (0.05, "Removing invalid faces", steps.remove_degenerate),
+            (0.1, "Welding vertices", lambda draft: steps.weld(draft, weld_distance)),
+            (0.1, "Welding vertices", lambda draft: steps.weld_corners(draft, weld_distance)),
+            (0.15, "Removing duplicate faces", steps.remove_duplicates),
+            (0.15, "Removing duplicate faces", steps.remove_unreferenced),
+            (0.2, "Splitting vertices where surfaces touch", steps.split),
+            (0.25, "Orienting faces", steps.orient),
+            (0.3, "Filling holes", lambda draft: steps.fill(draft, largest_hole, filling)),
+            (0.8, "Closing cracks", steps.close_flat),
+            (0.8, "Splitting vertices where surfaces touch", steps.split),
+            (0.85, "Orienting components outward", steps.orient_outward),
         ):
+            tell(progress, fraction, message)
             draft, sentence = step(draft)
             done += sentence.splitlines()
             if not len(draft.faces):
@@ -154,6 +161,7 @@ def repair(
                     f"no faces are left after these repairs: {'; '.join(done)}; "
                     "check how the mesh was made"
                 )
+        tell(progress, 0.9, "Checking the result")
         report = find_faults(draft.vertices, draft.faces)
     left = steps.remaining_holes(draft, largest_hole) if not report.is_closed else ()
     found = Repair(
@@ -161,4 +169,5 @@ def repair(
         draft.weights, draft.flipped, left,
     )  # fmt: skip
     found.__setstate__(found.__getstate__())  # makes the arrays read-only
+    tell(progress, 1.0, "Repaired")
     return found

@@ -25,6 +25,7 @@ from ..mesh import (
     misoriented_shells,
     repeats_vertex,
 )
+from ..progress import Progress
 from .cracks import close_cracks
 from .hole_borders import border_loops
 from .holes import close_holes
@@ -228,11 +229,11 @@ def orient(draft: Draft) -> tuple[Draft, str]:
     return draft.flip(flip), f"flip {_n(flip, 'face')} to agree with the neighbours"
 
 
-def fill(draft: Draft, largest: int) -> tuple[Draft, str]:
+def fill(draft: Draft, largest: int, progress: Progress | None = None) -> tuple[Draft, str]:
     """Fill holes of up to *largest* edges."""
     if len(draft.half_edges.non_manifold) or draft.half_edges.inconsistent.any():
         return draft, ""
-    closing = close_holes(draft.vertices, draft.half_edges, largest)
+    closing = close_holes(draft.vertices, draft.half_edges, largest, progress)
     sizes, new = closing.sizes, len(closing.vertices)
     if not sizes:
         return draft, ""

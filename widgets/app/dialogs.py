@@ -10,11 +10,10 @@ from typing import Any
 
 from qtpy import QtCore, QtWidgets
 
+from ..editor import READABLE_FILES
 from .autosave import Autosaves, Slot
 
 Qt = QtCore.Qt
-MESHES = "*.ply *.obj *.off *.stl *.vtk *.vtp *.vtkhdf"
-_READ = f"Meshes and sessions (*.segdeform {MESHES} *.vtu *.glb *.gltf);;All files (*)"
 
 
 class Answer(enum.Enum):
@@ -25,11 +24,12 @@ class Answer(enum.Enum):
     CANCEL = enum.auto()
     RECOVER = enum.auto()
     LATER = enum.auto()
+    REPAIR = enum.auto()
 
 
 def ask_file(parent: Any, folder: Path) -> Path | None:
     """Ask for a mesh or a session to open, starting in *folder*."""
-    name, _ = QtWidgets.QFileDialog.getOpenFileName(parent, "Open", str(folder), _READ)
+    name, _ = QtWidgets.QFileDialog.getOpenFileName(parent, "Open", str(folder), READABLE_FILES)
     return Path(name) if name else None
 
 
@@ -90,6 +90,12 @@ def show_error(parent: Any, title: str, text: str) -> None:
     _run(box)
 
 
+def ask_repair_instead(parent: Any, title: str, text: str) -> bool:
+    """Show why a file cannot be opened; return whether to repair it."""
+    answers = {Answer.REPAIR: "Repair and open ...", Answer.CANCEL: "Cancel"}
+    return _ask(parent, title, text, answers) is Answer.REPAIR
+
+
 def show_about(parent: Any, version: str) -> None:
     """Show the About dialog."""
     box = _box(
@@ -122,6 +128,7 @@ def moment(when: datetime, now: datetime) -> str:
 _ROLES = {
     Answer.SAVE: "AcceptRole",
     Answer.RECOVER: "AcceptRole",
+    Answer.REPAIR: "AcceptRole",
     Answer.DISCARD: "DestructiveRole",
     Answer.CANCEL: "RejectRole",
     Answer.LATER: "RejectRole",

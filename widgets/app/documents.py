@@ -8,8 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from vtk_segdeform import models
+from vtk_segdeform.errors import MeshError
+from vtk_segdeform.io import Surface, read_polydata, triangles_of
+from vtk_segdeform.mesh import Mesh, mesh_of
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
@@ -61,12 +67,46 @@ def from_file(path: Path) -> Reader:
     """Return the reader of a mesh file, with all its arrays, or of a session file."""
 
     def read(progress: Progress) -> Opened:
-        session = read_session(path, progress)
         if is_mesh(path):
-            return Document(path.name, source=path), session
-        return Document(path.name, session_path=path), session
+            progress(0.0, "Reading mesh")
+            return Document(path.name, source=path), Session(_surface(path))
+        return Document(path.name, session_path=path), read_session(path, progress)
 
     return read
+
+
+class Unopenable(MeshError):
+    """A surface cannot be deformed as it is, but it can be repaired.
+
+    Attributes
+    ----------
+    given : pyvista.PolyData
+        The surface.
+    valid : Mesh
+        The mesh of its faces with finite coordinates.
+    """
+
+    def __init__(self, text: str, given: Any, valid: Mesh) -> None:
+        super().__init__(text)
+        self.given, self.valid = given, valid
+
+
+def _surface(path: Path) -> Surface:
+    """Read a surface; raise `Unopenable` if there are valid faces beside invalid ones."""
+    given = read_polydata(path)
+    try:
+        return Surface(given)
+    except MeshError as fault:
+        text = f"{path}: {fault}"
+        points = np.array(given.points, dtype=np.float64)
+        is_valid = np.isfinite(points).all(axis=1)
+        triangles = triangles_of(given)
+        points[~is_valid] = 0.0
+        try:
+            valid = mesh_of(points, triangles[is_valid[triangles].all(axis=1)]).mesh
+        except MeshError:
+            raise MeshError(text) from None
+        raise Unopenable(text, given, valid) from None
 
 
 def from_slot(slot: Slot) -> Reader:

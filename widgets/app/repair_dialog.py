@@ -1,7 +1,7 @@
 """The dialog before a repair: the surface before and after, and what each step would do.
 
-Every change of the settings starts the repair again, in another thread; a repair that is no longer
-wanted ends in the background, and its result is dropped.
+Every change of the settings starts the repair again, in another thread.  A repair that is no longer
+wanted stops at its next progress report.
 """
 
 from __future__ import annotations
@@ -9,12 +9,13 @@ from __future__ import annotations
 import gc
 from typing import Any
 
+import numpy as np
 from qtpy import QtCore, QtWidgets
 
-from vtk_segdeform.io import repair_surface
+from vtk_segdeform.io import Surface, repair_surface, to_polydata
 from vtk_segdeform.mesh import Mesh, counted
 from vtk_segdeform.mesh_repair import Repair
-from vtk_segdeform.progress import Progress
+from vtk_segdeform.progress import Progress, part
 
 from ..editor import Job, error_text
 from .qt_timer import qt_timer
@@ -24,7 +25,7 @@ _DELAY = 300  # milliseconds between a change of the settings and the repair
 _PERIOD = 30  # milliseconds between two polls of the job
 _MOST_EDGES, _USUAL_EDGES = 1_000_000, 100
 _DELETE = QtCore.QEvent.Type.DeferredDelete
-_Result = tuple[Any, Repair]  # the surface is a pyvista.PolyData
+_Result = tuple[Surface, Repair]
 
 
 class RepairDialog(QtWidgets.QDialog):
@@ -35,25 +36,26 @@ class RepairDialog(QtWidgets.QDialog):
     given : pyvista.PolyData
         The surface; not changed.
     mesh : Mesh
-        The mesh of it, whose borders are outlined.
-    camera : vtkCamera
+        The mesh of it, or of its valid faces; its borders are outlined.
+    camera : vtkCamera or None
         Where to look from at first.
     parent : QWidget
         The window of the document.
 
     Attributes
     ----------
-    repaired : pyvista.PolyData or None
+    repaired : Surface or None
         The result, once it has been computed.
     """
 
     def __init__(self, given: Any, mesh: Mesh, camera: Any, parent: Any) -> None:
         super().__init__(parent)
         self.setWindowTitle("Repair and open")
-        self.repaired: Any = None
+        self.repaired: Surface | None = None
         self._given = given
         self._job: Job[_Result] | None = None
-        self.preview = Preview(given, mesh, camera, self)
+        shown = given if np.isfinite(given.points).all() else to_polydata(mesh)
+        self.preview = Preview(shown, mesh, camera, self)
         self.before, self.after = (QtWidgets.QRadioButton(text) for text in ("Before", "After"))
         self.before.setChecked(True)
         self.after.setEnabled(False)
@@ -73,12 +75,13 @@ class RepairDialog(QtWidgets.QDialog):
         self.steps = QtWidgets.QListWidget()
         self.steps.setWordWrap(True)
         self.steps.setSelectionMode(QtWidgets.QAbstractItemView.SelectionMode.NoSelection)
-        self.bar = QtWidgets.QProgressBar()
-        self.bar.setRange(0, 0)
+        self.bar, self.stage = QtWidgets.QProgressBar(), QtWidgets.QLabel()
         self.bar.setTextVisible(False)
-        policy = self.bar.sizePolicy()
-        policy.setRetainSizeWhenHidden(True)
-        self.bar.setSizePolicy(policy)
+        for each in (self.bar, self.stage):
+            policy = each.sizePolicy()
+            policy.setRetainSizeWhenHidden(True)
+            each.setSizePolicy(policy)
+        self.stage.setWordWrap(True)
         roles = QtWidgets.QDialogButtonBox.ButtonRole
         buttons = QtWidgets.QDialogButtonBox()
         self.accepting = buttons.addButton("Open repaired", roles.AcceptRole)
@@ -101,7 +104,7 @@ class RepairDialog(QtWidgets.QDialog):
         return self._job is not None or bool(self._delay.isActive())
 
     def release(self) -> None:
-        """Drop a repair that is still running, and delete the dialog with its view."""
+        """Cancel a repair that is still running, and delete the dialog with its view."""
         self._delay.stop()
         self._cancel()
         self.preview.close()
@@ -122,6 +125,7 @@ class RepairDialog(QtWidgets.QDialog):
         side.addLayout(settings)
         side.addWidget(QtWidgets.QLabel("Steps"))
         side.addWidget(self.steps, 1)
+        side.addWidget(self.stage)
         side.addWidget(self.bar)
         side.addWidget(buttons)
         view = QtWidgets.QVBoxLayout()
@@ -149,8 +153,11 @@ class RepairDialog(QtWidgets.QDialog):
         largest = self.edges.value() if self.fill.isChecked() else 0
 
         def work(progress: Progress) -> _Result:
-            progress(0.0, "Repairing")
-            return repair_surface(given, weld_distance=weld, largest_hole=largest)
+            repaired, done = repair_surface(
+                given, weld_distance=weld, largest_hole=largest, progress=part(progress, 0.0, 0.9)
+            )
+            progress(0.9, "Checking mesh")
+            return Surface(repaired), done
 
         self._show_busy()
         job: Job[_Result] = Job(
@@ -158,6 +165,7 @@ class RepairDialog(QtWidgets.QDialog):
             work,
             done=lambda result: self._show(*result) if self._is_wanted(job) else None,
             failed=lambda error: self._fail(error) if self._is_wanted(job) else None,
+            watch=lambda job: self._show_progress(job) if self._is_wanted(job) else None,
         )
         self._job = job
 
@@ -166,13 +174,28 @@ class RepairDialog(QtWidgets.QDialog):
 
     def _show_busy(self) -> None:
         self.repaired = None
-        self.bar.show()
+        self._set_progress(0.0, "")
+        for each in (self.bar, self.stage):
+            each.show()
         self.accepting.setEnabled(False)
 
-    def _show(self, repaired: Any, done: Repair) -> None:
-        self._job, self.repaired = None, repaired
-        self.bar.hide()
+    def _show_progress(self, job: Job[_Result]) -> None:
+        self._set_progress(job.fraction, job.text)
+
+    def _set_progress(self, fraction: float, text: str) -> None:
+        self.bar.setRange(0, 1000 if fraction else 0)  # an unknown fraction shows a busy bar
+        self.bar.setValue(round(1000.0 * fraction))
+        self.stage.setText(text)
+
+    def _end(self) -> None:
+        self._job = None
+        for each in (self.bar, self.stage):
+            each.hide()
         self.steps.clear()
+
+    def _show(self, repaired: Surface, done: Repair) -> None:
+        self._end()
+        self.repaired = repaired
         self.steps.addItems([f"{step[:1].upper()}{step[1:]}" for step in done.steps])
         if not done.steps:
             self.steps.addItem("Nothing to repair with these settings")
@@ -186,9 +209,7 @@ class RepairDialog(QtWidgets.QDialog):
             self.after.setChecked(True)
 
     def _fail(self, error: BaseException) -> None:
-        self._job = None
-        self.bar.hide()
-        self.steps.clear()
+        self._end()
         self.steps.addItem(error_text(error))
         self.before.setChecked(True)
         self.after.setEnabled(False)

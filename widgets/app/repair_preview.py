@@ -26,7 +26,7 @@ class Preview:
         The surface before.
     mesh : Mesh
         The mesh of it, whose borders are outlined.
-    camera : vtkCamera
+    camera : vtkCamera or None
         Where to look from at first.
     parent : QWidget
         The parent of the view.
@@ -47,10 +47,11 @@ class Preview:
         self._is_after = False
         self._marks = Highlights(View.of(self.plotter))
         self._outline()
-        mine = self.plotter.camera
-        mine.SetPosition(*camera.GetPosition())
-        mine.SetFocalPoint(*camera.GetFocalPoint())
-        mine.SetViewUp(*camera.GetViewUp())
+        if camera is not None:
+            mine = self.plotter.camera
+            mine.SetPosition(*camera.GetPosition())
+            mine.SetFocalPoint(*camera.GetFocalPoint())
+            mine.SetViewUp(*camera.GetViewUp())
         self.plotter.reset_camera()
 
     def set_result(self, done: Repair) -> None:

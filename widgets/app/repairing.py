@@ -1,6 +1,7 @@
 """Repair and open: a closed copy of the document's surface, as a new document.
 
-Nothing on disk changes, and the original document stays in the list of recent files.
+Also for a file that cannot be opened as it is.  Nothing on disk changes, and the original document
+stays in the list of recent files.
 """
 
 from __future__ import annotations
@@ -9,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from vtk_segdeform.io import Surface, to_polydata
+from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
-from .documents import Document, Opened
+from .documents import Document, Opened, Unopenable
 from .opening import Request
 from .repair_dialog import RepairDialog
 
@@ -22,25 +24,34 @@ def ask_repair(window: Any) -> Request | None:
     session = window.session
     surface = session.surface
     given = to_polydata(session.mesh) if surface is None else surface.given
-    dialog = RepairDialog(given, session.mesh, window.editor.view.camera, window)
+    camera = window.editor.view.camera
+    return _ask(window, window.document, given, session.mesh, camera)
+
+
+def ask_repair_of(window: Any, path: Path, error: Unopenable) -> Request | None:
+    """Do `ask_repair` for a file that could not be opened."""
+    return _ask(window, Document(path.name, source=path), error.given, error.valid, None)
+
+
+def _ask(window: Any, document: Document, given: Any, mesh: Mesh, camera: Any) -> Request | None:
+    dialog = RepairDialog(given, mesh, camera, window)
     try:
         is_accepted = dialog.exec() == dialog.DialogCode.Accepted
         repaired = dialog.repaired if is_accepted else None
     finally:
         dialog.release()
-    return None if repaired is None else _request(window.document, repaired)
+    return None if repaired is None else _request(document, repaired)
 
 
-def _request(document: Document, repaired: Any) -> Request:
+def _request(document: Document, repaired: Surface) -> Request:
     stem = Path(document.name).stem.removesuffix(" (repaired)")
     name = f"{stem} (repaired)"
     source = document.source
 
     def read(progress: Progress) -> Opened:
-        progress(0.0, "Checking mesh")
-        session = Session(Surface(repaired))
+        progress(0.0, "Opening the repaired surface")
         # Files are proposed beside the original, under the new name.
         place = None if source is None else source.with_stem(name)
-        return Document(name, source=place), session
+        return Document(name, source=place), Session(repaired)
 
     return Request(name, read, is_new=True)

@@ -15,8 +15,8 @@ from qtpy import QtCore, QtWidgets
 from vtk_segdeform.errors import SessionError
 from vtk_segdeform.files import replacing
 
-from ..editor import Action, Controller, error_text, exporting, saving
-from .dialogs import MESHES, Answer, ask_replace, ask_save, show_error
+from ..editor import MESH_FILES, Action, Controller, error_text, exporting, saving
+from .dialogs import Answer, ask_replace, ask_save, show_error
 from .documents import SUFFIX
 
 _SESSIONS = f"Sessions (*{SUFFIX})"
@@ -60,7 +60,7 @@ def save_mesh_as(window: Any) -> bool:
     """Ask for a file and save the posed mesh there, in the format of its suffix."""
     source = window.document.source
     suffix = ".ply" if source is None else source.suffix
-    path = _path(window, "Save mesh", f"Meshes ({MESHES})", suffix)
+    path = _path(window, "Save mesh", MESH_FILES, suffix)
     if path is None or not _done(window, exporting(path)):
         return False
     window.set_document(replace(window.document, mesh_path=path))

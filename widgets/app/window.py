@@ -22,15 +22,23 @@ from ..editor import DeformEditor, Job
 from ..qt import DeformWidget
 from .autosave import Autosaves, Slot
 from .autosaver import INTERVAL, Autosaver, stops_of
-from .dialogs import ask_file, choose_work, show_error
-from .documents import Document, Opened, from_file, from_slot, opening_error, sample_model
+from .dialogs import ask_file, ask_repair_instead, choose_work, show_error
+from .documents import (
+    Document,
+    Opened,
+    Unopenable,
+    from_file,
+    from_slot,
+    opening_error,
+    sample_model,
+)
 from .drops import Drops
 from .menus import Menus, connect_panel
 from .opening import Request
 from .pages import Pages
 from .qt_timer import qt_timer
 from .recent import Recent
-from .repairing import ask_repair
+from .repairing import ask_repair, ask_repair_of
 from .saving import may_discard
 
 _SIZE = 1200, 800
@@ -183,7 +191,7 @@ class Window(QtWidgets.QMainWindow):
             qt_timer(self, _PERIOD),
             request.reader,
             done=lambda opened: self._opened(request, opened),
-            failed=lambda error: self._failed(request, opening_error(error)),
+            failed=lambda error: self._failed(request, error),
             watch=self._show_progress,
         )
         self._show_page()
@@ -215,12 +223,19 @@ class Window(QtWidgets.QMainWindow):
         if request.slot is not None:
             self._say("Recovered (unsaved)")
 
-    def _failed(self, request: Request, text: str) -> None:
+    def _failed(self, request: Request, error: BaseException) -> None:
         self._cancel_opening()
-        if request.path is not None and not os.path.exists(request.path):
-            self.recent.drop(request.path)
+        path = request.path
+        if path is not None and not os.path.exists(path):
+            self.recent.drop(path)
         self._show_page()
-        show_error(self, f"Could not open {request.name}", text)
+        title, text = f"Could not open {request.name}", opening_error(error)
+        if path is None or not isinstance(error, Unopenable):
+            show_error(self, title, text)
+        elif ask_repair_instead(self, title, text):
+            repairing = ask_repair_of(self, path, error)
+            if repairing is not None:
+                self._open(repairing)
 
     def _cancel_opening(self) -> None:
         """Cancel; the job stops at its next progress report and is not waited for."""

@@ -43,9 +43,11 @@ from .panel_actions import (
     showing_cage,
     with_radius,
 )
-from .session_file import SessionFile, is_mesh, read_session
+from .session_file import MESH_FILES, READABLE_FILES, SessionFile, is_mesh, read_session
 
 __all__ = [
+    "MESH_FILES",
+    "READABLE_FILES",
     "Action",
     "Controller",
     "DeformEditor",

@@ -1,6 +1,6 @@
 """Notices: how the mesh that is deformed differs from what was given, and where.
 
-    12 holes: volume preserved under lids; welded 242 seam points    [Show] [x]
+    12 holes: volume kept under lids; welded 242 seam points    [Show] [x]
 
 The line is drawn at the lower left of a view, above the status line.  A click on Show marks the
 places on the model, a second one removes the marks; x closes the line.  It also disappears with the

@@ -9,6 +9,10 @@ from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session, load_session, save_session
 
 _SUFFIX = ".segdeform"
+_MESHES = "*.ply *.obj *.off *.stl *.glb *.gltf *.vtk *.vtp *.vtu *.vtkhdf"
+# Types of files in dialogs.
+MESH_FILES = f"Meshes ({_MESHES})"
+READABLE_FILES = f"Meshes and sessions (*{_SUFFIX} {_MESHES});;All files (*)"
 
 
 class SessionFile:

@@ -7,12 +7,19 @@ from typing import Any
 
 from qtpy import QtWidgets
 
-from ..editor import DeformEditor, Mode, exporting, opening, save, saving
+from ..editor import (
+    MESH_FILES,
+    READABLE_FILES,
+    DeformEditor,
+    Mode,
+    exporting,
+    opening,
+    save,
+    saving,
+)
 from .controls import choice_button, column, key_button, push_button, put, row
 
 _SESSIONS = "Sessions (*.segdeform)"
-_MESHES = "*.obj *.off *.ply *.stl *.vtk *.vtp *.vtkhdf"
-_READ = f"Meshes and sessions (*.segdeform {_MESHES} *.vtu *.glb *.gltf);;All files (*)"
 
 
 class Toolbar(QtWidgets.QWidget):
@@ -68,7 +75,9 @@ class Toolbar(QtWidgets.QWidget):
 
     def ask_and_open(self) -> None:
         """Ask for a file and open it."""
-        path, _ = QtWidgets.QFileDialog.getOpenFileName(self, "Open", self._folder(), _READ)
+        path, _ = QtWidgets.QFileDialog.getOpenFileName(
+            self, "Open", self._folder(), READABLE_FILES
+        )
         if path and self.may_discard():
             self._editor.do(opening(Path(path)))
 
@@ -100,7 +109,7 @@ class Toolbar(QtWidgets.QWidget):
     def ask_and_export(self) -> None:
         """Ask for a file and write the posed mesh there."""
         proposed = str(self._editor.path.with_suffix(".ply"))
-        path = self._path_to_write("Save mesh", proposed, f"Meshes ({_MESHES})")
+        path = self._path_to_write("Save mesh", proposed, MESH_FILES)
         if path is not None:
             self._editor.do(exporting(path if path.suffix else path.with_suffix(".ply")))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import threading
 
 import numpy as np
 import pytest
@@ -116,7 +117,7 @@ def soup():
 @pytest.mark.parametrize(
     ("given", "name", "text"),
     [
-        (bottle, "bottle.ply", "12 holes: volume preserved under lids"),
+        (bottle, "bottle.ply", "12 holes: volume kept under lids"),
         (lambda: sheet(6), "sheet.obj", "Open sheet: no volume to preserve"),
         (split_at_seam, "seam.ply", "Welded 64 seam points"),
         (soup, "soup.stl", ""),
@@ -271,3 +272,85 @@ def test_a_surface_that_cannot_be_repaired_says_why(hand, tmp_path, monkeypatch)
         assert not dialog.after.isEnabled()
 
     repair(hand, read)
+
+
+def with_invalid_points():
+    """Return a ball with coordinates that are no numbers, at two of its vertices."""
+    ball = split_at_seam(2)
+    ball.points[[3, 40]] = np.nan
+    return ball
+
+
+def test_a_file_with_invalid_points_is_repaired_and_opened(hand, boxes, tmp_path):
+    with_invalid_points().save(tmp_path / "ball.ply")
+    boxes.answers.append("Repair and open ...")
+
+    def accept(dialog):
+        assert lines(dialog)[0].startswith("Remove 2 vertices with NaN")
+        click(dialog.before)
+        picture = np.asarray(dialog.preview.plotter.screenshot())
+        assert len(np.unique(picture.reshape(-1, picture.shape[-1]), axis=0)) > 50  # shades
+        click(dialog.accepting)
+
+    reader = Reader(accept)
+    hand.window.open(tmp_path / "ball.ply")
+    until(lambda: hand.window.has_mesh, "the repaired file")
+    hand.settle()
+    reader.check()
+    assert hand.title == "ball (repaired)* - segdeform"
+    assert hand.window.session.mesh.is_closed
+    assert "NaN" in boxes.seen[0]
+
+
+def test_repair_is_not_offered_where_it_cannot_help(hand, boxes, tmp_path):
+    points = np.outer(np.arange(3.0), [1.0, 0.0, 0.0])  # in a line
+    polydata(points, [[0, 1, 2]]).save(tmp_path / "line.ply")
+    given = with_invalid_points()
+    given.points[:] = np.nan
+    given.save(tmp_path / "nan.ply")
+    (tmp_path / "damaged.ply").write_bytes(b"ply\nformat")
+    for name in ("line", "nan", "damaged"):
+        boxes.answers.append("OK")  # the only button
+        hand.window.open(tmp_path / f"{name}.ply")
+        hand.settle()
+    assert not hand.window.has_mesh
+
+
+def test_declining_a_repair_keeps_the_open_document(hand, boxes, tmp_path):
+    path = opened(hand, bottle(2), tmp_path / "bottle.ply")
+    with_invalid_points().save(tmp_path / "ball.ply")
+    boxes.answers.append("Cancel")
+    hand.window.open(tmp_path / "ball.ply")
+    hand.settle()
+    assert hand.title == f"{path.name} - segdeform"
+
+
+def test_the_dialog_shows_the_progress_and_a_cancelled_repair_stops(hand, tmp_path, monkeypatch):
+    opened(hand, bottle(2), tmp_path / "bottle.ply")
+    ended = threading.Event()
+
+    def work_for_long(*_, progress, **__):
+        try:
+            for k in range(10_000):
+                progress(0.4, "Filling 2 holes of 6 edges")
+                ended.wait(0.002)
+                assert k < 9_000
+        finally:
+            ended.set()
+
+    monkeypatch.setattr("vtk_segdeform.widgets.app.repair_dialog.repair_surface", work_for_long)
+
+    def watch():
+        dialog = application().activeModalWidget()
+        if isinstance(dialog, RepairDialog) and dialog.stage.text():
+            shown.append((dialog.stage.text(), dialog.bar.value() / dialog.bar.maximum()))
+            click(dialog.cancelling)
+        else:
+            QtCore.QTimer.singleShot(5, watch)
+
+    shown = []
+    QtCore.QTimer.singleShot(5, watch)
+    hand.choose("File", "Repair and open")
+    assert shown == [("Filling 2 holes of 6 edges", 0.36)]
+    until(ended.is_set, "the end of the repair")
+    assert hand.title == "bottle.ply - segdeform"

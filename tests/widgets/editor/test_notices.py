@@ -77,10 +77,10 @@ def two_parts():
 @pytest.mark.parametrize(
     ("given", "text"),
     [
-        (lambda: bottle(12), "12 holes: volume preserved under lids"),
-        (lambda: bottle(1, 3), "1 hole: volume preserved under its lid"),
+        (lambda: bottle(12), "12 holes: volume kept under lids"),
+        (lambda: bottle(1, 3), "1 hole: volume kept under a lid"),
         (lambda: sheet(8), "Open sheet: no volume to preserve"),
-        (two_parts, "3 holes: volume preserved under lids; 1 open sheet has no volume"),
+        (two_parts, "3 holes: volume kept under lids; 1 open sheet has no volume"),
     ],
 )
 def test_borders_are_counted_and_what_happens_to_the_volume_is_said(given, text):
@@ -239,9 +239,7 @@ def test_the_back_of_a_sheet_is_lit_as_its_front(open_editor):
 def test_a_mesh_without_a_surface_has_notices_of_its_borders():
     given = bottle(2)
     mesh = Mesh(given.points, given.regular_faces)
-    assert [each.text for each in notices_of(Session(mesh))] == [
-        "2 holes: volume preserved under lids"
-    ]
+    assert [each.text for each in notices_of(Session(mesh))] == ["2 holes: volume kept under lids"]
 
 
 def test_marks_follow_the_pose(open_editor):

@@ -66,7 +66,7 @@ def test_lids_are_chosen_for_an_open_surface_and_undone(make):
     notices = seen.editor.controller.notices
     assert seen.part.lids.isEnabled()
     assert seen.part.lids.currentText() == "Auto"
-    assert notices.text == "3 holes: volume preserved under lids"
+    assert notices.text == "3 holes: volume kept under lids"
     assert seen.part.volume.text() == "0 %"
     seen.choose("Off")
     assert seen.session.options.lids is False
