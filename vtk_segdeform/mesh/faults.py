@@ -20,7 +20,7 @@ from ..kernels import in_parallel
 from .grouping import connected, first_equal_row
 from .report import Fault, Id, Kind, MeshReport, counted
 from .shells import closed_shells, shell_faults
-from .topology import HalfEdges, repeats_face, repeats_vertex
+from .topology import HalfEdges, repeats_vertex
 from .triangles import corner_columns, cross, norm
 
 UNREPAIRABLE = (Kind.EMPTY, Kind.BAD_INDEX, Kind.TOO_LARGE, Kind.TOO_SMALL, Kind.FLAT)
@@ -70,6 +70,13 @@ class Search:
     points: FloatArray
     triangles: IntArray
 
+    @classmethod
+    def known(cls, points: FloatArray, half_edges: HalfEdges) -> Search:
+        """Return the search of the faces of *half_edges*, none degenerate or duplicate."""
+        search, none = cls(points, half_edges.faces), np.zeros(len(half_edges.faces), dtype=bool)
+        search.__dict__["_distinct"] = none, none, half_edges
+        return search
+
     @cached_property
     def number_faults(self) -> tuple[Fault, ...]:
         """Faults of coordinates and indices; nothing else is computed if some are unrepairable."""
@@ -117,7 +124,7 @@ class Search:
         if not any(fault.kind in UNREPAIRABLE for fault in found):
             n_components = int(self.half_edges.shells.max(initial=-1)) + 1
             found += _some(Kind.DEGENERATE, np.flatnonzero(self.degenerate))
-            found += _some(Kind.DUPLICATE_FACE, np.flatnonzero(self.duplicate & ~self.degenerate))
+            found += _some(Kind.DUPLICATE_FACE, np.flatnonzero(self.duplicate))
             if self.all_flat and not self.degenerate.all():
                 found.append(Fault(Kind.FLAT, 1))
             found += _some(Kind.ZERO_AREA, self.flat[~self.degenerate[self.flat]])
@@ -219,20 +226,16 @@ def _finite(points: FloatArray) -> BoolArray:
 
 
 def distinct_faces(faces: IntArray, n_vertices: int) -> tuple[BoolArray, BoolArray, HalfEdges]:
-    """Return which faces are degenerate, which repeat an earlier face, and the others' half-edges.
+    """Return which faces are degenerate, which repeat an earlier one, and the others' half-edges.
 
-    Two faces on the same three vertices share three edges.  If every edge has two faces, a face
-    can therefore only be a duplicate if two of its neighbours are the same face.
+    No face is both.
     """
-    degenerate = repeats_vertex(faces)
-    if not degenerate.any():
-        half_edges = HalfEdges(faces, n_vertices)
-        if half_edges.neighbours is not None:
-            one, other, _ = half_edges.neighbours.T
-            if not (one == other).any():
-                return degenerate, degenerate, half_edges
-    duplicate = repeats_face(faces)
-    return degenerate, duplicate, HalfEdges(faces[~degenerate & ~duplicate], n_vertices)
+    degenerate, duplicate = repeats_vertex(faces), np.zeros(len(faces), dtype=bool)
+    half_edges = HalfEdges(faces[~degenerate] if degenerate.any() else faces, n_vertices)
+    if half_edges.repeated.any():
+        duplicate[~degenerate] = half_edges.repeated
+        half_edges = HalfEdges(faces[~degenerate & ~duplicate], n_vertices)
+    return degenerate, duplicate, half_edges
 
 
 def _flat_faces(points: FloatArray, faces: IntArray) -> IntArray:

@@ -136,8 +136,7 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
     found = Search(valid, triangles)
     _require_usable(found)
     if found.half_edges.twin is not None and found.report.is_closed:
-        mesh = Mesh.reported(points, triangles, found.report)
-        return Soup(points, mesh, np.arange(len(points)))
+        return Soup(points, Mesh.of(found), np.arange(len(points)))
     target, kept, half_edges = _welded(valid, found)
     without_area = _without_area(found, kept, half_edges)
     flat = kept[without_area]
@@ -148,13 +147,15 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
     left = np.zeros(len(points), dtype=bool)
     left[half_edges.faces] = True
     number = np.cumsum(left) - 1
-    triangles_left = half_edges.faces
     if flip.any():
-        triangles_left = np.where(flip[:, None], triangles_left[:, [0, 2, 1]], triangles_left)
-    if left.all() and len(kept) == len(triangles) and not flip.any():
-        mesh = Mesh.reported(points, triangles, found.report)
+        faces_left = half_edges.faces
+        faces_left = np.where(flip[:, None], faces_left[:, [0, 2, 1]], faces_left)
+        mesh = Mesh(points[left], number[faces_left])
+    elif half_edges is found.half_edges and len(kept) == len(triangles) and left.all():
+        mesh = Mesh.of(found)
     else:
-        mesh = Mesh(points[left], number[triangles_left])
+        kept_edges = half_edges.renumbered(number, int(left.sum()))
+        mesh = Mesh.of(Search.known(points[left], kept_edges))
     loose = np.flatnonzero(~left[target])
     vertex_of = number[target]
     vertex_of[loose] = _nearest(points[loose], mesh.vertices)
@@ -177,25 +178,28 @@ def _welded(points: FloatArray, found: Search) -> tuple[IntArray, IntArray, Half
     """Return the point that each point (p,) is welded to, the faces kept, and their half-edges."""
     target, half_edges = np.arange(len(points)), found.half_edges
     kept = np.flatnonzero(~found.degenerate & ~found.duplicate)
-    while True:  # a face that is dropped may leave a border
+    while len(half_edges.boundary):  # a face that is dropped may leave a border
         weld = _coinciding_sheets(half_edges, found.first_at)
         weld[half_edges.tail[half_edges.boundary]] = True
         weld[half_edges.head[half_edges.boundary]] = True
         some = np.flatnonzero(weld)
-        first = some[first_equal_row(points[some])]
+        place, first_there = found.first_at[some], np.empty(len(points), dtype=np.int64)
+        first_there[place[::-1]] = some[::-1]  # the last write wins
+        first = first_there[place]
         if (first == some).all():
-            return target, kept, half_edges
+            break
         number = np.arange(len(points))
         number[some] = first
         target = number[target]
         degenerate, duplicate, half_edges = distinct_faces(number[half_edges.faces], len(points))
         kept = kept[~degenerate & ~duplicate]
+    return target, kept, half_edges
 
 
 def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
     """Return the vertices (p,) of faces of open shells with all positions of another such face."""
     found = np.zeros(len(first_at), dtype=bool)
-    if not len(half_edges.boundary) or (first_at == np.arange(len(first_at))).all():
+    if (first_at == np.arange(len(first_at))).all():
         return found
     used = np.zeros_like(found)
     used[half_edges.faces] = True
@@ -203,6 +207,8 @@ def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
     border = np.zeros_like(found)
     border[half_edges.tail[half_edges.boundary]] = True
     border[half_edges.head[half_edges.boundary]] = True
+    if border[used].all():
+        return found
     shells = half_edges.shells
     is_open = np.zeros(int(shells.max()) + 1, dtype=bool)
     is_open[shells[half_edges.boundary // 3]] = True
