@@ -6,6 +6,7 @@ import functools
 import os
 import sys
 from collections.abc import Iterator
+from typing import Any
 
 # Set before numpy, scipy and VTK are imported, because they read these variables once.  More
 # threads than cores slow the workers down, and another order of summation changes last digits.
@@ -23,6 +24,7 @@ import pytest  # noqa: E402
 import pyvista as pv  # noqa: E402 - reads the variables above
 
 from vtk_segdeform import models  # noqa: E402
+from vtk_segdeform.deformer import deformer  # noqa: E402
 from vtk_segdeform.io import isolated, reading_child  # noqa: E402
 
 pv.global_theme.multi_samples = 1  # multisampling makes software rendering five times slower
@@ -51,4 +53,21 @@ def vtk_in_process() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(isolated, "_exit_code", here)
+        yield
+
+
+@pytest.fixture(scope="module")
+def bound_once() -> Iterator[None]:
+    """Bind equal meshes, regions and cages once: for tests of poses, not of binding."""
+    known: dict[str, Any] = {}
+    bind = deformer.cached_binding
+
+    def bound(inputs: Any, folder: Any, progress: Any = None) -> Any:
+        key = inputs.digest()
+        if key not in known:
+            known[key] = bind(inputs, folder, progress)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(deformer, "cached_binding", bound)
         yield

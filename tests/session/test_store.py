@@ -27,6 +27,7 @@ from vtk_segdeform.session.state import Options, State
 from vtk_segdeform.session.store import load_session, save_session
 
 ROOT = Path(__file__).resolve().parents[2]
+pytestmark = pytest.mark.usefixtures("bound_once")
 SCENE = sausage(2)
 
 
