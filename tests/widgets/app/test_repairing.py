@@ -342,13 +342,14 @@ def test_the_dialog_shows_the_progress_and_a_cancelled_repair_stops(hand, tmp_pa
 
     monkeypatch.setattr("vtk_segdeform.widgets.app.repair_dialog.repair_surface", work_for_long)
 
-    def watch():
+    def watch(times_left=1000):
         dialog = application().activeModalWidget()
-        if isinstance(dialog, RepairDialog) and dialog.stage.text():
-            shown.append((dialog.stage.text(), dialog.bar.value() / dialog.bar.maximum()))
+        is_open = isinstance(dialog, RepairDialog)
+        if is_open and (dialog.stage.text() or not times_left):
+            shown.append((dialog.stage.text(), dialog.bar.value() / max(dialog.bar.maximum(), 1)))
             click(dialog.cancelling)
         else:
-            QtCore.QTimer.singleShot(5, watch)
+            QtCore.QTimer.singleShot(5, lambda: watch(times_left - is_open))
 
     shown = []
     QtCore.QTimer.singleShot(5, watch)
