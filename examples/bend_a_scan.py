@@ -8,7 +8,7 @@ points, cells and arrays, and the volume under lids over the holes is preserved.
 
     python examples/bend_a_scan.py FOLDER
 
-writes both surfaces.
+writes both surfaces and a picture.
 """
 
 import sys
@@ -27,7 +27,9 @@ grid = pv.StructuredGrid(radius * np.cos(angle), -radius * np.sin(angle), 3.0 * 
 scan = grid.extract_surface(algorithm=None, pass_pointid=False, pass_cellid=False)
 scan.active_texture_coordinates = np.stack([u.T.ravel(), v.T.ravel()], axis=1)
 scan.point_data["temperature"] = 20.0 + scan.points[:, 2]
-scan = scan.remove_cells([500, 501, 532, 533, 1200, 1201, 1700])
+for place in ([0.0, -0.3, 2.2], [-0.2, -0.2, 1.0]):
+    centres = scan.cell_centers().points
+    scan = scan.remove_cells(np.linalg.norm(centres - place, axis=1) < 0.17)
 
 surface = sd.Surface(scan)
 for workaround in surface.workarounds:
@@ -49,3 +51,14 @@ if len(sys.argv) > 1:
     folder.mkdir(parents=True, exist_ok=True)
     scan.save(folder / "scan.vtp")
     bent.save(folder / "bent.vtp")
+    plotter = pv.Plotter(shape=(1, 2), off_screen=True, border=False, window_size=(720, 480))
+    plotter.set_background("white", all_renderers=True)
+    for column, shown in enumerate((scan, bent)):
+        plotter.subplot(0, column)
+        plotter.add_mesh(
+            shown, color="#f0d9b5", show_edges=True, backface_params={"color": "#3d6b8f"}
+        )
+    plotter.link_views()
+    plotter.camera_position = [(-1.4, -6.0, 3.2), (0.35, 0.0, 1.45), (0.0, 0.0, 1.0)]
+    plotter.screenshot(folder / "scan-and-bent.png")
+    plotter.close()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import functools
 import os
 import sys
+from collections.abc import Iterator
+from typing import Any
 
 # Set before numpy, scipy and VTK are imported, because they read these variables once.  More
 # threads than cores slow the workers down, and another order of summation changes last digits.
@@ -22,6 +24,8 @@ import pytest  # noqa: E402
 import pyvista as pv  # noqa: E402 - reads the variables above
 
 from vtk_segdeform import models  # noqa: E402
+from vtk_segdeform.deformer import deformer  # noqa: E402
+from vtk_segdeform.io import isolated, reading_child  # noqa: E402
 
 pv.global_theme.multi_samples = 1  # multisampling makes software rendering five times slower
 
@@ -33,3 +37,37 @@ def cached_models(monkeypatch: pytest.MonkeyPatch) -> None:
     """Create each cactus and dinosaur once per process; meshes are immutable."""
     for name, cached in _MODELS.items():
         monkeypatch.setattr(models, name, cached)
+
+
+@pytest.fixture(scope="module")
+def vtk_in_process() -> Iterator[None]:
+    """Read files of VTK in this process: for tests of contents, it saves 0.2 s for each file."""
+    outside = isolated._exit_code
+
+    def here(arguments: list[str], folder: str, seconds: float) -> int:
+        tool, path, results, _ = arguments[-4:]
+        if tool != "vtk":
+            return outside(arguments, folder, seconds)
+        reading_child.main(tool, path, results, "0")
+        return 0
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(isolated, "_exit_code", here)
+        yield
+
+
+@pytest.fixture(scope="module")
+def bound_once() -> Iterator[None]:
+    """Bind equal meshes, regions and cages once: for tests of poses, not of binding."""
+    known: dict[str, Any] = {}
+    bind = deformer.cached_binding
+
+    def bound(inputs: Any, folder: Any, progress: Any = None) -> Any:
+        key = inputs.digest()
+        if key not in known:
+            known[key] = bind(inputs, folder, progress)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(deformer, "cached_binding", bound)
+        yield

@@ -1,4 +1,4 @@
-"""Deform dense closed meshes by dragging handles, with fine detail and exact volume preserved.
+"""Deform dense meshes by dragging handles, with fine detail and exact volume preserved.
 
     import vtk_segdeform as sd
 

@@ -13,7 +13,7 @@ class ArgumentError(SegDeformError, ValueError):
 
 
 class MeshError(SegDeformError, ValueError):
-    """The mesh is not a closed, outward oriented two-manifold; the message names each fault."""
+    """The mesh is not oriented, has bad faces or coordinates; the message names each fault."""
 
 
 class RegionError(SegDeformError, ValueError):

@@ -11,9 +11,12 @@ from given_surfaces import GIVEN, holed, parts, require_only_moved, tube
 from numpy.testing import assert_allclose, assert_array_equal
 
 from vtk_segdeform.cli.main import main
+from vtk_segdeform.geometry import lids_of
+from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io import Surface, read_polydata, write_mesh
 from vtk_segdeform.models import sphere
 
+pytestmark = pytest.mark.usefixtures("vtk_in_process")
 QUICK = ["--regions", "1", "--cage-vertices", "40"]
 OF_PARTS = ["--regions", "3", "--cage-vertices", "90"]
 BEND = ["--fixed", "z<15%", "--handle", "z>85%", "--translate", "0.4,0,0", *QUICK]
@@ -43,7 +46,20 @@ def test_deform_writes_what_was_given_only_moved(name, tmp_path, capsys):
     printed = capsys.readouterr().out
     for workaround in surface.workarounds:
         assert str(workaround) in printed or "hole" in str(workaround)
-    assert ("volume          preserved under" in printed) == (not surface.mesh.is_closed)
+    assert ("volume kept under lids" in printed) == (not surface.mesh.is_closed)
+
+
+@pytest.mark.parametrize(("lids", "words"), [("on", "4 holes: volume kept"), ("off", "lids off")])
+def test_lids_are_chosen(lids, words, tmp_path, capsys):
+    path, out = file_of("holed", tmp_path), tmp_path / "out.vtp"
+    assert main(["deform", str(path), "-o", str(out), "--lids", lids, *BEND]) == 0
+    assert words in capsys.readouterr().out
+    mesh, bent = (Surface(read_polydata(each)).mesh for each in (path, out))
+    closed = lids_of(mesh, True).closed(mesh)
+    volumes = [
+        signed_volume(lids_of(mesh).extension @ each.vertices, closed) for each in (mesh, bent)
+    ]
+    assert (abs(volumes[1] / volumes[0] - 1) < 1e-12) == (lids == "on")
 
 
 def test_both_sides_of_a_seam_follow_a_selection_of_one_of_them(tmp_path):

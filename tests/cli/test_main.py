@@ -125,7 +125,7 @@ def test_a_turn_about_the_fixed_centre_is_asked_for_by_name(bar, bar_file, tmp_p
 
 def test_check_praises_a_good_mesh(bar_file, capsys):
     assert main(["check", bar_file]) == 0
-    assert "can be deformed as it is: a closed surface" in capsys.readouterr().out
+    assert "can be deformed as it is. Closed surface: volume kept" in capsys.readouterr().out
 
 
 def test_check_says_that_an_open_mesh_can_be_deformed_and_changes_nothing(tmp_path, capsys):
@@ -135,7 +135,7 @@ def test_check_says_that_an_open_mesh_can_be_deformed_and_changes_nothing(tmp_pa
     before = path.read_bytes()
     assert main(["check", str(path)]) == 0
     text = capsys.readouterr().out
-    assert "can be deformed as it is: an open surface; volume preserved under 1 lid" in text
+    assert "can be deformed as it is. 1 hole: volume kept under a lid" in text
     assert "1 border of 3 edges" in text
     assert path.read_bytes() == before
     assert sorted(tmp_path.iterdir()) == [path]

@@ -351,7 +351,7 @@ def test_binding_reports_its_progress_and_can_be_cancelled():
 
 
 def test_set_up_reports_every_stage_and_can_be_cancelled_at_each():
-    mesh = cactus(4000)
+    mesh = cactus(1500)
     regions = segment(mesh, 2)
     cages = fit_cages(mesh, regions, 60)
     for work, least in (

@@ -95,6 +95,13 @@ def test_a_sheet_has_no_volume():
     assert own["VolumeChange"] == [0.0]
 
 
+@pytest.mark.parametrize(("lids", "count"), [(True, 4), (None, 4), (False, 0)])
+def test_lids_are_chosen(lids, count):
+    _, own = bent(GIVEN["holed"](), Lids=lids)
+    assert own["Lids"] == count
+    assert own["HasVolume"] == [count > 0]
+
+
 def test_targets_are_those_of_given_points():
     surface = tube()
     top = np.flatnonzero(surface.points[:, 2] > 2.7)[::-1]

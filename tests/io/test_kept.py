@@ -21,6 +21,7 @@ from vtk_segdeform.io.convert import read_polydata, write_mesh
 from vtk_segdeform.io.polygons import corner_values, padded_corners, polydata_of, polygons_of
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "files.rst"
+pytestmark = pytest.mark.usefixtures("vtk_in_process")
 FORMATS = [".ply", ".obj", ".off", ".stl", ".glb", ".vtp", ".vtk", ".vtu", ".vtkhdf"]
 SINGLE = {".stl", ".glb"}
 FOLLOW = ("Normals", "NORMAL", "NormalCorners")
@@ -95,7 +96,7 @@ def same_cells(first, second):
 
 
 @pytest.fixture(scope="module")
-def trips(tmp_path_factory):
+def trips(tmp_path_factory, vtk_in_process):
     """Return a function that gives (made, read, moved, read again) of a format and a surface."""
     folder = tmp_path_factory.mktemp("kept")
 

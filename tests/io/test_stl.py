@@ -61,6 +61,26 @@ def test_truncated_text_is_an_error(tmp_path):
             read_polydata(path)
 
 
+def test_text_without_its_last_line_is_read_with_a_warning(tmp_path, caplog):
+    path, data = octahedron(tmp_path, binary=False)
+    whole = read_polydata(path)
+    assert not caplog.records
+    text = data[: data.index(b"endsolid")]
+    for ending in (text, text.upper().rstrip()):
+        caplog.clear()
+        path.write_bytes(ending)
+        assert_array_equal(read_polydata(path).points, whole.points)
+        assert "a.stl: there is no endsolid" in caplog.text
+    end = text.rindex(b"endfacet")
+    for cut in (end, text.rindex(b"endloop"), text.rindex(b"vertex") + 9):
+        path.write_bytes(text[:cut])
+        with pytest.raises(MeshError, match=r"a\.stl: is truncated"):
+            read_polydata(path)
+    path.write_bytes(b"solid nothing\n")
+    with pytest.raises(MeshError, match=r"a\.stl: is truncated"):
+        read_polydata(path)
+
+
 def test_minus_zero_is_zero_and_nan_is_kept(tmp_path):
     path, _ = octahedron(tmp_path)
     write_mesh(path, Mesh(OCTAHEDRON[0] + 0.0, OCTAHEDRON[1]))

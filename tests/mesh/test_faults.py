@@ -10,12 +10,14 @@ import pytest
 from real_meshes import path_of, read_off
 from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
 
+from vtk_segdeform.errors import MeshError
 from vtk_segdeform.mesh import faults as search
 from vtk_segdeform.mesh import shells, topology
 from vtk_segdeform.mesh.faults import find_faults
 from vtk_segdeform.mesh.grouping import first_equal_row
 from vtk_segdeform.mesh.report import Kind
 from vtk_segdeform.mesh.topology import HalfEdges
+from vtk_segdeform.mesh_repair.repair import repair
 
 SPHERE = icosphere(2)
 N = len(SPHERE[0])
@@ -167,6 +169,20 @@ def test_a_face_without_area_and_a_coincident_vertex_are_notes():
     assert report.count(Kind.ZERO_AREA) == 2  # the two faces at that edge
 
 
+def test_a_mesh_without_any_area_is_a_fault():
+    vertices, faces = SPHERE
+    on_a_line = vertices[:, :1] * [3.0, -4.0, 12.0] + 5.0
+    for flat in (vertices * 0.0, on_a_line):
+        report = find_faults(flat, faces)
+        assert report.faults[0].kind is Kind.FLAT
+        assert str(report.faults[0]) == "all faces are flat"
+        with pytest.raises(MeshError, match=r"all faces are flat; .*not on a line"):
+            repair(flat, faces)
+    assert find_faults(vertices * [1.0, 1.0, 0.0], faces).ok
+    flat[faces[7]] = np.eye(3)
+    assert find_faults(flat, faces).count(Kind.FLAT) == 0
+
+
 def test_nan_and_infinite_coordinates_are_found():
     vertices, faces = SPHERE
     broken = vertices.copy()
@@ -195,6 +211,7 @@ def test_bad_indices_are_found():
             {Kind.DUPLICATE_FACE: 1, Kind.OPEN_EDGE: 3, Kind.HOLE: 1},
         ),
         (np.eye(3), [[0, 0, 1]], {Kind.UNREFERENCED: 1, Kind.DEGENERATE: 1}),
+        (np.zeros((3, 3)), [[0, 1, 2]], {Kind.FLAT: 1, Kind.OPEN_EDGE: 3, Kind.HOLE: 1}),
         (
             np.full((3, 3), np.nan),
             [[0, 1, 2]],

@@ -8,7 +8,7 @@ from numpy.testing import assert_array_equal
 from solids import CUBE, SOLIDS, icosphere, torus
 
 from vtk_segdeform.mesh import Mesh, mesh_of
-from vtk_segdeform.mesh.topology import boundary_edges, loops_of
+from vtk_segdeform.mesh.topology import HalfEdges, loops_of
 
 
 def edges_of(loops):
@@ -40,7 +40,7 @@ def test_a_closed_mesh_has_no_border():
 
 def test_the_boundary_of_a_boundary_is_zero():
     for faces, n in soups():
-        tail, head = boundary_edges(faces, n).T
+        tail, head = HalfEdges(faces, n).net_boundary.T
         assert_array_equal(np.bincount(tail, minlength=n), np.bincount(head, minlength=n))
 
 
@@ -51,7 +51,7 @@ def test_the_boundary_is_the_sum_of_the_edges_of_the_faces():
             for tail, head in ((a, b), (b, c), (c, a)):
                 total[tail, head] += 1
                 total[head, tail] -= 1
-        tail, head = boundary_edges(faces, n).T
+        tail, head = HalfEdges(faces, n).net_boundary.T
         found = np.zeros((n, n), dtype=int)
         np.add.at(found, (tail, head), 1)
         assert_array_equal(found, np.maximum(total, 0))
@@ -59,7 +59,7 @@ def test_the_boundary_is_the_sum_of_the_edges_of_the_faces():
 
 def test_loops_cover_the_boundary_once_and_pass_no_vertex_twice():
     for faces, n in soups():
-        boundary = boundary_edges(faces, n)
+        boundary = HalfEdges(faces, n).net_boundary
         loops = loops_of(boundary)
         assert edges_of(loops) == sorted(map(tuple, boundary.tolist()))
         assert all(len(np.unique(loop)) == len(loop) >= 3 for loop in loops)
@@ -67,7 +67,7 @@ def test_loops_cover_the_boundary_once_and_pass_no_vertex_twice():
 
 def test_reversing_the_faces_reverses_the_boundary():
     for faces, n in soups():
-        forth, back = boundary_edges(faces, n), boundary_edges(faces[:, ::-1], n)
+        forth, back = HalfEdges(faces, n).net_boundary, HalfEdges(faces[:, ::-1], n).net_boundary
         assert sorted(map(tuple, forth.tolist())) == sorted(map(tuple, back[:, ::-1].tolist()))
 
 
@@ -82,15 +82,15 @@ def test_loops_that_share_no_vertex_do_not_depend_on_numbers_or_order(seed):
     vertices, faces = icosphere(3)
     centres = rng.choice(len(vertices), 12, replace=False)
     faces = faces[~np.isin(faces, centres).any(axis=1)]
-    boundary = boundary_edges(faces, len(vertices))
+    boundary = HalfEdges(faces, len(vertices)).net_boundary
     if np.bincount(boundary[:, 0]).max() > 1:
         crossed = boundary[np.bincount(boundary[:, 0])[boundary[:, 0]] > 1, 0]
         faces = faces[~np.isin(faces, crossed).any(axis=1)]
-        boundary = boundary_edges(faces, len(vertices))
+        boundary = HalfEdges(faces, len(vertices)).net_boundary
     assert np.bincount(boundary[:, 0]).max() == 1
     number = rng.permutation(len(vertices))
     other = number[rng.permutation(faces)]
-    found = loops_of(boundary_edges(other, len(vertices)))
+    found = loops_of(HalfEdges(other, len(vertices)).net_boundary)
     assert cyclic(found) == cyclic([number[loop] for loop in loops_of(boundary)])
     assert 2 <= len(found) <= 12
 
@@ -128,7 +128,7 @@ def test_a_fin_has_a_border_and_its_body_has_none():
 
 def test_the_order_of_loops_is_that_of_their_first_edges():
     for faces, n in soups():
-        boundary = boundary_edges(faces, n)
+        boundary = HalfEdges(faces, n).net_boundary
         if len(boundary) and np.bincount(boundary[:, 0]).max() == 1:
             begin = [int(loop[0]) for loop in loops_of(boundary)]
             places = [boundary[:, 0].tolist().index(v) for v in begin]

@@ -159,6 +159,30 @@ def test_degenerate_faces_and_points_in_no_face_are_ignored():
     assert_array_equal(moved[66:], more[66:] + [1.0, 0.0, 0.0])
 
 
+def test_a_component_without_area_follows_the_nearest_vertices():
+    vertices, faces = SPHERE
+    line = np.array([[2.0, 0, 0], [2, 0, 1], [2, 0, 3], [2, 0, 7]])
+    n = len(vertices)
+    more = np.array([[n, n + 1, n + 2], [n + 1, n + 2, n + 3]])
+    unused = [[5.0, 5.0, 5.0]]
+    found = checked(np.concatenate([vertices, line, unused]), np.append(more, faces, axis=0))
+    assert_array_equal(found.mesh.faces, faces)
+    assert [str(each) for each in found.workarounds] == [
+        "ignored 2 faces without area",
+        "1 point is in no face",
+    ]
+    assert_array_equal(found.workarounds[0].points, n + np.arange(4))
+    assert_array_equal(found.workarounds[1].points, n + 4)
+    moved = found.moved(found.mesh.vertices + [0.0, 0.0, 1.0])
+    assert_array_equal(moved[n : n + 4], line + [0.0, 0.0, 1.0])
+    joined = np.array([[n, n + 1, 0]])  # touches the sphere in a vertex
+    mesh = checked(
+        np.concatenate([vertices, vertices[:1] + [[1, 0, 0], [2, 0, 0]]]),
+        np.append(faces, joined, axis=0),
+    ).mesh
+    assert mesh.n_faces == len(faces) + 1
+
+
 def test_faces_without_area_hold_a_mesh_together():
     vertices = np.array([[0.0, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 0], [1, -1, 0]])
     found = checked(vertices, [[0, 1, 2], [0, 3, 1], [0, 4, 3], [3, 4, 1]])
@@ -241,7 +265,7 @@ def hostile(rng):
     return vertices, rng.permutation(faces)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_any_triangles_with_a_face_that_is_not_flat_become_a_mesh(seed):
     rng = np.random.default_rng(seed)
     for _ in range(40):

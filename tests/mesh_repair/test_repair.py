@@ -318,10 +318,11 @@ def test_a_moebius_strip_cannot_be_oriented():
 @pytest.mark.parametrize(
     ("vertices", "faces", "message"),
     [
-        ([], [], "1 empty mesh"),
+        ([], [], "empty mesh; give"),
         (CUBE[0], CUBE[1] + 1, "with a vertex index out of range"),
         (CUBE[0], [[0, 0, 1]], "no faces are left after these repairs: remove 1 degenerate face"),
         (np.full((3, 3), np.nan), [[0, 1, 2]], "no faces are left"),
+        (np.zeros((3, 3)), [[0, 1, 2]], "cannot be repaired: all faces are flat; give at least"),
     ],
 )
 def test_a_mesh_that_cannot_be_repaired_is_an_error(vertices, faces, message):

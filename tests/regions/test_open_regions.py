@@ -23,7 +23,7 @@ def pieces(mesh, members):
 def test_any_surface_is_segmented_into_connected_regions(name):
     mesh = mesh_of(name)
     components = mesh.components.max() + 1
-    for n_regions in (None, *range(1, 9)):
+    for n_regions in (None, 1, 2, 5, 8):
         if n_regions is not None and n_regions > mesh.n_vertices:
             continue
         regions = segment(mesh, n_regions)

@@ -25,6 +25,7 @@ from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.subspace.subspace import cage_subspace
 from vtk_segdeform.widgets.volume_overlay.region_volumes import RegionVolumes
 
+pytestmark = pytest.mark.usefixtures("bound_once")
 SCENE = sausage(2)
 VERTICES = SCENE.mesh.vertices
 X = VERTICES[:, 0]

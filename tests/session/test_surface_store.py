@@ -57,6 +57,20 @@ def reopened(session, folder):
     return load_session(folder / "a.segdeform")
 
 
+@pytest.mark.parametrize("name", ["many arrays", "a long text"])
+def test_a_surface_too_large_to_read_is_not_written(name, tmp_path, monkeypatch):
+    surface = tube(8, 4)
+    if name == "many arrays":
+        monkeypatch.setattr("vtk_segdeform.session.archive._LONGEST_DIRECTORY", 2000)
+        for k in range(20):
+            surface.field_data[f"{k}"] = [k]
+    else:
+        surface.field_data["a" * (1 << 20)] = [0]
+    with pytest.raises(SessionError, match=r"cannot be written \(.* bytes of .* exceed the limit"):
+        save_session(tmp_path / "a.segdeform", Session(Surface(surface)))
+    assert not any(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("name", [*GIVEN, "rich"])
 def test_the_surface_in_a_session_file_is_the_one_that_was_given(name, tmp_path):
     given = rich() if name == "rich" else GIVEN[name]()

@@ -65,6 +65,8 @@ class Monkey:
         self.free_cages: WeakValueDictionary[int, np.ndarray] = WeakValueDictionary()
         self.last_session = session
         self.view.renderer.AddObserver("EndEvent", self.on_frame)
+        self.type("4")  # most events of a few hundred would otherwise come before the first pose
+        self.wait()
 
     def on_frame(self, *_):
         """Keep failed checks for `raise_failures`; VTK would print the exception and continue."""

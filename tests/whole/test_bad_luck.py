@@ -95,7 +95,14 @@ def require_kept_on_a_full_disk(folder, suffix):
 
 
 @posix
-@pytest.mark.parametrize("suffix", SUFFIXES + FOREIGN)
+@pytest.mark.parametrize(
+    "suffix",
+    [
+        *SUFFIXES,
+        *FOREIGN[:2],
+        *(pytest.param(each, marks=pytest.mark.campaign) for each in FOREIGN[2:]),
+    ],
+)
 def test_on_a_full_disk_a_mesh_file_is_unchanged_and_the_error_names_it(tmp_path, suffix, capfd):
     here = os.getcwd()
     require_kept_on_a_full_disk(tmp_path, suffix)

@@ -16,6 +16,7 @@ import vtk_segdeform as sd
 from vtk_segdeform import Session
 from vtk_segdeform.session.state import Pose, State
 
+pytestmark = pytest.mark.usefixtures("bound_once")
 SCENE = sausage()
 
 

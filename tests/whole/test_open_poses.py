@@ -8,19 +8,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from real_meshes import botsch_sorkine
+from numpy.testing import assert_array_equal
+from real_meshes import botsch_sorkine, path_of
 
 from vtk_segdeform.deformer.deform import deform
 from vtk_segdeform.geometry.distortion import distortion, triangle_distortion
+from vtk_segdeform.io.surface import Surface
 from vtk_segdeform.mesh.intersections import self_intersections
-from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.mesh.topology import HalfEdges
 from vtk_segdeform.solver.solution import Status
 
 
 def posed(name, n_regions):
-    vertices, faces, selection, matrix = botsch_sorkine(name)
-    mesh = Mesh(vertices, faces)
+    vertices, _, selection, matrix = botsch_sorkine(name)
+    mesh = Surface.read(path_of(f"botsch-sorkine/{name}.off")).mesh
+    assert_array_equal(mesh.vertices, vertices)
     fixed, handle = np.flatnonzero(selection == 0), np.flatnonzero(selection == 2)
     targets = vertices[handle] @ matrix[:3, :3].T + matrix[:3, 3]
     solution = deform(mesh, fixed, handle, targets, n_regions=n_regions)
@@ -37,7 +39,7 @@ def sharpest(mesh, vertices):
     return np.einsum("ij,ij->i", normal[one], normal[other]).min()
 
 
-@pytest.mark.parametrize("n_regions", [1, 6])
+@pytest.mark.parametrize("n_regions", [1, 3])
 def test_the_bar_twists_by_135_degrees_at_its_volume_without_crossings(n_regions):
     mesh, solution = posed("bar", n_regions)
     assert distortion(mesh, solution.vertices) < 0.15

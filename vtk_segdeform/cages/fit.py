@@ -44,6 +44,7 @@ _NODES, _NODES_PER_VERTEX = 3e5, 1e3  # limit of the nodes of a grid: the larger
 _FEWEST = 8  # vertices of a cage
 _SHELL = 6  # fewest vertices of each component of a cage with several
 _FLOOR = 12  # vertices of each cage before the rest is distributed
+_THINNEST = 1e-3  # width over length that a region counts with, at least
 _CLEARANCE = 0.5  # of the offset: least distance between faces and the surface
 _PUSHES, _NEAREST = 30, 200  # rounds; nearest vertices whose exact distance is computed
 _CLOSEST, _FARTHEST = 1e-12, 1e6  # limits of the offset, in diagonals of the mesh
@@ -171,7 +172,8 @@ def _distributed(patches: list[Patch], n_vertices: int) -> IntArray:
     """
     area = np.array([patch.area for patch in patches])
     spread = np.array([patch.spread for patch in patches])
-    need = np.sqrt(area * spread.sum(axis=1) / spread[:, 1:].sum(axis=1))
+    length = np.maximum(spread.sum(axis=1), np.finfo(float).tiny)
+    need = np.sqrt(area * length / np.maximum(spread[:, 1:].sum(axis=1), _THINNEST * length))
     share = np.round(need / need.sum(), 9)  # equal regions get equal numbers
     floor = min(_FLOOR, n_vertices // len(patches))
     ends = np.rint((n_vertices - floor * len(patches)) * np.cumsum(share) / share.sum())

@@ -39,6 +39,8 @@ _MARGIN = 3.7183  # steps around the offset surface; uneven, so that no extreme 
 _BLUR = 0.5  # standard deviation, relative to the offset
 _FIRST_OF_EQUALS = 1.0 - 1e-6 * np.arange(3)  # breaks ties between equal edges
 _PIECE = 20_000  # faces per task
+_FLAT = 1e-12  # area of faces relative to the square of their length
+_SHORTEST = 1e-2  # length of a face without any, relative to the mesh
 _SPACING = 0.7  # steps between samples of a face: less than 1, to leave no gaps
 
 
@@ -96,7 +98,7 @@ class Patch:
 
     surface: Surface
     members: BoolArray
-    weights: FloatArray  # (n,): area of the touching faces at their corners
+    weights: FloatArray  # (n,): area of the touching faces at their corners, not all 0
     axes: FloatArray  # (3, 3): principal axes as rows, longest first
 
     @classmethod
@@ -104,6 +106,10 @@ class Patch:
         """Return the patch of the vertices in the mask *members* (n,)."""
         touching = members[surface.faces].any(axis=1)
         corners, thirds = surface.faces[touching].ravel(), surface.face_areas[touching] / 3.0
+        length = surface.longest[touching]
+        if thirds.sum() <= _FLAT * (length @ length):  # count flat faces by their length instead
+            least = _SHORTEST * np.ptp(surface.points, axis=0).max()
+            thirds = np.maximum(length, least) ** 2 / 12.0
         weights = np.zeros(len(surface.points))
         weights += np.bincount(corners, np.repeat(thirds, 3), minlength=len(weights))
         around = np.flatnonzero(weights)
@@ -126,7 +132,7 @@ class Patch:
     @property
     def box(self) -> tuple[FloatArray, FloatArray]:
         """Lowest and highest coordinates of the touching faces along the axes, (3,) each."""
-        x = self.surface.points[self.weights > 0.0] @ self.axes.T
+        x = self.surface.points[self.members | (self.weights > 0.0)] @ self.axes.T
         return x.min(axis=0), x.max(axis=0)
 
     def ellipsoid(self, n: int) -> tuple[FloatArray, IntArray]:
@@ -141,7 +147,8 @@ class Patch:
         faces = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
         inner = -hull.equations[:, 3].max()  # radius of the inscribed ball
         low, high = self.box
-        half = np.maximum(high - low, 0.1 * (high - low).max()) / 2.0
+        size = (high - low).max() or np.sqrt(self.area)
+        half = np.maximum(high - low, 0.1 * size) / 2.0
         local = ball * (1.1 * np.sqrt(3.0) / inner * half) + (low + high) / 2.0
         return local @ self.axes, faces.astype(np.int64)
 

@@ -8,8 +8,9 @@ With ``--json`` it prints one object with these keys:
     holes                       number of edges of each border
     encloses                    whether each component encloses a volume
     volume_under_lids           whether some volume is preserved under lids over holes
-    workarounds                 what the mesh has differently: objects with kind, text, count, and
-                                points, the number of given points there
+    volume                      the volume in words
+    workarounds                 what the mesh has differently: objects with kind, text and count,
+                                the number of given points there
     faults, notes               of the triangles as given: objects with kind, text and count
     self_intersections          pairs of faces of the mesh that intersect
     can_be_deformed, reason     whether there is a mesh, and otherwise why not
@@ -29,7 +30,7 @@ from ..geometry import lids_of
 from ..io import Surface, repair_surface, triangles_of
 from ..mesh import Mesh, counted, find_faults, self_intersections
 from ..progress import Progress
-from .outputs import Say, volume_sentence
+from .outputs import Say
 
 _MOST_HOLES = 10  # listed one by one
 
@@ -103,8 +104,8 @@ def _of_mesh(mesh: Mesh) -> dict[str, Any]:
         "closed": mesh.is_closed,
         "holes": sorted((len(loop) for loop in mesh.borders), reverse=True),
         "encloses": lids.encloses.tolist(),
-        "volume_under_lids": bool(lids.encloses[lids.component].any()),
-        "volume": volume_sentence(mesh),
+        "volume_under_lids": bool(lids.used.any()),
+        "volume": lids.summary(),
         "self_intersections": len(self_intersections(mesh.vertices, mesh.faces)),
     }
 
@@ -122,8 +123,7 @@ def _print(found: dict[str, Any], say: Say) -> None:
         return
     parts = counted(found["components"], "component", "components")
     say(f"{given}; as a mesh {found['vertices']} vertices, {found['faces']} faces, {parts}")
-    what = "a closed surface" if found["closed"] else "an open surface"
-    say(f"can be deformed as it is: {what}; volume {found['volume']}")
+    say(f"can be deformed as it is. {found['volume']}")
     for each in found["workarounds"]:
         if each["kind"] != "hole":
             say(f"  worked around: {each['text']}")

@@ -19,6 +19,7 @@ from ..arrays import FloatArray, IntArray
 from ..cages import Cage, fit_cages
 from ..deformer import Deformer
 from ..errors import ConstraintError, MeshError
+from ..geometry import lids_of
 from ..io import Surface
 from ..pictures import picture_before_after, require_picture, require_screen
 from ..progress import Progress, part
@@ -40,6 +41,7 @@ from .outputs import (
 from .selection import Role, parse_selection
 
 SESSION = ".segdeform"  # suffix of session files
+LIDS = {"auto": None, "on": True, "off": False}  # values of --lids
 
 
 def deform(options: Namespace, say: Say, progress: Progress) -> bool:
@@ -50,6 +52,9 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     surface = Surface.read(options.input)
     mesh = surface.mesh
     report_surface(surface, say)
+    if not mesh.is_closed:
+        enclosed = lids_of(mesh, LIDS[options.lids])
+        say(f"volume          {enclosed.summary(preserved=not options.no_volume)}")
     fixed = _selected(options.fixed, surface, "fixed")
     handle, targets = _handles(options.handles, surface, fixed)
     regions, cages = _subspace(options, surface, part(progress, 0.0, 0.6))
@@ -160,7 +165,10 @@ def _selected(text: str, surface: Surface, role: Role) -> IntArray:
 
 def _settings(options: Namespace) -> dict[str, Any]:
     """Return the options of `Deformer` that are given on the command line."""
-    settings: dict[str, Any] = {"preserve_volume": not options.no_volume}
+    settings: dict[str, Any] = {
+        "preserve_volume": not options.no_volume,
+        "lids": LIDS[options.lids],
+    }
     if options.stretch is not None:
         settings["stretch"] = options.stretch
     if options.rotation_groups is not None:

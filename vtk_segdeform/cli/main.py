@@ -199,7 +199,7 @@ def _parser() -> argparse.ArgumentParser:
     form = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(
         prog="segdeform",
-        description="Deform closed meshes by moving handles, with detail and volume preserved.",
+        description="Deform surfaces by moving handles, with detail and volume preserved.",
         epilog=_EXAMPLES,
         formatter_class=form,
     )
@@ -328,6 +328,8 @@ def _handles(parser: argparse.ArgumentParser) -> None:
             f"--{name}", action=_HandleOption, metavar=metavar, help=text, required=required
         )
     add("--no-volume", action="store_true", help="do not preserve the volume")
+    text = "whether open parts enclose a volume under lids over their holes (default: auto)"
+    add("--lids", choices=("auto", "on", "off"), default="auto", help=text)
     text = "stretch resistance relative to detail preservation (default: 10)"
     add("--stretch", type=float, default=None, metavar="S", help=text)
     text = "number of rotation clusters; 0: one rotation per vertex (default: 300)"

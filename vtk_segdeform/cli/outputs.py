@@ -10,9 +10,8 @@ import pyvista as pv
 
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage
-from ..geometry import lids_of
 from ..io import Surface, polydata_of
-from ..mesh import Kind, Mesh, counted
+from ..mesh import Kind
 from ..pictures import COLOURS, rgb
 from ..regions import Regions
 from ..solver import Solution
@@ -25,29 +24,10 @@ _PALETTE = np.array([rgb(colour) for colour in COLOURS])
 
 
 def report_surface(surface: Surface, say: Say) -> None:
-    """Print what the mesh of *surface* has differently, and its volume if it has borders."""
+    """Print how the mesh of *surface* differs from it."""
     for workaround in surface.workarounds:
-        if workaround.kind is not Kind.HOLE:  # the volume tells of them
+        if workaround.kind is not Kind.HOLE:  # the line of the volume counts them
             say(f"input           {workaround}")
-    if not surface.mesh.is_closed:
-        say(f"volume          {volume_sentence(surface.mesh)}")
-
-
-def volume_sentence(mesh: Mesh) -> str:
-    """Return whether the volume of *mesh* is preserved by default, and under how many lids."""
-    if mesh.is_closed:
-        return "preserved"
-    lids = lids_of(mesh)
-    if not lids.encloses.any():
-        return "none to preserve: the surface is an open sheet"
-    holes = int(lids.encloses[lids.component].sum())
-    under = f"preserved under {counted(holes, 'lid over a hole', 'lids over holes')}"
-    sheets = int((~lids.encloses).sum())
-    return (
-        f"{under}; {counted(sheets, 'open sheet has', 'open sheets have')} none"
-        if sheets
-        else under
-    )
 
 
 def report_regions(regions: Regions, say: Say) -> None:

@@ -55,6 +55,7 @@ _ROUNDS = 3  # of k-means
 # variation, this share at most.
 _SUBTRACTED, _MOST = 0.9, 0.95
 _MESSAGE = "clustering rotations"
+_ROUNDING = 1e-13  # of a sum over the patches of a cluster
 _SOFTEST = 1e-3  # least eigenvalue of N and M, as a share of the largest
 _TIE_BREAK = 1e-6  # as in `kmeans`
 
@@ -106,10 +107,11 @@ def join_rotations(
 
     rows = _sums(rows, clusters)
     whole = _response(rows, rest, pulls)
-    varied = _sums(one.varied, clusters) - whole.varied
+    of_patches = _sums(one.varied, clusters)
+    varied = of_patches - whole.varied
     turned = _sums(one.turned, clusters) - whole.turned
-    with np.errstate(over="ignore"):
-        share = _SUBTRACTED * np.clip(turned / np.maximum(varied, np.finfo(float).tiny), 0.0, 1.0)
+    alike = varied <= _ROUNDING * of_patches  # patches that deform alike, up to rounding
+    share = _SUBTRACTED * np.clip(turned / np.where(alike, np.inf, varied), 0.0, 1.0)
     # Of a variation over n vertices, k equal patches show only (1 - 1 / k) / (1 - 1 / n).
     n, k = np.bincount(clusters, counts), np.bincount(clusters).clip(min=2)
     share = np.minimum(share * (1.0 - 1.0 / n) / (1.0 - 1.0 / k), _MOST)

@@ -106,6 +106,7 @@ class SegmentedCageDeformFilter(FilterSettings):
             fixed=soup.vertices_at(np.zeros(0, np.int64) if fixed is None else fixed),
             handle=vertices,
             preserve_volume=settings.preserve_volume,
+            lids=settings.lids,
         )
         solution = constrained.solve(targets, progress=part(self._progress(), 0.95, 1.0))
         output.ShallowCopy(source)
@@ -113,14 +114,14 @@ class SegmentedCageDeformFilter(FilterSettings):
         if settings.local_volume:
             change = local_volume_change(constrained.mesh, solution.vertices)[soup.vertex_of]
             surfaces.add_array(output.GetPointData(), "LocalVolumeChange", change)
-        lids = lids_of(soup.mesh)
+        lids = lids_of(soup.mesh, settings.lids)
         for name, value in (
             ("VolumeChange", [solution.volume_change]),
             ("HandleError", [solution.handle_error]),
             ("Steps", [solution.steps]),
             ("Status", str(solution.status)),
             ("HasVolume", [int(constrained.has_volume)]),
-            ("Lids", [int(lids.encloses[lids.component].sum())]),
+            ("Lids", [int(lids.used.sum())]),
         ):
             surfaces.add_array(output.GetFieldData(), name, value)
         self.UpdateProgress(1.0)

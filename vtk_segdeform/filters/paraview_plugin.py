@@ -98,6 +98,14 @@ class SegmentedCageDeform(SegmentedCageDeformFilter):
     def SetPreserveVolume(self, on: int) -> None:  # noqa: N802
         super().SetPreserveVolume(bool(on))
 
+    @smproperty.intvector(name="Lids", default_values=0)
+    @smdomain.xml(
+        '<EnumerationDomain name="enum"><Entry value="0" text="Auto"/>'
+        '<Entry value="1" text="Under lids"/><Entry value="2" text="Off"/></EnumerationDomain>'
+    )
+    def SetLids(self, choice: int) -> None:  # noqa: N802
+        super().SetLids((None, True, False)[choice])
+
     @smproperty.doublevector(name="Stretch", default_values=10.0)
     @smdomain.doublerange(min=0.0, max=100.0)
     def SetStretch(self, strength: float) -> None:  # noqa: N802

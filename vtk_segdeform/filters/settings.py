@@ -31,6 +31,7 @@ class Settings:
     axis: tuple[float, ...] = (0.0, 0.0, 1.0)
     angle: float = 0.0
     preserve_volume: bool = True
+    lids: bool | None = None
     stretch: float = 10.0
     local_volume: bool = True
 
@@ -94,6 +95,10 @@ class FilterSettings(VTKPythonAlgorithmBase):  # type: ignore[misc]
     def SetPreserveVolume(self, on: bool) -> None:  # noqa: N802
         """Set whether the enclosed volume is preserved exactly."""
         self._set(preserve_volume=as_switch(on, "on"))
+
+    def SetLids(self, on: bool | None) -> None:  # noqa: N802
+        """Set whether open parts enclose a volume under lids; None decides by their shape."""
+        self._set(lids=None if on is None else as_switch(on, "on"))
 
     def SetStretch(self, strength: float) -> None:  # noqa: N802
         """Set the stretch resistance; see `Deformer`."""

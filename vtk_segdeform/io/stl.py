@@ -6,10 +6,13 @@
 Equal corners are merged; vertices are numbered in the order of their first corner.  All triangles
 are kept, in their order.  Normals are ignored and computed again.  The 2 bytes are the cell array
 "Attribute" unless all are 0, the name or the 80 bytes the field array "Header".
+
+A text without "endsolid" is read with a warning if its last triangle is complete.
 """
 
 from __future__ import annotations
 
+import logging
 import re
 from pathlib import Path
 from typing import Any
@@ -28,6 +31,8 @@ _NAME = re.compile(rb"solid[ \t]*([^\r\n]*)", re.I)
 _VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE | re.I)
 _FACET = re.compile(rb"^[ \t]*facet\b", re.MULTILINE | re.I)
 _END = re.compile(rb"^[ \t]*endsolid\b", re.MULTILINE | re.I)
+_END_FACET = re.compile(rb"^[ \t]*endfacet\b", re.MULTILINE | re.I)
+_log = logging.getLogger(__name__)
 
 
 def read_stl(path: Path) -> pv.PolyData:
@@ -37,7 +42,7 @@ def read_stl(path: Path) -> pv.PolyData:
     text = data.lstrip()[:5].lower() == b"solid" and len(data) != _START + _SIZE * count
     attributes: Any = np.empty(0)
     if text:
-        corners, name = _of_text(data), _NAME.match(data.lstrip())
+        corners, name = _of_text(path, data), _NAME.match(data.lstrip())
         header = name[1] if name else b""
     else:
         rows = _of_bytes(data, count)
@@ -89,11 +94,17 @@ def _of_bytes(data: bytes, count: int) -> Any:
     return np.frombuffer(data, _ROW, count, _START)
 
 
-def _of_text(data: bytes) -> Any:
+def _of_text(path: Path, data: bytes) -> Any:
     data = data.replace(b"\r", b"\n")
-    rows = _VERTEX.findall(data)
-    if len(rows) != 3 * len(_FACET.findall(data)) or not _END.search(data):
+    rows, facets = _VERTEX.findall(data), len(_FACET.findall(data))
+    has_end = _END.search(data) is not None
+    is_complete = has_end or (facets > 0 and len(_END_FACET.findall(data)) == facets)
+    if len(rows) != 3 * facets or not is_complete:
         raise MeshError("is truncated, or has a facet without three vertices")
+    if not has_end:
+        _log.warning(
+            "%s: there is no endsolid; the file may be truncated after %d triangles", path, facets
+        )
     with np.errstate(over="ignore"):
         return np.array(rows, dtype=float).reshape(-1, 3).astype(np.float32)
 

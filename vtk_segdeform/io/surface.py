@@ -103,12 +103,14 @@ class Surface:
 
         MeshError if the numbers of their points differ.
         """
+        require(polydata, pv.PolyData, "polydata")
+        require(soup, Soup, "soup")
         if len(soup.points) != polydata.n_points:
             raise MeshError(
                 f"the mesh of {len(soup.points)} points is not one of {polydata.n_points} points"
             )
         surface = object.__new__(cls)
-        surface._given = require(polydata, pv.PolyData, "polydata").copy(deep=False)
+        surface._given = polydata.copy(deep=False)
         surface._soup = soup
         return surface
 

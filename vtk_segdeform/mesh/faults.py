@@ -20,10 +20,10 @@ from ..kernels import in_parallel
 from .grouping import connected, first_equal_row
 from .report import Fault, Id, Kind, MeshReport, counted
 from .shells import closed_shells, shell_faults
-from .topology import HalfEdges, repeats_face, repeats_vertex
+from .topology import HalfEdges, repeats_vertex
 from .triangles import corner_columns, cross, norm
 
-UNREPAIRABLE = (Kind.EMPTY, Kind.BAD_INDEX, Kind.TOO_LARGE, Kind.TOO_SMALL)  # no further checks
+UNREPAIRABLE = (Kind.EMPTY, Kind.BAD_INDEX, Kind.TOO_LARGE, Kind.TOO_SMALL, Kind.FLAT)
 _EXAMPLES = 4
 _PIECE = 10_000  # faces per task; their data fit into the cache
 _LARGEST, _SMALLEST = 1e70, 1e-70  # fourth powers of lengths must neither overflow nor vanish
@@ -70,6 +70,13 @@ class Search:
     points: FloatArray
     triangles: IntArray
 
+    @classmethod
+    def known(cls, points: FloatArray, half_edges: HalfEdges) -> Search:
+        """Return the search of the faces of *half_edges*, none degenerate or duplicate."""
+        search, none = cls(points, half_edges.faces), np.zeros(len(half_edges.faces), dtype=bool)
+        search.__dict__["_distinct"] = none, none, half_edges
+        return search
+
     @cached_property
     def number_faults(self) -> tuple[Fault, ...]:
         """Faults of coordinates and indices; nothing else is computed if some are unrepairable."""
@@ -99,6 +106,11 @@ class Search:
         """(k,) int: the faces without area."""
         return _flat_faces(self.points, self.triangles)
 
+    @property
+    def all_flat(self) -> bool:
+        """Whether no face has an area."""
+        return len(self.flat) == len(self.triangles)
+
     @cached_property
     def first_at(self) -> IntArray:
         """(n,) int: the first vertex at the position of each vertex."""
@@ -112,7 +124,9 @@ class Search:
         if not any(fault.kind in UNREPAIRABLE for fault in found):
             n_components = int(self.half_edges.shells.max(initial=-1)) + 1
             found += _some(Kind.DEGENERATE, np.flatnonzero(self.degenerate))
-            found += _some(Kind.DUPLICATE_FACE, np.flatnonzero(self.duplicate & ~self.degenerate))
+            found += _some(Kind.DUPLICATE_FACE, np.flatnonzero(self.duplicate))
+            if self.all_flat and not self.degenerate.all():
+                found.append(Fault(Kind.FLAT, 1))
             found += _some(Kind.ZERO_AREA, self.flat[~self.degenerate[self.flat]])
             found += _edge_faults(self.half_edges)
             found += _inward_shells(self.points, self.half_edges)
@@ -212,20 +226,16 @@ def _finite(points: FloatArray) -> BoolArray:
 
 
 def distinct_faces(faces: IntArray, n_vertices: int) -> tuple[BoolArray, BoolArray, HalfEdges]:
-    """Return which faces are degenerate, which repeat an earlier face, and the others' half-edges.
+    """Return which faces are degenerate, which repeat an earlier one, and the others' half-edges.
 
-    Two faces on the same three vertices share three edges.  If every edge has two faces, a face
-    can therefore only be a duplicate if two of its neighbours are the same face.
+    No face is both.
     """
-    degenerate = repeats_vertex(faces)
-    if not degenerate.any():
-        half_edges = HalfEdges(faces, n_vertices)
-        if half_edges.neighbours is not None:
-            one, other, _ = half_edges.neighbours.T
-            if not (one == other).any():
-                return degenerate, degenerate, half_edges
-    duplicate = repeats_face(faces)
-    return degenerate, duplicate, HalfEdges(faces[~degenerate & ~duplicate], n_vertices)
+    degenerate, duplicate = repeats_vertex(faces), np.zeros(len(faces), dtype=bool)
+    half_edges = HalfEdges(faces[~degenerate] if degenerate.any() else faces, n_vertices)
+    if half_edges.repeated.any():
+        duplicate[~degenerate] = half_edges.repeated
+        half_edges = HalfEdges(faces[~degenerate & ~duplicate], n_vertices)
+    return degenerate, duplicate, half_edges
 
 
 def _flat_faces(points: FloatArray, faces: IntArray) -> IntArray:

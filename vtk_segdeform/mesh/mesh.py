@@ -16,15 +16,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
-from scipy.sparse import csgraph
 
 from ..arrays import FloatArray, IntArray, as_points, frozen
 from ..errors import MeshError
 from ..freezing import Frozen, read_only
 from ..kernels import in_parallel
-from .faults import as_soup, find_faults
-from .report import MeshReport
-from .topology import boundary_edges, edge_keys, loops_of
+from .faults import Search, as_soup, find_faults
+from .topology import HalfEdges, components, loops_of
 
 _PIECE = 20_000  # faces per task; their data fit into the cache
 
@@ -67,23 +65,25 @@ class Mesh(Frozen):
     faces: IntArray
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
-        report = find_faults(vertices, faces)
+        self._set(Search(*as_soup(vertices, faces)))
+
+    @classmethod
+    def of(cls, search: Search) -> Mesh:
+        """Return the mesh of the triangles of a *search*, if it finds no faults."""
+        mesh = object.__new__(cls)
+        mesh._set(search)
+        return mesh
+
+    def _set(self, search: Search) -> None:
+        report = search.report
         if not report.ok:
             faults = ", ".join(map(str, report.faults))
             raise MeshError(f"not an oriented mesh: {faults}; see find_faults, repair and Surface")
-        self._set(*as_soup(vertices, faces), report)
-
-    @classmethod
-    def reported(cls, vertices: FloatArray, faces: IntArray, report: MeshReport) -> Mesh:
-        """Return a mesh whose *report* is known, and without faults, from arrays of `as_soup`."""
-        assert report.ok
-        mesh = object.__new__(cls)
-        mesh._set(vertices, faces, report)
-        return mesh
-
-    def _set(self, vertices: FloatArray, faces: IntArray, report: MeshReport) -> None:
-        self.__setstate__({"vertices": vertices.copy(), "faces": faces.copy()})
+        self.__setstate__({"vertices": search.points.copy(), "faces": search.triangles.copy()})
         self.__dict__["is_two_manifold"] = report.is_two_manifold
+        self.__dict__["boundary"] = read_only(search.half_edges.net_boundary)
+        if report.n_components == 1:
+            self.__dict__["components"] = read_only(np.zeros(self.n_vertices, dtype=np.int64))
 
     @property
     def n_vertices(self) -> int:
@@ -117,9 +117,7 @@ class Mesh(Frozen):
         An edge with k more faces in one direction occurs k times.  Every vertex has as many edges
         that begin there as end there.
         """
-        if self.is_two_manifold:
-            return read_only(np.empty((0, 2), dtype=np.int64))
-        return read_only(boundary_edges(self.faces, self.n_vertices))
+        return read_only(HalfEdges(self.faces, self.n_vertices).net_boundary)
 
     @cached_property
     def borders(self) -> tuple[IntArray, ...]:
@@ -129,12 +127,7 @@ class Mesh(Frozen):
     @cached_property
     def edges(self) -> IntArray:
         """(e, 2) int: the edges, smaller vertex first, in lexicographic order."""
-        tails, heads = self.faces.ravel(), self.faces[:, [1, 2, 0]].ravel()
-        if self.is_two_manifold:
-            once = tails < heads  # an edge occurs once in each direction
-            keys = np.sort(tails[once] * self.n_vertices + heads[once])
-        else:
-            keys = np.unique(edge_keys(tails, heads, self.n_vertices))
+        keys = HalfEdges(self.faces, self.n_vertices).edge_keys
         return read_only(np.stack(np.divmod(keys, self.n_vertices), axis=1))
 
     @cached_property
@@ -159,8 +152,7 @@ class Mesh(Frozen):
     @cached_property
     def components(self) -> IntArray:
         """(n,) int: the connected component of each vertex, numbered from 0."""
-        _, labels = csgraph.connected_components(self.adjacency, directed=False)
-        return read_only(labels.astype(np.int64))
+        return read_only(components(self.n_vertices, self.faces))
 
     @cached_property
     def face_areas(self) -> FloatArray:

@@ -7,8 +7,10 @@
     outward  a unit that encloses a volume, by itself or under lids, gets a positive volume; within
              another one a negative volume
 
-A lid is a cone over a part of the boundary of a unit, from the mean of its vertices.  A unit whose
-lids are as large as itself is a sheet, which has no outside.  One-sided patches are not changed.
+A lid is a cone over a part of the boundary of a unit, from the mean of its vertices.  A unit has an
+outside if the area of its lids is at most 0.6 of its own (`_MOST_LIDS`; half a ball has 0.5), else
+it is a sheet.  That decides about orientation only: which components keep a volume under lids is
+decided in `geometry.lids`, for oriented faces.  One-sided patches are not changed.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from .grouping import connected, first_members
 from .shells import NO_VOLUME, outward_signs, shell_depths, shell_volumes
 from .topology import HalfEdges, two_sides
 
-_LARGEST = 0.6  # area of the lids of a unit that encloses a volume, relative to its own
+_MOST_LIDS = 0.6  # area of the lids of a unit that has an outside, relative to its own
 
 
 def faces_to_flip(points: FloatArray, half_edges: HalfEdges) -> BoolArray:
@@ -140,7 +142,7 @@ def _inside_out(
     volume, area, size = shell_volumes(points, faces, unit)
     under_lids, lids = _lids(points, half_edges, flip, unit)
     volume = volume + under_lids
-    encloses = (lids <= _LARGEST * area) & ~one_sided
+    encloses = (lids <= _MOST_LIDS * area) & ~one_sided
     tiny = NO_VOLUME * (area * size)
     wrong = encloses & (volume < -tiny)
     wrong[of_shell[alone]] = False  # first those on which the winding numbers of shells depend

@@ -13,9 +13,12 @@ Id = int | tuple[int, ...]  # a vertex or face by its number, an edge by its two
 
 
 class Kind(enum.Enum):
-    """A kind of fault, or of note (those with False): its name, its location and what to do."""
+    """A kind of fault, or of note (those with False): its name, its location and what to do.
 
-    EMPTY = "empty mesh", "empty meshes", "", "give at least one face"
+    Those of the whole mesh, which occur once, have no plural.
+    """
+
+    EMPTY = "empty mesh", "", "", "give at least one face"
     NON_FINITE = (
         "vertex with NaN or infinite coordinates",
         "vertices with NaN or infinite coordinates",
@@ -36,9 +39,15 @@ class Kind(enum.Enum):
     )
     TOO_SMALL = (
         "mesh too small to compute volumes",
-        "meshes too small to compute volumes",
+        "",
         "",
         "scale the mesh up; its extent must be at least 1e-70",
+    )
+    FLAT = (
+        "all faces are flat",
+        "",
+        "",
+        "give at least one whose three corners are not on a line",
     )
     UNREFERENCED = (
         "unreferenced vertex",
@@ -138,6 +147,8 @@ class Fault:
     examples: tuple[Id, ...] = ()
 
     def __str__(self) -> str:
+        if not self.kind.many:
+            return self.kind.one
         text = f"{self.count} {self.kind.one if self.count == 1 else self.kind.many}"
         if not self.examples:
             return text

@@ -1,6 +1,7 @@
 """A `Mesh` from any triangles, and the map between both: what is given and what is deformed.
 
-    drop       faces without three different vertices, repeated faces, points in no face
+    drop       faces without three different vertices, repeated faces, points in no face, and
+               components without area
     weld       points of borders at exactly the same position, and open sheets that coincide
     orient     neighbouring faces alike, closed surfaces and nearly closed ones outward
 
@@ -29,8 +30,8 @@ from .faults import UNREPAIRABLE, Search, as_soup, distinct_faces
 from .grouping import connected, first_equal_row
 from .mesh import Mesh
 from .orientation import faces_to_flip
-from .report import Kind, counted
-from .topology import HalfEdges, repeats_vertex
+from .report import Fault, Kind, counted
+from .topology import HalfEdges, components, repeats_vertex
 
 _REFUSED = (*UNREPAIRABLE, Kind.NON_FINITE)
 
@@ -135,65 +136,70 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
     found = Search(valid, triangles)
     _require_usable(found)
     if found.half_edges.twin is not None and found.report.is_closed:
-        mesh = Mesh.reported(points, triangles, found.report)
-        return Soup(points, mesh, np.arange(len(points)))
+        return Soup(points, Mesh.of(found), np.arange(len(points)))
     target, kept, half_edges = _welded(valid, found)
+    without_area = _without_area(found, kept, half_edges)
+    flat = kept[without_area]
+    if len(flat):
+        kept = kept[~without_area]
+        half_edges = HalfEdges(half_edges.faces[~without_area], len(points))
     flip = faces_to_flip(valid, half_edges)
     left = np.zeros(len(points), dtype=bool)
     left[half_edges.faces] = True
     number = np.cumsum(left) - 1
-    triangles_left = half_edges.faces
     if flip.any():
-        triangles_left = np.where(flip[:, None], triangles_left[:, [0, 2, 1]], triangles_left)
-    if left.all() and len(kept) == len(triangles) and not flip.any():
-        mesh = Mesh.reported(points, triangles, found.report)
+        faces_left = half_edges.faces
+        faces_left = np.where(flip[:, None], faces_left[:, [0, 2, 1]], faces_left)
+        mesh = Mesh(points[left], number[faces_left])
+    elif half_edges is found.half_edges and len(kept) == len(triangles) and left.all():
+        mesh = Mesh.of(found)
     else:
-        mesh = Mesh(points[left], number[triangles_left])
+        kept_edges = half_edges.renumbered(number, int(left.sum()))
+        mesh = Mesh.of(Search.known(points[left], kept_edges))
     loose = np.flatnonzero(~left[target])
     vertex_of = number[target]
     vertex_of[loose] = _nearest(points[loose], mesh.vertices)
-    workarounds = tuple(_workarounds(triangles, kept, target, loose, flip, half_edges))
+    workarounds = tuple(_workarounds(triangles, kept, flat, target, loose, flip, half_edges))
     return Soup(points, mesh, vertex_of, workarounds)
 
 
 def _require_usable(found: Search) -> None:
     if not len(found.triangles):
         raise MeshError("this surface cannot be deformed: it has no faces; give at least one")
-    faults = [
-        f"{fault}; {fault.kind.advice}" for fault in found.number_faults if fault.kind in _REFUSED
-    ]
+    faults = [fault for fault in found.number_faults if fault.kind in _REFUSED]
+    if not faults and found.all_flat:
+        faults = [Fault(Kind.FLAT, 1)]
     if faults:
-        raise MeshError(f"this surface cannot be deformed: {'; '.join(faults)}")
-    if len(found.flat) == len(found.triangles):
-        raise MeshError(
-            "this surface cannot be deformed: all faces are flat; "
-            "give at least one whose three corners are not on a line"
-        )
+        reasons = "; ".join(f"{fault}; {fault.kind.advice}" for fault in faults)
+        raise MeshError(f"this surface cannot be deformed: {reasons}")
 
 
 def _welded(points: FloatArray, found: Search) -> tuple[IntArray, IntArray, HalfEdges]:
     """Return the point that each point (p,) is welded to, the faces kept, and their half-edges."""
     target, half_edges = np.arange(len(points)), found.half_edges
     kept = np.flatnonzero(~found.degenerate & ~found.duplicate)
-    while True:  # a face that is dropped may leave a border
+    while len(half_edges.boundary):  # a face that is dropped may leave a border
         weld = _coinciding_sheets(half_edges, found.first_at)
         weld[half_edges.tail[half_edges.boundary]] = True
         weld[half_edges.head[half_edges.boundary]] = True
         some = np.flatnonzero(weld)
-        first = some[first_equal_row(points[some])]
+        place, first_there = found.first_at[some], np.empty(len(points), dtype=np.int64)
+        first_there[place[::-1]] = some[::-1]  # the last write wins
+        first = first_there[place]
         if (first == some).all():
-            return target, kept, half_edges
+            break
         number = np.arange(len(points))
         number[some] = first
         target = number[target]
         degenerate, duplicate, half_edges = distinct_faces(number[half_edges.faces], len(points))
         kept = kept[~degenerate & ~duplicate]
+    return target, kept, half_edges
 
 
 def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
     """Return the vertices (p,) of faces of open shells with all positions of another such face."""
     found = np.zeros(len(first_at), dtype=bool)
-    if not len(half_edges.boundary) or (first_at == np.arange(len(first_at))).all():
+    if (first_at == np.arange(len(first_at))).all():
         return found
     used = np.zeros_like(found)
     used[half_edges.faces] = True
@@ -201,6 +207,8 @@ def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
     border = np.zeros_like(found)
     border[half_edges.tail[half_edges.boundary]] = True
     border[half_edges.head[half_edges.boundary]] = True
+    if border[used].all():
+        return found
     shells = half_edges.shells
     is_open = np.zeros(int(shells.max()) + 1, dtype=bool)
     is_open[shells[half_edges.boundary // 3]] = True
@@ -211,6 +219,19 @@ def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
     again = first != np.arange(len(first))
     found[faces[again]] = found[faces[first[again]]] = True
     return found
+
+
+def _without_area(found: Search, kept: IntArray, half_edges: HalfEdges) -> BoolArray:
+    """Return which faces (m,) are in a component of flat faces only, connected at any vertex."""
+    is_flat = np.zeros(len(found.triangles), dtype=bool)
+    is_flat[found.flat] = True
+    is_flat = is_flat[kept]
+    if not is_flat.any():
+        return is_flat
+    of_vertex = components(half_edges.n_vertices, half_edges.faces)
+    has_area = np.zeros(len(of_vertex), dtype=bool)
+    has_area[of_vertex[half_edges.faces[~is_flat, 0]]] = True
+    return np.asarray(~has_area[of_vertex[half_edges.faces[:, 0]]])
 
 
 def _nearest(points: FloatArray, vertices: FloatArray) -> IntArray:
@@ -225,6 +246,7 @@ def _nearest(points: FloatArray, vertices: FloatArray) -> IntArray:
 def _workarounds(
     triangles: IntArray,
     kept: IntArray,
+    flat: IntArray,
     target: IntArray,
     loose: IntArray,
     flip: BoolArray,
@@ -245,13 +267,19 @@ def _workarounds(
         faces = triangles[kept[flip]]
         yield _workaround(Kind.TURNED_EDGE, len(faces), "flipped # face", np.unique(faces))
     dropped = np.ones(len(triangles), dtype=bool)
-    dropped[kept] = False
+    dropped[kept] = dropped[flat] = False
     faces = triangles[dropped]
     degenerate = repeats_vertex(target[faces])
-    for kind, some in ((Kind.DUPLICATE_FACE, ~degenerate), (Kind.DEGENERATE, degenerate)):
-        if some.any():
-            text = f"ignored # {kind.one}"
-            yield _workaround(kind, int(some.sum()), text, np.unique(faces[some]))
+    for kind, ignored in (
+        (Kind.DUPLICATE_FACE, faces[~degenerate]),
+        (Kind.DEGENERATE, faces[degenerate]),
+        (Kind.ZERO_AREA, triangles[flat]),
+    ):
+        if len(ignored):
+            text = f"ignored {counted(len(ignored), kind.one, kind.many)}"
+            yield Workaround(text, np.unique(ignored), kind, len(ignored))
+    if len(flat):
+        loose = np.setdiff1d(loose, at(target[triangles[flat]]))
     if len(loose):
         text = f"{counted(len(loose), 'point is', 'points are')} in no face"
         yield Workaround(text, loose, Kind.UNREFERENCED, len(loose))

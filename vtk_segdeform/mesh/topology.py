@@ -28,6 +28,10 @@ from scipy.sparse import csgraph
 from ..arrays import BoolArray, IntArray
 from .grouping import connected, counting_order, first_equal_row, first_members
 
+_NAMELESS = (
+    "order", "twin", "opposite", "across", "first", "counts", "boundary", "pairs", "inconsistent",
+    "repeated", "shells", "sides", "one_sided",
+)  # fmt: skip
 _ROUNDS = 10_000  # steps around a vertex; with more faces at a vertex, `fans` are counted
 
 
@@ -78,9 +82,21 @@ class HalfEdges:
         return twin
 
     @cached_property
-    def neighbours(self) -> IntArray | None:
-        """(m, 3) int: the face across each half-edge; None where `twin` is None."""
-        return None if self.twin is None else (self.twin // 3).reshape(-1, 3)
+    def opposite(self) -> IntArray:
+        """(3m,) int: the other half-edge of a pair; -1 if there is none, -2 if several."""
+        if self.twin is not None:
+            return self.twin
+        opposite = np.full(3 * len(self.faces), -2)
+        opposite[self.boundary] = -1
+        one, other = self.pairs.T
+        opposite[one], opposite[other] = other, one
+        return opposite
+
+    @cached_property
+    def across(self) -> IntArray:
+        """(m, 3) int: the face across each half-edge; -1 if there is none, -2 if several."""
+        across = np.where(self.opposite < 0, self.opposite, self.opposite // 3)
+        return across.reshape(-1, 3)
 
     @cached_property
     def first(self) -> IntArray:
@@ -120,18 +136,70 @@ class HalfEdges:
         return inconsistent
 
     @cached_property
+    def edge_keys(self) -> IntArray:
+        """(e,) int: the key of each edge, sorted."""
+        keys: IntArray = self.keys[self.order[self.first]]
+        return keys
+
+    @cached_property
+    def net_boundary(self) -> IntArray:
+        """(b, 2) int: the sum of the directed edges of the faces: those without opposites, sorted.
+
+        An edge that k more faces have in one direction than in the other occurs k times.
+        """
+        if self.twin is not None:
+            return np.empty((0, 2), dtype=np.int64)
+        summed = self.counts != 2
+        summed[np.flatnonzero(~summed)[self.inconsistent]] = True
+        half = self.order[np.repeat(summed, self.counts)]
+        forth = np.where(self.tail[half] < self.head[half], 1, -1)
+        counts = self.counts[summed]
+        net = np.add.reduceat(forth, np.cumsum(counts) - counts) if len(half) else forth
+        edges = np.stack(np.divmod(self.edge_keys[summed], self.n_vertices), axis=1)
+        edges[net < 0] = edges[net < 0, ::-1]
+        return np.repeat(edges, np.abs(net), axis=0)
+
+    @cached_property
+    def repeated(self) -> BoolArray:
+        """(m,) bool: which faces have the same three vertices as an earlier face.
+
+        Such faces share three edges.  So a face can only be one of them if it has no edge alone,
+        and across two of its edges the same face, or an edge with three or more faces.
+        """
+        a, b, c = self.across.T
+        same = (a == b) | (b == c) | (c == a) | (a == -2) | (b == -2) | (c == -2)
+        some = np.flatnonzero(same & (a != -1) & (b != -1) & (c != -1))
+        repeated = np.zeros(len(self.faces), dtype=bool)
+        first = first_equal_row(np.sort(self.faces[some], axis=1))
+        repeated[some] = first != np.arange(len(some))
+        return repeated
+
+    def renumbered(self, number: IntArray, n_vertices: int) -> HalfEdges:
+        """Return the half-edges with each vertex v called number[v], which keeps their order.
+
+        What does not depend on the names of vertices is passed on.
+        """
+        renamed = HalfEdges(number[self.faces], n_vertices)
+        for name in _NAMELESS:
+            if name in self.__dict__:
+                renamed.__dict__[name] = self.__dict__[name]
+        return renamed
+
+    @cached_property
     def shells(self) -> IntArray:
         """(m,) int: the shell of each face, numbered from 0 in the order of their first faces."""
         m = len(self.faces)
         # Most meshes are one shell; testing for that takes a fifth of the time of the general case.
-        if self.neighbours is not None and m:
-            starts, across = np.arange(0, 3 * m + 1, 3), self.neighbours.ravel()
+        if m and (self.twin is not None or self.counts.max() <= 2):
+            starts, faces = np.arange(0, 3 * m + 1, 3), np.arange(m)[:, None]
+            across = np.where(self.across < 0, faces, self.across).ravel()  # itself at a border
             links = sparse.csr_array((np.ones(3 * m, bool), across, starts), shape=(m, m))
             if len(csgraph.breadth_first_order(links, 0)[0]) == m:
                 return np.zeros(m, dtype=np.int64)
-        same_edge = np.diff(self.keys[self.order]) == 0
-        one, other = self.order[:-1][same_edge] // 3, self.order[1:][same_edge] // 3
-        return connected(m, one, other)
+        later = np.ones(len(self.order), dtype=bool)  # on an edge, than its first half-edge
+        later[self.first] = False
+        at = np.flatnonzero(later)
+        return connected(m, self.order[at - 1] // 3, self.order[at] // 3)
 
     @cached_property
     def sides(self) -> tuple[IntArray, BoolArray]:
@@ -177,17 +245,19 @@ class HalfEdges:
         return np.flatnonzero(several)
 
     def _has_one_fan_each(self) -> bool:
-        """Return whether every vertex has one fan, judged by twins; may be False for a valid mesh.
+        """Return whether every vertex has one fan; may be False for a valid mesh.
 
         Crossing the half-edge that ends at a corner leads to the next corner of its fan.  The
-        walk goes around all vertices at once, each from one of its corners until it returns;
-        if every vertex has one fan, it visits every corner.
+        walk goes around all vertices at once, each from one of its corners, at a border from the
+        first, until it returns or ends; if every vertex has one fan, it visits every corner.
         """
-        if self.twin is None:
+        if self.twin is None and (self.inconsistent.any() or (self.counts > 2).any()):
             return False
-        step = np.roll(self.twin.reshape(-1, 3), 1, axis=1).ravel()
+        step = np.roll(self.opposite.reshape(-1, 3), 1, axis=1).ravel()
         start = np.full(self.n_vertices, -1)
         start[self.tail] = np.arange(len(step))
+        if self.twin is None:
+            start[self.tail[self.boundary]] = self.boundary
         start = at = start[start >= 0]
         visited = 0
         for _ in range(_ROUNDS):
@@ -195,7 +265,7 @@ class HalfEdges:
                 break
             visited += len(at)
             at = step[at]
-            going = at != start
+            going = (at != start) & (at >= 0)
             start, at = start[going], at[going]
         return visited == len(step)
 
@@ -223,19 +293,6 @@ def two_sides(
 def edge_keys(one: IntArray, other: IntArray, n_vertices: int) -> IntArray:
     """Return one number for each pair of vertices, the same for (a, b) and (b, a)."""
     return np.minimum(one, other) * n_vertices + np.maximum(one, other)
-
-
-def boundary_edges(faces: IntArray, n_vertices: int) -> IntArray:
-    """Return the boundary of triangles (m, 3): their directed edges without opposites, (b, 2).
-
-    An edge that k more faces have in one direction than in the other occurs k times.
-    """
-    tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    keys, edge = np.unique(edge_keys(tail, head, n_vertices), return_inverse=True)
-    net = np.rint(np.bincount(edge, np.where(tail < head, 1, -1))).astype(np.int64)
-    edges = np.stack(np.divmod(keys, n_vertices), axis=1)
-    edges[net < 0] = edges[net < 0, ::-1]
-    return np.repeat(edges, np.abs(net), axis=0)
 
 
 def loops_of(boundary: IntArray) -> list[IntArray]:
@@ -317,12 +374,6 @@ def repeats_vertex(faces: IntArray) -> BoolArray:
     """Return which faces contain a vertex twice, (m,) bool."""
     a, b, c = faces.T
     repeats: BoolArray = (a == b) | (b == c) | (c == a)
-    return repeats
-
-
-def repeats_face(faces: IntArray) -> BoolArray:
-    """Return which faces have the same three vertices as an earlier face, (m,) bool."""
-    repeats: BoolArray = first_equal_row(np.sort(faces, axis=1)) != np.arange(len(faces))
     return repeats
 
 

@@ -78,6 +78,8 @@ def best_neck(part: Surface, rim: FloatArray, share: float) -> Neck | None:
     neck : Neck or None
         Both sides are connected and not empty.
     """
+    if not part.areas.any():
+        return None
     candidates = [
         c for d in part.distances_from_ends(rim) for c in _candidates(part, rim, share, d)
     ]
@@ -155,6 +157,6 @@ def _measured_rank(
 
 def _rank(cost: FloatArray, area: FloatArray, total: float, share: float) -> FloatArray:
     """Return s, modified: area beyond the share counts less, and larger surfaces come first."""
-    area = np.maximum(area, np.finfo(float).tiny)
+    area = np.maximum(area, _LEAST * share)  # smaller ones are no limbs
     effective = np.minimum(area, share * (share / area) ** 0.25)
     return np.asarray(cost**2 / (2.0 * np.pi * effective) * share / total)

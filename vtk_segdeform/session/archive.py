@@ -21,6 +21,7 @@ _HEADER = "header.json"
 _LONGEST_HEADER = 1 << 20  # bytes
 _LONGEST_NPY_HEADER = 1 << 12  # bytes
 _LONGEST_DIRECTORY = 1 << 20  # bytes
+_ENTRY = 64  # bytes of the directory for each member, at most, without its name
 _LARGEST = 2 << 30  # bytes of a file; a million vertices take about 80 million
 _END = b"PK\5\6"  # start of the last 22 bytes of a zip file without a comment
 _END_64 = b"PK\6\7"  # start of the 20 bytes before them in a zip64 file, which is too large
@@ -52,15 +53,20 @@ def write_archive(file: IO[bytes], header: Mapping[str, Any], arrays: Mapping[st
     OSError
         If the file cannot be written, or would be too large to be read.
     """
-    total = sum(array.nbytes for array in arrays.values())
-    if total + _LONGEST_HEADER > _LARGEST:
-        raise OSError(f"{total:.3g} bytes exceed the limit of {_LARGEST:.3g}")
+    content = json.dumps(header, indent=1)
+    for what, size, limit in (
+        ("", sum(array.nbytes for array in arrays.values()) + _LONGEST_HEADER, _LARGEST),
+        (" of names and texts", len(content.encode()), _LONGEST_HEADER),
+        (" of a directory", sum(len(name) + _ENTRY for name in arrays), _LONGEST_DIRECTORY),
+    ):
+        if size > limit:
+            raise OSError(f"{size:.3g} bytes{what} exceed the limit of {limit:.3g}")
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
-        archive.writestr(zipfile.ZipInfo(_HEADER, _EPOCH), json.dumps(header, indent=1))
+        archive.writestr(zipfile.ZipInfo(_HEADER, _EPOCH), content)
         for name, array in arrays.items():
-            content = BytesIO()
-            npy.write_array(content, array.astype(_TYPES[type_of(array)]), allow_pickle=False)
-            archive.writestr(zipfile.ZipInfo(f"{name}.npy", _EPOCH), content.getbuffer())
+            stored = BytesIO()
+            npy.write_array(stored, array.astype(_TYPES[type_of(array)]), allow_pickle=False)
+            archive.writestr(zipfile.ZipInfo(f"{name}.npy", _EPOCH), stored.getbuffer())
 
 
 class Archive:
