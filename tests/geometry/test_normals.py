@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from open_surfaces import moebius
 from solids import icosphere, rotation
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkFiltersCore import vtkTriangleMeshPointNormals
@@ -125,3 +126,27 @@ def test_at_borders_and_non_manifold_vertices_they_are_sums_over_the_faces(make)
         np.add.at(expected, corner, np.cross(b - a, c - a))
     expected /= np.linalg.norm(expected, axis=1, keepdims=True)
     assert_allclose(VertexNormals(mesh).of(x), expected, atol=1e-6)
+
+
+@pytest.mark.usefixtures("either")
+@pytest.mark.parametrize("flipped", [0, 700])
+def test_on_a_surface_with_one_side_they_agree_with_the_faces_up_to_the_turned_corners(flipped):
+    strip = moebius()  # a seam moves with the faces that are flipped
+    faces = np.array(strip.regular_faces)
+    faces[:flipped] = faces[:flipped, ::-1]
+    mesh = Mesh(strip.points, faces)
+    x = mesh.vertices @ rotation([1.0, 2.0, -0.5], 1.1).T
+    normals = VertexNormals(mesh)
+    signs = np.ones(mesh.faces.size)
+    signs[normals.turned] = -1.0
+    assert len(np.unique(mesh.faces.ravel()[normals.turned])) == 8  # the seam, all across
+    a, b, c = x[mesh.faces.T]
+    of_face = np.cross(b - a, c - a)
+    of_face /= np.linalg.norm(of_face, axis=1, keepdims=True)
+    of_corner = normals.of(x)[mesh.faces] * signs.reshape(-1, 3, 1)
+    assert np.einsum("fci,fi->fc", of_corner, of_face).min() > 0.99
+
+
+def test_only_surfaces_with_one_side_have_turned_corners():
+    for mesh in (MESHES["torus"], cut_ball(), finned_ball()):
+        assert not len(VertexNormals(mesh).turned)

@@ -5,17 +5,22 @@ from __future__ import annotations
 import importlib
 import threading
 import time
+from functools import partial
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from open_surfaces import bottle, moebius, sheet
+from solids import icosphere
 
-from vtk_segdeform import models
+from vtk_segdeform import Mesh, Surface, models
 from vtk_segdeform.cages.fit import fit_cages
 from vtk_segdeform.cages.mean_value import mean_value_coordinates
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.energy.hessian import Factor
 from vtk_segdeform.errors import Cancelled
+from vtk_segdeform.geometry.lids import lids_of
+from vtk_segdeform.geometry.normals import VertexNormals
 from vtk_segdeform.geometry.rotations import closest_rotations
 from vtk_segdeform.geometry.volume import signed_volume, volume_along, volume_gradient
 from vtk_segdeform.kernels import dispatch, threads
@@ -53,6 +58,59 @@ def test_volumes_agree(twin, far):
     ):
         quick, plain = twin(call)
         assert_allclose(quick, plain, rtol=1e-12, atol=(1e-14 + 1e-15 * far) * size)
+
+
+def finned() -> Mesh:
+    """Return a ball with a fin, an edge with three faces, and with two tips of equal position."""
+    points, faces = icosphere(3)
+    edge = faces[0, :2]
+    tips = 1.5 * points[[edge[0], edge[0]]]
+    fin = [[*edge, len(points)], [edge[1], edge[0], len(points) + 1]]
+    return Mesh(np.vstack([points, tips]), np.vstack([faces, fin]))
+
+
+OPEN = {
+    "holes": lambda: Surface(bottle(5, 3)).mesh,
+    "sheet": lambda: Surface(sheet(20)).mesh,
+    "one triangle": lambda: Mesh(np.eye(3), [[0, 1, 2]]),
+    "finned": finned,
+    "one-sided": lambda: Surface(moebius()).mesh,
+}
+
+
+@pytest.mark.parametrize("name", OPEN)
+def test_on_open_meshes_volumes_and_normals_agree(twin, name, monkeypatch):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED", 0)
+    mesh = OPEN[name]()
+    rng = np.random.default_rng(3)
+    x = mesh.vertices + 0.01 * rng.normal(size=mesh.vertices.shape)
+    quick, plain = twin(lambda: VertexNormals(mesh).of(x))
+    assert_allclose(quick, plain, atol=1e-6)
+    lids = lids_of(mesh, True)
+    for points, faces in ((x, mesh.faces), (lids.extension @ x, lids.closed(mesh))):
+        for call in (
+            partial(signed_volume, points, faces),
+            partial(volume_along, points, rng.normal(size=points.shape), faces),
+            partial(volume_gradient, points, faces),
+        ):
+            quick, plain = twin(call)
+            assert_allclose(quick, plain, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", OPEN)
+def test_on_open_meshes_no_kernel_leaves_its_arrays(name):
+    """Python raises an error where compiled code would write beyond an array."""
+    kernels = pytest.importorskip("vtk_segdeform.kernels.compiled.normals")
+    mesh = OPEN[name]()
+    faces, n = mesh.faces, mesh.n_vertices
+    starts = np.concatenate([[0], np.cumsum(np.bincount(faces.ravel()))])
+    guarded = np.full(faces.size, -7, dtype=np.int32)
+    kernels.rings.py_func(guarded, faces, starts)
+    assert 0 <= guarded.min() <= guarded.max() < n
+    ring = np.full(faces.size + 64, -7, dtype=np.int32)
+    kernels.rings(ring[: faces.size], faces, starts)
+    assert_array_equal(ring[: faces.size], guarded)
+    assert (ring[faces.size :] == -7).all()
 
 
 SHAPES = {

@@ -59,6 +59,7 @@ from ..solver import (
     VolumeConstraint,
     Volumes,
     WeightContinuation,
+    body_volumes,
     connected_sets,
     errors_at,
     moved_along,
@@ -104,7 +105,8 @@ class _Constraints:
     places_of_fixed: FloatArray  # (s, 3)
     fixed_box: FloatArray  # (2, 3), corners of the box around the fixed vertices; or (0, 3)
     anchor: FloatArray  # (3,), mean of the fixed vertices: the centre when a pose is scaled
-    volumes: Volumes
+    preserved: tuple[VolumeConstraint, ...]  # on the mesh
+    volumes: Volumes  # the same on the surface of the steps
     is_scaled: bool  # whether exact volume is restored by scaling
     solver: GaussNewton  # with the initial weights
 
@@ -128,7 +130,7 @@ class Deformer:
         Vertices that stay in place, and vertices that follow *targets*.  Sets of handle vertices
         that no edge connects are separate handles, moved and rotated independently.
     preserve_volume : bool
-        Preserve the enclosed volume exactly, eq. (9).
+        Preserve the enclosed volume exactly, eq. (9); of several bodies, that of each.
     preserve_region_volumes : bool
         Preserve the volume of every region as well.
     lids : bool or None
@@ -295,6 +297,11 @@ class Deformer:
         return self._total_volume.has_volume
 
     @property
+    def preserved_volumes(self) -> tuple[VolumeConstraint, ...]:
+        """The volumes that every pose preserves: of each body, or of each region."""
+        return self._constraints.preserved
+
+    @property
     def step_volumes(self) -> Volumes:
         """The volumes that the solver's steps preserve, and the surface they are computed on."""
         return self._constraints.volumes
@@ -410,7 +417,7 @@ class Deformer:
         if self._constraints.is_scaled:
             return self._scaled()
         paths = self._map(self._p * size, [z * size for z in directions])
-        steps = steps_to_volume(self._preserved_volumes, paths)
+        steps = steps_to_volume(self._constraints.preserved, paths)
         self._p = self._p + sum(tk * z for tk, z in zip(steps, directions, strict=True))
         return moved_along(paths, steps), 0.0
 
@@ -435,13 +442,14 @@ class Deformer:
         moves = offsets - self._rest_cages * self._frame.size
         return self._binding.mapping.map(np.hstack([moves, *directions]), self._base)
 
-    @property
     def _preserved_volumes(self) -> tuple[VolumeConstraint, ...]:
         if not self.has_volume:
             return ()
         if self._preserve_region_volumes:
             return self._region_volumes
-        return (self._total_volume,) if self._preserve_volume else ()
+        if not self._preserve_volume:
+            return ()
+        return body_volumes(self._rest_pose, self._total_volume, self._lids, self.handle)
 
     @cached_property
     def _region_volumes(self) -> tuple[VolumeConstraint, ...]:
@@ -478,10 +486,11 @@ class Deformer:
             self.subspace, self._rest, [ids[places] for places in order], weight
         )
         gathered = in_order if positions.mean is None else positions.mean @ in_order
-        volumes = binding.coarse_volume.volumes(self._preserved_volumes, rest)
+        preserved = self._preserved_volumes()
+        volumes = binding.coarse_volume.volumes(preserved, rest)
         fixed_at = rest[self.fixed] if len(self.fixed) else np.zeros((1, 3))
         box = np.stack([fixed_at.min(axis=0), fixed_at.max(axis=0)])
-        only_total = self._preserve_volume and not self._preserve_region_volumes
+        is_whole = preserved == (self._total_volume,)
         is_large = mesh.n_vertices > sizes.SCALED_VOLUME
         self._constraints = _Constraints(
             fixed_at=mesh.vertices[self.fixed],
@@ -490,11 +499,9 @@ class Deformer:
             places_of_fixed=gathered[:, len(self.handle) :] @ rest[self.fixed],
             fixed_box=box[: 2 * len(self.fixed)],
             anchor=fixed_at.mean(axis=0) * self._frame.size,
+            preserved=preserved,
             volumes=volumes,
-            is_scaled=only_total
-            and self.has_volume
-            and is_large
-            and binding.coarse_volume.cells is not None,
+            is_scaled=is_whole and is_large and binding.coarse_volume.cells is not None,
             solver=GaussNewton(binding.energy, positions, volumes),
         )
         self.reset()

@@ -31,7 +31,14 @@ from .normal_transport import NormalTransport
 from .normals import VertexNormals
 from .rotations import closest_rotations, rigid_fit
 from .sampling import distinct_lengths, faces_between, nearest_source, unique_edges, voronoi_cells
-from .volume import signed_volume, step_to_volume, volume_along, volume_along_path, volume_gradient
+from .volume import (
+    corner_and_edges,
+    signed_volume,
+    step_to_volume,
+    volume_along,
+    volume_along_path,
+    volume_gradient,
+)
 
 __all__ = [
     "IntrinsicTriangulation",
@@ -43,6 +50,7 @@ __all__ = [
     "closest_rotations",
     "cluster_positions",
     "cluster_within_parts",
+    "corner_and_edges",
     "cotangent_laplacian",
     "distinct_lengths",
     "distortion",

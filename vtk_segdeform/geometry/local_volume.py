@@ -84,6 +84,11 @@ class LocalVolume:
         floor = _LEAST * np.abs(self._rest).mean()
         self._reliable = self._rest > floor
 
+    @property
+    def is_defined(self) -> bool:
+        """Whether any part of the mesh encloses a volume; else s is 0 everywhere."""
+        return self._inside is None or bool(len(self._inside))
+
     def change(self, vertices: FloatArray) -> FloatArray:
         """Return s, (n,), of the pose *vertices* (n, 3): 0.1 where the body expanded by 10 %.
 

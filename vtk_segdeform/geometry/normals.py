@@ -9,6 +9,9 @@ it is the direction of
 The rings of neighbours are computed once.  Each vertex depends on its own ring only, so the loop
 over vertices runs in parallel.  At borders and non-manifold vertices, which have no such ring, the
 normals of the faces are summed.
+
+A surface with one side cannot be oriented: somewhere it has a seam, where neighbouring faces differ
+in orientation.  At its vertices the normals of the faces that are `turned` count negative.
 """
 
 from __future__ import annotations
@@ -21,7 +24,7 @@ from scipy import sparse
 
 from ..arrays import FloatArray, IntArray
 from ..kernels import compiled_kernels, in_parallel, inputs
-from ..mesh import Mesh
+from ..mesh import HalfEdges, Mesh, two_sides
 
 _PIECES = 16  # most tasks
 _PIECE = 1 << 12  # fewest vertices per task
@@ -39,6 +42,23 @@ class VertexNormals:
     def __init__(self, mesh: Mesh) -> None:
         self._faces, self._n = mesh.faces, mesh.n_vertices
         self._scale = 1.0 / mesh.diagonal
+        self._mesh = mesh
+
+    @cached_property
+    def turned(self) -> IntArray:
+        """(k,) int: the corners, 3 f + c, of faces oriented against the normal at that corner.
+
+        They are at the seam of a surface with one side; any other mesh has none.
+        """
+        if self._mesh.is_two_manifold:
+            return np.empty(0, dtype=np.int64)
+        edges = HalfEdges(self._faces, self._n)
+        opposite = edges.inconsistent
+        if not opposite.any():
+            return np.empty(0, dtype=np.int64)
+        corners, across = edges.fan_links(edges.pairs)
+        _, turned = two_sides(self._faces.size, corners, across, np.tile(opposite, 2))
+        return np.flatnonzero(turned)
 
     def of(self, x: FloatArray, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
         """Return the normals (n, 3) of the pose *x* (n, 3), in *out* if given.
@@ -87,6 +107,8 @@ class VertexNormals:
 
     @cached_property
     def _around(self) -> sparse.csr_array:
-        """(n, m) sparse: 1 where a vertex is a corner of a face."""
+        """(n, m) sparse: 1 where a vertex is a corner of a face, -1 where that is turned."""
         corners = self._faces.ravel(), np.repeat(np.arange(len(self._faces)), 3)
-        return sparse.coo_array((np.ones(3 * len(self._faces)), corners)).tocsr()
+        signs = np.ones(self._faces.size)
+        signs[self.turned] = -1.0
+        return sparse.coo_array((signs, corners)).tocsr()

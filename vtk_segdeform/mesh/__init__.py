@@ -23,7 +23,15 @@ from .mesh import Mesh, require_mesh
 from .report import Kind, MeshReport, counted
 from .shells import misoriented_shells
 from .soup import Soup, Workaround, mesh_of
-from .topology import HalfEdges, components, edge_keys, face_edges, next_half_edge, repeats_vertex
+from .topology import (
+    HalfEdges,
+    components,
+    edge_keys,
+    face_edges,
+    next_half_edge,
+    repeats_vertex,
+    two_sides,
+)
 from .triangles import corner_angles, least_angle, normals
 
 __all__ = [
@@ -59,5 +67,6 @@ __all__ = [
     "repeats_vertex",
     "require_mesh",
     "self_intersections",
+    "two_sides",
     "winding_number",
 ]

@@ -222,16 +222,16 @@ class HalfEdges:
 
     def fans(self, pairs: IntArray) -> IntArray:
         """Return the fan of each corner, (3m,) int, connected across *pairs* (p, 2) only."""
+        return connected(3 * len(self.faces), *self.fan_links(pairs))
+
+    def fan_links(self, pairs: IntArray) -> tuple[IntArray, IntArray]:
+        """Return the corners (2p,) at both ends of *pairs* (p, 2), and those across from them."""
         one, other = pairs.T
         start, end = one, next_half_edge(one)  # the corners at both ends of the first half-edge
         parallel = self.tail[one] == self.tail[other]
         across_start = np.where(parallel, other, next_half_edge(other))
         across_end = np.where(parallel, next_half_edge(other), other)
-        return connected(
-            3 * len(self.faces),
-            np.concatenate([start, end]),
-            np.concatenate([across_start, across_end]),
-        )
+        return np.concatenate([start, end]), np.concatenate([across_start, across_end])
 
     @cached_property
     def pinched(self) -> IntArray:

@@ -26,7 +26,7 @@ from ..files import cache_folder
 from ..geometry import Lids, lids_of, volume_gradient
 from ..mesh import Mesh
 from ..progress import Progress, part, tell
-from ..solver import Solution, VolumeConstraint, region_volumes, total_volume
+from ..solver import Solution, VolumeConstraint, total_volume
 from .handles import require_near, targets_at
 from .listeners import Change
 from .state import Pose, State
@@ -203,15 +203,12 @@ class PoseSolver:
             return
         deformer.reset()
         # Every step of the solver meets the constraints, so its starting pose must do so too.
-        if pose is not None and self._meets_constraints(state, pose):
+        if pose is not None and self._meets_constraints(state, pose, deformer):
             deformer.resume(pose.cage_vertices, _stacked(pose.targets))
 
-    def _meets_constraints(self, state: State, pose: Pose) -> bool:
-        x, change = self._evaluate(state, pose)
-        if state.options.preserve_region_volumes and state.regions is not None:
-            constraints = region_volumes(self._mesh, state.regions.labels, self.lids(state))
-            return all(abs(c.relative(x)) <= _VOLUME_TOLERANCE for c in constraints)
-        return not state.options.preserve_volume or abs(change()) <= _VOLUME_TOLERANCE
+    def _meets_constraints(self, state: State, pose: Pose, deformer: Deformer) -> bool:
+        x, _ = self._evaluate(state, pose)
+        return all(abs(v.relative(x)) <= _VOLUME_TOLERANCE for v in deformer.preserved_volumes)
 
     def _evaluate(self, state: State, pose: Pose) -> tuple[FloatArray, Callable[[], float]]:
         """Return x = W~ p, and a function that returns its volume change."""

@@ -18,7 +18,13 @@ from .exact_volume import ScaledSurface, moved_along, steps_to_volume
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
 from .position_constraints import connected_sets, errors_at, position_term
 from .solution import Solution, Status
-from .volume_constraints import VolumeConstraint, Volumes, region_volumes, total_volume
+from .volume_constraints import (
+    VolumeConstraint,
+    Volumes,
+    body_volumes,
+    region_volumes,
+    total_volume,
+)
 from .waypoints import waypoints
 from .weights import WeightContinuation
 
@@ -33,6 +39,7 @@ __all__ = [
     "VolumeConstraint",
     "Volumes",
     "WeightContinuation",
+    "body_volumes",
     "connected_sets",
     "errors_at",
     "moved_along",

@@ -1,6 +1,9 @@
-"""Volume constraints: the volume of the whole mesh, or of each of its regions, is preserved.
+"""Volume constraints: the volume of each body of the mesh, or of each of its regions, is preserved.
 
     g_c(x) = V_c(x) - V_c(rest) = 0                                                     (9)
+
+A *body* is a connected component, with the cavities in it.  The paper has one constraint for the
+whole mesh; with several bodies one could then grow while the others shrink.
 
 A region is an open surface, and is closed at its border: each connected part of the border is
 spanned by a fan of triangles around its centre, which the regions on both sides share.  Region
@@ -24,6 +27,7 @@ from scipy.sparse import csgraph
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import (
     Lids,
+    corner_and_edges,
     lids_of,
     signed_volume,
     step_to_volume,
@@ -32,6 +36,9 @@ from ..geometry import (
 )
 from ..mesh import Mesh
 from ..subspace import Subspace
+
+_MOST_BODIES = 6  # with a constraint of their own, the largest ones: each takes a few solves a step
+_LEAST_BODY = 1e-4  # relative to the largest: too small for one of its own
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +54,7 @@ class VolumeConstraint:
 
     def violation(self, x: FloatArray) -> float:
         """Return g(x), in units of volume."""
-        return signed_volume(self._extended(x), self.faces) - self.target
+        return signed_volume(self.extended(x), self.faces) - self.target
 
     def relative(self, x: FloatArray) -> float:
         """Return g(x) / target; 0 if nothing is enclosed."""
@@ -60,7 +67,7 @@ class VolumeConstraint:
 
     def gradient(self, x: FloatArray) -> FloatArray:
         """Return J_g, (n, 3): the derivative of g by each vertex."""
-        gradient = volume_gradient(self._extended(x), self.faces)
+        gradient = volume_gradient(self.extended(x), self.faces)
         return gradient if self.extension is None else self.extension.T @ gradient
 
     def hessian_halves(self, x: FloatArray) -> sparse.csr_array:
@@ -70,7 +77,7 @@ class VolumeConstraint:
         det(x_i, x_j, x_k) / 6 is the axis c of x_k / 6.
         """
         i, j, k = (np.concatenate(np.roll(self.faces.T, -turn, axis=0)) for turn in range(3))
-        points = self._extended(x) / 6.0
+        points = self.extended(x) / 6.0
         halves = [
             sparse.coo_array((axis[k], (i, j)), (len(points), len(points))).tocsr()
             for axis in points.T
@@ -81,9 +88,9 @@ class VolumeConstraint:
 
     def exact_step(self, path: FloatArray) -> float:
         """Return the smallest t with g(x + t d) = 0, to rounding; x and d side by side (n, 6)."""
-        return step_to_volume(volume_along_path(self._extended(path), self.faces), self.target)
+        return step_to_volume(volume_along_path(self.extended(path), self.faces), self.target)
 
-    def _extended(self, x: FloatArray) -> FloatArray:
+    def extended(self, x: FloatArray) -> FloatArray:
         """Return all points, relative to a vertex if points were added, to limit cancellation."""
         if self.extension is None:
             return x
@@ -122,6 +129,28 @@ def total_volume(mesh: Mesh, lids: Lids | None = None) -> VolumeConstraint:
     return replace(free, target=free.violation(mesh.vertices))
 
 
+def body_volumes(
+    mesh: Mesh, whole: VolumeConstraint, lids: Lids, moved: IntArray
+) -> tuple[VolumeConstraint, ...]:
+    """Return one constraint for each body of *mesh*, which add up to the *whole*.
+
+    At most six bodies have one of their own: first those with vertices among *moved* (k,), then the
+    largest; the others share one, and very small ones that of the first.
+    """
+    if np.count_nonzero(lids.encloses) < 2:
+        return (whole,) if whole.has_volume else ()
+    component = np.concatenate([mesh.components, lids.component])[whole.faces[:, 0]]
+    a, e, f = corner_and_edges(whole.extended(mesh.vertices), whole.faces)
+    determinants = np.einsum("ij,ij->i", a - a[0], np.cross(e, f))
+    volumes = np.bincount(component, determinants, len(lids.encloses))
+    body = _bodies(mesh, volumes, mesh.components[moved])[component]
+    constraints = []
+    for k in range(int(body.max()) + 1):
+        free = replace(whole, faces=whole.faces[body == k], target=0.0)
+        constraints.append(replace(free, target=free.violation(mesh.vertices)))
+    return tuple(constraints)
+
+
 def region_volumes(
     mesh: Mesh, labels: IntArray, lids: Lids | None = None
 ) -> tuple[VolumeConstraint, ...]:
@@ -147,6 +176,32 @@ def region_volumes(
         free = VolumeConstraint(own, 0.0, extension)
         constraints.append(replace(free, target=free.violation(mesh.vertices)))
     return tuple(constraints)
+
+
+def _bodies(mesh: Mesh, volumes: FloatArray, moved: IntArray) -> IntArray:
+    """Return the constraint of each component, (c,) int, by their signed *volumes* (c,).
+
+    *moved* are components that come first.
+    """
+    outer = np.arange(len(volumes))
+    low, high = np.full((2, len(volumes), 3), [[[np.inf]], [[-np.inf]]])
+    np.minimum.at(low, mesh.components, mesh.vertices)
+    np.maximum.at(high, mesh.components, mesh.vertices)
+    largest = np.argsort(-volumes, kind="stable")
+    for cavity in np.flatnonzero(volumes < 0.0):
+        around = (low[largest] < low[cavity]) & (high[largest] > high[cavity])
+        bodies = largest[around.all(axis=1) & (volumes[largest] > 0.0)]
+        outer[cavity] = bodies[-1] if len(bodies) else cavity  # the smallest around it
+    sizes = np.abs(np.bincount(outer, volumes, len(volumes)))
+    least = _LEAST_BODY * sizes.max()
+    is_moved = np.isin(np.arange(len(volumes)), outer[moved])
+    alone = np.lexsort((-sizes, ~is_moved))[:_MOST_BODIES]
+    alone = alone[sizes[alone] >= least]
+    number = np.full(len(volumes), len(alone))
+    number[alone] = np.arange(len(alone))
+    if sizes[number == len(alone)].sum() < least:
+        number[number == len(alone)] = 0
+    return np.asarray(number[outer])
 
 
 def _in_order(faces: IntArray) -> IntArray:

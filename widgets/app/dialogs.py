@@ -93,7 +93,7 @@ def show_error(parent: Any, title: str, text: str) -> None:
 def ask_repair_instead(parent: Any, title: str, text: str) -> bool:
     """Show why a file cannot be opened; return whether to repair it."""
     answers = {Answer.REPAIR: "Repair and open ...", Answer.CANCEL: "Cancel"}
-    return _ask(parent, title, text, answers) is Answer.REPAIR
+    return _ask(parent, title, text, answers, is_warning=True) is Answer.REPAIR
 
 
 def show_about(parent: Any, version: str) -> None:
@@ -135,9 +135,12 @@ _ROLES = {
 }
 
 
-def _ask(parent: Any, text: str, more: str, answers: Mapping[Answer, str]) -> Answer:
+def _ask(
+    parent: Any, text: str, more: str, answers: Mapping[Answer, str], *, is_warning: bool = False
+) -> Answer:
     """Return the answer; Enter gives the first one, Escape and closing give the last one."""
-    box = _box(parent, QtWidgets.QMessageBox.Icon.Question, text, more)
+    icons = QtWidgets.QMessageBox.Icon
+    box = _box(parent, icons.Warning if is_warning else icons.Question, text, more)
     roles = QtWidgets.QMessageBox.ButtonRole
     buttons = {
         box.addButton(label, getattr(roles, _ROLES[answer])): answer

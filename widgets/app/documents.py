@@ -14,7 +14,7 @@ import numpy as np
 
 from vtk_segdeform import models
 from vtk_segdeform.errors import MeshError
-from vtk_segdeform.io import Surface, read_polydata, triangles_of
+from vtk_segdeform.io import read_polydata, triangles_of
 from vtk_segdeform.mesh import Mesh, mesh_of
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
@@ -67,10 +67,15 @@ def from_file(path: Path) -> Reader:
     """Return the reader of a mesh file, with all its arrays, or of a session file."""
 
     def read(progress: Progress) -> Opened:
+        try:
+            session = read_session(path, progress)
+        except MeshError as error:
+            if is_mesh(path):
+                _require_unrepairable(path, error)
+            raise
         if is_mesh(path):
-            progress(0.0, "Reading mesh")
-            return Document(path.name, source=path), Session(_surface(path))
-        return Document(path.name, session_path=path), read_session(path, progress)
+            return Document(path.name, source=path), session
+        return Document(path.name, session_path=path), session
 
     return read
 
@@ -91,22 +96,20 @@ class Unopenable(MeshError):
         self.given, self.valid = given, valid
 
 
-def _surface(path: Path) -> Surface:
-    """Read a surface; raise `Unopenable` if there are valid faces beside invalid ones."""
+def _require_unrepairable(path: Path, error: MeshError) -> None:
+    """Raise `Unopenable` if the file has valid faces beside invalid ones."""
     given = read_polydata(path)
+    points = np.array(given.points, dtype=np.float64)
+    is_valid = np.isfinite(points).all(axis=1)
+    if is_valid.all():
+        return
+    points[~is_valid] = 0.0
+    triangles = triangles_of(given)
     try:
-        return Surface(given)
-    except MeshError as fault:
-        text = f"{path}: {fault}"
-        points = np.array(given.points, dtype=np.float64)
-        is_valid = np.isfinite(points).all(axis=1)
-        triangles = triangles_of(given)
-        points[~is_valid] = 0.0
-        try:
-            valid = mesh_of(points, triangles[is_valid[triangles].all(axis=1)]).mesh
-        except MeshError:
-            raise MeshError(text) from None
-        raise Unopenable(text, given, valid) from None
+        valid = mesh_of(points, triangles[is_valid[triangles].all(axis=1)]).mesh
+    except MeshError:
+        return
+    raise Unopenable(str(error), given, valid) from None
 
 
 def from_slot(slot: Slot) -> Reader:

@@ -211,7 +211,8 @@ class Window(QtWidgets.QMainWindow):
         widget = self.editor_widget = DeformWidget(session, self)
         widget.editor.controller.file = self.document.file(session, is_unsaved=bool(request.slot))
         connect_panel(self)
-        widget.editor.controller.notices.offer("Repair ...", self._repair_soon)
+        if not session.mesh.is_two_manifold:  # a closed one with seams needs no repair
+            widget.editor.controller.notices.offer("Repair ...", self._repair_soon)
         self._stops.append(widget.editor.controller.messages.on_change(self._update_title))
         widget.session_changed.connect(lambda _: self._autosave())
         self._autosave(request.slot)

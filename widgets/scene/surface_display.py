@@ -2,6 +2,10 @@
 
 Positions and normals are updated in place when the pose changes.  Colours come in layers, and the
 newest layer is visible.
+
+A surface with one side has a seam, where neighbouring faces differ in orientation and light needs
+opposite normals.  The vertices there are drawn twice: the second ones, with opposite normals, are
+the corners that `VertexNormals.turned` lists.
 """
 
 from __future__ import annotations
@@ -40,16 +44,23 @@ class SurfaceDisplay:
         self.view = View.of(view)
         self.session = require(session, Session, "session")
         self._layers: dict[str, NDArray[np.uint8]] = {}
-        faces = session.mesh.faces
-        corners = np.full(len(faces), 3)
-        self.polydata = polydata_of(session.vertices.copy(), corners, faces.ravel())
-        self._points: NDArray[np.float64] = vtk_to_numpy(self.polydata.GetPoints().GetData())
+        mesh = session.mesh
+        self._vertex_normals = VertexNormals(mesh)
+        faces, turned = mesh.faces.ravel(), self._vertex_normals.turned
+        self._twice, second = np.unique(faces[turned], return_inverse=True)
+        if len(turned):
+            faces = faces.copy()
+            faces[turned] = mesh.n_vertices + second
+        x = session.vertices
+        self.polydata = polydata_of(np.vstack([x, x[self._twice]]), np.full(mesh.n_faces, 3), faces)
+        self._drawn: NDArray[np.float64] = vtk_to_numpy(self.polydata.GetPoints().GetData())
+        self._points = self._drawn[: mesh.n_vertices]
         self._read_only_points: NDArray[np.float64] = read_only(self._points)
-        self._vertex_normals = VertexNormals(session.mesh)
-        self._normals = self._vertex_normals.of(self._points)
+        self._normals = np.empty(self._drawn.shape, dtype=np.float32)
         self._normal_array = numpy_to_vtk(self._normals)
         self._normal_array.SetName("Normals")
         self.polydata.GetPointData().SetNormals(self._normal_array)
+        self.update_normals()
         self._mapper = vtkPolyDataMapper()
         self._mapper.SetInputData(self.polydata)
         self._mapper.SetScalarVisibility(False)
@@ -83,7 +94,8 @@ class SurfaceDisplay:
         top = next(reversed(self._layers.values()), None)
         self._mapper.SetScalarVisibility(top is not None)
         if top is not None:
-            array = numpy_to_vtk(np.ascontiguousarray(top, dtype=np.uint8), deep=True)
+            colours_drawn = np.concatenate([top, top[self._twice]])
+            array = numpy_to_vtk(np.ascontiguousarray(colours_drawn, dtype=np.uint8), deep=True)
             array.SetName("colours")
             self.polydata.GetPointData().SetScalars(array)
         self.view.request_render()
@@ -91,6 +103,7 @@ class SurfaceDisplay:
     def update(self) -> None:
         """Show the session's current pose; called automatically when it changes."""
         self._points[:] = self.session.vertices
+        self._drawn[len(self._points) :] = self._points[self._twice]
         self.polydata.GetPoints().GetData().Modified()
         self.polydata.GetPoints().Modified()
         self.update_normals()
@@ -98,7 +111,9 @@ class SurfaceDisplay:
 
     def update_normals(self) -> None:
         """Compute the normals of the shown pose; called automatically when it changes."""
-        self._vertex_normals.of(self._points, self._normals)
+        n = len(self._points)
+        self._vertex_normals.of(self._points, self._normals[:n])
+        self._normals[n:] = -self._normals[self._twice]
         self._normal_array.Modified()
 
     def remove(self) -> None:

@@ -44,13 +44,13 @@ class Legend:
         self._laid_out: tuple[Any, ...] = ()
         self._stop: Stop | None = None
 
-    def show(self, half_range: float, lines: Sequence[tuple[str, int | None]]) -> None:
+    def show(self, half_range: float | None, lines: Sequence[tuple[str, int | None]]) -> None:
         """Show or replace the colour bar and the lines.
 
         Parameters
         ----------
-        half_range : float
-            The value at the ends of the scale; see `diverging`.
+        half_range : float or None
+            The value at the ends of the scale, see `diverging`; None for no colour bar.
         lines : sequence of (text, region)
             From the top; *region* is the number of the region whose colour is the background, or
             None.
@@ -59,8 +59,9 @@ class Legend:
         if self._stop is None:
             self._stop = self.view.before_render(self._lay_out)
             renderer.AddViewProp(self._bar)
+        self._bar.SetVisibility(half_range is not None)
         table = self._bar.GetLookupTable()
-        if table is None or table.GetTableRange()[1] != half_range:
+        if half_range is not None and (table is None or table.GetTableRange()[1] != half_range):
             self._bar.SetLookupTable(_annotated_table(half_range))
         while len(self._lines) > len(lines):
             renderer.RemoveViewProp(self._lines.pop())

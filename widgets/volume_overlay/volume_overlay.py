@@ -11,6 +11,9 @@ surface at i touches it again:
 with a smoothing kernel k on the surface.  Under a rigid motion s is 0 and the mesh has exactly one
 colour.  `vtk_segdeform.geometry.local_volume` computes s, only while the overlay is shown.
 
+Where nothing encloses a volume, as on a sheet, there are no colours and no colour bar, and the
+first line says so.
+
 The lines of text are, from the top: for an open mesh, what encloses a volume; (V - V0) / V0 of the
 whole mesh; the smallest and the largest s; (V - V0) / V0 of each region, closed at its border as in
 `vtk_segdeform.solver.volume_constraints`; the number of steps of the last solve, and the time from
@@ -89,7 +92,7 @@ class VolumeOverlay:
 
     @property
     def half_range(self) -> float | None:
-        """The local volume change at the ends of the scale; None while hidden."""
+        """The local volume change at the ends of the scale; None without a scale."""
         return self._half_range
 
     @property
@@ -158,7 +161,7 @@ class VolumeOverlay:
         if change & Change.POSE:
             self._clock.note()
             self._update()
-        elif change & _IN_LINES and self._change is not None and self._half_range is not None:
+        elif change & _IN_LINES and self._change is not None:
             self._legend.show(self._half_range, self._lines(self._change))
             self.view.request_render()
 
@@ -167,9 +170,12 @@ class VolumeOverlay:
         self._show(self._change)
 
     def _show(self, change: FloatArray) -> None:
-        self._half_range = self._wanted_range or half_range_for(change, self._half_range)
+        colours = None
+        if self._prepared().is_defined:
+            self._half_range = self._wanted_range or half_range_for(change, self._half_range)
+            colours = colours_of(change, self._half_range)
         self._legend.show(self._half_range, self._lines(change))
-        self._surface.set_colours(_LAYER, colours_of(change, self._half_range))
+        self._surface.set_colours(_LAYER, colours)
 
     def _swap_light(self) -> None:
         """Exchange the light of the surface with the stored one: the soft light or its own."""

@@ -131,6 +131,7 @@ def test_a_dropped_surface_opens_at_once_and_one_line_says_how(hand, given, name
     notices = hand.window.editor.controller.notices
     assert notices.text == text or name == "soup.stl"  # which PyVista may weld when it reads
     assert notices.is_open is bool(notices.text)
+    assert ("Repair ..." in notices._offers) is (name in ("bottle.ply", "sheet.obj"))
 
 
 def test_show_is_clicked_in_the_view_of_qt(hand, tmp_path):

@@ -123,6 +123,22 @@ def test_a_click_on_show_marks_the_holes_and_a_second_one_removes_the_marks(open
     assert scene.editor.session.undo_label is None  # the click did not paint
 
 
+def test_the_buttons_work_in_a_part_of_the_window(open_editor):
+    scene = open_editor(Session(Surface(bottle())))
+    scene.view.renderer.SetViewport(0.25, 0.3, 1.0, 1.0)
+    scene.view.render()
+    origin = np.array(scene.view.renderer.GetOrigin())
+    assert (origin > 100).all()
+    place = scene.notices._line.centre_of("Show")
+    seen = np.abs(picture(scene.view).astype(int) - [140, 196, 234]).max(axis=2) < 10  # a button
+    x, y = np.add(place, origin).astype(int)
+    assert seen[::-1][y - 3 : y + 4, x - 20 : x + 21].any()
+    scene.hand.click(place)  # of the window
+    assert not scene.notices.are_marked
+    scene.hand.click(place + origin)
+    assert scene.notices.are_marked
+
+
 def test_marks_lie_on_the_borders_and_holes_at_the_back_show_through(open_editor):
     session = Session(Surface(bottle(1)))  # one hole at the top
     scene = open_editor(session)
@@ -142,6 +158,21 @@ def test_welded_points_are_dots(open_editor):
     scene.click("Show")
     assert scene.shade(DOT_RGB).sum() > 100
     assert not scene.shade(LOOP_RGB).any()
+
+
+def test_another_file_has_its_own_notices_and_marks(open_editor, tmp_path):
+    scene = open_editor(Session(Surface(bottle(3, 3))))
+    scene.click("Show")
+    sheet(6).save(tmp_path / "sheet.ply")
+    scene.editor.load(tmp_path / "sheet.ply")
+    assert scene.notices.text == "Open sheet: no volume to preserve"
+    assert scene.notices.is_open
+    assert not scene.notices.are_marked
+    assert not scene.shade(LOOP_RGB).any()
+    Surface(polydata(*icosphere(2))).given.save(tmp_path / "ball.ply")
+    scene.editor.load(tmp_path / "ball.ply")
+    assert scene.notices.text == ""
+    assert not scene.notices.is_open
 
 
 def test_the_line_closes_by_its_button_and_returns_by_the_key(open_editor):
@@ -167,15 +198,6 @@ def test_the_first_edit_closes_the_line_and_later_ones_do_not(open_editor):
     session.set_fixed([0, 1, 2])
     assert scene.notices.is_open
     assert scene.notices.are_marked
-
-
-def test_another_session_has_its_own_notices(open_editor, tmp_path):
-    scene = open_editor(closed())
-    path = tmp_path / "sheet.ply"
-    sheet(6).save(path)
-    scene.editor.load(path)
-    assert scene.notices.text == "Open sheet: no volume to preserve"
-    assert scene.notices.is_open
 
 
 def test_a_clean_view_has_no_line_and_no_marks(open_editor):

@@ -59,16 +59,21 @@ class Scene:
         self.hand.drag(150.0 + 145.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1))
         return self.session.fixed
 
-    def front(self):
-        """Return which vertices no face hides, by a ray from the camera to each of them."""
+    def front(self, every=1):
+        """Return which vertices no face hides, by a ray from the camera to each of them.
+
+        With *every* k, all but each k-th count as hidden, which saves time.
+        """
         x, faces = self.session.vertices, self.session.mesh.faces
         eye = np.array(self.view.camera.GetPosition())
         a, b, c = (x[corner] - eye for corner in faces.T)
         areas = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
         volume = np.einsum("ij,ij->i", a, areas[0])
-        seen = np.ones(len(x), dtype=bool)
-        for i, ray in enumerate(x - eye):
-            u, v, w = areas @ ray / volume  # the ray times u + v + w is in the plane of the face
+        seen = np.zeros(len(x), dtype=bool)
+        for i in range(0, len(x), every):
+            u, v, w = (
+                areas @ (x[i] - eye) / volume
+            )  # the ray times u + v + w is in the plane of the face
             hides = (np.minimum(np.minimum(u, v), w) > 0.0) & (u + v + w > 1.0 + 1e-9)
             seen[i] = not hides[(faces != i).all(axis=1)].any()
         return seen
@@ -99,7 +104,7 @@ SURFACES = {
 def test_a_brush_paints_around_the_point_that_is_seen(open_editor, name):
     scene = open_editor(SURFACES[name]())
     x = scene.session.mesh.vertices
-    front = np.flatnonzero(scene.front())
+    front = np.flatnonzero(scene.front(every=10))
     start = x[front[np.linalg.norm(x[front] - x[front].mean(axis=0), axis=1).argsort()[5]]]
     radius = scene.editor.widgets.selector.radius
     painted = scene.paint(Paint.FIXED, start)
@@ -113,9 +118,7 @@ def test_the_visible_surface_includes_the_inside_seen_through_a_hole(open_editor
     scene.view.renderer.ResetCamera()
     scene.view.render()
     seen, front = scene.lasso(through=False), scene.front()
-    is_seen = np.zeros(len(front), dtype=bool)
-    is_seen[seen] = True
-    assert (is_seen == front).mean() > 0.95
+    assert np.array_equal(seen, np.flatnonzero(front))
     x = scene.session.mesh.vertices
     outward = x[seen] / [1.0, 1.0, 1.6**2]
     away = np.einsum("ij,ij->i", outward, x[seen] - scene.view.camera.GetPosition()) > 0.0
@@ -137,6 +140,8 @@ def test_a_connected_part_ends_at_its_border(open_editor):
 def test_a_handle_is_dragged_and_an_enclosed_volume_stays_exact(open_editor, name):
     scene = open_editor(SURFACES[name]())
     session, x = scene.session, scene.session.mesh.vertices
+    session.change_options(n_cage_vertices=100)
+    session.fit_cages()
     along = int(np.ptp(x, axis=0).argmax())
     low, high = np.quantile(x[:, along], [0.1, 0.9])
     session.set_fixed(x[:, along] < low)
@@ -151,9 +156,9 @@ def test_a_handle_is_dragged_and_an_enclosed_volume_stays_exact(open_editor, nam
     said = scene.editor.status
     scene.hand.release()
     assert scene.hand.failures == []
-    moved = np.linalg.norm(session.vertices - x, axis=1)
-    assert moved[session.handles["handle 1"]].mean() > 0.02 * session.mesh.diagonal
-    assert moved[session.fixed].mean() < 0.02 * session.mesh.diagonal
+    moved = np.linalg.norm(session.vertices - x, axis=1) / session.mesh.diagonal
+    assert moved[session.handles["handle 1"]].min() > 0.07
+    assert moved[session.fixed].max() < 0.002
     assert abs(session.volume_change) < 1e-12
     assert session.has_volume is (name in ("bottle", "finned"))
     assert ("No volume to preserve" in said) is not session.has_volume
@@ -172,3 +177,23 @@ def test_nothing_is_black_from_either_side(open_editor, name):
         with scene.editor.controller.clean_view():
             dark = picture(scene.view).max(axis=2) < 60
         assert dark.mean() < 0.002
+
+
+def test_the_seam_of_a_surface_with_one_side_does_not_show(open_editor):
+    """Where faces differ in orientation depends on which are flipped; the picture does not."""
+    seen = []
+    for flipped in (0, 700):
+        given = moebius()
+        faces = np.array(given.regular_faces)
+        faces[:flipped] = faces[:flipped, ::-1]
+        scene = open_editor(polydata(given.points, faces))
+        assert scene.session.mesh.n_vertices == given.n_points
+        with scene.editor.controller.clean_view():
+            seen.append(picture(scene.view).astype(int))
+        x = scene.session.mesh.vertices @ np.diag([1.0, 1.0, 1.5])
+        scene.editor.widgets.surface.set_colours("test", np.uint8(128 + 60 * np.sin(3 * x)))
+        with scene.editor.controller.clean_view():
+            seen.append(picture(scene.view).astype(int))
+    for one, other in ((0, 2), (1, 3)):
+        assert (np.abs(seen[one] - seen[other]).max(axis=2) > 12).mean() < 2e-4
+    assert (np.abs(seen[0] - seen[1]).max(axis=2) > 12).mean() > 0.1

@@ -426,9 +426,14 @@ def test_an_open_body_has_a_line_about_its_lids():
     overlay.remove()
 
 
-def test_an_open_sheet_is_neutral_and_the_overlay_says_that_it_has_no_volume():
+def test_an_open_sheet_has_no_colours_and_the_overlay_says_that_it_has_no_volume():
     overlay = overlay_of(sheet(lambda u, v: (u, 0.02 * np.sin(5 * u), v), 12, 12))
     overlay.show()
+    assert [bar.GetVisibility() for bar in props(overlay, vtkScalarBarActor)] == [0]
+    assert overlay.half_range is None
+    assert overlay._surface.polydata.GetPointData().GetScalars() is None
+    overlay.wanted_range = 0.1
+    assert overlay.half_range is None
     first, *others = lines_of(overlay)
     assert first == "Open sheet: no volume to preserve"
     assert not [line for line in others if "%" in line]
