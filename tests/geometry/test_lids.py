@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -18,10 +20,10 @@ from open_meshes import (
     tube,
     with_holes,
 )
-from solids import rotation
+from solids import CUBE, rotation
 
 from vtk_segdeform import models
-from vtk_segdeform.geometry.lids import lids_of, mean_winding, volume_summary
+from vtk_segdeform.geometry.lids import _winding_of_few, lids_of, mean_winding, volume_summary
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 
@@ -216,6 +218,40 @@ def _two_away(mesh: Mesh, vertex: int) -> list[int]:
     """Return a vertex that shares exactly one neighbour with *vertex*."""
     near = [set(mesh.faces[(mesh.faces == v).any(axis=1)].ravel()) - {v} for v in range(200)]
     return [v for v in range(200) if v not in near[vertex] and len(near[v] & near[vertex]) == 1]
+
+
+SPIKE = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 4]])
+
+
+def test_the_winding_of_few_faces_is_summed_over_pairs_of_them():
+    tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    several = [
+        Mesh(SPIKE, tetrahedron),
+        Mesh(SPIKE, tetrahedron[1:]),
+        Mesh(*CUBE),
+        Mesh(CUBE[0], CUBE[1][:8]),
+    ]
+    several.append(Mesh(SPIKE, tetrahedron[1:, ::-1]))
+    mesh = together(*several)
+    sizes = np.array([each.n_faces for each in several])
+    found = _winding_of_few(mesh, np.arange(mesh.n_faces), np.cumsum(sizes) - sizes, sizes)
+    assert_allclose(found[[0, 2]], 1.0, atol=1e-12)  # the whole inside, from any point
+    assert found[4] == -found[1]
+    for one, each in zip(found, several, strict=True):
+        assert abs(one - mean_winding(each.vertices, each.faces)) < 0.12
+
+
+def test_thousands_of_leaves_and_cups_are_told_apart_soon():
+    leaf = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0.3], [0, 1, -0.2]], [[0, 1, 2], [0, 2, 3]])
+    spike = Mesh(SPIKE, [[0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    cup = cut(models.sphere(42), 2, 0.8)
+    kinds = [leaf] * 3000 + [spike] * 3000 + [cup] * 300
+    mesh = together(*(kinds[k] for k in RNG.permutation(len(kinds))))
+    began = time.process_time()
+    lids = lids_of(mesh)
+    assert time.process_time() - began < 5.0
+    n_faces = np.bincount(mesh.components[mesh.faces[:, 0]])
+    assert_array_equal(lids.encloses, n_faces > 2)
 
 
 @pytest.mark.parametrize(
