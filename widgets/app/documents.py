@@ -100,7 +100,7 @@ def _require_unrepairable(path: Path, error: MeshError) -> None:
     """Raise `Unopenable` if the file has valid faces beside invalid ones."""
     given = read_polydata(path)
     points = np.array(given.points, dtype=np.float64)
-    is_valid = np.isfinite(points).all(axis=1)
+    is_valid = np.asarray(np.isfinite(points).all(axis=1))
     if is_valid.all():
         return
     points[~is_valid] = 0.0
