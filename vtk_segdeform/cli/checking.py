@@ -33,6 +33,8 @@ from ..progress import Progress
 from .outputs import Say
 
 _MOST_HOLES = 10  # listed one by one
+# Notes on the triangles as given that the lines above them say of the mesh.
+_SAID = {"components", "open edge", "hole", "coincident"}
 
 
 def check(options: Namespace, say: Say, progress: Progress) -> bool:
@@ -137,7 +139,8 @@ def _print(found: dict[str, Any], say: Say) -> None:
         pairs = counted(found["self_intersections"], "pair", "pairs")
         say(f"  {pairs} of faces intersect; they will after a deformation, too")
     for each in found["notes"]:
-        say(f"  note: {each['text']}")
+        if each["kind"] not in _SAID:
+            say(f"  note: {each['text']}")
 
 
 def _repair(given: Any, options: Namespace, say: Say, progress: Progress) -> bool:
