@@ -124,6 +124,16 @@ def test_check_tells_a_script_all_about_a_surface(tmp_path, capsys):
     assert not found["volume_under_lids"]
 
 
+def test_check_says_each_thing_once(tmp_path, capsys):
+    path = file_of("holed", tmp_path)
+    assert main(["check", str(path)]) == 0
+    assert capsys.readouterr().out.splitlines()[1:] == [
+        "can be deformed as it is. 4 holes: volume kept under lids",
+        "  worked around: welded 50 seam points",
+        "  4 borders of 16, 16, 8, 4 edges",
+    ]
+
+
 def test_check_counts_self_intersections_and_does_not_refuse_them(tmp_path, capsys):
     two = pv.merge([pv.Sphere(radius=1.0), pv.Sphere(radius=1.0, center=(1, 0, 0))])
     write_mesh(tmp_path / "two.vtp", two.extract_surface(algorithm=None))

@@ -333,3 +333,13 @@ def test_a_file_with_the_suffix_of_another_format_says_so(tmp_path, suffix):
     (tmp_path / f"a{suffix}").write_text("v 0 0 0\n")
     with pytest.raises(MeshError, match=f"does not begin as a {suffix} file does"):
         read_polydata(tmp_path / f"a{suffix}")
+
+
+def test_text_that_vtkhdf_cannot_store_is_left_out_with_a_warning(tmp_path, caplog):
+    surface = to_polydata(Mesh(*icosphere(0)))
+    surface.point_data["name"] = np.array([f"point {k}" for k in range(surface.n_points)])
+    surface.point_data["height"] = surface.points[:, 2]
+    write_mesh(tmp_path / "a.vtkhdf", surface)
+    assert "VTKHDF cannot store point array 'name': left out" in caplog.text
+    assert list(read_polydata(tmp_path / "a.vtkhdf").point_data.keys()) == ["height"]
+    assert "name" in surface.point_data

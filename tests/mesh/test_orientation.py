@@ -7,23 +7,13 @@ import itertools
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from solids import CUBE, icosphere, rotation, torus
+from solids import CUBE, icosphere, rotation, together, torus
 
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh import find_faults, mesh_of
 
 SPHERE = icosphere(2)
 TURN = rotation([1.0, 2.0, 3.0], 0.7).T
-
-
-def together(*solids):
-    """Return solids as one, coincident vertices merged."""
-    starts = np.cumsum([0] + [len(v) for v, _ in solids])
-    faces = np.concatenate([f + start for (_, f), start in zip(solids, starts, strict=False)])
-    vertices, number = np.unique(
-        np.concatenate([v for v, _ in solids]), axis=0, return_inverse=True
-    )
-    return vertices, number.reshape(-1)[faces]
 
 
 def flipped(faces, which):

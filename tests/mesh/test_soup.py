@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from solids import CUBE, SOLIDS, icosphere, torus, two_components
+from solids import CUBE, SOLIDS, icosphere, together, torus, two_components
 
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.geometry.volume import signed_volume
@@ -19,16 +19,6 @@ BODIES = [body for body in BODIES if len(body[1]) < 400]
 def soup(vertices, faces):
     """Return the triangles with three points each, as STL has them."""
     return vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
-
-
-def together(*solids):
-    """Return solids as one, coincident vertices merged."""
-    starts = np.cumsum([0] + [len(v) for v, _ in solids])
-    faces = np.concatenate([f + start for (_, f), start in zip(solids, starts, strict=False)])
-    vertices, number = np.unique(
-        np.concatenate([v for v, _ in solids]), axis=0, return_inverse=True
-    )
-    return vertices, number.reshape(-1)[faces]
 
 
 def checked(vertices, faces):

@@ -29,6 +29,7 @@ import vtk_segdeform.widgets
 import vtk_segdeform.widgets.plugin
 from vtk_segdeform import models
 from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.mesh.faults import Search, as_soup
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.subspace.passengers import Passengers
 from vtk_segdeform.widgets.recording.film import Film
@@ -448,6 +449,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "Session.split_region.vertices": lambda: None,
     "Surface.at_vertices.values": lambda: np.arange(given().given.n_points),
     "Surface.of.soup": lambda: sd.mesh.mesh_of(mesh().vertices, mesh().faces),
+    "Mesh.of.search": lambda: Search(*as_soup(mesh().vertices, mesh().faces)),
     "Surface.moved.vertices": lambda: given().mesh.vertices,
     "Surface.read.path": lambda: _file("mesh.ply"),
     "Surface.targets_at.points": lambda: [0, 5],

@@ -103,3 +103,13 @@ def exact_volume_change(before: np.ndarray, after: np.ndarray, faces: np.ndarray
 
     rest = six_volumes(before)
     return float(Fraction(six_volumes(after) - rest, rest))
+
+
+def together(*solids):
+    """Return solids as one, coincident vertices merged."""
+    starts = np.cumsum([0] + [len(v) for v, _ in solids])
+    faces = np.concatenate([f + start for (_, f), start in zip(solids, starts, strict=False)])
+    vertices, number = np.unique(
+        np.concatenate([v for v, _ in solids]), axis=0, return_inverse=True
+    )
+    return vertices, number.reshape(-1)[faces]

@@ -229,8 +229,8 @@ OPEN = [
 ]  # fmt: skip
 
 FAULTY = [
-    Creature("empty", lambda: (np.empty((0, 3)), np.empty((0, 3), int)), "empty mesh|no surface", False, given="no surface|at least one face"),
-    Creature("no faces", lambda: (body()[0], np.empty((0, 3), int)), "empty mesh|no surface", False, given="no surface|at least one face"),
+    Creature("empty", lambda: (np.empty((0, 3)), np.empty((0, 3), int)), "empty mesh|no surface", False, given="no surface|no faces"),
+    Creature("no faces", lambda: (body()[0], np.empty((0, 3), int)), "empty mesh|no surface", False, given="no surface|no faces"),
     Creature("every second face", lambda: (body()[0], body()[1][::2]), "98 unreferenced"),
     Creature("inside out", lambda: flipped(body()), "1 inside-out component"),
     Creature("half flipped", lambda: flipped(body(), slice(0, 256)), "inconsistently oriented"),
@@ -271,9 +271,9 @@ POLYDATA = [
     Creature("float32 points", lambda: _single(_polydata(4))),
     Creature("with additional lines", lambda: _polydata(4) + _lines(), "unreferenced", but=ONLY_A_MESH),
     Creature("quadrilaterals, some missing", lambda: _polydata(4).extract_cells(range(1, 40)).extract_surface(algorithm=None)),
-    Creature("lines only", lambda: _lines(), "no surface|empty mesh|at least one face"),
-    Creature("points only", lambda: pv.PolyData(np.eye(3)), "no surface|empty mesh|at least one face"),
-    Creature("empty", lambda: pv.PolyData(), "no surface|empty mesh|at least one face"),
+    Creature("lines only", lambda: _lines(), "no surface|empty mesh|no faces"),
+    Creature("points only", lambda: pv.PolyData(np.eye(3)), "no surface|empty mesh|no faces"),
+    Creature("empty", lambda: pv.PolyData(), "no surface|empty mesh|no faces"),
 ]  # fmt: skip
 
 

@@ -160,7 +160,12 @@ def _selected(text: str, surface: Surface, role: Role) -> IntArray:
     """Return the vertices (k,) of the mesh that the selected points are."""
     points = surface.at_points(surface.mesh.vertices)
     ids = parse_selection(text, points, point_arrays=surface.given.point_data, role=role)
-    return surface.vertices_at(ids)
+    vertices = surface.vertices_at(ids)
+    if len(ids) and not len(vertices):
+        raise ConstraintError(
+            f"no point that {text!r} selects is in a face; points in no face only follow the surface"
+        )
+    return vertices
 
 
 def _settings(options: Namespace) -> dict[str, Any]:

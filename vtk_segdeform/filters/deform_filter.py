@@ -100,7 +100,7 @@ class SegmentedCageDeformFilter(FilterSettings):
             targets = np.array(settings.targets).reshape(-1, 3)
             vertices, targets = soup.targets_at(handle, targets)
         else:
-            vertices = soup.vertices_at(handle)
+            vertices, _ = soup.targets_at(handle, soup.points[handle])
             targets = self._moved(soup.mesh.vertices[vertices])
         constrained = deformer.hold(
             fixed=soup.vertices_at(np.zeros(0, np.int64) if fixed is None else fixed),

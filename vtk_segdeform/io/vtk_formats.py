@@ -12,6 +12,7 @@ the legacy reader fails on long names and on active scalars of more than four co
 from __future__ import annotations
 
 import base64
+import logging
 import re
 import shutil
 import tempfile
@@ -31,6 +32,7 @@ from .array_names import plain_names, warn_renamed
 from .isolated import read_isolated
 from .polygons import polydata_of
 
+_log = logging.getLogger(__name__)
 _PREFIX = re.compile(r"^\w+ \(\w+\): ")
 _XML = frozenset({".vtp", ".vtu"})
 _DENSEST = 1100  # most bytes out of one compressed byte
@@ -252,6 +254,8 @@ def _with_plain_names(surface: pv.PolyData, suffix: str) -> Any:
     copy.ShallowCopy(surface)
     for sort in ("Point", "Cell", "Field"):
         attributes = getattr(copy, f"Get{sort}Data")()
+        if suffix == ".vtkhdf" and sort != "Field":
+            _remove_texts(attributes, f"{sort.lower()} array")
         arrays = [attributes.GetAbstractArray(k) for k in range(attributes.GetNumberOfArrays())]
         refused, measure = _REFUSED.get(suffix, ""), _quoted if suffix == ".vtk" else len
         names = plain_names((a.GetName() for a in arrays), refused=refused, measure=measure)
@@ -266,6 +270,15 @@ def _with_plain_names(surface: pv.PolyData, suffix: str) -> Any:
             if scalars is not None and scalars.GetNumberOfComponents() > _MOST:
                 attributes.SetActiveAttribute(-1, _SCALARS)
     return copy
+
+
+def _remove_texts(attributes: Any, what: str) -> None:
+    """Remove arrays of text, which VTK's HDF writer cannot write; log a warning for each."""
+    for k in reversed(range(attributes.GetNumberOfArrays())):
+        array = attributes.GetAbstractArray(k)
+        if array.IsA("vtkStringArray"):
+            _log.warning("VTKHDF cannot store %s %r: left out", what, array.GetName())
+            attributes.RemoveArray(k)
 
 
 def _components(array: Any) -> list[str]:

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray, as_ids, as_points
-from ..errors import MeshError
+from ..errors import ConstraintError, MeshError
 from .faults import UNREPAIRABLE, Search, as_soup, distinct_faces
 from .grouping import connected, first_equal_row
 from .mesh import Mesh
@@ -95,6 +95,10 @@ class Soup:
         ids = as_ids(points, len(self.points), "points")
         ends = as_points(targets, "targets", len(ids))
         is_vertex = ~np.isin(ids, self.loose)
+        if len(ids) and not is_vertex.any():
+            raise ConstraintError(
+                "no point of the handle is in a face; points in no face only follow the surface"
+            )
         ids, ends = ids[is_vertex], ends[is_vertex]
         vertices, number = np.unique(self.vertex_of[ids], return_inverse=True)
         sums = np.zeros((len(vertices), 3))

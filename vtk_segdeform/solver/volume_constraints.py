@@ -142,7 +142,7 @@ def body_volumes(
     component = np.concatenate([mesh.components, lids.component])[whole.faces[:, 0]]
     a, e, f = corner_and_edges(whole.extended(mesh.vertices), whole.faces)
     determinants = np.einsum("ij,ij->i", a - a[0], np.cross(e, f))
-    volumes = np.bincount(component, determinants, len(lids.encloses))
+    volumes = np.asarray(np.bincount(component, determinants, len(lids.encloses)), np.float64)
     body = _bodies(mesh, volumes, mesh.components[moved])[component]
     constraints = []
     for k in range(int(body.max()) + 1):

@@ -7,7 +7,6 @@ import threading
 
 import numpy as np
 import pytest
-import pyvista as pv
 from app_hands import AppHand, Boxes, Window, delete, drop, settings_in
 from open_surfaces import bottle, polydata, sheet, split_at_seam
 from qt_hands import Qt, QtCore, QtHand, QtTest, application, until
@@ -17,20 +16,6 @@ from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.io import read_polydata
 from vtk_segdeform.widgets.app.autosave import Autosaves
 from vtk_segdeform.widgets.app.repair_dialog import RepairDialog
-
-
-@pytest.fixture(scope="module", autouse=True)
-def in_haste():
-    """Save time on antialiasing, and collect garbage in Qt's thread only."""
-    smooth = pv.global_theme.anti_aliasing
-    pv.global_theme.anti_aliasing = None
-    gc.collect()
-    gc.freeze()
-    gc.disable()
-    yield
-    gc.enable()
-    gc.unfreeze()
-    pv.global_theme.anti_aliasing = smooth
 
 
 @pytest.fixture

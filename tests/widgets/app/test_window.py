@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import pyvista as pv
 from app_hands import (
     AppHand,
     Boxes,
@@ -36,20 +35,6 @@ from vtk_segdeform.widgets.app import documents
 from vtk_segdeform.widgets.app.autosave import About, Autosaves, Slot
 
 BALL = models.sphere(300)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def in_haste():
-    """Save time on antialiasing, and collect garbage in Qt's thread only."""
-    smooth = pv.global_theme.anti_aliasing
-    pv.global_theme.anti_aliasing = None
-    gc.collect()
-    gc.freeze()
-    gc.disable()
-    yield
-    gc.enable()
-    gc.unfreeze()
-    pv.global_theme.anti_aliasing = smooth
 
 
 @pytest.fixture(scope="module")
