@@ -163,7 +163,7 @@ def _selected(text: str, surface: Surface, role: Role) -> IntArray:
     vertices = surface.vertices_at(ids)
     if len(ids) and not len(vertices):
         raise ConstraintError(
-            f"no point that {text!r} selects is in a face; points in no face only follow the surface"
+            f"no point that {text!r} selects is in a face; such points only follow the surface"
         )
     return vertices
 

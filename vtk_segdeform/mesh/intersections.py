@@ -47,7 +47,7 @@ def self_intersections(vertices: ArrayLike, faces: ArrayLike) -> IntArray:
     vertices : (n, 3) float
         In any length unit.
     faces : (m, 3) int
-        Consistently oriented and without degenerate faces.
+        Without degenerate faces.
 
     Returns
     -------
@@ -153,7 +153,13 @@ def _meet(points: FloatArray, a: IntArray, b: IntArray) -> BoolArray:
     shared = same.sum(axis=(1, 2))
     result = np.asarray(shared == 3)
     two = np.flatnonzero(shared == 2)
-    result[two] = _folded(points[a[two]], points[b[two]])
+    alone_a, alone_b = (same[two].any(axis=axis).argmin(axis=1) for axis in (2, 1))
+    begin_a, begin_b = (
+        np.take_along_axis(each[two], (alone[:, None] + 1) % 3, axis=1)[:, 0]
+        for each, alone in ((a, alone_a), (b, alone_b))
+    )
+    # The common edge has opposite directions in both faces, unless they are oppositely oriented.
+    result[two] = _folded(points[a[two]], points[b[two]], begin_a != begin_b)
     one = np.flatnonzero(shared == 1)
     roll_a, roll_b = (same[one].any(axis=axis).argmax(axis=1) for axis in (2, 1))
     around = np.arange(3)
@@ -165,9 +171,10 @@ def _meet(points: FloatArray, a: IntArray, b: IntArray) -> BoolArray:
     return result
 
 
-def _folded(a: FloatArray, b: FloatArray) -> BoolArray:
+def _folded(a: FloatArray, b: FloatArray, consistent: BoolArray) -> BoolArray:
+    """Return which triangles (k, 3, 3) with a common edge lie on one another."""
     n, m = _unit_normals(a), _unit_normals(b)
-    opposite = np.einsum("ij,ij->i", n, m) < 0
+    opposite = (np.einsum("ij,ij->i", n, m) < 0) == consistent
     return np.asarray(opposite & (np.linalg.norm(np.cross(n, m), axis=1) <= _FOLD))
 
 
