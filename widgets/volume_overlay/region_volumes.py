@@ -37,9 +37,10 @@ class RegionVolumes:
         owners, volumes = zip(*owned, strict=True)
         if session.state.pose is None:
             return [(owner, 0.0) for owner in owners]
-        if session.solution is not None:  # the solver has computed them
-            shares = session.solution.region_volume_change.tolist()
-        else:
+        solved = None if session.solution is None else session.solution.region_volume_change
+        if solved is not None and len(solved) == len(owners):
+            shares = solved.tolist()  # the solver has computed them
+        else:  # also if the choice of lids has changed since
             x = session.vertices
             shares = [volume.relative(x) for volume in volumes]
         return list(zip(owners, shares, strict=True))

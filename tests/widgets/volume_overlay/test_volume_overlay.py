@@ -427,7 +427,7 @@ def test_an_open_body_has_a_line_about_its_lids():
 
 
 def test_an_open_sheet_has_no_colours_and_the_overlay_says_that_it_has_no_volume():
-    overlay = overlay_of(sheet(lambda u, v: (u, 0.02 * np.sin(5 * u), v), 12, 12))
+    overlay = overlay_of(sheet(lambda u, v: (u, 0.1 * u**2, v), 12, 12))
     overlay.show()
     assert [bar.GetVisibility() for bar in props(overlay, vtkScalarBarActor)] == [0]
     assert overlay.half_range is None
@@ -439,5 +439,6 @@ def test_an_open_sheet_has_no_colours_and_the_overlay_says_that_it_has_no_volume
     assert not [line for line in others if "%" in line]
     assert not overlay.change.any()
     overlay.session.change_options(lids=True)
+    assert overlay.session.has_volume
     assert not [line for line in lines_of(overlay) if line.startswith("Local")]
     overlay.remove()
