@@ -160,3 +160,24 @@ def test_polygons_that_were_cut_wrongly_are_found():
     repeated = np.array([0, 1, 1, 3])  # has one triangle only
     args = np.array([4]), repeated, np.array([[0, 1, 3]]), np.array([0])
     assert _failed(dart, *args).tolist() == []
+
+
+@pytest.mark.parametrize("size", [4, 5, 7])
+@pytest.mark.parametrize("apart", [False, True])
+def test_a_polygon_given_again_is_cut_like_the_first_whatever_corner_it_begins_at(size, apart):
+    angle = 2.0 * np.pi * np.arange(size) / size
+    ring = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)  # all diagonals alike
+    points = np.concatenate([ring, ring + [3.0, 0.0, 0.0], ring])
+    own = np.arange(size) + (2 * size if apart else 0)
+    again = [np.roll(own[::side], turn) for side in (1, -1) for turn in range(size)]
+    polygons = np.concatenate([np.arange(size), size + np.arange(size), *again])
+    counts = np.full(2 + 2 * size, size)
+    faces, polygon = cut_into_triangles(points, counts, polygons)
+    assert_array_equal(np.bincount(polygon), counts - 2)
+    first = {frozenset(face) for face in (faces[polygon == 0]).tolist()}
+    for k in range(2, len(counts)):
+        found = faces[polygon == k]
+        assert {frozenset(face) for face in (found % (2 * size)).tolist()} == first
+        a, b, c = points[found].transpose(1, 0, 2)
+        side = 1.0 if k < 2 + size else -1.0
+        assert (side * np.cross(b - a, c - a)[:, 2] > 0.0).all()

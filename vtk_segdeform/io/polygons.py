@@ -11,7 +11,7 @@ import pyvista as pv
 
 from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
-from ..mesh import normals, repeats_vertex
+from ..mesh import first_equal_row, normals, repeats_vertex
 from ..mesh_repair import triangulate_long_loop
 
 _PLANAR = 1e-6  # height over size
@@ -147,24 +147,56 @@ def cut_into_triangles(
     """Return triangles (m, 3), and the polygon of each, (m,) int, in the order of polygons.
 
     Polygons are cut by ear clipping, planar ones without overlaps.  Where that fails, as for one
-    that touches or crosses itself, the triangulation has the least area.
+    that touches or crosses itself, the triangulation has the least area.  A polygon that is given
+    again, in either direction, is cut like the first one.
     """
     number = np.arange(len(counts))
     if (counts == 3).all():
         return corners.reshape(-1, 3), number
     faces, polygon = _clipped_ears(points, counts, corners)
-    failed = _failed(points, counts, corners, faces, polygon)
-    if not len(failed):
-        return faces, polygon
-    kept = ~np.isin(polygon, failed)
-    parts, owners = [faces[kept]], [polygon[kept]]
     starts = np.cumsum(counts) - counts
-    for each in failed:
-        parts.append(_cut_alone(points, corners[starts[each] :][: counts[each]]))
-        owners.append(np.full(len(parts[-1]), each))
-    faces, polygon = np.concatenate(parts), np.concatenate(owners)
-    order = np.argsort(polygon, kind="stable")
-    return faces[order], polygon[order]
+    failed = _failed(points, counts, corners, faces, polygon)
+    if len(failed):
+        kept = ~np.isin(polygon, failed)
+        parts, owners = [faces[kept]], [polygon[kept]]
+        for each in failed:
+            parts.append(_cut_alone(points, corners[starts[each] :][: counts[each]]))
+            owners.append(np.full(len(parts[-1]), each))
+        faces, polygon = np.concatenate(parts), np.concatenate(owners)
+        order = np.argsort(polygon, kind="stable")
+        faces, polygon = faces[order], polygon[order]
+    place, pieces = first_equal_row(points), np.bincount(polygon, minlength=len(counts))
+    for size in np.unique(counts[counts > 3]):
+        some = np.flatnonzero((counts == size) & (pieces == size - 2))
+        _cut_alike(faces, polygon, some, corners[starts[some][:, None] + np.arange(size)], place)
+    return faces, polygon
+
+
+def _cut_alike(
+    faces: IntArray, polygon: IntArray, some: IntArray, corners: IntArray, place: IntArray
+) -> None:
+    """Replace the triangles of polygons that repeat an earlier one of *some* (q,), cut like it.
+
+    *corners* (q, s) are their corners; points (n,) of equal *place* are at the same position.
+    """
+    at = place[corners]
+    ordered = np.sort(at, axis=1)
+    first = first_equal_row(ordered)
+    again = np.flatnonzero(
+        (first != np.arange(len(some))) & (np.diff(ordered, axis=1) > 0).all(axis=1)
+    )
+    first = first[again]
+    size = at.shape[1]
+    # Where the first two corners of the earlier polygon are.
+    one, two = ((at[again] == at[first, k][:, None]).argmax(axis=1) for k in (0, 1))
+    forth, back = (one + 1) % size == two, (two + 1) % size == one
+    known = forth | back
+    again, first, forth = again[known], first[known], forth[known]
+    rows = np.searchsorted(polygon, some)[:, None] + np.arange(size - 2)
+    like = place[faces[rows[first]]]  # (r, s - 2, 3)
+    corner = (like[..., None] == at[again][:, None, None]).argmax(axis=-1)
+    cut = corners[again][np.arange(len(again))[:, None, None], corner]
+    faces[rows[again]] = np.where(forth[:, None, None], cut, cut[:, :, ::-1])
 
 
 def _clipped_ears(
