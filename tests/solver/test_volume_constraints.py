@@ -218,3 +218,17 @@ def test_a_sheet_has_no_volume_and_no_change_of_it():
     assert not whole.has_volume
     assert whole.relative(mesh.vertices * 2.0) == 0.0
     assert region_volumes(mesh, thirds(mesh)) == ()
+
+
+def test_a_lid_belongs_to_the_region_at_its_border():
+    mesh = tube(6.0, 12, 6)
+    axis = np.ptp(mesh.vertices, axis=0).argmax()
+    height = mesh.vertices[:, axis]
+    labels = (height > height.mean()).astype(int)
+    regions = region_volumes(mesh, labels)
+    assert len(regions) == 2
+    for end, moved in ((height.min(), 0), (height.max(), 1)):
+        x = mesh.vertices.copy()
+        x[np.abs(height - end) < 1e-9, axis] += 0.1  # one border, and so its lid
+        assert abs(regions[moved].violation(x)) > 1e-3
+        assert abs(regions[1 - moved].violation(x)) < 1e-12
