@@ -29,6 +29,7 @@ import vtk_segdeform.widgets
 import vtk_segdeform.widgets.plugin
 from vtk_segdeform import models
 from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.mesh.faults import Search
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.subspace.passengers import Passengers
 from vtk_segdeform.widgets.recording.film import Film
@@ -53,7 +54,6 @@ WIDGETS = ("vtk_segdeform.widgets", "vtk_segdeform.widgets.recording.film")
 NOT_CALLED = {"on_press", "on_hover", "on_wheel", "on_key"}
 NOT_CALLED |= {"contains", "guarded", "pixel_at", "pointer", "ray", "to_display", "to_world"}
 NOT_CALLED |= {"FillInputPortInformation", "RequestData"}  # by VTK's pipeline
-NOT_CALLED |= {"reported"}  # for meshes whose arrays and report were just checked
 NOT_CALLED |= {"add_surface", "draw_mesh"}  # in a plotter created by `pictures`
 
 
@@ -447,6 +447,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "Session.set_fixed.vertices": _left,
     "Session.split_region.vertices": lambda: None,
     "Surface.at_vertices.values": lambda: np.arange(given().given.n_points),
+    "Mesh.of.search": lambda: Search(mesh().vertices, mesh().faces),
     "Surface.of.soup": lambda: sd.mesh.mesh_of(mesh().vertices, mesh().faces),
     "Surface.moved.vertices": lambda: given().mesh.vertices,
     "Surface.read.path": lambda: _file("mesh.ply"),

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..arrays import FloatArray, IntArray, as_points, frozen
+from ..checks import require
 from ..errors import MeshError
 from ..freezing import Frozen, read_only
 from ..kernels import in_parallel
@@ -71,7 +72,7 @@ class Mesh(Frozen):
     def of(cls, search: Search) -> Mesh:
         """Return the mesh of the triangles of a *search*, if it finds no faults."""
         mesh = object.__new__(cls)
-        mesh._set(search)
+        mesh._set(require(search, Search, "search"))
         return mesh
 
     def _set(self, search: Search) -> None:
