@@ -54,7 +54,6 @@ WIDGETS = ("vtk_segdeform.widgets", "vtk_segdeform.widgets.recording.film")
 NOT_CALLED = {"on_press", "on_hover", "on_wheel", "on_key"}
 NOT_CALLED |= {"contains", "guarded", "pixel_at", "pointer", "ray", "to_display", "to_world"}
 NOT_CALLED |= {"FillInputPortInformation", "RequestData"}  # by VTK's pipeline
-NOT_CALLED |= {"reported"}  # for meshes whose arrays and report were just checked
 NOT_CALLED |= {"add_surface", "draw_mesh"}  # in a plotter created by `pictures`
 
 

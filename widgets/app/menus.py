@@ -116,7 +116,7 @@ class Menus:
         session = window.session if window.has_mesh else None
         is_free = session is not None and not window.editor.is_busy
         for action, verb, label, keys in (
-            (self._undo, "&Undo", session and session.undo_label, "Ctrl+Z"),
+            (self._undo, "&Undo", session and window.editor.controller.undo_label, "Ctrl+Z"),
             (self._redo, "&Redo", session and session.redo_label, "Ctrl+Y"),
         ):
             name = str(label or "").replace("&", "&&")

@@ -27,6 +27,8 @@ class Request:
     """Where it was autosaved, if it is recovered work."""
     is_new: bool = False
     """Whether it has been made by the program, and is to be saved."""
+    original: Request | None = None
+    """How to return to the document of which it is a repaired copy."""
 
 
 class WaitingPage(QtWidgets.QWidget):

@@ -1,7 +1,7 @@
 """Repair and open: a closed copy of the document's surface, as a new document.
 
-Also for a file that cannot be opened as it is.  Nothing on disk changes, and the original document
-stays in the list of recent files.
+Also for a file that cannot be opened as it is.  Nothing on disk changes; undo returns to the
+original document.
 """
 
 from __future__ import annotations
@@ -25,7 +25,10 @@ def ask_repair(window: Any) -> Request | None:
     surface = session.surface
     given = to_polydata(session.mesh) if surface is None else surface.given
     camera = window.editor.view.camera
-    return _ask(window, window.document, given, session.mesh, camera)
+    opened = window.document, session
+    name, is_new = window.document.name, window.is_modified
+    original = Request(name, lambda progress: opened, is_new=is_new)
+    return _ask(window, window.document, given, session.mesh, camera, original)
 
 
 def ask_repair_of(window: Any, path: Path, error: Unopenable) -> Request | None:
@@ -33,17 +36,24 @@ def ask_repair_of(window: Any, path: Path, error: Unopenable) -> Request | None:
     return _ask(window, Document(path.name, source=path), error.given, error.valid, None)
 
 
-def _ask(window: Any, document: Document, given: Any, mesh: Mesh, camera: Any) -> Request | None:
+def _ask(
+    window: Any,
+    document: Document,
+    given: Any,
+    mesh: Mesh,
+    camera: Any,
+    original: Request | None = None,
+) -> Request | None:
     dialog = RepairDialog(given, mesh, camera, window)
     try:
         is_accepted = dialog.exec() == dialog.DialogCode.Accepted
         repaired = dialog.repaired if is_accepted else None
     finally:
         dialog.release()
-    return None if repaired is None else _request(document, repaired)
+    return None if repaired is None else _request(document, repaired, original)
 
 
-def _request(document: Document, repaired: Surface) -> Request:
+def _request(document: Document, repaired: Surface, original: Request | None) -> Request:
     stem = Path(document.name).stem.removesuffix(" (repaired)")
     name = f"{stem} (repaired)"
     source = document.source
@@ -54,4 +64,4 @@ def _request(document: Document, repaired: Surface) -> Request:
         place = None if source is None else source.with_stem(name)
         return Document(name, source=place), Session(repaired)
 
-    return Request(name, read, is_new=True)
+    return Request(name, read, is_new=True, original=original)

@@ -11,6 +11,7 @@ read, so an unreadable file loses nothing.  `Autosaver` saves unsaved work meanw
 from __future__ import annotations
 
 import os
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -166,6 +167,11 @@ class Window(QtWidgets.QMainWindow):
         """Repair once the current event of the view has been handled."""
         QtCore.QTimer.singleShot(0, self, self.repair)
 
+    def _undo_repair(self, original: Request) -> None:
+        """Return from a repaired copy, which is discarded, to the original document."""
+        self._is_new = False
+        QtCore.QTimer.singleShot(0, self, lambda: self._open(original))
+
     def recover(self) -> bool:
         """Offer to recover autosaved work; return whether the user accepts."""
         slot = choose_work(self, self.autosaves)
@@ -213,6 +219,9 @@ class Window(QtWidgets.QMainWindow):
         connect_panel(self)
         if not session.mesh.is_two_manifold:  # a closed one with seams needs no repair
             widget.editor.controller.notices.offer("Repair ...", self._repair_soon)
+        if request.original is not None:
+            undo = partial(self._undo_repair, request.original)
+            widget.editor.controller.earlier = "repair", undo
         self._stops.append(widget.editor.controller.messages.on_change(self._update_title))
         widget.session_changed.connect(lambda _: self._autosave())
         self._autosave(request.slot)

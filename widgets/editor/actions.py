@@ -54,7 +54,9 @@ def painting(target: Paint) -> Action:
 
 def undo(controller: Controller) -> None:
     """Undo the last step."""
-    label = controller.session.undo()
+    label, earlier = controller.undo_label, controller.earlier
+    if not controller.session.undo() and earlier is not None:
+        earlier[1]()
     controller.say(f"Undo: {label}" if label else "Nothing to undo")
 
 

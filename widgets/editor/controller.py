@@ -58,6 +58,8 @@ class Controller:
         How the mesh differs from what was given, and where; above the status line.
     log : Log
         The drags and jobs so far, and how they ended.
+    earlier : tuple of str and callable, or None
+        A step before the first of the session: its label, and a function that undoes it.
     recordings : Recordings
         The current recording of input and of video.
     """
@@ -68,6 +70,7 @@ class Controller:
         self.messages = Messages(view)
         self.messages.note(advice())
         self.notices = Notices(view, lambda: self.messages.height)
+        self.earlier: tuple[str, Callable[[], None]] | None = None
         self.recordings = Recordings(view)
         self._mode = Mode.REGIONS
         self._is_on = False
@@ -83,6 +86,13 @@ class Controller:
     def session(self) -> Session:
         """The session being edited; another one after `open`."""
         return self.widgets.session
+
+    @property
+    def undo_label(self) -> str | None:
+        """The step to undo: of the session, or else the one from which the session came."""
+        if self.session.undo_label is None and self.earlier is not None:
+            return self.earlier[0]
+        return self.session.undo_label
 
     @property
     def mode(self) -> Mode:

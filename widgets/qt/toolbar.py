@@ -61,7 +61,7 @@ class Toolbar(QtWidgets.QWidget):
         """Show the steps to undo and redo, and the mode."""
         session, busy = self._editor.session, self._editor.is_busy
         for button, label, verb, key in (
-            (self.undo, session.undo_label, "Undo", "Z"),
+            (self.undo, self._editor.controller.undo_label, "Undo", "Z"),
             (self.redo, session.redo_label, "Redo", "Y"),
         ):
             button.setEnabled(label is not None and not busy)

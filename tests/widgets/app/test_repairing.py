@@ -175,6 +175,20 @@ def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, 
     assert len(hand.window.session.mesh.borders) == 3
 
 
+def test_undo_returns_from_a_repaired_copy_to_the_original_with_its_edits(hand, boxes, tmp_path):
+    opened(hand, bottle(3), tmp_path / "bottle.ply")
+    original = hand.window.session
+    original.set_fixed([0, 1, 2])
+    boxes.answers.append("Discard")
+    repair(hand, lambda dialog: click(dialog.accepting))
+    hand.choose("Edit", "Undo repair")
+    until(lambda: hand.window.has_mesh and hand.window.session is original, "the original")
+    hand.settle()
+    assert hand.title == "bottle.ply* - segdeform"
+    assert original.undo_label == "set fixed vertices"
+    assert len(hand.window.session.mesh.borders) == 3
+
+
 def test_a_saved_repaired_copy_is_no_longer_new(hand, tmp_path, monkeypatch):
     opened(hand, bottle(2), tmp_path / "bottle.ply")
     repair(hand, lambda dialog: click(dialog.accepting))
