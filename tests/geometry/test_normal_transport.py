@@ -152,3 +152,13 @@ def test_tangents_follow_the_surface_and_stay_normal_to_the_normals():
     assert np.abs((moved * carried.normals(points * [1, 1, 3.0])).sum(axis=1)).max() < 1e-7
     away = np.abs(points[:, 2]) < 0.9
     assert (moved * tangents).sum(axis=1)[away].min() > 0.99
+
+
+def test_a_normal_whose_faces_are_flat_to_rounding_follows_the_faces_beside_them():
+    points = np.array(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, -1e-18, 3e-18]], dtype=float
+    )
+    faces = np.array([[0, 1, 2], [0, 2, 3], [0, 4, 1]])
+    normals = np.tile([0.0, 0.0, 1.0], (5, 1))
+    carried = transport_of(points, faces, normals)
+    assert_allclose(carried.normals(points @ TURN.T), normals @ TURN.T, atol=1e-12)

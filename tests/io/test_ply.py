@@ -223,3 +223,15 @@ def test_a_word_among_numbers_is_shown(tmp_path):
     (tmp_path / "a.ply").write_text(whole.replace("3 0 1 2", "3 0 one 2"))
     with pytest.raises(MeshError, match="'one' where a number is expected"):
         read_polydata(tmp_path / "a.ply")
+
+
+def test_texture_coordinates_of_gltf_are_turned_upside_down(tmp_path):
+    surface = to_polydata(Mesh(*TETRAHEDRON))
+    pairs = np.array([[0.0, 0.25], [0.5, 1.0], [1.0, 0.0], [0.25, 0.75]])
+    for name, v in (("TEXCOORD_0", 1.0 - pairs[:, 1]), ("uv", pairs[:, 1])):
+        surface.point_data.clear()
+        surface.point_data[name] = pairs
+        surface.point_data.active_texture_coordinates_name = name
+        write_mesh(tmp_path / "a.ply", surface)
+        found = read_polydata(tmp_path / "a.ply").active_texture_coordinates
+        assert_array_equal(found, np.column_stack([pairs[:, 0], v]))

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from solids import rotation
 
 from vtk_segdeform.errors import MeshError
-from vtk_segdeform.io.polygons import cut_into_triangles, polydata_of, triangles_of
+from vtk_segdeform.io.polygons import _failed, cut_into_triangles, polydata_of, triangles_of
 
 TURN = rotation([1.0, 2.0, 3.0], 0.7).T
 
@@ -141,3 +141,22 @@ def test_polygons_of_two_corners_are_ignored_and_bad_indices_are_not():
 def test_no_polygons_have_no_triangles():
     assert triangles_of(pv.PolyData()).shape == (0, 3)
     assert len(triangles_of(polydata_of(np.eye(3), np.array([3]), np.array([0, 1, 2])))) == 1
+
+
+def test_polygons_that_were_cut_wrongly_are_found():
+    dart = flat((0, 0), (2, 0), (0.5, 0.5), (0, 2))
+    bent = dart + np.outer([0, 0, 1, 0], [0.0, 0.0, 0.5])
+    inside, outside = [[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]  # the second one is turned
+
+    def failed(points, *cuts):
+        counts = np.full(len(cuts), 4)
+        corners = np.tile(np.arange(4), len(cuts))
+        polygon = np.repeat(np.arange(len(cuts)), [len(each) for each in cuts])
+        return _failed(points, counts, corners, np.concatenate(cuts), polygon).tolist()
+
+    assert failed(dart, inside, outside, inside, inside[:1]) == [1, 3]
+    assert failed(dart @ TURN, outside, inside) == [0]
+    assert failed(bent, outside, inside) == []  # not planar: no side is the upper one
+    repeated = np.array([0, 1, 1, 3])  # has one triangle only
+    args = np.array([4]), repeated, np.array([[0, 1, 3]]), np.array([0])
+    assert _failed(dart, *args).tolist() == []

@@ -94,3 +94,17 @@ def test_minus_zero_is_zero_and_nan_is_kept(tmp_path):
     rows[0, 12:16] = np.frombuffer(b"\1\0\x80\x7f", "u1")  # a NaN that signals
     path.write_bytes(head + rows.tobytes())
     assert np.isnan(read_polydata(path).points).sum() == 1
+
+
+def test_normals_and_attributes_belong_to_the_triangles_of_their_polygon(tmp_path):
+    surface = pv.Cube().clean()
+    surface.verts, surface.lines = [1, 0, 1, 1], [2, 0, 1]
+    cells = np.arange(surface.n_cells, dtype=np.uint16) + 7
+    surface.cell_data["Attribute"] = cells
+    write_mesh(tmp_path / "a.stl", surface)
+    rows = np.frombuffer((tmp_path / "a.stl").read_bytes(), "u1", offset=84).reshape(12, 50)
+    assert_array_equal(rows[:, 48:].copy().view("<u2").ravel(), np.repeat(cells[3:], 2))
+    normals = rows[:, :12].copy().view("<f4")
+    middle = rows[:, 12:48].copy().view("<f4").reshape(12, 3, 3).mean(axis=1)
+    assert_array_equal(np.linalg.norm(normals, axis=1), 1.0)
+    assert (np.einsum("ix,ix->i", normals, middle) == 0.5).all()  # outward

@@ -84,6 +84,8 @@ def test_a_triangle_soup_is_welded_to_the_body(body):
     assert found.mesh.n_vertices == len(np.unique(body[0], axis=0)) == len(body[0])
     assert found.mesh.is_two_manifold
     assert_array_equal(found.mesh.vertices[found.mesh.faces], body[0][body[1]])
+    _, first = np.unique(body[1], return_index=True)  # the vertices are numbered by first corners
+    assert_array_equal(found.vertex_of[np.sort(first)], np.arange(len(first)))
     assert texts(found) == [f"welded {3 * len(body[1])} seam points"]
 
 

@@ -185,7 +185,7 @@ def test_derivatives_under_lids_are_exact(name):
         )
         assert_allclose(far / near, 4.0, rtol=0.1)
         # The volume is a cubic along d, and a step along it is exact.
-        cubic = volume_along_path(each._extended(np.hstack([x, d])), each.faces)
+        cubic = volume_along_path(each.extended(np.hstack([x, d])), each.faces)
         for t in (-1.5, 0.7, 2.0):
             value = each.violation(x + t * d) + each.target
             assert_allclose(np.polyval(cubic[::-1], t), value, atol=1e-12 * size)

@@ -33,8 +33,6 @@ from ..progress import Progress
 from .outputs import Say
 
 _MOST_HOLES = 10  # listed one by one
-# Notes on the triangles as given that the lines above them say of the mesh.
-_SAID = {"components", "open edge", "hole", "coincident"}
 
 
 def check(options: Namespace, say: Say, progress: Progress) -> bool:
@@ -121,14 +119,15 @@ def _print(found: dict[str, Any], say: Say) -> None:
     polygons = counted(found["polygons"], "polygon", "polygons")
     given = f"{found['file']}: {found['points']} points, {polygons}"
     if not found["can_be_deformed"]:
-        say(f"{given}: cannot be deformed: {found['reason']}")
+        say(f"{given}: {found['reason']}")
         return
     parts = counted(found["components"], "component", "components")
-    say(f"{given}; as a mesh {found['vertices']} vertices, {found['faces']} faces, {parts}")
-    say(f"can be deformed as it is. {found['volume']}")
+    faces = counted(found["faces"], "face", "faces")
+    say(f"{given}; as a mesh {found['vertices']} vertices, {faces}, {parts}")
+    say(f"It can be deformed as it is. {found['volume']}.")
     for each in found["workarounds"]:
         if each["kind"] != "hole":
-            say(f"  worked around: {each['text']}")
+            say(f"  {each['text']}")
     holes = found["holes"]
     if holes:
         most = ", ".join(map(str, holes[:_MOST_HOLES])) + (
@@ -137,10 +136,7 @@ def _print(found: dict[str, Any], say: Say) -> None:
         say(f"  {counted(len(holes), 'border', 'borders')} of {most} edges")
     if found["self_intersections"]:
         pairs = counted(found["self_intersections"], "pair", "pairs")
-        say(f"  {pairs} of faces intersect; they will after a deformation, too")
-    for each in found["notes"]:
-        if each["kind"] not in _SAID:
-            say(f"  note: {each['text']}")
+        say(f"  {pairs} of faces intersect; this does not prevent a deformation")
 
 
 def _repair(given: Any, options: Namespace, say: Say, progress: Progress) -> bool:

@@ -24,11 +24,13 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 
 _AGREE = 1e-3  # distance of two unit normals that are the same one, stored in few bits
 _RANK = 1e-6  # relative eigenvalue below which area vectors around a normal do not span
 _LARGEST = 1e100
+_FLAT = 1e-5  # area over longest edge squared: the normal of a flatter face is rounding.  A normal
+# with no other faces follows those beside them
 _ROUNDING = 1e-14
 _MOST = 2.0  # largest sum |c_f A_f| / |n| of a combination
 
@@ -57,8 +59,8 @@ class NormalTransport:
         *, of_corner: IntArray, place: IntArray | None,
     ) -> None:  # fmt: skip
         self._given = np.asarray(normals, dtype=float)
-        usable = (np.abs(self._given) < _LARGEST).all(axis=1)  # not NaN either
-        self._normals = np.where(usable[:, None], self._given, 0.0)
+        finite = (np.abs(self._given) < _LARGEST).all(axis=1)  # not NaN either
+        self._normals = np.where(finite[:, None], self._given, 0.0)
         group = np.arange(len(self._normals))
         if place is not None:
             group = _agreeing(points[place], self._normals)
@@ -71,21 +73,37 @@ class NormalTransport:
         first, second = self._edges(points)
         self._area_vectors = np.cross(first, second)
         areas = np.linalg.norm(self._area_vectors, axis=1)
-        sound = np.isfinite(areas) & (areas > 0)
-        self._areas = np.where(sound, areas, 1.0)
+        usable = np.isfinite(areas) & (areas > 0)
+        self._areas = np.where(usable, areas, 1.0)
+        longest = np.maximum((first**2).sum(axis=1), (second**2).sum(axis=1))
+        sound = usable & (areas > _FLAT * longest)
         # A polygon counts as a whole, with all its triangles, for the normals at its corners.
         width = counts[polygon]
         triangle = np.repeat(np.arange(len(cut)), width)
         offset = np.arange(len(triangle)) - np.repeat(np.cumsum(width) - width, width)
         owner = group[of_corner[starts[polygon][triangle] + offset]]
-        here = sound[triangle]
         shape = len(self._normals), len(cut)
-        around = csr_array((np.ones(here.sum()), (owner[here], triangle[here])), shape=shape)
+        every, around = (
+            csr_array((np.ones(here.sum()), (owner[here], triangle[here])), shape=shape)
+            for here in (usable[triangle], sound[triangle])
+        )
+        lost = np.flatnonzero((np.diff(around.indptr) == 0) & (np.diff(every.indptr) > 0))
+        if len(lost):
+            around = _replaced(around, lost, self._beside(every[lost], sound, len(points)))
         around.sum_duplicates()
         around.data[:] = 1.0
         self._around = around[group]  # of each normal
         self._frames = np.stack([first, second, self._area_vectors / self._areas[:, None]], axis=2)
         self._by_area, self._by_frame = self._weights()
+
+    def _beside(self, flat: csr_array, sound: BoolArray, n: int) -> csr_array:
+        """Return sound triangles at corners of the *flat* ones, (l, t); these where none is."""
+        rows = np.repeat(np.arange(len(self._triangles)), 3)
+        at = csr_array((np.ones(len(rows)), (rows, self._triangles.ravel())), (len(sound), n))
+        near = (flat @ at) @ (at.T * sound).tocsr()
+        near.eliminate_zeros()
+        none = np.diff(near.indptr) == 0
+        return csr_array(near + flat * none[:, None])
 
     def _edges(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         a, b, c = (points[each] for each in self._triangles.T)
@@ -163,6 +181,14 @@ class NormalTransport:
         bad = ~np.isfinite(frames).all(axis=(1, 2)) | (np.abs(np.linalg.det(frames)) == 0)
         frames[bad] = np.eye(3)
         return frames
+
+
+def _replaced(matrix: csr_array, rows: IntArray, new: csr_array) -> csr_array:
+    """Return *matrix* with *new* rows (l, t) at *rows* (l,)."""
+    kept = np.ones(matrix.shape[0])
+    kept[rows] = 0.0
+    place = csr_array((np.ones(len(rows)), (rows, np.arange(len(rows)))), (len(kept), len(rows)))
+    return csr_array(matrix * kept[:, None] + place @ new)
 
 
 def _unit(vectors: FloatArray) -> FloatArray:

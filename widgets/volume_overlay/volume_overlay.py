@@ -192,7 +192,7 @@ class VolumeOverlay:
             lines.append((self.session.volume_summary, None))
         if self.session.has_volume:
             lines.append((f"Volume: {percent(self.session.volume_change)}", None))
-        if self.session.has_volume or low != high:
+        if self._prepared().is_defined:
             lines.append((f"Local: {low} to {high} %", None))
         regions = self._regions.changes()
         lines += [

@@ -438,4 +438,6 @@ def test_an_open_sheet_has_no_colours_and_the_overlay_says_that_it_has_no_volume
     assert first == "Open sheet: no volume to preserve"
     assert not [line for line in others if "%" in line]
     assert not overlay.change.any()
+    overlay.session.change_options(lids=True)
+    assert not [line for line in lines_of(overlay) if line.startswith("Local")]
     overlay.remove()

@@ -1,0 +1,77 @@
+"""Half-edges agree with the definitions, computed face by face, for any triangles."""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from vtk_segdeform.mesh.topology import HalfEdges
+
+
+def random_faces(seed: int) -> np.ndarray:
+    """Return a few triangles over a few vertices, without a vertex twice in one."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(3, 9))
+    return np.array([rng.permutation(n)[:3] for _ in range(rng.integers(1, 12))])
+
+
+def links(faces, corners):
+    """Return the components of *corners* (face, vertex) across edges of exactly two faces."""
+    of_edge: dict[frozenset, list[int]] = {}
+    for f, face in enumerate(faces.tolist()):
+        for a, b in pairwise([*face, face[0]]):
+            of_edge.setdefault(frozenset((a, b)), []).append(f)
+    group = {corner: {corner} for corner in corners}
+    for edge, owners in of_edge.items():
+        if len(owners) == 2:
+            for vertex in edge:
+                one, other = group[owners[0], vertex], group[owners[1], vertex]
+                if one is not other:
+                    one |= other
+                    group.update(dict.fromkeys(other, one))
+    return {id(each): each for each in group.values()}.values(), of_edge
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_any_few_triangles_have_the_properties_of_the_definitions(seed):
+    for part in range(5):
+        faces = random_faces(100 * seed + part)
+        n = int(faces.max()) + 1
+        half_edges = HalfEdges(faces, n)
+        keys = [frozenset(face) for face in faces.tolist()]
+        assert half_edges.repeated.tolist() == [key in keys[:k] for k, key in enumerate(keys)]
+        corners = [(f, v) for f, face in enumerate(faces.tolist()) for v in face]
+        fans, of_edge = links(faces, corners)
+        crowded = {v for edge, owners in of_edge.items() if len(owners) > 2 for v in edge}
+        n_fans = Counter(next(iter(fan))[1] for fan in fans)
+        pinched = sorted(v for v, k in n_fans.items() if k > 1 and v not in crowded)
+        assert half_edges.pinched.tolist() == pinched
+        net = Counter()
+        for face in faces.tolist():
+            for a, b in pairwise([*face, face[0]]):
+                net[min(a, b), max(a, b)] += 1 if a < b else -1
+        edges = [pair if k > 0 else pair[::-1] for pair, k in net.items() for _ in range(abs(k))]
+        assert sorted(edges) == sorted(map(tuple, half_edges.net_boundary.tolist()))
+        shell = list(range(len(faces)))
+        for owners in of_edge.values():
+            shell = [shell[owners[0]] if s in {shell[o] for o in owners} else s for s in shell]
+        first = {s: k for k, s in enumerate(dict.fromkeys(shell))}
+        assert half_edges.shells.tolist() == [first[s] for s in shell]
+
+
+def test_renumbered_half_edges_are_those_of_the_renumbered_faces():
+    for seed in range(40):
+        faces = random_faces(seed)
+        gaps = np.cumsum(np.random.default_rng(seed).integers(1, 4, faces.max() + 1))
+        known = HalfEdges(gaps[faces], int(gaps.max()) + 1)
+        assert known.shells is not None
+        number = np.zeros(known.n_vertices, dtype=np.int64)
+        number[gaps] = np.arange(len(gaps))
+        found, fresh = known.renumbered(number, len(gaps)), HalfEdges(faces, len(gaps))
+        assert "order" in vars(found)
+        for name in ("order", "first", "pairs", "boundary", "net_boundary", "pinched", "across"):
+            assert_array_equal(getattr(found, name), getattr(fresh, name))
