@@ -8,10 +8,15 @@ from scenes import sausage
 from solids import rotation
 
 from vtk_segdeform import models
+from vtk_segdeform.geometry.lids import lids_of
 from vtk_segdeform.geometry.volume import signed_volume, volume_along_path
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.solver.exact_volume import steps_to_volume
-from vtk_segdeform.solver.volume_constraints import region_volumes, total_volume
+from vtk_segdeform.solver.volume_constraints import (
+    _labels_of_faces,
+    region_volumes,
+    total_volume,
+)
 
 SCENE = sausage(3)
 MESH = SCENE.mesh
@@ -218,3 +223,16 @@ def test_a_sheet_has_no_volume_and_no_change_of_it():
     assert not whole.has_volume
     assert whole.relative(mesh.vertices * 2.0) == 0.0
     assert region_volumes(mesh, thirds(mesh)) == ()
+
+
+def test_the_faces_of_a_lid_belong_to_the_regions_at_its_border():
+    mesh = tube(6.0, 12, 6)
+    thin = np.ptp(mesh.vertices, axis=0).argmin()  # an axis across the tube
+    labels = (mesh.vertices[:, thin] > 1e-9).astype(int)
+    one, other = (abs(each.target) for each in region_volumes(mesh, labels))
+    lids = lids_of(mesh)
+    faces, of_faces = lids.closed(mesh), _labels_of_faces(mesh, labels, lids)
+    for corners, label in zip(faces[mesh.n_faces :], of_faces[mesh.n_faces :], strict=True):
+        beside = (np.isin(mesh.faces, corners[:2]).sum(axis=1) == 2).nonzero()[0]
+        assert label == of_faces[beside[0]]
+    assert one + other == pytest.approx(abs(signed_volume(lids.extension @ mesh.vertices, faces)))

@@ -164,10 +164,10 @@ class HalfEdges:
         """(m,) bool: which faces have the same three vertices as an earlier face.
 
         Such faces share three edges.  So a face can only be one of them if it has no edge alone,
-        and across two of its edges the same face, or an edge with three or more faces.
+        and across two of its edges the same face, or several faces each.
         """
         a, b, c = self.across.T
-        same = (a == b) | (b == c) | (c == a) | (a == -2) | (b == -2) | (c == -2)
+        same = (a == b) | (b == c) | (c == a)
         some = np.flatnonzero(same & (a != -1) & (b != -1) & (c != -1))
         repeated = np.zeros(len(self.faces), dtype=bool)
         first = first_equal_row(np.sort(self.faces[some], axis=1))
