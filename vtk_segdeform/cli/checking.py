@@ -79,7 +79,7 @@ def described(given: Any, name: str) -> dict[str, Any]:
         surface = Surface(given)
         mesh = surface.mesh
     except MeshError as fault:
-        return {**found, "reason": str(fault).removeprefix("this surface cannot be deformed: ")}
+        return {**found, "reason": str(fault)}
     return {
         **found,
         **_of_mesh(mesh),
