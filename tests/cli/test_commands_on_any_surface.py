@@ -128,8 +128,8 @@ def test_check_says_each_thing_once(tmp_path, capsys):
     path = file_of("holed", tmp_path)
     assert main(["check", str(path)]) == 0
     assert capsys.readouterr().out.splitlines()[1:] == [
-        "can be deformed as it is. 4 holes: volume kept under lids",
-        "  worked around: welded 50 seam points",
+        "It can be deformed as it is. 4 holes: volume kept under lids.",
+        "  welded 50 seam points",
         "  4 borders of 16, 16, 8, 4 edges",
     ]
 

@@ -33,8 +33,6 @@ from ..progress import Progress
 from .outputs import Say
 
 _MOST_HOLES = 10  # listed one by one
-# Notes on the triangles as given that the lines above them say of the mesh.
-_SAID = {"components", "open edge", "hole", "coincident"}
 
 
 def check(options: Namespace, say: Say, progress: Progress) -> bool:
@@ -81,7 +79,7 @@ def described(given: Any, name: str) -> dict[str, Any]:
         surface = Surface(given)
         mesh = surface.mesh
     except MeshError as fault:
-        return {**found, "reason": str(fault).removeprefix("this surface cannot be deformed: ")}
+        return {**found, "reason": str(fault)}
     return {
         **found,
         **_of_mesh(mesh),
@@ -139,9 +137,6 @@ def _print(found: dict[str, Any], say: Say) -> None:
     if found["self_intersections"]:
         pairs = counted(found["self_intersections"], "pair", "pairs")
         say(f"  {pairs} of faces intersect; this does not prevent a deformation")
-    for each in found["notes"]:
-        if each["kind"] not in _SAID:
-            say(f"  {each['text']}")
 
 
 def _repair(given: Any, options: Namespace, say: Say, progress: Progress) -> bool:

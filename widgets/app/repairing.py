@@ -27,7 +27,7 @@ def ask_repair(window: Any) -> Request | None:
     camera = window.editor.view.camera
     opened = window.document, session
     name, is_new = window.document.name, window.is_modified
-    original = Request(name, lambda progress: opened, is_new=is_new)
+    original = Request(name, lambda _: opened, is_new=is_new)
     return _ask(window, window.document, given, session.mesh, camera, original)
 
 
