@@ -96,7 +96,7 @@ def test_flips_remove_caps_and_keep_the_surface_closed_and_its_area(height):
     assert np.abs(surface.cotangents).max() < 100.0
     # The areas of the mollified caps differ slightly.
     assert_allclose(surface.face_areas.sum(), areas_of(*whole).sum(), rtol=2e-4)
-    one, other = half_edges.neighbours[:, 0], np.arange(len(surface.faces))
+    one, other = half_edges.across[:, 0], np.arange(len(surface.faces))
     assert (one != other).all()
     # Both faces at an edge have the same length for it.
     opposite = np.roll(surface.lengths, -2, axis=1).ravel()
