@@ -107,6 +107,7 @@ def test_the_clock_of_a_step_leaves_the_solver_and_the_drag_as_they_were(task, d
     deformer.reset()
 
 
+@pytest.mark.campaign
 def test_the_drag_profile_has_finite_times_and_names_arap_when_it_is_absent():
     section = drag_profile.run(TINY)
     frame, set_up = section.tables

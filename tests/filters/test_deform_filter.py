@@ -16,6 +16,8 @@ import vtk_segdeform as sd
 from vtk_segdeform.filters.deform_filter import SegmentedCageDeformFilter
 from vtk_segdeform.io.convert import to_polydata
 
+pytestmark = pytest.mark.usefixtures("bound_once")
+
 MESH = sd.models.cactus(800)
 HEIGHT = MESH.vertices[:, 2]
 FIXED, HANDLE = np.flatnonzero(HEIGHT < 0.1), np.flatnonzero(HEIGHT > 0.9)

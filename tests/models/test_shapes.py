@@ -76,6 +76,7 @@ def test_models_are_deterministic():
     assert_array_equal(one.faces, two.faces)
 
 
+@pytest.mark.campaign
 def test_more_vertices_give_the_same_body():
     volumes = [
         signed_volume(mesh.vertices, mesh.faces)

@@ -102,6 +102,7 @@ def test_the_hessian_is_the_derivative_of_the_gradient(monkeypatch, constraints,
     assert np.linalg.norm(guess - exact) < error * np.linalg.norm(exact)
 
 
+@pytest.mark.campaign
 def test_with_the_hessian_of_the_volume_a_pulled_body_takes_fewer_steps():
     scene, steps, poses = sausage(2), [], []
     for has_hessian in (True, False):

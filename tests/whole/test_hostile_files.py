@@ -406,13 +406,13 @@ def results(tmp_path_factory):
     """Read files of four sorts in one program; return [(files, answers)] by sort."""
     folder = tmp_path_factory.mktemp("files")
     sound = originals(folder)
-    damaged_files = mutants(folder, sound, 26, seed=1)
+    damaged_files = mutants(folder, sound, 13, seed=1)
     (folder / "counts").mkdir()
     sorts = [
         sound,
         damaged_files,
-        special(folder, sound)[::7],
-        false_counts(folder / "counts")[::4],
+        special(folder, sound)[::11],
+        false_counts(folder / "counts")[::6],
     ]
     before = sorted(folder.rglob("*"))
     found = iter(answers([file for files in sorts for file in files]))

@@ -14,7 +14,7 @@ from monkey import Monkey
     ("seed", "count"),
     [
         (1, 300),
-        (9, 300),
+        pytest.param(9, 300, marks=pytest.mark.campaign),
         pytest.param(3, 10_000, marks=pytest.mark.campaign),
     ],
 )

@@ -20,6 +20,8 @@ from vtk_segdeform.widgets.handle_dragger.handle_dragger import HandleDragger
 from vtk_segdeform.widgets.handle_dragger.handle_motion import Grip, Motion
 from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
 
+pytestmark = pytest.mark.usefixtures("bound_once")
+
 SCENE = sausage()
 TIP, TOP = "handle 1", "handle 2"
 LOOKS = [(10.0, -8.0, 6.0), (9.0, 7.0, 4.0), (-5.0, 6.0, -8.0)]

@@ -249,7 +249,8 @@ def test_nothing_is_left_in_plain_vtk(kind, times):
 
 @pytest.mark.skipif(ONE_SCREEN in os.environ, reason="runs the test above")
 @pytest.mark.skipif(not os.path.isdir("/proc/self/fd"), reason="needs Linux's /proc")
-@pytest.mark.parametrize("times", [1, pytest.param(50, marks=pytest.mark.campaign)])
+@pytest.mark.campaign
+@pytest.mark.parametrize("times", [1, 50])
 def test_a_dock_over_plain_vtk_works_and_leaves_nothing(times):
     application()  # or skip
     chosen = ["-k", f"plain_vtk and -{times}", "-m", "campaign or not campaign"]
