@@ -120,6 +120,7 @@ def test_the_drag_profile_has_finite_times_and_names_arap_when_it_is_absent():
     assert section.ratios[-1].verdict == "met"
 
 
+@pytest.mark.campaign
 def test_table_one_splits_a_step_in_both_formulations():
     section = table_one.run(TINY)
     *tables, changes = section.tables
