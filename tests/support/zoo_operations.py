@@ -7,7 +7,7 @@ become a `ReportedError`.
 from __future__ import annotations
 
 import io
-from contextlib import redirect_stdout
+from contextlib import redirect_stdout, suppress
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from vtk_segdeform.cli.main import main
 from vtk_segdeform.errors import MeshError, SegDeformError
 from vtk_segdeform.filters.deform_filter import SegmentedCageDeformFilter
 from vtk_segdeform.geometry import lids_of
+from vtk_segdeform.io import triangles_of
 from vtk_segdeform.io.convert import from_polydata, read_polydata, to_polydata, write_mesh
 from vtk_segdeform.io.polygons import polydata_of
 
@@ -201,9 +202,13 @@ def filtered(polydata, *, cages=None, **options):
         bend.SetInputDataObject(1, cages)
     if "handle" not in options and polydata.n_points:
         x = np.nan_to_num(np.asarray(polydata.points, float), posinf=0.0)
-        x = x[:, np.ptp(x, axis=0).argmax()]
-        options["fixed"] = np.flatnonzero(x <= x.min() + 0.12 * np.ptp(x)).tolist()
-        options["handle"] = np.flatnonzero(x >= x.max() - 0.12 * np.ptp(x)).tolist()
+        used = np.arange(len(x))
+        with suppress(MeshError, ValueError):  # a handle of stray points alone is refused
+            used = np.unique(triangles_of(polydata)) if polydata.n_cells else used
+        used = used if len(used) else np.arange(len(x))
+        x = x[used][:, np.ptp(x[used], axis=0).argmax()]
+        options["fixed"] = used[x <= x.min() + 0.12 * np.ptp(x)].tolist()
+        options["handle"] = used[x >= x.max() - 0.12 * np.ptp(x)].tolist()
     bend.SetNumberOfRegions(options.pop("n_regions", 2))
     bend.SetNumberOfCageVertices(60)
     bend.SetFixed(options.get("fixed", []))
