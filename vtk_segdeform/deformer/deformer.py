@@ -456,7 +456,7 @@ class Deformer:
         return region_volumes(self._rest_pose, self.regions.labels, self._lids)
 
     def _enclose(self) -> None:
-        """Compute the enclosed volume with the lids of now."""
+        """Compute the volume enclosed under the current lids."""
         vars(self).pop("_region_volumes", None)
         self._lids = lids_of(self._rest_pose, self._lids_option)
         self._total_volume = total_volume(self._rest_pose, self._lids)
