@@ -246,7 +246,7 @@ def _cut_alone(points: FloatArray, polygon: IntArray) -> IntArray:
 
 
 def _least_area(points: FloatArray, polygon: IntArray) -> IntArray:
-    """Return the triangles of a *polygon*, corner by corner, without those that repeat a corner."""
+    """Triangulate a *polygon*; its repeated corners are skipped."""
     corners = polygon[polygon != np.roll(polygon, -1)]
     if len(corners) < 3:
         return np.empty((0, 3), dtype=np.int64)
