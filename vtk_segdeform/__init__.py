@@ -52,7 +52,7 @@ if _TYPE_CHECKING:
         widgets,
     )
     from .cages import Cage, fit_cages, mean_value_coordinates
-    from .deformer import Deformer, deform
+    from .deformer import Deformer, deform, pull
     from .geometry import local_volume_change, volume_summary
     from .io import Surface, read_mesh, write_mesh
     from .mesh import Mesh, find_faults
@@ -81,6 +81,7 @@ _MODULE_OF = {
     "load_session": "session",
     "local_volume_change": "geometry",
     "mean_value_coordinates": "cages",
+    "pull": "deformer",
     "read_mesh": "io",
     "repair": "mesh_repair",
     "save_session": "session",
@@ -113,6 +114,7 @@ __all__ = [
     "local_volume_change",
     "mean_value_coordinates",
     "models",
+    "pull",
     "read_mesh",
     "repair",
     "save_session",

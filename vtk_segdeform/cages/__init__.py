@@ -11,7 +11,7 @@ The files, in reading order:
 """
 
 from .cage import MOST_CAGE_VERTICES, Cage, cage_faults
-from .fit import fit_cages
+from .fit import fit_cages, suggested_size
 from .mean_value import mean_value_coordinates
 
 __all__ = [
@@ -20,4 +20,5 @@ __all__ = [
     "cage_faults",
     "fit_cages",
     "mean_value_coordinates",
+    "suggested_size",
 ]

@@ -42,6 +42,7 @@ _ATTEMPTS = 8  # 1, 1.25, 2, 4, 9, 28, 108, 517
 _ROUND, _NEAR = 0.2, 0.2  # least roundness, and distance in offsets, of a good cage
 _NODES, _NODES_PER_VERTEX = 3e5, 1e3  # limit of the nodes of a grid: the larger of both
 _FEWEST = 8  # vertices of a cage
+_SUGGESTED, _SUGGESTED_EACH = 155, 30  # cage vertices in total, and for each region
 _SHELL = 6  # fewest vertices of each component of a cage with several
 _FLOOR = 12  # vertices of each cage before the rest is distributed
 _THINNEST = 1e-3  # width over length that a region counts with, at least
@@ -57,6 +58,11 @@ _log = logging.getLogger(__name__)
 
 
 @one_blas_thread()
+def suggested_size(regions: Regions) -> int:
+    """Return a total number of cage vertices for *regions*: 155, or 30 each if that is more."""
+    return min(max(_SUGGESTED, _SUGGESTED_EACH * regions.n_regions), MOST_CAGE_VERTICES)
+
+
 def fit_cages(
     mesh: Mesh,
     regions: Regions,

@@ -5,19 +5,33 @@ The files, in reading order:
     deformer         `Deformer`: targets in, `Solution` out
     frame            the coordinates in which a mesh is deformed
     arguments        checks of its arguments
+    locality         what stays when one point is pulled
     binding          all that is computed once for a mesh, its regions and its cages
     binding_cache    bindings kept on disk
     deform           `deform`: the whole method in one call
+    pull             `pull`: one point pulled, in one call
 """
 
-from .arguments import FARTHEST_APART, checked_constraints, checked_targets
+from .arguments import (
+    FARTHEST_APART,
+    checked_constraints,
+    checked_locality,
+    checked_radius,
+    checked_targets,
+    checked_vertex,
+)
 from .deform import deform
 from .deformer import Deformer
+from .pull import pull
 
 __all__ = [
     "FARTHEST_APART",
     "Deformer",
     "checked_constraints",
+    "checked_locality",
+    "checked_radius",
     "checked_targets",
+    "checked_vertex",
     "deform",
+    "pull",
 ]

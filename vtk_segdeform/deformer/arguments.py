@@ -14,6 +14,7 @@ from ..errors import ArgumentError, CageError, ConstraintError
 from ..mesh import Mesh
 
 _FARTHEST = 1e3  # sizes of the mesh
+_PULL_RADIUS = 0.15  # diagonals of the mesh
 FARTHEST_APART = 20.0
 """Diagonals of the mesh between two targets or fixed vertices, at most.
 
@@ -74,6 +75,30 @@ def checked_constraints(
             "remove them from one of the two"
         )
     return fixed, handle
+
+
+def checked_vertex(mesh: Mesh, vertex: int) -> int:
+    """Return *vertex*; ConstraintError if there is no such vertex."""
+    if not is_whole(vertex, 0, mesh.n_vertices - 1):
+        last = mesh.n_vertices - 1
+        raise ConstraintError(f"vertex must be a whole number, 0 to {last}; got {shown(vertex)}")
+    return int(vertex)
+
+
+def checked_radius(mesh: Mesh, radius: float | None) -> float:
+    """Return the *radius* of a pull, by default 15 % of the mesh's diagonal."""
+    if radius is None:
+        return _PULL_RADIUS * mesh.diagonal
+    if not (is_number(radius) and 0.0 < radius < np.inf):
+        raise ConstraintError(f"radius must be a positive number or None; got {shown(radius)}")
+    return float(radius)
+
+
+def checked_locality(locality: float | None) -> float | None:
+    """Return the *locality* of a pull; ConstraintError unless it is None or from 0 to 1."""
+    if locality is not None and not (is_number(locality) and 0.0 <= locality <= 1.0):
+        raise ConstraintError(f"locality must be a number from 0 to 1; got {shown(locality)}")
+    return None if locality is None else float(locality)
 
 
 def checked_targets(targets: ArrayLike, n_handle: int) -> FloatArray:

@@ -39,10 +39,10 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from .. import sizes
-from ..arrays import FloatArray, IntArray, as_numbers
+from ..arrays import FloatArray, IntArray, as_numbers, is_number
 from ..cages import Cage
-from ..checks import all_of, as_callable, as_flag, as_path
-from ..errors import Cancelled
+from ..checks import all_of, as_callable, as_flag, as_path, shown
+from ..errors import Cancelled, ConstraintError
 from ..freezing import read_only
 from ..geometry import Lids, lids_of
 from ..kernels import compiled_kernels, one_blas_thread
@@ -50,6 +50,7 @@ from ..mesh import Mesh, require_mesh
 from ..progress import Progress, tell
 from ..regions import Regions, require_regions
 from ..solver import (
+    Anchors,
     GaussNewton,
     ScaledSurface,
     Solution,
@@ -76,14 +77,17 @@ from .arguments import (
     check_options,
     checked_constraints,
     checked_targets,
+    checked_vertex,
     require_together,
     stacked_cages,
 )
 from .binding import BindingInputs
 from .binding_cache import cached_binding
 from .frame import Frame
+from .locality import SurfaceSamples
 
 _POSITION_WEIGHT = 90.0  # of a handle or fixed patch, times the scale of the shape energy
+_ANCHOR_WEIGHT = 100.0  # of the whole surface in a local deformer, in weights of a handle
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most
 _SCALED = 3e-5  # relative scale from which another solve follows
@@ -234,6 +238,7 @@ class Deformer:
         self._rest_pose = mesh.with_vertices(at_origin) if self._frame.is_far else mesh
         self._base = self._binding.mapping.base(self._rest_pose.vertices)
         self._enclose()
+        self._samples = SurfaceSamples.of(self._rest, self._binding.coarse_volume)
         self._constrain(fixed, handle)
         if compiled_kernels(mesh.n_vertices):
             tell(progress, 0.99, "taking a trial step")
@@ -266,6 +271,38 @@ class Deformer:
             other._lids_option = as_lids(lids)
             other._enclose()
         other._constrain(fixed, handle)
+        return other
+
+    @one_blas_thread()
+    def local(self, vertex: int, reach: float) -> Deformer:
+        """Return a deformer in the same pose that deforms the surface near *vertex* only.
+
+        Solves keep the rest of the surface where it is now, softly; see `locality`.  Nothing moves
+        before a handle does: forces that are not in balance at this pose, because another part of
+        the surface or other vertices were held before, remain as a constant load.
+
+        Parameters
+        ----------
+        vertex : int
+            The grabbed vertex.
+        reach : float
+            Distance along the surface, in the mesh's unit, up to which the surface is free.  Beyond
+            it the surface is held more and more; from twice this distance on it hardly moves.
+            Infinite: all of it is free.
+        """
+        vertex = checked_vertex(self.mesh, vertex)
+        if reach != np.inf and not (is_number(reach) and reach > 0.0):
+            raise ConstraintError(f"reach must be a positive number; got {shown(reach)}")
+        quadratic = self._samples.quadratic(vertex, float(reach) / self._frame.size)
+        weight = _ANCHOR_WEIGHT * _POSITION_WEIGHT * self._binding.energy.scale
+        before = self._constraints.solver
+        load = before.unbalanced(self._p, self._constraints.places(self._targets))
+        anchors = Anchors(weight * quadratic, self._p, load)
+        positions = before.positions.with_anchors(anchors)
+        other = self._shared()
+        solver = GaussNewton(before.energy, positions, self._constraints.volumes)
+        other._constraints = replace(self._constraints, solver=solver)
+        other._begin(self._p, self._targets)
         return other
 
     def copy(self) -> Deformer:

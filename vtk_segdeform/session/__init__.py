@@ -6,6 +6,7 @@ The files, in reading order:
     state          immutable states
     history        undo and redo
     handles        named handles and their targets
+    pulling        pulls and pins
     painting       painting, merging and splitting regions
     pose_solver    poses of states, with cached solvers
     listeners      notification of changes

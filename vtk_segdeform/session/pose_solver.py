@@ -29,7 +29,7 @@ from ..progress import Progress, part, tell
 from ..solver import Solution, VolumeConstraint, total_volume
 from .handles import require_near, targets_at
 from .listeners import Change
-from .state import Pose, State
+from .state import Locality, Pose, State
 
 _MAX_BOUND = 3  # bound deformers in memory: undo of new cages or options needs no new binding
 _BIND_SHARE = 0.95  # share of binding in the progress of `prepare`; the rest adds constraints
@@ -56,7 +56,9 @@ class PoseSolver:
         self._mesh = mesh
         self._bound: tuple[tuple[State, Deformer], ...] = ()  # newest first
         self._constrained: tuple[Deformer, State, Deformer] | None = None
-        self._current: Pose | None = None  # pose of the constrained deformer; None if unknown
+        self._local: tuple[Deformer, Locality, Deformer] | None = None
+        self._current: Pose | None = None  # pose of the deformer in use; None if unknown
+        self._used: Deformer | None = None
         self._evaluated: tuple[Pose, bool | None, FloatArray, Callable[[], float]] | None = None
         self._volumes: dict[bool | None, tuple[Lids, VolumeConstraint]] = {}
 
@@ -127,7 +129,7 @@ class PoseSolver:
         ConstraintError
             If no finite pose is found.
         """
-        deformer = self._constrain(state)
+        deformer = self._localise(state, self._constrain(state))
         self._start_from(state, deformer)
         self._current = None  # in case the solve fails
         solution = deformer.solve(_stacked(targets), max_steps=max_steps)
@@ -196,11 +198,27 @@ class PoseSolver:
         self._current = None
         return deformer
 
+    def _localise(self, state: State, constrained: Deformer) -> Deformer:
+        """Return a deformer that keeps what the last pull of *state* does not reach, if any."""
+        locality = state.locality
+        if locality is None:
+            return constrained
+        if self._local is not None and self._local[:2] == (constrained, locality):
+            return self._local[2]
+        deformer = constrained.copy()
+        x = deformer.surface(locality.cage_vertices)
+        deformer.resume(locality.cage_vertices, x[deformer.handle])
+        deformer = deformer.local(locality.vertex, locality.reach)
+        self._local = constrained, locality, deformer
+        self._current = None
+        return deformer
+
     def _start_from(self, state: State, deformer: Deformer) -> None:
         """Set *deformer* to the pose of *state*, unless it is there already."""
         pose = state.pose
-        if pose is not None and self._current is pose:
+        if pose is not None and self._current is pose and self._used is deformer:
             return
+        self._used = deformer
         deformer.reset()
         # Every step of the solver meets the constraints, so its starting pose must do so too.
         if pose is not None and self._meets_constraints(state, pose, deformer):

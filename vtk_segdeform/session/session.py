@@ -33,14 +33,14 @@ from numpy.typing import ArrayLike
 from ..arrays import FloatArray, IntArray, as_points, frozen, is_whole, plain
 from ..cages import Cage, fit_cages
 from ..checks import require, shown
-from ..deformer import checked_constraints
+from ..deformer import checked_constraints, checked_locality, checked_radius, checked_vertex
 from ..errors import CageError, RegionError, SessionError
 from ..geometry import Lids, local_volume_change
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress
 from ..regions import Regions, segment
 from ..solver import Solution, Status
-from . import handles, naming, painting
+from . import handles, naming, painting, pulling
 from .history import Timeline
 from .listeners import Change
 from .pose_solver import PoseSolver
@@ -118,6 +118,8 @@ class Session(Timeline):
         self._effort = Effort(0, 0.0)
         # The result of `fitted_cages`, which `set_cages` need not check.
         self._fitted: tuple[Regions | None, Sequence[Cage] | None] = None, None
+        # The state before the ongoing pull, and what it has grabbed.
+        self._grasp: tuple[State, pulling.Grasp] | None = None
         # The last pose of `move_cage`, and the cage vertices before the volume correction.
         self._placed: tuple[Pose | None, list[FloatArray]] = None, []
 
@@ -220,8 +222,11 @@ class Session(Timeline):
 
         If necessary, the cages are bound first, as by `bind`.
         """
-        pose = self._state.pose
-        return self.mesh.vertices if pose is None else self._pose_solver.vertices(self._state, pose)
+        return self._vertices_of(self._state)
+
+    def _vertices_of(self, state: State) -> FloatArray:
+        pose = state.pose
+        return self.mesh.vertices if pose is None else self._pose_solver.vertices(state, pose)
 
     @property
     def volume_change(self) -> float:
@@ -481,10 +486,84 @@ class Session(Timeline):
             cages.  The pose does not change then.
         """
         wanted = handles.checked_targets(self.mesh, self.handles, targets)
-        pose, solution = self._solve({**self.targets, **wanted}, max_steps)
-        self._solution = pose, solution
-        self._move(replace(self._state, pose=pose), *wanted)
+        state = replace(self._state, locality=None)
+        return self._drag(state, {**self.targets, **wanted}, list(wanted), max_steps)
+
+    def pull(
+        self,
+        vertex: int,
+        to: ArrayLike,
+        *,
+        radius: float | None = None,
+        locality: float | None = None,
+        max_steps: int | None = None,
+    ) -> Solution:
+        """Pull one point of the surface, as part of a drag like `drag`; see `pulling`.
+
+        Parameters
+        ----------
+        vertex : int
+            The grabbed vertex.
+        to : (3,) or (4, 4) float
+            Where it is pulled to; or an affine map of the surface around it since the press, which
+            may turn it.
+        radius : float, optional
+            Of the pulled surface, in the mesh's unit; by default 15 % of the mesh's diagonal.
+        locality : float, optional
+            1 keeps the surface farther away than twice the radius where it is; with less, more of
+            it follows, and with 0 all is free.  By default 1, and 0 between fixed vertices, pins
+            and handles that were not made by pulls.
+        max_steps : int, optional
+            As in `drag`.
+
+        Raises
+        ------
+        ConstraintError, CageError
+            If there is no such vertex, it is fixed, *to* is too far away, or there are no cages.
+
+        Notes
+        -----
+        Calls with the same vertex, radius and locality belong to one pull until `commit`, which
+        leaves a handle at the grabbed vertex.
+        """
+        vertex = checked_vertex(self.mesh, vertex)
+        radius = checked_radius(self.mesh, radius)
+        locality = checked_locality(locality)
+        motion = pulling.checked_motion(self.mesh, to)
+        turns = motion.shape == (4, 4)
+        start, grasp = self._grasp or (None, None)
+        is_new = start is None or start is not self._drag_start
+        if is_new or grasp is None or grasp.grip[:3] != (vertex, radius, locality):
+            self.commit()
+            start, grasp = self._state, None
+        assert start is not None
+        before = grasp
+        if grasp is None or (turns and not grasp.grip.turns):
+            grip = pulling.Grip(vertex, radius, locality, turns)
+            grasp = pulling.grasp(self.mesh, start, self._vertices_of(start), grip)
+        targets = grasp.targets(motion)
+        for name, points in targets.items():
+            handles.require_near(self.mesh, points, f"targets of {name}")
+        state = grasp.state
+        assert state.pose is not None
+        wanted = {**state.pose.targets, **targets}
+        if grasp is before:
+            state = replace(state, pose=self._state.pose)
+        solution = self._drag(state, wanted, [grasp.name], max_steps)
+        self._grasp = start, grasp
         return solution
+
+    def pin(self, vertex: int) -> str:
+        """Pin a vertex where it is now, and return the name of the pin, a handle.
+
+        Raises
+        ------
+        ConstraintError
+            If there is no such vertex, or it is fixed or in a handle already.
+        """
+        name, after = pulling.pinned(self.mesh, self._state, vertex)
+        self._set_handles(after, f"add {name}")
+        return name
 
     def move_handle(
         self, name: str, motion: ArrayLike, *, max_steps: int | None = None
@@ -544,7 +623,7 @@ class Session(Timeline):
 
         Adds no undo step: the result becomes part of the ongoing drag, or else of the last step.
         """
-        pose, solution = self._solve(self.targets, max_steps)
+        pose, solution = self._solve(self._state, self.targets, max_steps)
         if solution.steps == 0:  # converged already: keep the same pose object
             here = self._state.pose
             self._solution = None if here is None else (here, solution)
@@ -562,7 +641,7 @@ class Session(Timeline):
 
     def reset_pose(self) -> None:
         """Reset the pose to rest; an ongoing drag is committed first."""
-        self._step("reset pose", replace(self._state, pose=None))
+        self._step("reset pose", replace(self._state, pose=None, locality=None))
 
     def change_options(self, **changes: float | bool | None) -> None:
         """Change some of the `Options` by name; call `refine` to apply them to the pose."""
@@ -573,13 +652,24 @@ class Session(Timeline):
         options = replace(self.options, **changes)  # type: ignore[arg-type]  # `Options` checks them
         self._step("change options", replace(self._state, options=options))
 
+    def _drag(
+        self,
+        state: State,
+        targets: Mapping[str, FloatArray],
+        moved: list[str],
+        max_steps: int | None,
+    ) -> Solution:
+        """Solve from *state* for *targets*, as part of a drag of the handles *moved*."""
+        pose, solution = self._solve(state, targets, max_steps)
+        self._solution = pose, solution
+        self._move(replace(state, pose=pose), *moved)
+        return solution
+
     def _solve(
-        self, targets: Mapping[str, FloatArray], max_steps: int | None
+        self, state: State, targets: Mapping[str, FloatArray], max_steps: int | None
     ) -> tuple[Pose, Solution]:
         began = time.perf_counter()
-        pose, solution = self._pose_solver.solve(
-            self._state, MappingProxyType({**targets}), max_steps
-        )
+        pose, solution = self._pose_solver.solve(state, MappingProxyType({**targets}), max_steps)
         steps, seconds = self._effort
         self._effort = Effort(steps + solution.steps, seconds + time.perf_counter() - began)
         return pose, solution
@@ -598,11 +688,11 @@ class Session(Timeline):
             if same and old.smoothness == regions.smoothness:
                 return
             cages = self.cages if _still_fit(old, regions, self.cages) else ()
-        after = replace(self._state, regions=regions, cages=cages, pose=None, region_names=names)
-        self._step(label, after)
+        after = replace(self._state, regions=regions, cages=cages, region_names=names)
+        self._step(label, replace(after, pose=None, locality=None))
 
     def _set_cages(self, cages: tuple[Cage, ...], label: str) -> None:
-        self._step(label, replace(self._state, cages=cages, pose=None))
+        self._step(label, replace(self._state, cages=cages, pose=None, locality=None))
 
     def _set_handles(self, after: Mapping[str, IntArray], label: str) -> None:
         pose = self._state.pose

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray, as_points, frozen, is_number
+from ..arrays import FloatArray, IntArray, as_points, frozen, is_number, is_whole
 from ..cages import Cage
 from ..checks import all_of, require, require_sequence, shown
 from ..deformer import checked_constraints
@@ -92,6 +92,18 @@ class Pose(Frozen):
 
 
 @dataclass(frozen=True, eq=False)
+class Locality(Frozen):
+    """The part of the surface that the last pull deforms; see `Deformer.local`."""
+
+    vertex: int
+    """The grabbed vertex."""
+    reach: float
+    """In the mesh's unit; infinite if all of the surface is free."""
+    cage_vertices: tuple[FloatArray, ...]
+    """One (m_r, 3) float per region: the pose at the press, in which the rest stays."""
+
+
+@dataclass(frozen=True, eq=False)
 class State(Frozen):
     """Everything in a session except its mesh; immutable."""
 
@@ -107,6 +119,10 @@ class State(Frozen):
     options: Options = field(default_factory=Options)
     region_names: Names = ()
     """Names of the regions, as in `naming`."""
+    pulls: tuple[str, ...] = ()
+    """Names of handles made by pulls; those of no handle do not count."""
+    locality: Locality | None = None
+    """Of the last pull, if the pose comes from a pull."""
 
     @property
     def handle(self) -> IntArray:
@@ -164,8 +180,12 @@ def checked_state(mesh: Mesh, state: State) -> State:
     if state.pose is not None:
         pose = _checked_pose(cages, lengths, list(handles), require(state.pose, Pose, "state.pose"))
         _require_plausible(mesh, pose)
+    pulls, locality = tuple(state.pulls), state.locality
+    if locality is not None:
+        locality = _checked_locality(mesh, cages, require(locality, Locality, "state.locality"))
     owned = MappingProxyType({name: _frozen_copy(ids) for name, ids in handles.items()})
-    return State(regions, cages, _frozen_copy(fixed), owned, pose, state.options, names)
+    constraints = _frozen_copy(fixed), owned
+    return State(regions, cages, *constraints, pose, state.options, names, pulls, locality)
 
 
 def of_mesh(mesh: Mesh, regions: Regions) -> Regions:
@@ -227,6 +247,16 @@ def _checked_pose(
         raise ConstraintError("the pose must have one target for each vertex of each handle")
     owned = MappingProxyType({name: _frozen_copy(points) for name, points in targets.items()})
     return Pose(tuple(_frozen_copy(points) for points in places), owned)
+
+
+def _checked_locality(mesh: Mesh, cages: Sequence[Cage], locality: Locality) -> Locality:
+    start = _checked_pose(cages, [], [], Pose(locality.cage_vertices, {}))
+    _require_plausible(mesh, start)
+    if not is_whole(locality.vertex, 0, mesh.n_vertices - 1):
+        raise ConstraintError(f"there is no vertex {shown(locality.vertex)} to have been pulled")
+    if locality.reach != np.inf and not is_number(locality.reach, _TINY):
+        raise ConstraintError(f"the reach of a pull must be positive; got {shown(locality.reach)}")
+    return replace(locality, cage_vertices=start.cage_vertices)
 
 
 def _require_plausible(mesh: Mesh, pose: Pose) -> None:

@@ -8,6 +8,7 @@ The file is an `archive`, which ``numpy.load`` reads as an .npz file:
     cage_vertices.npy     (c, 3) float     cage_faces.npy   (k, 3) int             if any
     fixed.npy             (f,) int         handle.npy       (h,) int
     pose.npy              (c, 3) float     targets.npy      (h, 3) float           if not at rest
+    locality.npy          (c, 3) float     the cages where a pull began            if any
     surface_...npy        the given surface, as in `surface_store`                 if any
 
 The arrays of cages and of handles are concatenated; the header has their counts.  A loaded session
@@ -22,6 +23,7 @@ handles and pose are checked like arguments of a caller.
 
 from __future__ import annotations
 
+import math
 import os
 import struct
 import zipfile
@@ -39,7 +41,7 @@ from ..mesh import Mesh
 from ..regions import Regions
 from .archive import Archive, write_archive
 from .session import Session
-from .state import Options, Pose, State, split_rows
+from .state import Locality, Options, Pose, State, split_rows
 
 if TYPE_CHECKING:
     from ..io import Surface
@@ -139,6 +141,12 @@ def _write(file: Any, session: Session, given: Surface | None) -> None:
     if pose is not None:
         arrays["pose"] = np.concatenate(pose.cage_vertices)
         arrays["targets"] = np.concatenate([np.empty((0, 3)), *pose.targets.values()])
+    if state.pulls:  # optional, like what follows
+        header["pulls"] = list(state.pulls)
+    if state.locality is not None:
+        reach = state.locality.reach
+        header["locality"] = [state.locality.vertex, reach if math.isfinite(reach) else None]
+        arrays["locality"] = np.concatenate(state.locality.cage_vertices)
     if given is not None:
         from .surface_store import surface_parts  # imports pyvista
 
@@ -182,8 +190,15 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
     fixed = archive.array("fixed", "i", (_count(header, "n_fixed"),))
     options = Options(**header["options"])
     names = tuple(_list(header, "region_names")) if "region_names" in header else ()
+    pulls = tuple(map(str, _list(header, "pulls"))) if "pulls" in header else ()
+    locality = None
+    if "locality" in header:
+        vertex, reach = _list(header, "locality")
+        kept = split_rows(archive.array("locality", "f", (total, 3)), n_vertices)
+        reach = math.inf if reach is None else reach
+        locality = Locality(_whole(vertex, "locality"), reach, tuple(kept))
     handles = dict(zip(sizes, ids, strict=True))
-    state = State(regions, cages, fixed, handles, pose, options, names)
+    state = State(regions, cages, fixed, handles, pose, options, names, pulls, locality)
     if "surface" not in header:
         return mesh, state
     from .surface_store import read_surface  # imports pyvista

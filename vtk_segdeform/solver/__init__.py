@@ -16,7 +16,7 @@ The files, in reading order:
 from .coarse_volume import CoarseVolume
 from .exact_volume import ScaledSurface, moved_along, steps_to_volume
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
-from .position_constraints import connected_sets, errors_at, position_term
+from .position_constraints import Anchors, connected_sets, errors_at, position_term
 from .solution import Solution, Status
 from .volume_constraints import (
     VolumeConstraint,
@@ -29,6 +29,7 @@ from .waypoints import waypoints
 from .weights import WeightContinuation
 
 __all__ = [
+    "Anchors",
     "CoarseVolume",
     "GaussNewton",
     "ScaledSurface",

@@ -275,6 +275,17 @@ class GaussNewton:
             merits=tuple(merits),
         )
 
+    def unbalanced(self, p: FloatArray, targets: FloatArray) -> FloatArray:
+        """Return half the gradient of the objective at *p*, (m, 3), without that of the volumes.
+
+        It is zero at a minimum: the rest, which is orthogonal to it, changes the volumes only.
+        """
+        here = self._iterate_at(p, self.positions.toward(targets))
+        rows = np.reshape(here.rows, (len(here.rows), -1))
+        slope = here.slope.ravel()
+        share = np.linalg.lstsq(rows.T, slope, rcond=None)[0] if len(rows) else np.zeros(0)
+        return np.reshape(slope - share @ rows, p.shape)
+
     def _step(
         self, here: _Iterate, factor: Factor
     ) -> tuple[FloatArray, FloatArray, list[FloatArray]]:

@@ -7,6 +7,9 @@ All sets have the same total weight, divided evenly among their vertices, so tha
 vertex is as strong as a patch of a thousand; in larger sets neighbours share a place, their mean.
 A coarse cage cannot put every vertex of a set in its place; `weights` raises the weight of sets
 that miss their places by too much.
+
+Anchors keep samples of the surface where they are, softly and without a place to meet: the locality
+of a pull.
 """
 
 from __future__ import annotations
@@ -33,19 +36,48 @@ _SetRows: TypeAlias = tuple[slice, FloatArray | None, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
+class Anchors:
+    """Samples of the surface softly kept where they are at *p*: sum_s w_s |x_s - x_s(p)|^2.
+
+    The samples are rows of W~, so that the sum is <q - p, Q (q - p)> for cages at q, whatever the
+    number of samples: Q = sum_s w_s W~_s^T W~_s.
+
+    A constant load, which adds -2 <load, q - p>, makes *p* a pose at rest under other constraints.
+    """
+
+    quadratic: FloatArray  # Q, (m, m)
+    p: FloatArray  # (m, 3)
+    load: FloatArray  # (m, 3)
+
+    def value_and_slope(self, q: FloatArray) -> tuple[float, FloatArray]:
+        """Return the sum for cages at *q* (m, 3) and half its gradient (m, 3)."""
+        away = q - self.p
+        kept = self.quadratic @ away
+        return float(np.vdot(away, kept - 2.0 * self.load)), kept - self.load
+
+
+@dataclass(frozen=True, eq=False)
 class TargetTerm:
-    """The term for given targets, as r rows: sum_i omega_i |rows_i p - aims_i|^2 + constant."""
+    """The term for given targets, as r rows: sum_i omega_i |rows_i p - aims_i|^2 + constant.
+
+    And that of the anchors, if there are any.
+    """
 
     rows: FloatArray  # (r, m)
     aims: FloatArray  # (r, 3)
     weights: FloatArray  # (r,)
     constant: float
+    anchors: Anchors | None = None
 
     def value_and_slope(self, p: FloatArray) -> tuple[float, FloatArray]:
         """Return the term at *p* (m, 3) and half its gradient (m, 3)."""
         away = self.rows @ p - self.aims
         weighted = away * self.weights[:, None]
-        return self.constant + float(np.vdot(away, weighted)), self.rows.T @ weighted
+        value, slope = self.constant + float(np.vdot(away, weighted)), self.rows.T @ weighted
+        if self.anchors is None:
+            return value, slope
+        more, steeper = self.anchors.value_and_slope(p)
+        return value + more, slope + steeper
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +109,7 @@ class PositionTerm:
     mean: sparse.csr_array | None = None  # (k + c, v), from the vertices of the sets to the targets
     checks: CheckedVertices | None = None
     factored: list[_SetRows] | None = None  # `_sets`, if it has been computed
+    anchors: Anchors | None = None
 
     @property
     def weights(self) -> FloatArray:
@@ -104,8 +137,9 @@ class PositionTerm:
         return sets
 
     def quadratic(self) -> FloatArray:
-        """Return rows^T omega rows, (m, m)."""
-        return (self.rows.T * self.weights) @ self.rows
+        """Return rows^T omega rows, (m, m), and Q of the anchors."""
+        of_sets = (self.rows.T * self.weights) @ self.rows
+        return of_sets if self.anchors is None else of_sets + self.anchors.quadratic
 
     def toward(self, u: FloatArray) -> TargetTerm:
         """Return the term for targets *u* (k, 3)."""
@@ -118,7 +152,7 @@ class PositionTerm:
                 constant += float(omega[places.start] * np.vdot(left, left))
             aims.append(aim)
         rows, weights = self._short
-        return TargetTerm(rows, np.concatenate(aims), weights, constant)
+        return TargetTerm(rows, np.concatenate(aims), weights, constant, self.anchors)
 
     @cached_property
     def _short(self) -> tuple[FloatArray, FloatArray]:
@@ -152,6 +186,10 @@ class PositionTerm:
     def with_strength(self, strength: FloatArray) -> PositionTerm:
         """Return the term with other weights."""
         return replace(self, strength=strength, factored=self._sets)
+
+    def with_anchors(self, anchors: Anchors | None) -> PositionTerm:
+        """Return the term with other *anchors*."""
+        return replace(self, anchors=anchors)
 
 
 def position_term(

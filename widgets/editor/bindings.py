@@ -16,7 +16,7 @@ from .actions import Action
 from .help_card import Section
 from .mode import Mode
 
-R, C, H, D = Mode
+P, R, C, H, D = Mode
 ALL = frozenset(Mode)
 PAINTING = frozenset({R, H})
 
@@ -38,6 +38,7 @@ BINDINGS = (
     *(
         Binding((str(mode.value),), ALL, label, actions.to_mode(mode))
         for mode, label in (
+            (P, "Pull the surface"),
             (R, "Regions: paint"),
             (C, "Cages: drag vertices"),
             (H, "Handles: paint"),
@@ -48,7 +49,7 @@ BINDINGS = (
     Binding(("f",), ALL, "Fit cages", actions.fit_cages),
     Binding(("z", "ctrl+z"), ALL, "Undo", actions.undo),
     Binding(("y", "ctrl+y", "ctrl+shift+z"), ALL, "Redo", actions.redo),
-    Binding(("0", "home"), ALL, "Reset pose", actions.reset),
+    Binding(("home",), ALL, "Reset pose", actions.reset),
     Binding(("c",), ALL, "Show cages in all modes", actions.toggle_cages),
     Binding(("p",), ALL, "Preserve volume", actions.toggle_volume),
     Binding(("i",), ALL, "Show holes and changed places", actions.toggle_notices, while_busy=True),

@@ -36,6 +36,8 @@ def missing(session: Session, mode: Mode) -> str:
 
 def hint(widgets: WidgetSet, mode: Mode) -> str:
     """Return the hint for *mode*: the current action, and the next step."""
+    if mode is Mode.PULL:
+        return "Drag the surface"
     lacking = missing(widgets.session, mode)
     if lacking:
         return lacking

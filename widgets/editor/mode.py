@@ -1,4 +1,4 @@
-"""The four modes of the editor."""
+"""The modes of the editor."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import enum
 class Mode(enum.Enum):
     """The current action of the mouse on the mesh."""
 
+    PULL = 0
+    """Pull the surface at any point."""
     REGIONS = 1
     """Paint regions."""
     CAGES = 2

@@ -15,6 +15,7 @@ from vtk_segdeform.session import Session
 
 from ..cage_display import CageDisplay
 from ..handle_dragger import HandleDragger
+from ..puller import Puller
 from ..region_selector import Paint, RegionColours, RegionSelector
 from ..scene import SurfaceDisplay, View, Widget
 from ..volume_overlay import VolumeOverlay
@@ -39,6 +40,7 @@ class WidgetSet:
         self.selector = RegionSelector(view, session, self.surface, self.colours)
         self.cages = CageDisplay(view, session)
         self.dragger = HandleDragger(view, session, self.surface)
+        self.puller = Puller(view, session, self.surface)
         self.overlay = VolumeOverlay(view, session, self.surface)
         self.cages_wanted = self.overlay_wanted = False
         self.cages.hide()
@@ -47,7 +49,7 @@ class WidgetSet:
     @property
     def interactive(self) -> tuple[Widget, ...]:
         """The widgets that respond to events; one of them is on in each mode."""
-        return self.selector, self.cages, self.dragger
+        return self.selector, self.cages, self.dragger, self.puller
 
     @property
     def n_regions(self) -> int:
@@ -72,6 +74,7 @@ class WidgetSet:
         self.cages.SetEnabled(mode is Mode.CAGES)
         self.selector.SetEnabled(mode in (Mode.REGIONS, Mode.HANDLES))
         self.dragger.SetEnabled(mode is Mode.DEFORM)
+        self.puller.SetEnabled(mode is Mode.PULL)
 
     def show(self, mode: Mode) -> None:
         """Show cages and volume changes if they are wanted in *mode*."""
@@ -134,6 +137,6 @@ class WidgetSet:
 
     def remove(self) -> None:
         """Remove everything from the view, permanently."""
-        for each in (self.overlay, self.dragger, self.cages, self.selector, self.colours):
+        for each in (self.overlay, self.puller, self.dragger, self.cages, self.selector, self.colours):
             each.remove()
         self.surface.remove()

@@ -12,8 +12,17 @@ The files, in reading order:
     gizmo_label       its labels
 """
 
+from .gizmo_shapes import FREE, Part
 from .handle_dragger import HandleDragger
+from .handle_motion import Grip, Motion, next_constraint
+from .live_solve import LiveSolve
 
 __all__ = [
+    "FREE",
+    "Grip",
     "HandleDragger",
+    "LiveSolve",
+    "Motion",
+    "Part",
+    "next_constraint",
 ]

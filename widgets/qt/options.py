@@ -105,7 +105,7 @@ class DeformPart(QtWidgets.QGroupBox):
         self.clusters.setSingleStep(50)
         self.clusters.setSpecialValueText("One per vertex")
         self.clusters.valueChanged.connect(lambda n: editor.do(setting(rotation_groups=n or None)))
-        self.reset = key_button(editor, "0", Mode.DEFORM, "Reset pose")
+        self.reset = key_button(editor, "home", Mode.DEFORM, "Reset pose")
         column(
             self,
             form(("Volume change", self.volume)),

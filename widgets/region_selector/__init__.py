@@ -10,10 +10,12 @@ The files, in reading order:
     outline            the outline of a lasso or a rectangle
 """
 
+from .brush_ring import BrushRing
 from .region_colours import RegionColours
 from .region_selector import Paint, RegionSelector, Tool
 
 __all__ = [
+    "BrushRing",
     "Paint",
     "RegionColours",
     "RegionSelector",

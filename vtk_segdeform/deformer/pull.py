@@ -1,0 +1,101 @@
+"""One point pulled, in one call: segment, fit cages, bind, solve."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import plain
+from ..cages import fit_cages, suggested_size
+from ..mesh import Mesh, require_mesh
+from ..progress import Progress, part
+from ..regions import segment
+from ..solver import Solution
+from .arguments import (
+    as_lids,
+    checked_constraints,
+    checked_locality,
+    checked_radius,
+    checked_targets,
+    checked_vertex,
+)
+from .deformer import Deformer
+
+
+def pull(
+    mesh: Mesh,
+    vertex: int,
+    to: ArrayLike,
+    radius: float | None = None,
+    pins: ArrayLike = (),
+    *,
+    locality: float | None = None,
+    n_regions: int | None = None,
+    n_cage_vertices: int | None = None,
+    lids: bool | None = None,
+    progress: Progress | None = None,
+) -> Solution:
+    """Return *mesh* with one vertex pulled to a point, its detail and its volume preserved.
+
+    For one pull only.  `Session.pull` adds one to another.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        n vertices.
+    vertex : int
+        The grabbed vertex.
+    to : (3,) float
+        Where it is pulled to.
+    radius : float, optional
+        Of the pulled surface, in the mesh's unit; by default 15 % of the mesh's diagonal.
+    pins : (k,) int or (n,) bool
+        Vertices that stay in place.  With pins the surface between them is free.
+    locality : float, optional
+        1 keeps the surface farther away than twice the radius where it is; with less, more of it
+        follows, and with 0 all is free.  By default 1 without pins and 0 with pins.
+    n_regions : int or None
+        How many regions; None lets `segment` choose.
+    n_cage_vertices : int, optional
+        Total number of cage vertices; by default it follows the number of regions.
+    lids : bool or None
+        Whether an open surface encloses a volume under lids over its borders; see `Deformer`.
+    progress : Progress, optional
+        Called while cages are fitted and bound, and before every step; may cancel.
+
+    Returns
+    -------
+    Solution
+
+    Raises
+    ------
+    ConstraintError
+        If *vertex*, *to*, *radius*, *pins* or *locality* are invalid.
+
+    Examples
+    --------
+    >>> import vtk_segdeform as sd
+    >>> ball = sd.models.sphere(600)
+    >>> top = int(ball.vertices[:, 2].argmax())
+    >>> solution = sd.pull(ball, top, ball.vertices[top] + [0.0, 0.0, 0.5])
+    >>> abs(solution.volume_change) < 1e-12
+    True
+    """
+    require_mesh(mesh)
+    as_lids(lids)
+    vertex = checked_vertex(mesh, vertex)
+    fixed, handle = checked_constraints(mesh, pins, [vertex])
+    targets = checked_targets(np.atleast_2d(plain(to, "to")), 1)
+    radius, locality = checked_radius(mesh, radius), checked_locality(locality)
+    if locality is None:
+        locality = 0.0 if len(fixed) else 1.0
+    regions = segment(mesh, n_regions, progress=part(progress, 0.0, 0.2))
+    size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
+    cages = fit_cages(mesh, regions, size, progress=part(progress, 0.2, 0.7))
+    binding = part(progress, 0.7, 0.9)
+    deformer = Deformer(
+        mesh, regions, cages, fixed=fixed, handle=handle, lids=lids, progress=binding
+    )
+    if locality > 0.0:
+        deformer = deformer.local(vertex, radius / locality)
+    return deformer.solve(targets, progress=part(progress, 0.9, 1.0))

@@ -1,0 +1,161 @@
+"""Pulling: one point of the surface is grabbed, and the surface around it follows.
+
+A pull makes the grabbed vertex a handle, "pull 1", which stays where it was left; so the next pull
+adds to it.  Near it no second one is made: grabbing the surface there moves the same handle.  Other
+pulled points within the radius are carried along, the farther away the less.  At the press nothing
+moves: all handles stay where they are, whether or not the solver had put them into their places.
+
+A pin is a handle of one vertex that stays in its place, "pin 1".  Both are handles like any other:
+they can be moved, named, and removed.
+
+The surface beyond the reach is kept where it was at the press, softly; see `Deformer.local`.  The
+reach is the radius divided by the *locality*.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import FloatArray, IntArray, as_points, frozen, plain
+from ..deformer import checked_vertex
+from ..errors import ConstraintError
+from ..mesh import Mesh
+from .handles import Targets, moved, require_near, targets_at, with_handle
+from .state import Locality, Pose, State
+
+_SAME_POINT = 0.25  # of the radius: a pulled point so close is grabbed again
+_PATCH = 0.5  # of the radius: what turns rigidly in a pull with a rotation
+
+
+class Grip(NamedTuple):
+    """Where and how the surface is grabbed."""
+
+    vertex: int
+    radius: float
+    """Of the pulled surface, in the mesh's unit."""
+    locality: float | None
+    """0 to 1; None is 0 if there are fixed vertices, pins or other handles, and else 1."""
+    turns: bool
+    """Whether a patch around the vertex turns with the motion, which a single vertex cannot."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grasp:
+    """The grabbed point at the press, and what follows it.
+
+    Parameters
+    ----------
+    grip : Grip
+        With which the pull began.
+    state : State
+        The state at the press, with the handle of the pull.
+    name : str
+        The handle of the pull.
+    point : (3,) float
+        The grabbed vertex at the press.
+    carried : mapping of str to float
+        For other pulled points, the share of the motion that they follow.
+    """
+
+    grip: Grip
+    state: State
+    name: str
+    point: FloatArray
+    carried: Mapping[str, float]
+
+    def targets(self, to: FloatArray) -> Targets:
+        """Return the targets of the moved handles for *to*, a point (3,) or a matrix (4, 4)."""
+        assert self.state.pose is not None
+        start = self.state.pose.targets
+        if to.shape == (3,):
+            shift, own = to - self.point, start[self.name] + (to - self.point)
+        else:
+            own = moved(start[self.name], to)
+            shift = moved(self.point[None], to)[0] - self.point
+        more = {name: start[name] + share * shift for name, share in self.carried.items()}
+        return MappingProxyType({self.name: own, **more})
+
+
+def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
+    """Grab the pose *vertices* (n, 3) of *state*; ConstraintError if the vertex is fixed."""
+    vertex, radius, locality, turns = grip
+    if np.isin(vertex, state.fixed):
+        raise ConstraintError("this point is fixed; grab another one, or erase the fixed vertices")
+    x = mesh.vertices
+    pulls = tuple(name for name in state.pulls if name in state.handles)
+    names = list(state.handles)
+    away = {
+        name: float(np.linalg.norm(x[ids] - x[vertex], axis=1).min())
+        for name, ids in state.handles.items()
+    }
+    name = next((each for each in names if away[each] == 0.0), None)
+    if name is None:
+        near = [each for each in pulls if away[each] < _SAME_POINT * radius]
+        name = min(near, key=away.__getitem__, default=None)
+    if locality is None:
+        locality = 0.0 if len(state.fixed) or set(names) - set(pulls) else 1.0
+    handles = state.handles
+    if name is None:
+        name = _new_name(state, "pull")
+        handles = with_handle(mesh, state, name, [vertex])
+        pulls = (*pulls, name)
+    if turns and len(handles[name]) == 1:
+        patch = _patch(mesh, vertex, _PATCH * radius)
+        taken = [state.fixed, *(ids for other, ids in handles.items() if other != name)]
+        patch = np.setdiff1d(patch, np.concatenate(taken))
+        handles = with_handle(mesh, state, name, patch)
+    places = tuple(cage.vertices for cage in state.cages)
+    places = places if state.pose is None else state.pose.cage_vertices
+    pose = Pose(places, targets_at(handles, vertices))
+    reach = radius / locality if locality else np.inf
+    local = Locality(vertex, reach, pose.cage_vertices)
+    after = replace(state, handles=handles, pulls=pulls, pose=pose, locality=local)
+    others = [each for each in pulls if each != name and away.get(each, np.inf) < radius]
+    carried = {each: (1.0 - (away[each] / radius) ** 2) ** 2 for each in others}
+    return Grasp(grip, after, name, vertices[vertex], MappingProxyType(carried))
+
+
+def pinned(mesh: Mesh, state: State, vertex: int) -> tuple[str, Mapping[str, IntArray]]:
+    """Return the name of a new pin at *vertex*, and the handles of *state* with it."""
+    name = _new_name(state, "pin")
+    return name, with_handle(mesh, state, name, [checked_vertex(mesh, vertex)])
+
+
+def checked_motion(mesh: Mesh, to: ArrayLike) -> FloatArray:
+    """Return *to* as a point (3,) or a matrix (4, 4); ConstraintError if it is neither."""
+    array = plain(to, "to")
+    if array.shape == (4, 4):
+        return np.asarray(array, dtype=np.float64)
+    try:
+        point = as_points(np.atleast_2d(array), "to")
+    except ValueError as fault:
+        raise ConstraintError(str(fault)) from None
+    if array.shape != (3,):
+        raise ConstraintError(f"to must be a point (3,) or a matrix (4, 4); got {array.shape}")
+    require_near(mesh, point, "to")
+    return np.asarray(point[0])
+
+
+def _new_name(state: State, kind: str) -> str:
+    numbers = range(1, len(state.handles) + 2)
+    return next(name for n in numbers if (name := f"{kind} {n}") not in state.handles)
+
+
+def _patch(mesh: Mesh, vertex: int, radius: float) -> IntArray:
+    """Return the vertices within *radius* of *vertex* that edges within it reach, (k,)."""
+    away = np.linalg.norm(mesh.vertices - mesh.vertices[vertex], axis=1)
+    inside = away <= radius
+    found, front = np.array([vertex]), np.array([vertex])
+    while len(front):
+        near = np.unique(mesh.adjacency[front].indices)
+        front = np.setdiff1d(near[inside[near]], found, assume_unique=True)
+        found = np.concatenate([found, front])
+    own = np.sort(found)
+    frozen(own)
+    return own
