@@ -25,7 +25,8 @@ ROOMS = [
     "mesh", "mesh_repair", "geometry", "regions", "cages", "subspace", "energy", "solver",
     "deformer", "io", "session", "models", "pictures", "filters",
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
-    "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.recording", "widgets.editor",
+    "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.recording",
+    "widgets.editor",
     "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "benchmarks", "cli", "__main__",
 ]  # fmt: skip
 MOST_FLOORS = 24

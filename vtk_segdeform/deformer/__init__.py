@@ -14,11 +14,14 @@ The files, in reading order:
 
 from .arguments import (
     FARTHEST_APART,
+    LOCALITY,
+    SPREAD,
     checked_constraints,
     checked_locality,
     checked_radius,
     checked_targets,
     checked_vertex,
+    reach_and_follows,
 )
 from .deform import deform
 from .deformer import Deformer
@@ -26,6 +29,8 @@ from .pull import pull
 
 __all__ = [
     "FARTHEST_APART",
+    "LOCALITY",
+    "SPREAD",
     "Deformer",
     "checked_constraints",
     "checked_locality",
@@ -34,4 +39,5 @@ __all__ = [
     "checked_vertex",
     "deform",
     "pull",
+    "reach_and_follows",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,6 +16,8 @@ from ..mesh import Mesh
 
 _FARTHEST = 1e3  # sizes of the mesh
 _PULL_RADIUS = 0.15  # diagonals of the mesh
+LOCALITY, SPREAD = 0.5, 0.5
+"""The locality of a pull without pins; the part of its radius within which the surface is pulled."""
 FARTHEST_APART = 20.0
 """Diagonals of the mesh between two targets or fixed vertices, at most.
 
@@ -96,9 +99,14 @@ def checked_radius(mesh: Mesh, radius: float | None) -> float:
 
 def checked_locality(locality: float | None) -> float | None:
     """Return the *locality* of a pull; ConstraintError unless it is None or from 0 to 1."""
-    if locality is not None and not (is_number(locality) and 0.0 <= locality <= 1.0):
+    if locality is not None and not (is_number(locality, 0.0) and locality <= 1.0):
         raise ConstraintError(f"locality must be a number from 0 to 1; got {shown(locality)}")
     return None if locality is None else float(locality)
+
+
+def reach_and_follows(radius: float, locality: float) -> tuple[float, float]:
+    """Return the arguments of `Deformer.local` for a pull, by its *locality* from 0 to 1."""
+    return (radius / math.sqrt(locality) if locality else math.inf), 1.0 - locality
 
 
 def checked_targets(targets: ArrayLike, n_handle: int) -> FloatArray:

@@ -26,10 +26,11 @@ Long because every option of the method is explained in the docstring of `Deform
 
 from __future__ import annotations
 
+import copy
 import itertools
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from types import EllipsisType
 from typing import Any
@@ -90,12 +91,36 @@ _POSITION_WEIGHT = 90.0  # of a handle or fixed patch, times the scale of the sh
 _ANCHOR_WEIGHT = 100.0  # of the whole surface in a local deformer, in weights of a handle
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most
+_CORRECTIONS, _GAIN = 8, 0.7  # of pulled points: at most, and the factor by which errors must fall
 _SCALED = 3e-5  # relative scale from which another solve follows
 _ROUNDING = 1e-7  # relative scale that counts as rounding
 _MET = 1e-3  # position error, in diagonals, below which a target is met
 _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
+
+
+@dataclass(eq=False)
+class _PulledPoints:
+    """Handles of one vertex that pull the surface around it; see `locality`."""
+
+    places: IntArray = field(default_factory=lambda: _NONE)  # (q,), among the places of all sets
+    targets: IntArray = field(default_factory=lambda: _NONE)  # (q,), their targets
+    vertices: IntArray = field(default_factory=lambda: _NONE)  # (q,)
+    offsets: FloatArray = field(default_factory=lambda: _NO_POINTS)  # (q, 3), from target to x~
+    error: float = np.inf  # the largest, before the last correction
+
+    def moved(self, places: FloatArray) -> FloatArray:
+        """Return the *places* (s, 3) with those of x~."""
+        if not len(self.places):
+            return places
+        places = places.copy()
+        places[self.places] += self.offsets
+        return places
+
+    def correct(self, off: FloatArray, error: float) -> None:
+        """Move x~ by how far the vertices are *off* their targets, (q, 3), at most by *error*."""
+        self.offsets, self.error = self.offsets + off, error
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +138,7 @@ class _Constraints:
     volumes: Volumes  # the same on the surface of the steps
     is_scaled: bool  # whether exact volume is restored by scaling
     solver: GaussNewton  # with the initial weights
+    pulled: _PulledPoints
 
     def places(self, targets: FloatArray) -> FloatArray:
         """Return the places (s, 3) of all sets, for *targets* (k, 3) of the handles."""
@@ -274,7 +300,7 @@ class Deformer:
         return other
 
     @one_blas_thread()
-    def local(self, vertex: int, reach: float) -> Deformer:
+    def local(self, vertex: int, reach: float, spread: float, *, follows: float = 0.0) -> Deformer:
         """Return a deformer in the same pose that deforms the surface near *vertex* only.
 
         Solves keep the rest of the surface where it is now, softly; see `locality`.  Nothing moves
@@ -289,26 +315,58 @@ class Deformer:
             Distance along the surface, in the mesh's unit, up to which the surface is free.  Beyond
             it the surface is held more and more; from twice this distance on it hardly moves.
             Infinite: all of it is free.
+        spread : float
+            Distance along the surface, from a handle of one vertex, within which it pulls, so that
+            it makes no spike.
+        follows : float
+            0 to 1: parts of the surface beyond the reach, such as the hand if the elbow is grabbed,
+            follow if their area is less than this share of the largest such part.
         """
         vertex = checked_vertex(self.mesh, vertex)
         if reach != np.inf and not (is_number(reach) and reach > 0.0):
             raise ConstraintError(f"reach must be a positive number; got {shown(reach)}")
-        quadratic = self._samples.quadratic(vertex, float(reach) / self._frame.size)
+        if not (is_number(spread) and spread > 0.0):
+            raise ConstraintError(f"spread must be a positive number; got {shown(spread)}")
+        if not (is_number(follows, 0.0) and follows <= 1.0):
+            raise ConstraintError(f"follows must be a number from 0 to 1; got {shown(follows)}")
+        quadratic = self._samples.quadratic(vertex, float(reach) / self._frame.size, follows)
         weight = _ANCHOR_WEIGHT * _POSITION_WEIGHT * self._binding.energy.scale
-        before = self._constraints.solver
-        load = before.unbalanced(self._p, self._constraints.places(self._targets))
-        anchors = Anchors(weight * quadratic, self._p, load)
-        positions = before.positions.with_anchors(anchors)
-        other = self._shared()
+        before, p = self._constraints.solver, self._p
+        rows, soft, of_target = before.positions.rows.copy(), [], []
+        for number, ids in enumerate(self._constraints.handles):
+            row = self._soft_row(ids, spread / self._frame.size)
+            if row is not None:
+                place = int(np.searchsorted(before.positions.set_of, number))
+                rows[place] = row
+                soft.append(place)
+                of_target.append(int(ids[0]))
+        none = np.zeros_like(p)
+        positions = before.positions.local(rows, Anchors(weight * quadratic, p, none))
+        places = self._constraints.places(self._targets)
+        pulled = _PulledPoints(np.array(soft, dtype=np.int64), np.array(of_target, dtype=np.int64))
+        pulled.vertices = self.handle[pulled.targets]
+        pulled.offsets = rows[pulled.places] @ p - places[pulled.places]
         solver = GaussNewton(before.energy, positions, self._constraints.volumes)
-        other._constraints = replace(self._constraints, solver=solver)
-        other._begin(self._p, self._targets)
+        load = solver.unbalanced(p, pulled.moved(places))
+        anchors = Anchors(weight * quadratic, p, load)
+        solver = replace(solver, positions=positions.local(rows, anchors))
+        other = self._shared()
+        other._constraints = replace(self._constraints, solver=solver, pulled=pulled)
+        other._begin(p, self._targets)
         return other
+
+    def _soft_row(self, ids: IntArray, spread: float) -> FloatArray | None:
+        """Return the row with which the handle of targets *ids* pulls, if it is one vertex."""
+        if len(ids) != 1:
+            return None
+        vertex = int(self.handle[ids[0]])
+        return self._samples.soft_row(vertex, self._rest.vertices[vertex], spread)
 
     def copy(self) -> Deformer:
         """Return a deformer in the same pose that continues independently."""
         other = self._shared()
-        other._constraints = replace(self._constraints, solver=self._constraints.solver.copy())
+        own = self._constraints
+        other._constraints = replace(own, solver=own.solver.copy(), pulled=copy.copy(own.pulled))
         other._continuation = self._continuation.copy()
         return other
 
@@ -415,15 +473,35 @@ class Deformer:
     ) -> Solution:
         limit = self._options.max_steps if max_steps is None else max_steps
         options = replace(self._options, max_steps=limit, progress=progress)
-        places = self._constraints.places(goal)
         steps = self._follow_waypoints(goal, options)
-        is_drag = max_steps is not None and not np.array_equal(goal, self._targets)
+        is_same = np.array_equal(goal, self._targets)
+        self._targets, pulled = goal, self._constraints.pulled
+        error = pulled.error if is_same else np.inf
+        for _ in range(_CORRECTIONS if max_steps is None else 1):
+            is_drag = max_steps is not None and not is_same
+            result, x, more = self._solve_once(goal, options, is_drag)
+            steps += more
+            there = self._frame.inward(self._frame.in_scene(x[pulled.vertices]))
+            off = goal[pulled.targets] - there
+            before, error = error, float(np.linalg.norm(off, axis=1).max(initial=0.0))
+            if result.status is Status.STEP_LIMIT or error <= self._hold_tolerance:
+                break
+            if error > _GAIN * before:
+                break
+            pulled.correct(off, error)
+            is_same, result = True, replace(result, status=Status.STEP_LIMIT)
+        return self._solution(result, x, steps)
+
+    def _solve_once(
+        self, goal: FloatArray, options: SolverOptions, is_drag: bool
+    ) -> tuple[SolverResult, FloatArray, int]:
+        """Solve for *goal* (k, 3) with exact volume; return the mesh and the steps as well."""
+        places = self._constraints.pulled.moved(self._constraints.places(goal))
         if is_drag and self._continuation.has_raised_weights:
             result = self._continuation.solve_at_current_weights(places, options)
         else:
             result = self._continuation.solve(places, options)
-        self._targets = goal
-        steps += result.steps
+        steps = result.steps
         x, scaled_by = self._with_exact_volume(result)
         for _ in range(_SOLVES_PER_SCALING):
             if scaled_by <= _SCALED or result.status is Status.STEP_LIMIT:
@@ -431,7 +509,7 @@ class Deformer:
             result = self._continuation.solve(places, options)
             steps += result.steps
             x, scaled_by = self._with_exact_volume(result)
-        return self._solution(result, x, steps)
+        return result, x, steps
 
     def _follow_waypoints(self, goal: FloatArray, options: SolverOptions) -> int:
         """Move through the waypoints before *goal*; return the number of steps."""
@@ -439,7 +517,7 @@ class Deformer:
         *on_the_way, _ = waypoints(self._targets, goal, self._constraints.handles)
         steps = 0
         for targets in on_the_way:
-            places = self._constraints.places(targets)
+            places = self._constraints.pulled.moved(self._constraints.places(targets))
             steps += self._continuation.solve_at_current_weights(places, options).steps
         return steps
 
@@ -540,6 +618,7 @@ class Deformer:
             volumes=volumes,
             is_scaled=is_whole and is_large and binding.coarse_volume.cells is not None,
             solver=GaussNewton(binding.energy, positions, volumes),
+            pulled=_PulledPoints(),
         )
         self.reset()
 

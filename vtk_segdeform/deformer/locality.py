@@ -4,11 +4,23 @@
 
 The sum is over samples s of the surface, with their share a_s of the area, their distance d_s from
 the grabbed point and their position x_s^0 at the press.  Within the reach the surface is free; from
-twice the reach on, and on other parts, it has the whole weight.
+twice the reach on, and on other bodies, it has the whole weight.
+
+What lies beyond the reach may fall into several parts: who grabs an elbow divides the hand from the
+body.  Parts that are small beside the largest one follow the grabbed point, too.
 
 The samples are the cells of the coarse volume, or the vertices of a small mesh, and distances are
 along the edges between them, so a press takes some milliseconds whatever the size of the mesh; to
 fix as many vertices would take a second.
+
+A single vertex would be pulled out as a spike, as wide as the cages are apart.  So the samples
+around it are pulled, with their orientation free: the point that moves is
+
+    x~ = sum_s psi_s x_s,    sum_s psi_s = 1,    sum_s psi_s v_s = v
+
+with the least psi that decrease with the distance from the vertex v: moving least squares, which
+reproduce every affine motion of these samples.  `Deformer` corrects the target of x~ until the
+vertex itself is in its place.
 """
 
 from __future__ import annotations
@@ -24,6 +36,9 @@ from ..geometry import faces_between
 from ..mesh import Mesh
 from ..solver import CoarseVolume
 
+_FEWEST = 4  # samples that determine an affine motion
+_FLAT = 1e-3  # of the moments: thinner patches count as flat
+
 
 @dataclass(frozen=True, eq=False)
 class SurfaceSamples:
@@ -35,6 +50,8 @@ class SurfaceSamples:
         The sample of each vertex.
     rows : (s, m) float
         W~ at the samples.
+    points : (s, 3) float
+        Their positions at rest.
     areas : (s,) float
         Their shares of the area.
     edges : (s, s) sparse
@@ -43,6 +60,7 @@ class SurfaceSamples:
 
     cells: IntArray
     rows: FloatArray
+    points: FloatArray
     areas: FloatArray
     edges: sparse.csr_array
 
@@ -63,19 +81,44 @@ class SurfaceSamples:
         lengths = np.linalg.norm(points[near.row] - points[near.col], axis=1)
         edges = sparse.coo_array((lengths, (near.row, near.col)), (count, count)).tocsr()
         rows = coarse.surface.at(np.arange(count))
-        return cls(cells, rows, areas / areas.sum(), edges)
+        return cls(cells, rows, points, areas / areas.sum(), edges)
 
     def distances(self, vertex: int) -> FloatArray:
         """Return the distance of each sample from that of *vertex*, (s,); infinite elsewhere."""
         found = csgraph.dijkstra(self.edges, directed=False, indices=self.cells[vertex])
         return np.asarray(found, dtype=np.float64)
 
-    def quadratic(self, vertex: int, reach: float) -> FloatArray:
-        """Return sum_s w_s W~_s^T W~_s, (m, m), of total weight at most 1."""
+    def quadratic(self, vertex: int, reach: float, follows: float) -> FloatArray:
+        """Return sum_s w_s W~_s^T W~_s, (m, m), of total weight at most 1.
+
+        Parts beyond the *reach* that are smaller than the largest by the factor *follows* are free.
+        """
         if np.isinf(reach):
             return np.zeros((self.rows.shape[1],) * 2)
-        beyond = np.clip(self.distances(vertex) / reach - 1.0, 0.0, 1.0)
+        away = self.distances(vertex) / reach
+        beyond = np.clip(away - 1.0, 0.0, 1.0)
         weights = self.areas * beyond**2 * (3.0 - 2.0 * beyond)
+        far = np.flatnonzero((away > 1.0) & np.isfinite(away))
+        if len(far):
+            _, part = csgraph.connected_components(self.edges[far][:, far], directed=False)
+            size = np.bincount(part, self.areas[far])
+            weights[far[(size < follows * size.max())[part]]] = 0.0
         kept = weights > 0.0
         rows = self.rows[kept]
         return np.asarray((rows.T * weights[kept]) @ rows)
+
+    def soft_row(self, vertex: int, at: FloatArray, spread: float) -> FloatArray | None:
+        """Return the row of x~, (m,), from samples within *spread* of *vertex*, which is *at* v.
+
+        None if there are too few.
+        """
+        away = self.distances(vertex) / spread
+        near = np.flatnonzero(away < 1.0)
+        if len(near) < _FEWEST:
+            return None
+        weights = self.areas[near] * (1.0 - away[near] ** 2) ** 2
+        basis = np.column_stack([np.ones(len(near)), (self.points[near] - at) / spread])
+        moments = (basis.T * weights) @ basis
+        share = np.linalg.pinv(moments, rcond=_FLAT, hermitian=True)[0]
+        psi = weights * (basis @ share)
+        return np.asarray(psi @ self.rows[near] / psi.sum())

@@ -12,12 +12,15 @@ from ..progress import Progress, part
 from ..regions import segment
 from ..solver import Solution
 from .arguments import (
+    LOCALITY,
+    SPREAD,
     as_lids,
     checked_constraints,
     checked_locality,
     checked_radius,
     checked_targets,
     checked_vertex,
+    reach_and_follows,
 )
 from .deformer import Deformer
 
@@ -52,8 +55,9 @@ def pull(
     pins : (k,) int or (n,) bool
         Vertices that stay in place.  With pins the surface between them is free.
     locality : float, optional
-        1 keeps the surface farther away than twice the radius where it is; with less, more of it
-        follows, and with 0 all is free.  By default 1 without pins and 0 with pins.
+        1 keeps the surface farther away than twice the radius where it is.  With less, more of it
+        follows, above all the ends of limbs; with 0 all is free.  By default 0.5 without pins, and
+        0 with pins.
     n_regions : int or None
         How many regions; None lets `segment` choose.
     n_cage_vertices : int, optional
@@ -88,7 +92,7 @@ def pull(
     targets = checked_targets(np.atleast_2d(plain(to, "to")), 1)
     radius, locality = checked_radius(mesh, radius), checked_locality(locality)
     if locality is None:
-        locality = 0.0 if len(fixed) else 1.0
+        locality = 0.0 if len(fixed) else LOCALITY
     regions = segment(mesh, n_regions, progress=part(progress, 0.0, 0.2))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
     cages = fit_cages(mesh, regions, size, progress=part(progress, 0.2, 0.7))
@@ -96,6 +100,6 @@ def pull(
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, lids=lids, progress=binding
     )
-    if locality > 0.0:
-        deformer = deformer.local(vertex, radius / locality)
+    reach, follows = reach_and_follows(radius, locality)
+    deformer = deformer.local(vertex, reach, SPREAD * radius, follows=follows)
     return deformer.solve(targets, progress=part(progress, 0.9, 1.0))

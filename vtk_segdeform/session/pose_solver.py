@@ -208,7 +208,9 @@ class PoseSolver:
         deformer = constrained.copy()
         x = deformer.surface(locality.cage_vertices)
         deformer.resume(locality.cage_vertices, x[deformer.handle])
-        deformer = deformer.local(locality.vertex, locality.reach)
+        deformer = deformer.local(
+            locality.vertex, locality.reach, locality.spread, follows=locality.follows
+        )
         self._local = constrained, locality, deformer
         self._current = None
         return deformer

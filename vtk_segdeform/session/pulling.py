@@ -9,7 +9,7 @@ A pin is a handle of one vertex that stays in its place, "pin 1".  Both are hand
 they can be moved, named, and removed.
 
 The surface beyond the reach is kept where it was at the press, softly; see `Deformer.local`.  The
-reach is the radius divided by the *locality*.
+more local a pull, the shorter its reach.
 """
 
 from __future__ import annotations
@@ -23,14 +23,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_points, frozen, plain
-from ..deformer import checked_vertex
+from ..deformer import LOCALITY, SPREAD, checked_vertex, reach_and_follows
 from ..errors import ConstraintError
 from ..mesh import Mesh
 from .handles import Targets, moved, require_near, targets_at, with_handle
 from .state import Locality, Pose, State
 
 _SAME_POINT = 0.25  # of the radius: a pulled point so close is grabbed again
-_PATCH = 0.5  # of the radius: what turns rigidly in a pull with a rotation
 
 
 class Grip(NamedTuple):
@@ -40,7 +39,7 @@ class Grip(NamedTuple):
     radius: float
     """Of the pulled surface, in the mesh's unit."""
     locality: float | None
-    """0 to 1; None is 0 if there are fixed vertices, pins or other handles, and else 1."""
+    """0 to 1; None is 0 if there are fixed vertices, pins or other handles, and else 0.5."""
     turns: bool
     """Whether a patch around the vertex turns with the motion, which a single vertex cannot."""
 
@@ -99,22 +98,22 @@ def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
         near = [each for each in pulls if away[each] < _SAME_POINT * radius]
         name = min(near, key=away.__getitem__, default=None)
     if locality is None:
-        locality = 0.0 if len(state.fixed) or set(names) - set(pulls) else 1.0
+        locality = 0.0 if len(state.fixed) or set(names) - set(pulls) else LOCALITY
     handles = state.handles
     if name is None:
         name = _new_name(state, "pull")
         handles = with_handle(mesh, state, name, [vertex])
         pulls = (*pulls, name)
     if turns and len(handles[name]) == 1:
-        patch = _patch(mesh, vertex, _PATCH * radius)
+        patch = _patch(mesh, vertex, SPREAD * radius)
         taken = [state.fixed, *(ids for other, ids in handles.items() if other != name)]
         patch = np.setdiff1d(patch, np.concatenate(taken))
         handles = with_handle(mesh, state, name, patch)
     places = tuple(cage.vertices for cage in state.cages)
     places = places if state.pose is None else state.pose.cage_vertices
     pose = Pose(places, targets_at(handles, vertices))
-    reach = radius / locality if locality else np.inf
-    local = Locality(vertex, reach, pose.cage_vertices)
+    reach, follows = reach_and_follows(radius, locality)
+    local = Locality(vertex, reach, SPREAD * radius, follows, pose.cage_vertices)
     after = replace(state, handles=handles, pulls=pulls, pose=pose, locality=local)
     others = [each for each in pulls if each != name and away.get(each, np.inf) < radius]
     carried = {each: (1.0 - (away[each] / radius) ** 2) ** 2 for each in others}

@@ -510,9 +510,9 @@ class Session(Timeline):
         radius : float, optional
             Of the pulled surface, in the mesh's unit; by default 15 % of the mesh's diagonal.
         locality : float, optional
-            1 keeps the surface farther away than twice the radius where it is; with less, more of
-            it follows, and with 0 all is free.  By default 1, and 0 between fixed vertices, pins
-            and handles that were not made by pulls.
+            1 keeps the surface farther away than twice the radius where it is.  With less, more of
+            it follows, above all the ends of limbs; with 0 all is free.  By default 0.5, and 0
+            between fixed vertices, pins and handles that were not made by pulls.
         max_steps : int, optional
             As in `drag`.
 

@@ -99,6 +99,10 @@ class Locality(Frozen):
     """The grabbed vertex."""
     reach: float
     """In the mesh's unit; infinite if all of the surface is free."""
+    spread: float
+    """In the mesh's unit."""
+    follows: float
+    """0 to 1."""
     cage_vertices: tuple[FloatArray, ...]
     """One (m_r, 3) float per region: the pose at the press, in which the rest stays."""
 
@@ -254,8 +258,11 @@ def _checked_locality(mesh: Mesh, cages: Sequence[Cage], locality: Locality) -> 
     _require_plausible(mesh, start)
     if not is_whole(locality.vertex, 0, mesh.n_vertices - 1):
         raise ConstraintError(f"there is no vertex {shown(locality.vertex)} to have been pulled")
-    if locality.reach != np.inf and not is_number(locality.reach, _TINY):
-        raise ConstraintError(f"the reach of a pull must be positive; got {shown(locality.reach)}")
+    for length in (locality.spread, *([] if locality.reach == np.inf else [locality.reach])):
+        if not is_number(length, _TINY):
+            raise ConstraintError(f"the radius of a pull must be positive; got {shown(length)}")
+    if not (is_number(locality.follows, 0.0) and locality.follows <= 1.0):
+        raise ConstraintError(f"follows must be from 0 to 1; got {shown(locality.follows)}")
     return replace(locality, cage_vertices=start.cage_vertices)
 
 

@@ -144,8 +144,8 @@ def _write(file: Any, session: Session, given: Surface | None) -> None:
     if state.pulls:  # optional, like what follows
         header["pulls"] = list(state.pulls)
     if state.locality is not None:
-        reach = state.locality.reach
-        header["locality"] = [state.locality.vertex, reach if math.isfinite(reach) else None]
+        vertex, reach, *lengths, _ = vars(state.locality).values()
+        header["locality"] = [vertex, None if reach == math.inf else reach, *lengths]
         arrays["locality"] = np.concatenate(state.locality.cage_vertices)
     if given is not None:
         from .surface_store import surface_parts  # imports pyvista
@@ -193,10 +193,10 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
     pulls = tuple(map(str, _list(header, "pulls"))) if "pulls" in header else ()
     locality = None
     if "locality" in header:
-        vertex, reach = _list(header, "locality")
+        vertex, reach, spread, follows = _list(header, "locality")
         kept = split_rows(archive.array("locality", "f", (total, 3)), n_vertices)
         reach = math.inf if reach is None else reach
-        locality = Locality(_whole(vertex, "locality"), reach, tuple(kept))
+        locality = Locality(_whole(vertex, "locality"), reach, spread, follows, tuple(kept))
     handles = dict(zip(sizes, ids, strict=True))
     state = State(regions, cages, fixed, handles, pose, options, names, pulls, locality)
     if "surface" not in header:

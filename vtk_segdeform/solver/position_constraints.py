@@ -187,9 +187,9 @@ class PositionTerm:
         """Return the term with other weights."""
         return replace(self, strength=strength, factored=self._sets)
 
-    def with_anchors(self, anchors: Anchors | None) -> PositionTerm:
-        """Return the term with other *anchors*."""
-        return replace(self, anchors=anchors)
+    def local(self, rows: FloatArray, anchors: Anchors) -> PositionTerm:
+        """Return the term with other *rows* (k, m) of the places, and with *anchors*."""
+        return replace(self, rows=rows, factored=None, anchors=anchors)
 
 
 def position_term(

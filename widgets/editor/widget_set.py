@@ -137,6 +137,6 @@ class WidgetSet:
 
     def remove(self) -> None:
         """Remove everything from the view, permanently."""
-        for each in (self.overlay, self.puller, self.dragger, self.cages, self.selector, self.colours):
+        for each in (self.overlay, *reversed(self.interactive), self.colours):
             each.remove()
         self.surface.remove()
