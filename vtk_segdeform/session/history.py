@@ -52,6 +52,13 @@ class History:
         """The label of the step that `redo` repeats, or None."""
         return self._future[-1][0] if self._future else None
 
+    def amend(self, change: Callable[[State], State]) -> None:
+        """Replace every state by its *change*, before and after the current one."""
+        past = [(label, change(state)) for label, state in self._past]
+        self._past.clear()
+        self._past.extend(past)
+        self._future = [(label, change(state)) for label, state in self._future]
+
     def record(self, label: str, before: State, after: State) -> None:
         """Add the step *label* from *before* to *after*, and clear the steps to redo."""
         self._past.append((label, before))
@@ -170,6 +177,13 @@ class Timeline:
         in effect, and the other listeners are called; see `Listeners`.
         """
         return self._listeners.add(as_callable(listener, "listener"))
+
+    def _amend(self, change: Callable[[State], State]) -> None:
+        """Apply *change* to the current state and to all steps, which adds no step."""
+        self._history.amend(change)
+        if self._drag_start is not None:
+            self._drag_start = change(self._drag_start)
+        self._set_state(change(self._state), Change(0))
 
     def _step(self, label: str, after: State) -> None:
         """Record a step to *after*, unless nothing changes."""

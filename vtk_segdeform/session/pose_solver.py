@@ -94,9 +94,14 @@ class PoseSolver:
             cache=cache_folder() if self._mesh.n_vertices >= sizes.CACHED_BINDING else None,
             progress=progress,
         )
-        own = State(state.regions, state.cages, options=state.options)
-        self._bound = ((own, deformer), *self._bound)[:_MAX_BOUND]
+        self.adopt(state, deformer)
         return deformer
+
+    def adopt(self, state: State, deformer: Deformer) -> None:
+        """Use *deformer*, bound elsewhere, for the regions, cages and options of *state*."""
+        own = State(state.regions, state.cages, options=state.options)
+        others = [each for each in self._bound if not _same_binding(state, each[0])]
+        self._bound = ((own, deformer), *others)[:_MAX_BOUND]
 
     def prepare(self, state: State, progress: Progress | None = None) -> None:
         """Bind, and constrain the fixed vertices and handles of *state* if there are any."""

@@ -23,6 +23,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -31,13 +32,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_points, frozen, is_whole, plain
-from ..cages import Cage, fit_cages
+from ..cages import Cage, fit_cages, suggested_size
 from ..checks import require, shown
-from ..deformer import checked_constraints, checked_locality, checked_radius, checked_vertex
+from ..deformer import (
+    Deformer,
+    checked_constraints,
+    checked_locality,
+    checked_radius,
+    checked_vertex,
+)
 from ..errors import CageError, RegionError, SessionError
 from ..geometry import Lids, local_volume_change
 from ..mesh import Mesh, require_mesh
-from ..progress import Progress
+from ..progress import Progress, part
 from ..regions import Regions, segment
 from ..solver import Solution, Status
 from . import handles, naming, painting, pulling
@@ -59,6 +66,15 @@ class Effort(NamedTuple):
     """Solver steps."""
     seconds: float
     """Elapsed time, including binding where it was not done ahead."""
+
+
+class Preparation(NamedTuple):
+    """What a session needs before its surface can be pulled; made by `Session.preparation`."""
+
+    regions: Regions
+    cages: tuple[Cage, ...]
+    deformer: Deformer
+    """Bound to them."""
 
 
 class Session(Timeline):
@@ -425,6 +441,36 @@ class Session(Timeline):
         """Bind the cages and constraints in advance, so that the first move does not wait."""
         self._pose_solver.prepare(self._state, progress)
 
+    def preparation(self, progress: Progress | None = None) -> Preparation:
+        """Return the regions and cages that the session lacks, bound, without changing it.
+
+        This may run in another thread; pass the result to `accept` in the session's thread.
+        """
+        regions, options = self.regions, self.options
+        if regions is None:
+            regions = segment(self.mesh, None, progress=part(progress, 0.0, 0.2))
+        cages = self.cages
+        if not cages:
+            share = part(progress, 0.2, 0.5)
+            size = suggested_size(regions)
+            cages = fit_cages(self.mesh, regions, size, offset=options.offset, progress=share)
+        state = State(regions, cages, options=options)
+        deformer = PoseSolver(self.mesh).bind(state, part(progress, 0.5, 1.0))
+        return Preparation(regions, cages, deformer)
+
+    def accept(self, preparation: Preparation) -> bool:
+        """Use a `preparation`, in all steps of the history; False if the session changed since.
+
+        It is no step: undo does not remove it.
+        """
+        regions, cages, deformer = preparation
+        has_others = self.regions not in (None, regions) or self.cages not in ((), cages)
+        if has_others or deformer.mesh is not self.mesh:
+            return False
+        self._pose_solver.adopt(State(regions, cages, options=self.options), deformer)
+        self._amend(partial(_prepared, regions=regions, cages=cages))
+        return True
+
     # Fixed vertices and handles.
 
     def set_fixed(self, vertices: ArrayLike) -> None:
@@ -699,6 +745,13 @@ class Session(Timeline):
         if pose is not None:
             pose = handles.with_handles(pose, self.handles, after, self.vertices)
         self._step(label, replace(self._state, handles=after, pose=pose))
+
+
+def _prepared(state: State, *, regions: Regions, cages: tuple[Cage, ...]) -> State:
+    """Return *state* with regions and cages, if it has none yet."""
+    if state.regions not in (None, regions) or state.cages:
+        return state
+    return replace(state, regions=regions, cages=cages)
 
 
 def _still_fit(old: Regions, new: Regions, cages: Sequence[Cage]) -> bool:
