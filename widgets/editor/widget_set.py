@@ -137,6 +137,8 @@ class WidgetSet:
 
     def remove(self) -> None:
         """Remove everything from the view, permanently."""
-        for each in (self.overlay, *reversed(self.interactive), self.colours):
-            each.remove()
+        self.overlay.remove()
+        for widget in reversed(self.interactive):
+            widget.remove()
+        self.colours.remove()
         self.surface.remove()
