@@ -1,6 +1,7 @@
 """Choice between compiled kernels and their equivalents in numpy.
 
     kernels = compiled_kernels()        the module `compiled`, or None
+    kernels = compiled_checks(size)     the same for short checks, which are not worth an import
 
 numba is installed with the package on platforms that have wheels of it.  Importing it takes half a
 second, so it is imported for the first array that is large enough.  Without it everything works,
@@ -13,6 +14,7 @@ import functools
 import importlib
 import importlib.util
 import os
+import sys
 from typing import Any
 
 import numpy as np
@@ -21,11 +23,27 @@ from numpy.typing import NDArray
 from .. import sizes
 
 _LIBRARIES = "numba", "threadpoolctl"  # required for speed only
+_checked = 0  # faces processed by equivalents in numpy
 
 
 def compiled_kernels(size: int | None = None) -> Any:
     """Return the compiled kernels; None without numba, or if *size* is not worth a call."""
     return _kernels() if size is None or size >= sizes.COMPILED else None
+
+
+def compiled_checks(size: int) -> Any:
+    """Return the compiled kernels for checks of meshes; None while importing numba does not pay.
+
+    Many programs check a few meshes and need no other kernel.  So numba is imported only after the
+    equivalents in numpy have processed so many faces that they have taken as long as the import.
+    Both give the same results.
+    """
+    global _checked
+    if f"{__package__}.compiled" not in sys.modules:
+        _checked += size
+        if _checked < sizes.COMPILED_CHECKS:
+            return None
+    return _kernels()
 
 
 def advice() -> str:

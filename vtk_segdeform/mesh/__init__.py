@@ -5,7 +5,8 @@ The files, in reading order:
     mesh             `Mesh`, checked and immutable
     faults           search for the faults of a mesh
     report           kinds of faults, counted and described
-    topology         half-edges, edges, fans, shells and boundaries
+    topology         half-edges, edges, fans and shells
+    loops            boundaries as loops of vertices
     orientation      which faces of any triangles to flip
     soup             a mesh from any triangles, and the map between both
     shells           orientation of closed shells

@@ -131,15 +131,18 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
         not finite, or too far or too near for computing volumes.
     """
     points, triangles = as_soup(vertices, faces)
-    valid = points
-    if len(triangles) and triangles.min() >= 0 and triangles.max() < len(points):
-        used = np.zeros(len(points), dtype=bool)
-        used[triangles[~repeats_vertex(triangles)]] = True
+    found = Search(points, triangles)
+    if len(triangles) and found.n_repeating is not None:
+        used = found.used
+        if found.n_repeating:
+            used = np.zeros(len(points), dtype=bool)
+            used[triangles[~repeats_vertex(triangles)]] = True
         if not used.all():  # points in no face must not matter
-            valid = np.where(used[:, None], points, points[used.argmax()] if used.any() else 0.0)
-    found = Search(valid, triangles)
+            other = points[used.argmax()] if used.any() else 0.0
+            found = found.at(np.where(used[:, None], points, other))
+    valid = found.points
     _require_usable(found)
-    if found.half_edges.twin is not None and found.report.is_closed:
+    if found.half_edges.all_twins and found.is_closed:
         return Soup(points, Mesh.of(found), np.arange(len(points)))
     target, kept, half_edges = _welded(valid, found)
     without_area = _without_area(found, kept, half_edges)
@@ -185,7 +188,7 @@ def _welded(points: FloatArray, found: Search) -> tuple[IntArray, IntArray, Half
     while len(half_edges.boundary):  # a face that is dropped may leave a border
         weld = _coinciding_sheets(half_edges, found.first_at)
         weld[half_edges.tail[half_edges.boundary]] = True
-        weld[half_edges.head[half_edges.boundary]] = True
+        weld[half_edges.head_of(half_edges.boundary)] = True
         some = np.flatnonzero(weld)
         place, first_there = found.first_at[some], np.empty(len(points), dtype=np.int64)
         first_there[place[::-1]] = some[::-1]  # the last write wins
@@ -210,7 +213,7 @@ def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
     shared = used & (np.bincount(first_at[used], minlength=len(first_at)) > 1)[first_at]
     border = np.zeros_like(found)
     border[half_edges.tail[half_edges.boundary]] = True
-    border[half_edges.head[half_edges.boundary]] = True
+    border[half_edges.head_of(half_edges.boundary)] = True
     if border[used].all():
         return found
     shells = half_edges.shells
@@ -287,17 +290,17 @@ def _workarounds(
     if len(loose):
         text = f"{counted(len(loose), 'point is', 'points are')} in no face"
         yield Workaround(text, loose, Kind.UNREFERENCED, len(loose))
-    ends = np.stack([half_edges.tail, half_edges.head])[:, half_edges.boundary]
+    some = half_edges.boundary
+    ends = np.stack([half_edges.tail[some], half_edges.head_of(some)])
     corners, ends = np.unique(ends, return_inverse=True)
     if len(corners):
         n_holes = int(connected(len(corners), *ends.reshape(2, -1)).max()) + 1
         yield _workaround(Kind.HOLE, n_holes, "# hole", at(corners))
-    crowded = half_edges.order[half_edges.first[half_edges.counts > 2]]
-    if len(crowded):
+    if len(crowded := half_edges.branching):
         text = f"{counted(len(crowded), 'edge', 'edges')} with three or more faces"
-        there = at(np.append(half_edges.tail[crowded], half_edges.head[crowded]))
+        there = at(np.append(half_edges.tail[crowded], half_edges.head_of(crowded)))
         yield Workaround(text, there, Kind.NON_MANIFOLD_EDGE, len(crowded))
-    if half_edges.inconsistent.any() and half_edges.one_sided.any():
+    if len(half_edges.turned) and half_edges.one_sided.any():
         one_sided = half_edges.one_sided
         there = at(half_edges.faces[one_sided[half_edges.shells]])
         yield _workaround(Kind.ONE_SIDED, int(one_sided.sum()), "# one-sided component", there)
