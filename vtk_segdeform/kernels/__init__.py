@@ -7,7 +7,7 @@ The files, in reading order:
     compiled    the kernels, compiled by numba
 """
 
-from .dispatch import advice, compiled_checks, compiled_kernels, inputs, writable
+from .dispatch import advice, compiled_checks, compiled_kernels, inputs, scratch, writable
 from .threads import in_parallel, n_threads, one_blas_thread
 
 __all__ = [
@@ -18,5 +18,6 @@ __all__ = [
     "inputs",
     "n_threads",
     "one_blas_thread",
+    "scratch",
     "writable",
 ]

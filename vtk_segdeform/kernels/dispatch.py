@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from .. import sizes
 
 _LIBRARIES = "numba", "threadpoolctl"  # required for speed only
+_HUGE = 1 << 23  # bytes; only the pages that are used take memory
 _checked = 0  # faces processed by equivalents in numpy
 
 
@@ -73,6 +74,17 @@ def writable(array: NDArray[Any]) -> NDArray[Any]:
     For microsecond kernels, where the overhead of `inputs` would equal the kernel itself.
     """
     return array if array.flags.carray else np.array(array, order="C")
+
+
+def scratch(kind: type[np.signedinteger[Any]], *sizes: int) -> list[NDArray[Any]]:
+    """Return integer arrays of the given sizes and any values, for the time of a computation.
+
+    They are parts of one array that is large enough for numpy to request huge pages: small pages
+    can take longer to get than a kernel takes to fill them.
+    """
+    ends = np.cumsum(sizes)
+    room = np.empty(max(int(ends[-1]), _HUGE // kind().itemsize), dtype=kind)
+    return np.split(room[: ends[-1]], ends[:-1])
 
 
 @functools.cache

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +27,7 @@ UNREPAIRABLE = (Kind.EMPTY, Kind.BAD_INDEX, Kind.TOO_LARGE, Kind.TOO_SMALL, Kind
 _EXAMPLES = 4
 _FEW = 100  # faces or points that usually answer a question about all
 _PIECE = 10_000  # faces per task; their data fit into the cache
+_LARGE_PIECE = 200_000  # faces per task of compiled kernels, which take a millisecond for so many
 _LARGEST, _SMALLEST = 1e70, 1e-70  # fourth powers of lengths must neither overflow nor vanish
 _FLAT = 1e-12  # height over longest edge; a flatter face counts as one without area
 
@@ -193,7 +194,10 @@ class Search:
 
     @cached_property
     def _inward_and_flat_shells(self) -> tuple[IntArray, IntArray]:
-        return _inward_and_flat_shells(self.points, self.half_edges)
+        finite = None
+        if any(fault.kind is Kind.NON_FINITE for fault in self.number_faults):
+            finite = _finite(self.points)
+        return _inward_and_flat_shells(self.points, self.half_edges, finite)
 
     @property
     def is_two_manifold(self) -> bool:
@@ -315,7 +319,8 @@ def _flat_faces(points: FloatArray, faces: IntArray) -> IntArray:
     flat = np.zeros(len(faces), dtype=bool)
 
     if kernels := compiled_checks(len(faces)):
-        kernels.flat_faces(flat, *inputs(points, faces), _FLAT)
+        given = inputs(points, faces)
+        in_parallel(partial(kernels.flat_faces, flat, *given, _FLAT), len(faces), _LARGE_PIECE)
         return np.flatnonzero(flat)
 
     def work(start: int, stop: int) -> None:
@@ -350,14 +355,17 @@ def _turned_edges(half_edges: HalfEdges) -> Iterator[Fault]:
         yield from _some(Kind.TURNED_EDGE, turned, half_edges)
 
 
-def _inward_and_flat_shells(points: FloatArray, half_edges: HalfEdges) -> tuple[IntArray, IntArray]:
+def _inward_and_flat_shells(
+    points: FloatArray, half_edges: HalfEdges, finite: BoolArray | None
+) -> tuple[IntArray, IntArray]:
     """Return a vertex of each shell that is inside-out, and of each that encloses no volume.
 
-    Only shells that are closed and consistently oriented; others may be around them.
+    Only shells that are closed and consistently oriented; others may be around them.  *finite* (n,)
+    says which points are, if not all.
     """
     faces, shells = half_edges.faces, half_edges.shells
     closed = closed_shells(half_edges)
-    if not (finite := _finite(points)).all():
+    if finite is not None:
         valid = finite[faces].all(axis=1)
         closed[shells[~valid]] = False
         faces = faces[valid]

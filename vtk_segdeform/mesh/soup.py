@@ -33,6 +33,7 @@ from .orientation import faces_to_flip
 from .report import Fault, Kind, counted
 from .topology import HalfEdges, components, repeats_vertex
 
+_NONE: IntArray = np.empty(0, dtype=np.int64)
 _REFUSED = (*UNREPAIRABLE, Kind.NON_FINITE)
 
 
@@ -146,26 +147,30 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
         return Soup(points, Mesh.of(found), np.arange(len(points)))
     target, kept, half_edges = _welded(valid, found)
     without_area = _without_area(found, kept, half_edges)
-    flat = kept[without_area]
+    flat = np.flatnonzero(kept)[without_area] if without_area.any() else _NONE
     if len(flat):
-        kept = kept[~without_area]
+        kept[flat] = False
         half_edges = HalfEdges(half_edges.faces[~without_area], len(points))
     flip = faces_to_flip(valid, half_edges)
-    left = np.zeros(len(points), dtype=bool)
-    left[half_edges.faces] = True
-    number = np.cumsum(left) - 1
-    if flip.any():
-        faces_left = half_edges.faces
-        faces_left = np.where(flip[:, None], faces_left[:, [0, 2, 1]], faces_left)
-        mesh = Mesh(points[left], number[faces_left])
-    elif half_edges is found.half_edges and len(kept) == len(triangles) and left.all():
+    left = found.used
+    if not (same := half_edges is found.half_edges and found.n_repeating == 0 and kept.all()):
+        left = np.zeros(len(points), dtype=bool)
+        left[half_edges.faces] = True
+    vertex_of, loose = target, _NONE
+    if same and left.all() and not flip.any():
         mesh = Mesh.of(found)
     else:
-        kept_edges = half_edges.renumbered(number, int(left.sum()))
-        mesh = Mesh.of(Search.known(points[left], kept_edges))
-    loose = np.flatnonzero(~left[target])
-    vertex_of = number[target]
-    vertex_of[loose] = _nearest(points[loose], mesh.vertices)
+        number = np.cumsum(left) - 1
+        if flip.any():
+            faces_left = half_edges.faces
+            faces_left = np.where(flip[:, None], faces_left[:, [0, 2, 1]], faces_left)
+            mesh = Mesh(points[left], number[faces_left])
+        else:
+            kept_edges = half_edges.renumbered(number, int(left.sum()))
+            mesh = Mesh.of(Search.known(points[left], kept_edges))
+        loose = np.flatnonzero(~left[target])
+        vertex_of = number[target]
+        vertex_of[loose] = _nearest(points[loose], mesh.vertices)
     workarounds = tuple(_workarounds(triangles, kept, flat, target, loose, flip, half_edges))
     return Soup(points, mesh, vertex_of, workarounds)
 
@@ -181,10 +186,10 @@ def _require_usable(found: Search) -> None:
         raise MeshError(f"this surface cannot be deformed: {reasons}")
 
 
-def _welded(points: FloatArray, found: Search) -> tuple[IntArray, IntArray, HalfEdges]:
-    """Return the point that each point (p,) is welded to, the faces kept, and their half-edges."""
+def _welded(points: FloatArray, found: Search) -> tuple[IntArray, BoolArray, HalfEdges]:
+    """Return the point that each point (p,) is welded to, the faces (m,) kept, and half-edges."""
     target, half_edges = np.arange(len(points)), found.half_edges
-    kept = np.flatnonzero(~found.degenerate & ~found.duplicate)
+    kept = ~(found.degenerate | found.duplicate)
     while len(half_edges.boundary):  # a face that is dropped may leave a border
         weld = _coinciding_sheets(half_edges, found.first_at)
         weld[half_edges.tail[half_edges.boundary]] = True
@@ -199,7 +204,7 @@ def _welded(points: FloatArray, found: Search) -> tuple[IntArray, IntArray, Half
         number[some] = first
         target = number[target]
         degenerate, duplicate, half_edges = distinct_faces(number[half_edges.faces], len(points))
-        kept = kept[~degenerate & ~duplicate]
+        kept[kept] = ~(degenerate | duplicate)
     return target, kept, half_edges
 
 
@@ -228,8 +233,8 @@ def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
     return found
 
 
-def _without_area(found: Search, kept: IntArray, half_edges: HalfEdges) -> BoolArray:
-    """Return which faces (m,) are in a component of flat faces only, connected at any vertex."""
+def _without_area(found: Search, kept: BoolArray, half_edges: HalfEdges) -> BoolArray:
+    """Return which faces *kept* are in a component of flat faces only, connected at any vertex."""
     is_flat = np.zeros(len(found.triangles), dtype=bool)
     is_flat[found.flat] = True
     is_flat = is_flat[kept]
@@ -252,7 +257,7 @@ def _nearest(points: FloatArray, vertices: FloatArray) -> IntArray:
 
 def _workarounds(
     triangles: IntArray,
-    kept: IntArray,
+    kept: BoolArray,
     flat: IntArray,
     target: IntArray,
     loose: IntArray,
@@ -271,10 +276,10 @@ def _workarounds(
     if len(seam := np.flatnonzero(members > 1)):
         yield _workaround(Kind.COINCIDENT, len(seam), "welded # seam point", seam)
     if flip.any():
-        faces = triangles[kept[flip]]
+        faces = triangles[kept][flip]
         yield _workaround(Kind.TURNED_EDGE, len(faces), "flipped # face", np.unique(faces))
-    dropped = np.ones(len(triangles), dtype=bool)
-    dropped[kept] = dropped[flat] = False
+    dropped = ~kept
+    dropped[flat] = False
     faces = triangles[dropped]
     degenerate = repeats_vertex(target[faces])
     for kind, ignored in (

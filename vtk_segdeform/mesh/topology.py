@@ -27,7 +27,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, IntArray
-from ..kernels import compiled_checks, inputs
+from ..kernels import compiled_checks, in_parallel, inputs, scratch
 from .grouping import (
     begins,
     connected,
@@ -42,6 +42,7 @@ _NAMELESS = (
     "repeated", "shells", "sides", "one_sided", "crowded", "turned", "_alone", "_paired",
 )  # fmt: skip
 _MOST = 2**31 // 6  # faces, for numbers of 32 bits in the kernels
+_LARGE = 200_000  # faces for which another thread is worth waking
 _NONE: IntArray = np.empty(0, dtype=np.int64)
 _ROUNDS = 10_000  # steps around a vertex; with more faces at a vertex, `fans` are counted
 
@@ -87,12 +88,27 @@ class HalfEdges:
         if kernels is None:
             return None
         (faces,) = inputs(self.faces)
-        border = np.empty(n, np.int32)
-        count = kernels.one_fan_each(
-            border, np.empty((2, n), np.int32), np.empty(3 * m, int), faces
-        )
+        border, starts, *after = scratch(np.int32, n, n + 2, n, n)
+        links, tree = scratch(np.int64, 3 * m, n)
+        tree[:] = np.arange(n)
+        found = [0, 0]
+
+        def work(start: int, stop: int) -> None:
+            for task in range(start, stop):
+                if task == 0:
+                    found[0] = kernels.one_fan_each(border, starts, *after, links, faces)
+                else:  # for `shells`, which are needed too
+                    found[1] = kernels.link_corners(tree, faces)
+
+        in_parallel(work, 2, 1 if m >= _LARGE else 2)
+        count, n_trees = found
         if count < 0:
             return None
+        if n_trees == 1:
+            self.__dict__["shells"] = np.zeros(m, dtype=np.int64)
+        else:
+            kernels.number_trees(tree)
+            self.__dict__["shells"] = renumbered_by_first(tree[faces[:, 0]])
         alone = np.empty(count, dtype=np.int64)
         if count:
             kernels.border_half_edges(alone, border, faces)
@@ -105,7 +121,7 @@ class HalfEdges:
         kernels = compiled_checks(m) if m < _MOST else None
         if kernels is None:
             return None
-        opposite, others = np.empty(3 * m, dtype=np.int64), (np.empty(n, int), np.empty(3 * m, int))
+        opposite, others = np.empty(3 * m, dtype=np.int64), scratch(np.int64, n + 2, n, 3 * m)
         return opposite, not any(kernels.pair_half_edges(opposite, *others, *inputs(self.faces)))
 
     @cached_property
@@ -307,8 +323,9 @@ class HalfEdges:
     @cached_property
     def shells(self) -> IntArray:
         """(m,) int: the shell of each face, numbered from 0 in the order of their first faces."""
-        if self._alone is not None:
-            return self._shells_of_vertices()
+        if self._alone is not None:  # each vertex is in one shell, so that vertices were linked
+            shells: IntArray = self.__dict__["shells"]
+            return shells
         m = len(self.faces)
         if self._paired is not None:
             one, other = self.neighbours.T
@@ -327,15 +344,6 @@ class HalfEdges:
         later[self.first] = False
         at = np.flatnonzero(later)
         return connected(m, self.order[at - 1] // 3, self.order[at] // 3)
-
-    def _shells_of_vertices(self) -> IntArray:
-        """Return `shells` if every vertex has one fan, and so is in one shell only."""
-        tree = np.arange(self.n_vertices)
-        kernels = compiled_checks(len(self.faces))
-        if kernels.link_corners(tree, *inputs(self.faces)) == 1:
-            return np.zeros(len(self.faces), dtype=np.int64)
-        kernels.number_trees(tree)
-        return renumbered_by_first(tree[self.faces[:, 0]])
 
     @cached_property
     def sides(self) -> tuple[IntArray, BoolArray]:

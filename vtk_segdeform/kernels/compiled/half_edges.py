@@ -6,8 +6,6 @@ face (a, b, c) links b to c; around a vertex with one fan, the links are a cycle
 
 from __future__ import annotations
 
-import numpy as np
-
 from .kernels import kernel
 
 _compile = kernel()
@@ -15,14 +13,15 @@ _LOW = 0xFFFFFFFF
 
 
 @_compile
-def one_fan_each(border, after, links, faces):
+def one_fan_each(border, starts, onward, backward, links, faces):
     """Return the number of half-edges without a twin, or -1 unless every vertex has one fan.
 
     Put into *border* (n,) the vertex to which such a half-edge runs from each vertex; -1 if none.
-    *after* (2, n) int32 and *links* (3m,) int64 are of any values.  No face may repeat a vertex.
+    *starts* (n + 2,), *onward* (n,), *backward* (n,) and *links* (3m,) int64 are of any values.  No
+    face may repeat a vertex.
     """
     n = len(border)
-    starts = np.zeros(n + 2, np.int32)
+    starts[:] = 0
     for f in range(len(faces)):
         for c in range(3):
             starts[faces[f, c] + 2] += 1
@@ -36,7 +35,6 @@ def one_fan_each(border, after, links, faces):
         starts[b + 1], links[k] = k + 1, (c << 32) | a
         k = starts[c + 1]
         starts[c + 1], links[k] = k + 1, (a << 32) | b
-    onward, backward = after[0], after[1]
     n_alone = 0
     for v in range(n):
         first, last = starts[v], starts[v + 1]
@@ -89,7 +87,7 @@ def border_half_edges(alone, border, faces):
 
 
 @_compile
-def pair_half_edges(opposite, edges, bucket, faces):
+def pair_half_edges(opposite, starts, edges, bucket, faces):
     """Put the other half-edge of each pair into *opposite* (3m,); -1 if alone, -2 if several.
 
     Return the numbers of half-edges that are alone, of those on edges of three or more, and of
@@ -98,10 +96,10 @@ def pair_half_edges(opposite, edges, bucket, faces):
     Half-edges are put into a bucket for each lower vertex, as codes 2 h + (1 if h runs up).  A
     table over upper vertices then has for each edge the number of its half-edges, in the higher 32
     bits, and the exclusive or of their codes: with one code of a pair, it gives the other.
-    *edges* (n,) and *bucket* (3m,) are int64 of any values.
+    *starts* (n + 2,), *edges* (n,) and *bucket* (3m,) int64 are of any values.
     """
     n = len(edges)
-    starts = np.zeros(n + 2, np.int32)
+    starts[:] = 0
     for f in range(len(faces)):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         starts[min(a, b) + 2] += 1

@@ -13,12 +13,12 @@ _compile = kernel()
 
 
 @_compile
-def flat_faces(flat, points, faces, share):
-    """Put into *flat* (m,) whether the area is at most *share* of the square of the longest edge.
+def flat_faces(flat, points, faces, share, start, stop):
+    """Put into *flat* (m,) which of faces start..stop are at most *share* as high as long.
 
-    Area means twice the area.  NaN is not flat.
+    That is twice the area over the square of the longest edge.  NaN is not flat.
     """
-    for f in range(len(faces)):
+    for f in range(start, stop):
         i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
         ax, ay, az = points[i, 0], points[i, 1], points[i, 2]
         bx, by, bz = points[j, 0], points[j, 1], points[j, 2]
@@ -41,10 +41,13 @@ def flat_faces(flat, points, faces, share):
 def shell_sums(volume, area, size, origins, points, faces, shells):
     """Add to *volume* and *area* (k,) of each shell six times and twice those of its faces.
 
-    *size* (k,) becomes the largest distance of a first corner from the origin (k, 3) of the shell.
+    The origin (k, 3) of a shell is the apex of volumes, and *size* (k,) becomes the largest
+    distance of a first corner from it.  *shells* (m,) is not read if there is only one.
     """
+    several = len(origins) > 1
     for f in range(len(faces)):
-        s, i, j, k = shells[f], faces[f, 0], faces[f, 1], faces[f, 2]
+        s = shells[f] if several else 0
+        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
         ox, oy, oz = origins[s, 0], origins[s, 1], origins[s, 2]
         ax, ay, az = points[i, 0] - ox, points[i, 1] - oy, points[i, 2] - oz
         bx, by, bz = points[j, 0] - ox, points[j, 1] - oy, points[j, 2] - oz
@@ -55,9 +58,7 @@ def shell_sums(volume, area, size, origins, points, faces, shells):
         vx, vy, vz = cx - ax, cy - ay, cz - az
         x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         area[s] += np.sqrt((x * x + y * y) + z * z)
-        radius = np.sqrt((ax * ax + ay * ay) + az * az)
-        if radius > size[s]:
-            size[s] = radius
+        size[s] = max(size[s], np.sqrt((ax * ax + ay * ay) + az * az))
 
 
 @_compile
