@@ -24,7 +24,7 @@ from .. import sizes
 
 _LIBRARIES = "numba", "threadpoolctl"  # required for speed only
 _HUGE = 1 << 23  # bytes; only the pages that are used take memory
-_checked = 0  # faces processed by equivalents in numpy
+_checked = [0]  # faces processed so far by equivalents in numpy
 
 
 def compiled_kernels(size: int | None = None) -> Any:
@@ -39,10 +39,9 @@ def compiled_checks(size: int) -> Any:
     equivalents in numpy have processed so many faces that they have taken as long as the import.
     Both give the same results.
     """
-    global _checked
     if f"{__package__}.compiled" not in sys.modules:
-        _checked += size
-        if _checked < sizes.COMPILED_CHECKS:
+        _checked[0] += size
+        if _checked[0] < sizes.COMPILED_CHECKS:
             return None
     return _kernels()
 

@@ -17,10 +17,11 @@ from numpy.typing import ArrayLike
 from ..arrays import BoolArray, FloatArray, IntArray, plain
 from ..errors import ArgumentError
 from ..kernels import compiled_checks, in_parallel, inputs
+from .edges import repeats_vertex
 from .grouping import connected, first_equal_row, first_members
 from .report import Fault, Id, Kind, MeshReport, counted
 from .shells import closed_shells, shell_faults
-from .topology import HalfEdges, repeats_vertex
+from .topology import HalfEdges
 from .triangles import corner_columns, cross, norm
 
 UNREPAIRABLE = (Kind.EMPTY, Kind.BAD_INDEX, Kind.TOO_LARGE, Kind.TOO_SMALL, Kind.FLAT)

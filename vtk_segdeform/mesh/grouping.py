@@ -27,7 +27,7 @@ def connected(n: int, one: IntArray, other: IntArray) -> IntArray:
     if n == 0:
         return np.empty(0, dtype=np.int64)
     if kernels := compiled_checks(len(one)):
-        tree = np.arange(n)
+        tree: IntArray = np.arange(n)
         kernels.link(tree, *inputs(np.asarray(one, np.int64), np.asarray(other, np.int64)))
         kernels.number_trees(tree)
         return tree
@@ -45,7 +45,28 @@ def renumbered_by_first(labels: NDArray[np.integer]) -> IntArray:
     first[labels[::-1]] = np.arange(len(labels))[::-1]  # the last write wins
     rank = np.empty_like(first)
     rank[np.argsort(first, kind="stable")] = np.arange(len(first))
-    return rank[labels]
+    renumbered: IntArray = rank[labels]
+    return renumbered
+
+
+def two_sides(
+    n: int, one: IntArray, other: IntArray, opposite: BoolArray
+) -> tuple[IntArray, BoolArray]:
+    """Return the group of each of *n* items, (n,) int, and whether to flip it for all to agree.
+
+    Items one[i] and other[i] are neighbours, of different orientation if opposite[i].  A graph has
+    two nodes for each item, unchanged and flipped, and links between nodes of neighbours that
+    agree.  If both nodes of an item are connected, its group is one-sided, and none is flipped.
+    """
+    across = np.where(opposite, other + n, other)
+    group = connected(
+        2 * n,
+        np.concatenate([one, one + n]),
+        np.concatenate([across, (across + n) % max(2 * n, 1)]),
+    )
+    unchanged, flipped = group[:n], group[n:]
+    side = np.minimum(unchanged, flipped)
+    return side, (flipped == side) & (unchanged != flipped)
 
 
 def first_of_group(group: IntArray) -> IntArray:

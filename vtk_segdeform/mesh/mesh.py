@@ -22,9 +22,10 @@ from ..checks import require
 from ..errors import MeshError
 from ..freezing import Frozen, read_only
 from ..kernels import in_parallel
+from .edges import components
 from .faults import Search, as_soup, find_faults
 from .loops import loops_of
-from .topology import HalfEdges, components
+from .topology import HalfEdges
 
 _PIECE = 20_000  # faces per task; their data fit into the cache
 

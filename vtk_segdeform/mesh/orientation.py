@@ -20,9 +20,9 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from .grouping import begins, connected, first_members
+from .grouping import begins, connected, first_members, two_sides
 from .shells import NO_VOLUME, outward_signs, shell_depths, shell_volumes
-from .topology import HalfEdges, two_sides
+from .topology import HalfEdges
 
 _MOST_LIDS = 0.6  # area of the lids of a unit that has an outside, relative to its own
 

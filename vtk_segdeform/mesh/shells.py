@@ -93,7 +93,8 @@ def shell_volumes(
     origins = vertices[faces[first_members(shells), 0]]
     if kernels := compiled_checks(len(faces)):
         volume, area, size = np.zeros((3, len(origins)))
-        kernels.shell_sums(volume, area, size, *inputs(origins, vertices, faces, shells))
+        several = shells if len(origins) > 1 else shells[:1]  # not read if there is only one
+        kernels.shell_sums(volume, area, size, *inputs(origins, vertices, faces, several))
         return volume / 6.0, area / 2.0, size
     volumes, areas, radii = np.empty((3, len(faces)))
 

@@ -26,12 +26,13 @@ from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray, as_ids, as_points
 from ..errors import ConstraintError, MeshError
+from .edges import components, repeats_vertex
 from .faults import UNREPAIRABLE, Search, as_soup, distinct_faces
 from .grouping import connected, first_equal_row
 from .mesh import Mesh
 from .orientation import faces_to_flip
 from .report import Fault, Kind, counted
-from .topology import HalfEdges, components, repeats_vertex
+from .topology import HalfEdges
 
 _NONE: IntArray = np.empty(0, dtype=np.int64)
 _REFUSED = (*UNREPAIRABLE, Kind.NON_FINITE)

@@ -15,6 +15,8 @@ otherwise the other half-edge of each pair.  Compiled kernels find them in one p
               two-manifold has exactly one
 
 Positions are not used.
+
+Long because each compiled pass has its equivalent in numpy beside it.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, IntArray
 from ..kernels import compiled_checks, in_parallel, inputs, scratch
+from .edges import edge_keys, next_half_edge
 from .grouping import (
     begins,
     connected,
@@ -35,6 +38,7 @@ from .grouping import (
     first_equal_row,
     first_members,
     renumbered_by_first,
+    two_sides,
 )
 
 _NAMELESS = (
@@ -105,7 +109,7 @@ class HalfEdges:
         if count < 0:
             return None
         if n_trees == 1:
-            self.__dict__["shells"] = np.zeros(m, dtype=np.int64)
+            self.__dict__["shells"] = np.broadcast_to(np.int64(0), m)  # without memory
         else:
             kernels.number_trees(tree)
             self.__dict__["shells"] = renumbered_by_first(tree[faces[:, 0]])
@@ -412,52 +416,3 @@ class HalfEdges:
             going = (at != start) & (at >= 0)
             start, at = start[going], at[going]
         return visited == len(step)
-
-
-def two_sides(
-    n: int, one: IntArray, other: IntArray, opposite: BoolArray
-) -> tuple[IntArray, BoolArray]:
-    """Return the group of each of *n* items, (n,) int, and whether to flip it for all to agree.
-
-    Items one[i] and other[i] are neighbours, of different orientation if opposite[i].  A graph has
-    two nodes for each item, unchanged and flipped, and links between nodes of neighbours that
-    agree.  If both nodes of an item are connected, its group is one-sided, and none is flipped.
-    """
-    across = np.where(opposite, other + n, other)
-    group = connected(
-        2 * n,
-        np.concatenate([one, one + n]),
-        np.concatenate([across, (across + n) % max(2 * n, 1)]),
-    )
-    unchanged, flipped = group[:n], group[n:]
-    side = np.minimum(unchanged, flipped)
-    return side, (flipped == side) & (unchanged != flipped)
-
-
-def edge_keys(one: IntArray, other: IntArray, n_vertices: int) -> IntArray:
-    """Return one number for each pair of vertices, the same for (a, b) and (b, a)."""
-    return np.minimum(one, other) * n_vertices + np.maximum(one, other)
-
-
-def next_half_edge(half_edges: IntArray) -> IntArray:
-    """Return the next half-edge, or corner, of the same face."""
-    return np.where(half_edges % 3 == 2, half_edges - 2, half_edges + 1)
-
-
-def repeats_vertex(faces: IntArray) -> BoolArray:
-    """Return which faces contain a vertex twice, (m,) bool."""
-    a, b, c = faces.T
-    repeats: BoolArray = (a == b) | (b == c) | (c == a)
-    return repeats
-
-
-def components(n_points: int, faces: IntArray) -> IntArray:
-    """Return the component of each vertex, (n,) int, numbered from 0."""
-    return connected(n_points, faces.ravel(), faces[:, [1, 2, 0]].ravel())
-
-
-def face_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the edges (e, 2), and for each face (m, 3) the edges opposite its three corners."""
-    opposite = np.sort(faces[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2), axis=1)
-    edges, which = np.unique(opposite, axis=0, return_inverse=True)
-    return edges, which.reshape(-1, 3)
