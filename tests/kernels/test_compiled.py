@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from open_surfaces import bottle, moebius, sheet
-from solids import OCTAHEDRON, icosphere, together, torus, two_components
+from solids import OCTAHEDRON, icosphere, together, torus
 
 from vtk_segdeform import Mesh, Surface, models
 from vtk_segdeform.cages.fit import fit_cages
@@ -61,7 +61,7 @@ def test_checks_import_numba_only_where_it_pays(monkeypatch):
 
 def test_any_triangles_become_the_same_mesh(twin, monkeypatch):
     monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    for seed in range(24):
+    for seed in range(20):
         vertices, faces = torn(seed)
 
         def call(vertices=vertices, faces=faces):
@@ -80,7 +80,7 @@ def torn(seed):
     """Return parts with holes, flips, repeated faces, fins, seams or points in no face."""
     rng = np.random.default_rng(seed)
     band = np.asarray(moebius().points, float), triangles_of(moebius())
-    parts = [icosphere(2), band, two_components(), torus(9, 6), OCTAHEDRON]
+    parts = [icosphere(1), band, torus(9, 6), torus(8, 5), OCTAHEDRON]
     vertices, faces = together(*(parts[k] for k in rng.integers(0, len(parts), 2)))
     vertices = vertices * 10 ** rng.uniform(-7, 6) + 0.0
     if seed % 2:

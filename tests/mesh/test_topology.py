@@ -103,3 +103,9 @@ def test_renumbered_half_edges_are_those_of_the_renumbered_faces():
             "crowded", "turned", "branching", "repeated", "one_sided",
         ):  # fmt: skip
             assert_array_equal(getattr(found, name), getattr(fresh, name))
+
+
+def test_two_faces_back_to_back_are_a_repeated_face():
+    half_edges = HalfEdges(np.array([[0, 1, 2], [0, 2, 1]]), 3)
+    assert half_edges.repeated.tolist() == [False, True]
+    assert half_edges.all_twins
