@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import sys
 import threading
 import time
 from functools import partial
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from open_surfaces import bottle, moebius, sheet
-from solids import icosphere
+from solids import OCTAHEDRON, icosphere, together, torus
 
 from vtk_segdeform import Mesh, Surface, models
 from vtk_segdeform.cages.fit import fit_cages
@@ -23,7 +24,9 @@ from vtk_segdeform.geometry.lids import lids_of
 from vtk_segdeform.geometry.normals import VertexNormals
 from vtk_segdeform.geometry.rotations import closest_rotations
 from vtk_segdeform.geometry.volume import signed_volume, volume_along, volume_gradient
+from vtk_segdeform.io.polygons import triangles_of
 from vtk_segdeform.kernels import dispatch, threads
+from vtk_segdeform.mesh import find_faults, mesh_of
 from vtk_segdeform.regions.regions import Regions
 from vtk_segdeform.subspace.subspace import Subspace, _add_product, _adjoint_product
 
@@ -45,6 +48,56 @@ def twin(monkeypatch):
             return quick, call()
 
     return both
+
+
+def test_checks_import_numba_only_where_it_pays(monkeypatch):
+    pytest.importorskip("numba")
+    monkeypatch.delitem(sys.modules, "vtk_segdeform.kernels.compiled", raising=False)
+    monkeypatch.setattr(dispatch, "_checked", [0])
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 100)
+    assert dispatch.compiled_checks(60) is None
+    assert dispatch.compiled_checks(60) is not None
+
+
+def test_any_triangles_become_the_same_mesh(twin, monkeypatch):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    for seed in range(20):
+        vertices, faces = torn(seed)
+
+        def call(vertices=vertices, faces=faces):
+            soup, report = mesh_of(vertices, faces), find_faults(vertices, faces)
+            texts = *map(str, soup.workarounds), str(report), str(report.is_closed)
+            arrays = [soup.vertex_of, soup.mesh.boundary, soup.mesh.vertices, soup.mesh.faces]
+            return texts, [*arrays, *(each.points for each in soup.workarounds)]
+
+        (texts, arrays), (expected, others) = twin(call)
+        assert texts == expected
+        for one, other in zip(arrays, others, strict=True):
+            assert_array_equal(one, other)
+
+
+def torn(seed):
+    """Return parts with holes, flips, repeated faces, fins, seams or points in no face."""
+    rng = np.random.default_rng(seed)
+    band = np.asarray(moebius().points, float), triangles_of(moebius())
+    parts = [icosphere(1), band, torus(9, 6), torus(8, 5), OCTAHEDRON]
+    vertices, faces = together(*(parts[k] for k in rng.integers(0, len(parts), 2)))
+    vertices = vertices * 10 ** rng.uniform(-7, 6) + 0.0
+    if seed % 2:
+        faces = faces[rng.random(len(faces)) > 0.02]
+    if seed % 3 == 1:
+        flip = rng.random(len(faces)) < 0.03
+        faces = np.where(flip[:, None], faces[:, ::-1], faces)
+    if seed % 4 == 1:
+        more = np.c_[faces[:3, :2], rng.integers(0, len(vertices), 3)]
+        faces = np.vstack([faces, faces[:2, [1, 0, 2]], more])
+    if seed % 4 == 2:
+        side = vertices[faces].mean(axis=1)[:, 0] > 0
+        keys, number = np.unique(2 * faces.ravel() + np.repeat(side, 3), return_inverse=True)
+        vertices, faces = vertices[keys // 2], number.reshape(-1, 3)
+    if seed % 5 == 1:
+        vertices = np.vstack([vertices, [[np.nan, 0, 0], vertices[0]]])
+    return vertices, faces
 
 
 @pytest.mark.parametrize("far", [0.0, 1e3])

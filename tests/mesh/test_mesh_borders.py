@@ -8,7 +8,8 @@ from numpy.testing import assert_array_equal
 from solids import CUBE, SOLIDS, icosphere, torus
 
 from vtk_segdeform.mesh import Mesh, mesh_of
-from vtk_segdeform.mesh.topology import HalfEdges, loops_of
+from vtk_segdeform.mesh.loops import loops_of
+from vtk_segdeform.mesh.topology import HalfEdges
 
 
 def edges_of(loops):

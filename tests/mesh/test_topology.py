@@ -9,7 +9,22 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from vtk_segdeform import sizes
+from vtk_segdeform.kernels import dispatch
+from vtk_segdeform.mesh import topology
 from vtk_segdeform.mesh.topology import HalfEdges
+
+
+@pytest.fixture(params=["compiled", "threads", "numpy"], autouse=True)
+def kernels(request, monkeypatch):
+    """Run each test with compiled kernels, in one thread and in several, and without."""
+    if request.param == "numpy":
+        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+        return
+    pytest.importorskip("numba")
+    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
+    if request.param == "threads":
+        monkeypatch.setattr(topology, "_LARGE", 0)
 
 
 def random_faces(seed: int) -> np.ndarray:
@@ -36,12 +51,22 @@ def links(faces, corners):
     return {id(each): each for each in group.values()}.values(), of_edge
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(40))
 def test_any_few_triangles_have_the_properties_of_the_definitions(seed):
     for part in range(5):
         faces = random_faces(100 * seed + part)
         n = int(faces.max()) + 1
         half_edges = HalfEdges(faces, n)
+        forth = [(a, b) for face in faces.tolist() for a, b in pairwise([*face, face[0]])]
+        at = [[h for h, e in enumerate(forth) if {*e} == {*edge}] for edge in forth]
+        several = [h for h, around in enumerate(at) if len(around) > 2]
+        turned = [h for h, o in enumerate(at) if len(o) == 2 and forth[o[0]] == forth[o[1]]]
+        assert sorted(half_edges.boundary.tolist()) == [h for h, o in enumerate(at) if len(o) == 1]
+        assert sorted(half_edges.crowded.tolist()) == several
+        assert sorted(half_edges.turned.tolist()) == [h for h in turned if h == at[h][0]]
+        assert half_edges.all_twins == (all(len(o) == 2 for o in at) and not turned)
+        other = [-1 if len(o) == 1 else -2 if len(o) > 2 else sum(o) - h for h, o in enumerate(at)]
+        assert half_edges.opposite.tolist() == other
         keys = [frozenset(face) for face in faces.tolist()]
         assert half_edges.repeated.tolist() == [key in keys[:k] for k, key in enumerate(keys)]
         corners = [(f, v) for f, face in enumerate(faces.tolist()) for v in face]
@@ -72,6 +97,15 @@ def test_renumbered_half_edges_are_those_of_the_renumbered_faces():
         number = np.zeros(known.n_vertices, dtype=np.int64)
         number[gaps] = np.arange(len(gaps))
         found, fresh = known.renumbered(number, len(gaps)), HalfEdges(faces, len(gaps))
-        assert "order" in vars(found)
-        for name in ("order", "first", "pairs", "boundary", "net_boundary", "pinched", "across"):
+        assert "shells" in vars(found)
+        for name in (
+            "order", "first", "pairs", "boundary", "net_boundary", "pinched", "across", "shells",
+            "crowded", "turned", "branching", "repeated", "one_sided",
+        ):  # fmt: skip
             assert_array_equal(getattr(found, name), getattr(fresh, name))
+
+
+def test_two_faces_back_to_back_are_a_repeated_face():
+    half_edges = HalfEdges(np.array([[0, 1, 2], [0, 2, 1]]), 3)
+    assert half_edges.repeated.tolist() == [False, True]
+    assert half_edges.all_twins

@@ -11,10 +11,12 @@ import pyvista as pv
 
 from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
+from ..freezing import read_only
 from ..mesh import first_equal_row, normals, repeats_vertex
 from ..mesh_repair import triangulate_long_loop
 
 _PLANAR = 1e-6  # height over size
+_NO_COUNTS: IntArray = np.empty(0, dtype=np.int64)
 
 
 def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.PolyData:
@@ -133,6 +135,11 @@ def triangles_of(polydata: pv.PolyData) -> IntArray:
     MeshError
         If a vertex index is out of range.
     """
+    cells = polydata.GetPolys()
+    if cells.IsHomogeneous() == 3 and not polydata.GetNumberOfStrips():  # the most common case
+        corners = np.asarray(pv.convert_array(cells.GetConnectivityArray()), dtype=np.int64)
+        _require_polygons(polydata.n_points, _NO_COUNTS, corners)
+        return read_only(corners.reshape(-1, 3))
     counts, corners = _all_polygons(polydata)
     enough = counts >= 3
     if not enough.all():

@@ -7,15 +7,17 @@ The files, in reading order:
     compiled    the kernels, compiled by numba
 """
 
-from .dispatch import advice, compiled_kernels, inputs, writable
+from .dispatch import advice, compiled_checks, compiled_kernels, inputs, scratch, writable
 from .threads import in_parallel, n_threads, one_blas_thread
 
 __all__ = [
     "advice",
+    "compiled_checks",
     "compiled_kernels",
     "in_parallel",
     "inputs",
     "n_threads",
     "one_blas_thread",
+    "scratch",
     "writable",
 ]

@@ -1,6 +1,7 @@
 """Choice between compiled kernels and their equivalents in numpy.
 
     kernels = compiled_kernels()        the module `compiled`, or None
+    kernels = compiled_checks(size)     the same for short checks, which are not worth an import
 
 numba is installed with the package on platforms that have wheels of it.  Importing it takes half a
 second, so it is imported for the first array that is large enough.  Without it everything works,
@@ -13,6 +14,7 @@ import functools
 import importlib
 import importlib.util
 import os
+import sys
 from typing import Any
 
 import numpy as np
@@ -21,11 +23,27 @@ from numpy.typing import NDArray
 from .. import sizes
 
 _LIBRARIES = "numba", "threadpoolctl"  # required for speed only
+_HUGE = 1 << 23  # bytes; only the pages that are used take memory
+_checked = [0]  # faces processed so far by equivalents in numpy
 
 
 def compiled_kernels(size: int | None = None) -> Any:
     """Return the compiled kernels; None without numba, or if *size* is not worth a call."""
     return _kernels() if size is None or size >= sizes.COMPILED else None
+
+
+def compiled_checks(size: int) -> Any:
+    """Return the compiled kernels for checks of meshes; None while importing numba does not pay.
+
+    Many programs check a few meshes and need no other kernel.  So numba is imported only after the
+    equivalents in numpy have processed so many faces that they have taken as long as the import.
+    Both give the same results.
+    """
+    if f"{__package__}.compiled" not in sys.modules:
+        _checked[0] += size
+        if _checked[0] < sizes.COMPILED_CHECKS:
+            return None
+    return _kernels()
 
 
 def advice() -> str:
@@ -55,6 +73,17 @@ def writable(array: NDArray[Any]) -> NDArray[Any]:
     For microsecond kernels, where the overhead of `inputs` would equal the kernel itself.
     """
     return array if array.flags.carray else np.array(array, order="C")
+
+
+def scratch(kind: type[np.signedinteger[Any]], *sizes: int) -> list[NDArray[Any]]:
+    """Return integer arrays of the given sizes and any values, for the time of a computation.
+
+    They are parts of one array that is large enough for numpy to request huge pages: small pages
+    can take longer to get than a kernel takes to fill them.
+    """
+    ends = np.cumsum(sizes)
+    room = np.empty(max(int(ends[-1]), _HUGE // kind().itemsize), dtype=kind)
+    return np.split(room[: ends[-1]], ends[:-1])
 
 
 @functools.cache

@@ -5,7 +5,9 @@ The files, in reading order:
     mesh             `Mesh`, checked and immutable
     faults           search for the faults of a mesh
     report           kinds of faults, counted and described
-    topology         half-edges, edges, fans, shells and boundaries
+    topology         half-edges, fans and shells
+    edges            numbers, lists and components of edges
+    loops            boundaries as loops of vertices
     orientation      which faces of any triangles to flip
     soup             a mesh from any triangles, and the map between both
     shells           orientation of closed shells
@@ -15,23 +17,16 @@ The files, in reading order:
     grouping         connected components, equal rows and ragged ranges in linear time
 """
 
+from .edges import components, edge_keys, face_edges, next_half_edge, repeats_vertex
 from .faults import UNREPAIRABLE, as_soup, connectivity_faults, find_faults
-from .grouping import connected, first_equal_row, first_of_group, ragged_arange
+from .grouping import connected, first_equal_row, first_of_group, ragged_arange, two_sides
 from .inside import distance_to_surface, inside_nodes, inside_points, winding_number
 from .intersections import flat_faces, intersections_of, self_intersections
 from .mesh import Mesh, require_mesh
 from .report import Kind, MeshReport, counted
 from .shells import misoriented_shells
 from .soup import Soup, Workaround, mesh_of
-from .topology import (
-    HalfEdges,
-    components,
-    edge_keys,
-    face_edges,
-    next_half_edge,
-    repeats_vertex,
-    two_sides,
-)
+from .topology import HalfEdges
 from .triangles import corner_angles, least_angle, normals
 
 __all__ = [

@@ -7,25 +7,28 @@ reported once and under its own name.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import BoolArray, FloatArray, IntArray, plain
 from ..errors import ArgumentError
-from ..kernels import in_parallel
-from .grouping import connected, first_equal_row
+from ..kernels import compiled_checks, in_parallel, inputs
+from .edges import repeats_vertex
+from .grouping import connected, first_equal_row, first_members
 from .report import Fault, Id, Kind, MeshReport, counted
 from .shells import closed_shells, shell_faults
-from .topology import HalfEdges, repeats_vertex
+from .topology import HalfEdges
 from .triangles import corner_columns, cross, norm
 
 UNREPAIRABLE = (Kind.EMPTY, Kind.BAD_INDEX, Kind.TOO_LARGE, Kind.TOO_SMALL, Kind.FLAT)
 _EXAMPLES = 4
+_FEW = 100  # faces or points that usually answer a question about all
 _PIECE = 10_000  # faces per task; their data fit into the cache
+_LARGE_PIECE = 200_000  # faces per task of compiled kernels, which take a millisecond for so many
 _LARGEST, _SMALLEST = 1e70, 1e-70  # fourth powers of lengths must neither overflow nor vanish
 _FLAT = 1e-12  # height over longest edge; a flatter face counts as one without area
 
@@ -77,10 +80,40 @@ class Search:
         search.__dict__["_distinct"] = none, none, half_edges
         return search
 
+    def at(self, points: FloatArray) -> Search:
+        """Return the search of the same triangles over other *points* (n, 3)."""
+        search = Search(points, self.triangles)
+        search.__dict__["_corners"] = self._corners
+        return search
+
+    @cached_property
+    def _corners(self) -> tuple[BoolArray, int | None]:
+        used, faces = np.zeros(len(self.points), dtype=bool), self.triangles
+        if kernels := compiled_checks(len(faces)):
+            n_repeating = kernels.used_vertices(used, *inputs(faces))
+            if n_repeating >= 0:
+                return used, n_repeating
+        elif not len(faces) or (faces.min() >= 0 and faces.max() < len(used)):
+            used[faces] = True
+            return used, int(np.count_nonzero(repeats_vertex(faces)))
+        used[:] = False
+        used[faces[((faces >= 0) & (faces < len(used))).all(axis=1)]] = True
+        return used, None
+
+    @property
+    def used(self) -> BoolArray:
+        """(n,) bool: which points are in a face whose vertex indices are all in range."""
+        return self._corners[0]
+
+    @property
+    def n_repeating(self) -> int | None:
+        """Number of faces that contain a vertex twice; None if an index is out of range."""
+        return self._corners[1]
+
     @cached_property
     def number_faults(self) -> tuple[Fault, ...]:
         """Faults of coordinates and indices; nothing else is computed if some are unrepairable."""
-        return tuple(_number_faults(self.points, self.triangles))
+        return tuple(_number_faults(self))
 
     @cached_property
     def degenerate(self) -> BoolArray:
@@ -99,6 +132,11 @@ class Search:
 
     @cached_property
     def _distinct(self) -> tuple[BoolArray, BoolArray, HalfEdges]:
+        none = np.zeros(len(self.triangles), dtype=bool)
+        if self.n_repeating == 0:
+            half_edges = HalfEdges(self.triangles, len(self.points))
+            if not half_edges.repeated.any():
+                return none, none, half_edges
         return distinct_faces(self.triangles, len(self.points))
 
     @cached_property
@@ -106,41 +144,77 @@ class Search:
         """(k,) int: the faces without area."""
         return _flat_faces(self.points, self.triangles)
 
-    @property
+    @cached_property
     def all_flat(self) -> bool:
         """Whether no face has an area."""
-        return len(self.flat) == len(self.triangles)
+        few = self.triangles[:_FEW]  # usually enough
+        return len(_flat_faces(self.points, few)) == len(few) and (
+            len(self.flat) == len(self.triangles)
+        )
 
     @cached_property
     def first_at(self) -> IntArray:
         """(n,) int: the first vertex at the position of each vertex."""
         return first_equal_row(self.points)
 
+    @property
+    def _unrepairable(self) -> bool:
+        return any(fault.kind in UNREPAIRABLE for fault in self.number_faults)
+
     @cached_property
-    def report(self) -> MeshReport:
-        """All faults and notes."""
-        n_components = 0
+    def n_components(self) -> int:
+        """Number of shells; 0 if a fault cannot be repaired."""
+        return 0 if self._unrepairable else int(self.half_edges.shells.max(initial=-1)) + 1
+
+    @cached_property
+    def faults(self) -> tuple[Fault, ...]:
+        """What prevents the triangles from being a `Mesh`."""
         found = list(self.number_faults)
-        if not any(fault.kind in UNREPAIRABLE for fault in found):
-            n_components = int(self.half_edges.shells.max(initial=-1)) + 1
+        if not self._unrepairable:
             found += _some(Kind.DEGENERATE, np.flatnonzero(self.degenerate))
             found += _some(Kind.DUPLICATE_FACE, np.flatnonzero(self.duplicate))
             if self.all_flat and not self.degenerate.all():
                 found.append(Fault(Kind.FLAT, 1))
+            found += _turned_edges(self.half_edges)
+            found += _some(Kind.INWARD, self._inward_and_flat_shells[0])
+        return tuple(found)
+
+    @cached_property
+    def notes(self) -> tuple[Fault, ...]:
+        """What else is worth knowing."""
+        found: list[Fault] = []
+        if not self._unrepairable:
             found += _some(Kind.ZERO_AREA, self.flat[~self.degenerate[self.flat]])
-            found += _edge_faults(self.half_edges)
-            found += _inward_shells(self.points, self.half_edges)
+            found += _edge_notes(self.half_edges)
+            found += _some(Kind.NO_VOLUME, self._inward_and_flat_shells[1])
             coincident = self.first_at != np.arange(len(self.points))
             found += _some(Kind.COINCIDENT, np.flatnonzero(coincident))
-            if n_components > 1:
-                found.append(Fault(Kind.COMPONENTS, n_components))
-        return MeshReport(
-            n_vertices=len(self.points),
-            n_faces=len(self.triangles),
-            n_components=n_components,
-            faults=tuple(fault for fault in found if fault.kind.fatal),
-            notes=tuple(fault for fault in found if not fault.kind.fatal),
-        )
+            if self.n_components > 1:
+                found.append(Fault(Kind.COMPONENTS, self.n_components))
+        return tuple(found)
+
+    @cached_property
+    def _inward_and_flat_shells(self) -> tuple[IntArray, IntArray]:
+        finite = None
+        if any(fault.kind is Kind.NON_FINITE for fault in self.number_faults):
+            finite = _finite(self.points)
+        return _inward_and_flat_shells(self.points, self.half_edges, finite)
+
+    @property
+    def is_two_manifold(self) -> bool:
+        """`MeshReport.is_two_manifold`, without the other notes."""
+        return not self.faults and self.half_edges.all_twins and not len(self.half_edges.pinched)
+
+    @property
+    def is_closed(self) -> bool:
+        """`MeshReport.is_closed`, without the other notes."""
+        return self.is_two_manifold and not len(self._inward_and_flat_shells[1])
+
+    @cached_property
+    def report(self) -> MeshReport:
+        """All faults and notes."""
+        n_vertices, n_faces = len(self.points), len(self.triangles)
+        return MeshReport(n_vertices, n_faces, self.n_components, self.faults, self.notes)
 
 
 def as_soup(vertices: ArrayLike, faces: ArrayLike) -> tuple[FloatArray, IntArray]:
@@ -199,26 +273,29 @@ def connectivity_faults(n_points: int, faces: IntArray) -> list[str]:
     return faults
 
 
-def _number_faults(points: FloatArray, faces: IntArray) -> Iterator[Fault]:
+def _number_faults(search: Search) -> Iterator[Fault]:
+    points, faces = search.points, search.triangles
     if not len(faces):
         yield Fault(Kind.EMPTY, 1)
     finite, far = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
-    if not (np.abs(points) <= _LARGEST).all():  # one cheap test before several
+    if points.size and not -_LARGEST <= points.min() <= points.max() <= _LARGEST:
         finite = _finite(points)
         far[:] = (np.isfinite(points) & (np.abs(points) > _LARGEST)).any(axis=1)
     yield from _some(Kind.NON_FINITE, np.flatnonzero(~finite))
-    bad = np.zeros(len(faces), dtype=bool)
-    if len(faces) and (faces.min() < 0 or faces.max() >= len(points)):
-        bad[:] = ((faces < 0) | (faces >= len(points))).any(axis=1)
-    yield from _some(Kind.BAD_INDEX, np.flatnonzero(bad))
+    if search.n_repeating is None:
+        bad = ((faces < 0) | (faces >= len(points))).any(axis=1)
+        yield from _some(Kind.BAD_INDEX, np.flatnonzero(bad))
     yield from _some(Kind.TOO_LARGE, np.flatnonzero(far))
-    if finite.any() and not far.any():
-        columns = points.T if finite.all() else points[finite].T
-        if 0.0 < max(np.ptp(column) for column in columns) < _SMALLEST:
-            yield Fault(Kind.TOO_SMALL, 1)
-    used = np.zeros(len(points), dtype=bool)
-    used[faces[~bad] if bad.any() else faces] = True
-    yield from _some(Kind.UNREFERENCED, np.flatnonzero(~used))
+    if finite.any() and not far.any() and _too_small(points if finite.all() else points[finite]):
+        yield Fault(Kind.TOO_SMALL, 1)
+    yield from _some(Kind.UNREFERENCED, np.flatnonzero(~search.used))
+
+
+def _too_small(points: FloatArray) -> bool:
+    few = points[:_FEW]  # usually enough
+    if (np.abs(few - few[0]) >= _SMALLEST).any():
+        return False
+    return bool(0.0 < max(np.ptp(column) for column in points.T) < _SMALLEST)
 
 
 def _finite(points: FloatArray) -> BoolArray:
@@ -242,6 +319,11 @@ def _flat_faces(points: FloatArray, faces: IntArray) -> IntArray:
     """Return the faces without area, (k,) int."""
     flat = np.zeros(len(faces), dtype=bool)
 
+    if kernels := compiled_checks(len(faces)):
+        given = inputs(points, faces)
+        in_parallel(partial(kernels.flat_faces, flat, *given, _FLAT), len(faces), _LARGE_PIECE)
+        return np.flatnonzero(flat)
+
     def work(start: int, stop: int) -> None:
         with np.errstate(invalid="ignore", over="ignore"):
             a, b, c = corner_columns(points, faces[start:stop])
@@ -253,57 +335,55 @@ def _flat_faces(points: FloatArray, faces: IntArray) -> IntArray:
     return np.flatnonzero(flat)
 
 
-def _edge_faults(half_edges: HalfEdges) -> Iterator[Fault]:
-    def edges(some: IntArray) -> tuple[Id, ...]:
-        ends = np.stack([half_edges.tail[some], half_edges.head[some]], axis=1)
-        return tuple((a, b) for a, b in np.sort(ends, axis=1).tolist())
-
-    if half_edges.twin is not None:  # nothing else can be wrong
-        yield from _some(Kind.NON_MANIFOLD_VERTEX, half_edges.pinched)
-        return
-    yield from _some(Kind.OPEN_EDGE, half_edges.boundary, edges)
-    ends = np.stack(
-        [half_edges.tail[half_edges.boundary], half_edges.head[half_edges.boundary]], axis=1
-    )
+def _edge_notes(half_edges: HalfEdges) -> Iterator[Fault]:
+    boundary = half_edges.boundary
+    yield from _some(Kind.OPEN_EDGE, boundary, half_edges)
+    ends = np.stack([half_edges.tail[boundary], half_edges.head_of(boundary)], axis=1)
     corners, ends = np.unique(ends, return_inverse=True)
-    _, hole = np.unique(connected(len(corners), *ends.reshape(-1, 2).T), return_index=True)
+    hole = first_members(connected(len(corners), *ends.reshape(-1, 2).T))
     yield from _some(Kind.HOLE, corners[hole])
-    non_manifold = half_edges.order[half_edges.first[half_edges.counts > 2]]
-    yield from _some(Kind.NON_MANIFOLD_EDGE, non_manifold, edges)
+    yield from _some(Kind.NON_MANIFOLD_EDGE, half_edges.branching, half_edges)
     yield from _some(Kind.NON_MANIFOLD_VERTEX, half_edges.pinched)
-    turned = half_edges.pairs[half_edges.inconsistent, 0]
+    if len(half_edges.turned):
+        first = first_members(half_edges.shells)
+        yield from _some(Kind.ONE_SIDED, half_edges.faces[first[half_edges.one_sided], 0])
+
+
+def _turned_edges(half_edges: HalfEdges) -> Iterator[Fault]:
+    turned = half_edges.turned
     if len(turned):
-        one_sided = half_edges.one_sided
-        yield from _some(
-            Kind.TURNED_EDGE, turned[~one_sided[half_edges.shells[turned // 3]]], edges
-        )
-        _, first = np.unique(half_edges.shells, return_index=True)
-        yield from _some(Kind.ONE_SIDED, half_edges.faces[first[one_sided], 0])
+        turned = turned[~half_edges.one_sided[half_edges.shells[turned // 3]]]
+        yield from _some(Kind.TURNED_EDGE, turned, half_edges)
 
 
-def _inward_shells(points: FloatArray, half_edges: HalfEdges) -> Iterator[Fault]:
-    """Yield the faults of orientation of the shells that are closed and consistently oriented.
+def _inward_and_flat_shells(
+    points: FloatArray, half_edges: HalfEdges, finite: BoolArray | None
+) -> tuple[IntArray, IntArray]:
+    """Return a vertex of each shell that is inside-out, and of each that encloses no volume.
 
-    Others may be around them.
+    Only shells that are closed and consistently oriented; others may be around them.  *finite* (n,)
+    says which points are, if not all.
     """
     faces, shells = half_edges.faces, half_edges.shells
     closed = closed_shells(half_edges)
-    if not (finite := _finite(points)).all():
+    if finite is not None:
         valid = finite[faces].all(axis=1)
         closed[shells[~valid]] = False
         faces = faces[valid]
         left, shells = np.unique(shells[valid], return_inverse=True)
         closed = closed[left]
-    if closed.any():
-        wrong, flat, first = shell_faults(points, faces, shells, closed)
-        yield from _some(Kind.INWARD, faces[first[wrong & ~flat], 0])
-        yield from _some(Kind.NO_VOLUME, faces[first[flat], 0])
+    if not closed.any():
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    wrong, flat, first = shell_faults(points, faces, shells, closed)
+    return faces[first[wrong & ~flat], 0], faces[first[flat], 0]
 
 
-def _some(
-    kind: Kind, where: IntArray, ids: Callable[[IntArray], tuple[Id, ...]] | None = None
-) -> Iterator[Fault]:
-    """Yield the fault if it occurs; *ids* converts its first few occurrences to examples."""
+def _some(kind: Kind, where: IntArray, edges_of: HalfEdges | None = None) -> Iterator[Fault]:
+    """Yield the fault if it occurs, at vertices or faces, or at half-edges of *edges_of*."""
     if len(where):
         few = where[:_EXAMPLES]
-        yield Fault(kind, len(where), ids(few) if ids else tuple(few.tolist()))
+        examples: tuple[Id, ...] = tuple(few.tolist())
+        if edges_of is not None:
+            ends = np.stack([edges_of.tail[few], edges_of.head_of(few)], axis=1)
+            examples = tuple((a, b) for a, b in np.sort(ends, axis=1).tolist())
+        yield Fault(kind, len(where), examples)

@@ -11,6 +11,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, IntArray
+from ..kernels import compiled_checks, inputs, scratch
 
 _MIX = np.uint64(0x9E3779B97F4A7C15)  # odd, with irregular bits: a multiplicative hash
 
@@ -25,11 +26,47 @@ def connected(n: int, one: IntArray, other: IntArray) -> IntArray:
     """
     if n == 0:
         return np.empty(0, dtype=np.int64)
+    if kernels := compiled_checks(len(one)):
+        tree: IntArray = np.arange(n)
+        kernels.link(tree, *inputs(np.asarray(one, np.int64), np.asarray(other, np.int64)))
+        kernels.number_trees(tree)
+        return tree
     links = sparse.coo_array((np.ones(len(one), bool), (one, other)), shape=(n, n))
-    count, found = csgraph.connected_components(links, directed=False)
-    rank = np.empty(count, np.int64)
-    rank[np.argsort(first_members(found))] = np.arange(count)
-    return rank[found]
+    return renumbered_by_first(csgraph.connected_components(links, directed=False)[1])
+
+
+def renumbered_by_first(labels: NDArray[np.integer]) -> IntArray:
+    """Return *labels* (n,) of 0..k-1, maybe with gaps, numbered in the order of first members.
+
+    >>> renumbered_by_first(np.array([3, 1, 3, 0]))
+    array([0, 1, 0, 2])
+    """
+    first = np.full(int(labels.max(initial=-1)) + 1, len(labels))
+    first[labels[::-1]] = np.arange(len(labels))[::-1]  # the last write wins
+    rank = np.empty_like(first)
+    rank[np.argsort(first, kind="stable")] = np.arange(len(first))
+    renumbered: IntArray = rank[labels]
+    return renumbered
+
+
+def two_sides(
+    n: int, one: IntArray, other: IntArray, opposite: BoolArray
+) -> tuple[IntArray, BoolArray]:
+    """Return the group of each of *n* items, (n,) int, and whether to flip it for all to agree.
+
+    Items one[i] and other[i] are neighbours, of different orientation if opposite[i].  A graph has
+    two nodes for each item, unchanged and flipped, and links between nodes of neighbours that
+    agree.  If both nodes of an item are connected, its group is one-sided, and none is flipped.
+    """
+    across = np.where(opposite, other + n, other)
+    group = connected(
+        2 * n,
+        np.concatenate([one, one + n]),
+        np.concatenate([across, (across + n) % max(2 * n, 1)]),
+    )
+    unchanged, flipped = group[:n], group[n:]
+    side = np.minimum(unchanged, flipped)
+    return side, (flipped == side) & (unchanged != flipped)
 
 
 def first_of_group(group: IntArray) -> IntArray:
@@ -48,15 +85,22 @@ def first_equal_row(rows: NDArray[np.generic]) -> IntArray:
     >>> first_equal_row(np.array([[0, 1], [2, 3], [0, 1]]))
     array([0, 1, 0])
     """
+    points = rows.shape[1:] == (3,) and rows.dtype == np.float64
+    if points and (kernels := compiled_checks(len(rows))):
+        found = np.empty(len(rows), dtype=np.int64)
+        (table,) = scratch(np.int32, 1 << (2 * len(rows)).bit_length())
+        table[:] = -1
+        kernels.first_equal_points(found, *inputs(rows), table)
+        return found
     hashes = _hashes(rows)
     ordered = np.sort(hashes)  # faster than to find the order, and usually all that is needed
     if not (ordered[1:] == ordered[:-1]).any():
         return np.arange(len(rows))
     order = np.argsort(hashes, kind="stable")  # equal rows keep their order
-    new = _begins(hashes[order])
-    if (_begins(rows[order]) & ~new).any():  # different rows of equal hash
+    new = begins(hashes[order])
+    if (begins(rows[order]) & ~new).any():  # different rows of equal hash
         order = np.lexsort(rows.T)
-        new = _begins(rows[order])
+        new = begins(rows[order])
     first = np.empty(len(rows), dtype=np.int64)
     first[order] = order[np.flatnonzero(new)][np.cumsum(new) - 1]
     return first
@@ -84,9 +128,23 @@ def first_members(labels: NDArray[np.integer]) -> IntArray:
     >>> first_members(np.array([1, 0, 0, 1]))
     array([1, 0])
     """
-    first = np.empty(int(labels.max(initial=-1)) + 1, np.int64)
+    first = np.zeros(int(labels.max(initial=-1)) + 1, np.int64)
+    if len(first) == 1:
+        return first
     first[labels[::-1]] = np.arange(len(labels))[::-1]  # the last write wins
     return first
+
+
+def begins(ordered: NDArray[np.generic]) -> BoolArray:
+    """Return which items (k, ...) differ from the one before, (k,) bool.
+
+    >>> begins(np.array([4, 4, 7]))
+    array([ True, False,  True])
+    """
+    begins = np.ones(len(ordered), dtype=bool)
+    differ = ordered[1:] != ordered[:-1]
+    begins[1:] = differ if differ.ndim == 1 else differ.any(axis=1)
+    return begins
 
 
 def ragged_arange(counts: IntArray) -> tuple[IntArray, IntArray]:
@@ -97,14 +155,6 @@ def ragged_arange(counts: IntArray) -> tuple[IntArray, IntArray]:
     """
     i = np.repeat(np.arange(len(counts)), counts)
     return i, np.arange(len(i)) - np.repeat(counts.cumsum() - counts, counts)
-
-
-def _begins(ordered: NDArray[np.generic]) -> BoolArray:
-    """Return which items (k, ...) differ from the one before, (k,) bool."""
-    begins = np.ones(len(ordered), dtype=bool)
-    differ = ordered[1:] != ordered[:-1]
-    begins[1:] = differ if differ.ndim == 1 else differ.any(axis=1)
-    return begins
 
 
 def _hashes(rows: NDArray[np.generic]) -> NDArray[np.uint64]:

@@ -31,8 +31,8 @@ from numpy.typing import ArrayLike
 
 from ..arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
 from ..kernels import in_parallel
+from .edges import face_edges
 from .grouping import ragged_arange
-from .topology import face_edges
 
 _BLOCK = 1 << 17  # numbers per temporary array: a megabyte, which fits into the cache
 _PAIRS = 1 << 20  # pairs of face and column processed at once

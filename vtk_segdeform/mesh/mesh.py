@@ -22,8 +22,10 @@ from ..checks import require
 from ..errors import MeshError
 from ..freezing import Frozen, read_only
 from ..kernels import in_parallel
+from .edges import components
 from .faults import Search, as_soup, find_faults
-from .topology import HalfEdges, components, loops_of
+from .loops import loops_of
+from .topology import HalfEdges
 
 _PIECE = 20_000  # faces per task; their data fit into the cache
 
@@ -76,14 +78,13 @@ class Mesh(Frozen):
         return mesh
 
     def _set(self, search: Search) -> None:
-        report = search.report
-        if not report.ok:
-            faults = ", ".join(map(str, report.faults))
+        if search.faults:
+            faults = ", ".join(map(str, search.faults))
             raise MeshError(f"not an oriented mesh: {faults}; see find_faults, repair and Surface")
         self.__setstate__({"vertices": search.points.copy(), "faces": search.triangles.copy()})
-        self.__dict__["is_two_manifold"] = report.is_two_manifold
+        self.__dict__["is_two_manifold"] = search.is_two_manifold
         self.__dict__["boundary"] = read_only(search.half_edges.net_boundary)
-        if report.n_components == 1:
+        if search.n_components == 1:
             self.__dict__["components"] = read_only(np.zeros(self.n_vertices, dtype=np.int64))
 
     @property

@@ -20,9 +20,9 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from .grouping import connected, first_members
+from .grouping import begins, connected, first_members, two_sides
 from .shells import NO_VOLUME, outward_signs, shell_depths, shell_volumes
-from .topology import HalfEdges, two_sides
+from .topology import HalfEdges
 
 _MOST_LIDS = 0.6  # area of the lids of a unit that has an outside, relative to its own
 
@@ -34,28 +34,31 @@ def faces_to_flip(points: FloatArray, half_edges: HalfEdges) -> BoolArray:
     """
     patch, flip, two_sided = _patches(half_edges)
     unit = patch
-    if len(patch) and (half_edges.counts > 2).any():
+    if len(half_edges.crowded):
         group, turned = _linked(points, half_edges, patch, flip, two_sided)
         flip, unit = flip ^ turned[patch], group[patch]
-    n_flipped = np.bincount(unit, flip)
-    minority = n_flipped > np.bincount(unit) - n_flipped
-    flip ^= minority[unit] & two_sided[patch]
-    one_sided = np.zeros(len(minority), dtype=bool)
-    one_sided[unit[~two_sided[patch]]] = True
+    one_sided = np.zeros(int(unit.max(initial=-1)) + 1, dtype=bool)
+    if flip.any():
+        n_flipped = np.bincount(unit, flip)
+        minority = n_flipped > np.bincount(unit) - n_flipped
+        flip ^= minority[unit] & two_sided[patch]
+    if not two_sided.all():
+        one_sided[unit[~two_sided[patch]]] = True
     wrong = _inside_out(points, half_edges, flip, unit, one_sided)
-    return np.asarray(flip ^ wrong[unit])
+    return np.asarray(flip ^ wrong[unit]) if wrong.any() else flip
 
 
 def _patches(half_edges: HalfEdges) -> tuple[IntArray, BoolArray, BoolArray]:
     """Return the patch of each face, (m,), the faces to flip, and which patches have two sides."""
-    if not half_edges.inconsistent.any() and not (half_edges.counts > 2).any():
+    if not len(half_edges.turned) and not len(half_edges.crowded):
         patch = half_edges.shells
         flip = np.zeros(len(patch), dtype=bool)
         return patch, flip, np.ones(int(patch.max(initial=-1)) + 1, dtype=bool)
     side, flip = half_edges.sides
-    _, patch = np.unique(side, return_inverse=True)
-    one, other = half_edges.pairs.T
-    left = (flip[one // 3] ^ flip[other // 3]) != half_edges.inconsistent
+    patch = np.unique(side, return_inverse=True)[1]
+    one, other = half_edges.neighbours.T
+    parallel = half_edges.tail[one] == half_edges.tail[other]
+    left = (flip[one // 3] ^ flip[other // 3]) != parallel
     two_sided = np.ones(int(patch.max(initial=-1)) + 1, dtype=bool)
     two_sided[patch[one[left] // 3]] = False
     return patch, flip, two_sided
@@ -76,11 +79,10 @@ def _linked(
     q = len(two_sided)
     bordered = np.zeros(q, dtype=bool)
     bordered[patch[half_edges.boundary // 3]] = True
-    edge = np.repeat(np.arange(len(half_edges.counts)), half_edges.counts)
-    crowded = half_edges.counts[edge] > 2
-    edge, half = edge[crowded], half_edges.order[crowded]
+    half = half_edges.crowded
+    edge = np.cumsum(begins(half_edges.keys_of(half))) - 1
     of_body = ~bordered[patch[half // 3]]
-    n_of_bodies = np.bincount(edge, of_body, minlength=len(half_edges.counts))
+    n_of_bodies = np.bincount(edge, of_body)
     used = of_body | (n_of_bodies[edge] < 2)
     edge, half = edge[used], half[used]
     angle = _angles(points, half_edges, half, edge)
@@ -90,7 +92,7 @@ def _linked(
     following[np.append(begin[1:], len(order)) - 1] = begin
     one, other = order, order[following]
     wedge = (angle[other] - angle[one]) % (2.0 * np.pi)
-    forth = (half_edges.tail < half_edges.head)[half] ^ flip[half // 3]
+    forth = (half_edges.tail[half] < half_edges.head_of(half)) ^ flip[half // 3]
     vote = np.where(forth[one] != forth[other], 1.0, -1.0) * (wedge + 1e-3)
     p, r = patch[half[one] // 3], patch[half[other] // 3]
     counts = (p != r) & two_sided[p] & two_sided[r]
@@ -110,7 +112,7 @@ def _angles(
     points: FloatArray, half_edges: HalfEdges, half: IntArray, edge: IntArray
 ) -> FloatArray:
     """Return the angle of the faces of half-edges (h,) around their *edge*, from the first one."""
-    tail, head = half_edges.tail[half], half_edges.head[half]
+    tail, head = half_edges.tail[half], half_edges.head_of(half)
     start = points[np.minimum(tail, head)]
     axis = points[np.maximum(tail, head)] - start
     arm = points[half_edges.faces[half // 3].sum(axis=1) - tail - head] - start
@@ -134,11 +136,10 @@ def _inside_out(
     shells = half_edges.shells
     of_shell = unit[first_members(shells)]
     alone = np.ones(len(of_shell), dtype=bool)  # whether the shell is a unit
-    crowded = np.repeat(half_edges.counts > 2, half_edges.counts)
-    alone[shells[half_edges.order[crowded] // 3]] = False
+    alone[shells[half_edges.crowded // 3]] = False
     closed = alone & ~one_sided[of_shell]
     closed[shells[half_edges.boundary // 3]] = False
-    faces = np.where(flip[:, None], half_edges.faces[:, [0, 2, 1]], half_edges.faces)
+    faces = _flipped(half_edges.faces, flip)
     volume, area, size = shell_volumes(points, faces, unit)
     under_lids, lids = _lids(points, half_edges, flip, unit)
     volume = volume + under_lids
@@ -146,7 +147,7 @@ def _inside_out(
     tiny = NO_VOLUME * (area * size)
     wrong = encloses & (volume < -tiny)
     wrong[of_shell[alone]] = False  # first those on which the winding numbers of shells depend
-    faces = np.where(wrong[unit][:, None], faces[:, [0, 2, 1]], faces)
+    faces = _flipped(faces, wrong[unit]) if wrong.any() else faces
     depth = shell_depths(points, faces, shells, alone & encloses[of_shell])
     outward = outward_signs(volume[of_shell], depth, closed)[alone]
     of_shell = of_shell[alone]
@@ -154,15 +155,22 @@ def _inside_out(
     return np.asarray(wrong)
 
 
+def _flipped(faces: IntArray, flip: BoolArray) -> IntArray:
+    if not flip.any():
+        return faces
+    return np.where(flip[:, None], faces[:, [0, 2, 1]], faces)
+
+
 def _lids(
     points: FloatArray, half_edges: HalfEdges, flip: BoolArray, unit: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the volume and the area of the lids of each unit, (u,) float each."""
-    n_units, n_edges = int(unit.max(initial=-1)) + 1, len(half_edges.counts)
-    edge = np.repeat(np.arange(n_edges), half_edges.counts)
-    at_border = half_edges.counts[edge] != 2
-    half, edge = half_edges.order[at_border], edge[at_border]
-    forth = (half_edges.tail < half_edges.head)[half] ^ flip[half // 3]
+    n_units, half = int(unit.max(initial=-1)) + 1, half_edges.unpaired
+    if not len(half):
+        return np.zeros(n_units), np.zeros(n_units)
+    edge = np.cumsum(begins(half_edges.keys_of(half))) - 1
+    n_edges = int(edge[-1]) + 1
+    forth = (half_edges.tail[half] < half_edges.head_of(half)) ^ flip[half // 3]
     keys, first, which = np.unique(
         unit[half // 3] * n_edges + edge, return_index=True, return_inverse=True
     )
@@ -171,7 +179,7 @@ def _lids(
     if not len(keys):
         return np.zeros(n_units), np.zeros(n_units)
     owner = keys // n_edges
-    ends = np.sort(np.stack([half_edges.tail[half], half_edges.head[half]]), axis=0)
+    ends = np.sort(np.stack([half_edges.tail[half], half_edges.head_of(half)]), axis=0)
     tail, head = np.where(times > 0.0, ends, ends[::-1])
     nodes, ends = np.unique(owner * len(points) + [tail, head], return_inverse=True)
     ends = ends.reshape(2, -1)

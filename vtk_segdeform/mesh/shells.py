@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..kernels import in_parallel
+from ..kernels import compiled_checks, in_parallel, inputs
 from .grouping import first_members
 from .inside import winding_number
 from .topology import HalfEdges
@@ -29,14 +29,8 @@ _INSIDE = 0.5 + 1e-6  # at a flat part of a shell it is 0.5: not inside
 def closed_shells(half_edges: HalfEdges) -> BoolArray:
     """Return which shells are closed and consistently oriented, every edge a pair, (k,) bool."""
     closed = np.ones(int(half_edges.shells.max(initial=-1)) + 1, dtype=bool)
-    if half_edges.twin is None:
-        crowded = np.repeat(half_edges.counts > 2, half_edges.counts)
-        for some in (
-            half_edges.boundary,
-            half_edges.order[crowded],
-            half_edges.pairs[half_edges.inconsistent, 0],
-        ):
-            closed[half_edges.shells[some // 3]] = False
+    for some in (half_edges.boundary, half_edges.crowded, half_edges.turned):
+        closed[half_edges.shells[some // 3]] = False
     return closed
 
 
@@ -97,6 +91,11 @@ def shell_volumes(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the volume, area and size of each shell, (k,) each, from its first vertex."""
     origins = vertices[faces[first_members(shells), 0]]
+    if kernels := compiled_checks(len(faces)):
+        volume, area, size = np.zeros((3, len(origins)))
+        several = shells if len(origins) > 1 else shells[:1]  # not read if there is only one
+        kernels.shell_sums(volume, area, size, *inputs(origins, vertices, faces, several))
+        return volume / 6.0, area / 2.0, size
     volumes, areas, radii = np.empty((3, len(faces)))
 
     def work(start: int, stop: int) -> None:

@@ -26,13 +26,15 @@ from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray, as_ids, as_points
 from ..errors import ConstraintError, MeshError
+from .edges import components, repeats_vertex
 from .faults import UNREPAIRABLE, Search, as_soup, distinct_faces
 from .grouping import connected, first_equal_row
 from .mesh import Mesh
 from .orientation import faces_to_flip
 from .report import Fault, Kind, counted
-from .topology import HalfEdges, components, repeats_vertex
+from .topology import HalfEdges
 
+_NONE: IntArray = np.empty(0, dtype=np.int64)
 _REFUSED = (*UNREPAIRABLE, Kind.NON_FINITE)
 
 
@@ -131,38 +133,45 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
         not finite, or too far or too near for computing volumes.
     """
     points, triangles = as_soup(vertices, faces)
-    valid = points
-    if len(triangles) and triangles.min() >= 0 and triangles.max() < len(points):
-        used = np.zeros(len(points), dtype=bool)
-        used[triangles[~repeats_vertex(triangles)]] = True
+    found = Search(points, triangles)
+    if len(triangles) and found.n_repeating is not None:
+        used = found.used
+        if found.n_repeating:
+            used = np.zeros(len(points), dtype=bool)
+            used[triangles[~repeats_vertex(triangles)]] = True
         if not used.all():  # points in no face must not matter
-            valid = np.where(used[:, None], points, points[used.argmax()] if used.any() else 0.0)
-    found = Search(valid, triangles)
+            other = points[used.argmax()] if used.any() else 0.0
+            found = found.at(np.where(used[:, None], points, other))
+    valid = found.points
     _require_usable(found)
-    if found.half_edges.twin is not None and found.report.is_closed:
+    if found.half_edges.all_twins and found.is_closed:
         return Soup(points, Mesh.of(found), np.arange(len(points)))
     target, kept, half_edges = _welded(valid, found)
     without_area = _without_area(found, kept, half_edges)
-    flat = kept[without_area]
+    flat = np.flatnonzero(kept)[without_area] if without_area.any() else _NONE
     if len(flat):
-        kept = kept[~without_area]
+        kept[flat] = False
         half_edges = HalfEdges(half_edges.faces[~without_area], len(points))
     flip = faces_to_flip(valid, half_edges)
-    left = np.zeros(len(points), dtype=bool)
-    left[half_edges.faces] = True
-    number = np.cumsum(left) - 1
-    if flip.any():
-        faces_left = half_edges.faces
-        faces_left = np.where(flip[:, None], faces_left[:, [0, 2, 1]], faces_left)
-        mesh = Mesh(points[left], number[faces_left])
-    elif half_edges is found.half_edges and len(kept) == len(triangles) and left.all():
+    left = found.used
+    if not (same := half_edges is found.half_edges and found.n_repeating == 0 and kept.all()):
+        left = np.zeros(len(points), dtype=bool)
+        left[half_edges.faces] = True
+    vertex_of, loose = target, _NONE
+    if same and left.all() and not flip.any():
         mesh = Mesh.of(found)
     else:
-        kept_edges = half_edges.renumbered(number, int(left.sum()))
-        mesh = Mesh.of(Search.known(points[left], kept_edges))
-    loose = np.flatnonzero(~left[target])
-    vertex_of = number[target]
-    vertex_of[loose] = _nearest(points[loose], mesh.vertices)
+        number = np.cumsum(left) - 1
+        if flip.any():
+            faces_left = half_edges.faces
+            faces_left = np.where(flip[:, None], faces_left[:, [0, 2, 1]], faces_left)
+            mesh = Mesh(points[left], number[faces_left])
+        else:
+            kept_edges = half_edges.renumbered(number, int(left.sum()))
+            mesh = Mesh.of(Search.known(points[left], kept_edges))
+        loose = np.flatnonzero(~left[target])
+        vertex_of = number[target]
+        vertex_of[loose] = _nearest(points[loose], mesh.vertices)
     workarounds = tuple(_workarounds(triangles, kept, flat, target, loose, flip, half_edges))
     return Soup(points, mesh, vertex_of, workarounds)
 
@@ -178,14 +187,14 @@ def _require_usable(found: Search) -> None:
         raise MeshError(f"this surface cannot be deformed: {reasons}")
 
 
-def _welded(points: FloatArray, found: Search) -> tuple[IntArray, IntArray, HalfEdges]:
-    """Return the point that each point (p,) is welded to, the faces kept, and their half-edges."""
+def _welded(points: FloatArray, found: Search) -> tuple[IntArray, BoolArray, HalfEdges]:
+    """Return the point that each point (p,) is welded to, the faces (m,) kept, and half-edges."""
     target, half_edges = np.arange(len(points)), found.half_edges
-    kept = np.flatnonzero(~found.degenerate & ~found.duplicate)
+    kept = ~(found.degenerate | found.duplicate)
     while len(half_edges.boundary):  # a face that is dropped may leave a border
         weld = _coinciding_sheets(half_edges, found.first_at)
         weld[half_edges.tail[half_edges.boundary]] = True
-        weld[half_edges.head[half_edges.boundary]] = True
+        weld[half_edges.head_of(half_edges.boundary)] = True
         some = np.flatnonzero(weld)
         place, first_there = found.first_at[some], np.empty(len(points), dtype=np.int64)
         first_there[place[::-1]] = some[::-1]  # the last write wins
@@ -196,7 +205,7 @@ def _welded(points: FloatArray, found: Search) -> tuple[IntArray, IntArray, Half
         number[some] = first
         target = number[target]
         degenerate, duplicate, half_edges = distinct_faces(number[half_edges.faces], len(points))
-        kept = kept[~degenerate & ~duplicate]
+        kept[kept] = ~(degenerate | duplicate)
     return target, kept, half_edges
 
 
@@ -210,7 +219,7 @@ def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
     shared = used & (np.bincount(first_at[used], minlength=len(first_at)) > 1)[first_at]
     border = np.zeros_like(found)
     border[half_edges.tail[half_edges.boundary]] = True
-    border[half_edges.head[half_edges.boundary]] = True
+    border[half_edges.head_of(half_edges.boundary)] = True
     if border[used].all():
         return found
     shells = half_edges.shells
@@ -225,8 +234,8 @@ def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
     return found
 
 
-def _without_area(found: Search, kept: IntArray, half_edges: HalfEdges) -> BoolArray:
-    """Return which faces (m,) are in a component of flat faces only, connected at any vertex."""
+def _without_area(found: Search, kept: BoolArray, half_edges: HalfEdges) -> BoolArray:
+    """Return which faces *kept* are in a component of flat faces only, connected at any vertex."""
     is_flat = np.zeros(len(found.triangles), dtype=bool)
     is_flat[found.flat] = True
     is_flat = is_flat[kept]
@@ -249,7 +258,7 @@ def _nearest(points: FloatArray, vertices: FloatArray) -> IntArray:
 
 def _workarounds(
     triangles: IntArray,
-    kept: IntArray,
+    kept: BoolArray,
     flat: IntArray,
     target: IntArray,
     loose: IntArray,
@@ -268,10 +277,10 @@ def _workarounds(
     if len(seam := np.flatnonzero(members > 1)):
         yield _workaround(Kind.COINCIDENT, len(seam), "welded # seam point", seam)
     if flip.any():
-        faces = triangles[kept[flip]]
+        faces = triangles[kept][flip]
         yield _workaround(Kind.TURNED_EDGE, len(faces), "flipped # face", np.unique(faces))
-    dropped = np.ones(len(triangles), dtype=bool)
-    dropped[kept] = dropped[flat] = False
+    dropped = ~kept
+    dropped[flat] = False
     faces = triangles[dropped]
     degenerate = repeats_vertex(target[faces])
     for kind, ignored in (
@@ -287,17 +296,17 @@ def _workarounds(
     if len(loose):
         text = f"{counted(len(loose), 'point is', 'points are')} in no face"
         yield Workaround(text, loose, Kind.UNREFERENCED, len(loose))
-    ends = np.stack([half_edges.tail, half_edges.head])[:, half_edges.boundary]
+    some = half_edges.boundary
+    ends = np.stack([half_edges.tail[some], half_edges.head_of(some)])
     corners, ends = np.unique(ends, return_inverse=True)
     if len(corners):
         n_holes = int(connected(len(corners), *ends.reshape(2, -1)).max()) + 1
         yield _workaround(Kind.HOLE, n_holes, "# hole", at(corners))
-    crowded = half_edges.order[half_edges.first[half_edges.counts > 2]]
-    if len(crowded):
+    if len(crowded := half_edges.branching):
         text = f"{counted(len(crowded), 'edge', 'edges')} with three or more faces"
-        there = at(np.append(half_edges.tail[crowded], half_edges.head[crowded]))
+        there = at(np.append(half_edges.tail[crowded], half_edges.head_of(crowded)))
         yield Workaround(text, there, Kind.NON_MANIFOLD_EDGE, len(crowded))
-    if half_edges.inconsistent.any() and half_edges.one_sided.any():
+    if len(half_edges.turned) and half_edges.one_sided.any():
         one_sided = half_edges.one_sided
         there = at(half_edges.faces[one_sided[half_edges.shells]])
         yield _workaround(Kind.ONE_SIDED, int(one_sided.sum()), "# one-sided component", there)

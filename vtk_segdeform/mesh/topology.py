@@ -2,8 +2,9 @@
 
 A triangle (v_0, v_1, v_2) has three *half-edges*, directed from each corner to the next.
 Half-edge ``h = 3 f + c`` belongs to face f and runs from its corner c to its corner c + 1, so h
-also identifies that corner.  Sorting the 3m half-edges by edge gives everything else; on a closed,
-consistently oriented surface, where every half-edge has a twin, the twins alone suffice:
+also identifies that corner.  Sorting the 3m half-edges by edge gives everything else, but most
+surfaces need no sorting: if every vertex has one fan, the boundary and the shells suffice, and
+otherwise the other half-edge of each pair.  Compiled kernels find them in one pass over the faces:
 
     edge      the half-edges between the same two vertices, in either direction
     twin      the other half-edge of an edge that has two of opposite direction
@@ -14,6 +15,8 @@ consistently oriented surface, where every half-edge has a twin, the twins alone
               two-manifold has exactly one
 
 Positions are not used.
+
+Long because each compiled pass has its equivalent in numpy beside it.
 """
 
 from __future__ import annotations
@@ -26,12 +29,25 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, IntArray
-from .grouping import connected, counting_order, first_equal_row, first_members
+from ..kernels import compiled_checks, in_parallel, inputs, scratch
+from .edges import edge_keys, next_half_edge
+from .grouping import (
+    begins,
+    connected,
+    counting_order,
+    first_equal_row,
+    first_members,
+    renumbered_by_first,
+    two_sides,
+)
 
 _NAMELESS = (
     "order", "twin", "opposite", "across", "first", "counts", "boundary", "pairs", "inconsistent",
-    "repeated", "shells", "sides", "one_sided",
+    "repeated", "shells", "sides", "one_sided", "crowded", "turned", "_alone", "_paired",
 )  # fmt: skip
+_MOST = 2**31 // 6  # faces, for numbers of 32 bits in the kernels
+_LARGE = 200_000  # faces for which another thread is worth waking
+_NONE: IntArray = np.empty(0, dtype=np.int64)
 _ROUNDS = 10_000  # steps around a vertex; with more faces at a vertex, `fans` are counted
 
 
@@ -66,8 +82,57 @@ class HalfEdges:
         return order
 
     @cached_property
+    def _alone(self) -> IntArray | None:
+        """`boundary` if every vertex has one fan, and no face is repeated; else None.
+
+        None without compiled kernels.
+        """
+        m, n = len(self.faces), self.n_vertices
+        kernels = compiled_checks(m) if m < _MOST else None
+        if kernels is None:
+            return None
+        (faces,) = inputs(self.faces)
+        border, starts, *after = scratch(np.int32, n, n + 2, n, n)
+        links, tree = scratch(np.int64, 3 * m, n)
+        tree[:] = np.arange(n)
+        found = [0, 0]
+
+        def work(start: int, stop: int) -> None:
+            for task in range(start, stop):
+                if task == 0:
+                    found[0] = kernels.one_fan_each(border, starts, *after, links, faces)
+                else:  # for `shells`, which are needed too
+                    found[1] = kernels.link_corners(tree, faces)
+
+        in_parallel(work, 2, 1 if m >= _LARGE else 2)
+        count, n_trees = found
+        if count < 0:
+            return None
+        if n_trees == 1:
+            self.__dict__["shells"] = np.broadcast_to(np.int64(0), m)  # without memory
+        else:
+            kernels.number_trees(tree)
+            self.__dict__["shells"] = renumbered_by_first(tree[faces[:, 0]])
+        alone = np.empty(count, dtype=np.int64)
+        if count:
+            kernels.border_half_edges(alone, border, faces)
+        return self._by_edge(alone)
+
+    @cached_property
+    def _paired(self) -> tuple[IntArray, bool] | None:
+        """`opposite`, and whether all are twins; None without compiled kernels."""
+        m, n = len(self.faces), self.n_vertices
+        kernels = compiled_checks(m) if m < _MOST else None
+        if kernels is None:
+            return None
+        opposite, others = np.empty(3 * m, dtype=np.int64), scratch(np.int64, n + 2, n, 3 * m)
+        return opposite, not any(kernels.pair_half_edges(opposite, *others, *inputs(self.faces)))
+
+    @cached_property
     def twin(self) -> IntArray | None:
         """(3m,) int: the twin of each half-edge; None unless every half-edge has one."""
+        if self._paired is not None:
+            return self._paired[0] if self._paired[1] else None
         one, other = self.order[: len(self.order) // 2 * 2].reshape(-1, 2).T
         tail, head = self.tail[one], self.head[one]
         if not (
@@ -81,9 +146,21 @@ class HalfEdges:
         twin[one], twin[other] = other, one
         return twin
 
+    @property
+    def all_twins(self) -> bool:
+        """Whether every half-edge has a twin, so that all shells are closed and oriented."""
+        return self.twin is not None if self._alone is None else not len(self._alone)
+
+    @property
+    def _only_alone(self) -> bool:
+        """Whether every half-edge is known to have a twin or to be alone."""
+        return self._alone is not None or self.twin is not None
+
     @cached_property
     def opposite(self) -> IntArray:
         """(3m,) int: the other half-edge of a pair; -1 if there is none, -2 if several."""
+        if self._paired is not None:
+            return self._paired[0]
         if self.twin is not None:
             return self.twin
         opposite = np.full(3 * len(self.faces), -2)
@@ -111,9 +188,61 @@ class HalfEdges:
 
     @cached_property
     def boundary(self) -> IntArray:
-        """(b,) int: the half-edges that are alone on their edge."""
+        """(b,) int: the half-edges that are alone on their edge, in the order of edges."""
+        if self._alone is not None:
+            return self._alone
+        if self.twin is not None:
+            return _NONE
+        if self._paired is not None:
+            return self._by_edge(np.flatnonzero(self.opposite == -1))
         boundary: IntArray = self.order[self.first[self.counts == 1]]
         return boundary
+
+    @cached_property
+    def crowded(self) -> IntArray:
+        """(c,) int: the half-edges on edges of three or more, in the order of edges."""
+        if self._only_alone:
+            return _NONE
+        if self._paired is not None:
+            return self._by_edge(np.flatnonzero(self.opposite == -2))
+        crowded: IntArray = self.order[np.repeat(self.counts > 2, self.counts)]
+        return crowded
+
+    @property
+    def branching(self) -> IntArray:
+        """(k,) int: the first half-edge of every edge of three or more, in the order of edges."""
+        return self.crowded[begins(self.keys_of(self.crowded))]
+
+    @cached_property
+    def turned(self) -> IntArray:
+        """(t,) int: the first half-edges of inconsistent pairs, in the order of edges."""
+        if self._only_alone:
+            return _NONE
+        if self._paired is not None:
+            one, other = self.neighbours.T
+            return self._by_edge(one[self.tail[one] == self.tail[other]])
+        turned: IntArray = self.pairs[self.inconsistent, 0]
+        return turned
+
+    def _by_edge(self, half_edges: IntArray) -> IntArray:
+        """Return *half_edges* in the order of `order`."""
+        ordered: IntArray = half_edges[np.lexsort((half_edges, self.keys_of(half_edges)))]
+        return ordered
+
+    @property
+    def unpaired(self) -> IntArray:
+        """(k,) int: the half-edges that are not in pairs, in the order of edges."""
+        if not len(self.crowded):
+            return self.boundary
+        return self._by_edge(np.append(self.boundary, self.crowded))
+
+    def head_of(self, half_edges: IntArray) -> IntArray:
+        """Return the vertices at which *half_edges* (k,) end: `head`, if only some are needed."""
+        return self.tail[next_half_edge(half_edges)]
+
+    def keys_of(self, half_edges: IntArray) -> IntArray:
+        """Return the `keys` of *half_edges* (k,)."""
+        return edge_keys(self.tail[half_edges], self.head_of(half_edges), self.n_vertices)
 
     @cached_property
     def pairs(self) -> IntArray:
@@ -121,6 +250,14 @@ class HalfEdges:
         start = self.first[self.counts == 2]
         pairs: IntArray = self.order[start[:, None] + [0, 1]]
         return pairs
+
+    @property
+    def neighbours(self) -> IntArray:
+        """(p, 2) int: `pairs`, in any order."""
+        if self._paired is None:
+            return self.pairs
+        one = np.flatnonzero(self.opposite > np.arange(len(self.opposite)))
+        return np.stack([one, self.opposite[one]], axis=1)
 
     @cached_property
     def non_manifold(self) -> list[IntArray]:
@@ -147,15 +284,15 @@ class HalfEdges:
 
         An edge that k more faces have in one direction than in the other occurs k times.
         """
-        if self.twin is not None:
-            return np.empty((0, 2), dtype=np.int64)
-        summed = self.counts != 2
-        summed[np.flatnonzero(~summed)[self.inconsistent]] = True
-        half = self.order[np.repeat(summed, self.counts)]
-        forth = np.where(self.tail[half] < self.head[half], 1, -1)
-        counts = self.counts[summed]
-        net = np.add.reduceat(forth, np.cumsum(counts) - counts) if len(half) else forth
-        edges = np.stack(np.divmod(self.edge_keys[summed], self.n_vertices), axis=1)
+        half = self.boundary
+        if len(self.crowded) or len(self.turned):
+            turned = self.opposite[self.turned]
+            half = self._by_edge(np.concatenate([half, self.crowded, self.turned, turned]))
+        forth = np.where(self.tail[half] < self.head_of(half), 1, -1)
+        keys = self.keys_of(half)
+        first = np.flatnonzero(begins(keys))
+        net = np.add.reduceat(forth, first) if len(half) else forth
+        edges = np.stack(np.divmod(keys[first], self.n_vertices), axis=1)
         edges[net < 0] = edges[net < 0, ::-1]
         return np.repeat(edges, np.abs(net), axis=0)
 
@@ -166,6 +303,8 @@ class HalfEdges:
         Such faces share three edges.  So a face can only be one of them if it has no edge alone,
         and across two of its edges the same face, or several faces each.
         """
+        if self._alone is not None:
+            return np.zeros(len(self.faces), dtype=bool)
         a, b, c = self.across.T
         same = (a == b) | (b == c) | (c == a)
         some = np.flatnonzero(same & (a != -1) & (b != -1) & (c != -1))
@@ -188,7 +327,16 @@ class HalfEdges:
     @cached_property
     def shells(self) -> IntArray:
         """(m,) int: the shell of each face, numbered from 0 in the order of their first faces."""
+        if self._alone is not None:  # each vertex is in one shell, so that vertices were linked
+            shells: IntArray = self.__dict__["shells"]
+            return shells
         m = len(self.faces)
+        if self._paired is not None:
+            one, other = self.neighbours.T
+            following = np.flatnonzero(~begins(self.keys_of(self.crowded)))
+            one = np.append(one, self.crowded[following - 1])
+            other = np.append(other, self.crowded[following])
+            return connected(m, one // 3, other // 3)
         # Most meshes are one shell; testing for that takes a fifth of the time of the general case.
         if m and (self.twin is not None or self.counts.max() <= 2):
             starts, faces = np.arange(0, 3 * m + 1, 3), np.arange(m)[:, None]
@@ -207,17 +355,18 @@ class HalfEdges:
 
         Neighbours are those across pairs; see `two_sides`.
         """
-        one, other = self.pairs.T // 3
-        return two_sides(len(self.faces), one, other, self.inconsistent)
+        one, other = self.neighbours.T
+        parallel = self.tail[one] == self.tail[other]
+        return two_sides(len(self.faces), one // 3, other // 3, parallel)
 
     @cached_property
     def one_sided(self) -> BoolArray:
         """(k,) bool: for each shell, whether it contains a surface that has one side only."""
-        one, other = self.pairs.T // 3
+        one, other = self.neighbours.T
         _, flip = self.sides
-        left = (flip[one] ^ flip[other]) != self.inconsistent
+        left = (flip[one // 3] ^ flip[other // 3]) != (self.tail[one] == self.tail[other])
         found = np.zeros(int(self.shells.max(initial=-1)) + 1, dtype=bool)
-        found[self.shells[one[left]]] = True
+        found[self.shells[one[left] // 3]] = True
         return found
 
     def fans(self, pairs: IntArray) -> IntArray:
@@ -236,12 +385,11 @@ class HalfEdges:
     @cached_property
     def pinched(self) -> IntArray:
         """Vertices with several fans, except the ends of non-manifold edges."""
-        if self._has_one_fan_each():
-            return np.empty(0, dtype=np.int64)
-        _, corner = np.unique(self.fans(self.pairs), return_index=True)
+        if self._alone is not None or (self._paired is None and self._has_one_fan_each()):
+            return _NONE
+        corner = first_members(self.fans(self.neighbours))
         several = np.bincount(self.tail[corner], minlength=self.n_vertices) > 1
-        excluded = self.order[self.first[self.counts > 2]]
-        several[self.tail[excluded]] = several[self.head[excluded]] = False
+        several[self.tail[self.crowded]] = several[self.head[self.crowded]] = False
         return np.flatnonzero(several)
 
     def _has_one_fan_each(self) -> bool:
@@ -268,122 +416,3 @@ class HalfEdges:
             going = (at != start) & (at >= 0)
             start, at = start[going], at[going]
         return visited == len(step)
-
-
-def two_sides(
-    n: int, one: IntArray, other: IntArray, opposite: BoolArray
-) -> tuple[IntArray, BoolArray]:
-    """Return the group of each of *n* items, (n,) int, and whether to flip it for all to agree.
-
-    Items one[i] and other[i] are neighbours, of different orientation if opposite[i].  A graph has
-    two nodes for each item, unchanged and flipped, and links between nodes of neighbours that
-    agree.  If both nodes of an item are connected, its group is one-sided, and none is flipped.
-    """
-    across = np.where(opposite, other + n, other)
-    group = connected(
-        2 * n,
-        np.concatenate([one, one + n]),
-        np.concatenate([across, (across + n) % max(2 * n, 1)]),
-    )
-    unchanged, flipped = group[:n], group[n:]
-    side = np.minimum(unchanged, flipped)
-    return side, (flipped == side) & (unchanged != flipped)
-
-
-def edge_keys(one: IntArray, other: IntArray, n_vertices: int) -> IntArray:
-    """Return one number for each pair of vertices, the same for (a, b) and (b, a)."""
-    return np.minimum(one, other) * n_vertices + np.maximum(one, other)
-
-
-def loops_of(boundary: IntArray) -> list[IntArray]:
-    """Return the directed edges (b, 2) of a boundary as loops, the vertices (k,) of each in order.
-
-    Loops are in the order of their first edges, and begin there.  Where several loops pass a
-    vertex, a walk closes the shortest one first, so that no loop passes a vertex twice.
-    """
-    vertices, ends = np.unique(boundary, return_inverse=True)
-    tail, head = ends.reshape(-1, 2).T
-    part = connected(len(vertices), tail, head)
-    crossed = np.zeros(len(vertices), dtype=bool)  # parts in which loops share a vertex
-    crossed[part[np.bincount(tail, minlength=len(vertices)) > 1]] = True
-    walked = crossed[part[tail]]
-    first, loops = _cycles(tail[~walked], head[~walked], len(vertices))
-    first = np.flatnonzero(~walked)[first]
-    loops = [vertices[loop] for loop in loops]
-    if not walked.any():
-        return loops
-    more_first, more = _walk(boundary[walked])
-    first = np.append(first, np.flatnonzero(walked)[more_first])
-    loops += more
-    return [loops[i] for i in np.argsort(first, kind="stable")]
-
-
-def _cycles(tail: IntArray, head: IntArray, n: int) -> tuple[IntArray, list[IntArray]]:
-    """Return the first edge of each cycle, and its vertices in order; no vertex is in two.
-
-    The steps from each edge to the last one of its cycle are counted by doubling: in each round,
-    an edge looks twice as far ahead.
-    """
-    b = len(tail)
-    leaving = np.zeros(n, dtype=np.int64)
-    leaving[tail] = np.arange(b)
-    following = leaving[head]
-    label = connected(b, np.arange(b), following)
-    first = first_members(label)
-    last = np.zeros(b, dtype=bool)
-    last[first] = True
-    last = last[following]  # whether the next edge is the first one again
-    ahead = np.where(last, np.arange(b), following)
-    steps = np.where(last, 0, 1)  # from each edge to the one ahead
-    while (further := ahead[ahead] != ahead).any():
-        steps[further] += steps[ahead[further]]
-        ahead[further] = ahead[ahead[further]]
-    order = np.lexsort((-steps, label))
-    return first, np.split(tail[order], np.cumsum(np.bincount(label))[:-1]) if b else []
-
-
-def _walk(boundary: IntArray) -> tuple[list[int], list[IntArray]]:
-    """Return the edge at which each walk begins, and its loops."""
-    following: dict[int, list[int]] = {}
-    for tail, head in boundary[::-1].tolist():
-        following.setdefault(tail, []).append(head)
-    begun, loops = [], []
-    for edge, start in enumerate(boundary[:, 0].tolist()):
-        path, place = [start], {start: 0}
-        while following.get(path[-1]):
-            vertex = following[path[-1]].pop()
-            if vertex in place:  # a loop is closed
-                loop = path[place[vertex] :]
-                begun.append(edge)
-                loops.append(np.array(loop))
-                del path[place[vertex] + 1 :]
-                for each in loop[1:]:
-                    del place[each]
-            else:
-                place[vertex] = len(path)
-                path.append(vertex)
-    return begun, loops
-
-
-def next_half_edge(half_edges: IntArray) -> IntArray:
-    """Return the next half-edge, or corner, of the same face."""
-    return np.where(half_edges % 3 == 2, half_edges - 2, half_edges + 1)
-
-
-def repeats_vertex(faces: IntArray) -> BoolArray:
-    """Return which faces contain a vertex twice, (m,) bool."""
-    a, b, c = faces.T
-    repeats: BoolArray = (a == b) | (b == c) | (c == a)
-    return repeats
-
-
-def components(n_points: int, faces: IntArray) -> IntArray:
-    """Return the component of each vertex, (n,) int, numbered from 0."""
-    return connected(n_points, faces.ravel(), faces[:, [1, 2, 0]].ravel())
-
-
-def face_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the edges (e, 2), and for each face (m, 3) the edges opposite its three corners."""
-    opposite = np.sort(faces[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2), axis=1)
-    edges, which = np.unique(opposite, axis=0, return_inverse=True)
-    return edges, which.reshape(-1, 3)

@@ -7,29 +7,51 @@
     normals         `normals.VertexNormals`
     rotations       `rotations.closest_rotations`
     factor          `hessian.Factor`
+    half_edges      `topology.HalfEdges`, `grouping.connected`
+    triangles       `faults.Search`, `shells.shell_volumes`, `grouping.first_equal_row`
 
 They release the GIL and start no threads; `threads.in_parallel` runs several at a time.  Arguments
 are positional, as numba requires, and outputs are arrays passed as arguments.
 """
 
 from .factor import solve_factored
+from .half_edges import (
+    border_half_edges,
+    link,
+    link_corners,
+    number_trees,
+    one_fan_each,
+    pair_half_edges,
+    used_vertices,
+)
 from .low_rank import map_low_rank
 from .mean_value import weights
 from .normals import ring_normals, rings
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
 from .rotations import rotations
+from .triangles import first_equal_points, flat_faces, shell_sums
 from .volumes import volume_along_sums, volume_gradient, volume_sums
 
 __all__ = [
     "add_adjoint",
     "add_packed_adjoint",
     "add_product",
+    "border_half_edges",
+    "first_equal_points",
+    "flat_faces",
+    "link",
+    "link_corners",
     "map_low_rank",
     "map_packed",
+    "number_trees",
+    "one_fan_each",
+    "pair_half_edges",
     "ring_normals",
     "rings",
     "rotations",
+    "shell_sums",
     "solve_factored",
+    "used_vertices",
     "volume_along_sums",
     "volume_gradient",
     "volume_sums",
