@@ -49,6 +49,11 @@ class SessionFile:
         """Return whether *session* has unsaved changes."""
         return bool(self._saved.changes(session.state))
 
+    def prepared(self, session: Session, *, was_modified: bool) -> None:
+        """Continue after *session* was prepared for pulls, which is no change to be saved."""
+        if not was_modified:
+            self._saved = session.state
+
     def opened(self, path: Path, session: Session) -> None:
         """Continue with *path*, from which *session* was read; a mesh file is never overwritten."""
         if is_mesh(path):
