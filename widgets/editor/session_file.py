@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from vtk_segdeform.errors import MeshError
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session, load_session, save_session
 
 _SUFFIX = ".segdeform"
+_READ = 0.3  # share of reading in the progress of opening a mesh; the rest is checking it
 _MESHES = "*.ply *.obj *.off *.stl *.glb *.gltf *.vtk *.vtp *.vtu *.vtkhdf"
 # Types of files in dialogs.
 MESH_FILES = f"Meshes ({_MESHES})"
@@ -86,10 +88,17 @@ def read_session(path: Path, progress: Progress) -> Session:
     A session with a pose is bound, because the pose cannot be drawn otherwise.
     """
     if is_mesh(path):
-        from vtk_segdeform.io import Surface  # which imports pyvista
+        from vtk_segdeform.io import Surface, read_polydata  # which import pyvista
 
         progress(0.0, "Reading mesh")
-        return Session(Surface.read(path))
+        polydata = read_polydata(path)
+        progress(_READ, f"Checking mesh of {polydata.n_points:,} points")
+        try:
+            surface = Surface(polydata)
+        except MeshError as fault:
+            raise MeshError(f"{path}: {fault}") from None
+        progress(1.0, "Drawing mesh")
+        return Session(surface)
     session = load_session(path)
     if session.state.pose is not None:
         session.bind(progress)
