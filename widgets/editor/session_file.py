@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from vtk_segdeform.errors import MeshError
+from vtk_segdeform.kernels import compiled_kernels
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session, load_session, save_session
 
@@ -97,6 +98,7 @@ def read_session(path: Path, progress: Progress) -> Session:
             surface = Surface(polydata)
         except MeshError as fault:
             raise MeshError(f"{path}: {fault}") from None
+        compiled_kernels(surface.mesh.n_vertices)  # loads them here rather than when drawing
         progress(1.0, "Drawing mesh")
         return Session(surface)
     session = load_session(path)
