@@ -37,7 +37,11 @@ def bench(options: Namespace, say: Say, progress: Progress) -> bool:
         raise ArgumentError("--open requires --interactive")
     if options.open:
         sizes = DRAWN_SIZES if options.full else DRAWN_SIZES[:2]
-        say(opening_table(sizes=sizes if options.size is None else (options.size,), progress=progress))
+        say(
+            opening_table(
+                sizes=sizes if options.size is None else (options.size,), progress=progress
+            )
+        )
         return True
     if options.interactive:
         say(interactive_table(n_cage_vertices=options.cage_vertices, progress=progress))

@@ -43,7 +43,9 @@ from ..widgets.scene import Phase, Pointer
 _SIZE = (800, 600)  # window size in pixels
 _GOALS = {5430: 1.0, 50_000: 2.5, 1_000_000: 8.0}  # seconds until the surface follows
 DRAWN_SIZES = tuple(_GOALS)
-_HEAD = "| vertices | drawn s | press ms | followed s | goal | draw ms | gap ms | again ms | error |"
+_HEAD = (
+    "| vertices | drawn s | press ms | followed s | goal | draw ms | gap ms | again ms | error |"
+)
 _STEP, _MOVES, _TURN = 5.0, 20, 0.01  # pixels per move, moves that are followed, seconds per turn
 _NEAR = 0.02  # between a visible vertex and the surface at its pixel
 _LONGEST = 120.0  # seconds until the surface must follow
@@ -91,7 +93,8 @@ def opening_row(size: int) -> str:
     goal = next((f"{s / run.followed:.2g} x" for n, s in _GOALS.items() if n == size), "–")
     return (
         f"| {size} | {run.drawn:.2f} | {1e3 * run.press:.0f} | {run.followed:.2f} | {goal} "
-        f"| {1e3 * median(run.draws):.0f} | {1e3 * run.gap:.0f} | {1e3 * run.again:.0f} | {run.error:.1e} |"
+        f"| {1e3 * median(run.draws):.0f} | {1e3 * run.gap:.0f} | {1e3 * run.again:.0f} "
+        f"| {run.error:.1e} |"
     )
 
 
@@ -196,7 +199,9 @@ def _follows(editor: DeformEditor, at: FloatArray) -> bool:
     if session.state.locality is None:
         return False
     vertex = [session.state.locality.vertex]
-    seen = editor.view.to_display(np.vstack([session.mesh.vertices[vertex], session.vertices[vertex]]))
+    seen = editor.view.to_display(
+        np.vstack([session.mesh.vertices[vertex], session.vertices[vertex]])
+    )
     return bool(np.linalg.norm((seen[1] - seen[0])[:2]) > 0.5 * np.linalg.norm(at))
 
 

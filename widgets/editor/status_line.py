@@ -103,7 +103,10 @@ class StatusLine:
         left = margin + (self._tag.width() + size if tag else 0.0)
         self._aside.set_text(aside, size)
         right = width - margin - (self._aside.width() if aside else 0.0)
-        room, most = right - (size if aside else 0.0) - left, _LINES_OF_WARNING if warning else _LINES
+        room, most = (
+            right - (size if aside else 0.0) - left,
+            _LINES_OF_WARNING if warning else _LINES,
+        )
         lines = wrapped(
             self._lines[0], f"! {text}" if warning else text, size, room=room, most=most
         )

@@ -1,4 +1,4 @@
-"""The status part of the panel: the last result or error, and the progress of a job or preparation."""
+"""The status part of the panel: the last result or error, and the progress of background work."""
 
 from __future__ import annotations
 
