@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import FloatArray
-from ..benchmarks.measuring import in_own_process
+from ..benchmarks import in_own_process
 from ..errors import MissingDependencyError
 from ..io import write_mesh
 from ..models import cactus, sphere

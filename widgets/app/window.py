@@ -139,7 +139,7 @@ class Window(QtWidgets.QMainWindow):
     # Opening.
 
     def begin(self, path: Path | None = None) -> None:
-        """Offer to recover autosaved work, and open *path*, in another window if both are opened."""
+        """Offer to recover autosaved work; open *path*, in another window beside recovered work."""
         slot = self._recover()
         if path is None:
             return
