@@ -22,6 +22,7 @@ The files, in reading order:
 """
 
 from .history import plot_history, read_history, record
+from .measuring import in_own_process
 from .report import EXPERIMENTS, NAME, write_report
 from .scale import FULL, QUICK, USUAL
 
@@ -31,6 +32,7 @@ __all__ = [
     "NAME",
     "QUICK",
     "USUAL",
+    "in_own_process",
     "plot_history",
     "read_history",
     "record",

@@ -12,6 +12,7 @@ The files, in reading order:
     bench           ``segdeform bench``
     application     ``segdeform app``
     interactive     ``segdeform bench --interactive``
+    opening         ``segdeform bench --interactive --open``
     replaying       ``segdeform replay``
     progress_bar    progress bar in the terminal
 """

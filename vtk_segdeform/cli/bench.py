@@ -15,8 +15,10 @@ from ..benchmarks import (
     record,
     write_report,
 )
+from ..errors import ArgumentError
 from ..progress import Progress
 from .interactive import interactive_table
+from .opening import DRAWN_SIZES, opening_table
 from .outputs import Say
 
 
@@ -31,6 +33,16 @@ def bench(options: Namespace, say: Say, progress: Progress) -> bool:
         return True
     if options.record:
         read_history(options.record)  # report errors before the measurements
+    if options.open and not options.interactive:
+        raise ArgumentError("--open requires --interactive")
+    if options.open:
+        sizes = DRAWN_SIZES if options.full else DRAWN_SIZES[:2]
+        say(
+            opening_table(
+                sizes=sizes if options.size is None else (options.size,), progress=progress
+            )
+        )
+        return True
     if options.interactive:
         say(interactive_table(n_cage_vertices=options.cage_vertices, progress=progress))
         return True

@@ -279,6 +279,8 @@ def _bench(parser: argparse.ArgumentParser) -> None:
     task = parser.add_mutually_exclusive_group()
     text = "only time a drag in a window"
     task.add_argument("--interactive", action="store_true", help=text)
+    text = "with --interactive: open files, and drag as soon as they are drawn; --full: 1M vertices"
+    add("--open", action="store_true", help=text)
     text = "append the ratios, date and commit to a JSON lines file"
     task.add_argument("--record", type=Path, metavar="FILE", help=text)
     text = "only plot the runs recorded in FILE"

@@ -115,7 +115,7 @@ def replayed(
         clock, pace = Clock(limits.seconds), 0.0 if off_screen else 1.0
         replay_events(
             plotter, recording, folder=folder, limits=limits, pace=pace,
-            busy=lambda: editor.is_busy,
+            busy=lambda: editor.is_busy or editor.is_preparing,
         )  # fmt: skip
         interactor = editor.view.interactor
         clock.wait_while(lambda: editor.is_busy, lambda: interactor.InvokeEvent("TimerEvent"))

@@ -2,10 +2,11 @@
 
     in_parallel(work, n, size)        calls work(start, stop) for tasks of about *size* rows
 
-numpy and the compiled kernels release the GIL, so ordinary threads suffice.  There is one thread
-pool per process, for any number of open meshes; a host application can limit it with
-``SEGDEFORM_THREADS=1``.  Every row is computed in the same way on any thread, so results do not
-depend on the number of threads.
+numpy and the compiled kernels release the GIL, so ordinary threads suffice.  There are two thread
+pools per process, for any number of open meshes: one for the main thread, which draws, and one for
+all other threads, so that the main thread never waits for tasks of theirs.  A host application can
+limit them with ``SEGDEFORM_THREADS=1``.  Every row is computed in the same way on any thread, so
+results do not depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -51,7 +52,8 @@ def in_parallel(
                 progress(stop / n, message)
         return
     with one_blas_thread():
-        futures = [_pool().submit(work, *task) for task in tasks]
+        pool = _pool(threading.current_thread() is threading.main_thread())
+        futures = [pool.submit(work, *task) for task in tasks]
         try:
             if progress is None:  # waking for each task would take time from the other threads
                 wait(futures, return_when=FIRST_EXCEPTION)
@@ -139,7 +141,9 @@ def n_threads() -> int:
 
 
 @functools.cache
-def _pool() -> ThreadPoolExecutor:
+def _pool(is_main: bool) -> ThreadPoolExecutor:
+    """Return the pool of the main thread, or that of all other threads."""
     if hasattr(os, "register_at_fork"):
         os.register_at_fork(after_in_child=_pool.cache_clear)  # threads stay in the parent
-    return ThreadPoolExecutor(n_threads(), thread_name_prefix="segdeform")
+    name = "segdeform" if is_main else "segdeform background"
+    return ThreadPoolExecutor(n_threads(), thread_name_prefix=name)

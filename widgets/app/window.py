@@ -85,6 +85,8 @@ class Window(QtWidgets.QMainWindow):
         self.document = Document("")
         self.mesh_state: object = None
         self._is_new = False  # made by the program and not saved yet
+        self._make_other = partial(Window, settings, autosaves, interval=interval)
+        self._other: Window | None = None  # for a file beside recovered work
         self.editor_widget: Any = None
         self._request: Request | None = None
         self._job: Job[Opened] | None = None
@@ -137,9 +139,16 @@ class Window(QtWidgets.QMainWindow):
     # Opening.
 
     def begin(self, path: Path | None = None) -> None:
-        """Offer to recover autosaved work; otherwise open *path*."""
-        if not self.recover() and path is not None:
+        """Offer to recover autosaved work; open *path*, in another window beside recovered work."""
+        slot = self._recover()
+        if path is None:
+            return
+        if slot is None:
             self.open(path)
+        elif str(path.absolute()) not in (slot.about.session, slot.about.mesh):
+            self._other = self._make_other()
+            self._other.show()
+            self._other.open(path)
 
     def ask_and_open(self) -> None:
         """Ask for a file and open it."""
@@ -174,12 +183,16 @@ class Window(QtWidgets.QMainWindow):
 
     def recover(self) -> bool:
         """Offer to recover autosaved work; return whether the user accepts."""
+        return self._recover() is not None
+
+    def _recover(self) -> Slot | None:
+        """Offer to recover autosaved work; return what the user has chosen."""
         slot = choose_work(self, self.autosaves)
-        if slot is None:
-            return False
-        if not self._open(Request(slot.about.name, from_slot(slot), slot=slot)):
+        if slot is not None and not self._open(
+            Request(slot.about.name, from_slot(slot), slot=slot)
+        ):
             slot.release()
-        return True
+        return slot
 
     def clear_recent(self) -> None:
         """Clear the list of recent files."""

@@ -9,6 +9,7 @@ The files, in reading order:
                      the actions behind keys, menus and panels
     bindings         the table of keys
     job              background work, with progress and cancellation
+    preparing        the preparation for pulls, while the editor remains usable
     session_file     the file that the session is saved to
     recordings       recordings of input and video
     messages hints status_line help_card log

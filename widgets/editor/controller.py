@@ -1,8 +1,9 @@
 """The controller of the editor: one session, its widgets, the mode, the running job and the file.
 
 One job runs at a time, and the widgets are off meanwhile: a session must not be used while another
-thread binds it.  Every error, in a callback or in a job, is shown in the status line until the
-next action succeeds.
+thread binds it.  The preparation for pulls runs in the background instead, with the widgets on; a
+job cancels it.  Every error, in a callback or in a job, is shown in the status line until the next
+action succeeds.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import TypeVar
 
 from vtk_segdeform.kernels import advice
 from vtk_segdeform.progress import Progress
-from vtk_segdeform.session import Change, Session
+from vtk_segdeform.session import Change, Preparation, Session
 
 from ..recording import confined_path
 from ..scene import View, Widget
@@ -25,6 +26,7 @@ from .log import Log
 from .messages import Messages
 from .mode import Mode
 from .notices import Notices
+from .preparing import Preparing
 from .recordings import Recordings
 from .session_file import SessionFile, read_session
 from .widget_set import WidgetSet
@@ -76,6 +78,9 @@ class Controller:
         self._is_on = False
         self.log = Log()
         self._worker = Worker(view_timer(view), self.log, self._job_changed)
+        self._preparing = Preparing(
+            view_timer(view), self._may_accept, self._accept, self._prepare_pulls, self.refresh
+        )
         self.widgets = WidgetSet(view, session)
         self._listen()
         self.notices.follow(session)
@@ -104,6 +109,7 @@ class Controller:
         self.widgets.finish()
         self._mode = mode
         self.messages.clear()
+        self._prepare_pulls(again=True)
         self._apply_mode()
 
     @property
@@ -117,6 +123,7 @@ class Controller:
         try:
             if not on:
                 self.help.hide()
+                self._preparing.stop()
                 self._worker.cancel()
                 self.wait()
         finally:
@@ -156,7 +163,9 @@ class Controller:
                 mode, self._worker.text, job.fraction, is_cancelled=job.is_cancelled
             )
         elif self._is_on:
-            self.messages.show(mode, hint(self.widgets, self._mode))
+            fraction = self._preparing.fraction
+            preparing = None if fraction == 1.0 else fraction  # finished, but not accepted yet
+            self.messages.show(mode, hint(self.widgets, self._mode), preparing)
         else:
             self.messages.hide()
         self.notices.enable(self._is_on)
@@ -182,11 +191,15 @@ class Controller:
         self._stop_listening = self.session.on_change(self._session_changed)
         for widget in self.widgets.interactive:
             widget.AddObserver("EndInteractionEvent", self._gesture_ended)
+        self.widgets.puller.AddObserver("StartInteractionEvent", self._pull_started)
 
     def _gesture_ended(self, widget: Widget, _: str) -> None:
         if widget.remark:
             self.messages.note(widget.remark)
         self.refresh()
+
+    def _pull_started(self, *_: object) -> None:
+        self._prepare_pulls(again=True)
 
     def _session_changed(self, change: Change) -> None:
         if change & Change.HISTORY:
@@ -197,6 +210,7 @@ class Controller:
             self.messages.note("Pose reset: the regions or cages have changed")
         if change & Change.REGIONS:
             self.widgets.choose_region(self.widgets.selector.region)
+        self._prepare_pulls()
         self.refresh()
 
     # Jobs.
@@ -227,6 +241,7 @@ class Controller:
             return outcome
 
         self.widgets.finish()  # before the job starts, because it may fail
+        self._preparing.interrupt()
         self._worker.start(name, work, deliver)
         self.widgets.switch_off()
         self.refresh()
@@ -236,12 +251,16 @@ class Controller:
         self._worker.wait()
 
     def cancel(self) -> None:
-        """Cancel the job, or else the ongoing drag or stroke, or else close the help card."""
+        """Cancel the job, or else the ongoing drag or stroke, or the preparation; or close help."""
         if self.is_busy:
             self._worker.cancel()
             self.refresh()
-        elif not self.widgets.cancel():
+        elif self.widgets.cancel():
+            pass
+        elif self.help.is_shown:
             self.help.hide()
+        elif self._preparing.cancel():
+            self.say("Preparation cancelled. Drag the surface to start it again")
 
     def refuse(self) -> None:
         """Show that the running job must end, or be cancelled, before anything else."""
@@ -253,10 +272,36 @@ class Controller:
         widgets, session = self.widgets, self.session
         if not self._is_on or self.is_busy:
             return
+        self._prepare_pulls()
         if self._mode is Mode.DEFORM and session.is_ready and not session.is_bound:
             self.start("Binding mesh to cages", widgets.bind, lambda _: None)
         elif widgets.wants_overlay(self._mode) and not widgets.overlay.is_prepared:
             self.start("Computing local volume change", widgets.measure, lambda _: None)
+
+    @property
+    def is_preparing(self) -> bool:
+        """Whether pulls are being prepared in the background, and will be possible afterwards."""
+        return self._mode is Mode.PULL and self._preparing.fraction is not None
+
+    def _prepare_pulls(self, *, again: bool = False) -> None:
+        """Prepare the session for pulls in mode PULL; *again* even after an error or Escape.
+
+        Another mode continues a preparation, but its result waits for mode PULL.
+        """
+        if self._is_on and not self.is_busy:
+            self._preparing.update(self.session, start=self._mode is Mode.PULL, again=again)
+
+    def _may_accept(self) -> bool:
+        """Return whether the session may be prepared now: nothing is being pulled or painted."""
+        session = self.session
+        is_pulling = session.is_bound and any(w.is_grabbing for w in self.widgets.interactive)
+        return self._mode is Mode.PULL and not (self.is_busy or session.is_dragging or is_pulling)
+
+    def _accept(self, session: Session, preparation: Preparation) -> None:
+        was_modified = self.file.is_modified(session)
+        session.accept(preparation)
+        self.file.prepared(session, was_modified=was_modified)
+        self.refresh()
 
     def _job_changed(self) -> None:
         if not self.is_busy:
@@ -297,6 +342,7 @@ class Controller:
             self._listen()
             self.notices.follow(session)
             self.file.opened(path, session)
+            self.view.render()  # before anything else is computed
             return f"Opened {path}"
 
         self.start(f"Opening {path}", lambda progress: read_session(path, progress), replace)

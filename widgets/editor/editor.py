@@ -5,7 +5,8 @@
 
 The status line shows the next step; H shows the keys, which `bindings` lists and `actions`
 implements.  Long operations (segmentation, fitting cages, binding) are jobs in another thread:
-meanwhile only the camera works, and Escape cancels the job.
+meanwhile only the camera works, and Escape cancels the job.  In mode PULL all of them run together
+in the background, and everything else works meanwhile.
 
 An action during a drag or a stroke first finishes it, as if the button had been released, as one
 undo step.  Only Escape cancels it; the help card does not interrupt it.
@@ -105,6 +106,11 @@ class DeformEditor:
     def is_busy(self) -> bool:
         """Whether a job is running."""
         return self._controller.is_busy
+
+    @property
+    def is_preparing(self) -> bool:
+        """Whether pulls are being prepared in the background; nothing else waits for that."""
+        return self._controller.is_preparing
 
     def wait(self) -> None:
         """Block until no job is running; raise the error of a failed job.  For scripts."""

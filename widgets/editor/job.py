@@ -4,7 +4,8 @@
 
 The work runs in another thread.  A timer of the window reports its progress and, once it has
 ended, delivers its result or its error.  Everything except the work itself therefore happens in
-the window's thread.  `Worker` runs the jobs of an editor, one at a time.
+the window's thread.  `Worker` runs the jobs of an editor, one at a time; while one of them is
+running the editor refuses other actions.  `preparing` runs jobs that refuse nothing.
 """
 
 from __future__ import annotations
@@ -72,6 +73,8 @@ class Job(Generic[T]):
     watch : callable, optional
         ``watch(job)``, called there when `fraction` or `text` has changed, and once the job has
         ended, before *done* and *failed*.
+    is_due : callable, optional
+        ``is_due()``, called there: whether a result may be delivered now; by default always.
 
     Examples
     --------
@@ -92,8 +95,9 @@ class Job(Generic[T]):
         done: Callable[[T], object],
         failed: Callable[[BaseException], object] | None = None,
         watch: Callable[[Job[T]], object] | None = None,
+        is_due: Callable[[], bool] | None = None,
     ) -> None:
-        self._done, self._failed, self._watch = done, failed, watch
+        self._done, self._failed, self._watch, self._is_due = done, failed, watch, is_due
         self._shared = _Shared()
         self._reported = self._shared.progress
         self._reported_at = time.monotonic()
@@ -132,8 +136,15 @@ class Job(Generic[T]):
         """Stop the work at its next progress report; no result and no error is delivered."""
         self._shared.is_cancelled = True
 
+    def abandon(self) -> None:
+        """Cancel without waiting: nothing is called any more, not even *watch*."""
+        self.cancel()
+        if not self._ended:
+            self._ended = True
+            self._stop()
+
     def wait(self) -> None:
-        """Block until the work has ended, and deliver it.
+        """Block until the work has ended, and deliver it if it is due.
 
         Raises
         ------
@@ -154,7 +165,7 @@ class Job(Generic[T]):
     def deliver(self) -> None:
         """Deliver the result or the error if the work has ended."""
         # The timer fires once more while `done` runs an event loop of its own.
-        if self._ended or not self._future.done():
+        if self._ended or not self._future.done() or not self._may_deliver():
             return
         self._stop()
         self._ended = True
@@ -173,6 +184,10 @@ class Job(Generic[T]):
             self._failed(error)
         else:
             self._done(self._future.result())  # or raise the error of the work
+
+    def _may_deliver(self) -> bool:
+        is_result = not self.is_cancelled and self._future.exception() is None
+        return not is_result or self._is_due is None or self._is_due()
 
     def _seconds_since_report(self) -> float:
         return time.monotonic() - self._reported_at

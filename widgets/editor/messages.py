@@ -37,6 +37,7 @@ class Messages:
     def __init__(self, view: View) -> None:
         self._line = StatusLine(view)
         self._note = self._error = self._question = self._last_question = ""
+        self._preparing: float | None = None
         self._listeners: dict[int, Callable[[], object]] = {}
 
     @property
@@ -61,8 +62,8 @@ class Messages:
 
     @property
     def fraction(self) -> float | None:
-        """Completed fraction of the job that is shown, 0..1; None if there is none."""
-        return self._line.fraction
+        """Completed fraction of the job or preparation that is shown, 0..1; None if none is."""
+        return self._line.fraction if self._preparing is None else self._preparing
 
     def on_change(self, listener: Callable[[], object]) -> Stop:
         """Call *listener* whenever messages are shown, even if unchanged, until stopped."""
@@ -95,17 +96,23 @@ class Messages:
         self.note(question)
         return False
 
-    def show(self, mode: str, hint: str) -> None:
-        """Show the error, or else the result and *hint*, the next step in *mode*."""
+    def show(self, mode: str, hint: str, preparing: float | None = None) -> None:
+        """Show the error, or else the result and *hint*, the next step in *mode*.
+
+        At the right, show which fraction of the preparation is complete, if any is *preparing*.
+        """
+        self._preparing = preparing
+        aside = "" if preparing is None else f"Preparing ... {100.0 * preparing:.0f} % (Esc)"
         if self._error:
-            self._line.warn(self._error, mode)
+            self._line.warn(self._error, mode, aside)
         else:
             note = "" if self._note in hint else self._note  # the hint may contain it
-            self._line.say(" · ".join(filter(None, (note, hint))), mode)
+            self._line.say(" · ".join(filter(None, (note, hint))), mode, aside)
         self._notify()
 
     def show_progress(self, mode: str, text: str, fraction: float, *, is_cancelled: bool) -> None:
         """Show the progress of a job and how to cancel it."""
+        self._preparing = None
         if is_cancelled:
             self.note("Cancelled. Nothing was changed")  # shown once the job has ended
         key = "Stopping ..." if is_cancelled else "Esc to cancel"

@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from vtk_segdeform.errors import MeshError
+from vtk_segdeform.kernels import compiled_kernels
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session, load_session, save_session
 
 _SUFFIX = ".segdeform"
+_READ = 0.3  # share of reading in the progress of opening a mesh; the rest is checking it
 _MESHES = "*.ply *.obj *.off *.stl *.glb *.gltf *.vtk *.vtp *.vtu *.vtkhdf"
 # Types of files in dialogs.
 MESH_FILES = f"Meshes ({_MESHES})"
@@ -49,6 +52,11 @@ class SessionFile:
         """Return whether *session* has unsaved changes."""
         return bool(self._saved.changes(session.state))
 
+    def prepared(self, session: Session, *, was_modified: bool) -> None:
+        """Continue after *session* was prepared for pulls, which is no change to be saved."""
+        if not was_modified:
+            self._saved = session.state
+
     def opened(self, path: Path, session: Session) -> None:
         """Continue with *path*, from which *session* was read; a mesh file is never overwritten."""
         if is_mesh(path):
@@ -81,10 +89,18 @@ def read_session(path: Path, progress: Progress) -> Session:
     A session with a pose is bound, because the pose cannot be drawn otherwise.
     """
     if is_mesh(path):
-        from vtk_segdeform.io import Surface  # which imports pyvista
+        from vtk_segdeform.io import Surface, read_polydata  # which import pyvista
 
         progress(0.0, "Reading mesh")
-        return Session(Surface.read(path))
+        polydata = read_polydata(path)
+        progress(_READ, f"Checking mesh of {polydata.n_points:,} points")
+        try:
+            surface = Surface(polydata)
+        except MeshError as fault:
+            raise MeshError(f"{path}: {fault}") from None
+        compiled_kernels(surface.mesh.n_vertices)  # loads them here rather than when drawing
+        progress(1.0, "Drawing mesh")
+        return Session(surface)
     session = load_session(path)
     if session.state.pose is not None:
         session.bind(progress)

@@ -33,7 +33,8 @@ class StatusLine:
         self._bar = Panel(front, _BAR, layer=3)
         self._tag = Text(front, _TAG, bold=True, layer=4)
         self._lines = [Text(front, _LETTERS, layer=4) for _ in range(_LINES_OF_WARNING)]
-        self._content: tuple[str, str, bool, float | None] = "", "", False, None
+        self._aside = Text(front, _TAG, layer=4)
+        self._content: tuple[str, str, bool, float | None, str] = "", "", False, None, ""
         self._laid_out: tuple[Any, ...] = ()
         self._height = 0.0
         self._stop = self.view.before_render(self._lay_out)
@@ -54,17 +55,22 @@ class StatusLine:
         return self._content[3]
 
     @property
+    def aside(self) -> str:
+        """The text at its right end, or ""."""
+        return self._content[4]
+
+    @property
     def height(self) -> float:
         """Its height in the last picture, in pixels."""
         return self._height
 
-    def say(self, text: str, tag: str = "") -> None:
-        """Show *text* after *tag*, a word or two."""
-        self._set(tag, text, False, None)
+    def say(self, text: str, tag: str = "", aside: str = "") -> None:
+        """Show *text* after *tag*, a word or two, and *aside* at the right end."""
+        self._set(tag, text, False, None, aside)
 
-    def warn(self, text: str, tag: str = "") -> None:
+    def warn(self, text: str, tag: str = "", aside: str = "") -> None:
         """Show *text* as a warning."""
-        self._set(tag, text, True, None)
+        self._set(tag, text, True, None, aside)
 
     def progress(self, fraction: float, text: str, tag: str = "") -> None:
         """Show the progress of a job, 0..1, and its description."""
@@ -73,12 +79,14 @@ class StatusLine:
     def remove(self) -> None:
         """Remove it from the view, permanently."""
         self._stop()
-        parts: list[Panel | Text] = [self._strip, self._bar, self._tag, *self._lines]
+        parts: list[Panel | Text] = [self._strip, self._bar, self._tag, self._aside, *self._lines]
         for part in parts:
             part.remove()
 
-    def _set(self, tag: str, text: str, warning: bool, fraction: float | None) -> None:
-        content = tag, " ".join(text.split()), warning, fraction
+    def _set(
+        self, tag: str, text: str, warning: bool, fraction: float | None, aside: str = ""
+    ) -> None:
+        content = tag, " ".join(text.split()), warning, fraction, aside
         if content != self._content:
             self._content = content
             self.view.request_render()
@@ -88,12 +96,17 @@ class StatusLine:
         if (width, height, self._content) == self._laid_out:
             return
         self._laid_out = width, height, self._content
-        tag, text, warning, fraction = self._content
+        tag, text, warning, fraction, aside = self._content
         size = letter_size(width, height)
         margin, leading = 0.7 * size, 1.45 * size
         self._tag.set_text(tag, size)
         left = margin + (self._tag.width() + size if tag else 0.0)
-        room, most = width - margin - left, _LINES_OF_WARNING if warning else _LINES
+        self._aside.set_text(aside, size)
+        right = width - margin - (self._aside.width() if aside else 0.0)
+        room, most = (
+            right - (size if aside else 0.0) - left,
+            _LINES_OF_WARNING if warning else _LINES,
+        )
         lines = wrapped(
             self._lines[0], f"! {text}" if warning else text, size, room=room, most=most
         )
@@ -103,6 +116,7 @@ class StatusLine:
             words.set_text(lines[k] if k < len(lines) else "", size)
             words.place(left, high - 0.35 * size - (k + 0.5) * leading)
         self._tag.place(margin, high - 0.35 * size - 0.5 * leading)
+        self._aside.place(right, high - 0.35 * size - 0.5 * leading)
         self._strip.set_colour(_WARNING if warning else _CALM)
         self._strip.show(bool(tag or text))
         self._strip.place(0.0, 0.0, width, high)

@@ -97,8 +97,8 @@ class Puller(Widget):
         self._draw_ring(self._picker.hit(pointer))
 
     def on_press(self, press: Pointer) -> Gesture | None:
-        """Pull the surface under the pointer."""
-        hit = self._picker.hit(press) if self.session.cages else None
+        """Pull the surface under the pointer, as soon as the session is prepared."""
+        hit = self._picker.hit(press)
         return None if hit is None else self._pull(hit, press)
 
     def on_key(self, key: str, pointer: Pointer) -> bool:
@@ -112,6 +112,9 @@ class Puller(Widget):
 
     def _pull(self, hit: Hit, press: Pointer) -> Gesture:
         session = self.session
+        while not session.is_bound:
+            if (yield).phase is not Phase.MOVE:
+                return
         session.commit()  # keeps an unfinished drag from elsewhere out of our undo step
         self._live.pause()
         start = np.array(session.vertices[hit.vertex])

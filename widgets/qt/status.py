@@ -1,4 +1,4 @@
-"""The status part of the panel: the last result or error, and the progress of a job."""
+"""The status part of the panel: the last result or error, and the progress of background work."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class StatusPart(QtWidgets.QWidget):
         self.bar = QtWidgets.QProgressBar()
         self.bar.setRange(0, 1000)
         self.cancel = key_button(editor, "escape", Mode.REGIONS, "Cancel")
-        self.cancel.setToolTip("Cancel the job; nothing is changed (Esc)")
+        self.cancel.setToolTip("Cancel it; nothing is changed (Esc)")
         for each in (self.bar, self.cancel):
             policy = each.sizePolicy()
             policy.setRetainSizeWhenHidden(True)  # keep the layout when a job starts
@@ -55,7 +55,8 @@ class StatusPart(QtWidgets.QWidget):
         if self.words.text() != text:
             self.words.setText(text)
         self.sign.setVisible(bool(messages.error) and not busy)
-        self.bar.setVisible(busy)
-        self.cancel.setVisible(busy)
-        if busy:
+        is_running = messages.fraction is not None
+        self.bar.setVisible(is_running)
+        self.cancel.setVisible(is_running)
+        if is_running:
             self.bar.setValue(round(1000.0 * (messages.fraction or 0.0)))

@@ -485,11 +485,15 @@ def test_recovering_work_later_or_never(start, arm, ball_file, tmp_path, boxes):
     assert slots(tmp_path) == []
 
 
-def test_recovering_one_of_several_autosaves_keeps_the_others(start, tmp_path, boxes):
+def test_recovering_one_of_several_autosaves_keeps_the_others(start, ball_file, tmp_path, boxes):
     for name in "abc":
         left(tmp_path, Session(BALL), About(name))
     boxes.answers += ["Later", "Recover"]
-    hand = start()
+    hand = start(ball_file)
+    other = hand.window._other  # which has the file of the command line
+    until(lambda: other.has_mesh, "the file")
+    assert other.document.name == "ball.vtp"
+    delete(other)
     assert [text.split(" from")[0][-1] for text in boxes.seen] == ["c", "b"]
     assert hand.title == "b* - segdeform"
     assert len(slots(tmp_path)) == 3

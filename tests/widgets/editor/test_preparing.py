@@ -1,0 +1,216 @@
+"""The preparation for pulls: it runs in the background, and nothing else waits for it."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+from hands import Hand, plain_view
+from scenes import sausage
+
+from vtk_segdeform import Regions, Session
+from vtk_segdeform.errors import CageError
+from vtk_segdeform.io.convert import write_mesh
+from vtk_segdeform.session import Preparation
+from vtk_segdeform.widgets import DeformEditor, Mode
+from vtk_segdeform.widgets.editor import actions
+
+
+@pytest.fixture(scope="module")
+def prepared():
+    """Return a mesh and the preparation of its session; tests do not change them."""
+    session = Session(sausage().mesh)
+    session.set_regions(Regions.single(session.mesh))
+    return session.mesh, session.preparation()
+
+
+class Gate:
+    """Preparations that report 40 %, wait until the gate is open, and then return a result."""
+
+    def __init__(self, result: Preparation):
+        self.result, self.error = result, None
+        self.is_open, self.has_begun = threading.Event(), threading.Event()
+        self.begun = self.cancelled = 0
+
+    def prepare(self, progress):
+        self.begun += 1
+        try:
+            progress(0.4, "waiting")
+            self.has_begun.set()
+            while not self.is_open.wait(0.001):
+                progress(0.4, "waiting")
+        except BaseException:
+            self.cancelled += 1
+            raise
+        if self.error is not None:
+            raise self.error
+        return self.result
+
+
+class Bench:
+    """An editor in mode PULL, seen from the front, and a simulated hand."""
+
+    def __init__(self, mesh, gate, monkeypatch):
+        monkeypatch.setattr(Session, "preparation", lambda _, progress: gate.prepare(progress))
+        self.view, self.gate = plain_view((500, 400)), gate
+        self.editor = DeformEditor(self.view, mesh)
+        camera = self.view.camera
+        camera.SetPosition(0.0, -5.0, 0.5)
+        camera.SetFocalPoint(0.0, 0.0, 0.5)
+        camera.SetViewUp(0.0, 0.0, 1.0)
+        self.view.renderer.ResetCamera()
+        self.view.render()
+        self.hand = Hand(self.view)
+        self.editor.mode = Mode.PULL
+        self.editor.On()
+
+    @property
+    def session(self):
+        return self.editor.session
+
+    @property
+    def aside(self):
+        return self.editor.controller.messages.fraction
+
+    @property
+    def place(self):
+        """A pixel of the surface."""
+        return np.array(self.hand.at(self.session.mesh.vertices.mean(axis=0)))
+
+    def until(self, seen):
+        end = time.monotonic() + 20.0
+        while not seen():
+            assert time.monotonic() < end, "waited in vain"
+            self.hand.tick()
+
+    def finish(self):
+        self.gate.is_open.set()
+        self.until(lambda: not self.editor.is_preparing)
+
+
+@pytest.fixture
+def bench(prepared, monkeypatch):
+    """Yield an editor in mode PULL whose preparation waits for a gate."""
+    mesh, result = prepared
+    made = Bench(mesh, Gate(result), monkeypatch)
+    yield made
+    made.gate.is_open.set()
+    made.editor.remove()
+
+
+def test_everything_works_meanwhile_and_the_result_is_no_step(bench):
+    editor, hand, camera = bench.editor, bench.hand, bench.view.camera
+    bench.until(lambda: bench.aside == 0.4)
+    assert "Preparing ... 40 % (Esc)" in editor.controller.messages._line.aside
+    assert not editor.is_busy
+    before = camera.GetPosition()
+    hand.drag([(5, 5), (40, 30)])  # beside the mesh
+    assert camera.GetPosition() != before
+    hand.types("h")
+    assert editor.controller.help.is_shown
+    hand.types("escape")  # closes the help card only
+    assert editor.is_preparing
+    assert editor.do(actions.toggle_volume) is None
+    assert editor.do(actions.undo) is None
+    bench.finish()
+    assert bench.aside is None
+    assert bench.session.is_bound
+    assert not bench.session.can_undo
+    assert not editor.controller.file.is_modified(bench.session)
+    assert bench.gate.begun == 1
+    assert hand.failures == []
+
+
+def test_a_press_during_opening_becomes_a_pull(bench, tmp_path, monkeypatch):
+    monkeypatch.undo()  # the real preparation
+    write_mesh(tmp_path / "a.ply", bench.session.mesh)
+    bench.editor.load(tmp_path / "a.ply")
+    before, session = bench.session.vertices, bench.session
+    assert not session.is_bound
+    start = bench.place
+    bench.hand.press(start)
+    bench.hand.move(start + [30.0, 0.0])
+    bench.until(lambda: session.is_bound)
+    bench.until(lambda: bench.hand.move(start + [40.0, 0.0]) or session.is_dragging)
+    assert np.abs(session.vertices - before).max() > 0.01
+    bench.hand.release(start + [40.0, 0.0])
+    assert session.undo_label == "pull"
+    session.undo()
+    assert not session.can_undo
+    assert session.is_bound
+    assert bench.hand.failures == []
+
+
+def test_escape_cancels_until_the_next_press(bench):
+    gate, hand = bench.gate, bench.hand
+    bench.until(gate.has_begun.is_set)
+    hand.types("escape")
+    assert bench.aside is None
+    assert "Preparation cancelled" in bench.editor.status
+    bench.until(lambda: gate.cancelled == 1)
+    hand.tick(5)
+    hand.types("p")  # another action
+    hand.tick(5)
+    assert gate.begun == 1
+    hand.press(bench.place)
+    hand.tick(2)
+    assert bench.editor.is_preparing
+    bench.finish()
+    hand.release()
+    assert bench.session.is_bound
+
+
+def test_changed_options_start_it_again_and_a_job_wins(bench):
+    gate, session = bench.gate, bench.session
+    bench.until(gate.has_begun.is_set)
+    session.change_options(stretch=3.0)
+    bench.until(lambda: gate.begun == 2)
+    assert gate.cancelled == 1
+    go_on = threading.Event()
+    bench.editor.controller.start("counting", lambda _: go_on.wait(20.0), lambda _: None)
+    assert bench.editor.is_busy
+    assert not bench.editor.is_preparing
+    bench.until(lambda: gate.cancelled == 2)
+    go_on.set()
+    bench.until(lambda: not bench.editor.is_busy)
+    bench.until(lambda: gate.begun == 3)
+    bench.finish()
+    assert session.is_bound
+
+
+def test_the_result_waits_for_mode_pull_and_a_changed_session_refuses_it(bench):
+    bench.until(bench.gate.has_begun.is_set)
+    bench.editor.mode = Mode.HANDLES
+    bench.gate.is_open.set()
+    time.sleep(0.05)
+    bench.hand.tick(5)
+    assert bench.session.regions is None
+    bench.session.set_fixed([0, 1])  # not an input of the preparation
+    bench.editor.mode = Mode.PULL
+    bench.hand.tick(5)
+    assert bench.session.is_bound
+    assert bench.session.undo_label == "set fixed vertices"
+    assert bench.gate.begun == 1
+
+
+def test_an_error_is_shown_once_and_says_what_to_do(bench):
+    bench.gate.error = CageError("no cage fits")
+    bench.finish()
+    [error] = bench.hand.failures
+    assert "no cage fits" in str(error)
+    assert "Press 1" in bench.editor.status
+    bench.hand.tick(5)
+    bench.hand.types("p")
+    bench.hand.tick(5)
+    assert bench.gate.begun == 1
+    assert "no cage fits" not in bench.editor.status
+
+
+def test_removing_the_editor_does_not_wait(bench):
+    bench.until(bench.gate.has_begun.is_set)
+    bench.editor.remove()
+    assert not bench.editor.is_preparing
+    bench.hand.tick(3)
+    assert bench.session.regions is None

@@ -1,0 +1,154 @@
+"""Preparing a session for pulls in the background, while the editor remains usable.
+
+    lacking(session)    ->  the next stage of the preparation, or None: `Session.preparation`
+    another thread      ->  its result, from a snapshot of the session
+    `Session.accept`    ->  here, once no gesture runs; no undo step
+
+A stage is cancelled if its inputs change: the mesh, the regions, the cages or the options of the
+binding.  The next stage starts once the last one has ended, so only one runs at a time.  A stage
+that failed, or that the user has cancelled, is not repeated for the same inputs unless requested.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from typing import Any
+
+from vtk_segdeform.errors import SegDeformError, SessionError
+from vtk_segdeform.progress import Progress
+from vtk_segdeform.session import Preparation, Session
+
+from .job import Job, Timer
+from .messages import error_text
+
+_STEP = 0.05  # the fraction that is shown is a multiple of this: each change draws the view
+
+Work = Callable[[Progress], Preparation]
+
+
+def lacking(session: Session) -> Work | None:
+    """Return the next stage of the preparation of *session*; None if it needs none.
+
+    The work uses a copy of the session, which has no listeners, so another thread may run it.
+    """
+    if session.is_bound:
+        return None
+    return copy.copy(session).preparation
+
+
+class Preparing:
+    """The stage that is running, if any, and the inputs for which none is wanted.
+
+    Parameters
+    ----------
+    timer : callable
+        Polls the stages; see `Job`.
+    is_due : callable
+        Returns whether a result may change the session now.
+    accept : callable
+        ``accept(session, preparation)``, called with each result.
+    ended : callable
+        Called after a stage has ended without an error: the session may lack another one.
+    changed : callable
+        Called when `fraction` has changed.
+    """
+
+    def __init__(
+        self,
+        timer: Timer,
+        is_due: Callable[[], bool],
+        accept: Callable[[Session, Preparation], object],
+        ended: Callable[[], object],
+        changed: Callable[[], object],
+    ) -> None:
+        self._timer, self._is_due, self._accept = timer, is_due, accept
+        self._ended, self._changed = ended, changed
+        self._job: Job[Preparation] | None = None
+        self._inputs: tuple[Any, ...] = ()  # of the running stage
+        self._declined: tuple[Any, ...] = ()
+        self._fraction: float | None = None
+
+    @property
+    def fraction(self) -> float | None:
+        """Completed fraction of the running stage, 0..1, coarsely; None if none is running."""
+        return self._fraction
+
+    def update(self, session: Session, *, start: bool, again: bool = False) -> None:
+        """Cancel the running stage if its inputs have changed; *start* one if *session* lacks it.
+
+        *again* also starts a stage that has failed or was cancelled.
+        """
+        inputs = _key(session)
+        if again:
+            self._declined = ()
+        if self._job is not None:
+            if inputs != self._inputs:
+                self._job.cancel()
+            return
+        if start and inputs != self._declined and (work := lacking(session)) is not None:
+            self._inputs = inputs
+            self._job = Job(
+                self._timer,
+                work,
+                done=lambda result: self._finish(session, result),
+                failed=self._fail,
+                watch=self._watch,
+                is_due=self._is_due,
+            )
+            self._show(0.0)
+
+    def cancel(self) -> bool:
+        """Cancel the running stage, and decline its inputs; False if none is running."""
+        if self._job is None or self._job.is_cancelled:
+            return False
+        self._declined = self._inputs
+        self._job.cancel()
+        self._show(None)
+        return True
+
+    def interrupt(self) -> None:
+        """Cancel the running stage; the next `update` after its end may start it again."""
+        if self._job is not None:
+            self._job.cancel()
+            self._show(None)
+
+    def stop(self) -> None:
+        """Cancel the running stage without waiting for its end."""
+        if self._job is not None:
+            self._job.abandon()
+            self._job = None
+            self._show(None)
+
+    def _watch(self, job: Job[Preparation]) -> None:
+        if not job.is_running:
+            self._job = None
+        is_shown = job.is_running and not job.is_cancelled
+        self._show(_STEP * int(job.fraction / _STEP) if is_shown else None)
+        if job.is_cancelled and not job.is_running:
+            self._ended()
+
+    def _finish(self, session: Session, result: Preparation) -> None:
+        if _key(session) == self._inputs:
+            self._accept(session, result)
+        self._ended()
+
+    def _fail(self, error: BaseException) -> None:
+        self._declined = self._inputs
+        if isinstance(error, SegDeformError):
+            raise SessionError(
+                f"Cannot prepare this mesh for pulling: {error_text(error)}. Press 1 to paint "
+                "other regions, or drag again to retry"
+            ) from error
+        raise error
+
+    def _show(self, fraction: float | None) -> None:
+        if fraction != self._fraction:
+            self._fraction = fraction
+            self._changed()
+
+
+def _key(session: Session) -> tuple[Any, ...]:
+    """Return the inputs of a preparation; two are equal exactly if its result is the same."""
+    regions, cages, options = session.regions, session.cages, session.options
+    return session.mesh, regions, cages, options.stretch, options.rotation_groups, options.offset
