@@ -32,7 +32,7 @@ def pictures(block: object, script: dict[str, Any], conf: dict[str, Any]) -> str
     names = script["example_globals"]
     if not found and "solution" in names:
         found = [FOLDER / "pose.png"]
-        ends = {"fixed": names["foot"], "handle": names["tip"]}
+        ends = {"fixed": names.get("foot", []), "handle": np.atleast_1d(names["tip"])}
         picture_before_after(found[0], names["mesh"], names["solution"].vertices, **ends)
     places = []
     for path, place in zip(found, script["image_path_iterator"], strict=False):

@@ -53,9 +53,9 @@ def pull(
     pins : (k,) int or (n,) bool
         Vertices that stay in place.  With pins the surface between them is free.
     locality : float, optional
-        1 keeps the surface farther away than twice the radius where it is.  With less, more of it
-        follows, above all the ends of limbs; with 0 all is free.  By default 0.5 without pins, and
-        0 with pins.
+        1 keeps the surface in place; beyond four radii, of 15 % of the diagonal or more, it hardly
+        moves.  With less, more of it follows, above all the ends of limbs; with 0 all is free.
+        By default 0.5 without pins, and 0 with pins.
     n_regions : int or None
         How many regions; None lets `segment` choose.
     n_cage_vertices : int, optional

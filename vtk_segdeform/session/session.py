@@ -558,9 +558,10 @@ class Session(Timeline):
         radius : float, optional
             Of the pulled surface, in the mesh's unit; by default 15 % of the mesh's diagonal.
         locality : float, optional
-            1 keeps the surface farther away than twice the radius where it is.  With less, more of
-            it follows, above all the ends of limbs; with 0 all is free.  By default 0.5, and 0
-            between fixed vertices, pins and handles that were not made by pulls.
+            1 keeps the surface in place; beyond four radii, of 15 % of the diagonal or more, it
+            hardly moves.  With less, more of it follows, above all the ends of limbs; with 0 all is
+            free.  By default 0.5, and 0 between fixed vertices, pins and handles that were not
+            made by pulls.
         max_steps : int, optional
             As in `drag`.
 
