@@ -24,7 +24,7 @@ FILE = DOCS / "pictures" / "drag.gif"
 SIZE = (460, 380)  # pixels
 CAMERA = [(0.35, -3.0, 0.75), (0.02, 0.0, 0.5), (0.0, 0.0, 1.0)]
 N_FRAMES = 57
-WIDE, HIGH = 0.08, 0.2  # of the curve
+WIDE, HIGH = 0.1, 0.06  # of the curve
 ARROW = [[0, 0], [0, -17], [4, -13.5], [6.5, -19], [9, -18], [6.5, -12.5], [11.5, -12]]  # pixels
 
 
@@ -49,8 +49,9 @@ def main() -> None:
 def end_of_arm(mesh: sd.Mesh) -> Any:
     """Return a point of the surface near the end of an arm, in front of the camera."""
     x = mesh.vertices
-    near = np.flatnonzero(x[:, 0] > x[:, 0].max() - 0.04)
-    return x[near[np.argmin(x[near, 1])]]
+    arm = np.flatnonzero(x[:, 0] > x[:, 0].max() - 0.08)
+    end = arm[x[arm, 2] > x[arm, 2].max() - 0.04]
+    return x[end[np.argmin(x[end, 1])]]
 
 
 def frames(plotter: pv.Plotter, view: View, start: Any) -> Iterator[Callable[[], None]]:

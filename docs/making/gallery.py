@@ -9,6 +9,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from sphinx_gallery.scrapers import figure_rst
 
 from making.made import DOCS
