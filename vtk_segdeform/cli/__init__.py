@@ -3,7 +3,7 @@
 The files, in reading order:
 
     main            options, help and exit codes
-    pulling         the command `pull`
+    pulling         ``segdeform pull``
     commands        ``segdeform deform``, ``edit``, ``regions`` and ``cages``
     checking        ``segdeform check``
     selection       point selections such as ``z>80%``
