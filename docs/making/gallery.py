@@ -9,6 +9,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from sphinx_gallery.scrapers import figure_rst
 
 from making.made import DOCS
@@ -32,7 +33,7 @@ def pictures(block: object, script: dict[str, Any], conf: dict[str, Any]) -> str
     names = script["example_globals"]
     if not found and "solution" in names:
         found = [FOLDER / "pose.png"]
-        ends = {"fixed": names["foot"], "handle": names["tip"]}
+        ends = {"fixed": names.get("foot", []), "handle": np.atleast_1d(names["tip"])}
         picture_before_after(found[0], names["mesh"], names["solution"].vertices, **ends)
     places = []
     for path, place in zip(found, script["image_path_iterator"], strict=False):

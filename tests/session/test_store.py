@@ -58,8 +58,18 @@ def tiny(pose: bool = True) -> Session:
     return session
 
 
+def pulled() -> Session:
+    """Return a tiny session in which a point was pulled."""
+    session = tiny()
+    session.pull(2, session.vertices[2] + [0.1, 0.2, 0.0], locality=0.0, max_steps=2)
+    session.commit()
+    session.pull(2, session.vertices[2] + [0.0, 0.1, 0.0], locality=1.0, max_steps=2)
+    return session
+
+
 POSED = posed()
 TINY = tiny()
+PULLED = pulled()
 
 
 def same(a: Session, b: Session) -> bool:
@@ -80,7 +90,18 @@ def same(a: Session, b: Session) -> bool:
         and one.options == other.options
         and a.region_names == b.region_names
         and one.regions.smoothness == other.regions.smoothness
+        and one.pulls == other.pulls
+        and locality(a) == locality(b)
     )
+
+
+def locality(session: Session) -> list[object]:
+    """Return the locality of a session in a form that can be compared."""
+    last = session.state.locality
+    if last is None:
+        return []
+    kept = np.concatenate(last.cage_vertices)
+    return [last.vertex, last.reach, last.spread, last.follows, kept.tobytes()]
 
 
 def saved(session: Session, folder: Path) -> bytes:
@@ -88,7 +109,11 @@ def saved(session: Session, folder: Path) -> bytes:
     return (folder / "saved.npz").read_bytes()
 
 
-@pytest.mark.parametrize("session", [POSED, tiny(pose=False), TINY], ids=["all", "rest", "tiny"])
+@pytest.mark.parametrize(
+    "session",
+    [POSED, tiny(pose=False), TINY, PULLED],
+    ids=["all", "rest", "tiny", "pulled"],
+)
 def test_what_is_loaded_is_what_was_saved(session, tmp_path):
     content = saved(session, tmp_path)
     loaded = load_session(tmp_path / "saved.npz")
@@ -348,12 +373,27 @@ WRONG = [
     ({"header": {"posed": "yes"}}, "posed must be true or false"),
     ({"targets": np.zeros((2, 3))}, "targets must be"),
     ({"compress": True}, "header.json is compressed"),
+    ({"header": {"pulls": "pull 1"}}, "pulls must be a list"),
+    ({"header": {"pulls": [[]]}}, r"state\.pulls\[0\] must be"),
+    ({"header": {"locality": 3}}, "locality must be a list"),
+    ({"header": {"locality": [2, None, 0.1]}}, "locality must have 4 entries"),
+    ({"header": {"locality": [2.5, None, 0.1, 0.5]}}, "locality must be a whole number"),
+    ({"header": {"locality": [99, None, 0.1, 0.5]}}, "there is no vertex 99"),
+    ({"header": {"locality": [2, -1.0, 0.1, 0.5]}}, "radius of a pull must be positive"),
+    ({"header": {"locality": [2, "far", 0.1, 0.5]}}, "radius of a pull must be positive"),
+    ({"header": {"locality": [2, None, None, 0.5]}}, "radius of a pull must be positive"),
+    ({"header": {"locality": [2, None, 0.1, 1.5]}}, "follows must be from 0 to 1"),
+    ({"header": {"locality": [2, None, 0.1, "no"]}}, "follows must be from 0 to 1"),
+    ({"locality": np.zeros((3, 3))}, "locality must be float64 of shape"),
+    ({"locality": np.full((4, 3), np.nan)}, "NaN or infinite"),
+    ({"locality": np.full((4, 3), 1e300)}, "the pose is damaged"),
 ]
 
 
 @pytest.mark.parametrize(("change", "says"), WRONG)
 def test_a_file_that_was_tampered_with_is_refused_and_the_fault_named(change, says, tmp_path):
-    content = rewritten(saved(TINY, tmp_path), **change)
+    of_pulls = {"locality", "pulls"} & {*change, *change.get("header", {})}
+    content = rewritten(saved(PULLED if of_pulls else TINY, tmp_path), **change)
     assert re.search(says, refuse(content, tmp_path))
 
 

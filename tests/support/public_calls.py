@@ -91,7 +91,7 @@ def expensive(call: Call) -> bool:
     return call.name in {
         "PlotterTools.edit", "PolyDataTools.deform", "PolyDataTools.regions", "cactus", "deform",
         "dinosaur", "edit", "fit_cages", "film", "picture_before_after", "picture_distortion",
-        "picture_regions_and_cages", "picture_volume_change",
+        "picture_regions_and_cages", "picture_volume_change", "pull",
     }  # fmt: skip
 
 
@@ -204,6 +204,11 @@ def _worked_on() -> Session:
 
 def session() -> Session:
     return copy.copy(_worked_on())
+
+
+@functools.cache
+def _preparation() -> Any:
+    return session().preparation()
 
 
 def surface() -> pv.PolyData:
@@ -333,6 +338,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "exact_volume": lambda: True,
     "faces": lambda: mesh().faces,
     "fixed": _left,
+    "follows": lambda: 0.5,
     "folder": Path,
     "fps": lambda: 20.0,
     "frames": lambda: [None],
@@ -347,6 +353,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "lids": lambda: None,
     "limits": sd.widgets.ReplayLimits,
     "listener": lambda: lambda _change: None,
+    "locality": lambda: 0.5,
     "major": lambda: 1.0,
     "masks": lambda: regions().membership,
     "max_steps": lambda: 3,
@@ -364,15 +371,18 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "options": sd.Options,
     "overlap": lambda: 1,
     "path": lambda: Path("written.segdeform"),
+    "pins": lambda: [0],
     "pixels": lambda: 1_000_000,
     "points": lambda: mesh().vertices[:4],
     "polydata": surface,
+    "preparation": _preparation,
     "preserve_region_volumes": lambda: False,
     "preserve_volume": lambda: True,
     "progress": lambda: lambda _fraction, _message: None,
     "radius": lambda: 1.0,
     "region": lambda: 0,
     "report": lambda: sd.find_faults(mesh().vertices, mesh().faces),
+    "reach": lambda: 0.5,
     "regions": regions,
     "renderer": lambda: view().renderer,
     "rings": lambda: 1,
@@ -382,12 +392,15 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "session": session,
     "size": lambda: (0.2, 0.2, 1.0),
     "smoothness": lambda: 1.0,
+    "spread": lambda: 0.3,
     "state": lambda: _worked_on().state,
     "stretch": lambda: 10.0,
     "subtract": lambda: False,
     "surface": surface,
     "targets": _targets,
+    "to": lambda: mesh().vertices[100] + [0.0, 0.0, 0.1],
     "tolerance": lambda: 1e-6,
+    "vertex": lambda: 100,
     "vertices": lambda: mesh().vertices,
     "view": view,
     "values": lambda: np.arange(given().mesh.n_vertices),
@@ -511,6 +524,7 @@ SAID_AS: dict[str, tuple[str, ...]] = {
     "board.cages": ("weights",),
     "mean_value_coordinates.cage_vertices": ("cage_faces",),
     "deform.n_cage_vertices": ("n_vertices",),
+    "pull.n_cage_vertices": ("n_vertices",),
     "film.scene": ("view",),
     "from_meshset.arrays": ("attribute",),
     "repair.faces": ("cannot be repaired",),

@@ -26,7 +26,7 @@ from public_calls import CORE, SAID_AS, WIDGETS, Call, calls, valid
 
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.session.session import Session
-from vtk_segdeform.session.state import Pose, State
+from vtk_segdeform.session.state import Locality, Pose, State
 
 SECONDS = 30.0  # limit for one call
 GIGABYTES = 4  # in addition to the memory in use
@@ -146,16 +146,18 @@ def test_a_bad_argument_is_accepted_or_the_error_names_it(modules, bounded):
     _check_errors(cheap, 1, 2, bounded)
 
 
-@pytest.mark.parametrize("cls", [State, Pose], ids=lambda cls: cls.__name__)
+@pytest.mark.parametrize("cls", [State, Pose, Locality], ids=lambda cls: cls.__name__)
 def test_a_session_rejects_a_state_with_bad_parts(cls, bounded):
     """Each field of a state, or of its pose, in turn holds each bad value."""
     state = public_calls.session().state
-    thing = state if cls is State else state.pose
+    last = Locality(100, 0.5, 0.3, 0.5, state.pose.cage_vertices)
+    thing = {State: state, Pose: state.pose, Locality: last}[cls]
     accepted = 0
     for each in fields(cls):
         for kind in BAD:
             bad = replace(thing, **{each.name: BAD[kind]()})
-            bad = bad if cls is State else replace(state, pose=bad)
+            if cls is not State:
+                bad = replace(state, **{cls.__name__.lower(): bad})
             try:
                 with _within_limit():
                     Session(public_calls.mesh(), state=bad)

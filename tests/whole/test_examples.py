@@ -13,6 +13,9 @@ from vtk_segdeform.pictures.canvas import require_offscreen
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 RIGHT = {
+    "a_pull": lambda names: (
+        abs(names["solution"].volume_change) < 1e-12 and names["solution"].handle_error < 1e-3
+    ),
     "bend_a_scan": lambda names: (
         abs(names["solution"].volume_change) < 1e-12
         and (names["bent"].faces == names["scan"].faces).all()

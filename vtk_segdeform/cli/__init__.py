@@ -3,6 +3,7 @@
 The files, in reading order:
 
     main            options, help and exit codes
+    pulling         ``segdeform pull``
     commands        ``segdeform deform``, ``edit``, ``regions`` and ``cages``
     checking        ``segdeform check``
     selection       point selections such as ``z>80%``

@@ -26,12 +26,13 @@ from ..errors import ConstraintError, SegDeformError
 from ..version import __version__
 from .progress_bar import ProgressBar
 
-_VECTOR_OPTIONS = ("--rotate", "--pivot", "--translate")
+_VECTOR_OPTIONS = ("--rotate", "--pivot", "--translate", "--at", "--to", "--pin")
 DONE, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
 
 # Command -> module of this folder; the function has the name of the command.
 COMMANDS = {
     "demo": "demo",
+    "pull": "pulling",
     "deform": "commands",
     "edit": "commands",
     "app": "application",
@@ -62,6 +63,7 @@ code 1.
 _EXAMPLES = """\
 examples:
   segdeform demo -o demo-output
+  segdeform pull horse.ply -o pulled.ply --at 0.1,0,0.9 --to 0.2,0,1.1
   segdeform check scan.ply --repair -o closed.ply
   segdeform edit horse.ply -o bent.ply
   segdeform app horse.ply
@@ -221,6 +223,10 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("--size", type=_count, default=5430, metavar="N", help=text)
     sub.add_argument("--no-pictures", action="store_true", help="write no pictures")
 
+    sub = add_command("pull", "pull one point of a surface and write the result")
+    _input_output(sub, "the deformed mesh", required=True)
+    _pull(sub)
+
     sub = add_command("deform", "move handles of a mesh and write the result", _SELECTION)
     _input_output(sub, "the deformed mesh", required=True)
     _cages(sub)
@@ -311,6 +317,26 @@ def _cages(parser: argparse.ArgumentParser) -> None:
     _regions(parser)
     text = "total cage vertices (default: 155)"
     parser.add_argument("--cage-vertices", type=_count, default=155, metavar="N", help=text)
+
+
+def _pull(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    text = "a point on the surface, where it is grabbed"
+    add("--at", required=True, metavar="X,Y,Z", help=text)
+    add("--to", required=True, metavar="X,Y,Z", help="where this point is pulled to")
+    text = "radius of the pulled surface (default: 15 %% of the diagonal)"
+    add("--radius", type=float, default=None, metavar="R", help=text)
+    text = "1: the rest stays in place; 0: all of it follows (default: 0.5; with pins 0)"
+    add("--local", type=float, default=None, metavar="S", help=text)
+    text = "a point on the surface that stays in place; may be repeated"
+    add("--pin", action="append", default=[], metavar="X,Y,Z", help=text)
+    text = "number of regions (default: auto)"
+    add("--regions", type=_count, default=None, metavar="N", help=text)
+    text = "total cage vertices (default: by the number of regions)"
+    add("--cage-vertices", type=_count, default=None, metavar="N", help=text)
+    text = "whether open parts enclose a volume under lids over their holes (default: auto)"
+    add("--lids", choices=("auto", "on", "off"), default="auto", help=text)
+    add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
 
 
 def _handles(parser: argparse.ArgumentParser) -> None:

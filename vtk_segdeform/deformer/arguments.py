@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, IntArray, as_ids, as_points, is_number, is_whole
+from ..arrays import FloatArray, IntArray, as_ids, as_points, is_number, is_whole, plain
 from ..cages import Cage
 from ..checks import require_sequence, shown
 from ..errors import ArgumentError, CageError, ConstraintError
@@ -63,18 +63,18 @@ def stacked_cages(cages: Sequence[Cage], cage_vertices: Sequence[ArrayLike]) -> 
 
 
 def checked_constraints(
-    mesh: Mesh, fixed: ArrayLike, handle: ArrayLike
+    mesh: Mesh, fixed: ArrayLike, handle: ArrayLike, name: str = "fixed"
 ) -> tuple[IntArray, IntArray]:
-    """Return the vertex numbers of *fixed* and *handle*, or raise a ConstraintError."""
+    """Return the vertex numbers of *fixed*, called *name*, and *handle*, or raise an error."""
     try:
-        fixed = as_ids(fixed, mesh.n_vertices, "fixed")
+        fixed = as_ids(fixed, mesh.n_vertices, name)
         handle = as_ids(handle, mesh.n_vertices, "handle")
     except ValueError as fault:
         raise ConstraintError(str(fault)) from None
     both = np.intersect1d(fixed, handle)
     if len(both):
         raise ConstraintError(
-            f"{len(both)} vertices are both fixed and handle (the first is {both[0]}); "
+            f"{len(both)} vertices are both {name} and handle (the first is {both[0]}); "
             "remove them from one of the two"
         )
     return fixed, handle
@@ -107,6 +107,17 @@ def checked_locality(locality: float | None) -> float | None:
 def reach_and_follows(radius: float, locality: float) -> tuple[float, float]:
     """Return the arguments of `Deformer.local` for a pull, by its *locality* from 0 to 1."""
     return (radius / math.sqrt(locality) if locality else math.inf), 1.0 - locality
+
+
+def checked_point(to: ArrayLike) -> FloatArray:
+    """Return *to* as a point (3,); ConstraintError if it is none."""
+    array = plain(to, "to")
+    if array.shape != (3,):
+        raise ConstraintError(f"to must be a point (3,); got shape {array.shape}")
+    try:
+        return np.asarray(as_points(array[None], "to")[0])
+    except ValueError as fault:
+        raise ConstraintError(str(fault)) from None
 
 
 def checked_targets(targets: ArrayLike, n_handle: int) -> FloatArray:

@@ -323,7 +323,8 @@ class Deformer:
             follow if their area is less than this share of the largest such part.
         """
         vertex = checked_vertex(self.mesh, vertex)
-        if reach != np.inf and not (is_number(reach) and reach > 0.0):
+        is_infinite = isinstance(reach, float) and reach == np.inf
+        if not (is_infinite or (is_number(reach) and reach > 0.0)):
             raise ConstraintError(f"reach must be a positive number; got {shown(reach)}")
         if not (is_number(spread) and spread > 0.0):
             raise ConstraintError(f"spread must be a positive number; got {shown(spread)}")
@@ -476,7 +477,7 @@ class Deformer:
         steps = self._follow_waypoints(goal, options)
         is_same = np.array_equal(goal, self._targets)
         self._targets, pulled = goal, self._constraints.pulled
-        error = pulled.error if is_same else np.inf
+        error = pulled.error = pulled.error if is_same else np.inf
         for _ in range(_CORRECTIONS if max_steps is None else 1):
             is_drag = max_steps is not None and not is_same
             result, x, more = self._solve_once(goal, options, is_drag)

@@ -37,6 +37,7 @@ from ..mesh import Mesh
 from ..solver import CoarseVolume
 
 _FEWEST = 4  # samples that determine an affine motion
+_SHORTEST = 1e-12  # reach and spread; the mesh has size 1
 _FLAT = 1e-3  # of the moments: thinner patches count as flat
 
 
@@ -95,7 +96,7 @@ class SurfaceSamples:
         """
         if np.isinf(reach):
             return np.zeros((self.rows.shape[1],) * 2)
-        away = self.distances(vertex) / reach
+        away = self.distances(vertex) / max(reach, _SHORTEST)
         beyond = np.clip(away - 1.0, 0.0, 1.0)
         weights = self.areas * beyond**2 * (3.0 - 2.0 * beyond)
         far = np.flatnonzero((away > 1.0) & np.isfinite(away))
@@ -112,6 +113,7 @@ class SurfaceSamples:
 
         None if there are too few.
         """
+        spread = max(spread, _SHORTEST)
         away = self.distances(vertex) / spread
         near = np.flatnonzero(away < 1.0)
         if len(near) < _FEWEST:

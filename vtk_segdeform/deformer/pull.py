@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import plain
 from ..cages import fit_cages, suggested_size
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part
@@ -17,8 +15,8 @@ from .arguments import (
     as_lids,
     checked_constraints,
     checked_locality,
+    checked_point,
     checked_radius,
-    checked_targets,
     checked_vertex,
     reach_and_follows,
 )
@@ -55,9 +53,9 @@ def pull(
     pins : (k,) int or (n,) bool
         Vertices that stay in place.  With pins the surface between them is free.
     locality : float, optional
-        1 keeps the surface farther away than twice the radius where it is.  With less, more of it
-        follows, above all the ends of limbs; with 0 all is free.  By default 0.5 without pins, and
-        0 with pins.
+        1 keeps the surface in place; beyond four radii, of 15 % of the diagonal or more, it hardly
+        moves.  With less, more of it follows, above all the ends of limbs; with 0 all is free.
+        By default 0.5 without pins, and 0 with pins.
     n_regions : int or None
         How many regions; None lets `segment` choose.
     n_cage_vertices : int, optional
@@ -88,8 +86,8 @@ def pull(
     require_mesh(mesh)
     as_lids(lids)
     vertex = checked_vertex(mesh, vertex)
-    fixed, handle = checked_constraints(mesh, pins, [vertex])
-    targets = checked_targets(np.atleast_2d(plain(to, "to")), 1)
+    fixed, handle = checked_constraints(mesh, pins, [vertex], "pins")
+    target = checked_point(to)[None]
     radius, locality = checked_radius(mesh, radius), checked_locality(locality)
     if locality is None:
         locality = 0.0 if len(fixed) else LOCALITY
@@ -102,4 +100,4 @@ def pull(
     )
     reach, follows = reach_and_follows(radius, locality)
     deformer = deformer.local(vertex, reach, SPREAD * radius, follows=follows)
-    return deformer.solve(targets, progress=part(progress, 0.9, 1.0))
+    return deformer.solve(target, progress=part(progress, 0.9, 1.0))

@@ -164,15 +164,15 @@ def _farthest(points: FloatArray, place: FloatArray) -> float:
     return float(np.abs(points - place).max(initial=0.0))
 
 
-def moved(points: FloatArray, matrix: ArrayLike) -> FloatArray:
-    """Return *points* (k, 3) transformed by an affine (4, 4) *matrix*, which is checked."""
-    M = plain(matrix, "motion")
+def moved(points: FloatArray, matrix: ArrayLike, name: str = "motion") -> FloatArray:
+    """Return *points* (k, 3) transformed by an affine (4, 4) *matrix*, checked as *name*."""
+    M = plain(matrix, name)
     if M.dtype.kind not in "iuf":
-        raise ConstraintError(f"motion must contain real numbers; got {M.dtype}")
+        raise ConstraintError(f"{name} must contain real numbers; got {M.dtype}")
     if not np.array_equal(M[3], [0.0, 0.0, 0.0, 1.0]):
-        raise ConstraintError(f"the last row of motion must be 0 0 0 1; got {M[3]}")
+        raise ConstraintError(f"the last row of {name} must be 0 0 0 1; got {M[3]}")
     if not np.isfinite(M).all():
-        raise ConstraintError("motion must be finite; it contains NaN or infinite numbers")
+        raise ConstraintError(f"{name} must be finite; it contains NaN or infinite numbers")
     return np.asarray(points @ M[:3, :3].T + M[:3, 3])
 
 

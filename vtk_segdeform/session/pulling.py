@@ -22,8 +22,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, IntArray, as_points, frozen, plain
-from ..deformer import LOCALITY, SPREAD, checked_vertex, reach_and_follows
+from ..arrays import FloatArray, IntArray, frozen, plain
+from ..deformer import LOCALITY, SPREAD, checked_point, checked_vertex, reach_and_follows
 from ..errors import ConstraintError
 from ..mesh import Mesh
 from .handles import Targets, moved, require_near, targets_at, with_handle
@@ -75,8 +75,8 @@ class Grasp:
         if to.shape == (3,):
             shift, own = to - self.point, start[self.name] + (to - self.point)
         else:
-            own = moved(start[self.name], to)
-            shift = moved(self.point[None], to)[0] - self.point
+            own = moved(start[self.name], to, "to")
+            shift = moved(self.point[None], to, "to")[0] - self.point
         more = {name: start[name] + share * shift for name, share in self.carried.items()}
         return MappingProxyType({self.name: own, **more})
 
@@ -131,14 +131,11 @@ def checked_motion(mesh: Mesh, to: ArrayLike) -> FloatArray:
     array = plain(to, "to")
     if array.shape == (4, 4):
         return np.asarray(array, dtype=np.float64)
-    try:
-        point = as_points(np.atleast_2d(array), "to")
-    except ValueError as fault:
-        raise ConstraintError(str(fault)) from None
-    if array.shape != (3,):
+    if array.ndim == 2:
         raise ConstraintError(f"to must be a point (3,) or a matrix (4, 4); got {array.shape}")
-    require_near(mesh, point, "to")
-    return np.asarray(point[0])
+    point = checked_point(array)
+    require_near(mesh, point, "coordinates of to")
+    return point
 
 
 def _new_name(state: State, kind: str) -> str:

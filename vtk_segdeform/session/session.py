@@ -444,7 +444,8 @@ class Session(Timeline):
     def preparation(self, progress: Progress | None = None) -> Preparation:
         """Return the regions and cages that the session lacks, bound, without changing it.
 
-        This may run in another thread; pass the result to `accept` in the session's thread.
+        This may run in another thread; pass the result to `accept` in the session's thread.  Unless
+        the options have another number of cage vertices, it follows the number of regions.
         """
         regions, options = self.regions, self.options
         if regions is None:
@@ -452,7 +453,8 @@ class Session(Timeline):
         cages = self.cages
         if not cages:
             share = part(progress, 0.2, 0.5)
-            size = suggested_size(regions)
+            wanted = options.n_cage_vertices
+            size = suggested_size(regions) if wanted == Options().n_cage_vertices else wanted
             cages = fit_cages(self.mesh, regions, size, offset=options.offset, progress=share)
         state = State(regions, cages, options=options)
         deformer = PoseSolver(self.mesh).bind(state, part(progress, 0.5, 1.0))
@@ -463,7 +465,7 @@ class Session(Timeline):
 
         It is no step: undo does not remove it.
         """
-        regions, cages, deformer = preparation
+        regions, cages, deformer = require(preparation, Preparation, "preparation")
         has_others = self.regions not in (None, regions) or self.cages not in ((), cages)
         if has_others or deformer.mesh is not self.mesh:
             return False
@@ -556,9 +558,10 @@ class Session(Timeline):
         radius : float, optional
             Of the pulled surface, in the mesh's unit; by default 15 % of the mesh's diagonal.
         locality : float, optional
-            1 keeps the surface farther away than twice the radius where it is.  With less, more of
-            it follows, above all the ends of limbs; with 0 all is free.  By default 0.5, and 0
-            between fixed vertices, pins and handles that were not made by pulls.
+            1 keeps the surface in place; beyond four radii, of 15 % of the diagonal or more, it
+            hardly moves.  With less, more of it follows, above all the ends of limbs; with 0 all is
+            free.  By default 0.5, and 0 between fixed vertices, pins and handles that were not
+            made by pulls.
         max_steps : int, optional
             As in `drag`.
 
@@ -588,8 +591,8 @@ class Session(Timeline):
             grip = pulling.Grip(vertex, radius, locality, turns)
             grasp = pulling.grasp(self.mesh, start, self._vertices_of(start), grip)
         targets = grasp.targets(motion)
-        for name, points in targets.items():
-            handles.require_near(self.mesh, points, f"targets of {name}")
+        for points in targets.values():
+            handles.require_near(self.mesh, points, "coordinates of to")
         state = grasp.state
         assert state.pose is not None
         wanted = {**state.pose.targets, **targets}

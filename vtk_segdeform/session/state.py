@@ -184,7 +184,7 @@ def checked_state(mesh: Mesh, state: State) -> State:
     if state.pose is not None:
         pose = _checked_pose(cages, lengths, list(handles), require(state.pose, Pose, "state.pose"))
         _require_plausible(mesh, pose)
-    pulls, locality = tuple(state.pulls), state.locality
+    pulls, locality = all_of(state.pulls, str, "state.pulls"), state.locality
     if locality is not None:
         locality = _checked_locality(mesh, cages, require(locality, Locality, "state.locality"))
     owned = MappingProxyType({name: _frozen_copy(ids) for name, ids in handles.items()})
@@ -258,7 +258,9 @@ def _checked_locality(mesh: Mesh, cages: Sequence[Cage], locality: Locality) -> 
     _require_plausible(mesh, start)
     if not is_whole(locality.vertex, 0, mesh.n_vertices - 1):
         raise ConstraintError(f"there is no vertex {shown(locality.vertex)} to have been pulled")
-    for length in (locality.spread, *([] if locality.reach == np.inf else [locality.reach])):
+    reach = locality.reach
+    is_infinite = isinstance(reach, float) and reach == np.inf
+    for length in (locality.spread, *([] if is_infinite else [reach])):
         if not is_number(length, _TINY):
             raise ConstraintError(f"the radius of a pull must be positive; got {shown(length)}")
     if not (is_number(locality.follows, 0.0) and locality.follows <= 1.0):

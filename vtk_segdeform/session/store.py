@@ -190,10 +190,13 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
     fixed = archive.array("fixed", "i", (_count(header, "n_fixed"),))
     options = Options(**header["options"])
     names = tuple(_list(header, "region_names")) if "region_names" in header else ()
-    pulls = tuple(map(str, _list(header, "pulls"))) if "pulls" in header else ()
+    pulls = tuple(_list(header, "pulls")) if "pulls" in header else ()
     locality = None
     if "locality" in header:
-        vertex, reach, spread, follows = _list(header, "locality")
+        entries = _list(header, "locality")
+        if len(entries) != 4:
+            raise SessionError(f"locality must have 4 entries in the header; got {entries!r}")
+        vertex, reach, spread, follows = entries
         kept = split_rows(archive.array("locality", "f", (total, 3)), n_vertices)
         reach = math.inf if reach is None else reach
         locality = Locality(_whole(vertex, "locality"), reach, spread, follows, tuple(kept))

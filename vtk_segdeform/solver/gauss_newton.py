@@ -281,10 +281,9 @@ class GaussNewton:
         It is zero at a minimum: the rest, which is orthogonal to it, changes the volumes only.
         """
         here = self._iterate_at(p, self.positions.toward(targets))
-        if not here.rows:
-            return here.slope
-        rows, slope = np.reshape(here.rows, (len(here.rows), -1)), here.slope.ravel()
-        share = np.linalg.lstsq(rows.T, slope, rcond=None)[0]
+        rows = np.reshape(here.rows, (len(here.rows), p.size))
+        slope = here.slope.ravel()
+        share = np.linalg.lstsq(rows.T, slope, rcond=None)[0] if len(rows) else np.zeros(0)
         return np.reshape(slope - share @ rows, p.shape)
 
     def _step(

@@ -1,0 +1,70 @@
+"""The command `pull`: what was given is written, moved; errors name the option."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from given_surfaces import holed, require_only_moved
+from numpy.testing import assert_allclose
+
+from vtk_segdeform.cli.main import main
+from vtk_segdeform.geometry import lids_of
+from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.io import Surface, read_polydata, write_mesh
+
+pytestmark = pytest.mark.usefixtures("vtk_in_process")
+
+
+@pytest.fixture(scope="module")
+def given(tmp_path_factory) -> str:
+    path = tmp_path_factory.mktemp("pull") / "holed.vtp"
+    write_mesh(path, holed())
+    return str(path)
+
+
+def text(point) -> str:
+    return ",".join(map(str, point))
+
+
+def test_pull_moves_the_point_keeps_the_pins_and_writes_what_was_given(given, tmp_path, capsys):
+    before = read_polydata(given)
+    mesh = Surface(before).mesh
+    x = mesh.vertices
+    at, pin = x[x[:, 2].argmax()], x[x[:, 2].argmin()]
+    to, out = at + [0.1 * mesh.diagonal, 0.0, 0.0], tmp_path / "pulled.vtp"
+    words = ["pull", given, "-o", str(out), "--at", text(at), "--to", text(to), "--pin", text(pin)]
+    assert main([*words, "--regions", "1", "--cage-vertices", "40", "--radius", "0.5"]) == 0
+    printed = capsys.readouterr().out
+    assert "volume kept under lids" in printed
+    assert "status          converged" in printed
+    after = read_polydata(out)
+    require_only_moved(before, after)
+    moved = Surface(after).mesh.vertices
+    assert_allclose(moved[x[:, 2].argmax()], to, atol=1e-3 * mesh.diagonal)
+    assert_allclose(moved[x[:, 2].argmin()], pin, atol=1e-3 * mesh.diagonal)
+    lids, closed = lids_of(mesh), lids_of(mesh).closed(mesh)
+    volumes = [signed_volume(lids.extension @ each, closed) for each in (x, moved)]
+    assert np.ptp(volumes) < 1e-6 * volumes[0]  # of single precision coordinates
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--at", "9,9,9", "--to", "0,0,1"], "--at is .* away from the surface; .* vertex is at"),
+        (["--at", "0,1", "--to", "0,0,1"], "at must be three numbers"),
+        (["--at", "{top}", "--to", "0,0,x"], "to must be x,y,z"),
+        (["--at", "{top}", "--to", "-.1,0,9", "--pin", "-5,0,0"], "--pin is"),
+        (["--at", "{top}", "--to", "0,0,9", "--local", "2"], "locality must be a number from 0 to"),
+        (["--at", "{top}", "--to", "0,0,9", "--pin", "{top}"], "both pins and handle"),
+    ],
+)
+def test_wrong_options_are_errors_that_name_them(words, says, given, tmp_path, capsys):
+    x = Surface.read(given).mesh.vertices
+    words = [word.replace("{top}", text(x[x[:, 2].argmax()])) for word in words]
+    quick = ["--regions", "1", "--cage-vertices", "40"]
+    assert main(["pull", given, "-o", str(tmp_path / "out.vtp"), *words, *quick]) == 2
+    message = capsys.readouterr().err
+    assert re.search(says, message), message
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,162 @@
+"""Locality: anchors, samples of the surface, and pulls that make no spike."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from real_meshes import path_of
+from scenes import sausage
+from scipy import sparse
+
+from vtk_segdeform import models
+from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.deformer.locality import SurfaceSamples
+from vtk_segdeform.deformer.pull import pull
+from vtk_segdeform.errors import ConstraintError
+from vtk_segdeform.io.surface import Surface
+from vtk_segdeform.solver.position_constraints import Anchors, PositionTerm
+from vtk_segdeform.solver.solution import Status
+
+SCENE = sausage(2)
+X = SCENE.mesh.vertices
+D = SCENE.mesh.diagonal
+HIGH = int(np.argmax(X[:, 2]))
+UP = np.array([0.0, 0.0, 0.1 * D])
+
+
+@functools.cache
+def held() -> Deformer:
+    return SCENE.deformer().hold(handle=[HIGH])
+
+
+def chain(count: int = 12) -> SurfaceSamples:
+    """Return samples along a line, one apart, whose weights are the diagonal of `quadratic`."""
+    i = np.arange(count - 1)
+    edges = sparse.coo_array((np.ones(count - 1), (i, i + 1)), (count, count)).tocsr()
+    points = np.stack([np.arange(count), *np.zeros((2, count))], axis=1)
+    share = np.full(count, 1.0 / count)
+    return SurfaceSamples(np.arange(count), np.eye(count), points, share, edges + edges.T)
+
+
+def test_the_slope_of_the_objective_is_its_derivative_and_the_hessian_has_the_anchors():
+    rng = np.random.default_rng(3)
+    root = rng.normal(size=(9, 8))
+    anchors = Anchors(root.T @ root, rng.normal(size=(8, 3)), rng.normal(size=(8, 3)))
+    rows, base = rng.normal(size=(3, 8)), np.array([2.0, 2.0, 5.0])
+    term = PositionTerm(rows, np.array([0, 0, 1]), base, np.array([1.0, 3.0]), anchors=anchors)
+    p, way, u = rng.normal(size=(8, 3)), rng.normal(size=(8, 3)), rng.normal(size=(3, 3))
+    value, slope = term.value_and_slope(p, u)
+    errors = []
+    for step in (1e-2, 1e-3):
+        ahead, _ = term.value_and_slope(p + step * way, u)
+        first_order = value + 2.0 * step * np.vdot(slope, way)
+        second = step**2 * np.vdot(way, term.quadratic() @ way)
+        assert_allclose(ahead, first_order + second, rtol=1e-12)
+        errors.append(abs(ahead - first_order))
+    assert np.log10(errors[0] / errors[1]) == pytest.approx(2.0, abs=1e-6)
+    free = PositionTerm(rows, term.set_of, base, term.strength)
+    assert_allclose(term.quadratic() - free.quadratic(), anchors.quadratic, atol=1e-12)
+
+
+def test_at_the_press_the_objective_of_a_local_deformer_is_at_rest():
+    posed = held().copy()
+    posed.solve(X[[HIGH]] + UP)
+    local = posed.local(int(X[:, 0].argmax()), 0.2 * D, 0.1 * D)
+    solver, p = local._constraints.solver, local._p
+    places = local._constraints.pulled.moved(local._constraints.places(local._targets))
+    assert np.abs(solver.unbalanced(p, places)).max() < 1e-12 * np.abs(solver._hessian).max()
+    assert local.solve(X[[HIGH]] + UP).steps == 0
+    assert list(local._constraints.pulled.vertices) == [HIGH]  # not as a single vertex
+
+
+@pytest.mark.parametrize(
+    ("follows", "free"), [(0.0, range(6, 11)), (0.1, range(6, 11)), (0.5, range(6, 12))]
+)
+def test_the_reach_is_free_and_parts_beyond_it_follow_if_they_are_small(follows, free):
+    weights = np.diag(chain().quadratic(8, 2.0, follows)) * 12
+    assert set(np.flatnonzero(weights == 0.0)) == set(free)
+    assert weights[0:5] == pytest.approx(1.0)
+    assert weights[5] == pytest.approx(0.5)
+
+
+def test_another_body_stays():
+    samples = chain()
+    edges = samples.edges.tolil()
+    edges[3, 4] = edges[4, 3] = 0.0
+    apart = SurfaceSamples(
+        samples.cells, samples.rows, samples.points, samples.areas, edges.tocsr()
+    )
+    weights = np.diag(apart.quadratic(8, 3.0, 1.0)) * 12
+    assert_allclose(weights[:4], 1.0)
+    assert not np.diag(apart.quadratic(8, np.inf, 0.0)).any()
+
+
+def test_a_soft_row_reproduces_affine_maps():
+    samples = held()._samples
+    rest = held()._rest.vertices
+    row = samples.soft_row(HIGH, rest[HIGH], 0.05)
+    cages = held()._rest_cages
+    affine = np.array([[1.1, 0.2, 0.0], [0.1, 0.9, 0.3], [0.0, -0.2, 1.0]])
+    assert_allclose(row @ (cages @ affine), rest[HIGH] @ affine, atol=1e-3)
+    assert row.sum() == pytest.approx(1.0)
+    assert samples.soft_row(HIGH, rest[HIGH], 1e-6) is None
+
+
+def spike(mesh, x, vertex):
+    """Return how far a vertex is from the plane of its neighbours, in edge lengths."""
+    near = np.setdiff1d(mesh.adjacency[[vertex]].indices, [vertex])
+    middle = x[near].mean(axis=0)
+    normal = np.linalg.svd(x[near] - middle)[2][2]
+    edge = np.linalg.norm(mesh.vertices[near] - mesh.vertices[vertex], axis=1).mean()
+    return abs((x[vertex] - middle) @ normal) / edge
+
+
+def dense():
+    return models.cactus(1500)
+
+
+def real(name):
+    return Surface.read(path_of(name)).mesh
+
+
+BODIES = {
+    "cactus": dense,
+    "hand": functools.partial(real, "hand.off"),
+}
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_a_pull_reaches_its_target_without_a_spike_and_far_away_nothing_moves(name):
+    mesh = BODIES[name]()
+    rng = np.random.default_rng(5)
+    vertex = int(rng.integers(mesh.n_vertices))
+    x, away = mesh.vertices, np.linalg.norm(mesh.vertices - mesh.vertices[vertex], axis=1)
+    way = rng.normal(size=3)
+    to = x[vertex] + 0.1 * mesh.diagonal * way / np.linalg.norm(way)
+    solution = pull(mesh, vertex, to, locality=1.0)
+    assert solution.status is Status.CONVERGED
+    assert abs(solution.volume_change) < 1e-12
+    assert np.linalg.norm(solution.vertices[vertex] - to) < 6e-4 * mesh.diagonal
+    assert spike(mesh, solution.vertices, vertex) - spike(mesh, x, vertex) < 0.1
+    far = np.linalg.norm(solution.vertices - x, axis=1)[away > 4.0 * 0.15 * mesh.diagonal]
+    assert far.max(initial=0.0) < 2e-3 * mesh.diagonal
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"vertex": -1}, "vertex must be"),
+        ({"reach": 0.0}, "reach must be a positive number"),
+        ({"reach": np.nan}, "reach must be a positive number"),
+        ({"spread": np.inf}, "spread must be a positive number"),
+        ({"spread": "wide"}, "spread must be a positive number"),
+        ({"follows": 1.5}, "follows must be a number from 0 to 1"),
+        ({"follows": None}, "follows must be a number from 0 to 1"),
+    ],
+)
+def test_arguments_of_a_local_deformer_are_checked(changes, says):
+    with pytest.raises(ConstraintError, match=says):
+        held().local(**{"vertex": HIGH, "reach": 1.0, "spread": 0.5, **changes})

@@ -1,0 +1,356 @@
+"""Pulls: nothing moves at the press, the volume is exact in every frame, each pull is one step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scenes import sausage
+from solids import icosphere, rotation
+
+from vtk_segdeform.cages.cage import Cage
+from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.errors import CageError, ConstraintError
+from vtk_segdeform.geometry.lids import lids_of
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.regions.regions import Regions
+from vtk_segdeform.session.session import Session
+from vtk_segdeform.session.state import State
+from vtk_segdeform.session.store import load_session, save_session
+
+pytestmark = pytest.mark.usefixtures("bound_once")
+SCENE = sausage(2)
+MESH, X = SCENE.mesh, SCENE.mesh.vertices
+D = MESH.diagonal
+HIGH, LOW, TIP = (int(np.argmax(X @ way)) for way in ([0, 0, 1.0], [0.3, 0, -1.0], [1.0, 0, 0]))
+NEAR = int(np.argsort(np.linalg.norm(X - X[HIGH], axis=1))[1])  # the nearest
+UP = np.array([0.0, 0.0, 0.1 * D])
+
+
+def ready() -> Session:
+    return Session(MESH, state=State(SCENE.regions, SCENE.cages))
+
+
+def pulled(vertex: int = HIGH, shift: np.ndarray = UP, **options) -> Session:
+    session = ready()
+    session.pull(vertex, X[vertex] + shift, **options)
+    session.commit()
+    return session
+
+
+def moved(session: Session, before: np.ndarray) -> float:
+    """Return how far the surface is from *before*, as a share of the diagonal."""
+    return float(np.abs(session.vertices - before).max()) / D
+
+
+def with_pin(session: Session) -> None:
+    session.pin(LOW)
+
+
+def without_volume(session: Session) -> None:
+    session.change_options(preserve_volume=False)
+
+
+def with_fixed(session: Session) -> None:
+    session.set_fixed(X[:, 0] < -2.6)
+
+
+BEFORE: dict[str, Callable[[Session], object]] = {
+    "nothing": lambda session: None,
+    "a pull elsewhere": lambda session: session.pull(TIP, X[TIP] + UP),
+    "a pull stopped early": lambda session: session.pull(TIP, X[TIP] + 3.0 * UP, max_steps=1),
+    "a pin": with_pin,
+    "fixed vertices": with_fixed,
+    "volume preservation off": without_volume,
+    "a handle": lambda session: session.add_handle(SCENE.handle),
+    "a cage moved": lambda session: session.move_cage(0, SCENE.cages[0].vertices * [1, 1, 1.05]),
+}
+
+
+@pytest.mark.parametrize("locality", [None, 1.0])
+@pytest.mark.parametrize("before", BEFORE)
+def test_nothing_moves_at_the_press(before, locality):
+    session = pulled()
+    BEFORE[before](session)
+    session.commit()
+    x = session.vertices
+    for vertex in (LOW if before != "a pin" else NEAR, NEAR):
+        session.pull(vertex, session.vertices[vertex], locality=locality, max_steps=8)
+        assert moved(session, x) < 1e-12
+        session.commit()
+
+
+def test_nothing_moves_at_the_press_after_loading(tmp_path):
+    session = pulled(TIP)
+    save_session(tmp_path / "pulled.segdeform", session)
+    loaded = load_session(tmp_path / "pulled.segdeform")
+    x = session.vertices
+    assert loaded.state.pulls == ("pull 1",)
+    assert vars(loaded.state.locality).keys() == vars(session.state.locality).keys()
+    assert_array_equal(loaded.vertices, session.vertices)
+    for each in (session, loaded):
+        each.start_afresh()
+        each.pull(HIGH, x[HIGH], max_steps=8)
+        assert moved(each, x) < 1e-12
+        each.pull(HIGH, X[HIGH] + UP)
+    assert_array_equal(loaded.vertices, session.vertices)
+
+
+@pytest.mark.parametrize("locality", [None, 0.0, 1.0])
+def test_the_grabbed_vertex_follows_and_the_volume_is_exact_in_every_frame(locality):
+    session = ready()
+    for k in range(1, 6):
+        solution = session.pull(HIGH, X[HIGH] + k / 5 * UP, locality=locality, max_steps=8)
+        assert abs(solution.volume_change) < 1e-13
+    session.pull(HIGH, X[HIGH] + UP, locality=locality)
+    assert np.linalg.norm(session.vertices[HIGH] - X[HIGH] - UP) < 6e-4 * D
+    assert session.commit() == "drag pull 1"
+    assert session.undo() == "drag pull 1"
+    assert not session.can_undo
+    assert_array_equal(session.vertices, X)
+
+
+def test_a_frame_that_is_stopped_early_ends_at_its_target_when_it_is_solved_on():
+    session = ready()
+    session.pull(HIGH, X[HIGH] + 0.1 * UP)
+    for k in range(1, 4):
+        session.pull(HIGH, X[HIGH] + k * UP, max_steps=1)
+    session.refine()
+    assert np.linalg.norm(session.vertices[HIGH] - X[HIGH] - 3.0 * UP) < 6e-4 * D
+
+
+def test_pulls_add_up_and_each_is_one_step():
+    session = pulled()
+    first = session.vertices
+    session.pull(TIP, X[TIP] + UP)
+    session.commit()
+    assert list(session.handles) == ["pull 1", "pull 2"]
+    for vertex in (HIGH, TIP):
+        assert np.linalg.norm(session.vertices[vertex] - X[vertex] - UP) < 6e-3 * D
+    session.undo()
+    assert_array_equal(session.vertices, first)
+    assert list(session.handles) == ["pull 1"]
+
+
+def test_another_vertex_radius_or_locality_begins_another_pull():
+    session = ready()
+    session.pull(HIGH, X[HIGH] + UP, max_steps=2)
+    session.pull(HIGH, X[HIGH] + 2.0 * UP, radius=0.2 * D, max_steps=2)
+    session.pull(TIP, X[TIP] + UP, max_steps=2)
+    session.commit()
+    labels = [session.undo() for _ in range(3)]
+    assert labels == ["drag pull 2", "drag pull 1", "drag pull 1"]
+    assert not session.can_undo
+
+
+def test_a_pulled_point_nearby_is_grabbed_again_and_farther_ones_are_carried_along():
+    session = pulled()
+    x = session.vertices
+    session.pull(NEAR, x[NEAR] + UP)
+    assert list(session.handles) == ["pull 1"]
+    assert_allclose(session.targets["pull 1"], x[[HIGH]] + UP, atol=1e-12)
+    session.commit()
+    order = np.argsort(np.linalg.norm(X - X[HIGH], axis=1))
+    away = np.linalg.norm(X[order] - X[HIGH], axis=1) / (0.15 * D)
+    other = int(order[np.searchsorted(away, 0.6)])
+    x = session.vertices
+    before = x[[HIGH]]
+    session.pull(other, x[other] + UP)
+    share = (session.targets["pull 1"] - before) @ UP / (UP @ UP)
+    near = np.linalg.norm(X[other] - X[HIGH]) / (0.15 * D)
+    assert_allclose(share, (1.0 - near**2) ** 2, rtol=1e-6)
+
+
+def test_a_pin_stays_can_be_removed_and_makes_the_surface_between_free():
+    session = ready()
+    assert session.pin(LOW) == "pin 1"
+    for way in (UP, -UP):
+        session.pull(HIGH, X[HIGH] + way)
+        assert session.state.locality.reach == np.inf
+        assert np.linalg.norm(session.vertices[LOW] - X[LOW]) < 6e-4 * D
+    session.commit()
+    x = session.vertices
+    session.remove_handle("pin 1")
+    assert_array_equal(session.vertices, x)
+    session.pull(HIGH, x[HIGH] + UP)
+    assert np.isfinite(session.state.locality.reach)
+
+
+def test_a_renamed_pull_is_a_handle_like_any_other():
+    session = pulled()
+    session.rename_handle("pull 1", "nose")
+    session.pull(TIP, X[TIP] + UP, max_steps=2)
+    assert session.state.locality.reach == np.inf  # between handles the surface is free
+    session.commit()
+    assert list(session.handles) == ["nose", "pull 1"]
+    up = np.eye(4)
+    up[:3, 3] = 0.5 * UP
+    session.move_handle("nose", up)
+    assert session.state.locality is None
+    assert_allclose(session.vertices[HIGH], X[HIGH] + 1.5 * UP, atol=1e-3 * D)
+    session.commit()
+    session.drag({"nose": X[[HIGH]]})
+    assert_allclose(session.vertices[HIGH], X[HIGH], atol=1e-3 * D)
+
+
+def test_a_matrix_turns_the_surface_around_the_point():
+    turn = np.eye(4)
+    turn[:3, :3] = rotation([0.0, 0.0, 1.0], 0.5)
+    turn[:3, 3] = X[HIGH] + 0.3 * UP - turn[:3, :3] @ X[HIGH]
+    session = ready()
+    session.pull(HIGH, X[HIGH] + 0.3 * UP, locality=1.0, max_steps=8)
+    session.pull(HIGH, turn, locality=1.0)  # turned in the same pull
+    patch = session.handles["pull 1"]
+    assert len(patch) > 5
+    expected = X[patch] @ turn[:3, :3].T + turn[:3, 3]
+    assert_allclose(session.vertices[patch], expected, atol=5e-3 * D)
+    assert session.commit() == "drag pull 1"
+    assert session.undo() == "drag pull 1"
+    assert not session.can_undo
+
+
+@pytest.mark.parametrize("locality", [0.0, 1.0])
+def test_a_local_pull_leaves_the_rest_where_it_is(locality):
+    session = pulled(shift=0.5 * UP, radius=0.12 * D, locality=locality)
+    away = np.linalg.norm(X - X[HIGH], axis=1)
+    far = np.linalg.norm(session.vertices - X, axis=1)[away > 3.0 * 0.12 * D]
+    assert (far.max() < 2e-3 * D) == (locality == 1.0)
+
+
+@pytest.mark.parametrize(
+    ("scale", "shift"), [(1e-7, 0.0), (1e6, 0.0), (1.0, 1e6)], ids=["small", "large", "far"]
+)
+def test_a_pull_is_invariant_under_rigid_motion_and_scale(scale, shift):
+    turn = rotation([1, 2, 3], 1.2)
+    there = SCENE.transformed(turn, scale, shift=np.array([1.0, -1.0, 0.5]) * shift)
+    session = Session(there.mesh, state=State(there.regions, there.cages))
+    x = there.mesh.vertices
+    session.pull(HIGH, x[HIGH] + scale * turn @ UP)
+    expected = pulled().vertices
+    error = (session.vertices - x) / scale - (expected - X) @ turn.T
+    assert np.abs(error).max() < 3e-4 * D  # samples of the surface depend on its orientation
+    assert abs(session.volume_change) < (1e-10 if shift else 1e-12)  # of rounded coordinates
+
+
+def bodies() -> Session:
+    """Return two balls in a cage each, one with a hole."""
+    sphere, faces = icosphere(3)
+    ball, ball_faces = icosphere(1)
+    holed = faces[sphere[faces].mean(axis=1)[:, 2] > -0.9]
+    used, holed = np.unique(holed, return_inverse=True)
+    points = np.concatenate([sphere, sphere[used] + [3.0, 0.0, 0.0]])
+    mesh = Mesh(points, np.concatenate([faces, holed.reshape(-1, 3) + len(sphere)]))
+    right = points[:, 0] > 1.5
+    cages = tuple(Cage(1.6 * ball + [x, 0.0, 0.0], ball_faces) for x in (0.0, 3.0))
+    return Session(mesh, state=State(Regions.from_masks(mesh, [~right, right]), cages))
+
+
+def test_every_body_has_its_volume_in_every_frame_also_under_a_lid():
+    session = bodies()
+    mesh = session.mesh
+    tops = [int(np.argmax(mesh.vertices @ way)) for way in ([-0.2, 0, 1.0], [0.2, 0, 1.0])]
+    right = mesh.vertices[:, 0] > 1.5
+    for vertex in tops:
+        other = session.vertices[right if vertex == tops[0] else ~right]
+        start = session.vertices[vertex]
+        for k in range(1, 4):
+            session.pull(vertex, start + [0.0, 0.0, 0.2 * k], max_steps=8)
+            for body in _volumes(session):
+                assert abs(body.relative(session.vertices)) < 1e-12
+        session.commit()
+        stayed = session.vertices[right if vertex == tops[0] else ~right]
+        assert np.abs(stayed - other).max() < 1e-3
+    assert lids_of(mesh).has_volume
+
+
+def _volumes(session: Session):
+    state = session.state
+    bound = Deformer(session.mesh, state.regions, state.cages, handle=state.handle)
+    assert len(bound.preserved_volumes) == 2
+    return bound.preserved_volumes
+
+
+def test_a_preparation_is_no_step_and_is_accepted_only_by_what_it_was_made_for():
+    session = Session(MESH)
+    session.set_fixed(SCENE.fixed)
+    session.change_options(n_cage_vertices=40)
+    session.undo()
+    session.change_options(n_cage_vertices=60)
+    prepared = session.preparation()
+    assert session.regions is None
+    assert sum(cage.n_vertices for cage in prepared.cages) == 60
+    heard = []
+    session.on_change(heard.append)
+    assert session.accept(prepared)
+    assert session.is_bound
+    assert len(heard) == 1
+    assert session.undo_label == "change options"
+    session.pull(HIGH, X[HIGH] + UP, max_steps=2)
+    while session.can_undo:
+        session.undo()
+        assert session.regions is prepared.regions  # also before the first step
+    assert session.accept(session.preparation())
+    other = Session(MESH)
+    other.set_regions(SCENE.regions)
+    assert not other.accept(prepared)
+    assert other.cages == ()
+    elsewhere = Session(MESH.with_vertices(X * 2.0))
+    assert not elsewhere.accept(prepared)
+
+
+WRONG = [
+    (lambda s: s.pull(-1, UP), "vertex must be a whole number"),
+    (lambda s: s.pull(len(X), UP), "vertex must be a whole number"),
+    (lambda s: s.pull(2.5, UP), "vertex must be a whole number"),
+    (lambda s: s.pull(True, UP), "vertex must be a whole number"),
+    (lambda s: s.pull(HIGH, [0.0, 1.0]), "to "),
+    (lambda s: s.pull(HIGH, X[:2]), "to must be a point"),
+    (lambda s: s.pull(HIGH, [np.nan, 0.0, 0.0]), "to .*NaN|to must be finite"),
+    (lambda s: s.pull(HIGH, X[HIGH] + 100.0 * D), "coordinates of to are .* away"),
+    (lambda s: s.pull(HIGH, np.full((4, 4), np.nan)), "last row of to"),
+    (lambda s: s.pull(HIGH, np.diag([1.0, 1.0, 1.0, 2.0])), "last row of to"),
+    (lambda s: s.pull(HIGH, np.diag([1e9, 1.0, 1.0, 1.0])), "coordinates of to are .* away"),
+    (lambda s: s.pull(HIGH, X[HIGH], radius=0.0), "radius must be a positive number"),
+    (lambda s: s.pull(HIGH, X[HIGH], radius=np.inf), "radius must be a positive number"),
+    (lambda s: s.pull(HIGH, X[HIGH], radius="wide"), "radius must be a positive number"),
+    (lambda s: s.pull(HIGH, X[HIGH], locality=1.1), "locality must be a number from 0 to 1"),
+    (lambda s: s.pull(HIGH, X[HIGH], locality=-0.1), "locality must be a number from 0 to 1"),
+    (lambda s: s.pull(int(SCENE.fixed[0]), UP), "this point is fixed"),
+    (lambda s: s.pin(int(SCENE.fixed[0])), "both fixed and handle"),
+    (lambda s: s.pin(TIP), "already in 'pull 1'"),
+    (lambda s: s.pin(-3), "vertex must be a whole number"),
+    (lambda s: Session(MESH).pull(HIGH, X[HIGH]), "there are no cages"),
+]
+
+
+@pytest.mark.parametrize(("wrong", "says"), WRONG)
+def test_what_cannot_be_pulled_says_why_and_changes_nothing(wrong, says):
+    session = ready()
+    session.set_fixed(SCENE.fixed)
+    session.pull(TIP, X[TIP] + 0.3 * UP, max_steps=2)
+    session.commit()
+    state = session.state
+    with pytest.raises((ConstraintError, CageError), match=says):
+        wrong(session)
+    assert session.state is state
+
+
+def test_a_tiny_or_a_huge_radius_is_no_error():
+    for radius in (1e-9 * D, 1e3 * D):
+        session = pulled(shift=0.2 * UP, radius=radius)
+        assert np.isfinite(session.vertices).all()
+        assert abs(session.volume_change) < 1e-13
+
+
+def test_the_locality_of_another_mesh_is_refused():
+    state = pulled().state
+    for wrong in ({"vertex": len(X)}, {"reach": -1.0}, {"spread": 0.0}, {"follows": 2.0}):
+        broken = replace(state, locality=replace(state.locality, **wrong))
+        with pytest.raises(ConstraintError):
+            Session(MESH, state=broken)
+    broken = replace(state, locality=replace(state.locality, cage_vertices=()))
+    with pytest.raises(CageError):
+        Session(MESH, state=broken)
