@@ -19,8 +19,18 @@ The files, in reading order:
 """
 
 from . import actions
-from .actions import Action, painting, save, split_region, toggle_cages, toggle_overlay
-from .bindings import binding_of, key_cap
+from .actions import (
+    Action,
+    painting,
+    save,
+    show_pose,
+    show_rest,
+    split_region,
+    toggle_cages,
+    toggle_overlay,
+    toggle_regions,
+)
+from .bindings import BEFORE_AFTER, binding_of, key_cap
 from .controller import Controller
 from .editor import DeformEditor
 from .job import Job, Timer
@@ -32,6 +42,8 @@ from .panel_actions import (
     choosing_handle,
     choosing_region,
     exporting,
+    hiding_handle,
+    locking_handle,
     merging,
     naming_region,
     opening,
@@ -46,6 +58,7 @@ from .panel_actions import (
 from .session_file import MESH_FILES, READABLE_FILES, SessionFile, is_mesh, read_session
 
 __all__ = [
+    "BEFORE_AFTER",
     "MESH_FILES",
     "READABLE_FILES",
     "Action",
@@ -64,8 +77,10 @@ __all__ = [
     "choosing_region",
     "error_text",
     "exporting",
+    "hiding_handle",
     "is_mesh",
     "key_cap",
+    "locking_handle",
     "merging",
     "naming_region",
     "notices_of",
@@ -78,9 +93,12 @@ __all__ = [
     "selecting_through",
     "setting",
     "setting_colour_range",
+    "show_pose",
+    "show_rest",
     "showing_cage",
     "split_region",
     "toggle_cages",
     "toggle_overlay",
+    "toggle_regions",
     "with_radius",
 ]

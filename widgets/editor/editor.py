@@ -27,8 +27,8 @@ from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.session import Session
 
 from ..scene import Stop, View
-from .actions import Action
-from .bindings import binding_of, help_sections, key_cap, modes_of, pressed_key
+from .actions import Action, show_pose, show_rest
+from .bindings import BEFORE_AFTER, binding_of, help_sections, key_cap, modes_of, pressed_key
 from .controller import Controller
 from .mode import Mode
 from .widget_set import WidgetSet
@@ -164,6 +164,8 @@ class DeformEditor:
             self._stops = [
                 self.view.observe("KeyPressEvent", self._key, _AFTER_WIDGETS),
                 self.view.observe("CharEvent", lambda: self._took_key, _AFTER_WIDGETS),
+                self.view.observe("KeyReleaseEvent", self._release, _AFTER_WIDGETS),
+                self.view.observe("LeftButtonPressEvent", self._show_pose),
             ]
             self._controller.is_on = True
 
@@ -200,6 +202,13 @@ class DeformEditor:
             self._type(key)
         return self._took_key
 
+    def _release(self) -> None:
+        if pressed_key(self.view.interactor).endswith(BEFORE_AFTER):
+            self._show_pose()
+
+    def _show_pose(self) -> None:
+        show_pose(self._controller)
+
     def _type(self, key: str) -> None:
         binding = binding_of(key, self.mode)
         if binding is not None and binding.action is not None:
@@ -220,8 +229,10 @@ class DeformEditor:
                 return SessionError(controller.refusal)
             controller.widgets.finish()
         controller.messages.clear()
+        if action is not show_rest:
+            controller.show_rest(False)
         action(controller)
-        if not while_busy:  # otherwise Escape would restart the job it has just cancelled
+        if not while_busy and action is not show_rest:  # otherwise Escape would restart the job it has just cancelled
             controller.prepare()
         controller.refresh()
         return None

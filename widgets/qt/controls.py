@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from qtpy import QtCore, QtGui, QtWidgets
 
 from ..editor import DeformEditor, Mode, binding_of, key_cap
@@ -155,15 +157,15 @@ def put(widget: Any, value: Any) -> None:
     quiet.unblock()
 
 
-def swatch(colour: str, widget: Any) -> Any:
-    """Return an icon of a colour "#RRGGBB" at the resolution of *widget*."""
+def swatch(colour: NDArray[np.uint8], widget: Any) -> Any:
+    """Return an icon of a colour (3,), 0 to 255, at the resolution of *widget*."""
     size, ratio = widget.fontMetrics().height(), widget.devicePixelRatioF()
     picture = QtGui.QPixmap(round(size * ratio), round(size * ratio))
     picture.setDevicePixelRatio(ratio)
     picture.fill(Qt.GlobalColor.transparent)
     painter = QtGui.QPainter(picture)
     painter.setRenderHint(QtGui.QPainter.RenderHint.Antialiasing)
-    painter.setBrush(QtGui.QColor(colour))
+    painter.setBrush(QtGui.QColor(*colour.tolist()))
     painter.setPen(QtGui.QPen(widget.palette().color(QtGui.QPalette.ColorRole.Text), 1.0))
     painter.drawRoundedRect(QtCore.QRectF(1.0, 1.0, size - 2.0, size - 2.0), 3.0, 3.0)
     painter.end()
