@@ -33,6 +33,7 @@ from .actions import (
 from .bindings import BEFORE_AFTER, binding_of, key_cap
 from .controller import Controller
 from .editor import DeformEditor
+from .hints import hint
 from .job import Job, Timer
 from .log import Entry
 from .messages import error_text
@@ -78,6 +79,7 @@ __all__ = [
     "error_text",
     "exporting",
     "hiding_handle",
+    "hint",
     "is_mesh",
     "key_cap",
     "locking_handle",

@@ -232,7 +232,9 @@ class DeformEditor:
         if action is not show_rest:
             controller.show_rest(False)
         action(controller)
-        if not while_busy and action is not show_rest:  # otherwise Escape would restart the job it has just cancelled
+        if (
+            not while_busy and action is not show_rest
+        ):  # otherwise Escape would restart the job it has just cancelled
             controller.prepare()
         controller.refresh()
         return None

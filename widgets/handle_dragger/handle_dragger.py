@@ -103,8 +103,8 @@ class HandleDragger(Widget):
         """Hide or show a handle."""
         require_handle(self.session.handles, name)
         self.finish()
-        self._marks.hidden = self.hidden | {name} if as_flag(hidden, "hidden") else (
-            self.hidden - {name}
+        self._marks.hidden = (
+            self.hidden | {name} if as_flag(hidden, "hidden") else (self.hidden - {name})
         )
         self._marks.show(bool(self.GetEnabled()) and self.session.is_ready)
         self._update_gizmo()

@@ -55,9 +55,7 @@ class RegionColours:
         self._shown = False
         self._draw()
 
-    def fill(
-        self, *, regions: bool, handles: bool, hidden: frozenset[str] = frozenset()
-    ) -> None:
+    def fill(self, *, regions: bool, handles: bool, hidden: frozenset[str] = frozenset()) -> None:
         """Choose whether regions, and handles except *hidden* ones, are coloured.
 
         Fixed vertices always are.

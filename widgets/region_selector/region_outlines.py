@@ -1,7 +1,7 @@
 """The outlines of the regions as thin lines on the surface, and their numbers, from 1.
 
 An outline crosses the edges between two regions at their middle.  The number of a region is at a
-visible place, the one nearest to the centre of the region, and has the colour of the region as background.
+visible place near the centre of the region, and has its colour as background.
 """
 
 from __future__ import annotations

@@ -98,9 +98,10 @@ class VolumeOverlay:
 
     @property
     def wanted_range(self) -> float | None:
-        """The local volume change wanted at the ends of the scale, 0.5 by default; None is automatic.
+        """The local volume change wanted at the ends of the scale; 0.5 by default.
 
-        Can be set to None or a number above 0; anything else raises an ArgumentError.
+        Can be set to None, which is automatic, or to a number above 0; anything else raises an
+        ArgumentError.
         """
         return self._wanted_range
 
