@@ -19,7 +19,7 @@ color vision deficiency", IEEE TVCG 15, 2009.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 COLOURS = (
     "#E69F00", "#56B4E9", "#009E73", "#CC79A7", "#F0E442", "#0072B2", "#D55E00", "#B4B478",
@@ -55,10 +55,10 @@ def of_handle(handle: int) -> NDArray[np.uint8]:
     return rgb(HANDLES[handle % len(HANDLES)])
 
 
-def ink_on(colour: NDArray[np.uint8]) -> str:
+def ink_on(colour: ArrayLike) -> str:
     """Return the colour of text on a *colour* (3,), dark or white, whichever contrasts more.
 
     >>> ink_on(rgb("#F0E442")), ink_on(rgb("#0072B2"))
     ('#111111', '#FFFFFF')
     """
-    return _BLACK if np.dot(colour, [0.2126, 0.7152, 0.0722]) >= 0.45 * 255.0 else PAPER
+    return _BLACK if np.dot(np.asarray(colour), [0.2126, 0.7152, 0.0722]) >= 0.45 * 255.0 else PAPER

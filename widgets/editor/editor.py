@@ -33,6 +33,7 @@ from .controller import Controller
 from .mode import Mode
 from .widget_set import WidgetSet
 
+_REPEAT = 50  # milliseconds between release and press of a key that is held and repeats, at most
 _AFTER_WIDGETS = 0.75  # priority: our widgets have 1, VTK's own 0.5, pyvista and camera styles 0
 
 
@@ -58,6 +59,7 @@ class DeformEditor:
         self._took_key = False
         self._is_removed = False
         self._stops: list[Stop] = []
+        self._stop_waiting: Stop = _nothing  # for a key to be pressed again
 
     @property
     def session(self) -> Session:
@@ -174,6 +176,7 @@ class DeformEditor:
         for stop in self._stops:
             stop()
         self._stops = []
+        self._show_pose()
         self._controller.is_on = False
 
     def SetEnabled(self, enabled: bool) -> None:  # noqa: N802
@@ -203,10 +206,13 @@ class DeformEditor:
         return self._took_key
 
     def _release(self) -> None:
+        """Show the pose again, unless the release is followed by a press: a key that repeats."""
         if pressed_key(self.view.interactor).endswith(BEFORE_AFTER):
-            self._show_pose()
+            self._stop_waiting()
+            self._stop_waiting = self.view.every(_REPEAT, self._show_pose)
 
     def _show_pose(self) -> None:
+        self._stop_waiting()
         show_pose(self._controller)
 
     def _type(self, key: str) -> None:
@@ -229,6 +235,7 @@ class DeformEditor:
                 return SessionError(controller.refusal)
             controller.widgets.finish()
         controller.messages.clear()
+        self._stop_waiting()
         if action is not show_rest:
             controller.show_rest(False)
         action(controller)
@@ -238,6 +245,10 @@ class DeformEditor:
             controller.prepare()
         controller.refresh()
         return None
+
+
+def _nothing() -> None:
+    pass
 
 
 def _is_aimed(renderer: Any) -> bool:
