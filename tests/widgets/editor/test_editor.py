@@ -493,7 +493,7 @@ def test_a_key_of_another_mode_is_explained_and_withheld_from_vtk(bench):
     bench.type("s")  # surface, to VTK; fixed vertices, in mode 3
     assert heard == []
     assert "S works in mode 3 (Paint fixed vertices)" in bench.editor.status
-    bench.type("w")
+    bench.type("j")
     assert heard == ["char"]
 
 
