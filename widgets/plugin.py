@@ -74,12 +74,17 @@ def edit(mesh: Any, *, path: _Path = None, title: str = "segdeform") -> Any:
     MissingDependencyError
         If there is no screen.
     """
+    from .scene import set_background, set_lights
+
     session = session_of(mesh)
     path = None if path is None else as_path(path)
     as_text(title, "title")
     if not pv.OFF_SCREEN:
         require_screen()
     plotter = pv.Plotter(title=title, notebook=False)
+    is_dark = sum(pv.global_theme.background.float_rgb) < 1.5
+    set_background(plotter.renderer, dark=is_dark)
+    set_lights(plotter.renderer)
     try:
         editor = plotter.segdeform.edit(session, path=path)
         plotter.show()

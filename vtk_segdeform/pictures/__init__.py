@@ -16,7 +16,20 @@ from .canvas import (
     view_of,
     write_panels,
 )
-from .palette import BODY, COLOURS, FIXED, HANDLE, INK, PAPER, of_region, rgb
+from .palette import (
+    BACKGROUND,
+    BODY,
+    COLOURS,
+    DARK_BACKGROUND,
+    FIXED,
+    HANDLE,
+    INK,
+    PAPER,
+    ink_on,
+    of_handle,
+    of_region,
+    rgb,
+)
 from .pictures import (
     draw_mesh,
     picture_before_after,
@@ -26,14 +39,18 @@ from .pictures import (
 )
 
 __all__ = [
+    "BACKGROUND",
     "BODY",
     "COLOURS",
+    "DARK_BACKGROUND",
     "FIXED",
     "HANDLE",
     "INK",
     "PAPER",
     "add_surface",
     "draw_mesh",
+    "ink_on",
+    "of_handle",
     "of_region",
     "picture_before_after",
     "picture_distortion",

@@ -74,8 +74,11 @@ class Menus:
         self._cages = self._add(menu, "&Cages\tC", self._doing(actions.toggle_cages))
         show_volume = self._doing(actions.toggle_overlay)
         self._overlay = self._add(menu, "Local &volume change\tO", show_volume)
-        for action in (self._cages, self._overlay):
+        self._regions = self._add(menu, "&Regions\tShift+G", self._doing(actions.toggle_regions))
+        for action in (self._cages, self._overlay, self._regions):
             action.setCheckable(True)
+        style = self._add(menu, "&Shaded, edges, wireframe\tW", self._doing(actions.next_style))
+        self._need_mesh.append(style)
         self._need_mesh.append(self._add(menu, "&Fit to view", self._fit_to_view))
         menu.aboutToShow.connect(self._update_view)
 
@@ -127,10 +130,12 @@ class Menus:
         window = self._window
         self._cages.setEnabled(window.has_mesh and bool(window.session.cages))
         self._overlay.setEnabled(window.has_mesh)
+        self._regions.setEnabled(window.has_mesh and window.session.regions is not None)
         if window.has_mesh:
             widgets = window.editor.widgets
             self._cages.setChecked(widgets.cages.is_shown)
             self._overlay.setChecked(widgets.overlay_wanted)
+            self._regions.setChecked(widgets.regions_wanted)
 
     # Pieces.
 

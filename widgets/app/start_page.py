@@ -72,6 +72,7 @@ class StartPage(QtWidgets.QWidget):
     def _recent_button(self, path: Path) -> Any:
         button = QtWidgets.QPushButton()
         button.setFlat(True)
+        button.setAutoDefault(True)  # Enter presses it
         button.setEnabled(os.path.isfile(path))
         button.setToolTip(str(path))
         button.setStyleSheet("text-align: left; padding: 4px 2px;")
@@ -142,5 +143,6 @@ def _part(frame: Any, top: float, bottom: float) -> Any:
 
 def _button(text: str) -> Any:
     button = QtWidgets.QPushButton(text)
+    button.setAutoDefault(True)  # Enter presses it
     button.setMinimumHeight(round(2.2 * button.fontMetrics().height()))
     return button

@@ -20,10 +20,21 @@ The files, in reading order:
 """
 
 from . import actions
-from .actions import Action, painting, save, split_region, toggle_cages, toggle_overlay
-from .bindings import binding_of, key_cap
+from .actions import (
+    Action,
+    painting,
+    save,
+    show_pose,
+    show_rest,
+    split_region,
+    toggle_cages,
+    toggle_overlay,
+    toggle_regions,
+)
+from .bindings import BEFORE_AFTER, binding_of, key_cap
 from .controller import Controller
 from .editor import DeformEditor
+from .hints import hint
 from .job import Job, Timer
 from .log import Entry
 from .messages import error_text
@@ -33,6 +44,8 @@ from .panel_actions import (
     choosing_handle,
     choosing_region,
     exporting,
+    hiding_handle,
+    locking_handle,
     merging,
     naming_region,
     opening,
@@ -47,6 +60,7 @@ from .panel_actions import (
 from .session_file import MESH_FILES, READABLE_FILES, SessionFile, is_mesh, read_session
 
 __all__ = [
+    "BEFORE_AFTER",
     "MESH_FILES",
     "READABLE_FILES",
     "Action",
@@ -65,8 +79,11 @@ __all__ = [
     "choosing_region",
     "error_text",
     "exporting",
+    "hiding_handle",
+    "hint",
     "is_mesh",
     "key_cap",
+    "locking_handle",
     "merging",
     "naming_region",
     "notices_of",
@@ -79,9 +96,12 @@ __all__ = [
     "selecting_through",
     "setting",
     "setting_colour_range",
+    "show_pose",
+    "show_rest",
     "showing_cage",
     "split_region",
     "toggle_cages",
     "toggle_overlay",
+    "toggle_regions",
     "with_radius",
 ]

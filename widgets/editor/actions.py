@@ -16,6 +16,7 @@ from vtk_segdeform.regions import Regions
 from vtk_segdeform.regions import segment as segment_mesh
 
 from ..region_selector import Paint, Tool
+from ..scene import SurfaceStyle
 from .controller import Controller
 from .mode import Mode
 
@@ -127,6 +128,33 @@ def toggle_cages(controller: Controller) -> None:
     controller.widgets.cages_wanted = not controller.widgets.cages_wanted
     controller.widgets.show(controller.mode)
     controller.say("Cages shown" if controller.widgets.cages.is_shown else "Cages hidden")
+
+
+def toggle_regions(controller: Controller) -> None:
+    """Show the outlines and numbers of the regions in all modes, or only while painting them."""
+    if controller.session.regions is None:
+        raise RegionError("No regions to show yet. Press G to detect them, or 1 to paint one")
+    widgets = controller.widgets
+    widgets.regions_wanted = not widgets.regions_wanted
+    widgets.show(controller.mode)
+    controller.say("Regions shown" if widgets.regions_wanted else "Regions hidden")
+
+
+def next_style(controller: Controller) -> None:
+    """Draw the surface in the next style: shaded, shaded with edges, wireframe."""
+    surface, styles = controller.widgets.surface, [*SurfaceStyle]
+    surface.style = styles[(styles.index(surface.style) + 1) % len(styles)]
+    controller.say(surface.style.value)
+
+
+def show_rest(controller: Controller) -> None:
+    """Show the mesh at rest until `show_pose`; the session is unchanged."""
+    controller.show_rest(True)
+
+
+def show_pose(controller: Controller) -> None:
+    """Show the current pose again."""
+    controller.show_rest(False)
 
 
 def toggle_overlay(controller: Controller) -> None:

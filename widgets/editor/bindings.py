@@ -19,6 +19,7 @@ from .mode import Mode
 P, R, C, H, D = Mode
 ALL = frozenset(Mode)
 PAINTING = frozenset({R, H})
+BEFORE_AFTER = "backslash"  # acts while it is held
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,10 @@ BINDINGS = (
     Binding(("delete", "backspace"), frozenset({H, D}), "Remove handle", actions.remove_handle),
     Binding(("o",), frozenset({C, D}), "Show local volume change", actions.toggle_overlay),
     Binding(("x", "y", "z"), frozenset({D}), "While dragging: constrain to axis", None),
+    # How the mesh is shown.
+    Binding(("w",), ALL, "Shaded, with edges, wireframe", actions.next_style),
+    Binding(("shift+g",), ALL, "Show regions", actions.toggle_regions),
+    Binding((BEFORE_AFTER,), ALL, "Hold: show the mesh at rest", actions.show_rest),
 )
 
 _HEADINGS = {
@@ -99,6 +104,7 @@ _CAPS = {
     "plus": "+",
     "minus": "-",
     "delete": "Del",
+    "backslash": "\\",
 }
 _ALSO = {"kp_add": "plus", "kp_subtract": "minus", "iso_left_tab": "tab"}
 _UNLISTED = {"equal", "backspace", "ctrl+shift+z"}  # alternatives, left out of the help card

@@ -165,7 +165,8 @@ class Controller:
         elif self._is_on:
             fraction = self._preparing.fraction
             preparing = None if fraction == 1.0 else fraction  # finished, but not accepted yet
-            self.messages.show(mode, hint(self.widgets, self._mode), preparing)
+            text = "The mesh at rest" if self.shows_rest else hint(self.widgets, self._mode)
+            self.messages.show(mode, text, preparing)
         else:
             self.messages.hide()
         self.notices.enable(self._is_on)
@@ -181,6 +182,23 @@ class Controller:
             yield
         finally:
             self._apply_mode()
+
+    @property
+    def shows_rest(self) -> bool:
+        """Whether the mesh at rest is shown instead of the current pose."""
+        return self.widgets.surface.shows_rest
+
+    def show_rest(self, rest: bool) -> None:
+        """Show the mesh at rest, without widgets, or else the current pose with them."""
+        if rest == self.shows_rest:
+            return
+        if rest:
+            self.widgets.show_rest()
+        else:
+            self.widgets.surface.shows_rest = False
+            self._switch_widgets()
+            self.widgets.show(self._mode)
+        self.refresh()
 
     def _show_error(self, error: Exception) -> None:
         self.messages.report_error(error)

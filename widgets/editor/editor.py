@@ -28,12 +28,13 @@ from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.session import Session
 
 from ..scene import Stop, View
-from .actions import Action
-from .bindings import binding_of, help_sections, key_cap, modes_of, pressed_key
+from .actions import Action, show_pose, show_rest
+from .bindings import BEFORE_AFTER, binding_of, help_sections, key_cap, modes_of, pressed_key
 from .controller import Controller
 from .mode import Mode
 from .widget_set import WidgetSet
 
+_REPEAT = 50  # milliseconds between release and press of a key that is held and repeats, at most
 _AFTER_WIDGETS = 0.75  # priority: our widgets have 1, VTK's own 0.5, pyvista and camera styles 0
 
 
@@ -59,6 +60,7 @@ class DeformEditor:
         self._took_key = False
         self._is_removed = False
         self._stops: list[Stop] = []
+        self._stop_waiting: Stop = _nothing  # for a key to be pressed again
 
     @property
     def session(self) -> Session:
@@ -170,6 +172,8 @@ class DeformEditor:
             self._stops = [
                 self.view.observe("KeyPressEvent", self._key, _AFTER_WIDGETS),
                 self.view.observe("CharEvent", lambda: self._took_key, _AFTER_WIDGETS),
+                self.view.observe("KeyReleaseEvent", self._release, _AFTER_WIDGETS),
+                self.view.observe("LeftButtonPressEvent", self._show_pose),
             ]
             self._controller.is_on = True
 
@@ -178,6 +182,7 @@ class DeformEditor:
         for stop in self._stops:
             stop()
         self._stops = []
+        self._show_pose()
         self._controller.is_on = False
 
     def SetEnabled(self, enabled: bool) -> None:  # noqa: N802
@@ -206,6 +211,16 @@ class DeformEditor:
             self._type(key)
         return self._took_key
 
+    def _release(self) -> None:
+        """Show the pose again, unless the release is followed by a press: a key that repeats."""
+        if pressed_key(self.view.interactor).endswith(BEFORE_AFTER):
+            self._stop_waiting()
+            self._stop_waiting = self.view.every(_REPEAT, self._show_pose)
+
+    def _show_pose(self) -> None:
+        self._stop_waiting()
+        show_pose(self._controller)
+
     def _type(self, key: str) -> None:
         binding = binding_of(key, self.mode)
         if binding is not None and binding.action is not None:
@@ -226,11 +241,20 @@ class DeformEditor:
                 return SessionError(controller.refusal)
             controller.widgets.finish()
         controller.messages.clear()
+        self._stop_waiting()
+        if action is not show_rest:
+            controller.show_rest(False)
         action(controller)
-        if not while_busy:  # otherwise Escape would restart the job it has just cancelled
+        if (
+            not while_busy and action is not show_rest
+        ):  # otherwise Escape would restart the job it has just cancelled
             controller.prepare()
         controller.refresh()
         return None
+
+
+def _nothing() -> None:
+    pass
 
 
 def _is_aimed(renderer: Any) -> bool:

@@ -62,6 +62,21 @@ def choosing_handle(name: str) -> Action:
     return select
 
 
+def hiding_handle(name: str, hidden: bool) -> Action:
+    """Return the action that hides or shows a handle; the session is unchanged."""
+
+    def hide(controller: Controller) -> None:
+        controller.widgets.dragger.set_hidden(name, hidden)
+        controller.widgets.show(controller.mode)
+
+    return hide
+
+
+def locking_handle(name: str, locked: bool) -> Action:
+    """Return the action that locks a handle against dragging, or unlocks it."""
+    return lambda controller: controller.widgets.dragger.set_locked(name, locked)
+
+
 def renaming(name: str, new_name: str) -> Action:
     """Return the action that renames a handle."""
 

@@ -1,7 +1,8 @@
 """The widgets that show and change one session, and which of them are on in each mode.
 
-All widgets share one actor for the mesh.  The user decides whether cages and volume changes are
-shown as well: `cages_wanted`, `overlay_wanted`.
+All widgets share one actor for the mesh.  Regions are filled where they are painted.  The user
+decides whether cages, volume changes and the outlines of regions are shown as well:
+`cages_wanted`, `overlay_wanted`, `regions_wanted`.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from vtk_segdeform.session import Session
 from ..cage_display import CageDisplay
 from ..handle_dragger import HandleDragger
 from ..puller import Puller
-from ..region_selector import Paint, RegionColours, RegionSelector
+from ..region_selector import Paint, RegionColours, RegionOutlines, RegionSelector
 from ..scene import SurfaceDisplay, View, Widget
 from ..volume_overlay import VolumeOverlay
 from .mode import Mode
@@ -37,12 +38,13 @@ class WidgetSet:
         self.session = session
         self.surface = SurfaceDisplay(view, session)
         self.colours = RegionColours(self.surface)
+        self.outlines = RegionOutlines(self.surface)
         self.selector = RegionSelector(view, session, self.surface, self.colours)
         self.cages = CageDisplay(view, session)
         self.dragger = HandleDragger(view, session, self.surface)
         self.puller = Puller(view, session, self.surface)
         self.overlay = VolumeOverlay(view, session, self.surface)
-        self.cages_wanted = self.overlay_wanted = False
+        self.cages_wanted = self.overlay_wanted = self.regions_wanted = False
         self.cages.hide()
         self.choose_region(0)
 
@@ -70,6 +72,7 @@ class WidgetSet:
             self.selector.paints = Paint.REGION
         elif mode is Mode.HANDLES and self.selector.paints is Paint.REGION:
             self.selector.paints = Paint.HANDLE if len(self.session.fixed) else Paint.FIXED
+        self.surface.shows_rest = False
         self.show(mode)
         self.cages.SetEnabled(mode is Mode.CAGES)
         self.selector.SetEnabled(mode in (Mode.REGIONS, Mode.HANDLES))
@@ -77,7 +80,16 @@ class WidgetSet:
         self.puller.SetEnabled(mode is Mode.PULL)
 
     def show(self, mode: Mode) -> None:
-        """Show cages and volume changes if they are wanted in *mode*."""
+        """Show what *mode* shows, and cages, volume changes and regions that are wanted."""
+        self.colours.fill(
+            regions=mode is Mode.REGIONS,
+            handles=mode in (Mode.HANDLES, Mode.DEFORM),
+            hidden=self.dragger.hidden,
+        )
+        self.outlines.show(
+            lines=self.regions_wanted and mode is not Mode.REGIONS,
+            numbers=self.regions_wanted or mode is Mode.REGIONS,
+        )
         if mode is Mode.CAGES or self.cages_wanted:
             self.cages.show()
         else:
@@ -86,6 +98,14 @@ class WidgetSet:
             self.overlay.show()
         else:
             self.overlay.hide()
+
+    def show_rest(self) -> None:
+        """Show the mesh at rest, and none of the widgets, until `enter`."""
+        self.switch_off()
+        self.overlay.hide()
+        self.cages.hide()
+        self.outlines.show(lines=False, numbers=False)
+        self.surface.shows_rest = True
 
     def wants_overlay(self, mode: Mode) -> bool:
         """Return whether volume changes are shown in *mode*; painting hides them."""
@@ -99,7 +119,9 @@ class WidgetSet:
         mine.radius = share * self.session.mesh.diagonal
         self.dragger.local = before.dragger.local
         self.overlay.wanted_range = before.overlay.wanted_range
+        self.surface.style = before.surface.style
         self.cages_wanted, self.overlay_wanted = before.cages_wanted, before.overlay_wanted
+        self.regions_wanted = before.regions_wanted
 
     def replaced_by(self, session: Session) -> WidgetSet:
         """Remove these widgets from the view, and return others over another session."""
@@ -140,5 +162,6 @@ class WidgetSet:
         self.overlay.remove()
         for widget in reversed(self.interactive):
             widget.remove()
+        self.outlines.remove()
         self.colours.remove()
         self.surface.remove()

@@ -67,6 +67,7 @@ class HandleDragger(Widget):
         self.gizmo = Gizmo(self.view)
         self._local = False
         self._handle: str | None = None
+        self._locked: frozenset[str] = frozenset()
         self._grabbed: Part | None = None  # the part of the running gesture
         self._constraint: Part | None = None  # set by keys during the gesture
         self._live = LiveSolve(self.view, session, self.cancel)
@@ -87,6 +88,34 @@ class HandleDragger(Widget):
             self.finish()
             self._handle = name
             self._update_gizmo()
+
+    @property
+    def hidden(self) -> frozenset[str]:
+        """The handles that are neither shown nor dragged; they keep their place."""
+        return self._marks.hidden
+
+    @property
+    def locked(self) -> frozenset[str]:
+        """The handles that are shown, but not dragged."""
+        return self._locked
+
+    def set_hidden(self, name: str, hidden: bool) -> None:
+        """Hide or show a handle."""
+        require_handle(self.session.handles, name)
+        self.finish()
+        self._marks.hidden = (
+            self.hidden | {name} if as_flag(hidden, "hidden") else (self.hidden - {name})
+        )
+        self._marks.show(bool(self.GetEnabled()) and self.session.is_ready)
+        self._update_gizmo()
+
+    def set_locked(self, name: str, locked: bool) -> None:
+        """Lock or unlock a handle."""
+        require_handle(self.session.handles, name)
+        self.finish()
+        is_locked = as_flag(locked, "locked")
+        self._locked = self.locked | {name} if is_locked else self.locked - {name}
+        self._update_gizmo()
 
     @property
     def local(self) -> bool:
@@ -221,7 +250,10 @@ class HandleDragger(Widget):
             return None
         owners = (name for name, ids in self.session.handles.items() if hit.vertex in ids)
         name = next(owners, None)
-        return None if name is None else (name, hit.point)
+        return None if name is None or self._is_out_of_reach(name) else (name, hit.point)
+
+    def _is_out_of_reach(self, name: str) -> bool:
+        return name in self.hidden or name in self.locked
 
     # Display.
 
@@ -238,6 +270,11 @@ class HandleDragger(Widget):
     def _update_handle(self) -> None:
         """Keep the active handle, even if renamed; otherwise activate the first one, if any."""
         before, now = self._last_handles.get(self._handle or ""), self.session.handles
+        names = {id(ids): name for name, ids in now.items()}
+        self._locked, self._marks.hidden = (
+            frozenset(names.get(id(self._last_handles.get(name)), name) for name in some)
+            for some in (self._locked, self.hidden)
+        )
         self._last_handles = now
         if self._handle not in now:
             renamed = (name for name, ids in now.items() if ids is before)
@@ -246,7 +283,8 @@ class HandleDragger(Widget):
     def _update_gizmo(self) -> None:
         """Place the gizmo at the active handle, or hide it."""
         session, name = self.session, self._handle
-        if name is None or not session.is_ready or not self.GetEnabled():
+        is_shown = session.is_ready and self.GetEnabled()
+        if name is None or not is_shown or self._is_out_of_reach(name):
             self.gizmo.place(None)
             return
         ids = session.handles[name]

@@ -1,10 +1,13 @@
-"""The vertices of the handles as dots on the mesh: red, or yellow if highlighted."""
+"""The vertices of the handles as dots on the mesh, each handle in its own colour.
+
+The highlighted handle is yellow.  Handles may be hidden; their vertices stay where they are.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from vtk_segdeform.pictures import COLOURS, HANDLE, rgb
+from vtk_segdeform.pictures import COLOURS, of_handle, rgb
 from vtk_segdeform.session import Session
 
 from ..scene import View, Wireframe
@@ -23,6 +26,11 @@ class HandleMarks:
         The view to draw in; the mesh hides dots behind it.
     session : Session
         The session whose handles are shown.
+
+    Attributes
+    ----------
+    hidden : frozenset of str
+        The handles that are not shown; takes effect at the next `show`.
     """
 
     def __init__(self, view: View, session: Session) -> None:
@@ -30,6 +38,7 @@ class HandleMarks:
         self.session = session
         self._dots: dict[str, Wireframe] = {}
         self._highlighted: str | None = None
+        self.hidden: frozenset[str] = frozenset()
         self._is_shown = False
         self._stop = view.before_render(self._set_sizes)
 
@@ -44,6 +53,8 @@ class HandleMarks:
         self._dots = {}
         if self._is_shown:
             for name, ids in self.session.handles.items():
+                if name in self.hidden:
+                    continue
                 dots = Wireframe(self.session.vertices[ids], _NO_EDGES, np.arange(len(ids)))
                 self.view.renderer.AddActor(dots.actor)
                 self._dots[name] = dots
@@ -67,7 +78,9 @@ class HandleMarks:
 
     def _set_sizes(self) -> None:
         scale = float(np.clip(self.view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.7, 3.0))
-        for name, dots in self._dots.items():
-            highlighted = name == self._highlighted
-            colour, size = (_HIGHLIGHT, 6.0) if highlighted else (HANDLE, 4.0)
-            dots.set_style(rgb(colour), line_width=1.0, sphere_size=scale * size)
+        for number, name in enumerate(self.session.handles):
+            if name not in self._dots:
+                continue
+            dots, highlighted = self._dots[name], name == self._highlighted
+            colour, size = (rgb(_HIGHLIGHT), 6.0) if highlighted else (of_handle(number), 4.0)
+            dots.set_style(colour, line_width=1.0, sphere_size=scale * size)

@@ -7,6 +7,7 @@ The files, in reading order:
     toolbar painting regions handles options status log
                 the parts of the panel
     controls    buttons, fields and layouts of the parts
+    icons       the icons of the toolbar
 """
 
 from .widget import DeformWidget, deform_dock

@@ -9,9 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from qtpy import QtCore, QtGui, QtWidgets
 
 from ..editor import DeformEditor, Mode, binding_of, key_cap
+from .icons import SIZE
 
 Qt = QtCore.Qt
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
@@ -22,20 +25,13 @@ _GAP = 6
 def key_button(editor: DeformEditor, key: str, mode: Mode, text: str = "") -> Any:
     """Return a button for the action of *key* in *mode*, with its label or *text*."""
     binding = binding_of(key, mode)
-    if binding is None or binding.action is None:
-        raise ValueError(f"{key!r} has no action in {mode}")
-    action, while_busy = binding.action, binding.while_busy
-    button = push_button(text or binding.label, binding.label, key)
-    button.clicked.connect(lambda: editor.do(action, while_busy=while_busy))
-    return button
+    label = "" if binding is None else binding.label
+    return doing(editor, push_button(text or label, label, key), key, mode)
 
 
 def choice_button(editor: DeformEditor, key: str, mode: Mode, text: str) -> Any:
     """Return a `key_button` that stays down and is then highlighted."""
-    button = key_button(editor, key, mode, text)
-    button.setCheckable(True)
-    button.toggled.connect(lambda down: _highlight(button, down))
-    return button
+    return highlighted(key_button(editor, key, mode, text))
 
 
 def push_button(text: str, tip: str, key: str = "") -> Any:
@@ -45,6 +41,37 @@ def push_button(text: str, tip: str, key: str = "") -> Any:
     button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
     button.setMinimumWidth(1)  # the row determines its width, not the text
     button.setSizePolicy(_policy("Preferred"), _policy("Fixed"))
+    button.setAutoDefault(True)  # Enter presses it, outside dialogs too
+    return button
+
+
+def tool_button(text: str, tip: str, key: str = "") -> Any:
+    """Return a flat button for an icon and *text*, with the tooltip of a `push_button`."""
+    button = QtWidgets.QToolButton()
+    button.setText(text)
+    button.setToolTip(f"{tip} ({key_cap(key)})" if key else tip)
+    button.setAutoRaise(True)
+    button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+    button.setIconSize(QtCore.QSize(SIZE, SIZE))
+    for enter in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+        shortcut(enter, button, button.click, alone=True)
+    return button
+
+
+def highlighted(button: Any) -> Any:
+    """Return *button*, made to stay down, and then highlighted."""
+    button.setCheckable(True)
+    button.toggled.connect(lambda down: _highlight(button, down))
+    return button
+
+
+def doing(editor: DeformEditor, button: Any, key: str, mode: Mode) -> Any:
+    """Return *button*, which runs the action of *key* in *mode* when it is clicked."""
+    binding = binding_of(key, mode)
+    if binding is None or binding.action is None:
+        raise ValueError(f"{key!r} has no action in {mode}")
+    action, while_busy = binding.action, binding.while_busy
+    button.clicked.connect(lambda: editor.do(action, while_busy=while_busy))
     return button
 
 
@@ -142,7 +169,7 @@ def shortcut(keys: Any, parent: Any, do: Callable[[], object], *, alone: bool = 
 
 def put(widget: Any, value: Any) -> None:
     """Show *value* in a checkable button, check box, combo box or spin box; emit no signals."""
-    if isinstance(widget, QtWidgets.QPushButton):
+    if isinstance(widget, QtWidgets.QPushButton | QtWidgets.QToolButton):
         widget.setChecked(value)  # only clicks trigger its action
         return
     quiet = QtCore.QSignalBlocker(widget)
@@ -155,15 +182,15 @@ def put(widget: Any, value: Any) -> None:
     quiet.unblock()
 
 
-def swatch(colour: str, widget: Any) -> Any:
-    """Return an icon of a colour "#RRGGBB" at the resolution of *widget*."""
+def swatch(colour: NDArray[np.uint8], widget: Any) -> Any:
+    """Return an icon of a colour (3,), 0 to 255, at the resolution of *widget*."""
     size, ratio = widget.fontMetrics().height(), widget.devicePixelRatioF()
     picture = QtGui.QPixmap(round(size * ratio), round(size * ratio))
     picture.setDevicePixelRatio(ratio)
     picture.fill(Qt.GlobalColor.transparent)
     painter = QtGui.QPainter(picture)
     painter.setRenderHint(QtGui.QPainter.RenderHint.Antialiasing)
-    painter.setBrush(QtGui.QColor(colour))
+    painter.setBrush(QtGui.QColor(*colour.tolist()))
     painter.setPen(QtGui.QPen(widget.palette().color(QtGui.QPalette.ColorRole.Text), 1.0))
     painter.drawRoundedRect(QtCore.QRectF(1.0, 1.0, size - 2.0, size - 2.0), 3.0, 3.0)
     painter.end()
@@ -198,6 +225,8 @@ def _highlight(button: Any, down: bool) -> None:
         palette.setColor(roles.Button, palette.color(roles.Highlight))
         palette.setColor(roles.ButtonText, palette.color(roles.HighlightedText))
     button.setPalette(palette)
+    if isinstance(button, QtWidgets.QToolButton):
+        button.setAutoRaise(not down)  # a flat one would not show its colour
     policies = Qt.FocusPolicy  # Tab selects the one that is down, arrows its neighbours
     button.setFocusPolicy(policies.TabFocus if down else policies.NoFocus)
 

@@ -4,16 +4,30 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
 from qtpy import QtCore, QtWidgets
 
-from vtk_segdeform.pictures import FIXED, HANDLE
+from vtk_segdeform.pictures import FIXED, of_handle, rgb
 
-from ..editor import DeformEditor, Mode, choosing_handle, painting, renaming
+from ..editor import (
+    DeformEditor,
+    Mode,
+    choosing_handle,
+    hiding_handle,
+    locking_handle,
+    painting,
+    renaming,
+)
 from ..region_selector import Paint
 from .controls import RIGHT, column, key_button, row, swatch, table
 
 Qt = QtCore.Qt
-_TIP = "The selected row is painted in mode 3, a handle is dragged in mode 4. F2: rename"
+_NAME, _VERTICES, _SHOWN, _LOCKED = range(4)
+_TIP = (
+    "The selected row is painted in mode 3, a handle is dragged in mode 4. F2: rename. "
+    "Hidden and locked handles keep their place and cannot be dragged"
+)
 
 
 class _Row(NamedTuple):
@@ -22,6 +36,8 @@ class _Row(NamedTuple):
     """None for fixed vertices and for a new handle."""
     text: str
     n_vertices: int
+    shown: bool = True
+    locked: bool = False
 
 
 class HandlesPart(QtWidgets.QGroupBox):
@@ -37,7 +53,7 @@ class HandlesPart(QtWidgets.QGroupBox):
         super().__init__("Handles")
         self._editor = editor
         self._rows: list[_Row] = []
-        self.list = table(["Name", "Vertices"], _TIP, rows=6)
+        self.list = table(["Name", "Vertices", "Show", "Lock"], _TIP, rows=6)
         self.list.itemSelectionChanged.connect(self._selection_changed)
         self.list.itemChanged.connect(self._item_edited)
         self.new = key_button(editor, "a", Mode.HANDLES, "New")
@@ -48,7 +64,11 @@ class HandlesPart(QtWidgets.QGroupBox):
         """Show the current handles, and which one is selected."""
         session, widgets, mode = self._editor.session, self._editor.widgets, self._editor.mode
         marking, selector = mode is Mode.HANDLES, widgets.selector
-        rows = [_Row(Paint.HANDLE, name, name, len(ids)) for name, ids in session.handles.items()]
+        hidden, locked = widgets.dragger.hidden, widgets.dragger.locked
+        rows = [
+            _Row(Paint.HANDLE, name, name, len(ids), name not in hidden, name in locked)
+            for name, ids in session.handles.items()
+        ]
         if marking or len(session.fixed):
             rows.insert(0, _Row(Paint.FIXED, None, "Fixed", len(session.fixed)))
         painted = selector.handle if selector.handle in session.handles else None
@@ -66,12 +86,16 @@ class HandlesPart(QtWidgets.QGroupBox):
         self._rows = rows
         tree, quiet = self.list, QtCore.QSignalBlocker(self.list)
         tree.clear()
+        handles = [*self._editor.session.handles]
         for each in rows:
             item = QtWidgets.QTreeWidgetItem([each.text, f"{each.n_vertices}"])
-            item.setIcon(0, swatch(FIXED if each.paints is Paint.FIXED else HANDLE, tree))
-            item.setTextAlignment(1, RIGHT)
+            colour = _colour(each, handles)
+            item.setIcon(_NAME, swatch(colour, tree))
+            item.setTextAlignment(_VERTICES, RIGHT)
             if each.handle is not None:
                 item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable)
+                item.setCheckState(_SHOWN, _tick(each.shown))
+                item.setCheckState(_LOCKED, _tick(each.locked))
             tree.addTopLevelItem(item)
         quiet.unblock()
 
@@ -94,6 +118,21 @@ class HandlesPart(QtWidgets.QGroupBox):
 
     def _item_edited(self, item: Any, which: int) -> None:
         handle = self._rows[self.list.indexOfTopLevelItem(item)].handle
-        if which == 0 and handle is not None and item.text(0) != handle:
+        if handle is not None and which in (_SHOWN, _LOCKED):
+            ticked = item.checkState(which) == Qt.CheckState.Checked
+            change = hiding_handle(handle, not ticked) if which == _SHOWN else None
+            self._editor.do(change or locking_handle(handle, ticked))
+        if which == _NAME and handle is not None and item.text(0) != handle:
             self._rows = []  # refresh the row even if the name is refused
             self._editor.do(renaming(handle, item.text(0).strip()))
+
+
+def _colour(row: _Row, handles: list[str]) -> NDArray[np.uint8]:
+    """Return the colour of a row, among the names of all *handles*."""
+    if row.paints is Paint.FIXED:
+        return rgb(FIXED)
+    return of_handle(handles.index(row.handle) if row.handle in handles else len(handles))
+
+
+def _tick(on: bool) -> Any:
+    return Qt.CheckState.Checked if on else Qt.CheckState.Unchecked

@@ -1,5 +1,7 @@
 """The panel beside the view: a toolbar, the parts of the current mode, status and history.
 
+The toolbar may be moved out of the panel.
+
     DeformPanel(editor)
 
 The editor updates its messages after every change of the session, the mode, a tool or a job.  The
@@ -88,7 +90,8 @@ class DeformPanel(QtWidgets.QWidget):
     def refresh(self) -> None:
         """Update all visible parts."""
         editor, busy = self.editor, self.editor.is_busy
-        self.setEnabled(editor.GetEnabled())
+        for each in (self, self.toolbar):  # which may be beside the panel
+            each.setEnabled(editor.GetEnabled())
         self._inside.setEnabled(not busy)
         self.toolbar.refresh()
         self.status.refresh()
@@ -106,7 +109,8 @@ class DeformPanel(QtWidgets.QWidget):
         """Unsubscribe from the editor and disable the panel, permanently."""
         _stopper(self._stops, self._stop_session)()
         self._delay.stop()
-        self.setEnabled(False)
+        for each in (self, self.toolbar):
+            each.setEnabled(False)
 
     def _build(self) -> None:
         self._inside = QtWidgets.QWidget()
@@ -128,14 +132,15 @@ class DeformPanel(QtWidgets.QWidget):
         layout.addWidget(self.log)
         self.setMinimumWidth(_WIDTH * self.fontMetrics().averageCharWidth())
         for keys, key in _KEYS.items():
-            self._add_shortcut(keys, key)
+            for part in (self.toolbar, area, self.status, self.log):
+                self._add_shortcut(part, keys, key)
 
-    def _add_shortcut(self, keys: str, key: str) -> None:
+    def _add_shortcut(self, part: Any, keys: str, key: str) -> None:
         binding = binding_of(key, Mode.REGIONS)
         if binding is None or binding.action is None:
             raise ValueError(f"{key!r} has no action in all modes")
         action, while_busy = binding.action, binding.while_busy
-        shortcut(keys, self, lambda: self.editor.do(action, while_busy=while_busy))
+        shortcut(keys, part, lambda: self.editor.do(action, while_busy=while_busy))
 
     # Events.
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from qtpy import QtCore, QtWidgets
 
-from vtk_segdeform.pictures import COLOURS
+from vtk_segdeform.pictures import of_region
 
 from ..editor import (
     DeformEditor,
@@ -115,7 +115,7 @@ class RegionsPart(QtWidgets.QGroupBox):
             exists = each.region < self._editor.widgets.n_regions
             editable = Qt.ItemFlag.ItemIsEditable
             item.setFlags(item.flags() | editable if exists else item.flags() & ~editable)
-            item.setIcon(_NAME, swatch(COLOURS[each.region % len(COLOURS)], tree))
+            item.setIcon(_NAME, swatch(of_region(each.region), tree))
             item.setText(_CAGE, each.cage)
             item.setText(_VOLUME, each.volume)
             item.setTextAlignment(_VOLUME, RIGHT)

@@ -1,29 +1,42 @@
-"""The toolbar of the panel: files, undo and redo, and the four modes."""
+"""The toolbar: files, undo and redo, the modes, the rest pose, what is shown, and help.
+
+It has one row of icons with names, without some of the names where there is no room, and two rows
+in a narrow panel.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-from qtpy import QtWidgets
+from qtpy import QtCore, QtWidgets
 
 from ..editor import (
+    BEFORE_AFTER,
     MESH_FILES,
     READABLE_FILES,
     DeformEditor,
     Mode,
+    binding_of,
     exporting,
+    key_cap,
     opening,
     save,
     saving,
+    show_pose,
+    show_rest,
 )
-from .controls import choice_button, column, key_button, push_button, put, row
+from .controls import doing, highlighted, put, tool_button
+from .icons import icon
 
+Qt = QtCore.Qt
 _SESSIONS = "Sessions (*.segdeform)"
+_VIEW_KEYS = "w", "shift+g", "c", "o", "i"
+_HEIGHT = 32  # pixels of a row
 
 
 class Toolbar(QtWidgets.QWidget):
-    """The buttons at the top of the panel, the same in every mode.
+    """The buttons that are the same in every mode.
 
     Parameters
     ----------
@@ -34,28 +47,49 @@ class Toolbar(QtWidgets.QWidget):
     def __init__(self, editor: DeformEditor) -> None:
         super().__init__()
         self._editor = editor
-        self.open = push_button("Open ...", "Open a mesh or a session", "ctrl+o")
-        self.save = push_button("Save", "Save the session or the deformed mesh", "ctrl+s")
+        self.open = tool_button("Open", "Open a mesh or a session", "ctrl+o")
+        self.save = tool_button("Save", "Save the session or the deformed mesh", "ctrl+s")
         self.open.clicked.connect(self.ask_and_open)
-        menu = QtWidgets.QMenu(self.save)
+        menu = self._menu(self.save)
         for text, do in (
             ("Save session", self.save_session),
             ("Save session as ...", self.ask_and_save),
             ("Save mesh as ...", self.ask_and_export),
         ):
             menu.addAction(text).triggered.connect(do)
-        self.save.setMenu(menu)
-        self.undo = key_button(editor, "z", Mode.REGIONS, "Undo")
-        self.redo = key_button(editor, "y", Mode.REGIONS, "Redo")
-        self.modes = {
-            mode: choice_button(editor, str(mode.value), mode, f"{mode.value} {mode.name.title()}")
-            for mode in Mode
-        }
-        group = QtWidgets.QButtonGroup(self)
+        self.undo = doing(editor, tool_button("Undo", "Undo", "z"), "z", Mode.REGIONS)
+        self.redo = doing(editor, tool_button("Redo", "Redo", "y"), "y", Mode.REGIONS)
+        self.modes = {mode: self._mode_button(mode) for mode in Mode}
+        self._group = QtWidgets.QButtonGroup(self)
         for button in self.modes.values():
-            group.addButton(button)
-        column(self, row(self.open, self.save, self.undo, self.redo), row(*self.modes.values()))
-        self.layout().setContentsMargins(0, 0, 0, 0)
+            self._group.addButton(button)
+        tip = "Show the mesh at rest while the button is held"
+        self.compare = tool_button("Before/After", tip, BEFORE_AFTER)
+        self.compare.pressed.connect(lambda: editor.do(show_rest))
+        self.compare.released.connect(lambda: editor.do(show_pose, while_busy=True))
+        self.view = tool_button("View", "What is shown")
+        self._view_entries = self._fill_view()
+        self.help = doing(editor, tool_button("Keys", "Show keys", "h"), "h", Mode.REGIONS)
+        self._icons = {
+            "open": self.open, "save": self.save, "undo": self.undo, "redo": self.redo,
+            "compare": self.compare, "view": self.view, "help": self.help,
+            **{mode.name.lower(): button for mode, button in self.modes.items()},
+        }  # fmt: skip
+        # Groups from left to right; in a narrow panel the modes have a row of their own.
+        groups = (
+            (self.open, self.save, self.undo, self.redo),
+            (*self.modes.values(),),
+            (self.compare, self.view, self.help),
+        )
+        self._groups = [_group(buttons) for buttons in groups]
+        self._grid = QtWidgets.QGridLayout(self)
+        self._grid.setContentsMargins(4, 2, 4, 2)
+        self._grid.setSpacing(2)
+        self._grid.setColumnStretch(1, 1)
+        self._level = -1
+        self._arrange(0)
+        self.setSizePolicy(_policy("Ignored"), _policy("Fixed"))
+        self._draw_icons()
 
     def refresh(self) -> None:
         """Show the steps to undo and redo, and the mode."""
@@ -67,9 +101,92 @@ class Toolbar(QtWidgets.QWidget):
             button.setEnabled(label is not None and not busy)
             text = f"{verb}: {label} ({key})" if label else f"Nothing to {verb.lower()}"
             button.setToolTip(text)
-        for each in (self.open, self.save, *self.modes.values()):
+        for each in (self.open, self.save, self.compare, self.view, *self.modes.values()):
             each.setEnabled(not busy)
         put(self.modes[self._editor.mode], True)
+
+    def resizeEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
+        """Show as many names as there is room for."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def changeEvent(self, event: Any) -> None:  # noqa: N802
+        """Draw the icons in the colours of a new palette."""
+        super().changeEvent(event)
+        if event.type() == QtCore.QEvent.Type.PaletteChange:
+            self._draw_icons()
+        elif event.type() == QtCore.QEvent.Type.FontChange:
+            self._fit()
+
+    # Pieces.
+
+    def _mode_button(self, mode: Mode) -> Any:
+        key = str(mode.value)
+        binding = binding_of(key, mode)
+        tip = mode.name.title() if binding is None else binding.label
+        button = tool_button(mode.name.title(), tip, key)
+        return highlighted(doing(self._editor, button, key, mode))
+
+    def _menu(self, button: Any) -> Any:
+        menu = QtWidgets.QMenu(button)
+        button.setMenu(menu)
+        button.setPopupMode(QtWidgets.QToolButton.ToolButtonPopupMode.InstantPopup)
+        return menu
+
+    def _fill_view(self) -> list[Any]:
+        """Fill the menu of what is shown; the key of each entry is shown beside it."""
+        menu, entries = self._menu(self.view), []
+        menu.aboutToShow.connect(self._update_view)
+        for key in _VIEW_KEYS:
+            binding = binding_of(key, Mode.DEFORM)
+            if binding is None or binding.action is None:
+                raise ValueError(f"{key!r} has no action in mode 4")
+            entry = menu.addAction(f"{binding.label}\t{key_cap(key)}")
+            entry.triggered.connect(lambda _=False, do=binding.action: self._editor.do(do))
+            entries.append(entry)
+        return entries
+
+    def _update_view(self) -> None:
+        widgets = self._editor.widgets
+        _, regions, cages, overlay, _ = self._view_entries
+        for entry, on in (
+            (regions, widgets.regions_wanted),
+            (cages, widgets.cages.is_shown),
+            (overlay, widgets.overlay_wanted),
+        ):
+            entry.setCheckable(True)
+            entry.setChecked(on)
+
+    def _draw_icons(self) -> None:
+        for name, button in self._icons.items():
+            button.setIcon(icon(name, self.palette()))
+
+    def _fit(self) -> None:
+        """Use the arrangement with the most names that fits."""
+        for level in (3, 2, 1, 0):
+            self._arrange(level)
+            if level == 0 or self._grid.minimumSize().width() <= self.width():
+                return
+
+    def _arrange(self, level: int) -> None:
+        """Arrange the buttons: 0, 1 in two rows, 2, 3 in one; 1, 2 with names of modes, 3 all."""
+        if level == self._level:
+            return
+        self._level = level
+        styles, modes = Qt.ToolButtonStyle, self.modes.values()
+        for button in self._icons.values():
+            named = level == 3 or (level > 0 and button in modes)
+            style = styles.ToolButtonTextBesideIcon if named else styles.ToolButtonIconOnly
+            button.setToolButtonStyle(style)
+        files, choices, others = self._groups
+        self._grid.addWidget(files, 0, 0)
+        self._grid.addWidget(others, 0, 2)
+        centre = Qt.AlignmentFlag.AlignHCenter
+        if level < 2:
+            self._grid.addWidget(choices, 1, 0, 1, 3)
+        else:
+            self._grid.addWidget(choices, 0, 1, centre)
+        self._grid.invalidate()
 
     # Files.
 
@@ -119,3 +236,19 @@ class Toolbar(QtWidgets.QWidget):
 
     def _folder(self) -> Any:
         return str(self._editor.path.parent)
+
+
+def _group(buttons: tuple[Any, ...]) -> Any:
+    """Return a widget with *buttons* side by side."""
+    group = QtWidgets.QWidget()
+    layout = QtWidgets.QHBoxLayout(group)
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setSpacing(1)
+    for button in buttons:
+        button.setMinimumHeight(_HEIGHT - 4)
+        layout.addWidget(button)
+    return group
+
+
+def _policy(name: str) -> Any:
+    return getattr(QtWidgets.QSizePolicy.Policy, name)

@@ -15,19 +15,21 @@ from typing import Any
 
 import pyvista
 import pyvistaqt
-from qtpy import QtWidgets
+from qtpy import QtCore, QtGui, QtWidgets
 
 from vtk_segdeform.checks import require
 from vtk_segdeform.session import Session
 
 from .. import plugin  # registers `segdeform` on plotters even without entry points
 from ..editor import DeformEditor
-from ..scene import View
+from ..scene import View, set_background, set_lights
 from .panel import DeformPanel
+
+_DARK = 128  # lightness of a window, 0 to 255, below which its palette is dark
 
 
 class DeformWidget(QtWidgets.QWidget):
-    """A view with the editor in it, and the panel beside it.
+    """A toolbar, a view with the editor in it, and the panel beside it.
 
     Parameters
     ----------
@@ -54,6 +56,8 @@ class DeformWidget(QtWidgets.QWidget):
         self._is_closed = False
         self.plotter = pyvistaqt.QtInteractor(self, auto_update=False, off_screen=False)
         self.plotter.setAcceptDrops(False)  # it would add a second mesh to the view
+        set_lights(self.plotter.renderer)
+        self._set_background()
         self.editor: DeformEditor = self.plotter.segdeform.edit(session)
         self._camera_position: tuple[float, ...] | None = tuple(self.plotter.camera.position)
         self.panel = DeformPanel(self.editor, self)
@@ -64,9 +68,11 @@ class DeformWidget(QtWidgets.QWidget):
         halves.addWidget(self.panel)
         halves.setStretchFactor(0, 1)  # a wider window enlarges the view
         halves.setCollapsible(0, False)
-        layout = QtWidgets.QHBoxLayout(self)
+        layout = QtWidgets.QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(halves)
+        layout.setSpacing(0)
+        layout.addWidget(self.panel.toolbar)
+        layout.addWidget(halves, 1)
         self.setFocusProxy(self.plotter)
         application = QtWidgets.QApplication.instance()
         if application is not None:
@@ -90,6 +96,17 @@ class DeformWidget(QtWidgets.QWidget):
         if self._camera_position == tuple(self.plotter.camera.position):
             self.plotter.reset_camera()
         self._camera_position = None
+
+    def changeEvent(self, event: Any) -> None:  # noqa: N802
+        """Use the background for a new palette, light or dark."""
+        super().changeEvent(event)
+        if event.type() == QtCore.QEvent.Type.PaletteChange and not self._is_closed:
+            self._set_background()
+            self.editor.view.request_render()
+
+    def _set_background(self) -> None:
+        window = self.palette().color(QtGui.QPalette.ColorRole.Window)
+        set_background(self.plotter.renderer, dark=window.lightness() < _DARK)
 
     def closeEvent(self, event: Any) -> None:  # noqa: N802
         """Release all resources; the session is unchanged."""

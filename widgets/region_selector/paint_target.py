@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vtk_segdeform.arrays import BoolArray
 from vtk_segdeform.errors import ConstraintError
-from vtk_segdeform.pictures import FIXED, HANDLE, of_region, rgb
+from vtk_segdeform.pictures import FIXED, of_handle, of_region, rgb
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
 
@@ -48,7 +48,10 @@ class PaintTarget:
         """(3,) uint8: red, green and blue."""
         if self.paint is Paint.REGION:
             return of_region(self.region)
-        return rgb(FIXED if self.paint is Paint.FIXED else HANDLE)
+        if self.paint is Paint.FIXED:
+            return rgb(FIXED)
+        names = [*self.session.handles]
+        return of_handle(names.index(self.handle) if self.handle in names else len(names))
 
     def members(self) -> BoolArray:
         """Return the vertices of the target, (n,) bool."""

@@ -1,8 +1,9 @@
-"""Regions, fixed vertices and handles as vertex colours.
+"""Regions, fixed vertices and handles as vertex colours of a body that is otherwise clay.
 
 Regions have the colours of the palette.  Where regions overlap their colours are mixed in equal
 parts, not by blend weight: weights fade towards the border of a region, which would hide how far a
-stroke went.  Fixed vertices are grey, handles red, and the preview of a stroke covers everything.
+stroke went.  Fixed vertices are dark grey, each handle has its own colour, and the preview of a
+stroke covers everything.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vtk_segdeform.arrays import BoolArray
-from vtk_segdeform.pictures import BODY, FIXED, HANDLE, of_region, rgb
+from vtk_segdeform.pictures import BODY, FIXED, of_handle, of_region, rgb
 from vtk_segdeform.session import Change
 
 from ..scene import SurfaceDisplay
@@ -32,7 +33,8 @@ class RegionColours:
     def __init__(self, surface: SurfaceDisplay) -> None:
         self._surface = surface
         self._session = surface.session
-        self._shown = True
+        self._shown = self._fills_regions = self._marks_handles = True
+        self._hidden: frozenset[str] = frozenset()
         self._preview: tuple[BoolArray, NDArray[np.uint8]] | None = None
         self._base = self._base_colours()
         self._stop = self._session.on_change(self._changed)
@@ -52,6 +54,17 @@ class RegionColours:
         """Hide the layer."""
         self._shown = False
         self._draw()
+
+    def fill(self, *, regions: bool, handles: bool, hidden: frozenset[str] = frozenset()) -> None:
+        """Choose whether regions, and handles except *hidden* ones, are coloured.
+
+        Fixed vertices always are.
+        """
+        before = self._fills_regions, self._marks_handles, self._hidden
+        if (regions, handles, hidden) != before:
+            self._fills_regions, self._marks_handles, self._hidden = regions, handles, hidden
+            self._base = self._base_colours()
+            self._draw()
 
     def preview(self, vertices: BoolArray | None, colour: NDArray[np.uint8] | None = None) -> None:
         """Show *vertices*, a mask (n,), in a *colour* (3,) of 0 to 255; None ends the preview."""
@@ -75,16 +88,18 @@ class RegionColours:
 
     def _base_colours(self) -> NDArray[np.float64]:
         """Return the (n, 3) colours without the preview."""
-        session = self._session
-        if session.regions is None:
+        session, regions = self._session, self._session.regions
+        if regions is None or not self._fills_regions:
             colours = np.tile(rgb(BODY).astype(float), (session.mesh.n_vertices, 1))
         else:
-            palette = [of_region(r) for r in range(session.regions.n_regions)]
-            belongs = session.regions.membership
+            palette = [of_region(r) for r in range(regions.n_regions)]
+            belongs = regions.membership
             colours = (belongs / belongs.sum(axis=0)).T @ np.array(palette, dtype=float)
         colours[session.fixed] = rgb(FIXED)
-        for vertices in session.handles.values():
-            colours[vertices] = rgb(HANDLE)
+        if self._marks_handles:
+            for number, (name, vertices) in enumerate(session.handles.items()):
+                if name not in self._hidden:
+                    colours[vertices] = of_handle(number)
         return colours
 
     def _draw(self) -> None:

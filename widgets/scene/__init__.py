@@ -6,6 +6,7 @@ The files, in reading order:
     widget             the base class of the widgets
     gestures           press, move and release as one generator
     surface_display    the mesh of a session as an actor
+    backdrop           background and light of a window that belongs to the editor
     projection         projection between world and display coordinates
     foreground         a renderer that draws over another one
     labels             rectangles and text in display coordinates
@@ -14,12 +15,13 @@ The files, in reading order:
     step_budget        solver steps per event, recorded and replayed
 """
 
+from .backdrop import set_background, set_lights
 from .gestures import Gesture, Phase, Pointer
 from .highlights import Highlights
 from .labels import Panel, Text
 from .projection import Projection
 from .step_budget import StepBudget, observe_steps, prescribe_steps
-from .surface_display import SurfaceDisplay
+from .surface_display import SurfaceDisplay, SurfaceStyle
 from .view import Stop, View
 from .widget import Widget
 from .wireframe import Wireframe
@@ -34,10 +36,13 @@ __all__ = [
     "StepBudget",
     "Stop",
     "SurfaceDisplay",
+    "SurfaceStyle",
     "Text",
     "View",
     "Widget",
     "Wireframe",
     "observe_steps",
     "prescribe_steps",
+    "set_background",
+    "set_lights",
 ]

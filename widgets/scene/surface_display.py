@@ -1,7 +1,8 @@
 """The mesh of a session in its current pose, as one actor shared by all widgets.
 
 Positions and normals are updated in place when the pose changes.  Colours come in layers, and the
-newest layer is visible.
+newest layer is visible.  The body is matte clay, drawn shaded, shaded with its edges, or as a
+wireframe.
 
 A surface with one side has a seam, where neighbouring faces differ in orientation and light needs
 opposite normals.  The vertices there are drawn twice: the second ones, with opposite normals, are
@@ -10,6 +11,7 @@ the corners that `VertexNormals.turned` lists.
 
 from __future__ import annotations
 
+import enum
 from typing import Any
 
 import numpy as np
@@ -23,10 +25,18 @@ from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.freezing import read_only
 from vtk_segdeform.geometry import VertexNormals
 from vtk_segdeform.io import polydata_of
-from vtk_segdeform.pictures import BODY, rgb
+from vtk_segdeform.pictures import BODY, INK, rgb
 from vtk_segdeform.session import Change, Session
 
 from .view import View
+
+
+class SurfaceStyle(enum.Enum):
+    """How a surface is drawn."""
+
+    SHADED = "Shaded"
+    EDGES = "Shaded with edges"
+    WIREFRAME = "Wireframe"
 
 
 class SurfaceDisplay:
@@ -44,6 +54,7 @@ class SurfaceDisplay:
         self.view = View.of(view)
         self.session = require(session, Session, "session")
         self._layers: dict[str, NDArray[np.uint8]] = {}
+        self._style, self._shows_rest = SurfaceStyle.SHADED, False
         mesh = session.mesh
         self._vertex_normals = VertexNormals(mesh)
         faces, turned = mesh.faces.ravel(), self._vertex_normals.turned
@@ -72,7 +83,9 @@ class SurfaceDisplay:
         surface.SetColor(*(rgb(BODY) / 255.0))
         surface.SetAmbient(0.25)
         surface.SetDiffuse(0.8)
-        surface.SetSpecular(0.05)
+        surface.SetSpecular(0.0)
+        surface.SetEdgeColor(*(rgb(INK) / 255.0))
+        surface.SetEdgeOpacity(0.4)
         self.view.renderer.AddActor(self.actor)
         self._stop = session.on_change(self._changed)
 
@@ -80,6 +93,33 @@ class SurfaceDisplay:
     def points(self) -> NDArray[np.float64]:
         """(n, 3) float: the displayed vertices; a read-only view, not a copy."""
         return self._read_only_points
+
+    @property
+    def style(self) -> SurfaceStyle:
+        """How the surface is drawn."""
+        return self._style
+
+    @style.setter
+    def style(self, style: SurfaceStyle) -> None:
+        self._style = require(style, SurfaceStyle, "style")
+        surface = self.actor.GetProperty()
+        surface.SetEdgeVisibility(style is SurfaceStyle.EDGES)
+        if style is SurfaceStyle.WIREFRAME:
+            surface.SetRepresentationToWireframe()
+        else:
+            surface.SetRepresentationToSurface()
+        self.view.request_render()
+
+    @property
+    def shows_rest(self) -> bool:
+        """Whether the mesh at rest is shown instead of the current pose."""
+        return self._shows_rest
+
+    @shows_rest.setter
+    def shows_rest(self, rest: bool) -> None:
+        if rest != self._shows_rest:
+            self._shows_rest = rest
+            self.update()
 
     def set_colours(self, layer: str, colours: NDArray[np.uint8] | None) -> None:
         """Set the vertex *colours* (n, 3) uint8 of a layer, or remove the layer with None.
@@ -102,7 +142,7 @@ class SurfaceDisplay:
 
     def update(self) -> None:
         """Show the session's current pose; called automatically when it changes."""
-        self._points[:] = self.session.vertices
+        self._points[:] = self.session.mesh.vertices if self._shows_rest else self.session.vertices
         self._drawn[len(self._points) :] = self._points[self._twice]
         self.polydata.GetPoints().GetData().Modified()
         self.polydata.GetPoints().Modified()

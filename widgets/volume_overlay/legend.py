@@ -15,7 +15,7 @@ from vtkmodules.vtkRenderingAnnotation import vtkScalarBarActor
 from vtkmodules.vtkRenderingCore import vtkTextActor
 
 from vtk_segdeform.arrays import FloatArray
-from vtk_segdeform.pictures import INK, PAPER, of_region, rgb
+from vtk_segdeform.pictures import ink_on, of_region, rgb
 
 from ..scene import Stop, View
 from .diverging import lookup_table
@@ -174,6 +174,5 @@ def _annotated_table(half_range: float) -> Any:
 
 
 def _ink_on(colour: Any) -> FloatArray:
-    """Return dark or white, whichever contrasts more with *colour*."""
-    dark = np.dot(colour, [0.2126, 0.7152, 0.0722]) < 0.45
-    return np.asarray(rgb(PAPER if dark else INK) / 255.0)
+    """Return dark or white, whichever contrasts more with *colour* (3,), 0 to 1."""
+    return np.asarray(rgb(ink_on(255.0 * np.array(colour))) / 255.0)

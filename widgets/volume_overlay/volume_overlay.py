@@ -45,6 +45,7 @@ from .region_volumes import RegionVolumes
 _LAYER = "volume"
 _IN_LINES = Change.REGIONS | Change.NAMES | Change.OPTIONS
 _FIRST = 100.0  # priority: called before the widgets that change the pose
+_RANGE = 0.5  # at the ends of the scale, unless another one is wanted
 _MOST_REGIONS = 8  # more lines would cover the mesh
 # Ambient, diffuse and specular light: strong shading would be confused with the colour scale.
 _SOFT_LIGHT = 0.55, 0.45, 0.0
@@ -76,7 +77,7 @@ class VolumeOverlay:
         self._regions = RegionVolumes(session)
         self._change: FloatArray | None = None
         self._half_range: float | None = None
-        self._wanted_range: float | None = None
+        self._wanted_range: float | None = _RANGE
         self._light = _SOFT_LIGHT
         self._stop: Stop | None = None
 
@@ -97,9 +98,10 @@ class VolumeOverlay:
 
     @property
     def wanted_range(self) -> float | None:
-        """The local volume change wanted at the ends of the scale; None, the default, is automatic.
+        """The local volume change wanted at the ends of the scale; 0.5 by default.
 
-        Can be set to None or a number above 0; anything else raises an ArgumentError.
+        Can be set to None, which is automatic, or to a number above 0; anything else raises an
+        ArgumentError.
         """
         return self._wanted_range
 

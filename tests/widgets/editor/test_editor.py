@@ -16,6 +16,7 @@ from hands import Hand, picture, plain_view
 from numpy.testing import assert_array_equal
 from scenes import sausage
 from scipy.spatial.transform import Rotation
+from vtkmodules.util.numpy_support import vtk_to_numpy
 
 from vtk_segdeform import Session, load_session, models, save_session
 from vtk_segdeform.errors import CageError, RegionError
@@ -25,6 +26,7 @@ from vtk_segdeform.widgets.editor.bindings import BINDINGS
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import Kind, Part
 from vtk_segdeform.widgets.region_selector.region_selector import Paint, Tool
+from vtk_segdeform.widgets.scene.surface_display import SurfaceStyle
 from vtk_segdeform.widgets.scene.view import View
 from vtk_segdeform.widgets.volume_overlay.volume_overlay import VolumeOverlay
 
@@ -273,6 +275,65 @@ def test_each_mode_switches_on_its_own_widget_and_display(bench):
     assert widgets.overlay.is_shown
 
 
+def test_regions_are_filled_only_where_they_are_painted_and_outlined_on_demand(bench):
+    widgets, regions = bench.editor.widgets, bench.session.regions.n_regions
+    free = np.setdiff1d(np.arange(bench.session.mesh.n_vertices), bench.session.fixed)
+    free = np.setdiff1d(free, np.concatenate([*bench.session.handles.values()]))
+
+    def n_colours():
+        colours = vtk_to_numpy(widgets.surface.polydata.GetPointData().GetScalars())
+        return len(np.unique(colours[free], axis=0))
+
+    for mode in Mode:
+        bench.editor.mode = mode
+        bench.settle()
+        bench.view.render()
+        assert (n_colours() > 1) == (mode is Mode.REGIONS)
+        assert (widgets.outlines.n_numbers > 0) == (mode is Mode.REGIONS)
+    before = picture(bench.view)
+    bench.hand.types("shift+g")
+    assert (picture(bench.view) != before).any()
+    assert 0 < widgets.outlines.n_numbers <= regions
+    bench.hand.types("shift+g")
+    bench.editor.controller.messages.clear()
+    bench.editor.controller.refresh()
+    assert_array_equal(picture(bench.view), before)
+
+
+def test_a_held_key_shows_the_mesh_at_rest_and_its_release_the_pose(bench):
+    bench.editor.mode = Mode.DEFORM
+    bench.settle()
+    session, surface = bench.session, bench.editor.widgets.surface
+    session.drag(session.vertices[np.concatenate([*session.handles.values()])] + [0.1, 0.0, 0.0])
+    session.commit()
+    bench.settle()
+    state, posed = session.state, session.vertices.copy()
+    for event in ("KeyPressEvent", "KeyReleaseEvent", "KeyPressEvent"):  # a key that repeats
+        bench.hand.event(event, key="backslash")
+        assert_array_equal(surface.points, session.mesh.vertices)
+        assert not any(widget.GetEnabled() for widget in bench.editor.widgets.interactive)
+    bench.hand.tick()
+    assert_array_equal(surface.points, session.mesh.vertices)
+    bench.hand.event("KeyReleaseEvent", key="backslash")
+    bench.hand.tick()
+    assert_array_equal(surface.points, posed)
+    assert bench.editor.widgets.dragger.GetEnabled()
+    assert session.state is state
+    bench.hand.event("KeyPressEvent", key="backslash")
+    bench.type("1")  # any other action shows the pose as well
+    assert_array_equal(surface.points, posed)
+
+
+def test_one_key_cycles_through_shaded_edges_and_wireframe(bench):
+    shaded, seen = bench.editor.widgets.surface.style, []
+    for _ in SurfaceStyle:
+        bench.hand.types("w")
+        seen.append((bench.editor.widgets.surface.style, picture(bench.view)))
+    assert [style for style, _ in seen] == [SurfaceStyle.EDGES, SurfaceStyle.WIREFRAME, shaded]
+    for k in range(3):
+        assert np.mean(np.any(seen[k][1] != seen[k - 1][1], axis=2)) > 0.02
+
+
 def test_keys_select_the_target_of_painting(bench):
     selector = bench.editor.widgets.selector
     tools = {"l": Tool.LASSO, "t": Tool.RECTANGLE, "k": Tool.COMPONENT, "b": Tool.BRUSH}
@@ -432,7 +493,7 @@ def test_a_key_of_another_mode_is_explained_and_withheld_from_vtk(bench):
     bench.type("s")  # surface, to VTK; fixed vertices, in mode 3
     assert heard == []
     assert "S works in mode 3 (Paint fixed vertices)" in bench.editor.status
-    bench.type("w")
+    bench.type("j")
     assert heard == ["char"]
 
 

@@ -358,6 +358,25 @@ def test_keys_constrain_a_rotation_to_an_axis_then_to_its_own(bench):
         assert np.allclose(bench.targets(), own, atol=1e-12)
 
 
+@pytest.mark.parametrize("change", ["set_hidden", "set_locked"])
+def test_a_hidden_or_locked_handle_cannot_be_dragged_and_keeps_its_place(bench, change):
+    place = bench.hand.at(bench.session.vertices[bench.session.handles[TOP]].mean(axis=0))
+    before = picture(bench.view)
+    getattr(bench.dragger, change)(TOP, True)
+    bench.dragger.handle = TOP
+    assert bench.gizmo.centre is None
+    bench.dragger.handle = TIP
+    bench.session.rename_handle(TOP, "hat")
+    assert {*bench.dragger.hidden, *bench.dragger.locked} == {"hat"}
+    assert (picture(bench.view) != before).any() == (change == "set_hidden")
+    state = bench.session.state
+    bench.hand.drag([place, np.add(place, [30.0, 30.0])])
+    assert bench.session.state is state
+    getattr(bench.dragger, change)("hat", False)
+    bench.dragger.handle = "hat"
+    assert bench.gizmo.centre is not None
+
+
 def test_axis_keys_are_passed_on_while_nothing_is_dragged(bench):
     heard = []
     bench.view.interactor.AddObserver("KeyPressEvent", lambda *_: heard.append("key"), 0.5)

@@ -67,8 +67,10 @@ def is_kept(stand: Stand, place) -> Story:
 def settings(panel) -> list:
     """Return all widgets that can be clicked or set in mode 4, except files and modes."""
     kinds = QtWidgets.QAbstractButton, QtWidgets.QAbstractSpinBox
-    found = [each for kind in kinds for each in panel.findChildren(kind) if each.isVisible()]
-    asking = panel.toolbar.open, panel.toolbar.save  # a dialog
+    owners = panel, panel.toolbar  # which is not inside the panel of a `DeformWidget`
+    inside = {each for kind in kinds for owner in owners for each in owner.findChildren(kind)}
+    found = [each for each in inside if each.isVisible()]
+    asking = panel.toolbar.open, panel.toolbar.save, panel.toolbar.view  # a dialog or a menu
     return [each for each in found if each.isEnabled() and each not in asking]
 
 

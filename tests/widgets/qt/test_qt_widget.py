@@ -33,6 +33,7 @@ from vtk_segdeform import Regions, Session, models
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.io.convert import read_polydata, to_polydata
 from vtk_segdeform.io.surface import read_mesh
+from vtk_segdeform.pictures.palette import HANDLE
 from vtk_segdeform.session.store import load_session
 from vtk_segdeform.widgets import Mode, Paint, Tool
 from vtk_segdeform.widgets.qt.widget import DeformDock, DeformWidget, deform_dock
@@ -433,9 +434,9 @@ def test_the_colour_range_is_typed_and_kept_for_the_next_session(seen, tmp_path)
     assert not part.range.isEnabled()
     seen.click(part.overlay)
     bend(seen)
-    chosen = overlay().half_range
+    assert overlay().half_range == 0.5
     seen.type_number(part.range, 37.5)
-    assert overlay().half_range == 0.375 != chosen
+    assert overlay().half_range == 0.375
     assert seen.session.undo_label == "drag handle 1"  # the range is not an undo step
     seen.editor.save(tmp_path / "a.segdeform")
     seen.editor.load(tmp_path / "a.segdeform")
@@ -444,7 +445,7 @@ def test_the_colour_range_is_typed_and_kept_for_the_next_session(seen, tmp_path)
     assert part.range.value() == 37.5
     seen.type_number(part.range, 0)
     assert part.range.text() == "Auto"
-    assert overlay().half_range == chosen
+    assert overlay().half_range == 0.05  # automatic
 
 
 def test_an_error_is_shown_emitted_and_then_cleared(seen):
@@ -680,7 +681,8 @@ def test_every_control_is_reached_by_tab_and_has_a_tooltip(seen, mode):
     wanted = {
         each
         for kind in kinds
-        for each in seen.panel.findChildren(kind)
+        for part in (seen.panel.toolbar, seen.panel)
+        for each in part.findChildren(kind)
         if each.isVisible() and each.isEnabled()
     }
     assert len(wanted) > 8
@@ -692,7 +694,7 @@ def test_every_control_is_reached_by_tab_and_has_a_tooltip(seen, mode):
         here = application().focusWidget()
         if here in wanted and here not in reached:
             reached.add(here)
-            heights.append(here.mapTo(seen.panel, here.rect().topLeft()).y())
+            heights.append(here.mapTo(seen.widget, here.rect().topLeft()).y())
         QtTest.QTest.keyClick(here, Qt.Key_Tab)
     assert heights == sorted(heights)  # from the top down
     assert {each for each in wanted if each.focusPolicy() != Qt.NoFocus} <= reached
@@ -704,6 +706,41 @@ def test_every_control_is_reached_by_tab_and_has_a_tooltip(seen, mode):
     assert seen.editor.mode is not mode
 
 
+def test_enter_presses_the_focused_button_and_words_of_the_hint_run_keys(seen):
+    bar, panel = seen.panel.toolbar, seen.panel
+    for button, mode in ((bar.modes[Mode.HANDLES], Mode.HANDLES), (panel.handles.new, None)):
+        button.setFocusPolicy(Qt.StrongFocus)
+        button.setFocus()
+        QtTest.QTest.keyClick(button, Qt.Key_Return)
+        seen.settle()
+        assert mode is None or seen.editor.mode is mode
+    assert seen.editor.widgets.selector.handle is None
+    assert 'href="4"' in panel.status.hint.text()
+    panel.status.hint.linkActivated.emit("4")
+    seen.settle()
+    assert seen.editor.mode is Mode.DEFORM
+    bar.compare.pressed.emit()
+    assert seen.editor.controller.shows_rest
+    bar.compare.released.emit()
+    assert not seen.editor.controller.shows_rest
+
+
+def test_handles_are_hidden_and_locked_in_the_list_which_has_their_colours(seen):
+    seen.mode(Mode.DEFORM)
+    tree, dragger = seen.panel.handles.list, seen.editor.widgets.dragger
+    (name,) = seen.session.handles
+    row = [cells[0] for cells in rows(tree)].index(name)
+    image = tree.topLevelItem(row).icon(0).pixmap(16, 16).toImage()
+    middle = image.pixelColor(image.width() // 2, image.height() // 2)
+    assert middle.name().upper() == HANDLE
+    seen.click_row(tree, row, 2)
+    seen.click_row(tree, row, 3)
+    assert (dragger.hidden, dragger.locked) == ({name}, {name})
+    seen.click_row(tree, row, 2)
+    seen.click_row(tree, row, 3)
+    assert (dragger.hidden, dragger.locked) == (set(), set())
+
+
 def test_in_a_dark_palette_the_panel_is_dark_and_its_text_is_light(seen, tmp_path):
     before = application().palette()
     application().setPalette(QtGui.QPalette(QtGui.QColor("#3a3a3a"), QtGui.QColor("#2b2b2b")))
@@ -711,6 +748,7 @@ def test_in_a_dark_palette_the_panel_is_dark_and_its_text_is_light(seen, tmp_pat
         seen.settle()
         application().processEvents()
         seen.panel.grab().save(str(tmp_path / "panel.png"))
+        assert max(seen.widget.plotter.renderer.GetBackground()) < 0.2
         grey = np.array(Image.open(tmp_path / "panel.png").convert("L"))
         assert np.median(grey) < 60
         assert grey.max() > 200

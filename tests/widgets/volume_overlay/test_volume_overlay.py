@@ -56,6 +56,7 @@ def overlay(request):
     view.renderer.ResetCamera()
     view.render()
     overlay = VolumeOverlay(view, session, surface)
+    overlay.wanted_range = None
     overlay.surface = surface
     yield overlay
     overlay.remove()
