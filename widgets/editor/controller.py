@@ -72,7 +72,7 @@ class Controller:
         self.notices = Notices(view, lambda: self.messages.height)
         self.earlier: tuple[str, Callable[[], None]] | None = None
         self.recordings = Recordings(view)
-        self._mode = Mode.REGIONS
+        self._mode = Mode.PULL
         self._is_on = False
         self.log = Log()
         self._worker = Worker(view_timer(view), self.log, self._job_changed)
@@ -182,10 +182,16 @@ class Controller:
         self._stop_listening = self.session.on_change(self._session_changed)
         for widget in self.widgets.interactive:
             widget.AddObserver("EndInteractionEvent", self._gesture_ended)
+        self.widgets.puller.AddObserver("StartInteractionEvent", self._pull_began)
+        self.widgets.puller.AddObserver("ModifiedEvent", lambda *_: self.refresh())
 
     def _gesture_ended(self, widget: Widget, _: str) -> None:
         if widget.remark:
             self.messages.note(widget.remark)
+        self.refresh()
+
+    def _pull_began(self, *_: object) -> None:
+        self.messages.clear()
         self.refresh()
 
     def _session_changed(self, change: Change) -> None:
@@ -253,7 +259,8 @@ class Controller:
         widgets, session = self.widgets, self.session
         if not self._is_on or self.is_busy:
             return
-        if self._mode is Mode.DEFORM and session.is_ready and not session.is_bound:
+        drags = self._mode is Mode.PULL or (self._mode is Mode.DEFORM and session.is_ready)
+        if drags and session.cages and not session.is_bound:
             self.start("Binding mesh to cages", widgets.bind, lambda _: None)
         elif widgets.wants_overlay(self._mode) and not widgets.overlay.is_prepared:
             self.start("Computing local volume change", widgets.measure, lambda _: None)

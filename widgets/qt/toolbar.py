@@ -1,4 +1,4 @@
-"""The toolbar of the panel: files, undo and redo, and the four modes."""
+"""The toolbar of the panel: files, undo and redo, and the modes."""
 
 from __future__ import annotations
 
