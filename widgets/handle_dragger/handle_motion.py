@@ -55,11 +55,13 @@ class Grip:
     point: FloatArray
     """(3,) float: the world point that stays under the pointer."""
     centre: FloatArray
-    """(3,) float: the centre of rotation.  If it is the grabbed point, pixels are counted."""
+    """(3,) float: the centre of rotation."""
     axes: FloatArray
     """(3, 3) float: x, y and z as rows, each of length 1."""
     radius: float
-    """Of a ring; if it is seen edge-on, a pointer motion of this length rotates by one radian."""
+    """Of a ring; where pixels are counted, a pointer motion of this length rotates by a radian."""
+    has_arm: bool = True
+    """Whether the pointer rotates about the centre; if it is pressed there, pixels are counted."""
 
 
 class Motion:
@@ -182,8 +184,7 @@ def _track_plane(projection: Projection, axis: FloatArray, grip: Grip, press: Po
 
 def _track_angle(projection: Projection, axis: FloatArray, grip: Grip, press: Pointer) -> Tracker:
     line = _line_of_sight(projection, grip.centre)
-    is_centre = np.array_equal(grip.point, grip.centre)  # there is no arm to turn
-    if is_centre or abs(line @ axis) < _EDGE_ON:  # the front of the ring follows the pointer
+    if not grip.has_arm or abs(line @ axis) < _EDGE_ON:  # the front of the ring follows the pointer
         direction = np.array([np.copysign(1.0, line @ axis), 0.0])  # seen face-on: its top
         if abs(line @ axis) < _FACE_ON:
             front = grip.centre + 0.01 * grip.radius * np.outer([0.0, 1.0], np.cross(line, axis))

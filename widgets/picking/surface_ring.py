@@ -44,7 +44,8 @@ class SurfaceRing:
         self._faces = np.argsort(owner, kind="stable")
         self._first = np.searchsorted(owner[self._faces], np.arange(self._count + 1))
         across = self._block[edges[~inside]]
-        self._links = np.unique(across, axis=0).reshape(-1, 2)
+        self._links = np.unique(np.concatenate([across, across[:, ::-1]]), axis=0)
+        self._graph = sparse.csr_array((self._count, self._count))
         self._pose: int | None = None
         self._low = self._high = np.empty((0, 3))
 
@@ -79,7 +80,6 @@ class SurfaceRing:
         a, b = self._links.T
         reached = crossed.copy()  # a triangle belongs to one block, but reaches into others
         reached[a[crossed[b]]] = True
-        reached[b[crossed[a]]] = True
         blocks = np.flatnonzero(reached & near)
         pieces = [self._faces[self._first[k] : self._first[k + 1]] for k in blocks]
         corners = points[self._triangles[np.concatenate([[face], *pieces]).astype(np.int64)]]
@@ -93,16 +93,15 @@ class SurfaceRing:
         starts = np.searchsorted(self._block[self._by_block], np.arange(self._count))
         self._low = np.minimum.reduceat(x, starts)
         self._high = np.maximum.reduceat(x, starts)
-
-    def _near(self, block: int, radius: float) -> BoolArray:
-        """Return which blocks are near *block* along the surface, (b,) bool."""
         middle = 0.5 * (self._low + self._high)
         a, b = self._links.T
         length = np.maximum(np.linalg.norm(middle[a] - middle[b], axis=1), 1e-9 * self._size)
-        shape = self._count, self._count
-        graph = sparse.csr_array((length, (a, b)), shape=shape)
+        self._graph = sparse.csr_array((length, (a, b)), shape=(self._count, self._count))
+
+    def _near(self, block: int, radius: float) -> BoolArray:
+        """Return which blocks are near *block* along the surface, (b,) bool."""
         limit = _DETOUR * radius + 3.0 * self._size
-        away = csgraph.dijkstra(graph, directed=False, indices=block, limit=limit)
+        away = csgraph.dijkstra(self._graph, indices=block, limit=limit)
         return np.asarray(np.isfinite(away))
 
 

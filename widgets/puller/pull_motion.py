@@ -95,5 +95,5 @@ class PullMotion:
     def _begin(self) -> None:
         place = self._point + self._base_shift
         radius = self._arm * self._projection.pixel_at(place)
-        grip = Grip(place, place, np.eye(3), radius)
+        grip = Grip(place, place, np.eye(3), radius, has_arm=False)
         self._motion = Motion(self._projection, self.part, grip, self._start)

@@ -43,6 +43,7 @@ class Bench:
         view.renderer.ResetCamera()
         view.render()
         self.hand = Hand(view)
+        self.editor.mode = Mode.REGIONS
         self.editor.On()
 
     @property
