@@ -213,7 +213,9 @@ class Stand:
             at = {Mode.REGIONS: [0.9, -0.7, 0.0], Mode.HANDLES: [-1.6, -0.6, 0.0]}.get(
                 mode, session.mesh.vertices[x > 2.2].mean(axis=0)
             )
-        shift = np.array([6.0, 24.0] if mode in (Mode.PULL, Mode.CAGES, Mode.DEFORM) else [4.0, 2.0])
+        shift = np.array(
+            [6.0, 24.0] if mode in (Mode.PULL, Mode.CAGES, Mode.DEFORM) else [4.0, 2.0]
+        )
         return [np.round(self.hand.at(at) + share * shift) for share in (0.0, 0.4, 0.7, 1.0)]
 
     def drag(self, mode: Mode) -> np.ndarray:

@@ -101,7 +101,7 @@ class SurfaceRing:
     def _near(self, block: int, radius: float) -> BoolArray:
         """Return which blocks are near *block* along the surface, (b,) bool."""
         limit = _DETOUR * radius + 3.0 * self._size
-        away = csgraph.dijkstra(self._graph, indices=block, limit=limit)
+        away = csgraph.dijkstra(self._graph, indices=np.array([block]), limit=limit)[0]
         return np.asarray(np.isfinite(away))
 
 

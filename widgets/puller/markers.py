@@ -75,7 +75,7 @@ class Markers:
             if not away[k] <= _REACH * self._scale:
                 break
             if self._is_visible(places[k]):
-                return names[k]
+                return names[int(k)]
         return None
 
     def highlight(self, name: str | None) -> None:

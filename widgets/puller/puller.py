@@ -17,6 +17,7 @@ shows the radius.  A press on a pin or a pulled point, shown as dots, grabs that
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -25,7 +26,7 @@ import numpy as np
 
 from vtk_segdeform.arrays import FloatArray, is_number
 from vtk_segdeform.checks import require, shown
-from vtk_segdeform.deformer import LOCALITY
+from vtk_segdeform.deformer import LOCALITY, checked_locality
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.pictures import PAPER, rgb
 from vtk_segdeform.session import Change, Session
@@ -105,7 +106,8 @@ class Puller(Widget):
     @property
     def steps_of_radius(self) -> int:
         """By how many steps of the keys the radius differs from the initial one, rounded."""
-        return round(np.log(self._radius / (_RADIUS * self.session.mesh.diagonal)) / np.log(GROWTH))
+        share = self._radius / (_RADIUS * self.session.mesh.diagonal)
+        return round(math.log(share) / math.log(GROWTH))
 
     def reset_radius(self, steps: int = 0) -> None:
         """Set the radius to the initial one after *steps* steps of the keys, exactly."""
@@ -120,9 +122,7 @@ class Puller(Widget):
 
     @locality.setter
     def locality(self, locality: float | None) -> None:
-        if locality is not None and not is_number(locality, 0.0, 1.0):
-            raise ArgumentError(f"locality must be 0 to 1, or None; got {shown(locality)}")
-        self._locality = None if locality is None else float(locality)
+        self._locality = checked_locality(locality)
         self._invoke("ModifiedEvent")
 
     @property

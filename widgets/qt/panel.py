@@ -102,7 +102,9 @@ class DeformPanel(QtWidgets.QWidget):
             part.setVisible(editor.mode in modes)
             if editor.mode in modes:
                 part.refresh()
-        if editor.widgets.dragger.is_refining or editor.widgets.puller.is_refining:  # refinement ends without a message
+        if (
+            editor.widgets.dragger.is_refining or editor.widgets.puller.is_refining
+        ):  # refinement ends without a message
             self._delay.start()
 
     def stop(self) -> None:
