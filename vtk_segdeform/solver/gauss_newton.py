@@ -281,8 +281,8 @@ class GaussNewton:
         It is zero at a minimum: the rest, which is orthogonal to it, changes the volumes only.
         """
         here = self._iterate_at(p, self.positions.toward(targets))
-        rows = np.reshape(here.rows, (len(here.rows), -1))
         slope = here.slope.ravel()
+        rows = np.reshape(here.rows, (len(here.rows), len(slope)))
         share = np.linalg.lstsq(rows.T, slope, rcond=None)[0] if len(rows) else np.zeros(0)
         return np.reshape(slope - share @ rows, p.shape)
 

@@ -111,7 +111,9 @@ class Picker:
         if self._ring is None:
             self._ring = SurfaceRing(self._mesh)
         pose = self._data.GetPoints().GetMTime()
-        return self._ring.around(self._surface.points, pose, hit.point, hit.face, radius)
+        return self._ring.around(
+            self._surface.points, pose=pose, centre=hit.point, face=hit.face, radius=radius
+        )
 
     def component(self, vertex: int) -> BoolArray:
         """Return the connected part of the mesh that contains *vertex*, (n,) bool."""

@@ -50,7 +50,7 @@ class SurfaceRing:
         self._low = self._high = np.empty((0, 3))
 
     def around(
-        self, points: FloatArray, pose: int, centre: FloatArray, face: int, radius: float
+        self, points: FloatArray, *, pose: int, centre: FloatArray, face: int, radius: float
     ) -> FloatArray:
         """Return the segments (k, 2, 3) of the ring about *centre*.
 

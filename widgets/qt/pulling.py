@@ -42,7 +42,9 @@ class PullPart(QtWidgets.QGroupBox):
         self.local.valueChanged.connect(
             lambda share: editor.do(pulling_with(locality=0.01 * share))
         )
-        self.auto = check_box("Auto", "Free between pins and fixed vertices, otherwise halfway (A)")
+        self.auto = check_box(
+            "Auto local", "Free between pins and fixed vertices, otherwise halfway (A)"
+        )
         self.auto.clicked.connect(self._set_auto)
         self.unpin = key_button(editor, "u", Mode.PULL, "Remove all pins")
         self.volume = QtWidgets.QLabel()
@@ -52,9 +54,12 @@ class PullPart(QtWidgets.QGroupBox):
         self.reset = key_button(editor, "home", Mode.PULL, "Reset pose")
         column(
             self,
-            form(("Radius", self.radius), ("Local", self.local), ("", self.auto)),
-            form(("Volume change", self.volume)),
-            self.preserve,
+            form(
+                ("Radius", self.radius),
+                ("Local", self.local),
+                ("Volume change", self.volume),
+            ),
+            row(self.auto, self.preserve),
             row(self.unpin, self.reset),
         )
 
