@@ -41,7 +41,8 @@ SIZE = (260, 200)
 LONGEST = 30.0  # seconds that any action may take, on a busy machine
 SAME_POSE = 2e-3  # of the diagonal: the same pose reached in two ways
 STEPS = {Mode.REGIONS: "paint region 1", Mode.CAGES: "drag the cage of region 1",
-         Mode.HANDLES: "set tip", Mode.DEFORM: "drag tip"}  # fmt: skip
+         Mode.HANDLES: "set tip", Mode.DEFORM: "drag tip", Mode.PULL: "pull"}  # fmt: skip
+NUMBER = {"0", "1", "2", "3", "4", "minus", "backspace"}  # typed during a pull or a drag
 
 
 def table(*modes: Mode, campaign: bool = False) -> list:
@@ -64,6 +65,8 @@ def table(*modes: Mode, campaign: bool = False) -> list:
 
 def ends_the_drag(key: str, mode: Mode) -> bool:
     """Return whether *key* must end a drag in *mode*; Escape cancels it as well."""
+    if mode in (Mode.PULL, Mode.DEFORM) and key in NUMBER | {"return"}:
+        return key == "return"
     if any(b.action is None and key in b.keys and mode in b.modes for b in BINDINGS):
         return False  # the key belongs to the dragging widget
     binding = binding_of(key, mode)
@@ -170,8 +173,8 @@ class Stand:
     def settle(self) -> None:
         """Wait until the editor is idle, and check that it stays so."""
         self.until(lambda: not self.editor.is_busy, "the job")
-        dragger = self.editor.widgets.dragger
-        self.until(lambda: not dragger.is_refining, "the pose")
+        dragger, puller = self.editor.widgets.dragger, self.editor.widgets.puller
+        self.until(lambda: not (dragger.is_refining or puller.is_refining), "the pose")
         self.until(lambda: not self.has_timers(), "the timers")
         assert not any(widget.is_grabbing for widget in self.editor.widgets.interactive)
         assert not self.session.is_dragging
@@ -188,6 +191,7 @@ class Stand:
         controller.messages.clear()
         widgets.cages_wanted = widgets.overlay_wanted = False
         widgets.selector.tool, widgets.selector.through = Tool.BRUSH, False
+        widgets.puller.locality = None
         shutil.copy(self.folder / "start.segdeform", self.folder / "work.segdeform")
         self.editor.path = self.folder / "work.segdeform"
         self.editor.mode = mode
@@ -209,7 +213,9 @@ class Stand:
             at = {Mode.REGIONS: [0.9, -0.7, 0.0], Mode.HANDLES: [-1.6, -0.6, 0.0]}.get(
                 mode, session.mesh.vertices[x > 2.2].mean(axis=0)
             )
-        shift = np.array([6.0, 24.0] if mode in (Mode.CAGES, Mode.DEFORM) else [4.0, 2.0])
+        shift = np.array(
+            [6.0, 24.0] if mode in (Mode.PULL, Mode.CAGES, Mode.DEFORM) else [4.0, 2.0]
+        )
         return [np.round(self.hand.at(at) + share * shift) for share in (0.0, 0.4, 0.7, 1.0)]
 
     def drag(self, mode: Mode) -> np.ndarray:
@@ -279,7 +285,7 @@ class Stand:
         assert (story.labels, story.done) == (expected.labels, expected.done), told
         mine, its = (list(map(outline, each.states)) for each in (story, expected))
         assert mine == its, (mine, its)
-        if story.labels == dragged.labels and key not in ("x", "y", "z"):  # which constrain it
+        if story.labels == dragged.labels and key not in NUMBER | {"x", "y", "z", "r"}:
             is_final = story.done == dragged.done
             same_places(story.states[1], dragged.states[1], self.session, is_final=is_final)
 

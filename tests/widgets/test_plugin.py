@@ -234,6 +234,7 @@ def test_the_package_alone_does_not_load_pyvista():
 
 def pull(hand: Hand, editor) -> None:
     """Switch to the deform mode and drag the centre of the handle."""
+    editor.wait()
     hand.key("4")
     editor.wait()
     session = editor.session

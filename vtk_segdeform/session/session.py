@@ -497,9 +497,14 @@ class Session(Timeline):
             self._set_handles(after, f"set {name}")
         return name
 
-    def remove_handle(self, name: str) -> None:
-        """Remove a handle; the pose does not change."""
-        self._set_handles(handles.without_handle(self.handles, name), f"remove {name}")
+    def remove_handle(self, *names: str) -> None:
+        """Remove one or more handles, in one undo step; the pose does not change."""
+        after = self.handles
+        for name in names:
+            after = handles.without_handle(after, name)
+        if names:
+            label = names[0] if len(names) == 1 else f"{len(names)} handles"
+            self._set_handles(after, f"remove {label}")
 
     def rename_handle(self, name: str, new_name: str) -> None:
         """Rename a handle."""

@@ -1,10 +1,10 @@
-"""The four widgets together: modes, keys, background jobs, status line and help.
+"""The widgets together: modes, keys, background jobs, status line and help.
 
 The files, in reading order:
 
     editor           `DeformEditor`
     controller       session, widgets, mode, job and file of the editor
-    mode widget_set  the four modes, and the widgets of each
+    mode widget_set  the modes, and the widgets of each
     actions recording_actions panel_actions
                      the actions behind keys, menus and panels
     bindings         the table of keys
@@ -49,6 +49,7 @@ from .panel_actions import (
     merging,
     naming_region,
     opening,
+    pulling_with,
     renaming,
     saving,
     selecting_through,
@@ -89,6 +90,7 @@ __all__ = [
     "notices_of",
     "opening",
     "painting",
+    "pulling_with",
     "read_session",
     "renaming",
     "save",

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from vtk_segdeform.cages import Cage
+from vtk_segdeform.deformer import LOCALITY
 from vtk_segdeform.errors import CageError, ConstraintError, RegionError, SessionError
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.regions import Regions
@@ -190,6 +191,34 @@ def cancel(controller: Controller) -> None:
     controller.cancel()
 
 
+# Pulling.
+
+
+def more_local(controller: Controller) -> None:
+    """Make the next pull more local."""
+    _change_locality(controller, +0.1)
+
+
+def less_local(controller: Controller) -> None:
+    """Make the next pull less local."""
+    _change_locality(controller, -0.1)
+
+
+def auto_locality(controller: Controller) -> None:
+    """Let pins decide how local a pull is."""
+    controller.widgets.puller.locality = None
+    controller.say("Locality: auto")
+
+
+def unpin_all(controller: Controller) -> None:
+    """Remove all pins and pulled points."""
+    names = controller.widgets.puller.marked
+    if not names:
+        raise ConstraintError("No pins to remove. Shift-click the surface to add one")
+    controller.session.remove_handle(*names)
+    controller.say(f"Removed {_count(len(names), 'point')}")
+
+
 # Painting.
 
 
@@ -290,6 +319,13 @@ def _handle_names(controller: Controller) -> list[str]:
     if not names:
         raise ConstraintError("No handle yet. In mode 3, press D and paint one")
     return names
+
+
+def _change_locality(controller: Controller, change: float) -> None:
+    puller = controller.widgets.puller
+    before = LOCALITY if puller.locality is None else puller.locality
+    puller.locality = min(max(round(before + change, 1), 0.0), 1.0)
+    controller.say(f"Locality: {100.0 * puller.locality:.0f} %")
 
 
 def _count(number: int, noun: str) -> str:

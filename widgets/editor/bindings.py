@@ -20,6 +20,7 @@ P, R, C, H, D = Mode
 ALL = frozenset(Mode)
 PAINTING = frozenset({R, H})
 BEFORE_AFTER = "backslash"  # acts while it is held
+DRAGGING = frozenset({P, D})
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,12 @@ BINDINGS = (
     Binding(("t",), PAINTING, "Rectangle", actions.with_tool(Tool.RECTANGLE)),
     Binding(("k",), PAINTING, "Connected part", actions.with_tool(Tool.COMPONENT)),
     Binding(("bracketleft", "bracketright"), PAINTING, "Smaller, larger brush", None),
+    Binding(("bracketleft", "bracketright"), frozenset({P}), "Smaller, larger radius", None),
+    Binding(("plus", "equal"), frozenset({P}), "More local", actions.more_local),
+    Binding(("minus",), frozenset({P}), "Less local", actions.less_local),
+    Binding(("a",), frozenset({P}), "Automatic locality", actions.auto_locality),
+    Binding(("u",), frozenset({P}), "Remove all pins", actions.unpin_all),
+    Binding(("r",), frozenset({P}), "While pulling: turn", None),
     Binding(("v",), PAINTING, "Select through (X-ray)", actions.toggle_through),
     Binding(("plus", "equal"), PAINTING, "Grow by one ring", actions.grow),
     Binding(("minus",), PAINTING, "Shrink by one ring", actions.shrink),
@@ -77,8 +84,9 @@ BINDINGS = (
     Binding(("a",), frozenset({H}), "New handle", actions.new_handle),
     Binding(("n", "tab"), frozenset({H, D}), "Next handle", actions.next_handle),
     Binding(("delete", "backspace"), frozenset({H, D}), "Remove handle", actions.remove_handle),
-    Binding(("o",), frozenset({C, D}), "Show local volume change", actions.toggle_overlay),
-    Binding(("x", "y", "z"), frozenset({D}), "While dragging: constrain to axis", None),
+    Binding(("o",), frozenset({P, C, D}), "Show local volume change", actions.toggle_overlay),
+    Binding(("x", "y", "z"), DRAGGING, "While dragging: constrain to axis", None),
+    Binding(("return",), DRAGGING, "After a number: drag by exactly that", None),
     # How the mesh is shown.
     Binding(("w",), ALL, "Shaded, with edges, wireframe", actions.next_style),
     Binding(("shift+g",), ALL, "Show regions", actions.toggle_regions),
@@ -87,12 +95,13 @@ BINDINGS = (
 
 _HEADINGS = {
     ALL: "All modes",
+    frozenset({P}): "0 Pull",
+    DRAGGING: "0 Pull, 4 Deform",
     frozenset({R}): "1 Regions",
     PAINTING: "1 Regions, 3 Handles",
     frozenset({H}): "3 Handles",
     frozenset({H, D}): "3 Handles, 4 Deform",
-    frozenset({C, D}): "2 Cages, 4 Deform",
-    frozenset({D}): "4 Deform",
+    frozenset({P, C, D}): "0 Pull, 2 Cages, 4 Deform",
 }
 _CAPS = {
     "ctrl": "Ctrl",
@@ -105,8 +114,9 @@ _CAPS = {
     "minus": "-",
     "delete": "Del",
     "backslash": "\\",
+    "return": "Enter",
 }
-_ALSO = {"kp_add": "plus", "kp_subtract": "minus", "iso_left_tab": "tab"}
+_ALSO = {"kp_add": "plus", "kp_subtract": "minus", "iso_left_tab": "tab", "+": "plus", "-": "minus"}
 _UNLISTED = {"equal", "backspace", "ctrl+shift+z"}  # alternatives, left out of the help card
 
 

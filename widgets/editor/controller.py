@@ -74,7 +74,7 @@ class Controller:
         self.notices = Notices(view, lambda: self.messages.height)
         self.earlier: tuple[str, Callable[[], None]] | None = None
         self.recordings = Recordings(view)
-        self._mode = Mode.REGIONS
+        self._mode = Mode.PULL
         self._is_on = False
         self.log = Log()
         self._worker = Worker(view_timer(view), self.log, self._job_changed)
@@ -209,15 +209,18 @@ class Controller:
         self._stop_listening = self.session.on_change(self._session_changed)
         for widget in self.widgets.interactive:
             widget.AddObserver("EndInteractionEvent", self._gesture_ended)
-        self.widgets.puller.AddObserver("StartInteractionEvent", self._pull_started)
+        self.widgets.puller.AddObserver("StartInteractionEvent", self._pull_began)
+        self.widgets.puller.AddObserver("ModifiedEvent", lambda *_: self.refresh())
 
     def _gesture_ended(self, widget: Widget, _: str) -> None:
         if widget.remark:
             self.messages.note(widget.remark)
         self.refresh()
 
-    def _pull_started(self, *_: object) -> None:
+    def _pull_began(self, *_: object) -> None:
+        self.messages.clear()
         self._prepare_pulls(again=True)
+        self.refresh()
 
     def _session_changed(self, change: Change) -> None:
         if change & Change.HISTORY:

@@ -1,4 +1,4 @@
-"""The editor: regions, cages, handles and poses of one session in one view, in four modes.
+"""The editor: regions, cages, handles and poses of one session in one view, in five modes.
 
     editor = DeformEditor(view, mesh)
     editor.On()

@@ -37,7 +37,7 @@ def missing(session: Session, mode: Mode) -> str:
 def hint(widgets: WidgetSet, mode: Mode) -> str:
     """Return the hint for *mode*: the current action, and the next step."""
     if mode is Mode.PULL:
-        return "Drag the surface"
+        return _pull_hint(widgets)
     lacking = missing(widgets.session, mode)
     if lacking:
         return lacking
@@ -62,16 +62,36 @@ def _painting_hint(widgets: WidgetSet) -> str:
     return f"{_TOOLS[selector.tool]}: paint {target}{through}. Ctrl: erase"
 
 
+def _pull_hint(widgets: WidgetSet) -> str:
+    session = widgets.session
+    if widgets.puller.is_waiting:
+        return "Preparing: the pull starts in a moment · Esc to cancel"
+    if session.is_dragging:
+        return _drag_hint(session)
+    if _is_volume_off(session):
+        return "Drag the surface · Volume preservation off (P to turn on)"
+    if session.undo_label == "pull":
+        return "Drag the surface. Shift-click pins. Z: undo"
+    return "Drag the surface. Shift-click pins. [ ]: radius"
+
+
+def _drag_hint(session: Session) -> str:
+    volume = f"Volume {signed(100.0 * session.volume_change, 2)} %"
+    if not session.has_volume:
+        volume = "No volume to preserve"
+    return f"{volume} · Esc to cancel"
+
+
+def _is_volume_off(session: Session) -> bool:
+    options = session.options
+    return session.has_volume and not (options.preserve_volume or options.preserve_region_volumes)
+
+
 def _deform_hint(widgets: WidgetSet) -> str:
     session = widgets.session
     if session.is_dragging:
-        volume = f"Volume {signed(100.0 * session.volume_change, 2)} %"
-        if not session.has_volume:
-            volume = "No volume to preserve"
-        return f"{volume} · Esc to cancel"
-    if session.has_volume and not (
-        session.options.preserve_volume or session.options.preserve_region_volumes
-    ):
+        return _drag_hint(session)
+    if _is_volume_off(session):
         return "Move or rotate a handle · Volume preservation off (P to turn on)"
     solution = session.solution
     if solution is not None and solution.status not in (Status.CONVERGED, Status.STEP_LIMIT):

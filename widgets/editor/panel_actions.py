@@ -107,6 +107,19 @@ def with_radius(radius: float) -> Action:
     return resize
 
 
+def pulling_with(*, radius: float | None = None, locality: float | None = None) -> Action:
+    """Return the action that sets the radius of a pull, if given, and its locality, or None."""
+
+    def change(controller: Controller) -> None:
+        puller = controller.widgets.puller
+        if radius is not None:
+            puller.radius = radius
+        else:
+            puller.locality = locality
+
+    return change
+
+
 def setting_colour_range(share: float | None) -> Action:
     """Return the action that sets the colour range of the overlay to plus and minus *share*.
 

@@ -1,12 +1,15 @@
-"""The actions that record the editor's input, and a video of its deform mode."""
+"""The actions that record the editor's input, and a video of pulls and drags."""
 
 from __future__ import annotations
+
+from vtk_segdeform.deformer import LOCALITY
 
 from ..region_selector import Tool
 from .controller import Controller
 from .mode import Mode
 from .recordings import film_place
 
+_FILMED = Mode.PULL, Mode.DEFORM
 _KEY_OF = {Tool.BRUSH: "b", Tool.LASSO: "l", Tool.RECTANGLE: "t", Tool.COMPONENT: "k"}
 
 
@@ -17,23 +20,42 @@ def record_input(controller: Controller) -> None:
         controller.say(f"Recording saved to {recordings.end_recording()}")
         return
     selector = controller.widgets.selector
-    keys = f"3{_KEY_OF[selector.tool]}" + "v" * selector.through + str(controller.mode.value)
+    keys = f"3{_KEY_OF[selector.tool]}" + "v" * selector.through + _pull_keys(controller)
+    keys += str(controller.mode.value)
     path = recordings.start_recording(controller.place, controller.session, keys)
     controller.say(f"Recording input to {path}. Ctrl+R to stop")
 
 
+def _pull_keys(controller: Controller) -> str:
+    """Return the keys that set the radius and the locality of a pull, both rounded to a step.
+
+    The widget gets the rounded values as well, so that the replay has the same ones.
+    """
+    puller = controller.widgets.puller
+    steps, locality = puller.steps_of_radius, puller.locality
+    puller.reset_radius(steps)
+    if locality is None:
+        local = "a"
+    else:
+        tenths = round(10.0 * locality)
+        puller.locality = tenths / 10.0
+        change = tenths - round(10.0 * LOCALITY)
+        local = "a+-" + ("+" if change > 0 else "-") * abs(change)
+    return "0" + ("]" if steps > 0 else "[") * abs(steps) + local
+
+
 def record_video(controller: Controller) -> None:
-    """Start a video of the deform mode, or stop it and write it as a job."""
+    """Start a video of the modes that drag, or stop it and write it as a job."""
     recordings = controller.recordings
     if not recordings.is_filming:
         film_place(controller.place)  # report an unwritable place before filming
-        recordings.start_film(lambda: controller.mode is Mode.DEFORM and not controller.is_busy)
-        where = "" if controller.mode is Mode.DEFORM else " of mode 4"
+        recordings.start_film(lambda: controller.mode in _FILMED and not controller.is_busy)
+        where = "" if controller.mode in _FILMED else " of modes 0 and 4"
         controller.say(f"Recording video{where}. Ctrl+M to stop")
         return
     path, frames = film_place(controller.place), recordings.end_film()
     if not len(frames):
-        controller.say("No video saved: nothing was drawn in mode 4")
+        controller.say("No video saved: nothing was drawn in modes 0 and 4")
         return
     controller.start(
         f"Writing {path.name}",

@@ -43,6 +43,7 @@ class WidgetSet:
         self.cages = CageDisplay(view, session)
         self.dragger = HandleDragger(view, session, self.surface)
         self.puller = Puller(view, session, self.surface)
+        self.puller.binds = False  # the editor does, in the background
         self.overlay = VolumeOverlay(view, session, self.surface)
         self.cages_wanted = self.overlay_wanted = self.regions_wanted = False
         self.cages.hide()
@@ -51,7 +52,7 @@ class WidgetSet:
     @property
     def interactive(self) -> tuple[Widget, ...]:
         """The widgets that respond to events; one of them is on in each mode."""
-        return self.selector, self.cages, self.dragger, self.puller
+        return self.puller, self.selector, self.cages, self.dragger
 
     @property
     def n_regions(self) -> int:
@@ -109,14 +110,16 @@ class WidgetSet:
 
     def wants_overlay(self, mode: Mode) -> bool:
         """Return whether volume changes are shown in *mode*; painting hides them."""
-        return self.overlay_wanted and mode in (Mode.CAGES, Mode.DEFORM)
+        return self.overlay_wanted and mode in (Mode.PULL, Mode.CAGES, Mode.DEFORM)
 
     def copy_settings(self, before: WidgetSet) -> None:
         """Use the same tools, sizes and display options as the widgets *before*."""
         mine, its = self.selector, before.selector
         mine.tool, mine.through = its.tool, its.through
-        share = its.radius / before.session.mesh.diagonal
-        mine.radius = share * self.session.mesh.diagonal
+        size = self.session.mesh.diagonal / before.session.mesh.diagonal
+        mine.radius = size * its.radius
+        self.puller.radius = size * before.puller.radius
+        self.puller.locality = before.puller.locality
         self.dragger.local = before.dragger.local
         self.overlay.wanted_range = before.overlay.wanted_range
         self.surface.style = before.surface.style

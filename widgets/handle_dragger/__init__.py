@@ -4,6 +4,7 @@ The files, in reading order:
 
     handle_dragger    `HandleDragger`
     handle_motion     from pointer positions to a rigid motion
+    number_entry      a number typed during a drag
     live_solve        solving within the time of an event, refining between events
     handle_marks      the vertices of handles as dots
     gizmo             the gizmo: arrows, squares, rings and a ball
@@ -12,17 +13,23 @@ The files, in reading order:
     gizmo_label       its labels
 """
 
-from .gizmo_shapes import FREE, Part
+from .gizmo import AXIS_COLOURS, Gizmo
+from .gizmo_shapes import FREE, Kind, Part
 from .handle_dragger import HandleDragger
 from .handle_motion import Grip, Motion, next_constraint
 from .live_solve import LiveSolve
+from .number_entry import NumberEntry
 
 __all__ = [
+    "AXIS_COLOURS",
     "FREE",
+    "Gizmo",
     "Grip",
     "HandleDragger",
+    "Kind",
     "LiveSolve",
     "Motion",
+    "NumberEntry",
     "Part",
     "next_constraint",
 ]

@@ -8,6 +8,7 @@ vertices of any handle activates that handle and moves it in the view plane.
                 again: no constraint.  While rotating: about the axis; again: no constraint
     shift       move slowly
     control     rotate in steps of 15 degrees
+    a number, enter             move by exactly that much; see `number_entry`
     escape, right button        cancel
 
 Each move solves once, for about 20 ms, for the current position of the pointer.  While the pointer
@@ -34,6 +35,7 @@ from .gizmo_shapes import FREE, Kind, Part
 from .handle_marks import HandleMarks
 from .handle_motion import Grip, Motion, next_constraint
 from .live_solve import LiveSolve
+from .number_entry import NumberEntry
 
 _CLICK_TOLERANCE = 3.0  # pixels; smaller movements of a press on a handle do not move it
 
@@ -70,6 +72,7 @@ class HandleDragger(Widget):
         self._locked: frozenset[str] = frozenset()
         self._grabbed: Part | None = None  # the part of the running gesture
         self._constraint: Part | None = None  # set by keys during the gesture
+        self._entry = NumberEntry()  # of the running gesture
         self._live = LiveSolve(self.view, session, self.cancel)
         self._last_handles = session.handles  # to recognise a renamed handle
         self._update_handle()
@@ -193,11 +196,16 @@ class HandleDragger(Widget):
         return self._drag(FREE, point, press)
 
     def on_key(self, key: str, pointer: Pointer) -> bool:
-        """Change the axis or plane constraint of the running drag."""
-        axis = "xyz".find(key.lower()) if len(key) == 1 else -1
-        if self._grabbed is None or axis < 0 or pointer.control:
+        """Change the axis or plane constraint of the running drag, or type its amount."""
+        if self._grabbed is None or pointer.control:
             return False
-        self._constraint = next_constraint(self._grabbed, self._constraint, axis)
+        axis = "xyz".find(key.lower()) if len(key) == 1 else -1
+        if axis >= 0:
+            self._constraint = next_constraint(self._grabbed, self._constraint, axis)
+        elif self._entry.is_enter(key):
+            return self.finish()
+        elif not self._entry.type(key):
+            return False
         self._send(Phase.MOVE, "InteractionEvent")
         return True
 
@@ -212,6 +220,7 @@ class HandleDragger(Widget):
         grip = Grip(point, gizmo.centre, gizmo.axes, gizmo.radius)
         motion = self._motion_of(part, grip, press)
         self._grabbed, self._constraint = part, None
+        entry = self._entry = NumberEntry()
         has_moved = committed = False
         try:
             while (pointer := (yield)).phase is Phase.MOVE:
@@ -219,12 +228,14 @@ class HandleDragger(Widget):
                     return  # a commit, undo or redo from elsewhere has ended the drag
                 if motion.part != (self._constraint or part):
                     motion = self._motion_of(self._constraint or part, grip, press)
-                matrix = motion.matrix(pointer)
+                matrix = entry.matrix(motion) if entry.text else motion.matrix(pointer)
                 distance = float(np.linalg.norm(pointer.position - press.position))
-                if has_moved or (distance > tolerance and (matrix != np.eye(4)).any()):
+                is_far = distance > tolerance or bool(entry.text)
+                if matrix is not None and (has_moved or (is_far and (matrix != np.eye(4)).any())):
                     has_moved = True
                     self._live.solve(partial(session.move_handle, name, matrix))
-                    gizmo.set_caption(motion.amount)
+                if has_moved or entry.text:
+                    gizmo.set_caption(entry.caption(motion))
             if pointer.phase is Phase.RELEASE:
                 session.commit(f"{'rotate' if part.kind is Kind.ROTATION else 'drag'} {name}")
                 committed = True

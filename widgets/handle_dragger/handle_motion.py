@@ -27,6 +27,7 @@ from ..scene import Pointer, Projection
 from .gizmo_shapes import Kind, Part
 
 _EDGE_ON = 0.2  # sine of the angle of a plane to the line of sight below which pixels are counted
+_FACE_ON = 0.9  # the same sine, above which a ring grabbed at its centre is turned by its top
 _LEAST_SLOPE = 0.1  # sine of the angle to which a line of sight is tilted during the drag
 _SLOW_FACTOR = 0.2  # with Shift
 _SNAP = np.radians(15.0)  # with Control
@@ -58,7 +59,9 @@ class Grip:
     axes: FloatArray
     """(3, 3) float: x, y and z as rows, each of length 1."""
     radius: float
-    """Of a ring; if it is seen edge-on, a pointer motion of this length rotates by one radian."""
+    """Of a ring; where pixels are counted, a pointer motion of this length rotates by a radian."""
+    has_arm: bool = True
+    """Whether the pointer rotates about the centre; if it is pressed there, pixels are counted."""
 
 
 class Motion:
@@ -87,6 +90,9 @@ class Motion:
         self._last = self._start = self._track(press)
         self._base = self._applied = np.zeros_like(self._last)
         self._is_slow = False
+        self._direction = np.ones(1) if part.kind is Kind.ROTATION else np.zeros(3)
+        if part.kind is Kind.AXIS:
+            self._direction = self._axis
 
     @property
     def amount(self) -> str:
@@ -97,7 +103,22 @@ class Motion:
 
     def matrix(self, pointer: Pointer) -> FloatArray:
         """Return the translation or rotation from the press to *pointer* as a (4, 4) matrix."""
-        displacement = self._applied = self._follow(pointer)
+        displacement = self._follow(pointer)
+        length = float(np.linalg.norm(displacement))
+        if length and self.part.kind in (Kind.FREE, Kind.PLANE):
+            self._direction = displacement / length
+        return self._by(displacement)
+
+    def exact(self, amount: float) -> FloatArray:
+        """Return the motion by *amount* in the current direction as a (4, 4) matrix.
+
+        A rotation is by *amount* degrees.  Without a direction yet, nothing moves.
+        """
+        factor = np.radians(amount) if self.part.kind is Kind.ROTATION else amount
+        return self._by(factor * self._direction)
+
+    def _by(self, displacement: FloatArray) -> FloatArray:
+        self._applied = displacement
         motion = np.eye(4)
         if self.part.kind is not Kind.ROTATION:
             motion[:3, 3] = displacement
@@ -163,10 +184,12 @@ def _track_plane(projection: Projection, axis: FloatArray, grip: Grip, press: Po
 
 def _track_angle(projection: Projection, axis: FloatArray, grip: Grip, press: Pointer) -> Tracker:
     line = _line_of_sight(projection, grip.centre)
-    if abs(line @ axis) < _EDGE_ON:  # edge-on: the front of the ring follows the pointer
-        front = np.stack([grip.centre, grip.centre + 0.01 * grip.radius * np.cross(line, axis)])
-        start, end = projection.to_display(front)[:, :2]
-        direction = (end - start) / np.linalg.norm(end - start)
+    if not grip.has_arm or abs(line @ axis) < _EDGE_ON:  # the front of the ring follows the pointer
+        direction = np.array([np.copysign(1.0, line @ axis), 0.0])  # seen face-on: its top
+        if abs(line @ axis) < _FACE_ON:
+            front = grip.centre + 0.01 * grip.radius * np.outer([0.0, 1.0], np.cross(line, axis))
+            start, end = projection.to_display(front)[:, :2]
+            direction = (end - start) / np.linalg.norm(end - start)
         per_pixel = projection.pixel_at(grip.centre) / grip.radius
         return lambda pointer: np.array(
             [(pointer.position - press.position) @ direction * per_pixel]

@@ -5,13 +5,16 @@ The files, in reading order:
     picking             rays from the pointer, vertices within a radius, visible vertices
     visibility          which vertices the mesh itself hides
     surface_distance    distance along the surface
+    surface_ring        the ring around a point
 """
 
 from .picking import Hit, Picker
+from .surface_ring import contour
 from .visibility import may_overlap
 
 __all__ = [
     "Hit",
     "Picker",
+    "contour",
     "may_overlap",
 ]

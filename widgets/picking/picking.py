@@ -17,6 +17,7 @@ from vtk_segdeform.arrays import BoolArray, FloatArray
 
 from ..scene import Pointer, SurfaceDisplay
 from .surface_distance import SurfaceDistance
+from .surface_ring import SurfaceRing
 from .visibility import visible_vertices
 
 # A ray through an edge must not pass between its two faces.
@@ -65,6 +66,7 @@ class Picker:
         self._locator = vtkStaticCellLocator()
         self._locator.SetDataSet(self._data)
         self._distance: SurfaceDistance | None = None
+        self._ring: SurfaceRing | None = None
         self._visibility: _Visibility | None = None
         # Their display positions identify the camera.  The clipping range would not: it changes
         # whenever other actors are drawn.
@@ -103,6 +105,15 @@ class Picker:
         points = np.array([hit.point for hit in hits]).reshape(-1, 3)
         faces = np.array([hit.face for hit in hits], dtype=np.int64)
         return self._distance.within(self._surface.points, points, faces, radius)
+
+    def ring(self, hit: Hit, radius: float) -> FloatArray:
+        """Return the segments (k, 2, 3) where the surface leaves the ball of *radius* at *hit*."""
+        if self._ring is None:
+            self._ring = SurfaceRing(self._mesh)
+        pose = self._data.GetPoints().GetMTime()
+        return self._ring.around(
+            self._surface.points, pose=pose, centre=hit.point, face=hit.face, radius=radius
+        )
 
     def component(self, vertex: int) -> BoolArray:
         """Return the connected part of the mesh that contains *vertex*, (n,) bool."""

@@ -2,7 +2,10 @@
 
 The files, in reading order:
 
-    puller    `Puller`
+    puller         `Puller`
+    pull_motion    from pointer positions to the motion of the grabbed point
+    markers        pins and pulled points as dots
+    guide          the line of an axis
 """
 
 from .puller import Puller

@@ -1,61 +1,94 @@
 """Pulling the surface at any point; it follows at every move.
 
 A press grabs the surface under the pointer and moves it in the view plane.  A ring on the surface
-shows the radius.
+shows the radius.  A press on a pin or a pulled point, shown as dots, grabs that.
 
-    x, y, z     while pulling: constrain to the axis; again: to the plane perpendicular to it;
-                again: no constraint
+    shift + click       pin the point, or remove the pin or pulled point there
+    shift + wheel, [ ]  smaller, larger radius
+    while pulling:
+    x, y, z     constrain to the axis; again: to the plane perpendicular to it; again: no constraint
+    r           turn the surface around the point instead of moving it, about the line of sight or
+                the axis of x, y, z; again: move it
+    control     turn in steps of 15 degrees
     shift       pull slowly
+    a number, enter             pull by exactly that much along the axis, or in the direction so far
     escape, right button        cancel
-
-A press with Shift that does not move pins the point, or removes the pin there.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from vtk_segdeform.checks import require
-from vtk_segdeform.pictures import INK, rgb
-from vtk_segdeform.session import Session
+from vtk_segdeform.arrays import FloatArray, is_number
+from vtk_segdeform.checks import require, shown
+from vtk_segdeform.deformer import LOCALITY, checked_locality
+from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.pictures import PAPER, rgb
+from vtk_segdeform.session import Change, Session
+from vtk_segdeform.solver import Solution
 
-from ..handle_dragger import FREE, Grip, LiveSolve, Motion, Part, next_constraint
+from ..handle_dragger import Gizmo, LiveSolve
 from ..picking import Hit, Picker
 from ..region_selector import BrushRing
-from ..scene import Gesture, Phase, Pointer, SurfaceDisplay, Widget
+from ..scene import Gesture, Phase, Pointer, Stop, SurfaceDisplay, Widget
+from .guide import Guide
+from .markers import Markers, marked_vertices
+from .pull_motion import PullMotion
 
 _RADIUS = 0.15  # the initial radius, in diagonals of the mesh
+_SMALLEST, _LARGEST = 0.005, 1.0  # in diagonals
+GROWTH = 1.1  # factor for one click of the wheel or one key press
 _CLICK_TOLERANCE = 3.0  # pixels; a press that moves less does not pull
+_RING_THICKNESS = 0.6  # of the ring of a brush
+_POLL = 40  # milliseconds
+_FIXED = "This point is fixed. Grab another one, or erase fixed vertices in mode 3"
+_NO_DIRECTION = "No direction yet. Press X, Y or Z before the number, or drag first"
+_PREPARING = "Preparing: the pull starts in a moment"
 
 
 class Puller(Widget):
-    """Pulls the surface of a session at any point.
+    """Pulls the surface of a session at any point; invisible until it is on.
 
     Parameters
     ----------
     view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
         The view to work in.  Call `remove` before its window closes.
     session : Session
-        The session to edit.  It can be pulled once it has cages.
+        The session to edit.  It can be pulled once it has cages; a pull that begins earlier waits.
     surface : SurfaceDisplay, optional
         The displayed mesh of the session; by default the widget adds its own.
+
+    Attributes
+    ----------
+    binds : bool
+        Whether the first pull binds a session that is not bound.  Otherwise it waits until that is
+        done elsewhere.
     """
 
     def __init__(self, view: Any, session: Session, surface: SurfaceDisplay | None = None) -> None:
         super().__init__(view, session)
         if surface is not None:
             require(surface, SurfaceDisplay, "surface")
+        self.binds = True
         self._own_surface = surface is None
         self._surface = SurfaceDisplay(self.view, session) if surface is None else surface
         self._picker = Picker(self._surface)
         self._ring = BrushRing(self._surface)
+        self._markers = Markers(self._surface, self._picker)
+        self._gizmo = Gizmo(self.view)
+        self._guide = Guide(self.view)
         self._radius = _RADIUS * session.mesh.diagonal
         self._locality: float | None = None
-        self._constraint: Part | None = None  # set by keys during the gesture
+        self._motion: PullMotion | None = None  # of the running gesture
+        self._pending: Callable[[], None] | None = None  # a released pull that could not start yet
+        self._stop_polling: Stop | None = None
         self._live = LiveSolve(self.view, session, self.cancel)
+        self._stop_listening = session.on_change(self._changed)
 
     @property
     def radius(self) -> float:
@@ -64,7 +97,23 @@ class Puller(Widget):
 
     @radius.setter
     def radius(self, radius: float) -> None:
-        self._radius = radius
+        if not (is_number(radius) and radius > 0.0):
+            raise ArgumentError(f"radius must be above 0; got {shown(radius)}")
+        diagonal = self.session.mesh.diagonal
+        self._radius = float(np.clip(radius, _SMALLEST * diagonal, _LARGEST * diagonal))
+        self._invoke("ModifiedEvent")
+
+    @property
+    def steps_of_radius(self) -> int:
+        """By how many steps of the keys the radius differs from the initial one, rounded."""
+        share = self._radius / (_RADIUS * self.session.mesh.diagonal)
+        return round(math.log(share) / math.log(GROWTH))
+
+    def reset_radius(self, steps: int = 0) -> None:
+        """Set the radius to the initial one after *steps* steps of the keys, exactly."""
+        self.radius = _RADIUS * self.session.mesh.diagonal
+        for _ in range(abs(steps)):
+            self.radius = self.radius * GROWTH ** (1 if steps > 0 else -1)
 
     @property
     def locality(self) -> float | None:
@@ -73,79 +122,262 @@ class Puller(Widget):
 
     @locality.setter
     def locality(self, locality: float | None) -> None:
-        self._locality = locality
+        self._locality = checked_locality(locality)
+        self._invoke("ModifiedEvent")
 
-    def Off(self) -> None:  # noqa: N802 - VTK's word
+    @property
+    def effective_locality(self) -> float:
+        """`locality`, or the value that the pins and fixed vertices lead to."""
+        if self._locality is not None:
+            return self._locality
+        session = self.session
+        others = session.handles.keys() - set(session.state.pulls)
+        return 0.0 if len(session.fixed) or others else LOCALITY
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether a pull waits for the session to be ready."""
+        return self._stop_polling is not None
+
+    @property
+    def is_refining(self) -> bool:
+        """Whether a timer refines the pose at present."""
+        return self._live.is_refining
+
+    @property
+    def marked(self) -> tuple[str, ...]:
+        """The names of the pins and pulled points."""
+        return tuple(marked_vertices(self.session))
+
+    def On(self) -> None:  # noqa: N802 - VTK's word
+        """Start handling events, and show pins and pulled points."""
+        if not self.GetEnabled():
+            super().On()
+            self._stops.append(self.view.observe("LeaveEvent", self._left))
+            self._markers.show(True)
+
+    def Off(self) -> None:  # noqa: N802
         """Stop handling events and refining; finish an ongoing gesture."""
         try:
             super().Off()
         finally:
+            self._drop_pending()
             self._live.pause()
             self._ring.hide()
+            self._markers.show(False)
 
     def remove(self) -> None:
         """Remove the widget from the view permanently."""
         self.Off()
+        self._stop_listening()
         self._live.remove()
+        self._guide.remove()
+        self._gizmo.remove()
+        self._markers.remove()
         self._ring.remove()
         if self._own_surface:
             self._surface.remove()
 
     # Events.
     def on_hover(self, pointer: Pointer) -> None:
-        """Show the ring."""
-        self._draw_ring(self._picker.hit(pointer))
+        """Highlight the marker under the pointer, or show the ring."""
+        inside = self.view.contains(pointer)
+        marker = self._markers.at(pointer) if inside else None
+        self._markers.highlight(marker)
+        hit = self._picker.hit(pointer) if inside and marker is None else None
+        self._draw_ring(hit)
 
     def on_press(self, press: Pointer) -> Gesture | None:
-        """Pull the surface under the pointer, as soon as the session is prepared."""
+        """Pull the marker or the surface under the pointer; beside it, pass on the press."""
+        self._drop_pending()
+        self.remark = ""
+        marker = self._markers.at(press)
+        if marker is not None:
+            vertex = self._markers.vertex(marker)
+            return self._pull(vertex, np.array(self._surface.points[vertex]), press)
         hit = self._picker.hit(press)
-        return None if hit is None else self._pull(hit, press)
+        if hit is None:
+            return None
+        if np.isin(hit.vertex, self.session.fixed):
+            return self._refuse(_FIXED)
+        return self._pull(hit.vertex, hit.point, press)
+
+    def on_wheel(self, pointer: Pointer, clicks: int) -> bool:
+        """Change the radius over the mesh with Shift held; else pass the wheel to the camera."""
+        if self.is_grabbing:
+            return True  # camera and radius stay the same during a pull
+        if not pointer.shift or self._picker.hit(pointer) is None:
+            return False
+        self._resize(clicks, pointer)
+        return True
 
     def on_key(self, key: str, pointer: Pointer) -> bool:
-        """Change the axis or plane constraint of the running pull."""
-        axis = "xyz".find(key.lower()) if len(key) == 1 else -1
-        if not self.is_grabbing or axis < 0 or pointer.control:
+        """Change the radius, or the constraint or the kind of the running pull, or type a number.
+
+        During a pull all keys of a number are handled here, whatever else they do.
+        """
+        clicks = {"bracketleft": -1, "[": -1, "bracketright": +1, "]": +1}.get(key)
+        if clicks is not None:
+            if not self.is_grabbing:
+                self._resize(clicks, pointer)
+            return True
+        motion = self._motion
+        if motion is None or pointer.control:
             return False
-        self._constraint = next_constraint(FREE, self._constraint, axis)
+        axis = "xyz".find(key.lower()) if len(key) == 1 else -1
+        if axis >= 0:
+            motion.constrain(axis)
+        elif key.lower() == "r":
+            motion.toggle_turning(pointer)
+        elif motion.entry.is_enter(key):
+            return self.finish()
+        elif not motion.entry.type(key):
+            return False
         self._send(Phase.MOVE, "InteractionEvent")
         return True
 
-    def _pull(self, hit: Hit, press: Pointer) -> Gesture:
+    # Gestures.
+
+    def _pull(self, vertex: int, point: FloatArray, press: Pointer) -> Gesture:
+        """Pull *vertex*; *point*, on the surface near it, stays under the pointer."""
         session = self.session
-        while not session.is_bound:
-            if (yield).phase is not Phase.MOVE:
-                return
         session.commit()  # keeps an unfinished drag from elsewhere out of our undo step
         self._live.pause()
-        start = np.array(session.vertices[hit.vertex])
-        grip = Grip(hit.point, hit.point, np.eye(3), self.radius)
-        motion = Motion(self.view, FREE, grip, press)
-        self._constraint = None
-        has_moved = committed = False
-        pull = partial(session.pull, hit.vertex, radius=self.radius, locality=self.locality)
+        start = np.array(self._surface.points[vertex])
+        motion = self._motion = PullMotion(self.view, point, press, self._gizmo.size)
+        pull = partial(session.pull, vertex, radius=self.radius, locality=self.locality)
+        to: FloatArray | None = None  # where to pull to, once the pointer has moved
+        has_moved = wants = committed = False
         try:
             while (pointer := (yield)).phase is Phase.MOVE:
                 if has_moved and not session.is_dragging:
                     return  # a commit, undo or redo from elsewhere has ended the pull
-                if motion.part != (self._constraint or FREE):
-                    motion = Motion(self.view, self._constraint or FREE, grip, press)
-                matrix = motion.matrix(pointer)
                 distance = float(np.linalg.norm(pointer.position - press.position))
-                if has_moved or distance > _CLICK_TOLERANCE:
+                wants = wants or distance > _CLICK_TOLERANCE or bool(motion.entry.text)
+                if not wants and motion.part.axis is None and not motion.has_turned:
+                    continue
+                moves = motion.follow(pointer)
+                self._show(motion)
+                if not (wants and moves):
+                    continue
+                to = motion.of(start)
+                if self._is_ready:
                     has_moved = True
-                    self._ring.hide()
-                    self._live.solve(partial(pull, start + matrix[:3, 3]))
+                    self._live.solve(partial(pull, to))
+                else:
+                    self._wait()
             if pointer.phase is Phase.RELEASE:
+                if to is not None and not has_moved:
+                    self._pull_later(partial(pull, to))
+                elif to is None and motion.entry.text:
+                    self.remark = _NO_DIRECTION
+                elif to is None and press.shift:
+                    self._toggle_pin(vertex)
                 session.commit("pull")
                 committed = True
         finally:
+            self._motion = None
+            self._show(None)
+            if self._pending is None:
+                self._drop_pending()
             if not committed:  # last, as listeners of the session may raise
                 session.revert()
             self._live.resume()
+
+    def _refuse(self, remark: str) -> Gesture:
+        """Do nothing until the release, and say why."""
+        self._ring.hide()
+        while (yield).phase is Phase.MOVE:
+            pass
+        self.remark = remark
+
+    def _toggle_pin(self, vertex: int) -> None:
+        session = self.session
+        owners = [name for name, ids in session.handles.items() if vertex in ids]
+        if owners:
+            session.remove_handle(owners[0])
+            self.remark = f"Removed {owners[0]}"
+        else:
+            self.remark = f"Added {session.pin(vertex)}"
+
+    # Pulls that wait for the session.
+
+    @property
+    def _is_ready(self) -> bool:
+        return bool(self.session.cages) and (self.binds or self.session.is_bound)
+
+    def _wait(self) -> None:
+        if self._stop_polling is None:
+            self._stop_polling = self.view.every(_POLL, self._poll)
+            self._invoke("ModifiedEvent")
+
+    def _poll(self) -> None:
+        if not self._is_ready:
+            return
+        pending = self._pending
+        self._drop_pending()
+        if self.is_grabbing:
+            self._send(Phase.MOVE, "InteractionEvent")
+        elif pending is not None:
+            pending()
+            self._invoke("EndInteractionEvent")
+
+    def _pull_later(self, pull: Callable[..., Solution]) -> None:
+        """Pull once the session is ready, unless another press or change comes first."""
+
+        def begin() -> None:
+            self._live.solve(pull)
+            self.session.commit("pull")
+            self._live.resume()
+
+        if self._is_ready:
+            begin()
+        else:
+            self._pending = begin
+            self._wait()
+            self.remark = _PREPARING
+
+    def _drop_pending(self) -> None:
+        """Wait no longer."""
+        self._pending = None
+        if self._stop_polling is not None:
+            self._stop_polling()
+            self._stop_polling = None
+            self._invoke("ModifiedEvent")
+
+    # Display.
+
+    def _resize(self, clicks: int, pointer: Pointer) -> None:
+        self.radius = self.radius * GROWTH**clicks
+        self.on_hover(pointer)
 
     def _draw_ring(self, hit: Hit | None) -> None:
         if hit is None:
             self._ring.hide()
         else:
-            distances = self._picker.distances([hit], self.radius)
-            self._ring.draw(distances, self.radius, rgb(INK))
+            segments = self._picker.ring(hit, self.radius)
+            self._ring.draw_segments(segments, rgb(PAPER), thickness=_RING_THICKNESS)
+
+    def _show(self, motion: PullMotion | None) -> None:
+        """Show the gizmo part, the guide and the amount of *motion*, or none of them."""
+        part = None if motion is None else motion.part
+        self._markers.highlight(None)
+        self._ring.hide()
+        self._gizmo.show_only(part)
+        self._gizmo.set_caption("" if motion is None else motion.caption)
+        self._gizmo.place(None if motion is None else motion.place)
+        self._guide.show(part, None if motion is None else motion.place)
+
+    def _left(self) -> None:
+        self._ring.hide()
+        self._markers.highlight(None)
+
+    def _changed(self, change: Change) -> None:
+        if not self.GetEnabled():
+            return
+        if change & (Change.CONSTRAINTS | Change.HISTORY):
+            self._markers.show(True)
+        if change & Change.POSE:
+            self._ring.hide()  # the surface has moved away from it
+            if self._pending is not None:
+                self._drop_pending()

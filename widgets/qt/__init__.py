@@ -4,7 +4,7 @@ The files, in reading order:
 
     widget      `DeformWidget` and `deform_dock`
     panel       the panel beside the view
-    toolbar painting regions handles options status log
+    toolbar pulling painting regions handles options status log
                 the parts of the panel
     controls    buttons, fields and layouts of the parts
     icons       the icons of the toolbar

@@ -23,6 +23,7 @@ from .handles import HandlesPart
 from .log import LogPart
 from .options import CagesPart, DeformPart
 from .painting import PaintingPart
+from .pulling import PullPart
 from .regions import RegionsPart
 from .status import StatusPart
 from .toolbar import Toolbar
@@ -60,7 +61,9 @@ class DeformPanel(QtWidgets.QWidget):
         self.painting, self.regions = PaintingPart(editor), RegionsPart(editor)
         self.handles = HandlesPart(editor)
         self.cages, self.deform = CagesPart(editor), DeformPart(editor)
+        self.pulling = PullPart(editor)
         self._parts: dict[Any, set[Mode]] = {
+            self.pulling: {Mode.PULL},
             self.handles: {Mode.HANDLES, Mode.DEFORM},
             self.cages: {Mode.CAGES},
             self.deform: {Mode.DEFORM},
@@ -102,7 +105,9 @@ class DeformPanel(QtWidgets.QWidget):
             part.setVisible(editor.mode in modes)
             if editor.mode in modes:
                 part.refresh()
-        if editor.widgets.dragger.is_refining:  # refinement ends without a message
+        if (
+            editor.widgets.dragger.is_refining or editor.widgets.puller.is_refining
+        ):  # refinement ends without a message
             self._delay.start()
 
     def stop(self) -> None:
@@ -153,13 +158,13 @@ class DeformPanel(QtWidgets.QWidget):
 
     def _follow(self) -> None:
         """Subscribe to the current session, and to no other one."""
-        self._session, selector = self.editor.session, self.editor.widgets.selector
+        self._session, widgets = self.editor.session, self.editor.widgets
         for stop in self._stop_session:
             stop()
-        tag = selector.AddObserver("ModifiedEvent", lambda *_: self._messages_changed())
+        tag = widgets.selector.AddObserver("ModifiedEvent", lambda *_: self._messages_changed())
         self._stop_session[:] = [
             self._session.on_change(self._session_changed),
-            lambda: selector.RemoveObserver(tag),
+            lambda: widgets.selector.RemoveObserver(tag),
         ]
 
     def _session_changed(self, change: Change) -> None:

@@ -11,9 +11,10 @@ from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
-from vtk_segdeform.arrays import FloatArray, IntArray
+from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.pictures import INK, rgb
 
+from ..picking import contour
 from ..scene import SurfaceDisplay
 
 _DESIGN_HEIGHT = 600  # pixels; lines are wider in a higher window
@@ -50,8 +51,17 @@ class BrushRing:
         colour : (3,) uint8
             Red, green and blue, 0 to 255.
         """
-        faces = self._surface.session.mesh.faces
-        ends = contour(self._surface.points, faces, distance, radius).reshape(-1, 3)
+        below = distance <= radius
+        a, b, c = (below[corner] for corner in self._surface.session.mesh.faces.T)
+        faces = self._surface.session.mesh.faces[(a != b) | (b != c)]
+        segments = contour(self._surface.points[faces], distance[faces], radius)
+        self.draw_segments(segments, colour)
+
+    def draw_segments(
+        self, segments: FloatArray, colour: NDArray[np.uint8], *, thickness: float = 1.0
+    ) -> None:
+        """Draw a ring of *segments* (k, 2, 3), *thickness* times as thick as a brush's."""
+        ends = segments.reshape(-1, 3)
         points, lines = vtkPoints(), vtkCellArray()
         points.SetData(numpy_to_vtk(ends, deep=True))
         lines.SetData(
@@ -64,7 +74,7 @@ class BrushRing:
         shades, widths = (rgb(INK), colour), (_RIM_WIDTH, _LINE_WIDTH)
         for actor, shade, width in zip(self._actors, shades, widths, strict=True):
             actor.GetProperty().SetColor(*(shade / 255.0))
-            actor.GetProperty().SetLineWidth(float(scale * width))
+            actor.GetProperty().SetLineWidth(float(scale * thickness * width))
         self._show(True)
 
     def hide(self) -> None:
@@ -94,19 +104,3 @@ class BrushRing:
         actor.VisibilityOff()
         self._surface.view.renderer.AddActor(actor)
         return actor
-
-
-def contour(vertices: FloatArray, faces: IntArray, values: FloatArray, level: float) -> FloatArray:
-    """Return the segments (k, 2, 3) of the contour line at *level* of *values* (n,).
-
-    Values are interpolated linearly.  Each triangle with corners on both sides has one segment.
-    """
-    below = values <= level
-    a, b, c = (below[corner] for corner in faces.T)
-    faces = faces[(a != b) | (b != c)]
-    i, j = faces, faces[:, [1, 2, 0]]
-    crossed = (values[i] <= level) != (values[j] <= level)  # two sides of each triangle
-    i, j = i[crossed], j[crossed]
-    fraction = (level - values[i]) / (values[j] - values[i])
-    points = vertices[i] + fraction[:, None] * (vertices[j] - vertices[i])
-    return np.asarray(points.reshape(-1, 2, 3))

@@ -6,8 +6,7 @@ the stroke, the release records one undo step, and Escape cancels.
 brush, component    a press beside the mesh moves the camera
 lasso, rectangle    start anywhere in the view
 all tools           a press with Shift held moves the camera
-``[``  ``]``        smaller, larger brush; the wheel over the mesh does the same.  Beside the mesh,
-                    or with Shift or Control held, the wheel zooms.
+``[``  ``]``        smaller, larger brush; with Shift held the wheel over the mesh does the same
 
 A change of regions resets the pose, as in `Session`; fixed vertices and handles keep it.
 `PaintTarget` says which vertices a stroke skips.
@@ -168,10 +167,10 @@ class RegionSelector(Widget):
             self._draw_ring(pointer, self._target, pointer.control)
 
     def on_wheel(self, pointer: Pointer, clicks: int) -> bool:
-        """Resize the brush over the mesh; pass the wheel to the camera with Shift or Control."""
+        """Resize the brush over the mesh with Shift held; else pass the wheel to the camera."""
         if self.is_grabbing:
             return True  # camera and radius stay the same during a stroke
-        if self.tool is not Tool.BRUSH or pointer.shift or pointer.control:
+        if self.tool is not Tool.BRUSH or not pointer.shift:
             return False
         if self._picker.hit(pointer) is None:
             return False

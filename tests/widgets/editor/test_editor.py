@@ -36,7 +36,7 @@ ROOT = Path(__file__).resolve().parents[3]
 class Bench:
     """An editor in a view, seen from the front with z up, and a simulated hand."""
 
-    def __init__(self, view: View, session):
+    def __init__(self, view: View, session, mode: Mode | None = Mode.REGIONS):
         self.view = view
         self.editor = DeformEditor(view, session)
         view.camera.SetPosition(0.0, -5.0, 0.5)
@@ -45,6 +45,8 @@ class Bench:
         view.renderer.ResetCamera()
         view.render()
         self.hand = Hand(view)
+        if mode is not None:
+            self.editor.mode = mode
         self.editor.On()
 
     @property
@@ -508,7 +510,7 @@ def test_the_help_card_is_shown_and_hidden(bench):
 
 def test_without_numba_the_status_line_says_so_until_the_first_action(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "numba" else name)
-    made = Bench(plain_view((500, 400)), sausage().mesh)
+    made = Bench(plain_view((500, 400)), sausage().mesh, mode=None)
     said = "numba is not installed: frames take 3 to 6 times as long. pip install numba"
     assert made.editor.status.startswith(said)
     made.type("1")
@@ -679,7 +681,7 @@ def test_another_session_can_be_opened_and_edited(bench, tmp_path):
     posed = bench.session.vertices
     path = tmp_path / "posed.segdeform"
     bench.editor.save(path)
-    bench.type("0")
+    bench.type("home")
     first = bench.session
     bench.type("ctrl+o")
     assert "Unsaved changes will be lost. Open again" in bench.editor.status

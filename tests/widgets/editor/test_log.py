@@ -12,7 +12,7 @@ from vtkmodules.vtkRenderingUI import vtkGenericRenderWindowInteractor
 from vtk_segdeform.errors import CageError, Cancelled
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.solver.solution import Status
-from vtk_segdeform.widgets import DeformEditor
+from vtk_segdeform.widgets import DeformEditor, Mode
 from vtk_segdeform.widgets.editor.log import Entry, Log
 
 SCENE = sausage()
@@ -116,6 +116,7 @@ def test_a_job_is_logged_with_its_outcome():
     window.AddRenderer(renderer)
     editor = DeformEditor((renderer, vtkGenericRenderWindowInteractor()), ready())
     editor.view.on_failure(lambda _: None)
+    editor.mode = Mode.REGIONS
     editor.On()
 
     def fail(*_):

@@ -38,6 +38,7 @@ class Scene:
         self.view.camera.SetViewUp(0.0, 0.0, 1.0)
         self.editor = DeformEditor(self.view, session)
         self.view.renderer.ResetCamera()
+        self.editor.mode = Mode.HANDLES
         self.editor.On()
         self.editor.controller.notices.close()
         self.hand = Hand(self.view)

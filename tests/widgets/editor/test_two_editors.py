@@ -25,6 +25,7 @@ def halves():
     right = View(renderer, left.interactor)
     editors = [DeformEditor(view, sausage(2).mesh) for view in (left, right)]
     for editor in editors:
+        editor.mode = Mode.REGIONS
         editor.On()
     left.render()
     hand = Hand(left)

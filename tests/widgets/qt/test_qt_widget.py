@@ -119,6 +119,8 @@ def make():
 
     def over(mesh):
         made.append(Seen(DeformWidget(mesh)))
+        made[-1].editor.wait()
+        made[-1].editor.mode = Mode.REGIONS
         return made[-1]
 
     yield over

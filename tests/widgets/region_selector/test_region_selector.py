@@ -265,12 +265,12 @@ def test_a_region_cannot_be_emptied(desk):
     assert desk.session.regions is regions
 
 
-def test_brackets_and_the_wheel_over_the_mesh_change_the_brush(desk):
+def test_brackets_and_the_wheel_with_shift_over_the_mesh_change_the_brush(desk):
     here, radius = desk.under(0.0, 0.0), desk.selector.radius
     camera = desk.view.camera.GetDistance()
-    desk.hand.wheel(+2, here)
+    desk.hand.wheel(+2, here, shift=True)
     assert desk.selector.radius > 1.3 * radius
-    desk.hand.wheel(-2, here)
+    desk.hand.wheel(-2, here, shift=True)
     assert desk.selector.radius == pytest.approx(radius)
     desk.hand.key("bracketright", here)
     assert desk.selector.radius > radius
@@ -279,9 +279,9 @@ def test_brackets_and_the_wheel_over_the_mesh_change_the_brush(desk):
     assert desk.view.camera.GetDistance() == camera
 
 
-def test_the_wheel_zooms_beside_the_mesh_and_with_a_modifier_but_not_during_a_stroke(desk):
+def test_the_wheel_zooms_without_shift_and_beside_the_mesh_but_not_during_a_stroke(desk):
     here, radius = desk.under(0.0, 0.0), desk.selector.radius
-    for place, held in (((5, 5), {}), (here, {"shift": True}), (here, {"control": True})):
+    for place, held in (((5, 5), {"shift": True}), (here, {}), (here, {"control": True})):
         camera = desk.view.camera.GetDistance()
         desk.hand.wheel(+1, place, **held)
         assert desk.view.camera.GetDistance() < camera
@@ -297,9 +297,9 @@ def test_the_wheel_zooms_beside_the_mesh_and_with_a_modifier_but_not_during_a_st
 
 def test_the_radius_of_the_brush_is_limited(desk):
     here, size = desk.under(0.0, 0.0), desk.session.mesh.diagonal
-    desk.hand.wheel(+80, here)
+    desk.hand.wheel(+80, here, shift=True)
     assert desk.selector.radius == pytest.approx(2.0 * size)
-    desk.hand.wheel(-120, here)
+    desk.hand.wheel(-120, here, shift=True)
     assert 0.0 < desk.selector.radius < 1e-3 * size
     desk.selector.paints = Paint.FIXED
     desk.hand.click(here)

@@ -1,0 +1,230 @@
+"""Pulling the surface with the mouse: volume, undo, pins, numbers, turning, waiting."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hands import Hand, plain_view
+from scenes import sausage
+
+from vtk_segdeform import Session
+from vtk_segdeform.errors import ArgumentError, ConstraintError
+from vtk_segdeform.widgets.puller.puller import Puller
+
+pytestmark = pytest.mark.usefixtures("bound_once")
+
+SCENE = sausage()
+SIZE = SCENE.mesh.diagonal
+
+
+class Bench:
+    """A session, a puller that is on, seen from the front with z up, and a hand."""
+
+    def __init__(self, *, has_cages=True):
+        self.session = Session(SCENE.mesh)
+        if has_cages:
+            self.prepare()
+        self.view = plain_view()
+        self.puller = Puller(self.view, self.session)
+        self.view.camera.SetPosition(0.0, -12.0, 0.0)
+        self.view.camera.SetViewUp(0.0, 0.0, 1.0)
+        self.view.renderer.ResetCamera()
+        self.view.camera.Zoom(0.7)
+        self.view.render()
+        self.puller.On()
+        self.hand = Hand(self.view)
+
+    def prepare(self):
+        self.session.set_regions(SCENE.regions)
+        self.session.set_cages(SCENE.cages)
+
+    def on(self, x=2.0):
+        """Return a pixel on the front of the body, and the vertex nearest to it."""
+        front = SCENE.mesh.vertices[:, 1] < 0.0
+        away = np.linalg.norm(self.session.vertices[:, ::2] - [x, 0.0], axis=1)
+        vertex = int(np.where(front, away, np.inf).argmin())
+        return np.round(self.hand.at(self.session.vertices[vertex])), vertex
+
+    @property
+    def target(self):
+        (point,) = self.session.targets["pull 1"]
+        return point
+
+
+@pytest.fixture
+def bench():
+    made = Bench()
+    yield made
+    assert made.hand.failures == []
+    made.puller.remove()
+    assert made.view.renderer.GetViewProps().GetNumberOfItems() == 0
+
+
+def test_a_pull_is_one_step_and_every_frame_has_the_volume(bench):
+    session, hand = bench.session, bench.hand
+    before = session.undo_label
+    place, _ = bench.on()
+    hand.press(place)
+    hand.move(place + [1, 1])
+    hand.release(place)
+    assert session.state.pose is None  # a click pulls nothing
+    assert session.undo_label == before
+    hand.press(place)
+    for k in range(1, 6):
+        hand.move(place + [0, 8 * k])
+        assert abs(session.volume_change) < 1e-12
+        hand.tick()
+        assert abs(session.volume_change) < 1e-12
+    hand.release()
+    assert session.undo_label == "pull"
+    assert (session.vertices - SCENE.mesh.vertices)[:, 2].max() > 0.2
+    assert session.undo() == "pull"
+    assert (session.state.pose, session.undo_label) == (None, before)
+    hand.press(place)
+    hand.move(place + [0, 20])
+    hand.key("Escape")
+    hand.release()
+    assert session.state.pose is None
+
+
+def test_shift_click_pins_and_unpins_and_markers_are_grabbed(bench):
+    session, hand = bench.session, bench.hand
+    place, _ = bench.on(0.5)
+    hand.click(place, shift=True)
+    assert list(session.handles) == ["pin 1"]
+    assert session.undo_label == "add pin 1"
+    hand.press(place + [4, 0])  # near it
+    hand.move(place + [4, 25])
+    assert list(session.handles) == ["pin 1"]
+    hand.release()
+    assert session.undo_label == "pull"
+    place = np.array(hand.at(session.vertices[session.handles["pin 1"]][0]))
+    hand.click(place + [0, 5], shift=True)
+    assert session.handles == {}
+    assert bench.puller.marked == ()
+    session.undo()
+    assert bench.puller.marked == ("pin 1",)
+
+
+@pytest.mark.parametrize(
+    ("keys", "shift"),
+    [(["x"], [-0.75, 0.0, 0.0]), (["z"], [0.0, 0.0, -0.75]), ([], [0.0, 0.0, -0.75])],
+)
+def test_a_typed_number_pulls_exactly_that_far(bench, keys, shift):
+    place, vertex = bench.on()
+    start = bench.session.vertices[vertex]
+    bench.hand.press(place)
+    bench.hand.move(place + [0, 30])
+    for key in [*keys, "period", "7", "9", "BackSpace", "5", "minus"]:
+        bench.hand.key(key)
+    bench.hand.move(place + [70, 70])  # ignored from now on
+    bench.hand.key("Return")
+    assert not bench.puller.is_grabbing
+    bench.hand.release()
+    np.testing.assert_allclose(bench.target - start, shift, atol=1e-9)
+
+
+def test_x_constrains_to_the_axis_and_then_to_the_plane(bench):
+    place, vertex = bench.on()
+    start = bench.session.vertices[vertex]
+    bench.hand.press(place)
+    bench.hand.move(place + [30, 20])
+    for still, moves in ((2, 0), (0, 2)):
+        bench.hand.key("x")
+        shift = bench.target - start
+        assert abs(shift[still]) < 1e-9
+        assert shift[moves] > 0.1
+    bench.hand.key("x")
+    assert (np.abs(bench.target - start)[[0, 2]] > 0.1).all()  # free again
+    bench.hand.release()
+
+
+def test_r_turns_about_the_point_and_a_number_is_degrees(bench):
+    place, vertex = bench.on(2.6)
+    bench.hand.press(place)
+    bench.hand.key("r")
+    bench.hand.key("y")
+    for key in "30":
+        bench.hand.key(key)
+    bench.hand.key("Return")
+    ids = bench.session.handles["pull 1"]
+    assert len(ids) > 3
+    before = SCENE.mesh.vertices[ids] - SCENE.mesh.vertices[vertex]
+    after = bench.session.targets["pull 1"] - SCENE.mesh.vertices[vertex]
+    c, s = np.cos(np.radians(30.0)), np.sin(np.radians(30.0))
+    np.testing.assert_allclose(after, before @ [[c, 0, -s], [0, 1, 0], [s, 0, c]], atol=1e-9)
+    assert bench.session.undo_label == "pull"
+
+
+def test_shift_and_the_wheel_or_brackets_change_the_radius(bench):
+    puller, hand = bench.puller, bench.hand
+    place, _ = bench.on()
+    before, camera = puller.radius, bench.view.camera.GetDistance()
+    hand.wheel(2, place, shift=True)
+    assert puller.radius == pytest.approx(1.1**2 * before)
+    hand.key("bracketleft", place)
+    assert puller.radius == pytest.approx(1.1 * before)
+    assert bench.view.camera.GetDistance() == camera
+    assert puller.steps_of_radius == 1
+    hand.wheel(1, place)  # zooms
+    assert bench.view.camera.GetDistance() < camera
+    assert puller.radius == pytest.approx(1.1 * before)
+    puller.radius = 100.0 * SIZE
+    assert puller.radius == SIZE
+    with pytest.raises(ArgumentError, match="radius must be above 0"):
+        puller.radius = np.nan
+    with pytest.raises(ConstraintError, match="locality must be a number from 0 to 1"):
+        puller.locality = 2.0
+
+
+def test_fixed_points_are_refused_with_advice(bench):
+    place, vertex = bench.on()
+    bench.session.set_fixed([vertex])
+    camera = bench.view.camera.GetPosition()
+    bench.hand.drag([place, place + [0, 30]])
+    assert "This point is fixed" in bench.puller.remark
+    assert bench.session.state.pose is None
+    assert bench.view.camera.GetPosition() == camera
+
+
+@pytest.mark.parametrize("released", [False, True])
+def test_a_pull_before_the_cages_are_there_begins_as_soon_as_they_are(released):
+    bench = Bench(has_cages=False)
+    place, vertex = bench.on()
+    bench.hand.press(place)
+    bench.hand.move(place + [0, 30])
+    if released:
+        bench.hand.release()
+        assert "Preparing" in bench.puller.remark
+    bench.hand.tick()
+    assert bench.puller.is_waiting
+    bench.prepare()
+    bench.hand.tick()
+    assert not bench.puller.is_waiting
+    assert (bench.target - SCENE.mesh.vertices[vertex])[2] > 0.2
+    bench.hand.release()
+    assert bench.session.undo_label == "pull"
+    assert bench.hand.failures == []
+    bench.puller.remove()
+
+
+@pytest.mark.parametrize("scale", [1e-7, 1e6])
+def test_the_ring_has_the_radius_at_any_scale_and_place(scale):
+    mesh = SCENE.mesh.with_vertices(scale * (SCENE.mesh.vertices + [1e6, 0.0, 0.0]))
+    view = plain_view()
+    puller = Puller(view, Session(mesh))
+    view.camera.SetPosition(scale * 1e6, -12.0 * scale, 0.0)
+    view.camera.SetFocalPoint(scale * 1e6, 0.0, 0.0)
+    view.camera.SetViewUp(0.0, 0.0, 1.0)
+    view.renderer.ResetCamera()
+    puller.On()
+    hand = Hand(view)
+    hand.hover((200, 200))
+    (hit,) = puller._picker.hits(view.pointer(None))[:1]
+    for share in (0.15, 1e-4):  # the second one is smaller than a triangle
+        ring = puller._picker.ring(hit, share * mesh.diagonal)
+        assert len(ring) > 20
+        away = np.linalg.norm(ring - hit.point, axis=2) / mesh.diagonal
+        np.testing.assert_allclose(away, share, rtol=0.02)
+    puller.remove()
+    assert hand.failures == []

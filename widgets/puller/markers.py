@@ -1,0 +1,179 @@
+"""Pins and pulled points as dots of constant size: black with a white rim, pulled points smaller.
+
+Dots that the body hides are drawn faintly through it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+from vtkmodules.vtkCommonCore import vtkPoints
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
+
+from vtk_segdeform.arrays import FloatArray
+from vtk_segdeform.pictures import COLOURS, PAPER, rgb
+from vtk_segdeform.session import Session
+
+from ..picking import Picker
+from ..scene import Phase, Pointer, SurfaceDisplay
+
+_BLACK, _HIGHLIGHT = "#101010", COLOURS[4]
+_PIN, _PULLED, _RIM = 11.0, 7.0, 4.0  # pixels: the dots, and both sides of the rim together
+_THROUGH = 0.25  # opacity of dots that the body hides
+_REACH = 10.0  # pixels from the pointer
+_DESIGN_HEIGHT = 600  # pixels; dots are larger in a higher window
+
+
+class Markers:
+    """The handles of one vertex, and those that pulls left behind; hidden until `show`.
+
+    Parameters
+    ----------
+    surface : SurfaceDisplay
+        The displayed mesh.
+    picker : Picker
+        Decides which dots are visible.
+    """
+
+    def __init__(self, surface: SurfaceDisplay, picker: Picker) -> None:
+        self._surface, self._picker, self._view = surface, picker, surface.view
+        self._vertices: dict[str, int] = {}
+        self._highlighted: str | None = None
+        self._is_shown = False
+        front, behind = self._view.renderer, self._view.foreground
+        self._dots = {
+            (is_pin, part): _Dots(behind if part == "through" else front)
+            for part in ("rim", "fill", "through")
+            for is_pin in (True, False)
+        }
+        self._bright = _Dots(front)
+        self._stop = self._view.before_render(self._lay_out)
+
+    def show(self, shown: bool) -> None:
+        """Show the current pins and pulled points, or hide them."""
+        self._is_shown = shown
+        self._vertices = marked_vertices(self._surface.session) if shown else {}
+        if self._highlighted not in self._vertices:
+            self._highlighted = None
+        self._view.request_render()
+
+    def vertex(self, name: str) -> int:
+        """Return the marked vertex of a handle."""
+        return self._vertices[name]
+
+    def at(self, pointer: Pointer) -> str | None:
+        """Return the visible marker nearest to *pointer* and near it, or None."""
+        if not self._vertices:
+            return None
+        places = self._surface.points[list(self._vertices.values())]
+        away = np.linalg.norm(self._view.to_display(places)[:, :2] - pointer.position, axis=1)
+        names = list(self._vertices)
+        for k in np.argsort(away):
+            if not away[k] <= _REACH * self._scale:
+                break
+            if self._is_visible(places[k]):
+                return names[int(k)]
+        return None
+
+    def highlight(self, name: str | None) -> None:
+        """Highlight one marker, or none."""
+        if name != self._highlighted:
+            self._highlighted = name
+            self._view.request_render()
+
+    def remove(self) -> None:
+        """Remove the dots from the view permanently."""
+        self._stop()
+        for dots in (*self._dots.values(), self._bright):
+            dots.remove()
+
+    @property
+    def _scale(self) -> float:
+        return float(np.clip(self._view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.8, 3.0))
+
+    def _is_visible(self, place: FloatArray) -> bool:
+        x, y, _ = self._view.to_display(place[None])[0]
+        hit = self._picker.hit(Pointer(Phase.HOVER, x, y))
+        pixel = self._view.pixel_at(place)
+        return hit is None or bool(np.linalg.norm(hit.point - place) <= _REACH * pixel)
+
+    def _lay_out(self) -> None:
+        """Place the dots in front of the surface, as seen from the camera."""
+        scale, pulls = self._scale, self._surface.session.state.pulls
+        for is_pin, size in ((True, _PIN), (False, _PULLED)):
+            ids = [v for name, v in self._vertices.items() if (name in pulls) is not is_pin]
+            places = self._surface.points[np.array(ids, dtype=np.int64)]
+            rim = scale * (size + _RIM)
+            for part, lift, width, colour, opacity in (
+                ("rim", rim, rim, PAPER, 1.0),
+                ("fill", 1.2 * rim, scale * size, _BLACK, 1.0),
+                ("through", 0.0, scale * size, _BLACK, _THROUGH),
+            ):
+                self._dots[is_pin, part].draw(self._lifted(places, lift), colour, width, opacity)
+        chosen = [] if self._highlighted is None else [self._vertices[self._highlighted]]
+        place = self._surface.points[np.array(chosen, dtype=np.int64)]
+        size = _PULLED if self._highlighted in pulls else _PIN
+        self._bright.draw(self._lifted(place, 2.0 * scale * size), _HIGHLIGHT, scale * size)
+
+    def _lifted(self, places: FloatArray, pixels: float) -> FloatArray:
+        """Return *places* (k, 3) moved towards the camera, to where they look the same."""
+        if not len(places):
+            return places
+        camera, view = self._view.camera, self._view
+        to_eye = np.broadcast_to(-view.view_direction, places.shape)
+        if not camera.GetParallelProjection():
+            to_eye = camera.GetPosition() - places
+            to_eye = to_eye / np.maximum(np.linalg.norm(to_eye, axis=1), 1e-300)[:, None]
+        step = np.array([view.pixel_at(place) for place in places])
+        return np.asarray(places + (pixels * step)[:, None] * to_eye)
+
+
+def marked_vertices(session: Session) -> dict[str, int]:
+    """Return the vertex of every pin and pulled point of a session by its name."""
+    found, x = {}, session.mesh.vertices
+    for name, ids in session.handles.items():
+        if len(ids) == 1 or name in session.state.pulls:
+            middle = x[ids].mean(axis=0)
+            found[name] = int(ids[np.linalg.norm(x[ids] - middle, axis=1).argmin()])
+    return found
+
+
+class _Dots:
+    """Points as discs or spheres of constant size on the screen."""
+
+    def __init__(self, renderer: Any) -> None:
+        self._renderer = renderer
+        self._data = vtkPolyData()
+        mapper = vtkPolyDataMapper()
+        mapper.SetInputData(self._data)
+        self._actor = vtkActor()
+        self._actor.SetMapper(mapper)
+        self._actor.PickableOff()
+        self._actor.UseBoundsOff()  # the mesh has the same bounds
+        self._actor.GetProperty().RenderPointsAsSpheresOn()
+        self._actor.GetProperty().LightingOff()
+        self._actor.VisibilityOff()
+        renderer.AddActor(self._actor)
+
+    def draw(self, places: FloatArray, colour: str, size: float, opacity: float = 1.0) -> None:
+        self._actor.SetVisibility(len(places) > 0)
+        if not len(places):
+            return
+        points, cells = vtkPoints(), vtkCellArray()
+        points.SetData(numpy_to_vtk(np.ascontiguousarray(places), deep=True))
+        ids = np.arange(len(places) + 1, dtype=np.int64)
+        cells.SetData(
+            numpy_to_vtkIdTypeArray(ids, deep=True), numpy_to_vtkIdTypeArray(ids[:-1], deep=True)
+        )
+        self._data.SetPoints(points)
+        self._data.SetVerts(cells)
+        style = self._actor.GetProperty()
+        style.SetColor(*(rgb(colour) / 255.0))
+        style.SetPointSize(size)
+        style.SetOpacity(opacity)
+
+    def remove(self) -> None:
+        self._renderer.RemoveActor(self._actor)
