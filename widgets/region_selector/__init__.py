@@ -11,6 +11,7 @@ The files, in reading order:
 """
 
 from .brush_ring import BrushRing
+from .paint_target import dominant_region
 from .region_colours import RegionColours
 from .region_selector import Paint, RegionSelector, Tool
 
@@ -20,4 +21,5 @@ __all__ = [
     "RegionColours",
     "RegionSelector",
     "Tool",
+    "dominant_region",
 ]

@@ -7,6 +7,9 @@ The files, in reading order:
     gestures           press, move and release as one generator
     surface_display    the mesh of a session as an actor
     projection         projection between world and display coordinates
+    viewpoint          movements of the camera, named views, framing, the up axis
+    navigation         the camera by mouse
+    orientation_cube   a cube that shows the directions of the model
     foreground         a renderer that draws over another one
     labels             rectangles and text in display coordinates
     wireframe          edges and vertices of a mesh
@@ -17,16 +20,22 @@ The files, in reading order:
 from .gestures import Gesture, Phase, Pointer
 from .highlights import Highlights
 from .labels import Panel, Text
+from .navigation import Navigation
+from .orientation_cube import OrientationCube
 from .projection import Projection
 from .step_budget import StepBudget, observe_steps, prescribe_steps
 from .surface_display import SurfaceDisplay
 from .view import Stop, View
+from .viewpoint import VIEWS, Viewpoint
 from .widget import Widget
 from .wireframe import Wireframe
 
 __all__ = [
+    "VIEWS",
     "Gesture",
     "Highlights",
+    "Navigation",
+    "OrientationCube",
     "Panel",
     "Phase",
     "Pointer",
@@ -36,6 +45,7 @@ __all__ = [
     "SurfaceDisplay",
     "Text",
     "View",
+    "Viewpoint",
     "Widget",
     "Wireframe",
     "observe_steps",
