@@ -10,7 +10,7 @@ meanwhile only the camera works, and Escape cancels the job.
 An action during a drag or a stroke first finishes it, as if the button had been released, as one
 undo step.  Only Escape cancels it; the help card does not interrupt it.
 
-The camera moves alike in every host; see `Camera`.  pyvista's own keys are unchanged.  The editor receives keys after its
+The camera moves alike in every host; see `Camera`.  The editor receives keys after its
 widgets, so that x, y, z constrain a drag, but before VTK and pyvista, from which it withholds its
 own keys.  With several editors in one window, keys go to the one under the pointer.
 """

@@ -60,9 +60,7 @@ class SessionFile:
             self.path = path
             self.mark_saved(session)
 
-    def write(
-        self, session: Session, place: Path, view: Mapping[str, Any] | None = None
-    ) -> None:
+    def write(self, session: Session, place: Path, view: Mapping[str, Any] | None = None) -> None:
         """Save *session* to *place*, which differs from `path` in a replay; see `save_session`."""
         save_session(place, session, view=view)
         self._written, self._saved = place, session.state

@@ -18,6 +18,7 @@ from ..editor import (
     saving,
 )
 from .controls import choice_button, column, key_button, push_button, put, row
+from .view_menu import add_view_entries
 
 _SESSIONS = "Sessions (*.segdeform)"
 
@@ -45,6 +46,10 @@ class Toolbar(QtWidgets.QWidget):
         ):
             menu.addAction(text).triggered.connect(do)
         self.save.setMenu(menu)
+        self.view = push_button("View", "Views, up axis and projection")
+        views = QtWidgets.QMenu(self.view)
+        add_view_entries(views, lambda: editor)
+        self.view.setMenu(views)
         self.undo = key_button(editor, "z", Mode.REGIONS, "Undo")
         self.redo = key_button(editor, "y", Mode.REGIONS, "Redo")
         self.modes = {
@@ -54,7 +59,11 @@ class Toolbar(QtWidgets.QWidget):
         group = QtWidgets.QButtonGroup(self)
         for button in self.modes.values():
             group.addButton(button)
-        column(self, row(self.open, self.save, self.undo, self.redo), row(*self.modes.values()))
+        column(
+            self,
+            row(self.open, self.save, self.undo, self.redo, self.view),
+            row(*self.modes.values()),
+        )
         self.layout().setContentsMargins(0, 0, 0, 0)
 
     def refresh(self) -> None:

@@ -194,7 +194,9 @@ class Navigation:
             or now - last[0] > _DOUBLE_CLICK
             or np.linalg.norm(pointer.position - last[1].position) > _SAME_PLACE
             or last[2] is not self._click[2]
-            or any((each.alt, each.shift, each.control) != (False,) * 3 for each in (pointer, last[1]))
+            or any(
+                (each.alt, each.shift, each.control) != (False,) * 3 for each in (pointer, last[1])
+            )
             or not (self.view.contains(pointer) and self._is_mine(pointer))
         ):
             return False
@@ -228,7 +230,9 @@ class Navigation:
             style = style.GetCurrentStyle()
         if style is None:
             return
-        tag = style.AddObserver(event, lambda *_: style.GetCommand(tag).SetAbortFlag(1), _ABOVE_STYLE)
+        tag = style.AddObserver(
+            event, lambda *_: style.GetCommand(tag).SetAbortFlag(1), _ABOVE_STYLE
+        )
         self._withheld.append((style, tag))
 
     def _end_withholding(self) -> None:

@@ -129,14 +129,15 @@ class Viewpoint:
         away, up = (np.array(each, dtype=float) @ self.axes for each in _VIEWS["home"])
         self._aim(away, up, points, animate=False)
 
-    def frame(self, points: FloatArray | None = None) -> None:
+    def frame(self, points: FloatArray | None = None, *, animate: bool = True) -> None:
         """Show *points* (k, 3), by default the model, from the current direction."""
         camera = self.view.camera
         away = np.subtract(camera.GetPosition(), camera.GetFocalPoint())
         up = np.array(camera.GetViewUp())
         if not _is_sound(away, up):
             away, up = self.axes[1:]
-        self._aim(away, up, self._points() if points is None else points, animate=True)
+        points = self._points() if points is None else points
+        self._aim(away, up, points, animate=animate)
 
     def toggle_projection(self) -> bool:
         """Switch between perspective and orthographic; return whether it is orthographic now."""
@@ -203,7 +204,9 @@ class Viewpoint:
         diagonal = self._diagonal()
         if camera.GetParallelProjection():
             scale = camera.GetParallelScale()
-            wanted = float(np.clip(scale / factor, 1e-3 * _NEAREST * diagonal, _FARTHEST * diagonal))
+            wanted = float(
+                np.clip(scale / factor, 1e-3 * _NEAREST * diagonal, _FARTHEST * diagonal)
+            )
             direction = self.view.view_direction
             shift = (1.0 - wanted / scale) * (pivot - focus)
             shift -= (shift @ direction) * direction

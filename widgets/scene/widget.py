@@ -2,8 +2,9 @@
 
 A widget returns the gesture that a press starts from `on_press`.  If there is one, the press does
 not reach the camera, moves and the release are sent to the gesture, and Escape or the right button
-cancels it.  A press with Alt always reaches the camera.  Any other interruption, such as a change of tool or a background job, finishes the
-gesture like a release, so no work is lost.  Elsewhere in the view the camera works as usual.
+cancels it.  A press with Alt always reaches the camera.  Any other interruption, such as a change
+of tool or a background job, finishes the gesture like a release, so no work is lost.  Elsewhere in
+the view the camera works as usual.
 
 The interface follows VTK's widgets: `On`, `Off`, `SetEnabled`, `GetEnabled`, and observers of
 ``StartInteractionEvent``, ``InteractionEvent`` and ``EndInteractionEvent``, each invoked after the
