@@ -5,9 +5,8 @@ the stroke, the release records one undo step, and Escape cancels.
 
 brush, component    a press beside the mesh moves the camera
 lasso, rectangle    start anywhere in the view
-all tools           a press with Shift held moves the camera
-``[``  ``]``        smaller, larger brush; the wheel over the mesh does the same.  Beside the mesh,
-                    or with Shift or Control held, the wheel zooms.
+all tools           a press with Alt held moves the camera
+``[``  ``]``        smaller, larger brush; the wheel zooms
 
 A change of regions resets the pose, as in `Session`; fixed vertices and handles keep it.
 `PaintTarget` says which vertices a stroke skips.
@@ -158,8 +157,8 @@ class RegionSelector(Widget):
             self._ring.hide()
 
     def on_press(self, press: Pointer) -> Gesture | None:
-        """Start a stroke; pass the press to the camera with Shift or beside the mesh."""
-        stroke = None if press.shift else self._stroke_from(press)
+        """Start a stroke; pass the press to the camera beside the mesh."""
+        stroke = self._stroke_from(press)
         return None if stroke is None else self._follow(stroke, self._target, press.control)
 
     def on_hover(self, pointer: Pointer) -> None:
@@ -168,15 +167,9 @@ class RegionSelector(Widget):
             self._draw_ring(pointer, self._target, pointer.control)
 
     def on_wheel(self, pointer: Pointer, clicks: int) -> bool:
-        """Resize the brush over the mesh; pass the wheel to the camera with Shift or Control."""
-        if self.is_grabbing:
-            return True  # camera and radius stay the same during a stroke
-        if self.tool is not Tool.BRUSH or pointer.shift or pointer.control:
-            return False
-        if self._picker.hit(pointer) is None:
-            return False
-        self._resize(clicks, pointer)
-        return True
+        """Keep the camera in its place during a stroke; otherwise the wheel zooms."""
+        del pointer, clicks
+        return self.is_grabbing
 
     def on_key(self, key: str, pointer: Pointer) -> bool:
         """Resize the brush with the bracket keys."""

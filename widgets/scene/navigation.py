@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -94,9 +95,9 @@ class Navigation:
         for button in _BUTTONS:
             press, release = f"{button}ButtonPressEvent", f"{button}ButtonReleaseEvent"
             self._stops += [
-                observe(press, lambda button=button: self._press(button), _BELOW_WIDGETS),
+                observe(press, partial(self._press, button), _BELOW_WIDGETS),
                 # Before the widgets: a release must never be missed.
-                observe(release, lambda button=button: self._release(button), _DOUBLE_CLICKS),
+                observe(release, partial(self._release, button), _DOUBLE_CLICKS),
             ]
 
     def Off(self) -> None:  # noqa: N802
@@ -230,9 +231,11 @@ class Navigation:
             style = style.GetCurrentStyle()
         if style is None:
             return
-        tag = style.AddObserver(
-            event, lambda *_: style.GetCommand(tag).SetAbortFlag(1), _ABOVE_STYLE
-        )
+
+        def withhold(*_: object) -> None:
+            style.GetCommand(tag).SetAbortFlag(1)
+
+        tag: int = style.AddObserver(event, withhold, _ABOVE_STYLE)
         self._withheld.append((style, tag))
 
     def _end_withholding(self) -> None:

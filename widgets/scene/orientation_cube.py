@@ -24,7 +24,7 @@ from .view import Stop, View
 _ABOVE_WIDGETS = 1.5  # priority: our widgets have 1
 _SIZE, _SMALLEST_VIEW = 84.0, 240  # pixels
 _MARGIN = 10.0  # pixels, to the corner of the view
-_REACH = 1.75  # half the height of what its camera sees; a corner of the cube is at 0.87
+_REACH = 0.9  # half the height of its view; a corner of the cube is at 0.87
 _EDGE = 0.32  # from the centre of a face to where an edge begins; the edge itself is at 0.5
 _CLICK = 4.0  # pixels; a press that moves more is a drag
 _FACE, _LINE = "#E9E7E2", INK
@@ -63,7 +63,7 @@ class OrientationCube:
         self._renderer.InteractiveOff()
         camera = self._renderer.GetActiveCamera()
         camera.ParallelProjectionOn()
-        camera.SetParallelScale(_REACH * 0.6)
+        camera.SetParallelScale(_REACH)
         self._renderer.AddViewProp(self._cube)
         layer_above(self.view.renderer, self._renderer)
         observe = self.view.observe
@@ -167,8 +167,10 @@ class OrientationCube:
 def _cube() -> vtkAnnotatedCubeActor:
     cube = vtkAnnotatedCubeActor()
     cube.PickableOff()
-    cube.SetFaceTextScale(0.22)
+    cube.SetFaceTextScale(0.15)
     cube.GetCubeProperty().SetColor(*(rgb(_FACE) / 255.0))
+    cube.GetCubeProperty().SetAmbient(0.7)
+    cube.GetCubeProperty().SetDiffuse(0.3)
     cube.GetCubeProperty().SetEdgeVisibility(True)
     cube.GetCubeProperty().SetEdgeColor(*(rgb(_LINE) / 255.0))
     cube.SetTextEdgesVisibility(False)
@@ -190,6 +192,5 @@ def _label(cube: vtkAnnotatedCubeActor, axes: FloatArray) -> None:
         getattr(cube, f"Set{'XYZ'[k]}MinusFaceText")(second)
     # VTK draws the text of z faces for y up, of all others for z up.
     is_y_up = abs(axes[2][1]) > 0.5
-    cube.SetXFaceTextRotation(90.0 if is_y_up else 0.0)
-    cube.SetYFaceTextRotation(0.0)
-    cube.SetZFaceTextRotation(0.0)
+    cube.SetXFaceTextRotation(270.0 if is_y_up else 360.0)  # VTK does not return to 0
+    cube.SetZFaceTextRotation(90.0 if is_y_up else 360.0)

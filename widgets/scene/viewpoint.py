@@ -95,7 +95,7 @@ class Viewpoint:
         front = -_AXES[1] if abs(self._up[2]) > 0.5 else _AXES[2]
         front = front - (front @ self._up) * self._up
         front /= np.linalg.norm(front)
-        return np.stack([np.cross(self._up, front), front, self._up])
+        return np.array([np.cross(self._up, front), front, self._up])
 
     # Views.
 
@@ -248,25 +248,30 @@ class Viewpoint:
 
     def restore(self, settings: Mapping[str, Any]) -> bool:
         """Restore `settings`; return False, and change nothing, if they are damaged."""
-        vectors = [settings.get(name) for name in ("up", "position", "focus", "view_up")]
-        angle, scale = settings.get("angle"), settings.get("scale")
-        for vector in vectors:
-            if not (isinstance(vector, list) and len(vector) == 3 and all(map(is_number, vector))):
-                return False
-        up, position, focus, view_up = np.array(vectors, dtype=float)
-        diagonal = self._diagonal()
-        away = position - focus
-        middle = self._points().mean(axis=0)
+        names = (
+            ("up", 3),
+            ("position", 3),
+            ("focus", 3),
+            ("view_up", 3),
+            ("angle", 1),
+            ("scale", 1),
+        )
+        found = [_numbers(settings.get(name), count) for name, count in names]
+        numbers = np.concatenate([each for each in found if each is not None])
+        if len(numbers) != sum(count for _, count in names):
+            return False
+        up, position, focus, view_up = numbers[:12].reshape(4, 3)
+        angle, scale = map(float, numbers[12:])
+        away, middle = position - focus, self._points().mean(axis=0)
+        farthest = 1e3 * _FARTHEST * self._diagonal()
         if not (
-            is_number(angle)
-            and is_number(scale)
-            and isinstance(settings.get("parallel"), bool)
+            isinstance(settings.get("parallel"), bool)
             and 1.0 <= angle <= 150.0
-            and 0.0 < scale <= 1e3 * _FARTHEST * diagonal
-            and np.linalg.norm(away) <= 1e3 * _FARTHEST * diagonal
-            and np.linalg.norm(focus - middle) <= 1e3 * _FARTHEST * diagonal
+            and 0.0 < scale <= farthest
+            and np.linalg.norm(away) <= farthest
+            and np.linalg.norm(focus - middle) <= farthest
             and _is_sound(away, view_up)
-            and np.linalg.norm(up) > 0.0
+            and up.any()
         ):
             return False
         self.finish()
@@ -363,6 +368,13 @@ class Viewpoint:
     def _drawn(self) -> None:
         self.view.renderer.ResetCameraClippingRange()
         self.view.request_render()
+
+
+def _numbers(value: object, count: int) -> FloatArray | None:
+    """Return *count* numbers of a file, (count,) float; None if *value* is anything else."""
+    values = value if isinstance(value, list) else [value]
+    is_sound = len(values) == count and all(map(is_number, values))
+    return np.array(values, dtype=float) if is_sound else None
 
 
 def _is_sound(away: FloatArray, up: FloatArray) -> bool:
