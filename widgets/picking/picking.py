@@ -82,6 +82,7 @@ class Picker:
             return []
         self._locator.BuildLocator()  # does nothing unless the pose has changed
         points, faces = vtkPoints(), vtkIdList()
+        points.SetDataTypeToDouble()  # far from the origin single precision is coarse
         tolerance = _INTERSECTION_TOLERANCE * self._mesh.diagonal
         self._locator.IntersectWithLine(near, far, tolerance, points, faces)
         return [

@@ -11,7 +11,7 @@ events that move the camera do not reach the interactor style of the host; all o
 receive them, and the style receives every other event.  No drag of the camera withholds keys,
 timers or moves of the mouse from anybody.
 
-A click that has edited the session is never the first half of a double click.
+A drag, or a click that has edited the session, is never the first half of a double click.
 """
 
 from __future__ import annotations
@@ -171,6 +171,10 @@ class Navigation:
         self._end_withholding()
         if button == self._button:
             self._move = None
+        if button == "Left" and self._click is not None:
+            moved = self.view.pointer(Phase.RELEASE).position - self._click[1].position
+            if np.linalg.norm(moved) > _SAME_PLACE:
+                self._click = None  # it was a drag
         return False
 
     def _wheel(self, direction: str, clicks: int) -> bool:
