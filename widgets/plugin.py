@@ -140,7 +140,8 @@ class PlotterTools:
         if path is not None:
             editor.path = path
         if not self._plotter.camera_set:
-            self._plotter.reset_camera()  # as `add_mesh` does
+            editor.controller.camera.begin(is_aimed=False)
+            self._plotter.camera_set = True  # otherwise `show` would aim it again
         editor.On()
         return editor
 

@@ -36,7 +36,9 @@ from vtk_segdeform.widgets.editor.bindings import BINDINGS, binding_of
 from vtk_segdeform.widgets.handle_dragger import live_solve
 from vtk_segdeform.widgets.scene.view import View
 
-KEYS = sorted({key for binding in BINDINGS for key in binding.keys})
+KEYS = sorted(
+    {k for b in BINDINGS for k in b.keys if b.heading != "View" or k in ("kp_1", "period")}
+)
 SIZE = (260, 200)
 LONGEST = 30.0  # seconds that any action may take, on a busy machine
 SAME_POSE = 2e-3  # of the diagonal: the same pose reached in two ways

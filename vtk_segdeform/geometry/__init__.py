@@ -13,6 +13,7 @@ The files, in reading order:
     normal_transport   given normals and tangents, carried along by a deformation
     distortion      stretch and shear of each triangle
     local_volume    volume change below the surface at each vertex
+    up_axis         a guess of the axis that points up
 """
 
 from .differential import (
@@ -31,6 +32,7 @@ from .normal_transport import NormalTransport
 from .normals import VertexNormals
 from .rotations import closest_rotations, rigid_fit
 from .sampling import distinct_lengths, faces_between, nearest_source, unique_edges, voronoi_cells
+from .up_axis import guess_up_axis
 from .volume import (
     corner_and_edges,
     signed_volume,
@@ -56,6 +58,7 @@ __all__ = [
     "distortion",
     "faces_between",
     "farthest_points",
+    "guess_up_axis",
     "inner_vertices",
     "lids_of",
     "local_volume_change",

@@ -21,7 +21,7 @@ from .listeners import Change
 from .naming import region_name
 from .session import Effort, Preparation, Session
 from .state import Options, State
-from .store import load_session, save_session
+from .store import load_session, save_session, saved_view
 
 __all__ = [
     "Change",
@@ -34,4 +34,5 @@ __all__ = [
     "region_name",
     "require_handle",
     "save_session",
+    "saved_view",
 ]

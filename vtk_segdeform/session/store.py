@@ -11,6 +11,9 @@ The file is an `archive`, which ``numpy.load`` reads as an .npz file:
     locality.npy          (c, 3) float     the cages where a pull began            if any
     surface_...npy        the given surface, as in `surface_store`                 if any
 
+The header may also have the ``view`` of the editor: camera, mode and up axis.  Nothing else depends
+on it.
+
 The arrays of cages and of handles are concatenated; the header has their counts.  A loaded session
 is bitwise identical to the saved one, but has no history.
 
@@ -56,7 +59,13 @@ _ERRORS = (zipfile.BadZipFile, ValueError, KeyError, TypeError, EOFError, Overfl
            RuntimeError, NotImplementedError, struct.error, OSError)  # fmt: skip
 
 
-def save_session(path: str | os.PathLike[str], session: Session, *, surface: bool = True) -> None:
+def save_session(
+    path: str | os.PathLike[str],
+    session: Session,
+    *,
+    surface: bool = True,
+    view: Mapping[str, Any] | None = None,
+) -> None:
     """Save *session*; if writing fails, an existing file remains unchanged.
 
     Parameters
@@ -67,6 +76,8 @@ def save_session(path: str | os.PathLike[str], session: Session, *, surface: boo
         The current state, including an ongoing drag, is saved; the history is not.
     surface : bool
         Save the given surface as well.  Without it, the file has a session of the mesh alone.
+    view : mapping, optional
+        The state of an editor's view, for JSON; see `saved_view`.
 
     Raises
     ------
@@ -79,7 +90,7 @@ def save_session(path: str | os.PathLike[str], session: Session, *, surface: boo
     given = session.surface if as_flag(surface, "surface") else None
     try:
         with replacing(path) as draft, open(draft, "wb") as file:
-            _write(file, session, given)
+            _write(file, session, given, view)
     except OSError as fault:
         raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
 
@@ -110,7 +121,23 @@ def load_session(path: str | os.PathLike[str]) -> Session:
         raise SessionError(f"{path}: is not a readable session file: {reason}") from fault
 
 
-def _write(file: Any, session: Session, given: Surface | None) -> None:
+def saved_view(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the state of the view in a session file; {} if it has none or cannot be read.
+
+    Its values are unchecked: the file may be damaged or malicious.
+    """
+    try:
+        with open_regular(as_path(path)) as file:
+            header = Archive(file).header()
+    except _ERRORS:
+        return {}
+    view = header.get("view") if isinstance(header, dict) else None
+    return view if isinstance(view, dict) else {}
+
+
+def _write(
+    file: Any, session: Session, given: Surface | None, view: Mapping[str, Any] | None
+) -> None:
     mesh, state = session.mesh, session.state
     regions, pose = state.regions, state.pose
     options = {name: _plain(value) for name, value in asdict(state.options).items()}
@@ -131,6 +158,8 @@ def _write(file: Any, session: Session, given: Surface | None) -> None:
     }
     if state.region_names:  # optional: earlier versions ignore it
         header["region_names"] = list(state.region_names)
+    if view is not None:
+        header["view"] = dict(view)
     arrays: dict[str, Any] = {"mesh_vertices": mesh.vertices, "mesh_faces": mesh.faces}
     arrays |= {"fixed": state.fixed, "handle": state.handle}
     if regions is not None:

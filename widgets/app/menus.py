@@ -11,6 +11,7 @@ from qtpy import QtCore, QtGui, QtWidgets
 from vtk_segdeform.version import __version__
 
 from ..editor import actions
+from ..qt import add_view_entries
 from . import saving
 from .dialogs import show_about
 from .start_page import home_as_tilde
@@ -79,7 +80,9 @@ class Menus:
             action.setCheckable(True)
         style = self._add(menu, "&Shaded, edges, wireframe\tW", self._doing(actions.next_style))
         self._need_mesh.append(style)
-        self._need_mesh.append(self._add(menu, "&Fit to view", self._fit_to_view))
+        menu.addSeparator()
+        window = self._window
+        add_view_entries(menu, lambda: window.editor if window.has_mesh else None)
         menu.aboutToShow.connect(self._update_view)
 
     def _help(self) -> None:
@@ -87,11 +90,6 @@ class Menus:
         keys = self._add(menu, "&Keyboard shortcuts\tH", self._doing(actions.toggle_help))
         self._need_mesh.append(keys)
         self._add(menu, "&About segdeform", self._show_about).setMenuRole(_role("AboutRole"))
-
-    def _fit_to_view(self) -> None:
-        view = self._window.editor.view
-        view.renderer.ResetCamera()
-        view.render()
 
     def _show_about(self) -> None:
         show_about(self._window, __version__)

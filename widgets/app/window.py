@@ -229,6 +229,10 @@ class Window(QtWidgets.QMainWindow):
         self.mesh_state, self._is_new = None, request.is_new
         widget = self.editor_widget = DeformWidget(session, self)
         widget.editor.controller.file = self.document.file(session, is_unsaved=bool(request.slot))
+        widget.editor.show_cube = True
+        path = self.document.session_path or self.document.source
+        if path is not None and request.slot is None:
+            widget.editor.controller.restore_view(path)
         connect_panel(self)
         if not session.mesh.is_two_manifold:  # a closed one with seams needs no repair
             widget.editor.controller.notices.offer("Repair ...", self._repair_soon)

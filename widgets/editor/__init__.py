@@ -5,7 +5,8 @@ The files, in reading order:
     editor           `DeformEditor`
     controller       session, widgets, mode, job and file of the editor
     mode widget_set  the modes, and the widgets of each
-    actions recording_actions panel_actions
+    camera           navigation, views, up axis and orientation cube
+    actions recording_actions panel_actions view_actions
                      the actions behind keys, menus and panels
     bindings         the table of keys
     job              background work, with progress and cancellation
@@ -59,6 +60,14 @@ from .panel_actions import (
     with_radius,
 )
 from .session_file import MESH_FILES, READABLE_FILES, SessionFile, is_mesh, read_session
+from .view_actions import (
+    frame_all,
+    frame_selection,
+    looking_from,
+    toggle_cube,
+    toggle_projection,
+    with_up,
+)
 
 __all__ = [
     "BEFORE_AFTER",
@@ -80,11 +89,14 @@ __all__ = [
     "choosing_region",
     "error_text",
     "exporting",
+    "frame_all",
+    "frame_selection",
     "hiding_handle",
     "hint",
     "is_mesh",
     "key_cap",
     "locking_handle",
+    "looking_from",
     "merging",
     "naming_region",
     "notices_of",
@@ -103,7 +115,10 @@ __all__ = [
     "showing_cage",
     "split_region",
     "toggle_cages",
+    "toggle_cube",
     "toggle_overlay",
     "toggle_regions",
+    "toggle_projection",
     "with_radius",
+    "with_up",
 ]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..region_selector import Paint, Tool
-from . import actions, recording_actions
+from . import actions, recording_actions, view_actions
 from .actions import Action
 from .help_card import Section
 from .mode import Mode
@@ -21,6 +21,7 @@ ALL = frozenset(Mode)
 PAINTING = frozenset({R, H})
 BEFORE_AFTER = "backslash"  # acts while it is held
 DRAGGING = frozenset({P, D})
+_VIEW = "View"
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,8 @@ class Binding:
     """None if a widget handles these keys itself and they are listed for the help card only."""
     while_busy: bool = False
     """Whether the keys work while a job is running."""
+    heading: str = ""
+    """The section of the help card; by default that of the modes."""
 
 
 BINDINGS = (
@@ -91,6 +94,21 @@ BINDINGS = (
     Binding(("w",), ALL, "Shaded, with edges, wireframe", actions.next_style),
     Binding(("shift+g",), ALL, "Show regions", actions.toggle_regions),
     Binding((BEFORE_AFTER,), ALL, "Hold: show the mesh at rest", actions.show_rest),
+    *(
+        Binding((key,), ALL, label, action, while_busy=True, heading=_VIEW)
+        for key, label, action in (
+            ("kp_1", "Front", view_actions.looking_from("front")),
+            ("ctrl+kp_1", "Back", view_actions.looking_from("back")),
+            ("kp_3", "Right", view_actions.looking_from("right")),
+            ("ctrl+kp_3", "Left", view_actions.looking_from("left")),
+            ("kp_7", "Top", view_actions.looking_from("top")),
+            ("ctrl+kp_7", "Bottom", view_actions.looking_from("bottom")),
+            ("kp_0", "Three-quarter view", view_actions.looking_from("home")),
+            ("kp_5", "Orthographic or perspective", view_actions.toggle_projection),
+            ("period", "Frame selection", view_actions.frame_selection),
+            ("comma", "Frame all", view_actions.frame_all),
+        )
+    ),
 )
 
 _HEADINGS = {
@@ -103,6 +121,14 @@ _HEADINGS = {
     frozenset({H, D}): "3 Handles, 4 Deform",
     frozenset({P, C, D}): "0 Pull, 2 Cages, 4 Deform",
 }
+# How the mouse moves the camera; see `scene.navigation`.
+_MOUSE = [
+    ("Alt+drag", "Orbit; beside the mesh without Alt"),
+    ("Middle drag", "Pan"),
+    ("Right drag", "Zoom"),
+    ("Wheel", "Zoom to the pointer"),
+    ("Double click", "Frame the part under the pointer, or all"),
+]
 _CAPS = {
     "ctrl": "Ctrl",
     "shift": "Shift",
@@ -115,8 +141,16 @@ _CAPS = {
     "delete": "Del",
     "backslash": "\\",
     "return": "Enter",
+    "period": ".",
+    "comma": ",",
+    **{f"kp_{digit}": f"Num {digit}" for digit in range(10)},
 }
+# Without Num Lock the keypad has other names.  Its digits are not those of the main row.
+_KEYPAD = {"kp_insert": "kp_0", "kp_end": "kp_1", "kp_next": "kp_3", "kp_page_down": "kp_3",
+           "kp_begin": "kp_5", "kp_home": "kp_7", "kp_decimal": "period"}  # fmt: skip
+_KEYPAD |= {f"kp_{digit}": f"kp_{digit}" for digit in range(10)}
 _ALSO = {"kp_add": "plus", "kp_subtract": "minus", "iso_left_tab": "tab", "+": "plus", "-": "minus"}
+_ALSO |= _KEYPAD
 _UNLISTED = {"equal", "backspace", "ctrl+shift+z"}  # alternatives, left out of the help card
 
 
@@ -159,14 +193,11 @@ def key_cap(key: str) -> str:
 
 def help_sections() -> list[Section]:
     """Return the table for users, grouped by modes."""
-    return [
-        (
-            heading,
-            [
-                ("  ".join(key_cap(key) for key in b.keys if key not in _UNLISTED), b.label)
-                for b in BINDINGS
-                if b.modes == modes
-            ],
-        )
-        for modes, heading in _HEADINGS.items()
-    ]
+    sections: dict[str, list[tuple[str, str]]] = {name: [] for name in _HEADINGS.values()}
+    sections[_VIEW] = list(_MOUSE)
+    for b in BINDINGS:
+        caps = "  ".join(key_cap(key) for key in b.keys if key not in _UNLISTED)
+        heading = b.heading or _HEADINGS.get(b.modes)
+        if heading is not None:
+            sections[heading].append((caps, b.label))
+    return list(sections.items())

@@ -15,10 +15,11 @@ from typing import TypeVar
 
 from vtk_segdeform.kernels import advice
 from vtk_segdeform.progress import Progress
-from vtk_segdeform.session import Change, Preparation, Session
+from vtk_segdeform.session import Change, Preparation, Session, saved_view
 
 from ..recording import confined_path
 from ..scene import View, Widget
+from .camera import Camera, has_y_up
 from .help_card import HelpCard, Section
 from .hints import hint
 from .job import Worker, view_timer
@@ -28,7 +29,7 @@ from .mode import Mode
 from .notices import Notices
 from .preparing import Preparing
 from .recordings import Recordings
-from .session_file import SessionFile, read_session
+from .session_file import SessionFile, is_mesh, read_session
 from .widget_set import WidgetSet
 
 T = TypeVar("T")
@@ -64,6 +65,8 @@ class Controller:
         A step before the first of the session: its label, and a function that undoes it.
     recordings : Recordings
         The current recording of input and of video.
+    camera : Camera
+        Navigation, views and the orientation cube.
     """
 
     def __init__(self, view: View, session: Session, keys: list[Section]) -> None:
@@ -82,6 +85,7 @@ class Controller:
             view_timer(view), self._may_accept, self._accept, self._prepare_pulls, self.refresh
         )
         self.widgets = WidgetSet(view, session)
+        self.camera = Camera(view, self.widgets)
         self._listen()
         self.notices.follow(session)
         self.file = SessionFile(Path("session.segdeform"), session)
@@ -120,6 +124,7 @@ class Controller:
     @is_on.setter
     def is_on(self, on: bool) -> None:
         self._is_on = on
+        self.camera.navigation.SetEnabled(on)
         try:
             if not on:
                 self.help.hide()
@@ -136,6 +141,7 @@ class Controller:
         self._stop_failures()
         self.log.unfollow()
         self.recordings.remove()
+        self.camera.remove()
         self.widgets.remove()
         self.help.remove()
         self.notices.remove()
@@ -351,7 +357,7 @@ class Controller:
     def save(self) -> None:
         """Write the session to the file."""
         place = self.place
-        self.file.write(self.session, place)
+        self.file.write(self.session, place, self.camera.settings(self._mode))
         self.say(f"Saved to {place}")
 
     def open(self, path: Path) -> None:
@@ -359,11 +365,23 @@ class Controller:
 
         def replace(session: Session) -> str:
             self.widgets = self.widgets.replaced_by(session)
+            self.camera.follow(self.widgets)
             self._stop_listening()
             self._listen()
             self.notices.follow(session)
             self.file.opened(path, session)
+            self.restore_view(path)
             self.view.render()  # before anything else is computed
             return f"Opened {path}"
 
         self.start(f"Opening {path}", lambda progress: read_session(path, progress), replace)
+
+    def restore_view(self, path: Path) -> None:
+        """Restore camera and mode from a session file; set the up axis that a mesh file has."""
+        if is_mesh(path):
+            if has_y_up(path):
+                self.camera.show_model(path)
+            return
+        mode = self.camera.restore(saved_view(path))
+        if mode is not None:
+            self.mode = mode

@@ -11,7 +11,7 @@ in the background, and everything else works meanwhile.
 An action during a drag or a stroke first finishes it, as if the button had been released, as one
 undo step.  Only Escape cancels it; the help card does not interrupt it.
 
-The camera style and pyvista's own keys are unchanged.  The editor receives keys after its
+The camera moves alike in every host; see `Camera`.  The editor receives keys after its
 widgets, so that x, y, z constrain a drag, but before VTK and pyvista, from which it withholds its
 own keys.  With several editors in one window, keys go to the one under the pointer.
 """
@@ -55,8 +55,7 @@ class DeformEditor:
         has_camera = _is_aimed(self.view.renderer)
         session = session if isinstance(session, Session) else Session(session)
         self._controller = Controller(self.view, session, help_sections())
-        if not has_camera:
-            self.view.renderer.ResetCamera()
+        self._controller.camera.begin(is_aimed=has_camera)
         self._took_key = False
         self._is_removed = False
         self._stops: list[Stop] = []
@@ -89,6 +88,19 @@ class DeformEditor:
                 f"mode must be one of {', '.join(map(str, Mode))}; got {shown(mode)}"
             )
         self._controller.mode = mode
+
+    @property
+    def show_cube(self) -> bool:
+        """Whether the orientation cube is shown."""
+        return self._controller.camera.cube.is_shown
+
+    @show_cube.setter
+    def show_cube(self, shown: bool) -> None:
+        cube = self._controller.camera.cube
+        if as_flag(shown, "show_cube"):
+            cube.show()
+        else:
+            cube.hide()
 
     @property
     def path(self) -> Path:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.kernels import compiled_kernels
@@ -66,9 +68,9 @@ class SessionFile:
             self.path = path
             self.mark_saved(session)
 
-    def write(self, session: Session, place: Path) -> None:
+    def write(self, session: Session, place: Path, view: Mapping[str, Any] | None = None) -> None:
         """Save *session* to *place*, which differs from `path` in a replay; see `save_session`."""
-        save_session(place, session)
+        save_session(place, session, view=view)
         self._written, self._saved = place, session.state
 
     def mark_saved(self, session: Session) -> None:

@@ -9,16 +9,22 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 
-import numpy as np
-
+from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.session import Session
 
 from ..cage_display import CageDisplay
 from ..handle_dragger import HandleDragger
+from ..picking import Picker
 from ..puller import Puller
-from ..region_selector import Paint, RegionColours, RegionOutlines, RegionSelector
-from ..scene import SurfaceDisplay, View, Widget
+from ..region_selector import (
+    Paint,
+    RegionColours,
+    RegionOutlines,
+    RegionSelector,
+    dominant_region,
+)
+from ..scene import Pointer, SurfaceDisplay, View, Widget
 from ..volume_overlay import VolumeOverlay
 from .mode import Mode
 
@@ -37,6 +43,7 @@ class WidgetSet:
     def __init__(self, view: View, session: Session) -> None:
         self.session = session
         self.surface = SurfaceDisplay(view, session)
+        self._picker = Picker(self.surface)
         self.colours = RegionColours(self.surface)
         self.outlines = RegionOutlines(self.surface)
         self.selector = RegionSelector(view, session, self.surface, self.colours)
@@ -131,9 +138,24 @@ class WidgetSet:
         after = WidgetSet(self.selector.view, session)
         after.copy_settings(self)
         self.remove()
-        if not np.array_equal(session.mesh.vertices, self.session.mesh.vertices):
-            after.selector.view.renderer.ResetCamera()
         return after
+
+    def point_at(self, pointer: Pointer) -> FloatArray | None:
+        """Return the point (3,) of the surface at *pointer*, or None beside it."""
+        hit = self._picker.hit(pointer)
+        return None if hit is None else hit.point
+
+    def part_at(self, pointer: Pointer) -> FloatArray | None:
+        """Return the vertices (k, 3) of the region at *pointer*, or else of the connected part.
+
+        None beside the surface.
+        """
+        hit, regions = self._picker.hit(pointer), self.session.regions
+        if hit is None:
+            return None
+        if regions is None:
+            return self.session.vertices[self._picker.component(hit.vertex)]
+        return self.session.vertices[regions.members(dominant_region(regions, hit.vertex))]
 
     def bind(self, progress: Progress) -> None:
         """Precompute the data of the first drag; in any thread, while all widgets are off."""

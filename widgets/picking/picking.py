@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from vtkmodules.vtkCommonCore import vtkIdList, vtkPoints
@@ -22,6 +23,8 @@ from .visibility import visible_vertices
 
 # A ray through an edge must not pass between its two faces.
 _INTERSECTION_TOLERANCE = 1e-7  # of the diagonal
+# All pickers of a surface share its search structure.
+_locators: WeakKeyDictionary[SurfaceDisplay, vtkStaticCellLocator] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +66,9 @@ class Picker:
         self._data = vtkPolyData()
         self._data.SetPoints(surface.polydata.GetPoints())
         self._data.SetPolys(surface.polydata.GetPolys())
-        self._locator = vtkStaticCellLocator()
-        self._locator.SetDataSet(self._data)
+        self._locator = _locators.setdefault(surface, vtkStaticCellLocator())
+        if self._locator.GetDataSet() is None:
+            self._locator.SetDataSet(self._data)
         self._distance: SurfaceDistance | None = None
         self._ring: SurfaceRing | None = None
         self._visibility: _Visibility | None = None
@@ -80,6 +84,7 @@ class Picker:
             return []
         self._locator.BuildLocator()  # does nothing unless the pose has changed
         points, faces = vtkPoints(), vtkIdList()
+        points.SetDataTypeToDouble()  # far from the origin single precision is coarse
         tolerance = _INTERSECTION_TOLERANCE * self._mesh.diagonal
         self._locator.IntersectWithLine(near, far, tolerance, points, faces)
         return [

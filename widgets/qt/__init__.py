@@ -6,13 +6,17 @@ The files, in reading order:
     panel       the panel beside the view
     toolbar pulling painting regions handles options status log
                 the parts of the panel
+    view_menu   menu entries for the camera
+    event_filter    what pyvistaqt does not tell VTK of Qt's events
     controls    buttons, fields and layouts of the parts
     icons       the icons of the toolbar
 """
 
+from .view_menu import add_view_entries
 from .widget import DeformWidget, deform_dock
 
 __all__ = [
     "DeformWidget",
+    "add_view_entries",
     "deform_dock",
 ]

@@ -28,6 +28,7 @@ from ..editor import (
 )
 from .controls import doing, highlighted, put, tool_button
 from .icons import icon
+from .view_menu import add_view_entries
 
 Qt = QtCore.Qt
 _SESSIONS = "Sessions (*.segdeform)"
@@ -144,6 +145,8 @@ class Toolbar(QtWidgets.QWidget):
             entry = menu.addAction(f"{binding.label}\t{key_cap(key)}")
             entry.triggered.connect(lambda _=False, do=binding.action: self._editor.do(do))
             entries.append(entry)
+        menu.addSeparator()
+        add_view_entries(menu, lambda: self._editor)
         return entries
 
     def _update_view(self) -> None:

@@ -5,7 +5,7 @@ the stroke, the release records one undo step, and Escape cancels.
 
 brush, component    a press beside the mesh moves the camera
 lasso, rectangle    start anywhere in the view
-all tools           a press with Shift held moves the camera
+all tools           a press with Alt held moves the camera
 ``[``  ``]``        smaller, larger brush; with Shift held the wheel over the mesh does the same
 
 A change of regions resets the pose, as in `Session`; fixed vertices and handles keep it.
@@ -157,8 +157,8 @@ class RegionSelector(Widget):
             self._ring.hide()
 
     def on_press(self, press: Pointer) -> Gesture | None:
-        """Start a stroke; pass the press to the camera with Shift or beside the mesh."""
-        stroke = None if press.shift else self._stroke_from(press)
+        """Start a stroke; pass the press to the camera beside the mesh."""
+        stroke = self._stroke_from(press)
         return None if stroke is None else self._follow(stroke, self._target, press.control)
 
     def on_hover(self, pointer: Pointer) -> None:

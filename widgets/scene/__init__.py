@@ -8,6 +8,9 @@ The files, in reading order:
     surface_display    the mesh of a session as an actor
     backdrop           background and light of a window that belongs to the editor
     projection         projection between world and display coordinates
+    viewpoint          movements of the camera, named views, framing, the up axis
+    navigation         the camera by mouse
+    orientation_cube   a cube that shows the directions of the model
     foreground         a renderer that draws over another one
     labels             rectangles and text in display coordinates
     wireframe          edges and vertices of a mesh
@@ -19,16 +22,22 @@ from .backdrop import set_background, set_lights
 from .gestures import Gesture, Phase, Pointer
 from .highlights import Highlights
 from .labels import Panel, Text
+from .navigation import Navigation
+from .orientation_cube import OrientationCube
 from .projection import Projection
 from .step_budget import StepBudget, observe_steps, prescribe_steps
 from .surface_display import SurfaceDisplay, SurfaceStyle
 from .view import Stop, View
+from .viewpoint import VIEWS, Viewpoint
 from .widget import Widget
 from .wireframe import Wireframe
 
 __all__ = [
+    "VIEWS",
     "Gesture",
     "Highlights",
+    "Navigation",
+    "OrientationCube",
     "Panel",
     "Phase",
     "Pointer",
@@ -39,6 +48,7 @@ __all__ = [
     "SurfaceStyle",
     "Text",
     "View",
+    "Viewpoint",
     "Widget",
     "Wireframe",
     "observe_steps",

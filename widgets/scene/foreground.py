@@ -29,11 +29,7 @@ class Foreground:
         self.renderer = vtkRenderer()
         self.renderer.InteractiveOff()
         self.renderer.SetViewport(*renderer.GetViewport())
-        window = renderer.GetRenderWindow()
-        layer = 1 + max(r.GetLayer() for r in _renderers(window) if _overlap(r, renderer))
-        window.SetNumberOfLayers(max(window.GetNumberOfLayers(), layer + 1))
-        self.renderer.SetLayer(layer)
-        window.AddRenderer(self.renderer)
+        layer_above(renderer, self.renderer)
 
     def follow(self) -> None:
         """Copy camera and viewport, with a clipping range that covers the actors of both."""
@@ -55,6 +51,15 @@ class Foreground:
         if window is not None:
             window.RemoveRenderer(self.renderer)
             window.SetNumberOfLayers(1 + max((r.GetLayer() for r in _renderers(window)), default=0))
+
+
+def layer_above(renderer: Any, added: Any) -> None:
+    """Add the renderer *added* to the window of *renderer*, in a layer above all at its place."""
+    window = renderer.GetRenderWindow()
+    layer = 1 + max(r.GetLayer() for r in _renderers(window) if _overlap(r, renderer))
+    window.SetNumberOfLayers(max(window.GetNumberOfLayers(), layer + 1))
+    added.SetLayer(layer)
+    window.AddRenderer(added)
 
 
 def _renderers(window: Any) -> list[Any]:

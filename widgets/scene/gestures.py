@@ -49,6 +49,7 @@ class Pointer:
     y: float
     shift: bool = False
     control: bool = False
+    alt: bool = False
 
     @property
     def position(self) -> FloatArray:

@@ -226,7 +226,8 @@ class View(Projection):
         """Return the current pointer position of the interactor, with the given *phase*."""
         x, y = self.interactor.GetEventPosition()
         shift, control = self.interactor.GetShiftKey(), self.interactor.GetControlKey()
-        return Pointer(phase, float(x), float(y), shift=bool(shift), control=bool(control))
+        alt = bool(self.interactor.GetAltKey())
+        return Pointer(phase, float(x), float(y), bool(shift), bool(control), alt)
 
     def _end_camera_drag(self, *_: object) -> None:
         """End an ongoing camera drag, as if the button had been released."""

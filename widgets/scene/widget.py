@@ -2,8 +2,9 @@
 
 A widget returns the gesture that a press starts from `on_press`.  If there is one, the press does
 not reach the camera, moves and the release are sent to the gesture, and Escape or the right button
-cancels it.  Any other interruption, such as a change of tool or a background job, finishes the
-gesture like a release, so no work is lost.  Elsewhere in the view the camera works as usual.
+cancels it.  A press with Alt always reaches the camera.  Any other interruption, such as a change
+of tool or a background job, finishes the gesture like a release, so no work is lost.  Elsewhere in
+the view the camera works as usual.
 
 The interface follows VTK's widgets: `On`, `Off`, `SetEnabled`, `GetEnabled`, and observers of
 ``StartInteractionEvent``, ``InteractionEvent`` and ``EndInteractionEvent``, each invoked after the
@@ -66,7 +67,10 @@ class Widget(abc.ABC):
         del pointer
 
     def on_wheel(self, pointer: Pointer, clicks: int) -> bool:
-        """Handle +1 or -1 *clicks* of the wheel; return False to pass them to the camera."""
+        """Handle +1 or -1 *clicks* of the wheel; return False to pass them to the camera.
+
+        Called with Shift held, and during a gesture; otherwise the wheel always zooms.
+        """
         del pointer, clicks
         return False
 
@@ -159,7 +163,8 @@ class Widget(abc.ABC):
         self.finish()  # in case the last release never arrived
         if self.is_grabbing:  # the gesture is still handling the event that caused this one
             return True
-        gesture = self.on_press(press) if self.view.contains(press) else None
+        is_mine = self.view.contains(press) and not press.alt  # with Alt the camera moves
+        gesture = self.on_press(press) if is_mine else None
         if gesture is None:
             return False
         self._grab.begin(gesture, press)
@@ -189,7 +194,8 @@ class Widget(abc.ABC):
 
     def _wheel(self, clicks: int) -> bool:
         pointer = self.view.pointer(Phase.HOVER)
-        return self.view.contains(pointer) and self.on_wheel(pointer, clicks)
+        is_mine = self.view.contains(pointer) and (pointer.shift or self.is_grabbing)
+        return is_mine and self.on_wheel(pointer, clicks)
 
     def _key(self) -> bool:
         key = self.view.interactor.GetKeySym() or ""

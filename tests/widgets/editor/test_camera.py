@@ -1,0 +1,173 @@
+"""The camera of the editor: by mouse in every mode, named views, framing, and its saved state."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+from hands import Hand, plain_view
+from vtkmodules.vtkInteractionStyle import (
+    vtkInteractorStyleJoystickCamera,
+    vtkInteractorStyleTerrain,
+    vtkInteractorStyleTrackballCamera,
+)
+
+from vtk_segdeform import Mesh, models
+from vtk_segdeform.session import saved_view
+from vtk_segdeform.widgets import DeformEditor, Mode
+
+STYLES = {
+    each.__name__: each
+    for each in (
+        vtkInteractorStyleTrackballCamera,
+        vtkInteractorStyleTerrain,
+        vtkInteractorStyleJoystickCamera,
+    )
+}
+
+
+@functools.cache
+def _cactus():
+    return models.cactus(500)
+
+
+class Bench:
+    """An editor over a cactus in plain VTK, and a hand."""
+
+    def __init__(self, scale=1.0, shift=0.0):
+        mesh = _cactus()
+        self.mesh = Mesh(mesh.vertices * scale + shift, mesh.faces)
+        self.view = plain_view()
+        self.editor = DeformEditor(self.view, self.mesh)
+        self.editor.On()
+        self.view.render()
+        self.hand = Hand(self.view)
+
+    @property
+    def camera(self):
+        camera = self.view.camera
+        return np.array([camera.GetPosition(), camera.GetFocalPoint(), camera.GetViewUp()])
+
+    @property
+    def middle(self):
+        return np.round(self.hand.at(self.mesh.vertices.mean(axis=0)))
+
+    def drag(self, button, start, *, alt=False):
+        """Drag, and return how position, focus and view-up of the camera have moved."""
+        before = self.camera
+        self.view.interactor.SetAltKey(alt)
+        self.hand.hover(start)
+        self.hand.event(f"{button}ButtonPressEvent", start)
+        for by in ((10, 4), (20, 8)):
+            self.hand.move(np.add(start, by))
+        self.hand.event(f"{button}ButtonReleaseEvent", np.add(start, (20, 8)))
+        self.view.interactor.SetAltKey(0)
+        after = self.camera
+        self.hand.move(start)
+        assert np.array_equal(self.camera, after)  # it does not follow the pointer any more
+        return np.abs(after - before).max(axis=1) / self.mesh.diagonal
+
+
+@pytest.fixture(params=[(1.0, 0.0), (1e-7, 0.0), (1e6, 0.0), (1.0, 1e6)])
+def bench(request):
+    bench = Bench(*request.param)
+    yield bench
+    bench.editor.remove()
+
+
+def test_every_drag_moves_the_camera_in_every_mode_and_style(bench):
+    for style, mode in zip([*STYLES, *STYLES], Mode, strict=False):
+        bench.view.interactor.SetInteractorStyle(STYLES[style]())
+        bench.editor.mode = mode
+        before = bench.editor.session.state
+        for button, place, alt in (
+            ("Left", bench.middle, True), ("Left", (5, 395), False),
+            ("Middle", bench.middle, False), ("Right", bench.middle, False),
+        ):  # fmt: skip
+            moved = bench.drag(button, place, alt=alt)
+            assert moved[0] > 1e-3, (style, mode, button)
+            assert (moved[1] > 1e-3) == (button == "Middle" or alt)
+            assert np.isfinite(bench.camera).all()
+            bench.editor.controller.camera.viewpoint.home()
+        assert bench.editor.session.state is before
+        assert bench.hand.failures == []
+
+
+def test_the_wheel_zooms_to_the_pointer_within_limits(bench):
+    place, radius = bench.middle, bench.editor.widgets.selector.radius
+    bench.hand.hover(place)
+    point = bench.editor.widgets.point_at(bench.view.pointer(None))
+    for clicks in (8, 40, -90):
+        bench.hand.wheel(clicks, place)
+        assert np.allclose(bench.hand.at(point), place, atol=1.0)
+        distance = bench.view.camera.GetDistance() / bench.mesh.diagonal
+        assert 1e-3 < distance < 200.0
+        near, far = bench.view.camera.GetClippingRange()
+        assert 0.0 < near < far
+    assert bench.editor.widgets.selector.radius == radius
+
+
+def test_the_camera_never_turns_upside_down(bench):
+    for dy in (70, -90, 90):
+        for _ in range(4):
+            bench.hand.drag([(5, 200), (15, 200 + dy)])
+        assert bench.camera[2] @ [0.0, 0.0, 1.0] >= -1e-9
+        assert abs(bench.camera[2] @ bench.view.view_direction) < 1e-6
+
+
+def test_keys_of_the_keypad_show_the_model_and_change_no_mode(bench):
+    mode, seen = bench.editor.mode, set()
+    for key in ("KP_1", "KP_End", "KP_3", "KP_7", "KP_5", "KP_0", "period", "comma"):
+        bench.hand.key(key)
+        seen.add(tuple(np.round(bench.view.view_direction, 6)))
+        shown = bench.view.to_display(bench.mesh.vertices)[:, :2]
+        assert shown.min() > 0.0
+        assert shown.max() < 400.0
+    assert seen >= {(0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, -1.0)}
+    assert bench.editor.mode is mode
+    assert bench.view.camera.GetParallelProjection()
+
+
+def test_a_double_click_frames_and_a_click_on_the_cube_turns():
+    bench = Bench()
+    bench.hand.wheel(10, (100, 100))
+    for _ in range(2):
+        bench.hand.click((5, 5))
+    shown = bench.view.to_display(bench.mesh.vertices)[:, :2]
+    assert shown.min() > 0.0
+    assert shown.max() < 400.0
+    bench.editor.show_cube = True
+    bench.view.render()
+    left, bottom, right, top = bench.editor.controller.camera.cube.rectangle
+    bench.hand.click((0.5 * (left + right), top - 0.3 * (top - bottom)))
+    assert bench.editor.session.undo_label is None
+    assert bench.view.view_direction @ [0.0, 0.0, 1.0] < -0.7
+    count = bench.view.window.GetRenderers().GetNumberOfItems()
+    bench.editor.remove()
+    assert bench.view.window.GetRenderers().GetNumberOfItems() < count
+
+
+def test_a_session_file_keeps_the_view_and_ignores_a_damaged_one(tmp_path):
+    bench, path = Bench(), tmp_path / "work.segdeform"
+    bench.hand.key("KP_3")
+    bench.editor.mode = Mode.CAGES
+    bench.editor.save(path)
+    kept = saved_view(path)
+    other = Bench()
+    other.editor.load(path)
+    assert np.allclose(other.camera, bench.camera)
+    assert other.editor.mode is Mode.CAGES
+    before = other.camera
+    for name, value in (
+        ("position", ["x"] * 3),
+        ("angle", float("nan")),
+        ("scale", -1.0),
+        ("focus", kept["position"]),
+        ("up", [0, 0, 0]),
+        ("parallel", 1),
+    ):
+        other.editor.controller.camera.viewpoint.restore({**kept, name: value})
+        assert np.array_equal(other.camera, before), name
+    path.write_bytes(b"nothing")
+    assert saved_view(path) == {}

@@ -1,0 +1,196 @@
+"""A cube in the upper right corner of a view that shows the directions of the model.
+
+Drag it to orbit.  Click a face for the view from there, an edge or a corner for the view between.
+Faces are named after the up axis: Front, Right, Top and so on.
+
+The cube has a renderer of its own above that of the view, which copies the camera's direction.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from vtkmodules.vtkRenderingAnnotation import vtkAnnotatedCubeActor
+from vtkmodules.vtkRenderingCore import vtkRenderer
+
+from vtk_segdeform.arrays import FloatArray
+from vtk_segdeform.pictures import INK, rgb
+
+from .foreground import layer_above
+from .gestures import Phase, Pointer
+from .navigation import Navigation
+from .projection import Projection
+from .view import Stop, View
+
+_ABOVE_WIDGETS = 1.5  # priority: our widgets have 1
+_SIZE, _SMALLEST_VIEW = 84.0, 240  # pixels
+_MARGIN = 10.0  # pixels, to the corner of the view
+_REACH = 0.9  # half the height of its view; a corner of the cube is at 0.87
+_EDGE = 0.32  # from the centre of a face to where an edge begins; the edge itself is at 0.5
+_CLICK = 4.0  # pixels; a press that moves more is a drag
+_FACE, _LINE = "#E9E7E2", INK
+_AXES = np.eye(3)
+
+
+class OrientationCube:
+    """The cube of a view; hidden until `show`.
+
+    Parameters
+    ----------
+    view : View
+        The view to show it in.
+    navigation : Navigation
+        Moves the camera of the view.
+    """
+
+    def __init__(self, view: View, navigation: Navigation) -> None:
+        self.view, self._navigation = view, navigation
+        self._renderer: vtkRenderer | None = None
+        self._cube = _cube()
+        self._labelled: tuple[float, ...] = ()  # the up axis
+        self._press: Pointer | None = None
+        self._stops: list[Stop] = []
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether it is shown."""
+        return self._renderer is not None
+
+    def show(self) -> None:
+        """Show it."""
+        if self._renderer is not None:
+            return
+        self._renderer = vtkRenderer()
+        self._renderer.InteractiveOff()
+        camera = self._renderer.GetActiveCamera()
+        camera.ParallelProjectionOn()
+        camera.SetParallelScale(_REACH)
+        self._renderer.AddViewProp(self._cube)
+        layer_above(self.view.renderer, self._renderer)
+        observe = self.view.observe
+        self._stops = [
+            self.view.before_render(self._follow),
+            observe("LeftButtonPressEvent", self._pressed, _ABOVE_WIDGETS),
+            observe("LeftButtonReleaseEvent", self._released, _ABOVE_WIDGETS),
+        ]
+        self.view.request_render()
+
+    def hide(self) -> None:
+        """Hide it and remove its renderer from the window."""
+        if self._renderer is None:
+            return
+        for stop in self._stops:
+            stop()
+        self._stops, self._press = [], None
+        self._renderer.RemoveAllViewProps()
+        window = self._renderer.GetRenderWindow()
+        if window is not None:
+            window.RemoveRenderer(self._renderer)
+        self._renderer = None
+        self.view.request_render()
+
+    @property
+    def rectangle(self) -> tuple[float, float, float, float]:
+        """Left, bottom, right and top in pixels of the window; all 0 in a view too small for it."""
+        x, y = self.view.renderer.GetOrigin()
+        width, height = self.view.renderer.GetSize()
+        if min(width, height) < _SMALLEST_VIEW:
+            return 0.0, 0.0, 0.0, 0.0
+        size = float(np.clip(_SIZE * height / 600.0, _SIZE, 2.0 * _SIZE))
+        right, top = x + width - _MARGIN, y + height - _MARGIN
+        return right - size, top - size, right, top
+
+    def direction_at(self, pointer: Pointer) -> FloatArray | None:
+        """Return the direction (3,) of the face, edge or corner at *pointer*, or None beside it."""
+        left, bottom, right, top = self.rectangle
+        if self._renderer is None or not (
+            left < right and left <= pointer.x <= right and bottom <= pointer.y <= top
+        ):
+            return None
+        near, far = Projection(self._renderer).ray(pointer)
+        step = far - near
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slabs = np.sort([(-0.5 - near) / step, (0.5 - near) / step], axis=0)
+        enter, leave = np.nanmax(slabs[0]), np.nanmin(slabs[1])
+        if not enter <= leave:
+            return None
+        point = near + enter * step
+        direction = np.where(np.abs(point) > _EDGE, np.sign(point), 0.0)
+        return np.asarray(direction)
+
+    # Events.
+
+    def _pressed(self) -> bool:
+        pointer = self.view.pointer(Phase.PRESS)
+        self._press = None
+        if pointer.alt or self.direction_at(pointer) is None:
+            return False
+        self._press = pointer
+        self._navigation.orbit(pointer)
+        return True
+
+    def _released(self) -> bool:
+        press, self._press = self._press, None
+        if press is None:
+            return False
+        pointer = self.view.pointer(Phase.RELEASE)
+        moved = float(np.linalg.norm(pointer.position - press.position))
+        direction = self.direction_at(press)
+        self._navigation.end_drag()
+        if moved <= _CLICK and direction is not None:
+            self._navigation.viewpoint.look_along(direction)
+        return True
+
+    # Drawing.
+
+    def _follow(self) -> None:
+        """Copy the direction of the view's camera, and lay out."""
+        renderer = self._renderer
+        if renderer is None:
+            return
+        left, bottom, right, top = self.rectangle
+        renderer.SetDraw(left < right)
+        if left >= right:
+            return
+        width, height = self.view.window.GetSize()
+        renderer.SetViewport(left / width, bottom / height, right / width, top / height)
+        camera, of_view = renderer.GetActiveCamera(), self.view.camera
+        camera.SetFocalPoint(0.0, 0.0, 0.0)
+        camera.SetPosition(*(-5.0 * self.view.view_direction))
+        camera.SetViewUp(*of_view.GetViewUp())
+        camera.SetClippingRange(1.0, 10.0)
+        up = tuple(self._navigation.viewpoint.up)
+        if up != self._labelled:
+            self._labelled = up
+            _label(self._cube, self._navigation.viewpoint.axes)
+
+
+def _cube() -> vtkAnnotatedCubeActor:
+    cube = vtkAnnotatedCubeActor()
+    cube.PickableOff()
+    cube.SetFaceTextScale(0.15)
+    cube.GetCubeProperty().SetColor(*(rgb(_FACE) / 255.0))
+    cube.GetCubeProperty().SetAmbient(0.7)
+    cube.GetCubeProperty().SetDiffuse(0.3)
+    cube.GetCubeProperty().SetEdgeVisibility(True)
+    cube.GetCubeProperty().SetEdgeColor(*(rgb(_LINE) / 255.0))
+    cube.SetTextEdgesVisibility(False)
+    for sign in ("Plus", "Minus"):
+        for axis in "XYZ":
+            style = getattr(cube, f"Get{axis}{sign}FaceProperty")()
+            style.SetColor(*(rgb(_LINE) / 255.0))
+            style.LightingOff()
+    return cube
+
+
+def _label(cube: vtkAnnotatedCubeActor, axes: FloatArray) -> None:
+    """Write the names of the views on the faces; *axes* (3, 3) are right, front and up."""
+    names = ("RIGHT", "LEFT"), ("FRONT", "BACK"), ("TOP", "BOTTOM")
+    for (plus, minus), axis in zip(names, axes, strict=True):
+        k = int(np.abs(axis).argmax())
+        first, second = (plus, minus) if axis[k] > 0.0 else (minus, plus)
+        getattr(cube, f"Set{'XYZ'[k]}PlusFaceText")(first)
+        getattr(cube, f"Set{'XYZ'[k]}MinusFaceText")(second)
+    # VTK draws the text of z faces for y up, of all others for z up.
+    is_y_up = abs(axes[2][1]) > 0.5
+    cube.SetXFaceTextRotation(270.0 if is_y_up else 360.0)  # VTK does not return to 0
+    cube.SetZFaceTextRotation(90.0 if is_y_up else 360.0)
