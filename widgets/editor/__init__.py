@@ -117,8 +117,8 @@ __all__ = [
     "toggle_cages",
     "toggle_cube",
     "toggle_overlay",
-    "toggle_regions",
     "toggle_projection",
+    "toggle_regions",
     "with_radius",
     "with_up",
 ]

@@ -269,7 +269,6 @@ def test_a_region_cannot_be_emptied(desk):
 
 def test_brackets_and_the_wheel_with_shift_over_the_mesh_change_the_brush(desk):
     here, radius = desk.under(0.0, 0.0), desk.selector.radius
-    camera = desk.view.camera.GetDistance()
     desk.hand.wheel(+2, here, shift=True)
     assert desk.selector.radius > 1.3 * radius
     desk.hand.wheel(-2, here, shift=True)
