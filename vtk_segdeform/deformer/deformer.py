@@ -262,7 +262,6 @@ class Deformer:
 
         at_origin = self._frame.about_origin(mesh.vertices)
         self._rest_pose = mesh.with_vertices(at_origin) if self._frame.is_far else mesh
-        self._base = self._binding.mapping.base(self._rest_pose.vertices)
         self._enclose()
         self._samples = SurfaceSamples.of(self._rest, self._binding.coarse_volume)
         self._constrain(fixed, handle)
@@ -555,7 +554,7 @@ class Deformer:
         x is rest + W~ (p - rest), which is W~ p, but at rest exact however W~ is rounded.
         """
         moves = offsets - self._rest_cages * self._frame.size
-        return self._binding.mapping.map(np.hstack([moves, *directions]), self._base)
+        return self.subspace.map(np.hstack([moves, *directions]), self._rest_pose.vertices)
 
     def _preserved_volumes(self) -> tuple[VolumeConstraint, ...]:
         if not self.has_volume:
@@ -576,11 +575,7 @@ class Deformer:
         self._lids = lids_of(self._rest_pose, self._lids_option)
         self._total_volume = total_volume(self._rest_pose, self._lids)
         self._scaled_surface = ScaledSurface(
-            self.subspace,
-            self._binding.mapping,
-            self._rest_pose.vertices,
-            self._total_volume,
-            base=self._base,
+            self.subspace, self._rest_pose.vertices, self._total_volume
         )
 
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
     volumes         `volume.signed_volume`, `volume.volume_along_path`, `volume.volume_gradient`
     products        `subspace.Subspace`
-    low_rank        `low_rank.LowRankSubspace`
+    interpolated    `interpolated.InterpolatedBlock`
     mean_value      `mean_value.mean_value_coordinates`
     normals         `normals.VertexNormals`
     rotations       `rotations.closest_rotations`
@@ -13,7 +13,7 @@ are positional, as numba requires, and outputs are arrays passed as arguments.
 """
 
 from .factor import solve_factored
-from .low_rank import map_low_rank
+from .interpolated import add_interpolated, interpolated_rows
 from .mean_value import weights
 from .normals import ring_normals, rings
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
@@ -22,9 +22,10 @@ from .volumes import volume_along_sums, volume_gradient, volume_sums
 
 __all__ = [
     "add_adjoint",
+    "add_interpolated",
     "add_packed_adjoint",
     "add_product",
-    "map_low_rank",
+    "interpolated_rows",
     "map_packed",
     "ring_normals",
     "rings",
