@@ -19,7 +19,7 @@ from .. import sizes
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage
 from ..energy import Energy, join_rotations, shape_energy, with_cage_stiffness
-from ..geometry import cluster_within_parts
+from ..geometry import cluster_within_parts, decimated
 from ..mesh import Mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions
@@ -119,6 +119,10 @@ def _first_clusters(inputs: BindingInputs) -> IntArray | None:
         count = max(sizes.FIRST_CLUSTERS, sizes.FIRST_CLUSTERS_EACH * count)
     if count >= n:
         return np.arange(n)
+    if inputs.is_reduced and n > sizes.DECIMATED:
+        _, kept, of_vertex = decimated(inputs.regions.mesh, sizes.DECIMATED_POINTS)
+        parts, x = inputs.parts[kept], inputs.rest.vertices[kept]
+        return cluster_within_parts(x, parts, count, quick=True)[of_vertex]
     return cluster_within_parts(inputs.rest.vertices, inputs.parts, count, quick=inputs.is_reduced)
 
 

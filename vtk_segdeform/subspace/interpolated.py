@@ -170,6 +170,9 @@ class InterpolatedBlock:
     def adjoint(self, y: FloatArray) -> FloatArray:
         """Return the transpose times *y* (n, k): (m, k)."""
         own, at_nodes = self._of(slice(None)), np.zeros((len(self.values), y.shape[1]))
+        if kernels := compiled_kernels():
+            kernels.add_interpolated_adjoint(at_nodes, *inputs(y, *own, self.lines))
+            return np.asarray(self.values.T @ at_nodes)
         for start in range(0, len(y), _SOME):
             piece = slice(start, start + _SOME)
             at_nodes += self._weights(piece, own).T @ y[piece]

@@ -13,7 +13,7 @@ are positional, as numba requires, and outputs are arrays passed as arguments.
 """
 
 from .factor import solve_factored
-from .interpolated import add_interpolated, interpolated_rows
+from .interpolated import add_interpolated, add_interpolated_adjoint, interpolated_rows
 from .mean_value import weights
 from .normals import ring_normals, rings
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
@@ -23,6 +23,7 @@ from .volumes import volume_along_sums, volume_gradient, volume_sums
 __all__ = [
     "add_adjoint",
     "add_interpolated",
+    "add_interpolated_adjoint",
     "add_packed_adjoint",
     "add_product",
     "interpolated_rows",

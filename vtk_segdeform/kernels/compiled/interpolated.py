@@ -41,6 +41,22 @@ def add_interpolated(x, rows, blend, offsets, cells, lines, values):
 
 
 @_compile
+def add_interpolated_adjoint(values, y, blend, offsets, cells, lines):
+    """Add the transpose of the interpolation times *y* (n, k) to *values* (nodes, k)."""
+    u, v, w = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(len(y)):
+        _splines(u, float(offsets[i, 0]), blend[i])
+        _splines(v, float(offsets[i, 1]), 1.0)
+        _splines(w, float(offsets[i, 2]), 1.0)
+        line = lines[cells[i]]
+        for k in range(9):
+            weight, n = u[k // 3] * v[k % 3], line[k]
+            for d in range(3):
+                for c in range(y.shape[1]):
+                    values[n + d, c] += weight * w[d] * y[i, c]
+
+
+@_compile
 def interpolated_rows(out, blend, offsets, cells, lines, values):
     """Put the interpolated *values* (nodes, m) into *out* (k, m)."""
     u, v, w = np.empty(3), np.empty(3), np.empty(3)
