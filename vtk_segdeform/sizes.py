@@ -2,7 +2,7 @@
 
 Below a size the plain way is as fast, or more exact at no cost; above it another way pays.  The
 table in ``docs/speed.rst`` has the measurements.  Read a size as an attribute of this module,
-``sizes.LOW_RANK``: tests lower it to cover the other way with small meshes.
+``sizes.INTERPOLATED``: tests lower it to cover the other way with small meshes.
 """
 
 from __future__ import annotations

@@ -140,7 +140,7 @@ def _inside_of_many(points: FloatArray, vertices: FloatArray, faces: IntArray) -
         for some in np.array_split(corners[parts == k], max(1, len(share) * len(corners) >> 20)):
             reached.ravel()[boxes((share @ some).reshape(-1, 3))] = True
     box = boxes(points)
-    is_near = ndimage.binary_dilation(reached, np.ones((3, 3, 3))).ravel()[box]
+    is_near = ndimage.binary_dilation(reached, np.ones((3, 3, 3), dtype=bool)).ravel()[box]
     inside = np.empty(len(points), dtype=bool)
     inside[is_near] = inside_points(points[is_near], vertices, faces)
     far = np.flatnonzero(~is_near)

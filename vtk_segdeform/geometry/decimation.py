@@ -23,7 +23,7 @@ _PER_CELL = 1.5  # clusters in a surface, for each square of the grid that would
 _ROUNDS, _GAIN = 6, 0.8  # of the search for the spacing; exponent of its correction
 _FEW, _MANY = 0.7, 1.5  # clusters, in numbers requested
 
-_last: WeakKeyDictionary[Mesh, tuple[int, Mesh, IntArray]] = WeakKeyDictionary()
+_last: WeakKeyDictionary[Mesh, tuple[int, Mesh, IntArray, IntArray]] = WeakKeyDictionary()
 
 
 def decimated(mesh: Mesh, n_points: int) -> tuple[Mesh, IntArray, IntArray]:
@@ -44,9 +44,9 @@ def decimated(mesh: Mesh, n_points: int) -> tuple[Mesh, IntArray, IntArray]:
     if found is None or found[0] != n_points:
         cluster = _clusters(mesh, n_points)
         kept = _nearest_to_mean(mesh.vertices, cluster)
-        found = n_points, _joined(mesh, kept, cluster), kept, cluster
-        _last[mesh] = found
-    return found[1:]
+        found = _last[mesh] = n_points, _joined(mesh, kept, cluster), kept, cluster
+    _, coarse, kept, cluster = found
+    return coarse, kept, cluster
 
 
 def _clusters(mesh: Mesh, n_points: int) -> IntArray:

@@ -69,13 +69,15 @@ class CoarseVolume:
         if n <= sizes.COARSE_VOLUME or whole:
             return cls(subspace)
         rng = np.random.default_rng(0)
-        areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), n)
+        corners = np.repeat(mesh.face_areas, 3)
+        areas = np.asarray(np.bincount(mesh.faces.ravel(), corners, n), dtype=np.float64)
         if n > sizes.DECIMATED:
             coarse, kept, cluster = decimated(mesh, sizes.DECIMATED_POINTS)
             _, cells = voronoi_cells(coarse, sizes.COARSE_VOLUME_POINTS, rng, progress)
-            cells, of_cluster = cells[cluster], np.bincount(cluster, areas)
-            areas = np.zeros(n)
-            areas[kept] = of_cluster
+            cells = cells[cluster]
+            of_clusters = np.zeros(n)
+            of_clusters[kept] = np.bincount(cluster, areas)
+            areas = of_clusters
         else:
             _, cells = voronoi_cells(mesh, sizes.COARSE_VOLUME_POINTS, rng, progress)
         shares = areas / np.bincount(cells, areas)[cells]

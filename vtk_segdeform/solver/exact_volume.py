@@ -103,9 +103,7 @@ class ScaledSurface:
         The total volume.
     """
 
-    def __init__(
-        self, subspace: Subspace, rest: FloatArray, constraint: VolumeConstraint
-    ) -> None:
+    def __init__(self, subspace: Subspace, rest: FloatArray, constraint: VolumeConstraint) -> None:
         self._subspace, self._rest, self._constraint = subspace, rest, constraint
 
     def scaled(self, moves: FloatArray, centre: FloatArray) -> tuple[FloatArray, float]:

@@ -137,7 +137,7 @@ class InterpolatedBlock:
     @property
     def size(self) -> int:
         """Number of numbers in all rows."""
-        return len(self.blend) * self.values.shape[1]
+        return int(np.prod(self.shape))
 
     def __getitem__(self, rows: IntArray | slice) -> FloatArray:
         """Return some rows, (k, m)."""

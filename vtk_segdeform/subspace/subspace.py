@@ -169,7 +169,7 @@ class Subspace:
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
             met = np.flatnonzero(is_met[rows])
             if isinstance(block, InterpolatedBlock):
-                out[:, columns] = block.premultiplied(by_column[:, rows])
+                out[:, columns] = block.premultiplied(by_column[:, rows].tocsr())
                 continue
             for piece in row_pieces(len(met), block.shape[1]):
                 out[:, columns] += by_column[:, rows[met[piece]]] @ _double(block[met[piece]])
@@ -380,18 +380,20 @@ def cage_subspace(
         If *blend* has another shape, or is no partition of unity over the regions.
     """
     _check_cages(regions, cages)
+    rows: list[IntArray] = []
+    blocks: list[FloatArray | InterpolatedBlock] = []
     weights = regions.weights if blend is None else _checked_blend(blend, regions)
-    rows, blocks = [], []
     for r, cage in enumerate(cages):
         share = part(progress, r / len(cages), (r + 1) / len(cages))
         members = np.flatnonzero(weights[r] > 0.0)
         points = regions.mesh.vertices[members]
+        interpolated = None
         if regions.mesh.n_vertices > sizes.INTERPOLATED:
-            block = InterpolatedBlock.of(points, weights[r, members], cage, share)
-            if block is not None:
-                rows.append(members)
-                blocks.append(block)
-                continue
+            interpolated = InterpolatedBlock.of(points, weights[r, members], cage, share)
+        rows.append(members)
+        if interpolated is not None:
+            blocks.append(interpolated)
+            continue
         is_large = np.count_nonzero(weights) * cage.n_vertices > sizes.SINGLE_PRECISION
         block = np.empty((len(members), cage.n_vertices), np.float32 if is_large else np.float64)
         for start in range(0, len(members), _COORDINATES):
@@ -400,7 +402,6 @@ def cage_subspace(
             w = mean_value_coordinates(points[piece], cage.vertices, cage.faces, progress=ways)
             w *= weights[r, members[piece]][:, None]
             block[piece] = w
-        rows.append(members)
         blocks.append(block)
     return Subspace(regions.mesh.n_vertices, tuple(rows), tuple(blocks))
 
