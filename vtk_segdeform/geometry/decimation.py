@@ -72,11 +72,12 @@ def _clusters(mesh: Mesh, n_points: int) -> IntArray:
 def _in_own_frame(positions: FloatArray) -> FloatArray:
     """Return positions (n, 3) from their lowest corner, in axes that rotate with the mesh.
 
-    Random weights separate axes of equal length.
+    Random weights separate axes of equal length, and determine their signs.
     """
-    weights = np.random.default_rng(0).uniform(0.5, 1.5, len(positions))
+    weights, signs = np.random.default_rng(0).uniform(0.5, 1.5, (2, len(positions)))
     away = positions - (weights @ positions) / weights.sum()
     axes = np.linalg.eigh((away.T * weights) @ away)[1]
+    axes = axes * np.where(((signs - 1.0) @ away) @ axes < 0.0, -1.0, 1.0)
     x = np.stack([away @ axis for axis in axes.T], axis=1)
     return np.asarray(x - x.min(axis=0))
 
