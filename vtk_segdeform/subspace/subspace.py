@@ -13,6 +13,8 @@ to the surface, in single precision.  Its rounded numbers then *are* W~: every p
 with it is computed in double precision, so x = W~ p is as linear, and its volume as exact, as with
 double precision, and half as much memory is read.  Products go over a block piece by piece, so
 that no large copy of it is made.
+
+Long because every product with W~ has a way for blocks as arrays and for interpolated ones.
 """
 
 from __future__ import annotations
