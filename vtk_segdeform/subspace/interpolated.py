@@ -179,7 +179,7 @@ class InterpolatedBlock:
         return np.asarray(self.values.T @ at_nodes)
 
     def add_to(
-        self, x: FloatArray, rows: IntArray, at_nodes: FloatArray, start: int, stop: int
+        self, x: FloatArray, rows: IntArray, at_nodes: FloatArray, *, start: int, stop: int
     ) -> None:
         """Add the motion of vertices start..stop to *rows* of *x*, given that of the nodes."""
         piece = slice(start, stop)

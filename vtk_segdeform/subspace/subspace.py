@@ -309,7 +309,7 @@ def _add_interpolated(
 
     def add(start: int, stop: int) -> None:
         _begin_rows(x, rows, base, start, stop)
-        block.add_to(x, rows, at_nodes, start, stop)
+        block.add_to(x, rows, at_nodes, start=start, stop=stop)
 
     if not len(rows):
         _begin_rows(x, rows, base, 0, 0)
