@@ -2,7 +2,7 @@
 
 Below a size the plain way is as fast, or more exact at no cost; above it another way pays.  The
 table in ``docs/speed.rst`` has the measurements.  Read a size as an attribute of this module,
-``sizes.LOW_RANK``: tests lower it to cover the other way with small meshes.
+``sizes.INTERPOLATED``: tests lower it to cover the other way with small meshes.
 """
 
 from __future__ import annotations
@@ -62,6 +62,14 @@ instead of 5.8."""
 FIRST_CLUSTERS_EACH = 6
 """First clusters for each one requested, if these are more."""
 
+DECIMATED = 20_000
+"""Vertices beyond which regions are detected, and cages fitted, on a decimated mesh.
+
+Both depend on the shape only: for a mesh of a million vertices they take 1.5 s instead of 24."""
+
+DECIMATED_POINTS = 12_000
+"""Vertices of the decimated mesh, about: several hundred for each limb."""
+
 SCALED_VOLUME = 20_000
 """Vertices beyond which a pose is scaled to its exact volume instead of moved along a direction.
 
@@ -81,10 +89,10 @@ It is smooth, and an overlay needs it in every frame: 1 ms instead of 12 for 22,
 LOCAL_VOLUME_POINTS = 8_000
 """Cells of such a mesh, about."""
 
-LOW_RANK = 100_000
-"""Vertices beyond which W~ is mapped by its low-rank factors.
+INTERPOLATED = 100_000
+"""Vertices beyond which the rows of W~ are interpolated on a grid.
 
-A map reads fewer numbers: 6.2 ms instead of 8.1 for 350,000 vertices."""
+There are about 90,000 nodes, whatever the mesh: W~ of a million vertices takes 1 s instead of 7."""
 
 CUBATURE_SAMPLE = 36_000
 """Vertices in the weighted sample from which the energy of a large mesh is computed."""

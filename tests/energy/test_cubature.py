@@ -11,7 +11,6 @@ from solids import rotation
 from vtk_segdeform import models, sizes
 from vtk_segdeform.energy.cubature import Sample
 from vtk_segdeform.energy.energy import shape_energy
-from vtk_segdeform.geometry.intrinsic import IntrinsicTriangulation
 from vtk_segdeform.geometry.kmeans import cluster_positions
 from vtk_segdeform.subspace.subspace import Subspace, cage_subspace
 
@@ -34,10 +33,6 @@ def sample_size(monkeypatch):
     return resize
 
 
-def surface_of(mesh):
-    return IntrinsicTriangulation.of(mesh.vertices, mesh.faces)
-
-
 def sampled(stretch=10.0):
     return shape_energy(SCENE.mesh, SUBSPACE, stretch, CLUSTERS)
 
@@ -51,13 +46,13 @@ def value(energy, p):
 
 
 def test_of_a_small_mesh_every_vertex_is_used():
-    assert Sample.of(surface_of(SCENE.mesh), CLUSTERS) is None
+    assert Sample.of(SCENE.mesh, CLUSTERS) is None
 
 
 @pytest.mark.parametrize("stretch", [0.0, 10.0])
 def test_a_sample_of_all_vertices_has_the_whole_energy(sample_size, monkeypatch, stretch):
     sample_size(10**6)
-    everything = Sample.of(surface_of(SCENE.mesh), CLUSTERS)
+    everything = Sample.of(SCENE.mesh, CLUSTERS)
     assert_array_equal(everything.weights, 1.0)
     found = sampled(stretch)
     monkeypatch.setattr(sizes, "CUBATURE_FACTOR", 10**6)
@@ -70,7 +65,7 @@ def test_a_sample_of_all_vertices_has_the_whole_energy(sample_size, monkeypatch,
 
 @pytest.mark.usefixtures("sample_size")
 def test_the_weights_in_a_cluster_add_up_to_its_area():
-    sample = Sample.of(surface_of(SCENE.mesh), CLUSTERS)
+    sample = Sample.of(SCENE.mesh, CLUSTERS)
     areas = vertex_areas(SCENE.mesh)
     represented = np.bincount(CLUSTERS[sample.ids], sample.weights * areas[sample.ids])
     assert_allclose(represented, np.bincount(CLUSTERS, areas), rtol=1e-12)
@@ -79,7 +74,7 @@ def test_the_weights_in_a_cluster_add_up_to_its_area():
 
 @pytest.mark.usefixtures("sample_size")
 def test_a_sample_has_the_rows_and_triangles_of_the_mesh():
-    mesh, sample = SCENE.mesh, Sample.of(surface_of(SCENE.mesh), CLUSTERS)
+    mesh, sample = SCENE.mesh, Sample.of(SCENE.mesh, CLUSTERS)
     assert_array_equal(sample.surface.vertices, mesh.vertices[sample.ids])
     none = np.zeros(0, dtype=np.int64), np.zeros((0, 4))  # a cage that moves no vertex
     for subspace in (SUBSPACE, Subspace(mesh.n_vertices, *((each,) for each in none))):
@@ -94,7 +89,7 @@ def test_every_cluster_has_samples_and_a_small_one_is_sampled_completely(sample_
     clusters = CLUSTERS.copy()
     clusters[[5, 6, 700]] = clusters.max() + 1
     sample_size(200)
-    sample = Sample.of(surface_of(SCENE.mesh), clusters)
+    sample = Sample.of(SCENE.mesh, clusters)
     assert_array_equal(np.unique(clusters[sample.ids[sample.weights > 0.0]]), np.unique(clusters))
     assert_array_equal(sample.weights[np.isin(sample.ids, [5, 6, 700])], 1.0)
 
@@ -105,7 +100,7 @@ def test_a_cluster_without_area_has_samples(sample_size):
     x[np.union1d(last, SCENE.mesh.adjacency[last].indices)] = x[last[0]]
     flat = SCENE.mesh.with_vertices(x)
     sample_size(100)
-    sample = Sample.of(surface_of(flat), CLUSTERS)
+    sample = Sample.of(flat, CLUSTERS)
     assert sample.weights[np.isin(sample.ids, last)].any()
     energy = shape_energy(flat, SUBSPACE, 10.0, CLUSTERS)
     assert energy.covariance_operator.shape == (3 * (CLUSTERS.max() + 1), SUBSPACE.n_columns)
@@ -157,11 +152,11 @@ def test_the_sample_is_the_same_in_every_frame_even_of_a_regular_mesh(sample_siz
     mesh = models.bar(divisions=(8, 8, 30))
     clusters = cluster_positions(mesh.vertices, 10)
     sample_size(200)
-    here = Sample.of(surface_of(mesh), clusters)
+    here = Sample.of(mesh, clusters)
     for seed in range(3):
         turn = rotation(np.random.default_rng(seed).normal(size=3), 1.0 + seed)
         moved = mesh.with_vertices(3.7 * mesh.vertices @ turn.T + [1.0, -2.0, 5.0])
-        there = Sample.of(surface_of(moved), clusters)
+        there = Sample.of(moved, clusters)
         assert_array_equal(there.ids, here.ids)
         assert_allclose(there.weights, here.weights, rtol=1e-9)
 

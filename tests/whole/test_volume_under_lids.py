@@ -14,6 +14,7 @@ import vtk_segdeform as sd
 from vtk_segdeform import models, sizes
 from vtk_segdeform.errors import ArgumentError, SessionError
 from vtk_segdeform.solver import exact_volume, region_volumes, total_volume
+from vtk_segdeform.subspace import interpolated
 
 EXACT = 4e-14
 BODIES = {
@@ -90,7 +91,7 @@ def test_every_pose_has_the_volume_of_the_rest_shape(name, n_regions):
         assert abs(volume.relative(each.vertices)) < EXACT
 
 
-@pytest.mark.parametrize("way", ["coarse", "scaled", "low rank", "gpu"])
+@pytest.mark.parametrize("way", ["coarse", "scaled", "interpolated", "gpu"])
 @pytest.mark.parametrize("per_region", [False, True])
 def test_the_volume_is_exact_at_every_size(monkeypatch, way, per_region):
     monkeypatch.setattr(sizes, "COARSE_VOLUME", 200)
@@ -98,8 +99,9 @@ def test_the_volume_is_exact_at_every_size(monkeypatch, way, per_region):
     monkeypatch.setattr(sizes, "VOLUME_HESSIAN_POINTS", 200)
     if way != "coarse":
         monkeypatch.setattr(sizes, "SCALED_VOLUME", 200)
-    if way == "low rank":
-        monkeypatch.setattr(sizes, "LOW_RANK", 200)
+    if way == "interpolated":
+        monkeypatch.setattr(sizes, "INTERPOLATED", 200)
+        monkeypatch.setattr(interpolated, "_WORTHWHILE", np.inf)
     if way == "gpu":
         monkeypatch.setattr(exact_volume, "gpu_arrays", lambda: np)
     deformer = bind(*caged("body with 12 holes", 3), preserve_region_volumes=per_region)

@@ -125,7 +125,7 @@ def profile_of(size: int, scale: Scale) -> Profile:
 def _read(subspace: Subspace) -> None:
     """Read W from memory once, in all threads."""
     for block in subspace.blocks:
-        flat = block.reshape(-1)
+        flat = np.asarray(getattr(block, "values", block)).reshape(-1)
 
         def read(start: int, stop: int, flat: FloatArray = flat) -> None:
             np.dot(flat[start:stop], flat[start:stop])

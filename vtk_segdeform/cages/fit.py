@@ -12,6 +12,9 @@ which is always valid.
 
 The n vertices of a cage of area A are about ``sqrt(A / n)`` apart; the default offset is
 proportional to that length, because mean value coordinates degrade close to large faces.
+
+A large mesh is decimated first, far more finely than its cages; only the last check is on the mesh
+itself.
 """
 
 from __future__ import annotations
@@ -23,9 +26,11 @@ from numpy.typing import ArrayLike
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from ..arrays import FloatArray, IntArray, as_ids, is_number, is_whole
+from .. import sizes
+from ..arrays import BoolArray, FloatArray, IntArray, as_ids, is_number, is_whole
 from ..checks import shown
 from ..errors import CageError, RegionError
+from ..geometry import decimated
 from ..kernels import n_threads, one_blas_thread
 from ..mesh import Mesh, distance_to_surface, inside_points, require_mesh
 from ..progress import Progress, part, tell
@@ -102,21 +107,37 @@ def fit_cages(
     require_mesh(mesh)
     require_regions(regions, mesh)
     _check_offset(offset, mesh)
-    patches, n_regions = [], regions.n_regions
+    n_regions = regions.n_regions
     _require_enough(n_vertices, n_regions)
     tell(progress, 0.0, "measuring regions")
-    surface = Surface.of(mesh)
-    for r, members in enumerate(regions.membership):
-        tell(progress, _MEASURED * r / n_regions, "measuring regions")
-        patches.append(Patch.of(surface, members))
+    shape, membership = mesh, regions.membership
+    if mesh.n_vertices > sizes.DECIMATED:
+        shape, kept, cluster = decimated(mesh, sizes.DECIMATED_POINTS)
+        membership = membership[:, kept]
+        for members, some in zip(membership, regions.membership, strict=True):
+            members[cluster[some]] = True
+    patches = _patches(shape, membership, progress)
     numbers = _distributed(patches, n_vertices)
     cages = []
     for r, (patch, number) in enumerate(zip(patches, numbers, strict=True)):
         ends = _MEASURED + (1.0 - _MEASURED) * np.array([r, r + 1]) / n_regions
         piece = part(progress, *map(float, ends))
-        cages.append(_fit(patch, int(number), offset, piece))
+        cage = _fit(patch, int(number), offset, piece)
+        if shape is not mesh and not cage.contains(mesh.vertices[regions.membership[r]]).all():
+            patch = Patch.of(Surface.of(mesh), regions.membership[r])
+            cage = _fit(patch, int(number), offset, piece)
+        cages.append(cage)
     tell(progress, 1.0, "cages ready")
     return tuple(cages)
+
+
+def _patches(mesh: Mesh, membership: BoolArray, progress: Progress | None) -> list[Patch]:
+    """Return the patch of each region, *membership* (r, n)."""
+    patches, surface = [], Surface.of(mesh)
+    for r, members in enumerate(membership):
+        tell(progress, _MEASURED * r / len(membership), "measuring regions")
+        patches.append(Patch.of(surface, members))
+    return patches
 
 
 def fit_cage(

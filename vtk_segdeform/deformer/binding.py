@@ -3,7 +3,6 @@
     W~                 `subspace.cage_subspace`, figure 6 of the paper
     E(p)               `energy.shape_energy`, eqs. (5), (10), (20), and the stiffness of the cages
     coarse volume      `coarse_volume.CoarseVolume`, of a large mesh
-    low-rank W~        `low_rank.LowRankSubspace`, of a very large mesh
 
 It does not depend on fixed vertices, handles or targets.  `binding_cache` keeps it on disk.
 """
@@ -20,14 +19,14 @@ from .. import sizes
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage
 from ..energy import Energy, join_rotations, shape_energy, with_cage_stiffness
-from ..geometry import cluster_within_parts
+from ..geometry import cluster_within_parts, decimated
 from ..mesh import Mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions
 from ..solver import CoarseVolume
-from ..subspace import LowRankSubspace, Subspace, cage_subspace
+from ..subspace import cage_subspace
 
-_FORMAT = 9  # increment whenever the content of a binding changes
+_FORMAT = 10  # increment whenever the content of a binding changes
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,12 +89,6 @@ class Binding:
 
     energy: Energy
     coarse_volume: CoarseVolume
-    low_rank: LowRankSubspace | None = None
-
-    @property
-    def mapping(self) -> Subspace | LowRankSubspace:
-        """The map from the cages to the mesh: W~, or its low-rank factors."""
-        return self.low_rank or self.energy.subspace
 
     @classmethod
     def compute(cls, inputs: BindingInputs, progress: Progress | None = None) -> Binding:
@@ -112,14 +105,9 @@ class Binding:
             faces = [cage.faces for cage in cages]
             energy = with_cage_stiffness(energy, inputs.rest_cages, faces, clusters)
             energy = _joined(inputs, energy, clusters, part(progress, 0.85, 0.86))
-        share, whole = part(progress, 0.86, 0.9), energy.has_vertex_rotations
+        share, whole = part(progress, 0.86, 1.0), energy.has_vertex_rotations
         coarse = CoarseVolume.of(regions.mesh, subspace, whole=whole, progress=share)
-        low_rank = None
-        if rest.n_vertices > sizes.LOW_RANK:
-            share = part(progress, 0.9, 1.0)
-            cages_at_rest = inputs.rest_cages
-            low_rank = LowRankSubspace.of(subspace, rest.vertices, cages_at_rest, progress=share)
-        return cls(energy, coarse, low_rank)
+        return cls(energy, coarse)
 
 
 def _first_clusters(inputs: BindingInputs) -> IntArray | None:
@@ -131,6 +119,10 @@ def _first_clusters(inputs: BindingInputs) -> IntArray | None:
         count = max(sizes.FIRST_CLUSTERS, sizes.FIRST_CLUSTERS_EACH * count)
     if count >= n:
         return np.arange(n)
+    if inputs.is_reduced and n > sizes.DECIMATED:
+        _, kept, of_vertex = decimated(inputs.regions.mesh, sizes.DECIMATED_POINTS)
+        parts, x = inputs.parts[kept], inputs.rest.vertices[kept]
+        return cluster_within_parts(x, parts, count, quick=True)[of_vertex]
     return cluster_within_parts(inputs.rest.vertices, inputs.parts, count, quick=inputs.is_reduced)
 
 

@@ -22,12 +22,13 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import FloatArray, IntArray
 from ..energy import Energy
 from ..files import fault_of, open_regular, replacing
 from ..kernels import in_parallel
 from ..progress import Progress
 from ..solver import CoarseVolume
-from ..subspace import LowRankSubspace, Subspace
+from ..subspace import InterpolatedBlock, Subspace
 from .binding import Binding, BindingInputs
 
 ENDING = ".binding.npz"
@@ -73,17 +74,13 @@ def read_binding(path: Path, n_vertices: int) -> Binding | None:
         if "cells" in arrays:
             surface = _subspace(arrays, "c", int(arrays["n_cells"]))
             coarse = CoarseVolume(surface, arrays["cells"], arrays["shares"])
-        low_rank = None
-        if "low_rank_starts" in arrays:
-            names = [each.name for each in fields(LowRankSubspace)]
-            low_rank = LowRankSubspace(*(arrays["low_rank_" + name] for name in names))
         os.utime(path)  # recently used files are deleted last
     except FileNotFoundError:
         return None
     except Exception as fault:  # noqa: BLE001 - damaged files raise a dozen kinds
         _warn_once(path, f"ignored, {getattr(fault, 'strerror', None) or fault}")
         return None
-    return Binding(energy, coarse, low_rank)
+    return Binding(energy, coarse)
 
 
 def write_binding(path: Path, binding: Binding) -> None:
@@ -102,9 +99,6 @@ def write_binding(path: Path, binding: Binding) -> None:
         arrays |= {"cells": coarse.cells, "shares": coarse.shares}
         arrays |= {"n_cells": np.array(coarse.surface.n_vertices)}
         arrays |= _arrays(coarse.surface, "c")
-    if low_rank := binding.low_rank:
-        for each in fields(LowRankSubspace):
-            arrays["low_rank_" + each.name] = getattr(low_rank, each.name)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with suppress(FileNotFoundError):
@@ -161,11 +155,25 @@ def _make_room(folder: Path) -> None:
 
 
 def _arrays(subspace: Subspace, name: str) -> dict[str, Any]:
-    parts = enumerate(zip(subspace.rows, subspace.blocks, strict=True))
-    return {f"{name}{r}{kind}": a for r, pair in parts for kind, a in zip("rb", pair, strict=True)}
+    arrays: dict[str, Any] = {}
+    for r, (rows, block) in enumerate(zip(subspace.rows, subspace.blocks, strict=True)):
+        arrays[f"{name}{r}r"] = rows
+        if isinstance(block, InterpolatedBlock):
+            for each in fields(block):
+                arrays[f"{name}{r}b_{each.name}"] = getattr(block, each.name)
+        else:
+            arrays[f"{name}{r}b"] = block
+    return arrays
 
 
 def _subspace(arrays: dict[str, Any], name: str, n: int) -> Subspace:
-    count = sum(key.startswith(name) and key[1:-1].isdigit() for key in arrays) // 2
-    rows, blocks = ([arrays[f"{name}{r}{kind}"] for r in range(count)] for kind in "rb")
+    rows: list[IntArray] = []
+    blocks: list[FloatArray | InterpolatedBlock] = []
+    names = [each.name for each in fields(InterpolatedBlock)]
+    while (key := f"{name}{len(rows)}r") in arrays:
+        block = arrays.get(key[:-1] + "b")
+        if block is None:
+            block = InterpolatedBlock(*(arrays[f"{key[:-1]}b_{each}"] for each in names))
+        rows.append(arrays[key])
+        blocks.append(block)
     return Subspace(n, tuple(rows), tuple(blocks))

@@ -206,6 +206,9 @@ class Deformer:
 
     _lids: Lids
     _total_volume: VolumeConstraint
+    _known_volumes: dict[
+        tuple[bool, bool, tuple[int, ...]], tuple[tuple[VolumeConstraint, ...], Volumes]
+    ]
     _scaled_surface: ScaledSurface
     _constraints: _Constraints
     _continuation: WeightContinuation
@@ -262,7 +265,6 @@ class Deformer:
 
         at_origin = self._frame.about_origin(mesh.vertices)
         self._rest_pose = mesh.with_vertices(at_origin) if self._frame.is_far else mesh
-        self._base = self._binding.mapping.base(self._rest_pose.vertices)
         self._enclose()
         self._samples = SurfaceSamples.of(self._rest, self._binding.coarse_volume)
         self._constrain(fixed, handle)
@@ -556,16 +558,25 @@ class Deformer:
         x is rest + W~ (p - rest), which is W~ p, but at rest exact however W~ is rounded.
         """
         moves = offsets - self._rest_cages * self._frame.size
-        return self._binding.mapping.map(np.hstack([moves, *directions]), self._base)
+        return self.subspace.map(np.hstack([moves, *directions]), self._rest_pose.vertices)
 
-    def _preserved_volumes(self) -> tuple[VolumeConstraint, ...]:
-        if not self.has_volume:
-            return ()
-        if self._preserve_region_volumes:
-            return self._region_volumes
-        if not self._preserve_volume:
-            return ()
-        return body_volumes(self._rest_pose, self._total_volume, self._lids, self.handle)
+    def _preserved_volumes(self) -> tuple[tuple[VolumeConstraint, ...], Volumes]:
+        """Return the volumes to preserve, on the mesh and on the surface of the steps.
+
+        They are the same for all handles on the same bodies.
+        """
+        bodies, regions = (), self.has_volume and self._preserve_region_volumes
+        whole = self.has_volume and self._preserve_volume and not regions
+        if whole:
+            bodies = tuple(np.unique(self.mesh.components[self.handle]).tolist())
+        if (found := self._known_volumes.get((regions, whole, bodies))) is None:
+            preserved = self._region_volumes if regions else ()
+            if whole:
+                handle = self.handle
+                preserved = body_volumes(self._rest_pose, self._total_volume, self._lids, handle)
+            volumes = self._binding.coarse_volume.volumes(preserved, self._rest.vertices)
+            found = self._known_volumes[regions, whole, bodies] = preserved, volumes
+        return found
 
     @cached_property
     def _region_volumes(self) -> tuple[VolumeConstraint, ...]:
@@ -574,14 +585,11 @@ class Deformer:
     def _enclose(self) -> None:
         """Compute the volume enclosed under the current lids."""
         vars(self).pop("_region_volumes", None)
+        self._known_volumes = {}
         self._lids = lids_of(self._rest_pose, self._lids_option)
         self._total_volume = total_volume(self._rest_pose, self._lids)
         self._scaled_surface = ScaledSurface(
-            self.subspace,
-            self._binding.mapping,
-            self._rest_pose.vertices,
-            self._total_volume,
-            base=self._base,
+            self.subspace, self._rest_pose.vertices, self._total_volume
         )
 
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:
@@ -602,8 +610,7 @@ class Deformer:
             self.subspace, self._rest, [ids[places] for places in order], weight
         )
         gathered = in_order if positions.mean is None else positions.mean @ in_order
-        preserved = self._preserved_volumes()
-        volumes = binding.coarse_volume.volumes(preserved, rest)
+        preserved, volumes = self._preserved_volumes()
         fixed_at = rest[self.fixed] if len(self.fixed) else np.zeros((1, 3))
         box = np.stack([fixed_at.min(axis=0), fixed_at.max(axis=0)])
         is_whole = preserved == (self._total_volume,)

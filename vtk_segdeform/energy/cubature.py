@@ -35,6 +35,7 @@ import numpy as np
 from .. import sizes
 from ..arrays import FloatArray, IntArray
 from ..geometry import IntrinsicTriangulation
+from ..mesh import Mesh
 from ..subspace import Subspace
 
 _OFFSET = 0.381966  # of the area between two samples; no fraction that regular meshes repeat
@@ -61,29 +62,29 @@ class Sample:
     weights: FloatArray
 
     @classmethod
-    def of(cls, surface: IntrinsicTriangulation, clusters: IntArray) -> Sample | None:
-        """Return a sample of *surface*, or None if it is small enough to use every vertex.
+    def of(cls, mesh: Mesh, clusters: IntArray) -> Sample | None:
+        """Return a sample of *mesh*, or None if it is small enough to use every vertex.
 
         *clusters* (n,) are the rotation clusters of its vertices, numbered from 0.
         """
-        n, faces = len(surface.vertices), surface.faces
+        x, faces = mesh.vertices, mesh.faces
+        n = len(x)
         each = sizes.CUBATURE_SAMPLE_EACH * (int(clusters.max()) + 1)
         number = max(sizes.CUBATURE_SAMPLE, each)
         if n < sizes.CUBATURE_FACTOR * number:
             return None
-        thirds = np.repeat(surface.face_areas / 3.0, 3)
+        thirds = np.repeat(mesh.face_areas / 3.0, 3)
         areas = np.asarray(np.bincount(faces.ravel(), thirds, n), dtype=np.float64)
-        order = _along_curve(surface.vertices, clusters)
-        weights = _weights(order, clusters, areas, number)
-        is_sampled = weights > 0.0
-        near = is_sampled[faces].any(axis=1)
-        seen = faces[near]
-        place = np.zeros(n, dtype=np.int64)
-        place[seen] = 1
-        ids = np.flatnonzero(place)
-        place[ids] = np.arange(len(ids))
-        part = IntrinsicTriangulation(surface.vertices[ids], place[seen], surface.lengths[near])
-        return cls(ids, part, weights[ids])
+        weights = _weights(_along_curve(x, clusters), clusters, areas, number)
+        near = (weights > 0.0)[faces].any(axis=1)
+        ids, corners = _numbered(faces[near], n)
+        surface = IntrinsicTriangulation.of(x[ids], corners)
+        if surface.faces is not corners:  # bad triangles were flipped: others may be near now
+            whole = IntrinsicTriangulation.of(x, faces)
+            near = (weights > 0.0)[whole.faces].any(axis=1)
+            ids, corners = _numbered(whole.faces[near], n)
+            surface = IntrinsicTriangulation(x[ids], corners, whole.lengths[near])
+        return cls(ids, surface, weights[ids])
 
     def rows(self, subspace: Subspace) -> Subspace:
         """Return the rows of W~, *subspace*, for `ids`."""
@@ -94,6 +95,15 @@ class Sample:
             rows.append(mine)
             blocks.append(block[found[mine]])
         return Subspace(len(self.ids), tuple(rows), tuple(blocks))
+
+
+def _numbered(faces: IntArray, n: int) -> tuple[IntArray, IntArray]:
+    """Return the vertices of *faces* (k,), in ascending order, and the faces over these."""
+    place = np.zeros(n, dtype=np.int64)
+    place[faces] = 1
+    ids = np.flatnonzero(place)
+    place[ids] = np.arange(len(ids))
+    return ids, place[faces]
 
 
 def _weights(order: IntArray, clusters: IntArray, areas: FloatArray, number: int) -> FloatArray:

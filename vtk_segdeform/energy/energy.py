@@ -203,9 +203,10 @@ def shape_energy(
     if not is_number(stretch, 0.0):
         raise ArgumentError(f"stretch must be a number, 0 or more; got {stretch!r}")
     tell(progress, 0.0, "sampling vertices")
-    surface = IntrinsicTriangulation.of(mesh.vertices, mesh.faces)
     rows, own, weights, inner = subspace, clusters, None, inner_vertices(mesh)
-    if clusters is not None and (sample := Sample.of(surface, clusters)):
+    if clusters is None or not (sample := Sample.of(mesh, clusters)):
+        surface = IntrinsicTriangulation.of(mesh.vertices, mesh.faces)
+    else:
         surface, weights = sample.surface, sample.weights
         rows, own, inner = sample.rows(subspace), clusters[sample.ids], inner[sample.ids]
     vertices = np.arange(mesh.n_vertices)

@@ -9,6 +9,7 @@ The files, in reading order:
     rotations       local rotations
     kmeans          clusters of points, and points far from each other
     sampling        even samples of the vertices, and their Voronoi cells
+    decimation      a mesh with one vertex for each cluster of neighbours
     normals         vertex normals for drawing
     normal_transport   given normals and tangents, carried along by a deformation
     distortion      stretch and shear of each triangle
@@ -16,6 +17,7 @@ The files, in reading order:
     up_axis         a guess of the axis that points up
 """
 
+from .decimation import decimated
 from .differential import (
     area_gradients,
     cotangent_laplacian,
@@ -54,6 +56,7 @@ __all__ = [
     "cluster_within_parts",
     "corner_and_edges",
     "cotangent_laplacian",
+    "decimated",
     "distinct_lengths",
     "distortion",
     "faces_between",

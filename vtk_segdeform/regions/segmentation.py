@@ -6,16 +6,19 @@ requested than there are limbs, the largest are cut into slices of about equal a
 All this is computed on a coarse surface (`coarse`), so that it costs about the same for every mesh
 and hardly depends on the resolution of the mesh.
 
-Finally the borders between parts are shortened and moved into creases on the mesh (`borders`).
+Finally the borders between parts are shortened and moved into creases on the mesh (`borders`), or,
+of a large mesh, on a decimated one.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from .. import sizes
 from ..arrays import FloatArray, IntArray, is_whole
 from ..checks import shown
 from ..errors import ArgumentError, RegionError
+from ..geometry import decimated
 from ..kernels import one_blas_thread
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part, tell
@@ -84,12 +87,16 @@ def segment(
     if not is_whole(seed, 0):
         raise ArgumentError(f"seed must be a whole number, 0 or more; got {shown(seed)}")
     tell(progress, 0.0, "sampling vertices")
-    shape = _without_ties(mesh)
+    shape = mesh
     if n_regions is not None and n_regions <= mesh.components.max() + 1:
-        labels = _merged_components(shape, int(n_regions))
+        labels = _merged_components(_without_ties(mesh), int(n_regions))
     else:
         n_regions = None if n_regions is None else int(n_regions)
         points = max(_POINTS, _POINTS_PER_REGION * (n_regions or 1))
+        cluster = None
+        if n > max(sizes.DECIMATED, points):
+            shape, _, cluster = decimated(mesh, max(sizes.DECIMATED_POINTS, points))
+        shape = _without_ties(shape)
         sampling = part(progress, 0.02, 0.1)
         cell, surface = coarsen(shape, points, np.random.default_rng(int(seed)), sampling)
         labels = _parts(surface, n_regions, progress)[cell]
@@ -97,6 +104,8 @@ def segment(
         labels = smooth_borders(shape, labels)
         tell(progress, 0.9, "smoothing borders")
         labels = connected_parts(shape, labels)
+        if cluster is not None:
+            labels = labels[cluster]
     tell(progress, 0.95, "growing regions")
     if overlap is None:
         overlap = max(2, round(_OVERLAP * np.sqrt(n / (labels.max() + 1))))
@@ -111,7 +120,10 @@ def _without_ties(mesh: Mesh) -> Mesh:
     Symmetric shapes have many equal distances, and rounding must not decide between them, since it
     differs between frames of reference.  The moves depend on the vertex indices only.
     """
-    first = mesh.adjacency.indices[mesh.adjacency.indptr[:-1]]
+    start, end = mesh.adjacency.indptr[:-1], mesh.adjacency.indptr[1:]
+    joined = np.flatnonzero(start < end)  # all vertices, unless a mesh is decimated
+    first = np.arange(mesh.n_vertices)
+    first[joined] = mesh.adjacency.indices[start[joined]]
     share = _TIE_BREAK * np.random.default_rng(0).random((mesh.n_vertices, 1))
     return mesh.with_vertices(mesh.vertices + share * (mesh.vertices[first] - mesh.vertices))
 

@@ -23,7 +23,7 @@ from scipy import sparse
 
 from .. import sizes
 from ..arrays import FloatArray, IntArray
-from ..geometry import cluster_positions, faces_between, voronoi_cells
+from ..geometry import cluster_positions, decimated, faces_between, voronoi_cells
 from ..mesh import Mesh
 from ..progress import Progress
 from ..subspace import Subspace
@@ -44,7 +44,8 @@ class CoarseVolume:
         The cell of each vertex; None for a small mesh.
     shares : (n,) float or None
         The weight of each vertex in the mean of its cell: its share of the area.  The mean by
-        number of vertices would depend on how finely each part is meshed.
+        number of vertices would depend on how finely each part is meshed.  Of a large mesh, only
+        the vertices of a decimated one have a share.
     """
 
     surface: Subspace
@@ -68,8 +69,17 @@ class CoarseVolume:
         if n <= sizes.COARSE_VOLUME or whole:
             return cls(subspace)
         rng = np.random.default_rng(0)
-        _, cells = voronoi_cells(mesh, sizes.COARSE_VOLUME_POINTS, rng, progress)
-        areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas, 3), n)
+        corners = np.repeat(mesh.face_areas, 3)
+        areas = np.asarray(np.bincount(mesh.faces.ravel(), corners, n), dtype=np.float64)
+        if n > sizes.DECIMATED:
+            coarse, kept, cluster = decimated(mesh, sizes.DECIMATED_POINTS)
+            _, cells = voronoi_cells(coarse, sizes.COARSE_VOLUME_POINTS, rng, progress)
+            cells = cells[cluster]
+            of_clusters = np.zeros(n)
+            of_clusters[kept] = np.bincount(cluster, areas)
+            areas = of_clusters
+        else:
+            _, cells = voronoi_cells(mesh, sizes.COARSE_VOLUME_POINTS, rng, progress)
         shares = areas / np.bincount(cells, areas)[cells]
         return cls(subspace.averaged(_matrix(cells, shares)), cells, shares)
 
@@ -140,4 +150,6 @@ def _coarse(constraint: VolumeConstraint, cells: IntArray) -> VolumeConstraint:
 
 def _matrix(cells: IntArray, shares: FloatArray) -> sparse.csr_array:
     """Return the matrix (k, n) from vertices to the means of their cells."""
-    return sparse.coo_array((shares, (cells, np.arange(len(cells))))).tocsr()
+    used = np.flatnonzero(shares) if (shares == 0.0).any() else np.arange(len(cells))
+    shape = int(cells.max()) + 1, len(cells)
+    return sparse.coo_array((shares[used], (cells[used], used)), shape).tocsr()

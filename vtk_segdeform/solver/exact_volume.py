@@ -19,7 +19,7 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..kernels import in_parallel
-from ..subspace import GPUError, GPUSurface, LowRankSubspace, Subspace, gpu_arrays
+from ..subspace import GPUError, GPUSurface, Subspace, gpu_arrays
 from .volume_constraints import VolumeConstraint
 
 _log = logging.getLogger(__name__)
@@ -97,25 +97,14 @@ class ScaledSurface:
     ----------
     subspace : Subspace
         W~.
-    mapping : Subspace or LowRankSubspace
-        W~ as it is mapped without a GPU.
-    rest, base : (n, 3) float
-        The mesh at rest; and its ``mapping.base``.
+    rest : (n, 3) float
+        The mesh at rest.
     constraint : VolumeConstraint
         The total volume.
     """
 
-    def __init__(
-        self,
-        subspace: Subspace,
-        mapping: Subspace | LowRankSubspace,
-        rest: FloatArray,
-        constraint: VolumeConstraint,
-        *,
-        base: FloatArray,
-    ) -> None:
-        self._subspace, self._mapping = subspace, mapping
-        self._rest, self._base, self._constraint = rest, base, constraint
+    def __init__(self, subspace: Subspace, rest: FloatArray, constraint: VolumeConstraint) -> None:
+        self._subspace, self._rest, self._constraint = subspace, rest, constraint
 
     def scaled(self, moves: FloatArray, centre: FloatArray) -> tuple[FloatArray, float]:
         """Return the mesh (n, 3) for *moves* (m, 3) of the cages, and its factor about *centre*."""
@@ -126,7 +115,7 @@ class ScaledSurface:
                 return self._gpu.host(x), scale
             except GPUError as fault:
                 self._turn_off_gpu(fault)
-        x = self._mapping.map(moves, self._base)
+        x = self._subspace.map(moves, self._rest)
         return x, scale_to_volume(self._constraint, x, centre)
 
     @cached_property

@@ -115,7 +115,7 @@ class GPUSurface:
             self._rest = arrays.asarray(np.asarray(rest_vertices, dtype=np.float64))
             self._corners = [self._ids(corner) for corner in faces.T]
             self._rows = [self._ids(rows) for rows in subspace.rows]
-            self._blocks = [self._widened(block) for block in subspace.blocks]
+            self._blocks = [self._widened(np.asarray(block)) for block in subspace.blocks]
 
     @_faults_named()
     def map(self, moves: FloatArray) -> GPUArray:

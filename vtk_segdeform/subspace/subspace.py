@@ -8,10 +8,13 @@ alpha are the blend weights of `Regions`, w the mean value coordinates in the ca
 W~ is zero wherever a vertex is outside a region, so it is stored as one dense block per region,
 blend weights included; the zeros are never stored.
 
-A block of a large mesh is in single precision.  Its rounded numbers then *are* W~: every product
+The blocks of a large mesh are interpolated (`interpolated`), or else, where its cage is too close
+to the surface, in single precision.  Its rounded numbers then *are* W~: every product
 with it is computed in double precision, so x = W~ p is as linear, and its volume as exact, as with
 double precision, and half as much memory is read.  Products go over a block piece by piece, so
 that no large copy of it is made.
+
+Long because every product with W~ has a way for blocks as arrays and for interpolated ones.
 """
 
 from __future__ import annotations
@@ -33,6 +36,7 @@ from ..errors import CageError, RegionError
 from ..kernels import compiled_kernels, in_parallel, inputs, writable
 from ..progress import Progress, part
 from ..regions import Regions
+from .interpolated import InterpolatedBlock
 
 _LARGEST_CAGE = 1e3  # diagonals of the mesh
 _COORDINATES = 1 << 15  # vertices whose mean value coordinates are computed together
@@ -41,6 +45,7 @@ _PER_FACE = 24  # numbers whose product takes as long as a face of a volume
 _CACHED = 1 << 17  # numbers of a block that are multiplied together: a megabyte
 _PIECES = 16  # of a block at most, for compiled kernels: each call takes some microseconds
 _DENSE = 1 << 22  # numbers in a dense piece: 32 megabytes
+_SPARSE = 16  # rows for each one of which the squares of interpolated ones are summed
 _NOTHING = inputs(np.empty((0, 3)))
 
 
@@ -50,7 +55,7 @@ class Subspace:
 
     n_vertices: int
     rows: tuple[IntArray, ...]
-    blocks: tuple[FloatArray, ...]
+    blocks: tuple[FloatArray | InterpolatedBlock, ...]
 
     @cached_property
     def n_columns(self) -> int:
@@ -86,21 +91,20 @@ class Subspace:
         entries = np.concatenate(each), (np.concatenate(self.rows), region)
         return sparse.coo_array(entries, (self.n_vertices, len(self.rows))).tocsr()
 
-    def base(self, points: FloatArray) -> FloatArray:
-        """Return *points* (n, 3) in the order in which `map` adds them: the vertices' own."""
-        return points
-
     def map(self, p: FloatArray, base: FloatArray | None = None) -> FloatArray:
         """Return x = W~ p, (n, k), for stacked cage vertices *p* (m, k).
 
-        A *base*, `base` of some points, is added to the first three columns.
+        A *base* (n, 3) is added to the first three columns.
         """
         if self._is_packed and p.shape[1] % 3 == 0 and (kernels := compiled_kernels()):
             return self._packed.map(p, base, kernels)
         make = np.zeros if base is None else np.empty
         x = make((self.n_vertices, p.shape[1]))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
-            _add_product(x, rows, block, p[columns], compiled=self._is_compiled, base=base)
+            if isinstance(block, InterpolatedBlock):
+                _add_interpolated(x, rows, block, p[columns], base)
+            else:
+                _add_product(x, rows, block, p[columns], compiled=self._is_compiled, base=base)
             base = None
         return x
 
@@ -110,7 +114,10 @@ class Subspace:
             return self._packed.adjoints([y], self.n_columns, kernels)[0]
         p = np.empty((self.n_columns, y.shape[1]))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
-            p[columns] = _adjoint_product(rows, block, y, compiled=self._is_compiled)
+            if isinstance(block, InterpolatedBlock):
+                p[columns] = block.adjoint(y[rows])
+            else:
+                p[columns] = _adjoint_product(rows, block, y, compiled=self._is_compiled)
         return p
 
     def adjoints(self, ys: Sequence[FloatArray]) -> list[FloatArray]:
@@ -121,13 +128,11 @@ class Subspace:
 
     def at(self, vertices: IntArray) -> FloatArray:
         """Return the rows of W~ for some mesh *vertices*, dense (k, m)."""
-        place = np.full(self.n_vertices, -1)
         out = np.zeros((len(vertices), self.n_columns))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
-            place[:] = -1
-            place[rows] = np.arange(len(rows))
-            found = place[vertices]
-            out[found >= 0, columns] = block[found[found >= 0]]
+            place = np.searchsorted(rows, vertices)
+            found = np.flatnonzero(np.append(rows, -1)[place] == vertices)
+            out[found, columns] = block[place[found]]
         return out
 
     def nonzeros(self, vertices: IntArray) -> tuple[IntArray, FloatArray]:
@@ -165,6 +170,9 @@ class Subspace:
         out = np.zeros((operator.shape[0], self.n_columns))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
             met = np.flatnonzero(is_met[rows])
+            if isinstance(block, InterpolatedBlock):
+                out[:, columns] = block.premultiplied(by_column[:, rows].tocsr())
+                continue
             for piece in row_pieces(len(met), block.shape[1]):
                 out[:, columns] += by_column[:, rows[met[piece]]] @ _double(block[met[piece]])
         return out
@@ -174,6 +182,11 @@ class Subspace:
         rows, blocks, by_column = [], [], mean.tocsc()
         for members, block in zip(self.rows, self.blocks, strict=True):
             own = np.unique(by_column[:, members].indices).astype(np.int64)
+            if isinstance(block, InterpolatedBlock):
+                averages = block.premultiplied(by_column[:, members].tocsr()[own])
+                rows.append(own)
+                blocks.append(averages)
+                continue
             averages = np.zeros((len(own), block.shape[1]))
             for piece in row_pieces(len(members), block.shape[1]):
                 averages += by_column[:, members[piece]].tocsr()[own] @ _double(block[piece])
@@ -182,9 +195,14 @@ class Subspace:
         return Subspace(mean.shape[0], tuple(rows), tuple(blocks))
 
     def sums_of_squares(self, clusters: IntArray) -> FloatArray:
-        """Return sum_{i in g} W~_ij^2, (G, m), for *clusters* g of the vertices, (n,)."""
+        """Return sum_{i in g} W~_ij^2, (G, m), for *clusters* g of the vertices, (n,).
+
+        Of interpolated rows the sums are over some of them, so only their ratios are meaningful.
+        """
         out = np.zeros((int(clusters.max()) + 1, self.n_columns))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
+            if isinstance(block, InterpolatedBlock):
+                rows, block = rows[::_SPARSE], block[::_SPARSE]
             for piece in row_pieces(len(rows), block.shape[1]):
                 size = piece.stop - piece.start
                 places = (clusters[rows[piece]], np.arange(size))
@@ -265,19 +283,49 @@ def _add_product(
         size = max(8 * size, -(-len(rows) // _PIECES))
 
     def add(start: int, stop: int) -> None:
-        if base is not None:
-            first = rows[start] if start else 0
-            last = rows[stop] if stop < len(rows) else len(x)
-            x[first:last, :3] = base[first:last, : x.shape[1]]
-            x[first:last, 3:] = 0.0
+        _begin_rows(x, rows, base, start, stop)
         if kernels:
             kernels.add_product(x, *arguments, start, stop)
         else:
             x[rows[start:stop]] += _double(block[start:stop]) @ p
 
-    if base is not None and not len(rows):
-        x[:, :3], x[:, 3:] = base[:, : x.shape[1]], 0.0
+    if not len(rows):
+        _begin_rows(x, rows, base, 0, 0)
     in_parallel(add, len(rows), size)
+
+
+def _add_interpolated(
+    x: FloatArray,
+    rows: IntArray,
+    block: InterpolatedBlock,
+    p: FloatArray,
+    base: FloatArray | None,
+) -> None:
+    """Do the same for a block whose rows are interpolated."""
+    at_nodes = np.empty((len(block.values), p.shape[1]))
+
+    def move(start: int, stop: int) -> None:
+        at_nodes[start:stop] = block.values[start:stop] @ p
+
+    def add(start: int, stop: int) -> None:
+        _begin_rows(x, rows, base, start, stop)
+        block.add_to(x, rows, at_nodes, start=start, stop=stop)
+
+    if not len(rows):
+        _begin_rows(x, rows, base, 0, 0)
+    in_parallel(move, len(at_nodes), max(_CACHED // block.shape[1], -(-len(at_nodes) // _PIECES)))
+    in_parallel(add, len(rows), max(_CACHED // 27, -(-len(rows) // _PIECES)))
+
+
+def _begin_rows(
+    x: FloatArray, rows: IntArray, base: FloatArray | None, start: int, stop: int
+) -> None:
+    """Set x to *base*, if there is one, from rows[start] on and up to rows[stop]."""
+    if base is not None:
+        first = rows[start] if start else 0
+        last = rows[stop] if stop < len(rows) else len(x)
+        x[first:last, :3] = base[first:last, : x.shape[1]]
+        x[first:last, 3:] = 0.0
 
 
 def _adjoint_product(
@@ -334,12 +382,20 @@ def cage_subspace(
         If *blend* has another shape, or is no partition of unity over the regions.
     """
     _check_cages(regions, cages)
+    rows: list[IntArray] = []
+    blocks: list[FloatArray | InterpolatedBlock] = []
     weights = regions.weights if blend is None else _checked_blend(blend, regions)
-    rows, blocks = [], []
     for r, cage in enumerate(cages):
         share = part(progress, r / len(cages), (r + 1) / len(cages))
         members = np.flatnonzero(weights[r] > 0.0)
         points = regions.mesh.vertices[members]
+        interpolated = None
+        if regions.mesh.n_vertices > sizes.INTERPOLATED:
+            interpolated = InterpolatedBlock.of(points, weights[r, members], cage, share)
+        rows.append(members)
+        if interpolated is not None:
+            blocks.append(interpolated)
+            continue
         is_large = np.count_nonzero(weights) * cage.n_vertices > sizes.SINGLE_PRECISION
         block = np.empty((len(members), cage.n_vertices), np.float32 if is_large else np.float64)
         for start in range(0, len(members), _COORDINATES):
@@ -348,7 +404,6 @@ def cage_subspace(
             w = mean_value_coordinates(points[piece], cage.vertices, cage.faces, progress=ways)
             w *= weights[r, members[piece]][:, None]
             block[piece] = w
-        rows.append(members)
         blocks.append(block)
     return Subspace(regions.mesh.n_vertices, tuple(rows), tuple(blocks))
 

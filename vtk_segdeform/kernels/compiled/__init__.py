@@ -2,7 +2,7 @@
 
     volumes         `volume.signed_volume`, `volume.volume_along_path`, `volume.volume_gradient`
     products        `subspace.Subspace`
-    low_rank        `low_rank.LowRankSubspace`
+    interpolated    `interpolated.InterpolatedBlock`
     mean_value      `mean_value.mean_value_coordinates`
     normals         `normals.VertexNormals`
     rotations       `rotations.closest_rotations`
@@ -24,7 +24,7 @@ from .half_edges import (
     pair_half_edges,
     used_vertices,
 )
-from .low_rank import map_low_rank
+from .interpolated import add_interpolated, add_interpolated_adjoint, interpolated_rows
 from .mean_value import weights
 from .normals import ring_normals, rings
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
@@ -34,14 +34,16 @@ from .volumes import volume_along_sums, volume_gradient, volume_sums
 
 __all__ = [
     "add_adjoint",
+    "add_interpolated",
+    "add_interpolated_adjoint",
     "add_packed_adjoint",
     "add_product",
     "border_half_edges",
     "first_equal_points",
     "flat_faces",
+    "interpolated_rows",
     "link",
     "link_corners",
-    "map_low_rank",
     "map_packed",
     "number_trees",
     "one_fan_each",

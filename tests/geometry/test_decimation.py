@@ -1,0 +1,53 @@
+"""Decimation: clusters of neighbours, whatever the mesh is like."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from open_meshes import sheet, together
+
+from vtk_segdeform import models, sizes
+from vtk_segdeform.cages import fit_cages
+from vtk_segdeform.geometry import decimated, signed_volume
+from vtk_segdeform.mesh import connected
+from vtk_segdeform.regions import segment
+
+CACTUS = models.cactus(4000)
+
+
+def two_close_sheets():
+    flat = sheet(lambda u, v: (u, v, 0.0 * u))
+    return together(flat, flat.with_vertices(flat.vertices + [0.0, 0.0, 1e-4]))
+
+
+@pytest.mark.parametrize("mesh", [CACTUS, two_close_sheets()], ids=["cactus", "sheets"])
+def test_clusters_are_connected_and_never_join_two_sheets(mesh):
+    coarse, kept, cluster = decimated(mesh, mesh.n_vertices // 8)
+    assert 0.3 < coarse.n_vertices / (mesh.n_vertices // 8) < 3.0
+    i, j = mesh.edges.T
+    same = cluster[i] == cluster[j]
+    assert connected(mesh.n_vertices, i[same], j[same]).max() + 1 == coarse.n_vertices
+    assert (cluster[kept] == np.arange(len(kept))).all()
+    assert (mesh.components[kept][cluster] == mesh.components).all()
+    assert coarse.is_closed == mesh.is_closed
+
+
+def test_the_shape_is_the_same_in_any_place_and_size():
+    coarse, kept, _ = decimated(CACTUS, 1000)
+    volumes = [signed_volume(each.vertices, each.faces) for each in (coarse, CACTUS)]
+    assert volumes[0] == pytest.approx(volumes[1], rel=0.05)
+    assert decimated(CACTUS, 1000)[0] is coarse  # known
+    moved = CACTUS.with_vertices(1e-7 * CACTUS.vertices[:, [1, 2, 0]] + 3.0)
+    assert np.mean(np.isin(decimated(moved, 1000)[1], kept)) > 0.9
+
+
+def test_regions_and_cages_of_a_large_mesh_are_those_of_a_decimated_one(monkeypatch):
+    plain = segment(CACTUS)
+    monkeypatch.setattr(sizes, "DECIMATED", 3500)
+    monkeypatch.setattr(sizes, "DECIMATED_POINTS", 3200)
+    regions = segment(CACTUS)
+    assert regions.n_regions == plain.n_regions == 3
+    assert np.mean(regions.labels == plain.labels) > 0.9
+    cages = fit_cages(CACTUS, regions, 100)
+    for cage, members in zip(cages, regions.membership, strict=True):
+        cage.require_encloses(CACTUS.vertices[members], "vertices")
