@@ -27,6 +27,7 @@ _HIGHEST = 1e4  # times the initial weight
 # A higher weight is accepted if it multiplies the errors by at most _GAIN and the energy by at most
 # _COST; at a higher cost, poses begin to fold.
 _GAIN, _COST = 0.7, 1.75
+_RETRY = 1.2  # times the error at which a higher weight was refused: it is tried again
 _AIM = 0.95  # of the tolerance; closer to it, interpolation too often fails
 _TRIES = 3
 _ALL = 0.98  # share of the higher weights beyond which these are used
@@ -150,6 +151,7 @@ class WeightContinuation:
         self._raised: list[_Weighted] = []  # with higher weights, used for the last pose
         self._current = self._initial  # the solver of the last pose
         self._only_current = False  # whether only that solver has followed the last targets
+        self._refused = 0.0  # the error at which more weight did not help `follow`
         self._tolerance = tolerance
 
     def copy(self) -> WeightContinuation:
@@ -159,7 +161,7 @@ class WeightContinuation:
         other._initial, *other._raised = (each.copy() for each in [initial, *self._raised])
         index = [initial, *self._raised].index(self._current)
         other._current = [other._initial, *other._raised][index]
-        other._only_current = self._only_current
+        other._only_current, other._refused = self._only_current, self._refused
         return other
 
     @property
@@ -186,13 +188,44 @@ class WeightContinuation:
         for weighted in (self._initial, *self._raised):
             weighted.solver.volumes = volumes
 
+    def restart(self, p: FloatArray) -> None:
+        """Begin the next solve at cage vertices *p* (m, 3), at the weights of the last pose."""
+        self._current.p = p
+        self._current.solver.forget()
+
     def solve_at_current_weights(self, places: FloatArray, options: SolverOptions) -> SolverResult:
         """Return a pose for *places* (k, 3) at the weights of the last pose; it is not final."""
         self._only_current = self.has_raised_weights
         return replace(self._current.solve(places, options), status=Status.STEP_LIMIT)
 
+    def follow(self, places: FloatArray, options: SolverOptions) -> SolverResult:
+        """Return a pose for *places* (k, 3) near the converged one; it is not final.
+
+        As `solve_at_current_weights`, but sets that miss their places get more weight, as in the
+        final pose: if a small fixed patch turns a little, all that is beyond it moves far.
+        """
+        assert options.within is not None
+        here, result = self._current, self.solve_at_current_weights(places, options)
+        errors, left = _Errors.of(here, places), options.max_steps - result.steps
+        is_off = (errors.places > self._tolerance) & (here.strength < _HIGHEST)
+        is_tried = errors.places.max(initial=0.0) < _RETRY * self._refused
+        if result.remaining > options.within or is_tried or not is_off.any() or left <= 0:
+            return result
+        ahead = self._at(np.where(is_off, _FACTOR * here.strength, here.strength), near=here)
+        ahead.p = here.p
+        attempt = ahead.solve(places, replace(options, max_steps=left))
+        reached = _Errors.of(ahead, places)
+        if attempt.remaining <= options.within:
+            if reached.improve_on(errors) and attempt.shape <= _COST * result.shape:
+                self._current, self._only_current = ahead, True
+                result = replace(attempt, status=Status.STEP_LIMIT)
+            else:
+                self._refused = float(errors.places.max())
+        return replace(result, steps=options.max_steps - left + attempt.steps)
+
     def solve(self, places: FloatArray, options: SolverOptions) -> SolverResult:
         """Return the final pose for *places* (k, 3); its steps are those at all weights."""
+        self._refused = 0.0
         if self._only_current:
             self._initial.p, self._raised = self._current.p, [self._current]
             self._only_current = False

@@ -1,5 +1,8 @@
 """Solving during a drag: a few steps at each event, more from a timer between events.
 
+Every pose shown is near a converged one: if the steps of an event do not suffice, the session stops
+on the way to the pointer, and continues at the next event or tick; see `Session.drag`.
+
 The number of steps per event follows from the measured time of the last steps.  If a solve stops at
 its step limit, a timer refines the pose until it has converged or makes no more progress.  A replay
 uses the recorded numbers of steps; see `StepBudget`.
@@ -17,9 +20,11 @@ from vtk_segdeform.solver import Solution, Status
 
 from ..scene import StepBudget, Stop, View
 
-_EVENT_TIME = 0.020  # seconds per event, about half the time of software rendering
+_WITHIN = 0.0025  # diagonals: estimated distance of a shown pose from its converged one, at most
+_EVENT_TIME = 0.030  # seconds per event, about half the time of software rendering
 _REFINE_TIME = 0.080  # seconds per refinement, when no event is pending
 _MOST_STEPS = 8  # per event: following the pointer matters more than converging
+_LEAST_STEPS = 2  # per event: fewer often stop between two poses that may be shown
 _LEAST_REFINE_STEPS = 3  # with fewer per call, Anderson acceleration has no effect
 _PERIOD = 40  # milliseconds between two refinements
 
@@ -51,8 +56,8 @@ class LiveSolve:
 
     @property
     def steps(self) -> int:
-        """The number of steps of the next event: 1 to 8, and 1 before the first measurement."""
-        return self._steps_in(_EVENT_TIME, 1)
+        """The number of steps of the next event: 2 to 8, and 2 before the first measurement."""
+        return self._steps_in(_EVENT_TIME, _LEAST_STEPS)
 
     @property
     def is_refining(self) -> bool:
@@ -60,7 +65,7 @@ class LiveSolve:
         return self._stop is not None
 
     def solve(self, solve: Callable[..., Solution]) -> None:
-        """Call ``solve(max_steps=...)``, and refine its result later."""
+        """Call ``solve(max_steps=..., within=...)``, and refine its result later."""
         if not self._session.is_bound:
             self._session.bind()  # beforehand, so that it is not measured as part of a step
         self._measure(solve, self.steps)
@@ -112,5 +117,5 @@ class LiveSolve:
     def _measure(self, solve: Callable[..., Solution], steps: int) -> None:
         """Solve and record the time per step."""
         began = time.perf_counter()
-        solution = solve(max_steps=self._budget.steps(steps))
+        solution = solve(max_steps=self._budget.steps(steps), within=_WITHIN)
         self._seconds.append((time.perf_counter() - began) / max(1, solution.steps))
