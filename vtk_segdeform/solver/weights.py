@@ -28,6 +28,8 @@ _HIGHEST = 1e4  # times the initial weight
 # _COST; at a higher cost, poses begin to fold.
 _GAIN, _COST = 0.7, 1.75
 _RETRY = 1.2  # times the error at which a higher weight was refused: it is tried again
+_LIVE_AIM = 0.7  # of the tolerance, in a drag: errors are about inverse to weights
+_RAISING = 4  # steps after more weight, at least
 _AIM = 0.95  # of the tolerance; closer to it, interpolation too often fails
 _TRIES = 3
 _ALL = 0.98  # share of the higher weights beyond which these are used
@@ -206,22 +208,28 @@ class WeightContinuation:
         """
         assert options.within is not None
         here, result = self._current, self.solve_at_current_weights(places, options)
-        errors, left = _Errors.of(here, places), options.max_steps - result.steps
-        is_off = (errors.places > self._tolerance) & (here.strength < _HIGHEST)
-        is_tried = errors.places.max(initial=0.0) < _RETRY * self._refused
-        if result.remaining > options.within or is_tried or not is_off.any() or left <= 0:
-            return result
-        ahead = self._at(np.where(is_off, _FACTOR * here.strength, here.strength), near=here)
-        ahead.p = here.p
-        attempt = ahead.solve(places, replace(options, max_steps=left))
-        reached = _Errors.of(ahead, places)
-        if attempt.remaining <= options.within:
-            if reached.improve_on(errors) and attempt.shape <= _COST * result.shape:
-                self._current, self._only_current = ahead, True
-                result = replace(attempt, status=Status.STEP_LIMIT)
-            else:
+        steps = result.steps
+        while result.remaining <= options.within:
+            errors = _Errors.of(here, places)
+            is_off = (errors.places > self._tolerance) & (here.strength < _HIGHEST)
+            if not is_off.any() or errors.places.max() < _RETRY * self._refused:
+                break
+            factor = np.clip(errors.places / (_LIVE_AIM * self._tolerance), 1.0, _FACTOR)
+            ahead = self._at(here.strength * np.where(is_off, factor, 1.0), near=here)
+            ahead.p = here.p
+            left = max(_RAISING, options.max_steps - steps)
+            attempt = ahead.solve(places, replace(options, max_steps=left))
+            steps += attempt.steps
+            reached = _Errors.of(ahead, places)
+            is_met = (reached.places[is_off] <= self._tolerance).all()
+            is_better = is_met or reached.improve_on(errors)
+            is_near = attempt.remaining <= options.within
+            if not (is_near and is_better and attempt.shape <= _COST * result.shape):
                 self._refused = float(errors.places.max())
-        return replace(result, steps=options.max_steps - left + attempt.steps)
+                break
+            here = self._current = ahead
+            self._only_current, result = True, replace(attempt, status=Status.STEP_LIMIT)
+        return replace(result, steps=steps)
 
     def solve(self, places: FloatArray, options: SolverOptions) -> SolverResult:
         """Return the final pose for *places* (k, 3); its steps are those at all weights."""

@@ -6,6 +6,8 @@ on the way to the pointer, and continues at the next event or tick; see `Session
 The number of steps per event follows from the measured time of the last steps.  If a solve stops at
 its step limit, a timer refines the pose until it has converged or makes no more progress.  A replay
 uses the recorded numbers of steps; see `StepBudget`.
+
+While targets move, pictures are drawn without anti-aliasing.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from statistics import median
 from vtk_segdeform.session import Session
 from vtk_segdeform.solver import Solution, Status
 
-from ..scene import StepBudget, Stop, View
+from ..scene import Draft, StepBudget, Stop, View
 
 _WITHIN = 0.0025  # diagonals: estimated distance of a shown pose from its converged one, at most
 _EVENT_TIME = 0.030  # seconds per event, about half the time of software rendering
@@ -26,6 +28,7 @@ _REFINE_TIME = 0.080  # seconds per refinement, when no event is pending
 _MOST_STEPS = 8  # per event: following the pointer matters more than converging
 _LEAST_STEPS = 2  # per event: fewer often stop between two poses that may be shown
 _LEAST_REFINE_STEPS = 3  # with fewer per call, Anderson acceleration has no effect
+_REST = 0.2  # seconds without a move, after which pictures are drawn in full quality
 _PERIOD = 40  # milliseconds between two refinements
 
 
@@ -53,6 +56,7 @@ class LiveSolve:
         self._seconds: deque[float] = deque(maxlen=5)  # per step; their median is used
         self._stop: Stop | None = None
         self._budget = StepBudget(view.interactor)
+        self._draft, self._moved_at = Draft(view), 0.0
 
     @property
     def steps(self) -> int:
@@ -68,7 +72,9 @@ class LiveSolve:
         """Call ``solve(max_steps=..., within=...)``, and refine its result later."""
         if not self._session.is_bound:
             self._session.bind()  # beforehand, so that it is not measured as part of a step
+        self._draft.begin()
         self._measure(solve, self.steps)
+        self._moved_at = time.perf_counter()
         self.resume()
 
     def resume(self) -> None:
@@ -84,7 +90,8 @@ class LiveSolve:
             self._stop = self._view.every(_PERIOD, self._tick)
 
     def pause(self) -> None:
-        """Stop refining until `resume`."""
+        """Stop refining until `resume`, and draw in full quality."""
+        self._draft.end()
         if self._stop is not None:
             self._stop()
             self._stop = None
@@ -98,6 +105,8 @@ class LiveSolve:
         self.resume()  # the pose may have changed since the last tick
         if self._stop is None:
             return
+        if time.perf_counter() - self._moved_at > _REST:
+            self._draft.end()
         is_done = False
         try:
             steps = self._steps_in(_REFINE_TIME, _LEAST_REFINE_STEPS)

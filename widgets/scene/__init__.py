@@ -8,12 +8,14 @@ The files, in reading order:
     surface_display    the mesh of a session as an actor
     projection         projection between world and display coordinates
     foreground         a renderer that draws over another one
+    draft              drawing without anti-aliasing while something moves
     labels             rectangles and text in display coordinates
     wireframe          edges and vertices of a mesh
     highlights         loops and vertices of a mesh, marked
     step_budget        solver steps per event, recorded and replayed
 """
 
+from .draft import Draft
 from .gestures import Gesture, Phase, Pointer
 from .highlights import Highlights
 from .labels import Panel, Text
@@ -25,6 +27,7 @@ from .widget import Widget
 from .wireframe import Wireframe
 
 __all__ = [
+    "Draft",
     "Gesture",
     "Highlights",
     "Panel",
