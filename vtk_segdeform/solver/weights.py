@@ -29,6 +29,7 @@ _HIGHEST = 1e4  # times the initial weight
 _GAIN, _COST = 0.7, 1.75
 _RETRY = 1.2  # times the error at which a higher weight was refused: it is tried again
 _LIVE_AIM = 0.7  # of the tolerance, in a drag: errors are about inverse to weights
+_LIVE_GAIN = 0.95
 _RAISING = 4  # steps after more weight, at least
 _AIM = 0.95  # of the tolerance; closer to it, interpolation too often fails
 _TRIES = 3
@@ -209,8 +210,10 @@ class WeightContinuation:
         assert options.within is not None
         here, result = self._current, self.solve_at_current_weights(places, options)
         steps = result.steps
-        while result.remaining <= options.within:
+        for _ in range(_TRIES):
             errors = _Errors.of(here, places)
+            if result.remaining > options.within:
+                break
             is_off = (errors.places > self._tolerance) & (here.strength < _HIGHEST)
             if not is_off.any() or errors.places.max() < _RETRY * self._refused:
                 break
@@ -221,8 +224,7 @@ class WeightContinuation:
             attempt = ahead.solve(places, replace(options, max_steps=left))
             steps += attempt.steps
             reached = _Errors.of(ahead, places)
-            is_met = (reached.places[is_off] <= self._tolerance).all()
-            is_better = is_met or reached.improve_on(errors)
+            is_better = reached.places.max() <= _LIVE_GAIN * errors.places.max()
             is_near = attempt.remaining <= options.within
             if not (is_near and is_better and attempt.shape <= _COST * result.shape):
                 self._refused = float(errors.places.max())
