@@ -8,7 +8,6 @@ The files, in reading order:
     history               record and plot the ratios of many runs
     tasks                 meshes, handles and targets
     drags                 drags, frame by frame
-    live_drags            steps and errors of the frames of live drags
     measuring             time, memory and child processes
     drag_profile          drags of 5 thousand to a million vertices
     frame_profile         the parts of one drag

@@ -19,7 +19,7 @@ The files, in reading order:
 from .handles import require_handle
 from .listeners import Change
 from .naming import region_name
-from .session import Effort, Preparation, Session
+from .session import Effort, Session
 from .state import Options, State
 from .store import load_session, save_session
 
@@ -27,7 +27,6 @@ __all__ = [
     "Change",
     "Effort",
     "Options",
-    "Preparation",
     "Session",
     "State",
     "load_session",
