@@ -92,6 +92,8 @@ _ANCHOR_WEIGHT = 100.0  # of the whole surface in a local deformer, in weights o
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most
 _CORRECTIONS, _GAIN = 8, 0.7  # of pulled points: at most, and the factor by which errors must fall
+_FEW_STEPS, _MANY_STEPS = 3, 12  # to a pose of a live solve
+_LEAST_SHARE = 1.0 / 32.0  # of the usual distance between waypoints
 _SCALED = 3e-5  # relative scale from which another solve follows
 _ROUNDING = 1e-7  # relative scale that counts as rounding
 _MET = 1e-3  # position error, in diagonals, below which a target is met
@@ -121,6 +123,28 @@ class _PulledPoints:
     def correct(self, off: FloatArray, error: float) -> None:
         """Move x~ by how far the vertices are *off* their targets, (q, 3), at most by *error*."""
         self.offsets, self.error = self.offsets + off, error
+
+
+@dataclass(eq=False)
+class _Approach:
+    """How far a live solve aims at a time, towards targets that move on."""
+
+    share: float = 0.5  # of the usual distance between waypoints
+    steps: int = 0  # since the last pose near a converged one
+
+    def reached(self, steps: int) -> None:
+        """Aim farther, if a pose took few *steps*."""
+        if self.steps + steps <= _FEW_STEPS:
+            self.share = min(1.0, 1.5 * self.share)
+        self.steps = 0
+
+    def missed(self, steps: int) -> bool:
+        """Count *steps*; return whether to begin again, at a nearer aim."""
+        self.steps += steps
+        if self.steps < _MANY_STEPS or self.share <= _LEAST_SHARE:
+            return False
+        self.share, self.steps = 0.5 * self.share, 0
+        return True
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,6 +236,7 @@ class Deformer:
     _scaled_surface: ScaledSurface
     _constraints: _Constraints
     _continuation: WeightContinuation
+    _aim: _Approach
     _p: FloatArray  # (m, 3), the cages of the last pose, in solver coordinates
     _targets: FloatArray  # (k, 3), the targets of the last pose
 
@@ -370,7 +395,7 @@ class Deformer:
         other = self._shared()
         own = self._constraints
         other._constraints = replace(own, solver=own.solver.copy(), pulled=copy.copy(own.pulled))
-        other._continuation = self._continuation.copy()
+        other._continuation, other._aim = self._continuation.copy(), copy.copy(self._aim)
         return other
 
     __copy__ = copy
@@ -440,6 +465,7 @@ class Deformer:
         targets: ArrayLike,
         *,
         max_steps: int | None = None,
+        within: float | None = None,
         progress: Progress | None = None,
     ) -> Solution:
         """Return the pose with the handle vertices at *targets*.
@@ -452,6 +478,12 @@ class Deformer:
         max_steps : int, optional
             Instead of the deformer's own limit, from the last waypoint on: a drag may stop early
             and continue with the next event.
+        within : float, optional
+            For live drags: return only poses that are estimated to be within this distance, in
+            diagonals, of the converged pose.  Steps stop there; and where *max_steps*, of all
+            waypoints together, do not suffice, the pose is that of targets on the way,
+            `Solution.targets`, or still the last one.  The next call continues.  Once these targets
+            are reached, further calls converge as they do without *within*.
         progress : Progress, optional
             Called before every step; may cancel, which restores the pose before the call.
 
@@ -464,8 +496,12 @@ class Deformer:
         goal = self._frame.inward(checked_targets(targets, len(self.handle)))
         check_distance(goal)
         require_together(self._rest, goal, self._constraints.fixed_box)
+        if within is not None and not is_number(within, 0.0):
+            raise ConstraintError(f"within must be a positive number; got {shown(within)}")
         before = self._p, self._targets
         try:
+            if within is not None and not np.array_equal(goal, self._targets):
+                return self._approach(goal, max_steps, within, _counting(progress))
             return self._solve(goal, max_steps, _counting(progress))
         except Cancelled:
             self._begin(*before)
@@ -494,6 +530,39 @@ class Deformer:
             pulled.correct(off, error)
             is_same, result = True, replace(result, status=Status.STEP_LIMIT)
         return self._solution(result, x, steps)
+
+    def _approach(
+        self, goal: FloatArray, max_steps: int | None, within: float, progress: Progress | None
+    ) -> Solution:
+        """Move towards *goal* by poses *within* a distance of converged ones; return the last."""
+        limit = self._options.max_steps if max_steps is None else max_steps
+        unit = self._frame.size / self.mesh.diagonal
+        options = replace(self._options, within=within / unit, progress=progress)
+        reached, steps, remaining = None, 0, np.inf
+        for targets in waypoints(self._targets, goal, self._constraints.handles, self._aim.share):
+            places = self._constraints.pulled.moved(self._constraints.places(targets))
+            options = replace(options, max_steps=limit - steps)
+            result = self._continuation.follow(places, options)
+            steps, remaining = steps + result.steps, result.remaining * unit
+            if remaining > within:
+                if self._aim.missed(result.steps):
+                    self._continuation.restart(self._p if reached is None else reached.p)
+                break
+            self._aim.reached(result.steps)
+            reached, self._targets = result, targets
+            if steps >= limit:
+                break
+        if reached is None:
+            result = replace(result, p=self._p, directions=())
+            solution = self._solution(result, self._map(self._p * self._frame.size), steps)
+        else:
+            x, _ = self._with_exact_volume(reached)
+            remaining = reached.remaining * unit
+            solution = self._solution(reached, x, steps)
+        on_the_way = None if np.array_equal(goal, self._targets) else self._targets
+        if on_the_way is not None:
+            on_the_way = self._frame.outward(on_the_way)
+        return replace(solution, remaining=remaining, targets=on_the_way)
 
     def _solve_once(
         self, goal: FloatArray, options: SolverOptions, is_drag: bool
@@ -635,6 +704,7 @@ class Deformer:
         solver = self._constraints.solver
         solver.volumes = self._constraints.volumes
         self._continuation = WeightContinuation(solver, p, self._hold_tolerance)
+        self._aim = _Approach()
         self._p, self._targets = p, targets
         if self._constraints.is_scaled and p is not self._rest_cages:
             self._continuation.continue_from(p)

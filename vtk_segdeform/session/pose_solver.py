@@ -123,9 +123,15 @@ class PoseSolver:
         return self._evaluate(state, pose)[1]()
 
     def solve(
-        self, state: State, targets: Mapping[str, FloatArray], max_steps: int | None
+        self,
+        state: State,
+        targets: Mapping[str, FloatArray],
+        max_steps: int | None,
+        within: float | None = None,
     ) -> tuple[Pose, Solution]:
         """Solve for *targets* (k, 3) of every handle, starting from the pose of *state*.
+
+        The pose has these targets, even if its cages are still on the way; see `Deformer.solve`.
 
         Raises
         ------
@@ -137,12 +143,15 @@ class PoseSolver:
         deformer = self._localise(state, self._constrain(state))
         self._start_from(state, deformer)
         self._current = None  # in case the solve fails
-        solution = deformer.solve(_stacked(targets), max_steps=max_steps)
+        solution = deformer.solve(_stacked(targets), max_steps=max_steps, within=within)
         if not np.isfinite(solution.vertices).all():
             raise ConstraintError("no finite pose for these targets; move the handles less")
         for vertices in solution.cage_vertices:
             frozen(vertices)
-        pose = Pose(solution.cage_vertices, targets)
+        cages, before = solution.cage_vertices, state.pose
+        if before is not None and all(map(np.array_equal, cages, before.cage_vertices)):
+            cages = before.cage_vertices  # so that their vertices are known
+        pose = Pose(cages, targets)
         self._current = pose
         x, change = self._evaluate(state, pose)
         return pose, replace(solution, vertices=x, volume=change)
@@ -238,8 +247,8 @@ class PoseSolver:
     def _evaluate(self, state: State, pose: Pose) -> tuple[FloatArray, Callable[[], float]]:
         """Return x = W~ p, and a function that returns its volume change."""
         lids, before = state.options.lids, self._evaluated
-        if before is None or before[0] is not pose or before[1] is not lids:
-            same = before is not None and before[0] is pose
+        same = before is not None and before[0].cage_vertices is pose.cage_vertices
+        if before is None or not same or before[1] is not lids:
             x = before[2] if before and same else self.bind(state).surface(pose.cage_vertices)
             frozen(x)
             _, volume = self._enclosed(state)

@@ -515,7 +515,11 @@ class Session(Timeline):
     # The pose.
 
     def drag(
-        self, targets: Mapping[str, ArrayLike] | ArrayLike, *, max_steps: int | None = None
+        self,
+        targets: Mapping[str, ArrayLike] | ArrayLike,
+        *,
+        max_steps: int | None = None,
+        within: float | None = None,
     ) -> Solution:
         """Move handles to *targets*, and start a drag unless one is ongoing.
 
@@ -526,6 +530,10 @@ class Session(Timeline):
             all handles, concatenated.
         max_steps : int, optional
             Stop after this number of solver steps; the next move, or `refine`, continues.
+        within : float, optional
+            For live drags: the mesh takes only poses that are estimated to be within this distance,
+            in diagonals, of a converged one.  If it cannot reach *targets* in *max_steps*, it stops
+            on the way, or does not move; the next move, or `refine`, continues.
 
         Returns
         -------
@@ -540,7 +548,8 @@ class Session(Timeline):
         """
         wanted = handles.checked_targets(self.mesh, self.handles, targets)
         state = replace(self._state, locality=None)
-        return self._drag(state, {**self.targets, **wanted}, list(wanted), max_steps)
+        limits = max_steps, within
+        return self._drag(state, {**self.targets, **wanted}, list(wanted), limits)
 
     def pull(
         self,
@@ -550,6 +559,7 @@ class Session(Timeline):
         radius: float | None = None,
         locality: float | None = None,
         max_steps: int | None = None,
+        within: float | None = None,
     ) -> Solution:
         """Pull one point of the surface, as part of a drag like `drag`; see `pulling`.
 
@@ -567,7 +577,7 @@ class Session(Timeline):
             hardly moves.  With less, more of it follows, above all the ends of limbs; with 0 all is
             free.  By default 0.5, and 0 between fixed vertices, pins and handles that were not
             made by pulls.
-        max_steps : int, optional
+        max_steps, within : int and float, optional
             As in `drag`.
 
         Raises
@@ -603,7 +613,7 @@ class Session(Timeline):
         wanted = {**state.pose.targets, **targets}
         if grasp is before:
             state = replace(state, pose=self._state.pose)
-        solution = self._drag(state, wanted, [grasp.name], max_steps)
+        solution = self._drag(state, wanted, [grasp.name], (max_steps, within))
         self._grasp = start, grasp
         return solution
 
@@ -620,7 +630,12 @@ class Session(Timeline):
         return name
 
     def move_handle(
-        self, name: str, motion: ArrayLike, *, max_steps: int | None = None
+        self,
+        name: str,
+        motion: ArrayLike,
+        *,
+        max_steps: int | None = None,
+        within: float | None = None,
     ) -> Solution:
         """Move one handle by a matrix or to targets; otherwise like `drag`.
 
@@ -631,16 +646,17 @@ class Session(Timeline):
         motion : (4, 4) or (k, 3) float
             An affine map of the targets at the start of the drag, so that moving the mouse back
             moves the handle back; or a target for each vertex of the handle.
-        max_steps : int, optional
+        max_steps, within : int and float, optional
             As in `drag`.
         """
         handles.require_handle(self.handles, name)
         matrix = plain(motion, "motion")
         if matrix.shape != (4, 4):
-            return self.drag({name: matrix}, max_steps=max_steps)
+            return self.drag({name: matrix}, max_steps=max_steps, within=within)
         pose = (self._drag_start or self._state).pose
         start = self._rest_targets() if pose is None else pose.targets
-        return self.drag({name: handles.moved(start[name], matrix)}, max_steps=max_steps)
+        targets = {name: handles.moved(start[name], matrix)}
+        return self.drag(targets, max_steps=max_steps, within=within)
 
     def move_cage(self, region: int, vertices: ArrayLike) -> None:
         """Move the vertices of one cage to *vertices* (m_r, 3); the mesh follows, x = W~ p.
@@ -672,12 +688,14 @@ class Session(Timeline):
         """Return *points* (k, 3), given at rest, moved along with the mesh to the current pose."""
         return self._pose_solver.bind(self._state).passengers(points).moved(self.cage_vertices)
 
-    def refine(self, *, max_steps: int | None = None) -> Solution:
+    def refine(self, *, max_steps: int | None = None, within: float | None = None) -> Solution:
         """Continue solving for the current targets, for example after a drag with *max_steps*.
+
+        With *within*, as in `drag`, until the targets are reached; then until it has converged.
 
         Adds no undo step: the result becomes part of the ongoing drag, or else of the last step.
         """
-        pose, solution = self._solve(self._state, self.targets, max_steps)
+        pose, solution = self._solve(self._state, self.targets, (max_steps, within))
         if solution.steps == 0:  # converged already: keep the same pose object
             here = self._state.pose
             self._solution = None if here is None else (here, solution)
@@ -711,19 +729,22 @@ class Session(Timeline):
         state: State,
         targets: Mapping[str, FloatArray],
         moved: list[str],
-        max_steps: int | None,
+        limits: tuple[int | None, float | None],
     ) -> Solution:
         """Solve from *state* for *targets*, as part of a drag of the handles *moved*."""
-        pose, solution = self._solve(state, targets, max_steps)
+        pose, solution = self._solve(state, targets, limits)
         self._solution = pose, solution
         self._move(replace(state, pose=pose), *moved)
         return solution
 
     def _solve(
-        self, state: State, targets: Mapping[str, FloatArray], max_steps: int | None
+        self,
+        state: State,
+        targets: Mapping[str, FloatArray],
+        limits: tuple[int | None, float | None],
     ) -> tuple[Pose, Solution]:
         began = time.perf_counter()
-        pose, solution = self._pose_solver.solve(state, MappingProxyType({**targets}), max_steps)
+        pose, solution = self._pose_solver.solve(state, MappingProxyType({**targets}), *limits)
         steps, seconds = self._effort
         self._effort = Effort(steps + solution.steps, seconds + time.perf_counter() - began)
         return pose, solution

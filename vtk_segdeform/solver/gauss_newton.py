@@ -79,6 +79,7 @@ class SolverOptions:
     acceleration: int = 5  # steps that Anderson acceleration remembers; 0 turns it off
     exact_hessian: bool = True  # False holds rotations and volumes' gradients fixed, as in (21)
     exact_volume: bool = True  # False leaves the linearised multiplier of (21), for comparison
+    within: float | None = None  # stop, after a step, where the estimated `remaining` is at most so
     progress: Progress | None = field(default=None, compare=False)  # called before every step
 
     def __post_init__(self) -> None:
@@ -104,6 +105,7 @@ class SolverResult:
     status: Status
     steps: int
     step_size: float  # of the last step, root mean square over the surface
+    remaining: float  # estimate of the largest distance to the minimum; infinite without `within`
     shape: float  # E(p): the objective without the position term
     merits: tuple[float, ...]  # the objective at the start and after each step
 
@@ -231,7 +233,9 @@ class GaussNewton:
         directions: list[FloatArray] = []
         newton = options.exact_hessian and self.energy.has_exact_gradient
         status = Status.STEP_LIMIT
-        while len(merits) <= options.max_steps:
+        remaining = math.inf
+        last = options.max_steps + (options.within is not None)  # which estimates what remains
+        while len(merits) <= last:
             tell(options.progress, (len(merits) - 1) / options.max_steps, "solving")
             if newton and state.factor_is_old:
                 state.renew_factor(self._full_factor(here, state) or self._factor)
@@ -241,8 +245,14 @@ class GaussNewton:
             if newton and state.step_is_doubtful:
                 state.drop_factor()
                 continue
+            if options.within is not None:
+                remaining = self._farthest(step)
             if state.step_size <= options.tolerance:
                 status = Status.CONVERGED
+                break
+            if len(merits) > 1 and remaining <= (options.within or 0.0):
+                break
+            if len(merits) > options.max_steps:
                 break
             ahead = None
             if options.acceleration:
@@ -259,7 +269,7 @@ class GaussNewton:
                 state.drop_factor()
                 continue
             if ahead is None:
-                status = Status.STALLED
+                status, remaining = Status.STALLED, 0.0
                 break
             here = ahead
             merits.append(here.merit)
@@ -271,6 +281,7 @@ class GaussNewton:
             status=status,
             steps=len(merits) - 1,
             step_size=state.step_size,
+            remaining=remaining,
             shape=here.shape,
             merits=tuple(merits),
         )
@@ -377,6 +388,11 @@ class GaussNewton:
 
     def _improves(self, ahead: _Iterate, here: _Iterate) -> bool:
         return ahead.merit <= here.merit + _RISE * (self.energy.constant + abs(here.merit))
+
+    def _farthest(self, step: FloatArray) -> float:
+        """Return the largest distance by which a *step* moves the surface of the volumes."""
+        moves = self.volumes.surface.map(step)
+        return math.sqrt(float(np.einsum("ij,ij->i", moves, moves).max(initial=0.0)))
 
     def _length(self, step: FloatArray) -> float:
         """Return the root mean square of a *step* over the surface."""

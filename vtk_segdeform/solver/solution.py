@@ -49,6 +49,11 @@ class Solution:
     """Computes `volume_change`."""
     region_volumes: Callable[[FloatArray], FloatArray] = field(repr=False)
     """Computes `region_volume_change`."""
+    remaining: float = 0.0
+    """Estimate of the largest distance of a vertex to its place in the converged pose, in diagonals
+    of the mesh, for a solve `within` a distance; otherwise infinite until it has converged."""
+    targets: FloatArray | None = None
+    """(k, 3) float: the targets of this pose, if it is on the way to those of the solve."""
 
     def __post_init__(self) -> None:
         for name in ("vertices", "cage_vertices"):

@@ -26,7 +26,9 @@ _SAMPLE = 500  # vertices of a large handle that are tested for a far motion
 _HALF_TURN = 1e-6  # radians below 180 degrees that count as 180
 
 
-def waypoints(start: FloatArray, end: FloatArray, handles: list[IntArray]) -> list[FloatArray]:
+def waypoints(
+    start: FloatArray, end: FloatArray, handles: list[IntArray], share: float = 1.0
+) -> list[FloatArray]:
     """Return the targets (k, 3) to solve for in order; the last one is *end*.
 
     Parameters
@@ -35,12 +37,15 @@ def waypoints(start: FloatArray, end: FloatArray, handles: list[IntArray]) -> li
         Present and final positions of the handle vertices, mesh size 1.
     handles : list of int arrays
         The indices in 0..k-1 of each handle, which has a motion of its own.
+    share : float
+        Of the usual distance between waypoints, at most 1.
     """
     samples = [h[:: max(1, len(h) // _SAMPLE)] for h in handles]
-    if all(_is_short(start[h], end[h]) for h in samples):
+    if all(_is_short(start[h], end[h], share) for h in samples):
         return [end]
     motions = [_ScrewMotion(start[h], end[h]) for h in handles]
-    count = max([1, *(motion.parts for motion in motions)])
+    length = max([0.0, *(motion.length for motion in motions)])
+    count = max(1, min(int(np.ceil(length / share - 1e-6)), _MOST_MOTIONS))
     way = []
     for k in range(1, count):
         targets = np.empty_like(end)
@@ -50,19 +55,19 @@ def waypoints(start: FloatArray, end: FloatArray, handles: list[IntArray]) -> li
     return [*way, end]
 
 
-def _is_short(start: FloatArray, end: FloatArray) -> bool:
+def _is_short(start: FloatArray, end: FloatArray, share: float) -> bool:
     """Tell whether a motion is so short that it needs no waypoint; faster than `_ScrewMotion`.
 
     A rotation by theta moves points by 2 sin(theta / 2) times their distance from its axis, and
     the sum of squared distances is least for the axis along which the points are longest.
     """
-    move, share = end - start, np.full(len(start), 1.0 / len(start))
-    if np.einsum("ij,ij->i", move, move).max() > _LONGEST_MOVE**2:
+    move, mean = end - start, np.full(len(start), 1.0 / len(start))
+    if np.einsum("ij,ij->i", move, move).max() > (share * _LONGEST_MOVE) ** 2:
         return False
-    move -= share @ move
-    arms = start - share @ start
+    move -= mean @ move
+    arms = start - mean @ start
     about_longest = np.linalg.eigvalsh(arms.T @ arms)[:2].sum()
-    return bool(np.vdot(move, move) <= _SHORT_TURN**2 * about_longest)
+    return bool(np.vdot(move, move) <= (share * _SHORT_TURN) ** 2 * about_longest)
 
 
 class _ScrewMotion:
@@ -87,8 +92,8 @@ class _ScrewMotion:
         if self._centre is not None:
             arms = np.cross(start - self._centre, self._axis)
             way = np.maximum(way, self._angle * np.linalg.norm(arms, axis=1))
-        ratio = max(self._angle / _LONGEST_TURN, float(way.max()) / _LONGEST_MOVE)
-        self.parts = min(int(np.ceil(ratio - 1e-6)), _MOST_MOTIONS)
+        # In units of the longest motion between two waypoints.
+        self.length = max(self._angle / _LONGEST_TURN, float(way.max()) / _LONGEST_MOVE)
 
     def at(self, s: float) -> FloatArray:
         """Return the handle after the fraction *s* of its motion, (k, 3)."""

@@ -27,6 +27,10 @@ _HIGHEST = 1e4  # times the initial weight
 # A higher weight is accepted if it multiplies the errors by at most _GAIN and the energy by at most
 # _COST; at a higher cost, poses begin to fold.
 _GAIN, _COST = 0.7, 1.75
+_RETRY = 1.2  # times the error at which a higher weight was refused: it is tried again
+_LIVE_AIM = 0.7  # of the tolerance, in a drag: errors are about inverse to weights
+_LIVE_GAIN = 0.95
+_RAISING = 4  # steps after more weight, at least
 _AIM = 0.95  # of the tolerance; closer to it, interpolation too often fails
 _TRIES = 3
 _ALL = 0.98  # share of the higher weights beyond which these are used
@@ -150,6 +154,7 @@ class WeightContinuation:
         self._raised: list[_Weighted] = []  # with higher weights, used for the last pose
         self._current = self._initial  # the solver of the last pose
         self._only_current = False  # whether only that solver has followed the last targets
+        self._refused = 0.0  # the error at which more weight did not help `follow`
         self._tolerance = tolerance
 
     def copy(self) -> WeightContinuation:
@@ -159,7 +164,7 @@ class WeightContinuation:
         other._initial, *other._raised = (each.copy() for each in [initial, *self._raised])
         index = [initial, *self._raised].index(self._current)
         other._current = [other._initial, *other._raised][index]
-        other._only_current = self._only_current
+        other._only_current, other._refused = self._only_current, self._refused
         return other
 
     @property
@@ -186,13 +191,51 @@ class WeightContinuation:
         for weighted in (self._initial, *self._raised):
             weighted.solver.volumes = volumes
 
+    def restart(self, p: FloatArray) -> None:
+        """Begin the next solve at cage vertices *p* (m, 3), at the weights of the last pose."""
+        self._current.p = p
+        self._current.solver.forget()
+
     def solve_at_current_weights(self, places: FloatArray, options: SolverOptions) -> SolverResult:
         """Return a pose for *places* (k, 3) at the weights of the last pose; it is not final."""
         self._only_current = self.has_raised_weights
         return replace(self._current.solve(places, options), status=Status.STEP_LIMIT)
 
+    def follow(self, places: FloatArray, options: SolverOptions) -> SolverResult:
+        """Return a pose for *places* (k, 3) near the converged one; it is not final.
+
+        As `solve_at_current_weights`, but sets that miss their places get more weight, as in the
+        final pose: if a small fixed patch turns a little, all that is beyond it moves far.
+        """
+        assert options.within is not None
+        here, result = self._current, self.solve_at_current_weights(places, options)
+        steps = result.steps
+        for _ in range(_TRIES):
+            errors = _Errors.of(here, places)
+            if result.remaining > options.within:
+                break
+            is_off = (errors.places > self._tolerance) & (here.strength < _HIGHEST)
+            if not is_off.any() or errors.places.max() < _RETRY * self._refused:
+                break
+            factor = np.clip(errors.places / (_LIVE_AIM * self._tolerance), 1.0, _FACTOR)
+            ahead = self._at(here.strength * np.where(is_off, factor, 1.0), near=here)
+            ahead.p = here.p
+            left = max(_RAISING, options.max_steps - steps)
+            attempt = ahead.solve(places, replace(options, max_steps=left))
+            steps += attempt.steps
+            reached = _Errors.of(ahead, places)
+            is_better = reached.places.max() <= _LIVE_GAIN * errors.places.max()
+            is_near = attempt.remaining <= options.within
+            if not (is_near and is_better and attempt.shape <= _COST * result.shape):
+                self._refused = float(errors.places.max())
+                break
+            here = self._current = ahead
+            self._only_current, result = True, replace(attempt, status=Status.STEP_LIMIT)
+        return replace(result, steps=steps)
+
     def solve(self, places: FloatArray, options: SolverOptions) -> SolverResult:
         """Return the final pose for *places* (k, 3); its steps are those at all weights."""
+        self._refused = 0.0
         if self._only_current:
             self._initial.p, self._raised = self._current.p, [self._current]
             self._only_current = False

@@ -1,8 +1,13 @@
 """Solving during a drag: a few steps at each event, more from a timer between events.
 
+Every pose shown is near a converged one: if the steps of an event do not suffice, the session stops
+on the way to the pointer, and continues at the next event or tick; see `Session.drag`.
+
 The number of steps per event follows from the measured time of the last steps.  If a solve stops at
 its step limit, a timer refines the pose until it has converged or makes no more progress.  A replay
 uses the recorded numbers of steps; see `StepBudget`.
+
+While targets move, pictures are drawn without anti-aliasing.
 """
 
 from __future__ import annotations
@@ -15,12 +20,15 @@ from statistics import median
 from vtk_segdeform.session import Session
 from vtk_segdeform.solver import Solution, Status
 
-from ..scene import StepBudget, Stop, View
+from ..scene import Draft, StepBudget, Stop, View
 
-_EVENT_TIME = 0.020  # seconds per event, about half the time of software rendering
+_WITHIN = 0.0025  # diagonals: estimated distance of a shown pose from its converged one, at most
+_EVENT_TIME = 0.030  # seconds per event, about half the time of software rendering
 _REFINE_TIME = 0.080  # seconds per refinement, when no event is pending
 _MOST_STEPS = 8  # per event: following the pointer matters more than converging
+_LEAST_STEPS = 2  # per event: fewer often stop between two poses that may be shown
 _LEAST_REFINE_STEPS = 3  # with fewer per call, Anderson acceleration has no effect
+_REST = 0.2  # seconds without a move, after which pictures are drawn in full quality
 _PERIOD = 40  # milliseconds between two refinements
 
 
@@ -48,11 +56,12 @@ class LiveSolve:
         self._seconds: deque[float] = deque(maxlen=5)  # per step; their median is used
         self._stop: Stop | None = None
         self._budget = StepBudget(view.interactor)
+        self._draft, self._moved_at = Draft(view), 0.0
 
     @property
     def steps(self) -> int:
-        """The number of steps of the next event: 1 to 8, and 1 before the first measurement."""
-        return self._steps_in(_EVENT_TIME, 1)
+        """The number of steps of the next event: 2 to 8, and 2 before the first measurement."""
+        return self._steps_in(_EVENT_TIME, _LEAST_STEPS)
 
     @property
     def is_refining(self) -> bool:
@@ -60,10 +69,12 @@ class LiveSolve:
         return self._stop is not None
 
     def solve(self, solve: Callable[..., Solution]) -> None:
-        """Call ``solve(max_steps=...)``, and refine its result later."""
+        """Call ``solve(max_steps=..., within=...)``, and refine its result later."""
         if not self._session.is_bound:
             self._session.bind()  # beforehand, so that it is not measured as part of a step
+        self._draft.begin()
         self._measure(solve, self.steps)
+        self._moved_at = time.perf_counter()
         self.resume()
 
     def resume(self) -> None:
@@ -79,7 +90,8 @@ class LiveSolve:
             self._stop = self._view.every(_PERIOD, self._tick)
 
     def pause(self) -> None:
-        """Stop refining until `resume`."""
+        """Stop refining until `resume`, and draw in full quality."""
+        self._draft.end()
         if self._stop is not None:
             self._stop()
             self._stop = None
@@ -93,6 +105,8 @@ class LiveSolve:
         self.resume()  # the pose may have changed since the last tick
         if self._stop is None:
             return
+        if time.perf_counter() - self._moved_at > _REST:
+            self._draft.end()
         is_done = False
         try:
             steps = self._steps_in(_REFINE_TIME, _LEAST_REFINE_STEPS)
@@ -112,5 +126,5 @@ class LiveSolve:
     def _measure(self, solve: Callable[..., Solution], steps: int) -> None:
         """Solve and record the time per step."""
         began = time.perf_counter()
-        solution = solve(max_steps=self._budget.steps(steps))
+        solution = solve(max_steps=self._budget.steps(steps), within=_WITHIN)
         self._seconds.append((time.perf_counter() - began) / max(1, solution.steps))

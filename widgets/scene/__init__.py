@@ -12,6 +12,7 @@ The files, in reading order:
     navigation         the camera by mouse
     orientation_cube   a cube that shows the directions of the model
     foreground         a renderer that draws over another one
+    draft              drawing without anti-aliasing while something moves
     labels             rectangles and text in display coordinates
     wireframe          edges and vertices of a mesh
     highlights         loops and vertices of a mesh, marked
@@ -19,6 +20,7 @@ The files, in reading order:
 """
 
 from .backdrop import set_background, set_lights
+from .draft import Draft
 from .gestures import Gesture, Phase, Pointer
 from .highlights import Highlights
 from .labels import Panel, Text
@@ -34,6 +36,7 @@ from .wireframe import Wireframe
 
 __all__ = [
     "VIEWS",
+    "Draft",
     "Gesture",
     "Highlights",
     "Navigation",

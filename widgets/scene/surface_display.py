@@ -62,7 +62,7 @@ class SurfaceDisplay:
         if len(turned):
             faces = faces.copy()
             faces[turned] = mesh.n_vertices + second
-        x = session.vertices
+        x = self._shown = session.vertices
         self.polydata = polydata_of(np.vstack([x, x[self._twice]]), np.full(mesh.n_faces, 3), faces)
         self._drawn: NDArray[np.float64] = vtk_to_numpy(self.polydata.GetPoints().GetData())
         self._points = self._drawn[: mesh.n_vertices]
@@ -142,7 +142,8 @@ class SurfaceDisplay:
 
     def update(self) -> None:
         """Show the session's current pose; called automatically when it changes."""
-        self._points[:] = self.session.mesh.vertices if self._shows_rest else self.session.vertices
+        self._shown = self.session.mesh.vertices if self._shows_rest else self.session.vertices
+        self._points[:] = self._shown
         self._drawn[len(self._points) :] = self._points[self._twice]
         self.polydata.GetPoints().GetData().Modified()
         self.polydata.GetPoints().Modified()
@@ -171,5 +172,5 @@ class SurfaceDisplay:
         return array
 
     def _changed(self, change: Change) -> None:
-        if change & Change.POSE:
-            self.update()
+        if change & Change.POSE and self.session.vertices is not self._shown:
+            self.update()  # otherwise only targets have moved

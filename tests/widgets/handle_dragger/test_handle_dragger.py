@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import FREE, PARTS, Kind,
 from vtk_segdeform.widgets.handle_dragger.handle_dragger import HandleDragger
 from vtk_segdeform.widgets.handle_dragger.handle_motion import Grip, Motion
 from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
+from vtk_segdeform.widgets.scene.step_budget import prescribe_steps
 
 pytestmark = pytest.mark.usefixtures("bound_once")
 
@@ -797,3 +799,54 @@ def test_the_caption_shows_the_angle_during_a_rotation(bench):
     bench.hand.hover((5, 5))
     assert np.array_equal(picture(bench.view), before)
     assert captions() == ["x", "y", "z"]
+
+
+# Poses that are shown.
+
+
+def converged(session):
+    """Return the converged pose for the targets that the session has reached, (n, 3)."""
+    state, reached = session.state, session.solution.targets
+    if reached is not None:
+        parts = np.split(reached, [len(session.handles[TIP])])
+        targets = dict(zip(session.handles, parts, strict=True))
+        state = replace(state, pose=replace(state.pose, targets=targets))
+    other = Session(SCENE.mesh, state=state)
+    other.refine()
+    return other.vertices
+
+
+def test_a_jerk_shows_only_poses_that_can_be_trusted_and_ends_as_without_hurry(bench):
+    session, hand, window = bench.session, bench.hand, bench.view.window
+    window.SetMultiSamples(4)
+    prescribe_steps(bench.view.interactor, (2,) * 8)
+    place, start, shown = bench.aim(FREE), bench.targets(), session.vertices
+    far, new = SCENE.mesh.vertices[:, 0] < 1.5, []
+    hand.press(place)
+    for way in (90.0, 90.0, -60.0, -60.0):
+        hand.move(place + [0.3 * way, way])
+        assert np.linalg.norm(bench.targets() - start, axis=1).min() > 0.5  # at the pointer
+        assert abs(session.volume_change) < 1e-12
+        assert window.GetMultiSamples() == 0
+        if session.vertices is not shown:
+            shown = session.vertices
+            assert np.array_equal(bench.dragger._surface.points, shown)
+            away = np.linalg.norm(converged(session) - shown, axis=1)[far].max()
+            new.append(away / SCENE.mesh.diagonal)
+    assert len(new) >= 2
+    assert max(new) < 0.01
+    hand.release()
+    assert session.undo_label == f"drag {TIP}"
+    for _ in range(60):
+        bench.view.interactor.TimerEvent()
+    assert not bench.dragger.is_refining
+    assert window.GetMultiSamples() == 4
+    assert session.solution.status is Status.CONVERGED
+    calm = Session(SCENE.mesh, state=replace(session.state, pose=None))
+    for share in np.linspace(0.0, 1.0, 9)[1:]:
+        calm.drag({TIP: start + share * (bench.targets() - start)})
+    # The weights of handles, and with them the pose, depend a little on the way.
+    for vertices in (converged(session), calm.vertices):
+        assert np.abs(vertices - session.vertices).max() < 2e-3 * SCENE.mesh.diagonal
+    session.undo()
+    assert session.state.pose is None
