@@ -5,6 +5,8 @@ a distance of the model at which both projections are accurate.  `Viewpoint.home
 view: three-quarter front, with the up axis vertical on the screen.
 
 A named view is reached in a short animation, except off-screen.
+
+Long because every movement of the camera is here.
 """
 
 from __future__ import annotations
@@ -74,7 +76,7 @@ class Viewpoint:
     @property
     def up(self) -> FloatArray:
         """(3,) float: the up axis, of length 1."""
-        return self._up.copy()
+        return np.array(self._up)
 
     @up.setter
     def up(self, up: ArrayLike) -> None:
