@@ -95,7 +95,7 @@ class Viewpoint:
         front = -_AXES[1] if abs(self._up[2]) > 0.5 else _AXES[2]
         front = front - (front @ self._up) * self._up
         front /= np.linalg.norm(front)
-        return np.array([np.cross(self._up, front), front, self._up])
+        return np.asarray(np.stack([np.cross(self._up, front), front, self._up]))
 
     # Views.
 
