@@ -140,6 +140,7 @@ class Stand:
         save_session(folder / "start.segdeform", editor.session)
         self.session_before, self.start = editor.session, editor.session.state
         self.references: dict[tuple, Story] = {}
+        self.camera: dict | None = None  # at the first drag; some keys move it
 
     # What differs from host to host.
 
@@ -222,6 +223,9 @@ class Stand:
 
     def drag(self, mode: Mode) -> np.ndarray:
         """Press and drag, and return the place without releasing the button."""
+        viewpoint = self.editor.controller.camera.viewpoint
+        self.camera = self.camera or viewpoint.settings()
+        assert viewpoint.restore(self.camera)
         self.draw()
         first, *others = self.way(mode)
         self.hand.press(first)

@@ -9,6 +9,7 @@ The files, in reading order:
     backdrop           background and light of a window that belongs to the editor
     projection         projection between world and display coordinates
     viewpoint          movements of the camera, named views, framing, the up axis
+    camera_checks      rotations of a camera, and checks of its vectors
     navigation         the camera by mouse
     orientation_cube   a cube that shows the directions of the model
     foreground         a renderer that draws over another one

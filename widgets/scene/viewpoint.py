@@ -19,10 +19,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vtk_segdeform.arrays import FloatArray, is_number
+from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.checks import shown
 from vtk_segdeform.errors import ArgumentError
 
+from .camera_checks import axis_angle, is_sound, numbers, rotation
 from .gestures import Pointer
 from .view import Stop, View
 
@@ -97,7 +98,7 @@ class Viewpoint:
         front = -_AXES[1] if abs(self._up[2]) > 0.5 else _AXES[2]
         front = front - (front @ self._up) * self._up
         front /= np.linalg.norm(front)
-        return np.array([np.cross(self._up, front), front, self._up])
+        return np.asarray(np.stack([np.cross(self._up, front), front, self._up]))
 
     # Views.
 
@@ -136,7 +137,7 @@ class Viewpoint:
         camera = self.view.camera
         away = np.subtract(camera.GetPosition(), camera.GetFocalPoint())
         up = np.array(camera.GetViewUp())
-        if not _is_sound(away, up):
+        if not is_sound(away, up):
             away, up = self.axes[1:]
         points = self._points() if points is None else points
         self._aim(away, up, points, animate=animate)
@@ -174,13 +175,13 @@ class Viewpoint:
         step = _TURN / max(1, self.view.renderer.GetSize()[1])
         away, up = -self.view.view_direction, np.array(camera.GetViewUp())
         right = np.cross(up, away)
-        if not (_is_sound(away, up) and np.linalg.norm(right) > 0.0):
+        if not (is_sound(away, up) and np.linalg.norm(right) > 0.0):
             self.home()
             return
         right /= np.linalg.norm(right)
         height = math.asin(float(np.clip(away @ axis, -1.0, 1.0)))
         tilted = float(np.clip(height - dy * step, -0.5 * math.pi, 0.5 * math.pi))
-        turn = _rotation(axis, -dx * step) @ _rotation(right, height - tilted)
+        turn = rotation(axis, -dx * step) @ rotation(right, height - tilted)
         position, focus = np.array(camera.GetPosition()), np.array(camera.GetFocalPoint())
         self._place(
             pivot + turn @ (position - pivot),
@@ -258,12 +259,12 @@ class Viewpoint:
             ("angle", 1),
             ("scale", 1),
         )
-        found = [_numbers(settings.get(name), count) for name, count in names]
-        numbers = np.concatenate([each for each in found if each is not None])
-        if len(numbers) != sum(count for _, count in names):
+        found = [numbers(settings.get(name), count) for name, count in names]
+        values = np.concatenate([each for each in found if each is not None])
+        if len(values) != sum(count for _, count in names):
             return False
-        up, position, focus, view_up = numbers[:12].reshape(4, 3)
-        angle, scale = map(float, numbers[12:])
+        up, position, focus, view_up = values[:12].reshape(4, 3)
+        angle, scale = map(float, values[12:])
         away, middle = position - focus, self._points().mean(axis=0)
         farthest = 1e3 * _FARTHEST * self._diagonal()
         if not (
@@ -272,7 +273,7 @@ class Viewpoint:
             and 0.0 < scale <= farthest
             and np.linalg.norm(away) <= farthest
             and np.linalg.norm(focus - middle) <= farthest
-            and _is_sound(away, view_up)
+            and is_sound(away, view_up)
             and up.any()
         ):
             return False
@@ -327,14 +328,14 @@ class Viewpoint:
         camera = self.view.camera
         away, up = -self.view.view_direction, np.array(camera.GetViewUp())
         right = np.cross(up, away)
-        if not (_is_sound(away, up) and np.linalg.norm(right) > 0.0):
+        if not (is_sound(away, up) and np.linalg.norm(right) > 0.0):
             self._set(focus, axes, distance, scale)
             return
         right /= np.linalg.norm(right)
         start = np.stack([right, np.cross(away, right), away])
         first_focus, first = np.array(camera.GetFocalPoint()), camera.GetDistance()
         first_scale, began = camera.GetParallelScale(), time.monotonic()
-        axis, angle = _axis_angle(axes.T @ start)
+        axis, angle = axis_angle(axes.T @ start)
 
         def advance() -> None:
             t = min(1.0, (time.monotonic() - began) / _DURATION)
@@ -345,7 +346,7 @@ class Viewpoint:
             s = t * t * (3.0 - 2.0 * t)
             self._set(
                 first_focus + s * (focus - first_focus),
-                start @ _rotation(axis, s * angle).T,
+                start @ rotation(axis, s * angle).T,
                 first ** (1.0 - s) * distance**s,
                 first_scale ** (1.0 - s) * scale**s,
             )
@@ -359,7 +360,7 @@ class Viewpoint:
     def _place(self, position: FloatArray, focus: FloatArray, up: ArrayLike) -> None:
         """Set the camera, unless that would be invalid."""
         up = np.asarray(up, dtype=float)
-        if not _is_sound(position - focus, up):
+        if not is_sound(position - focus, up):
             return
         camera = self.view.camera
         camera.SetPosition(*position)
@@ -370,37 +371,3 @@ class Viewpoint:
     def _drawn(self) -> None:
         self.view.renderer.ResetCameraClippingRange()
         self.view.request_render()
-
-
-def _numbers(value: object, count: int) -> FloatArray | None:
-    """Return *count* numbers of a file, (count,) float; None if *value* is anything else."""
-    values = value if isinstance(value, list) else [value]
-    is_sound = len(values) == count and all(map(is_number, values))
-    return np.array(values, dtype=float) if is_sound else None
-
-
-def _is_sound(away: FloatArray, up: FloatArray) -> bool:
-    """Return whether a camera may look along *away* with *up* on its screen."""
-    if not (np.isfinite(away).all() and np.isfinite(up).all()):
-        return False
-    length = np.linalg.norm(away) * np.linalg.norm(up)
-    return bool(length > 0.0 and np.linalg.norm(np.cross(away, up)) > 1e-9 * length)
-
-
-def _rotation(axis: FloatArray, angle: float) -> FloatArray:
-    """Return the rotation (3, 3) about *axis* of length 1 by *angle* in radians."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross)
-
-
-def _axis_angle(turn: FloatArray) -> tuple[FloatArray, float]:
-    """Return the axis (3,) of length 1 and the angle of a rotation (3, 3)."""
-    vector = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    sine, cosine = float(np.linalg.norm(vector)), float(np.trace(turn)) - 1.0
-    if sine > 1e-9:
-        return vector / sine, math.atan2(sine, cosine)
-    if cosine > 0.0:
-        return _AXES[2], 0.0
-    axis = np.linalg.eigh(0.5 * (turn + turn.T))[1][:, -1]  # a half turn
-    return np.asarray(axis), math.pi
