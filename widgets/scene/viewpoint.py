@@ -5,8 +5,6 @@ a distance of the model at which both projections are accurate.  `Viewpoint.home
 view: three-quarter front, with the up axis vertical on the screen.
 
 A named view is reached in a short animation, except off-screen.
-
-Long because every movement of the camera is here.
 """
 
 from __future__ import annotations
