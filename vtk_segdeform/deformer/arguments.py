@@ -16,7 +16,7 @@ from ..mesh import Mesh
 
 _FARTHEST = 1e3  # sizes of the mesh
 _PULL_RADIUS = 0.15  # diagonals of the mesh
-LOCALITY, SPREAD = 0.5, 0.5
+LOCALITY, SPREAD = 0.2, 0.5
 """The locality of a pull without pins; and the share of its radius within which it grabs."""
 FARTHEST_APART = 20.0
 """Diagonals of the mesh between two targets or fixed vertices, at most.

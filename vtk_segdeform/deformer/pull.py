@@ -55,7 +55,7 @@ def pull(
     locality : float, optional
         1 keeps the surface in place; beyond four radii, of 15 % of the diagonal or more, it hardly
         moves.  With less, more of it follows, above all the ends of limbs; with 0 all is free.
-        By default 0.5 without pins, and 0 with pins.
+        By default 0.2 without pins, and 0 with pins.
     n_regions : int or None
         How many regions; None lets `segment` choose.
     n_cage_vertices : int, optional

@@ -39,7 +39,7 @@ class Grip(NamedTuple):
     radius: float
     """Of the pulled surface, in the mesh's unit."""
     locality: float | None
-    """0 to 1; None is 0 if there are fixed vertices, pins or other handles, and else 0.5."""
+    """0 to 1; None is 0 if there are fixed vertices, pins or other handles, and else 0.2."""
     turns: bool
     """Whether a patch around the vertex turns with the motion, which a single vertex cannot."""
 
