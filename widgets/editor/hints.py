@@ -67,19 +67,20 @@ def _pull_hint(widgets: WidgetSet) -> str:
     if widgets.puller.is_waiting:
         return "Preparing: the pull starts in a moment · Esc to cancel"
     if session.is_dragging:
-        return _drag_hint(session)
+        return _drag_hint(session, "X Y Z: axis. R: turn. ")
     if _is_volume_off(session):
         return "Drag the surface · Volume preservation off (P to turn on)"
     if session.undo_label == "pull":
         return "Drag the surface. Shift-click pins. Z: undo"
-    return "Drag the surface. Shift-click pins. [ ]: radius"
+    radius = 100.0 * widgets.puller.radius / session.mesh.diagonal
+    return f"Drag the surface. Shift-click pins. [ ]: radius ({radius:.3g} %)"
 
 
-def _drag_hint(session: Session) -> str:
+def _drag_hint(session: Session, keys: str = "") -> str:
     volume = f"Volume {signed(100.0 * session.volume_change, 2)} %"
     if not session.has_volume:
         volume = "No volume to preserve"
-    return f"{volume} · Esc to cancel"
+    return f"{volume} · {keys}Esc to cancel"
 
 
 def _is_volume_off(session: Session) -> bool:

@@ -319,6 +319,7 @@ class Puller(Widget):
         if self.is_grabbing:
             self._send(Phase.MOVE, "InteractionEvent")
         elif pending is not None:
+            self.remark = ""
             pending()
             self._invoke("EndInteractionEvent")
 
