@@ -546,7 +546,7 @@ class Deformer:
             steps, remaining = steps + result.steps, result.remaining * unit
             if remaining > within:
                 if self._aim.missed(result.steps):
-                    self._continuation.restart(self._p if reached is None else reached.p)
+                    self._continuation.restart()
                 break
             self._aim.reached(result.steps)
             reached, self._targets = result, targets
