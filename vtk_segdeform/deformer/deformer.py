@@ -94,7 +94,7 @@ _SOLVES_PER_SCALING = 4  # at most
 _CORRECTIONS, _GAIN = 8, 0.7  # of pulled points: at most, and the factor by which errors must fall
 _FEW_STEPS = 4  # to a pose of a live solve: it may aim farther
 _MOST_CALLS = 4  # of a live solve without a pose: it aims nearer
-_LIVE = 0.5  # of the error of pulled points is corrected in each pose of a live solve
+_LIVE, _LIVE_CORRECTIONS = 0.6, 2  # of the error of pulled points; and per live solve, at most
 _LEAST_SHARE = 1.0 / 32.0  # of the usual distance between waypoints
 _SCALED = 3e-5  # relative scale from which another solve follows
 _ROUNDING = 1e-7  # relative scale that counts as rounding
@@ -121,10 +121,6 @@ class _PulledPoints:
         places = places.copy()
         places[self.places] += self.offsets
         return places
-
-    def off(self, targets: FloatArray, x: FloatArray) -> FloatArray:
-        """Return how far the vertices at *x* (n, 3) are off their *targets* (k, 3), (q, 3)."""
-        return targets[self.targets] - x[self.vertices]
 
     def correct(self, off: FloatArray, error: float) -> None:
         """Move x~ by how far the vertices are *off* their targets, (q, 3), at most by *error*."""
@@ -538,7 +534,7 @@ class Deformer:
             is_drag = max_steps is not None and not is_same
             result, x, more = self._solve_once(goal, options, is_drag)
             steps += more
-            off = pulled.off(goal, self._frame.inward(self._frame.in_scene(x)))
+            off = self._off(goal, x)
             before, error = error, float(np.linalg.norm(off, axis=1).max(initial=0.0))
             if result.status is Status.STEP_LIMIT or error <= self._hold_tolerance:
                 break
@@ -573,15 +569,45 @@ class Deformer:
             result = replace(result, p=self._p, directions=())
             solution = self._solution(result, self._map(self._p * self._frame.size), steps)
         else:
-            x, _ = self._with_exact_volume(reached)
-            off = self._constraints.pulled.off(self._targets, self._frame.inward(self._frame.in_scene(x)))
-            self._constraints.pulled.correct(_LIVE * off, np.inf)
+            reached, x, more = self._at_pointer(reached, options)
+            steps += more
             remaining = reached.remaining * unit
             solution = self._solution(reached, x, steps)
         on_the_way = None if np.array_equal(goal, self._targets) else self._targets
         if on_the_way is not None:
             on_the_way = self._frame.outward(on_the_way)
         return replace(solution, remaining=remaining, targets=on_the_way)
+
+    def _at_pointer(
+        self, reached: SolverResult, options: SolverOptions
+    ) -> tuple[SolverResult, FloatArray, int]:
+        """Correct the pose *reached* while pulled points are off their targets; also return x."""
+        steps, pulled = 0, self._constraints.pulled
+        x, _ = self._with_exact_volume(reached)
+        for _ in range(_LIVE_CORRECTIONS):
+            off = self._off(self._targets, x)
+            error = float(np.linalg.norm(off, axis=1).max(initial=0.0))
+            if error <= (options.within or 0.0):
+                break
+            before = pulled.offsets
+            pulled.correct(_LIVE * off, np.inf)
+            places = pulled.moved(self._constraints.places(self._targets))
+            result = self._continuation.follow(places, replace(options, max_steps=_FEW_STEPS))
+            steps += result.steps
+            if result.remaining > (options.within or 0.0):
+                pulled.offsets = before
+                self._continuation.restart()
+                break
+            reached = result
+            x, _ = self._with_exact_volume(reached)
+        pulled.correct(_LIVE * self._off(self._targets, x), np.inf)
+        return reached, x, steps
+
+    def _off(self, targets: FloatArray, x: FloatArray) -> FloatArray:
+        """Return how far the pulled vertices of *x* (n, 3) are off their *targets*, (q, 3)."""
+        pulled = self._constraints.pulled
+        there = self._frame.inward(self._frame.in_scene(x[pulled.vertices]))
+        return targets[pulled.targets] - there
 
     def _solve_once(
         self, goal: FloatArray, options: SolverOptions, is_drag: bool

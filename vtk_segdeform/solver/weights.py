@@ -40,7 +40,8 @@ class _Weighted:
 
     solver: GaussNewton
     p: FloatArray  # (m, 3)
-    settled: FloatArray = field(init=False)  # (m, 3), the last pose near a minimum
+    settled: FloatArray = field(init=False)  # (m, 3), the last pose of `follow`
+    near: tuple[FloatArray, SolverResult] | None = None  # places (k, 3), and a pose near a minimum
 
     def __post_init__(self) -> None:
         self.settled = self.p
@@ -55,6 +56,12 @@ class _Weighted:
         result = self.solver.minimise(self.p, places, options)
         self.p = result.p
         return result
+
+    def near_at(self, places: FloatArray) -> SolverResult | None:
+        """Return the result of the last live solve, if it was near the minimum at *places*."""
+        if self.near is None or self.near[1].p is not self.p:
+            return None
+        return self.near[1] if np.array_equal(self.near[0], places) else None
 
     def copy(self) -> _Weighted:
         other = _Weighted(self.solver.copy(), self.p)
@@ -138,12 +145,21 @@ class _Run:
         self._options = options
 
     def solve(self, weighted: _Weighted) -> SolverResult:
-        """Solve with *weighted*, and count its steps; near its minimum it counts as converged."""
-        result = weighted.solve(self.places, self._options)
+        """Solve with *weighted*, and count its steps.
+
+        In a live drag a pose near the minimum counts as converged, and is not improved.
+        """
         self.used.append(weighted)
+        if self._options.within is None:
+            result = weighted.solve(self.places, self._options)
+        elif (known := weighted.near_at(self.places)) is not None:
+            return known
+        else:
+            result = weighted.solve(self.places, self._options)
+            if result.remaining <= self._options.within:
+                result = replace(result, status=Status.CONVERGED)
+                weighted.near = self.places, result
         self.steps += result.steps
-        if self.is_live and result.remaining <= (self._options.within or 0.0):
-            return replace(result, status=Status.CONVERGED)
         return result
 
 
