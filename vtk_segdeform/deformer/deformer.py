@@ -92,6 +92,7 @@ _ANCHOR_WEIGHT = 100.0  # of the whole surface in a local deformer, in weights o
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most
 _CORRECTIONS, _GAIN = 8, 0.7  # of pulled points: at most, and the factor by which errors must fall
+_PULLED = 5e-5  # error of pulled points in a final pose: it depends on the way no more than this
 _FEW_STEPS = 4  # to a pose of a live solve: it may aim farther
 _MOST_CALLS = 4  # of a live solve without a pose: it aims nearer
 _LIVE, _LIVE_CORRECTIONS = 0.6, 2  # of the error of pulled points; and per live solve, at most
@@ -135,9 +136,7 @@ class _Approach:
     calls: int = 0  # since the last pose near a converged one
     next: FloatArray | None = None  # (k, 3), the targets that the last call did not reach
 
-    def way(
-        self, start: FloatArray, goal: FloatArray, handles: list[IntArray]
-    ) -> list[FloatArray]:
+    def way(self, start: FloatArray, goal: FloatArray, handles: list[IntArray]) -> list[FloatArray]:
         """Return the targets (k, 3) between *start* and *goal*, and *goal*."""
         if self.next is None or np.array_equal(self.next, goal):
             return waypoints(start, goal, handles, self.share)
@@ -536,7 +535,7 @@ class Deformer:
             steps += more
             off = self._off(goal, x)
             before, error = error, float(np.linalg.norm(off, axis=1).max(initial=0.0))
-            if result.status is Status.STEP_LIMIT or error <= self._hold_tolerance:
+            if result.status is Status.STEP_LIMIT or error <= _PULLED:
                 break
             if error > _GAIN * before:
                 break
