@@ -199,7 +199,7 @@ def test_the_demo_leaves_meshes_whose_volume_is_the_same(tmp_path, capsys):
 def test_the_bench_of_pulls_reports_their_frames_and_errors():
     from vtk_segdeform.cli.live_pulls import pull_table
 
-    head, _, *rows = pull_table(sizes=(300,), pulls=("fast",)).splitlines()
+    head, _, *rows = pull_table(sizes=(500,), pulls=("fast",)).splitlines()
     (row,) = (dict(zip(head.split(" | "), row.split(" | "), strict=True)) for row in rows)
     assert row["pull"] == "fast"
     assert 1 <= int(row["steps"]) <= 4

@@ -1,4 +1,4 @@
-"""``segdeform bench --interactive``: pulls as the widgets solve them, and the errors of their poses.
+"""``segdeform bench --interactive``: live pulls, and how far their poses are from converged ones.
 
 The top of a cactus is pulled along prescribed paths, in prescribed steps and without a window.
 
