@@ -8,8 +8,8 @@ tolerance, and the pose changes smoothly with the targets.
 
 A pose is final when the continuation began with the initial weights, so that the weights, and with
 them the pose, depend on the targets and not on the poses before.  The solver of each combination
-of weights starts from its own last pose.  During a fast drag the weights stay the same until the
-targets rest.
+of weights starts from its own last pose.  During a drag the weights stay the same until the targets
+rest; `WeightContinuation.follow` instead finds them in every frame, by poses near the minima.
 """
 
 from __future__ import annotations
