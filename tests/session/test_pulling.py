@@ -20,6 +20,7 @@ from vtk_segdeform.regions.regions import Regions
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.session.state import State
 from vtk_segdeform.session.store import load_session, save_session
+from vtk_segdeform.solver.solution import Status
 
 pytestmark = pytest.mark.usefixtures("bound_once")
 SCENE = sausage(2)
@@ -354,3 +355,16 @@ def test_the_locality_of_another_mesh_is_refused():
     broken = replace(state, locality=replace(state.locality, cage_vertices=()))
     with pytest.raises(CageError):
         Session(MESH, state=broken)
+
+
+def test_in_a_live_pull_the_grabbed_vertex_keeps_to_the_pointer():
+    session = ready()
+    for share in (0.0, 0.5, 1.5, 0.5, 1.0, 1.5, 2.0):
+        to = X[HIGH] + share * UP
+        solution = session.pull(HIGH, to, max_steps=3, within=0.0025)
+        place = to if solution.targets is None else solution.targets[0]
+        assert np.linalg.norm(session.vertices[HIGH] - place) < 4e-3 * D
+        assert abs(session.volume_change) < 1e-12
+    while session.refine(max_steps=3, within=0.0025).status is Status.STEP_LIMIT:
+        pass
+    assert moved(session, pulled(shift=2.0 * UP).vertices) < 1e-4

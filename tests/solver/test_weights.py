@@ -109,6 +109,20 @@ def test_during_a_drag_weights_stay_the_same_and_no_pose_is_final():
         assert strength(deformer) == before
 
 
+def test_live_poses_have_weights_near_the_final_ones_and_end_in_the_same_pose(direct):
+    deformer, shown = SCENE.held(), 0
+    for degrees in (2.0, 8.0, 14.0, 10.0):
+        solution = deformer.solve(bent(degrees), max_steps=3, within=0.0025)
+        assert solution.status is Status.STEP_LIMIT
+        if solution.targets is None:
+            shown += 1
+            final = SCENE.held()
+            assert away(solution, final.solve(bent(degrees))) < 4e-3
+            assert (off(deformer) <= 1.2).all()
+    assert shown >= 3
+    assert away(rested(deformer, MIDDLE, 3), direct) < 1e-5
+
+
 def test_a_copy_continues_independently():
     deformer = SCENE.held()
     deformer.solve(FAR)

@@ -13,6 +13,7 @@ The files, in reading order:
     bench           ``segdeform bench``
     application     ``segdeform app``
     interactive     ``segdeform bench --interactive``
+    live_pulls      bench --interactive: live pulls, and the errors of their poses
     opening         ``segdeform bench --interactive --open``
     replaying       ``segdeform replay``
     progress_bar    progress bar in the terminal

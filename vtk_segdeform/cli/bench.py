@@ -16,8 +16,9 @@ from ..benchmarks import (
     write_report,
 )
 from ..errors import ArgumentError
-from ..progress import Progress
+from ..progress import Progress, part
 from .interactive import interactive_table
+from .live_pulls import pull_table
 from .opening import DRAWN_SIZES, opening_table
 from .outputs import Say
 
@@ -44,7 +45,10 @@ def bench(options: Namespace, say: Say, progress: Progress) -> bool:
         )
         return True
     if options.interactive:
-        say(interactive_table(n_cage_vertices=options.cage_vertices, progress=progress))
+        drag, pulls = part(progress, 0.0, 0.3), part(progress, 0.3, 1.0)
+        say(interactive_table(n_cage_vertices=options.cage_vertices, progress=drag))
+        say("")
+        say(pull_table(progress=pulls))
         return True
     scale = QUICK if options.quick else FULL if options.full else USUAL
     scale = replace(scale, n_cage_vertices=options.cage_vertices)

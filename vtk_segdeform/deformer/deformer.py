@@ -92,7 +92,10 @@ _ANCHOR_WEIGHT = 100.0  # of the whole surface in a local deformer, in weights o
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most
 _CORRECTIONS, _GAIN = 8, 0.7  # of pulled points: at most, and the factor by which errors must fall
-_FEW_STEPS, _MANY_STEPS = 3, 12  # to a pose of a live solve
+_PULLED = 5e-5  # error of pulled points in a final pose: it depends on the way no more than this
+_FEW_STEPS = 4  # to a pose of a live solve: it may aim farther
+_MOST_CALLS = 4  # of a live solve without a pose: it aims nearer
+_LIVE, _LIVE_CORRECTIONS = 0.6, 2  # of the error of pulled points; and per live solve, at most
 _LEAST_SHARE = 1.0 / 32.0  # of the usual distance between waypoints
 _SCALED = 3e-5  # relative scale from which another solve follows
 _ROUNDING = 1e-7  # relative scale that counts as rounding
@@ -130,20 +133,29 @@ class _Approach:
     """How far a live solve aims at a time, towards targets that move on."""
 
     share: float = 0.5  # of the usual distance between waypoints
-    steps: int = 0  # since the last pose near a converged one
+    calls: int = 0  # since the last pose near a converged one
+    next: FloatArray | None = None  # (k, 3), the targets that the last call did not reach
+
+    def way(self, start: FloatArray, goal: FloatArray, handles: list[IntArray]) -> list[FloatArray]:
+        """Return the targets (k, 3) between *start* and *goal*, and *goal*."""
+        if self.next is None or np.array_equal(self.next, goal):
+            return waypoints(start, goal, handles, self.share)
+        return [self.next, *waypoints(self.next, goal, handles, self.share)]
 
     def reached(self, steps: int) -> None:
         """Aim farther, if a pose took few *steps*."""
-        if self.steps + steps <= _FEW_STEPS:
+        if not self.calls and steps <= _FEW_STEPS:
             self.share = min(1.0, 1.5 * self.share)
-        self.steps = 0
+        self.calls, self.next = 0, None
 
-    def missed(self, steps: int) -> bool:
-        """Count *steps*; return whether to begin again, at a nearer aim."""
-        self.steps += steps
-        if self.steps < _MANY_STEPS or self.share <= _LEAST_SHARE:
+    def missed(self, targets: FloatArray) -> bool:
+        """Keep to *targets*; or return True to begin again, at a nearer aim."""
+        self.calls, self.next = self.calls + 1, targets
+        if self.calls > 1 and self.share > _LEAST_SHARE:
+            self.share *= 0.5
+        if self.calls < _MOST_CALLS or self.share <= _LEAST_SHARE:
             return False
-        self.share, self.steps = 0.5 * self.share, 0
+        self.calls, self.next = 0, None
         return True
 
 
@@ -512,6 +524,7 @@ class Deformer:
     ) -> Solution:
         limit = self._options.max_steps if max_steps is None else max_steps
         options = replace(self._options, max_steps=limit, progress=progress)
+        self._aim.next = None
         steps = self._follow_waypoints(goal, options)
         is_same = np.array_equal(goal, self._targets)
         self._targets, pulled = goal, self._constraints.pulled
@@ -520,10 +533,9 @@ class Deformer:
             is_drag = max_steps is not None and not is_same
             result, x, more = self._solve_once(goal, options, is_drag)
             steps += more
-            there = self._frame.inward(self._frame.in_scene(x[pulled.vertices]))
-            off = goal[pulled.targets] - there
+            off = self._off(goal, x)
             before, error = error, float(np.linalg.norm(off, axis=1).max(initial=0.0))
-            if result.status is Status.STEP_LIMIT or error <= self._hold_tolerance:
+            if result.status is Status.STEP_LIMIT or error <= _PULLED:
                 break
             if error > _GAIN * before:
                 break
@@ -539,14 +551,14 @@ class Deformer:
         unit = self._frame.size / self.mesh.diagonal
         options = replace(self._options, within=within / unit, progress=progress)
         reached, steps, remaining = None, 0, np.inf
-        for targets in waypoints(self._targets, goal, self._constraints.handles, self._aim.share):
+        for targets in self._aim.way(self._targets, goal, self._constraints.handles):
             places = self._constraints.pulled.moved(self._constraints.places(targets))
             options = replace(options, max_steps=limit - steps)
             result = self._continuation.follow(places, options)
             steps, remaining = steps + result.steps, result.remaining * unit
             if remaining > within:
-                if self._aim.missed(result.steps):
-                    self._continuation.restart(self._p if reached is None else reached.p)
+                if self._aim.missed(targets):
+                    self._continuation.restart()
                 break
             self._aim.reached(result.steps)
             reached, self._targets = result, targets
@@ -556,13 +568,45 @@ class Deformer:
             result = replace(result, p=self._p, directions=())
             solution = self._solution(result, self._map(self._p * self._frame.size), steps)
         else:
-            x, _ = self._with_exact_volume(reached)
+            reached, x, more = self._at_pointer(reached, options)
+            steps += more
             remaining = reached.remaining * unit
             solution = self._solution(reached, x, steps)
         on_the_way = None if np.array_equal(goal, self._targets) else self._targets
         if on_the_way is not None:
             on_the_way = self._frame.outward(on_the_way)
         return replace(solution, remaining=remaining, targets=on_the_way)
+
+    def _at_pointer(
+        self, reached: SolverResult, options: SolverOptions
+    ) -> tuple[SolverResult, FloatArray, int]:
+        """Correct the pose *reached* while pulled points are off their targets; also return x."""
+        steps, pulled = 0, self._constraints.pulled
+        x, _ = self._with_exact_volume(reached)
+        for _ in range(_LIVE_CORRECTIONS):
+            off = self._off(self._targets, x)
+            error = float(np.linalg.norm(off, axis=1).max(initial=0.0))
+            if error <= (options.within or 0.0):
+                break
+            before = pulled.offsets
+            pulled.correct(_LIVE * off, np.inf)
+            places = pulled.moved(self._constraints.places(self._targets))
+            result = self._continuation.follow(places, replace(options, max_steps=_FEW_STEPS))
+            steps += result.steps
+            if result.remaining > (options.within or 0.0):
+                pulled.offsets = before
+                self._continuation.restart()
+                break
+            reached = result
+            x, _ = self._with_exact_volume(reached)
+        pulled.correct(_LIVE * self._off(self._targets, x), np.inf)
+        return reached, x, steps
+
+    def _off(self, targets: FloatArray, x: FloatArray) -> FloatArray:
+        """Return how far the pulled vertices of *x* (n, 3) are off their *targets*, (q, 3)."""
+        pulled = self._constraints.pulled
+        there = self._frame.inward(self._frame.in_scene(x[pulled.vertices]))
+        return targets[pulled.targets] - there
 
     def _solve_once(
         self, goal: FloatArray, options: SolverOptions, is_drag: bool

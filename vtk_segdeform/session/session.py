@@ -58,6 +58,8 @@ if TYPE_CHECKING:
 
     from ..io import Surface
 
+_ROUNDING = 1e-9  # diagonals: distance of cage vertices that are in the same place
+
 
 class Effort(NamedTuple):
     """Total effort of solving so far; subtract two values for the effort in between."""
@@ -696,8 +698,10 @@ class Session(Timeline):
         Adds no undo step: the result becomes part of the ongoing drag, or else of the last step.
         """
         pose, solution = self._solve(self._state, self.targets, (max_steps, within))
-        if solution.steps == 0:  # converged already: keep the same pose object
-            here = self._state.pose
+        here = self._state.pose
+        # Converged already: keep the same pose object.  But even without a step, the final pose can
+        # have other weights of handles than the one before.
+        if solution.steps == 0 and (here is None or self._is_same_place(here, pose)):
             self._solution = None if here is None else (here, solution)
             return solution
         self._solution = pose, solution
@@ -748,6 +752,11 @@ class Session(Timeline):
         steps, seconds = self._effort
         self._effort = Effort(steps + solution.steps, seconds + time.perf_counter() - began)
         return pose, solution
+
+    def _is_same_place(self, a: Pose, b: Pose) -> bool:
+        """Tell whether the cages of two poses differ by rounding only."""
+        p, q = np.concatenate(a.cage_vertices), np.concatenate(b.cage_vertices)
+        return bool(np.abs(p - q).max() <= _ROUNDING * self.mesh.diagonal)
 
     def _rest_targets(self) -> Mapping[str, FloatArray]:
         return handles.targets_at(self.handles, self.mesh.vertices)

@@ -8,13 +8,13 @@ tolerance, and the pose changes smoothly with the targets.
 
 A pose is final when the continuation began with the initial weights, so that the weights, and with
 them the pose, depend on the targets and not on the poses before.  The solver of each combination
-of weights starts from its own last pose.  During a fast drag the weights stay the same until the
-targets rest.
+of weights starts from its own last pose.  During a drag the weights stay the same until the targets
+rest; `WeightContinuation.follow` instead finds them in every frame, by poses near the minima.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,10 +27,7 @@ _HIGHEST = 1e4  # times the initial weight
 # A higher weight is accepted if it multiplies the errors by at most _GAIN and the energy by at most
 # _COST; at a higher cost, poses begin to fold.
 _GAIN, _COST = 0.7, 1.75
-_RETRY = 1.2  # times the error at which a higher weight was refused: it is tried again
-_LIVE_AIM = 0.7  # of the tolerance, in a drag: errors are about inverse to weights
-_LIVE_GAIN = 0.95
-_RAISING = 4  # steps after more weight, at least
+_FEWEST, _MOST = 0.5, 1.1  # of the tolerance: errors at which a drag keeps its weights
 _AIM = 0.95  # of the tolerance; closer to it, interpolation too often fails
 _TRIES = 3
 _ALL = 0.98  # share of the higher weights beyond which these are used
@@ -43,6 +40,11 @@ class _Weighted:
 
     solver: GaussNewton
     p: FloatArray  # (m, 3)
+    settled: FloatArray = field(init=False)  # (m, 3), the last pose of `follow`
+    near: tuple[FloatArray, SolverResult] | None = None  # places (k, 3), and a pose near a minimum
+
+    def __post_init__(self) -> None:
+        self.settled = self.p
 
     @property
     def strength(self) -> FloatArray:
@@ -55,8 +57,16 @@ class _Weighted:
         self.p = result.p
         return result
 
+    def near_at(self, places: FloatArray) -> SolverResult | None:
+        """Return the result of the last live solve, if it was near the minimum at *places*."""
+        if self.near is None or self.near[1].p is not self.p:
+            return None
+        return self.near[1] if np.array_equal(self.near[0], places) else None
+
     def copy(self) -> _Weighted:
-        return _Weighted(self.solver.copy(), self.p)
+        other = _Weighted(self.solver.copy(), self.p)
+        other.settled = self.settled
+        return other
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +115,12 @@ class _Bracket:
         low = np.where(is_low, strength, self.low)
         return replace(self, low=low, low_errors=np.where(is_low, errors, self.low_errors))
 
+    def contains(self, weighted: _Weighted) -> bool:
+        """Tell whether the weights are in the bracket, and not all at its upper end."""
+        strength = weighted.strength
+        is_in = (self.low * (1.0 - _SAME) <= strength) & (strength <= self.high * (1.0 + _SAME))
+        return bool(is_in.all() and (strength < self.high * (1.0 - _SAME)).any())
+
     def at(self, aim: float) -> FloatArray | None:
         """Return the weights at which errors should be *aim*; None if those are the high ones.
 
@@ -125,12 +141,24 @@ class _Run:
         self.places = places
         self.used: list[_Weighted] = []
         self.steps = 0
+        self.is_live = options.within is not None
         self._options = options
 
     def solve(self, weighted: _Weighted) -> SolverResult:
-        """Solve with *weighted*, and count its steps."""
-        result = weighted.solve(self.places, self._options)
+        """Solve with *weighted*, and count its steps.
+
+        In a live drag a pose near the minimum counts as converged, and is not improved.
+        """
         self.used.append(weighted)
+        if self._options.within is None:
+            result = weighted.solve(self.places, self._options)
+        elif (known := weighted.near_at(self.places)) is not None:
+            return known
+        else:
+            result = weighted.solve(self.places, self._options)
+            if result.remaining <= self._options.within:
+                result = replace(result, status=Status.CONVERGED)
+                weighted.near = self.places, result
         self.steps += result.steps
         return result
 
@@ -154,7 +182,6 @@ class WeightContinuation:
         self._raised: list[_Weighted] = []  # with higher weights, used for the last pose
         self._current = self._initial  # the solver of the last pose
         self._only_current = False  # whether only that solver has followed the last targets
-        self._refused = 0.0  # the error at which more weight did not help `follow`
         self._tolerance = tolerance
 
     def copy(self) -> WeightContinuation:
@@ -164,7 +191,7 @@ class WeightContinuation:
         other._initial, *other._raised = (each.copy() for each in [initial, *self._raised])
         index = [initial, *self._raised].index(self._current)
         other._current = [other._initial, *other._raised][index]
-        other._only_current, other._refused = self._only_current, self._refused
+        other._only_current = self._only_current
         return other
 
     @property
@@ -184,17 +211,16 @@ class WeightContinuation:
 
     def continue_from(self, p: FloatArray) -> None:
         """Continue from cage vertices *p* (m, 3), and preserve the volumes of that pose."""
-        self._current.p = p
-        self._only_current = self.has_raised_weights
-        self._raised = [self._current] if self.has_raised_weights else []
+        self._current.p = self._current.settled = p
         volumes = self._current.solver.volumes.preserved_at(p)
         for weighted in (self._initial, *self._raised):
             weighted.solver.volumes = volumes
 
-    def restart(self, p: FloatArray) -> None:
-        """Begin the next solve at cage vertices *p* (m, 3), at the weights of the last pose."""
-        self._current.p = p
-        self._current.solver.forget()
+    def restart(self) -> None:
+        """Begin the next solve where the last successful `follow` ended."""
+        for weighted in (self._initial, *self._raised):
+            weighted.p = weighted.settled
+            weighted.solver.forget()
 
     def solve_at_current_weights(self, places: FloatArray, options: SolverOptions) -> SolverResult:
         """Return a pose for *places* (k, 3) at the weights of the last pose; it is not final."""
@@ -202,40 +228,25 @@ class WeightContinuation:
         return replace(self._current.solve(places, options), status=Status.STEP_LIMIT)
 
     def follow(self, places: FloatArray, options: SolverOptions) -> SolverResult:
-        """Return a pose for *places* (k, 3) near the converged one; it is not final.
+        """Return a pose for *places* (k, 3) near the final one, found in the same way.
 
-        As `solve_at_current_weights`, but sets that miss their places get more weight, as in the
-        final pose: if a small fixed patch turns a little, all that is beyond it moves far.
+        All solvers stop ``options.within`` a distance of their minima, after at most
+        ``options.max_steps`` each.  If one does not, `remaining` is infinite, and the next call
+        continues.
         """
-        assert options.within is not None
-        here, result = self._current, self.solve_at_current_weights(places, options)
-        steps = result.steps
-        for _ in range(_TRIES):
-            errors = _Errors.of(here, places)
-            if result.remaining > options.within:
-                break
-            is_off = (errors.places > self._tolerance) & (here.strength < _HIGHEST)
-            if not is_off.any() or errors.places.max() < _RETRY * self._refused:
-                break
-            factor = np.clip(errors.places / (_LIVE_AIM * self._tolerance), 1.0, _FACTOR)
-            ahead = self._at(here.strength * np.where(is_off, factor, 1.0), near=here)
-            ahead.p = here.p
-            left = max(_RAISING, options.max_steps - steps)
-            attempt = ahead.solve(places, replace(options, max_steps=left))
-            steps += attempt.steps
-            reached = _Errors.of(ahead, places)
-            is_better = reached.places.max() <= _LIVE_GAIN * errors.places.max()
-            is_near = attempt.remaining <= options.within
-            if not (is_near and is_better and attempt.shape <= _COST * result.shape):
-                self._refused = float(errors.places.max())
-                break
-            here = self._current = ahead
-            self._only_current, result = True, replace(attempt, status=Status.STEP_LIMIT)
-        return replace(result, steps=steps)
+        run = _Run(places, options)
+        found, result = self._raise(run)
+        self._raised = list(dict.fromkeys([*run.used[1:], *self._raised]))
+        self._only_current = False
+        if result.status is Status.STEP_LIMIT:
+            return replace(result, steps=run.steps, remaining=np.inf)
+        self._current, self._raised = found, list(dict.fromkeys(run.used[1:]))
+        for weighted in (self._initial, *self._raised):
+            weighted.settled = weighted.p
+        return replace(result, steps=run.steps, status=Status.STEP_LIMIT)
 
     def solve(self, places: FloatArray, options: SolverOptions) -> SolverResult:
         """Return the final pose for *places* (k, 3); its steps are those at all weights."""
-        self._refused = 0.0
         if self._only_current:
             self._initial.p, self._raised = self._current.p, [self._current]
             self._only_current = False
@@ -276,6 +287,17 @@ class WeightContinuation:
     ) -> tuple[_Weighted, SolverResult]:
         """Return a solver with less weight and no larger errors, and its pose; or *here*."""
         allowed = np.maximum(self._tolerance, bracket.high_errors)
+        last = self._current
+        if run.is_live and result.status is not Status.STEP_LIMIT and bracket.contains(last):
+            attempt = run.solve(last)
+            if attempt.status is Status.STEP_LIMIT:
+                return last, attempt
+            errors = _Errors.of(last, run.places).both
+            inside = bracket.high > bracket.low
+            if (errors <= _MOST * allowed).all() and (
+                errors[inside] >= _FEWEST * self._tolerance
+            ).all():
+                return last, attempt
         for _ in range(_TRIES):
             strength = bracket.at(_AIM * self._tolerance)
             if strength is None or result.status is Status.STEP_LIMIT:

@@ -26,7 +26,7 @@ _WITHIN = 0.0025  # diagonals: estimated distance of a shown pose from its conve
 _EVENT_TIME = 0.030  # seconds per event, about half the time of software rendering
 _REFINE_TIME = 0.080  # seconds per refinement, when no event is pending
 _MOST_STEPS = 8  # per event: following the pointer matters more than converging
-_LEAST_STEPS = 2  # per event: fewer often stop between two poses that may be shown
+_LEAST_STEPS = 3  # per event: fewer often stop between two poses that may be shown
 _LEAST_REFINE_STEPS = 3  # with fewer per call, Anderson acceleration has no effect
 _REST = 0.2  # seconds without a move, after which pictures are drawn in full quality
 _PERIOD = 40  # milliseconds between two refinements
@@ -60,7 +60,7 @@ class LiveSolve:
 
     @property
     def steps(self) -> int:
-        """The number of steps of the next event: 2 to 8, and 2 before the first measurement."""
+        """The number of steps of the next event: 3 to 8, and 3 before the first measurement."""
         return self._steps_in(_EVENT_TIME, _LEAST_STEPS)
 
     @property
