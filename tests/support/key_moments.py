@@ -279,8 +279,8 @@ class Stand:
         place = self.drag(mode)
         self.hand.types(key)
         if ends_the_drag(key, mode):
-            self.hand.move(place + [-40.0, -30.0])  # no longer drags anything
-            self.hand.move(place)
+            place = place + [-40.0, -30.0]
+            self.hand.move(place)  # no longer drags anything
         else:
             assert any(widget.is_grabbing for widget in self.editor.widgets.interactive)
         self.hand.release(place)
