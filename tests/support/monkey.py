@@ -181,11 +181,12 @@ class Monkey:
         for _ in range(200):
             self.hand.tick()
             widgets = self.editor.widgets
-            if not (widgets.dragger.is_refining or widgets.puller.is_refining):
+            refining = widgets.dragger.is_refining, widgets.puller.is_refining
+            if not any(refining):
                 break
         self.raise_failures()
         assert not any(widget.is_grabbing for widget in widgets.interactive)
-        assert not (widgets.dragger.is_refining or widgets.puller.is_refining)
+        assert not any(refining)
         assert not self.editor.session.is_dragging
         camera = self.view.camera.GetPosition()
         self.hand.move(self.place + 5)

@@ -31,7 +31,7 @@ def test_random_events_preserve_the_volume(seed, count, tmp_path):
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit - half
     print(
         f"seed {seed}: {count} events, {monkey.frames} frames, {monkey.posed} of them deformed, "
-        f"{monkey.pulled} after pulls, {monkey.pinned} with pins, {monkey.turned} events of turning, "
+        f"{monkey.pulled} with pulls, {monkey.pinned} pins, {monkey.turned} events of turns, "
         f"{monkey.refused} actions refused, {monkey.free} frames of free volume, "
         f"|dV|/V at most {monkey.worst:.1e}, {grown / 1e6:.0f} MB more in the second half"
     )

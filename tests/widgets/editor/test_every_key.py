@@ -49,9 +49,7 @@ def test_during_a_job(plain, mode, key):
 KEYS_OF_PYVISTA = {"c", "f", "p", "r", "s", "w", "escape"}
 
 
-@pytest.mark.parametrize(
-    ("mode", "key"), table(Mode.PULL, Mode.DEFORM, daily=KEYS_OF_PYVISTA)
-)
+@pytest.mark.parametrize(("mode", "key"), table(Mode.PULL, Mode.DEFORM, daily=KEYS_OF_PYVISTA))
 def test_in_mid_drag_in_a_plotter(plotter, mode, key):
     plotter.during(mode, key)
 
