@@ -131,3 +131,13 @@ def test_a_copy_continues_independently():
     other.solve(NEAR)
     assert strength(other) < strength(deformer)
     assert deformer.solve(FAR).steps == 0
+
+
+def test_a_copy_continues_a_drag_whose_weights_have_just_been_raised():
+    deformer = SCENE.held()
+    for degrees in np.linspace(2.0, 20.0, 10):
+        deformer.solve(bent(degrees), max_steps=8, within=0.0025)
+    assert strength(deformer) > 1.0
+    other = deformer.copy()
+    assert strength(other) == strength(deformer)
+    assert away(deformer.solve(FAR, max_steps=8), other.solve(FAR, max_steps=8)) == 0.0

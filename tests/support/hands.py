@@ -36,7 +36,7 @@ def plain_view(size: tuple[int, int] = (400, 400)) -> View:
 
 # VTK's names of the keys that the editor's table has in lower case.
 KEYSYMS = {"escape": "Escape", "home": "Home", "f1": "F1", "tab": "Tab", "delete": "Delete",
-           "backspace": "BackSpace",
+           "backspace": "BackSpace", "return": "Return",
            **{f"kp_{digit}": f"KP_{digit}" for digit in range(10)}}  # fmt: skip
 
 

@@ -24,7 +24,8 @@ LONGEST = 120.0  # seconds that a job may take, on a busy machine
 KEYS = sorted({key for binding in BINDINGS for key in binding.keys})
 # Files are opened so rarely that there are unsaved changes to lose.
 RARE = {"p": 0.3, "ctrl+o": 0.3, "ctrl+s": 0.2, "g": 0.1, "f": 1.5, "delete": 0.3, "backspace": 0.3}
-OFTEN = {"1": 2.0, "2": 2.0, "3": 2.0, "4": 6.0, "escape": 3.0, "x": 2.0, "z": 3.0}
+OFTEN = {"0": 6.0, "1": 2.0, "2": 2.0, "3": 2.0, "4": 6.0, "escape": 3.0, "x": 2.0, "z": 3.0,
+         "r": 2.0, "return": 2.0}  # fmt: skip
 ODDS = np.array([RARE.get(key, OFTEN.get(key, 1.0)) for key in KEYS])
 
 
@@ -33,8 +34,10 @@ class Monkey:
 
     Attributes
     ----------
-    frames, posed, free : int
-        Rendered frames; of these, frames with a pose, and frames with free volume.
+    frames, posed, pulled, free : int
+        Rendered frames; of these, frames with a pose, with a pull, and with free volume.
+    pinned, turned : int
+        Frames with a pin, and events after which a pull was turning.
     refused : int
         Actions that raised a `SegDeformError`.
     worst : float
@@ -58,7 +61,8 @@ class Monkey:
         self.hand = Hand(self.view)
         self.editor.On()
         self.place = np.array(SIZE) / 2.0
-        self.frames = self.posed = self.free = self.refused = 0
+        self.frames = self.posed = self.pulled = self.free = self.refused = 0
+        self.pinned = self.turned = 0
         self.worst = 0.0
         # Cage vertices of poses without exact volume: made while volumes were free, or read from a
         # file.  Poses derived by marking handles share the array, so it identifies them as well.
@@ -82,8 +86,12 @@ class Monkey:
         session = self.editor.session
         self.frames += 1
         assert np.isfinite(session.vertices).all()
-        assert np.array_equal(self.editor.widgets.surface.points, session.vertices)
+        surface = self.editor.widgets.surface
+        shown = session.mesh.vertices if surface.shows_rest else session.vertices
+        assert np.array_equal(surface.points, shown)
         self.posed += session.vertices is not session.mesh.vertices
+        self.pulled += bool(session.state.pulls)
+        self.pinned += any(name.startswith("pin ") for name in session.handles)
         pose = session.state.pose
         is_free = not session.options.preserve_volume or session is not self.last_session
         self.last_session = session
@@ -119,6 +127,8 @@ class Monkey:
             self.hand.event("RightButtonReleaseEvent", self.place)
         else:
             self.hand.tick()
+        motion = self.editor.widgets.puller._motion
+        self.turned += motion is not None and motion.has_turned
         if not self.editor.session.options.preserve_volume and self.rng.random() < 0.15:
             self.type("p")  # preserve volumes again soon
         if self.rng.random() < 0.02:  # otherwise the right button zooms the mesh out of sight
@@ -170,13 +180,13 @@ class Monkey:
         self.wait()
         for _ in range(200):
             self.hand.tick()
-            if not self.editor.widgets.dragger.is_refining:
+            widgets = self.editor.widgets
+            refining = widgets.dragger.is_refining, widgets.puller.is_refining
+            if not any(refining):
                 break
         self.raise_failures()
-        widgets = self.editor.widgets
-        for widget in (widgets.selector, widgets.cages, widgets.dragger):
-            assert not widget.is_grabbing
-        assert not widgets.dragger.is_refining
+        assert not any(widget.is_grabbing for widget in widgets.interactive)
+        assert not any(refining)
         assert not self.editor.session.is_dragging
         camera = self.view.camera.GetPosition()
         self.hand.move(self.place + 5)

@@ -150,8 +150,11 @@ class QtHand:
     def types(self, key: str) -> None:
         """Type a key as the editor's table has it: "z", "escape", "ctrl+shift+z"."""
         *held, name = key.split("+")
-        control = Qt.ControlModifier if "ctrl" in held else Qt.NoModifier
-        self.key(name, control | (Qt.ShiftModifier if "shift" in held else Qt.NoModifier))
+        modifiers = Qt.ControlModifier if "ctrl" in held else Qt.NoModifier
+        modifiers |= Qt.ShiftModifier if "shift" in held else Qt.NoModifier
+        if name.startswith("kp_"):
+            modifiers |= Qt.KeypadModifier
+        self.key(name.removeprefix("kp_"), modifiers)
 
     def _pixel(self, position):
         """Return a position in Qt's coordinates: device-independent, from the upper left corner."""

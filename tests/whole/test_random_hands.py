@@ -31,11 +31,13 @@ def test_random_events_preserve_the_volume(seed, count, tmp_path):
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit - half
     print(
         f"seed {seed}: {count} events, {monkey.frames} frames, {monkey.posed} of them deformed, "
+        f"{monkey.pulled} with pulls, {monkey.pinned} pins, {monkey.turned} events of turns, "
         f"{monkey.refused} actions refused, {monkey.free} frames of free volume, "
         f"|dV|/V at most {monkey.worst:.1e}, {grown / 1e6:.0f} MB more in the second half"
     )
     assert monkey.frames > count / 10
     assert monkey.posed > count / 50
+    assert monkey.pulled > count / 50
     assert monkey.worst <= 1e-12
     assert grown < 100e6
     monkey.editor.remove()

@@ -188,9 +188,9 @@ class WeightContinuation:
         """Return a continuation that proceeds from here independently."""
         initial = self._initial
         other = WeightContinuation(initial.solver.copy(), initial.p, self._tolerance)
-        other._initial, *other._raised = (each.copy() for each in [initial, *self._raised])
-        index = [initial, *self._raised].index(self._current)
-        other._current = [other._initial, *other._raised][index]
+        copies = {each: each.copy() for each in (initial, *self._raised, self._current)}
+        other._initial, other._current = copies[initial], copies[self._current]
+        other._raised = [copies[each] for each in self._raised]
         other._only_current = self._only_current
         return other
 

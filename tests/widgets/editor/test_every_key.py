@@ -35,28 +35,31 @@ def test_in_mid_drag(plain, mode, key):
     plain.during(mode, key)
 
 
-@pytest.mark.parametrize("times", [1, 2])
-@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM))
+@pytest.mark.parametrize("times", [1, pytest.param(2, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, Mode.PULL))
 def test_while_the_pose_converges(plain, mode, key, times):
     plain.just_after(mode, *[key] * times)
 
 
-@pytest.mark.parametrize(("mode", "key"), table(Mode.REGIONS, Mode.DEFORM))
+@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, Mode.REGIONS, Mode.PULL))
 def test_during_a_job(plain, mode, key):
     plain.in_a_job(mode, key)
 
 
-@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM))
+KEYS_OF_PYVISTA = {"c", "f", "p", "r", "s", "w", "escape"}
+
+
+@pytest.mark.parametrize(("mode", "key"), table(Mode.PULL, Mode.DEFORM, daily=KEYS_OF_PYVISTA))
 def test_in_mid_drag_in_a_plotter(plotter, mode, key):
     plotter.during(mode, key)
 
 
-@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, campaign=True))
+@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, daily={"w"}))
 def test_while_the_pose_converges_in_a_plotter(plotter, mode, key):
     plotter.just_after(mode, key)
 
 
-@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, campaign=True))
+@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, daily={"w"}))
 def test_during_a_job_in_a_plotter(plotter, mode, key):
     plotter.in_a_job(mode, key)
 

@@ -271,6 +271,7 @@ def test_marks_follow_the_pose(open_editor):
     session.set_cages([Cage(3.0 * ball, faces)])
     session.change_options(preserve_volume=False)
     scene = open_editor(session)
+    scene.view.camera.ParallelProjectionOn()  # all marks move equally far
     session.move_cage(0, 3.0 * ball)  # the first edit
     session.commit()
     scene.hand.types("i")

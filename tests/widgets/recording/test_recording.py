@@ -10,10 +10,12 @@ import pytest
 import pyvista as pv
 from hands import Hand, picture, plain_view
 from scenes import sausage
+from soaking import slender
 
 from vtk_segdeform import Session
 from vtk_segdeform.errors import SessionError
 from vtk_segdeform.widgets.handle_dragger.handle_dragger import HandleDragger
+from vtk_segdeform.widgets.puller.puller import Puller as SurfacePuller
 from vtk_segdeform.widgets.recording.recording import Recorder, replay
 from vtk_segdeform.widgets.scene.gestures import Gesture, Phase, Pointer
 from vtk_segdeform.widgets.scene.step_budget import StepBudget, prescribe_steps
@@ -264,6 +266,58 @@ def test_a_drag_is_replayed_bit_by_bit_on_a_slower_machine(monkeypatch):
         replay(slow.view, lines)
         ends.append(np.array_equal(slow.session.vertices, fast.session.vertices))
     assert ends == [True, False]  # without the recorded steps the pose differs
+
+
+class Pulling:
+    """A puller over a small session without handles; on a fast machine or on a slow one."""
+
+    def __init__(self, monkeypatch, seconds: float) -> None:
+        clock = itertools.count()
+        own = SimpleNamespace(perf_counter=lambda: seconds * next(clock))
+        monkeypatch.setattr("vtk_segdeform.widgets.handle_dragger.live_solve.time", own)
+        scene, self.view = slender(), plain_view((300, 200))
+        self.session = Session(scene.mesh)
+        self.session.set_regions(scene.regions)
+        self.session.set_cages(scene.cages)
+        self.puller = SurfacePuller(self.view, self.session)
+        self.view.camera.SetPosition(0.0, -12.0, 0.0)
+        self.view.camera.SetViewUp(0.0, 0.0, 1.0)
+        self.view.renderer.ResetCamera()
+        self.view.render()
+        self.puller.On()
+
+    def work(self, hand: Hand) -> None:
+        """Pin, change the radius, pull along an axis, turn, and pull by a number."""
+        x, y = np.round(hand.at([-2.0, -0.5, 0.0]))
+        hand.click((x, y), shift=True)
+        vertex = np.linalg.norm(self.session.vertices - [2.0, -0.6, 0.0], axis=1).argmin()
+        x, y = np.round(hand.at(self.session.vertices[vertex]))
+        hand.wheel(1, (x, y), shift=True)
+        for keys in (("z",), ("r",), ("x", "1", "period", "5", "Return")):
+            hand.press((x, y))
+            hand.move((x, y + 6))
+            for key in keys:
+                hand.key(key)
+            hand.move((x + 9, y + 12))
+            hand.release((x + 9, y + 12))
+            hand.tick(2)
+            x, y = np.round(hand.at(self.session.vertices[vertex]))
+
+
+def test_pulls_pins_turns_and_numbers_are_replayed_bit_by_bit(monkeypatch):
+    fast = Pulling(monkeypatch, 0.001)
+    hand, recorder = Hand(fast.view), Recorder(fast.view)
+    fast.work(hand)
+    recorder.stop()
+    assert hand.failures == []
+    slow = Pulling(monkeypatch, 0.5)
+    replay(slow.view, recorder.lines)
+    assert list(slow.session.handles) == list(fast.session.handles)
+    assert np.array_equal(slow.session.vertices, fast.session.vertices)
+    steps = []
+    while (step := slow.session.undo()) is not None:
+        steps.append(step)
+    assert steps[:4] == ["pull", "pull", "pull", "add pin 1"]
 
 
 def test_two_widgets_of_one_window_share_the_prescribed_steps():
