@@ -16,8 +16,8 @@ from making.made import FIGURES as FOLDER
 from vtk_segdeform.widgets import DeformEditor, replay
 
 PICTURES = (
-    "hand-open", "hand-pulled", "hand-regions", "hand-cages", "hand-fixed", "hand-handle", "hand-bent",
-    "hand-volume", "hand-painted", "hand-cage-vertex", "hand-keys",
+    "hand-open", "hand-pulled", "hand-regions", "hand-cages", "hand-fixed", "hand-handle",
+    "hand-bent", "hand-volume", "hand-painted", "hand-cage-vertex", "hand-keys",
 )  # fmt: skip
 """In the order in which they are drawn."""
 
