@@ -16,8 +16,8 @@ from making.made import FIGURES as FOLDER
 from vtk_segdeform.widgets import DeformEditor, replay
 
 PICTURES = (
-    "hand-open", "hand-regions", "hand-cages", "hand-fixed", "hand-handle", "hand-bent",
-    "hand-volume", "hand-painted", "hand-cage-vertex", "hand-keys",
+    "hand-open", "hand-pulled", "hand-regions", "hand-cages", "hand-fixed", "hand-handle",
+    "hand-bent", "hand-volume", "hand-painted", "hand-cage-vertex", "hand-keys",
 )  # fmt: skip
 """In the order in which they are drawn."""
 
@@ -35,8 +35,11 @@ class Hand:
 
     def play(self, *lines: str) -> None:
         """Replay lines of a recording."""
+        editor = self.editor
         replay(
-            self.plotter, ["vtk_segdeform recording 1", *lines], busy=lambda: self.editor.is_busy
+            self.plotter,
+            ["vtk_segdeform recording 1", *lines],
+            busy=lambda: editor.is_busy or editor.is_preparing,
         )
 
     def press(self, *keys: str) -> None:
@@ -70,9 +73,16 @@ class Hand:
 
 def bend(hand: Hand) -> None:
     """Follow the tutorial from a bare mesh to a bent one."""
-    height = hand.editor.session.mesh.vertices[:, 2]
+    vertices = hand.editor.session.mesh.vertices
+    height = vertices[:, 2]
     hand.save("hand-open")
-    hand.press("g")
+    hand.play("0.0 Timer 1")  # until pulls are prepared
+    end = hand.at(vertices[[np.argmax(vertices[:, 0])]])[0] - [8.0, 0.0]
+    hand.drag(end + t * np.array([80.0, 60.0]) for t in np.linspace(0.0, 1.0, 16))
+    if np.allclose(hand.editor.session.vertices, vertices):
+        raise RuntimeError("the pull missed the arm")
+    hand.save("hand-pulled")
+    hand.press("z", "1", "g")
     hand.save("hand-regions")
     hand.press("f", "2")
     hand.save("hand-cages")
@@ -104,7 +114,7 @@ def gizmo_of(hand: Hand) -> tuple[Any, float]:
 def paint(hand: Hand) -> None:
     """Paint a region, drag a cage vertex, and show the keys."""
     mesh = hand.editor.session.mesh
-    hand.press("g", "a", "bracketright", "bracketright")
+    hand.press("1", "g", "a", "bracketright", "bracketright")
     place = hand.at([[0.0, -0.1, 0.62], [0.02, -0.1, 0.78]])
     hand.drag([place[0] + t * (place[1] - place[0]) for t in np.linspace(0.0, 1.0, 12)])
     hand.save("hand-painted")

@@ -74,7 +74,7 @@ def test_it_is_zero_for_a_sheared_bar():
 
 
 def test_cells_agree_with_vertices_and_interpolate_smoothly(monkeypatch):
-    ball, faces = icosphere(6)
+    ball, faces = icosphere(5)
     mesh = Mesh(ball * [3.0, 0.8, 0.8], faces)
     x = mesh.vertices
     girth = 1.0 - 0.3 * np.exp(-(x[:, :1] ** 2) / 0.5)

@@ -27,15 +27,15 @@ def drag(n):
     height = mesh.vertices[:, 2]
     tip = np.flatnonzero(height > 0.92)
     regions = sd.segment(mesh, 3)
-    cages = sd.fit_cages(mesh, regions, 60)
+    cages = sd.fit_cages(mesh, regions, 40)
     deformer = sd.Deformer(mesh, regions, cages, fixed=height < 0.08, handle=tip)
     poses = [deformer.solve(mesh.vertices[tip] + [0.1 * k, 0.0, 0.0]).vertices for k in (1, 2)]
     return [*poses, deformer.carry(mesh.vertices[::5])]
 
-before, alone = blas(), drag(700)
+before, alone = blas(), drag(500)
 for _ in range(int(sys.argv[1])):
     together = []
-    workers = [threading.Thread(target=lambda: together.append(drag(700))) for _ in range(3)]
+    workers = [threading.Thread(target=lambda: together.append(drag(500))) for _ in range(3)]
     for worker in workers:
         worker.start()
     for worker in workers:

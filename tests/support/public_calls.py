@@ -33,6 +33,7 @@ from vtk_segdeform.mesh.faults import Search, as_soup
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.subspace.passengers import Passengers
 from vtk_segdeform.widgets.recording.film import Film
+from vtk_segdeform.widgets.scene.surface_display import SurfaceStyle
 
 CORE = (
     "vtk_segdeform",
@@ -352,6 +353,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "largest_hole": lambda: 10,
     "lids": lambda: None,
     "limits": sd.widgets.ReplayLimits,
+    "locked": lambda: True,
     "listener": lambda: lambda _change: None,
     "locality": lambda: 0.5,
     "major": lambda: 1.0,
@@ -412,6 +414,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "count": lambda: 3,
     "degrees": lambda: 30.0,
     "distortion": lambda: np.zeros(mesh().n_vertices),
+    "hidden": lambda: True,
     "hold": lambda: True,
     "on": lambda: True,
     "strength": lambda: 10.0,
@@ -435,6 +438,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "visible": lambda: True,
     "when": lambda: lambda: True,
     "while_busy": lambda: False,
+    "within": lambda: 0.05,
     "acceleration": lambda: 3,
     "exact_hessian": lambda: False,
 }
@@ -445,6 +449,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "CageDisplay.opacity.value": lambda: 0.5,
     "DeformEditor.load.path": lambda: _file("saved.segdeform"),
     "DeformEditor.mode.value": lambda: sd.widgets.Mode.DEFORM,
+    "DeformEditor.show_cube.value": lambda: True,
     "DeformEditor.path.value": lambda: Path("other.segdeform"),
     "Film.save.path": lambda: Path("saved.gif"),
     "HandleDragger.handle.value": lambda: "handle 1",
@@ -469,6 +474,8 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "Surface.vertices_at.points": lambda: [0, 5],
     "Surface.write.path": lambda: Path("written.vtp"),
     "Surface.write.vertices": lambda: given().mesh.vertices,
+    "SurfaceDisplay.shows_rest.value": lambda: True,
+    "SurfaceDisplay.style.value": lambda: SurfaceStyle.EDGES,
     "VolumeOverlay.wanted_range.value": lambda: 0.2,
     "blend_at.points": lambda: mesh().vertices[:4],
     "cactus.n_vertices": lambda: 600,
@@ -492,6 +499,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "read_mesh.path": lambda: _file("mesh.ply"),
     "read_polydata.path": lambda: _file("mesh.ply"),
     "require_writable.arrays": lambda: False,
+    "save_session.view": lambda: {"mode": "PULL"},
     "require_writable.path": lambda: Path("written.vtp"),
     "write.path": lambda: Path("written.ply"),
     "write_mesh.path": lambda: Path("written.ply"),
@@ -501,6 +509,8 @@ SPECIAL: dict[str, Callable[[], Any]] = {
 SAID_AS: dict[str, tuple[str, ...]] = {
     "Cage.require_encloses.points": ("handle 1",),
     "HandleDragger.handle.value": ("handle",),
+    "HandleDragger.set_hidden.name": ("handle",),
+    "HandleDragger.set_locked.name": ("handle",),
     "Cage.vertices": ("faces",),
     "CageDisplay.show_faults.vertices": ("faces",),
     "film.frames": ("film", "targets"),

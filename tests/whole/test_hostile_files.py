@@ -401,49 +401,30 @@ def special(folder, sound):
     return files
 
 
-@pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    """Read files of four sorts in one program; return [(files, answers)] by sort."""
-    folder = tmp_path_factory.mktemp("files")
-    sound = originals(folder)
-    damaged_files = mutants(folder, sound, 13, seed=1)
-    (folder / "counts").mkdir()
-    sorts = [
-        sound,
-        damaged_files,
-        special(folder, sound)[::11],
-        false_counts(folder / "counts")[::6],
-    ]
-    before = sorted(folder.rglob("*"))
-    found = iter(answers([file for files in sorts for file in files]))
-    assert sorted(folder.rglob("*")) == before  # reading writes nothing
-    return [(files, [next(found) for _ in files]) for files in sorts]
+def test_files_of_every_sort_are_read_or_the_error_names_them(tmp_path):
+    """One program reads all of them: starting it takes longer than reading them."""
+    valid = originals(tmp_path)
+    damaged_files = mutants(tmp_path, valid, 13, seed=1)
+    (tmp_path / "counts").mkdir()
+    no_files = special(tmp_path, valid)[::11]
+    counts = false_counts(tmp_path / "counts")[::6]
+    before = sorted(tmp_path.rglob("*"))
+    found = iter(answers([*valid, *damaged_files, *no_files, *counts]))
+    assert sorted(tmp_path.rglob("*")) == before  # reading writes nothing
 
+    read = {path.name: next(found)[0] for _, path in valid}
+    assert read == dict.fromkeys(read, "read")
+    assert not failures(damaged_files, [next(found) for _ in damaged_files])
 
-def test_valid_files_of_every_kind_are_read(results):
-    files, found = results[0]
-    assert {path.name: answer for (_, path), (answer, _) in zip(files, found, strict=True)} == {
-        path.name: "read" for _, path in files
-    }
+    of_no_files = [next(found) for _ in no_files]
+    assert not failures(no_files, of_no_files)
+    assert Counter(answer for answer, _ in of_no_files)["refused"] > 0.9 * len(no_files)
 
-
-def test_damaged_files_of_every_kind_are_read_or_the_error_names_them(results):
-    assert not failures(*results[1])
-
-
-def test_the_error_names_a_path_that_is_not_a_file_of_its_kind(results):
-    files, found = results[2]
-    assert not failures(files, found)
-    assert Counter(answer for answer, _ in found)["refused"] > 0.9 * len(files)
-
-
-def test_counts_in_a_file_are_checked_against_its_size(results):
-    files, found = results[3]
-    assert not failures(files, found)
-    refused = {
-        path.name for (_, path), (answer, _) in zip(files, found, strict=True) if answer != "read"
-    }
-    assert len(refused) > 0.7 * len(files)
+    of_counts = [next(found) for _ in counts]
+    assert not failures(counts, of_counts)
+    names = zip(counts, of_counts, strict=True)
+    refused = {path.name for (_, path), (answer, _) in names if answer != "read"}
+    assert len(refused) > 0.7 * len(counts)
 
 
 @pytest.mark.campaign

@@ -39,7 +39,7 @@ def sharpest(mesh, vertices):
     return np.einsum("ij,ij->i", normal[one], normal[other]).min()
 
 
-@pytest.mark.parametrize("n_regions", [1, 3])
+@pytest.mark.parametrize("n_regions", [pytest.param(1, marks=pytest.mark.campaign), 3])
 def test_the_bar_twists_by_135_degrees_at_its_volume_without_crossings(n_regions):
     mesh, solution = posed("bar", n_regions)
     assert distortion(mesh, solution.vertices) < 0.15

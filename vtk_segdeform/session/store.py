@@ -84,10 +84,14 @@ def save_session(
     SessionError
         If the file cannot be written: no such folder, no permission, no space, or *path* is a
         folder or a device.
+    ArgumentError
+        If an argument has the wrong type.
     """
     path = as_path(path)
     require(session, Session, "session")
     given = session.surface if as_flag(surface, "surface") else None
+    if view is not None:
+        require(view, Mapping, "view")
     try:
         with replacing(path) as draft, open(draft, "wb") as file:
             _write(file, session, given, view)

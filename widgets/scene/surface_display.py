@@ -20,7 +20,7 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from vtk_segdeform.arrays import plain
-from vtk_segdeform.checks import require
+from vtk_segdeform.checks import as_flag, require
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.freezing import read_only
 from vtk_segdeform.geometry import VertexNormals
@@ -117,8 +117,8 @@ class SurfaceDisplay:
 
     @shows_rest.setter
     def shows_rest(self, rest: bool) -> None:
-        if rest != self._shows_rest:
-            self._shows_rest = rest
+        if as_flag(rest, "shows_rest") != self._shows_rest:
+            self._shows_rest = bool(rest)
             self.update()
 
     def set_colours(self, layer: str, colours: NDArray[np.uint8] | None) -> None:
