@@ -283,7 +283,8 @@ class Window(QtWidgets.QMainWindow):
     def _close_document(self) -> None:
         widget, self.editor_widget = self.editor_widget, None
         if widget is not None:
-            self._stops.pop()()
+            while self._stops:
+                self._stops.pop()()
             widget.close()
 
     # Display.

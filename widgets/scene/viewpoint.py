@@ -260,9 +260,10 @@ class Viewpoint:
             ("scale", 1),
         )
         found = [numbers(settings.get(name), count) for name, count in names]
-        values = np.concatenate([each for each in found if each is not None])
-        if len(values) != sum(count for _, count in names):
+        given = [each for each in found if each is not None]
+        if len(given) < len(names):
             return False
+        values = np.concatenate(given)
         up, position, focus, view_up = values[:12].reshape(4, 3)
         angle, scale = map(float, values[12:])
         away, middle = position - focus, self._points().mean(axis=0)
