@@ -357,8 +357,8 @@ def test_the_view_menu_shows_hides_and_ticks(start, arm_file):
     hand = start(arm_file)
     hand.view_hand()
     for name, is_shown in (
-        ("Cages", lambda: hand.window.editor.widgets.cages.is_shown),
-        ("Local volume change", lambda: hand.window.editor.widgets.overlay.is_shown),
+        ("Show cages in all modes", lambda: hand.window.editor.widgets.cages.is_shown),
+        ("Show local volume change", lambda: hand.window.editor.widgets.overlay.is_shown),
     ):
         assert hand.reads("View")[name] == (True, False)
         hand.choose("View", name)
