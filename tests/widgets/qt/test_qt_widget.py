@@ -39,6 +39,7 @@ from vtk_segdeform.widgets import Mode, Paint, Tool
 from vtk_segdeform.widgets.qt.widget import DeformDock, DeformWidget, deform_dock
 
 MESH = models.cactus(500)
+pytestmark = pytest.mark.usefixtures("unprepared")
 
 
 @pytest.fixture
@@ -235,7 +236,7 @@ def rename(tree, name):
     """Type another name for the selected row."""
     tree.setFocus()
     QtTest.QTest.keyClick(tree, Qt.Key_F2)
-    field = tree.viewport().findChild(QtWidgets.QLineEdit)
+    field = tree.viewport().findChildren(QtWidgets.QLineEdit)[-1]  # an earlier one may be closing
     field.setText(name)  # a keyboard lacks some of its letters
     QtTest.QTest.keyClick(field, Qt.Key_Return)
 
@@ -780,9 +781,8 @@ def test_the_example_of_an_application_runs(tmp_path):
         [sys.executable, example, "--picture", tmp_path / "window.png"],
         env={**os.environ, **screen}, check=True, timeout=100,
     )  # fmt: skip
-    colours = np.array(Image.open(tmp_path / "window.png").convert("RGB")).astype(int)
-    body = (np.ptp(colours, axis=2) > 10) & (colours.mean(axis=2) < 220)
-    assert 0.04 < body.mean() < 0.5  # the cactus, the current mode, the status line
+    grey = np.array(Image.open(tmp_path / "window.png").convert("L"))
+    assert 0.1 < (grey < 215).mean() < 0.5  # the cactus; the status line is 0.04
 
 
 def test_a_bad_argument_is_one_of_our_errors_before_anything_is_created():
