@@ -33,8 +33,10 @@ from vtk_segdeform.io.surface import Surface
 from vtk_segdeform.session.store import load_session, save_session
 from vtk_segdeform.widgets.app import documents
 from vtk_segdeform.widgets.app.autosave import About, Autosaves, Slot
+from vtk_segdeform.widgets.editor import preparing
 
 BALL = models.sphere(300)
+PREPARED = preparing.lacking
 pytestmark = pytest.mark.usefixtures("unprepared")
 
 
@@ -548,6 +550,37 @@ def bent(arm):
 
 
 # Closing.
+
+
+def test_a_file_is_prepared_for_pulls_without_a_change_and_closed_meanwhile_at_once(
+    start, ball_file, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(preparing, "lacking", PREPARED)
+    hand = start(ball_file)
+    until(lambda: hand.window.session.is_bound, "the preparation")
+    hand.settle()
+    assert hand.title == "ball.vtp - segdeform"
+    assert slots(tmp_path) == []
+    assert hand.window.close()  # no question
+    go_on, waiting = threading.Event(), threading.Event()
+
+    def lacking(_):
+        def work(progress):
+            waiting.set()
+            assert go_on.wait(30.0)
+            progress(1.0, "")  # cancelled
+
+        return work
+
+    monkeypatch.setattr(preparing, "lacking", lacking)
+    hand = start(ball_file)
+    until(waiting.is_set, "another preparation")
+    view, drawn = hand.window.editor.view, []
+    view.window.AddObserver("StartEvent", lambda *_: drawn.append(1))
+    assert hand.window.close()
+    assert len(drawn) <= 1
+    assert not go_on.is_set()
+    go_on.set()
 
 
 @pytest.mark.parametrize("times", [1, pytest.param(30, marks=pytest.mark.campaign)])
