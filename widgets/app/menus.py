@@ -72,18 +72,8 @@ class Menus:
 
     def _view(self) -> None:
         menu = self._menu("&View")
-        self._cages = self._add(menu, "&Cages\tC", self._doing(actions.toggle_cages))
-        show_volume = self._doing(actions.toggle_overlay)
-        self._overlay = self._add(menu, "Local &volume change\tO", show_volume)
-        self._regions = self._add(menu, "&Regions\tShift+G", self._doing(actions.toggle_regions))
-        for action in (self._cages, self._overlay, self._regions):
-            action.setCheckable(True)
-        style = self._add(menu, "&Shaded, edges, wireframe\tW", self._doing(actions.next_style))
-        self._need_mesh.append(style)
-        menu.addSeparator()
         window = self._window
         add_view_entries(menu, lambda: window.editor if window.has_mesh else None)
-        menu.aboutToShow.connect(self._update_view)
 
     def _help(self) -> None:
         menu = self._menu("&Help")
@@ -124,17 +114,6 @@ class Menus:
             action.setText(f"{verb} {name}\t{keys}" if name else f"{verb}\t{keys}")
             action.setEnabled(is_free and bool(label))
 
-    def _update_view(self) -> None:
-        window = self._window
-        self._cages.setEnabled(window.has_mesh and bool(window.session.cages))
-        self._overlay.setEnabled(window.has_mesh)
-        self._regions.setEnabled(window.has_mesh and window.session.regions is not None)
-        if window.has_mesh:
-            widgets = window.editor.widgets
-            self._cages.setChecked(widgets.cages.is_shown)
-            self._overlay.setChecked(widgets.overlay_wanted)
-            self._regions.setChecked(widgets.regions_wanted)
-
     # Pieces.
 
     def _menu(self, title: str) -> Any:
@@ -153,8 +132,9 @@ class Menus:
 
 
 def connect_panel(window: Any) -> None:
-    """Connect the file buttons of the panel to the functions of the menus."""
+    """Connect the file buttons of the panel to the functions of the menus; hide its View menu."""
     toolbar = window.editor_widget.panel.toolbar
+    toolbar.view.hide()  # the menu bar has the same entries
     toolbar.open.clicked.disconnect()
     toolbar.open.clicked.connect(window.ask_and_open)
     saves = saving.save_session, saving.save_session_as, saving.save_mesh_as

@@ -179,14 +179,19 @@ class Controller:
 
     @contextmanager
     def clean_view(self) -> Iterator[None]:
-        """Draw the view without status line, notices and gizmos inside a ``with`` block."""
+        """Draw the view without status line, notices, cube and gizmos inside a ``with`` block."""
+        cube = self.camera.cube
+        has_cube = cube.is_shown
         self.widgets.switch_off()
         self.messages.hide()
         self.notices.enable(False)
+        cube.hide()
         self.view.render()
         try:
             yield
         finally:
+            if has_cube:
+                cube.show()
             self._apply_mode()
 
     @property

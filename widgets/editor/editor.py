@@ -149,7 +149,7 @@ class DeformEditor:
         as_callable(action, "action")
         as_flag(while_busy, "while_busy")
         error: Exception | None = None
-        with self.view.guarded():
+        with self.view.guarded(), self.view.drawing_once():
             try:
                 error = self._do(action, while_busy)
             except Exception as raised:
@@ -210,9 +210,10 @@ class DeformEditor:
 
     def remove(self) -> None:
         """Remove everything from the view, permanently; the session is unchanged."""
-        self.Off()
-        self._is_removed = True
-        self._controller.remove()
+        with self.view.drawing_once():
+            self.Off()
+            self._is_removed = True
+            self._controller.remove()
 
     # Keys.
 

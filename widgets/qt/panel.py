@@ -135,7 +135,11 @@ class DeformPanel(QtWidgets.QWidget):
         layout.addWidget(area, 1)
         layout.addWidget(self.status)
         layout.addWidget(self.log)
-        self.setMinimumWidth(_WIDTH * self.fontMetrics().averageCharWidth())
+        # The widest part fits beside a scroll bar.
+        widest = max(part.minimumSizeHint().width() for part in self._parts)
+        widest += area.verticalScrollBar().sizeHint().width() + 2 * layout.contentsMargins().left()
+        letters = _WIDTH * self.fontMetrics().averageCharWidth()
+        self.setMinimumWidth(max(widest, letters))
         for keys, key in _KEYS.items():
             for part in (self.toolbar, area, self.status, self.log):
                 self._add_shortcut(part, keys, key)

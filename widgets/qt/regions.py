@@ -90,7 +90,7 @@ class RegionsPart(QtWidgets.QGroupBox):
             _Row(
                 region,
                 editor.session.region_name(region),
-                f"{cages[region].n_vertices} vertices" if cages else "None",
+                str(cages[region].n_vertices) if cages else "None",
                 widgets.cages.is_visible(region) if cages else None,
                 percent(volumes[region]) if region in volumes else "",
             )
@@ -117,6 +117,7 @@ class RegionsPart(QtWidgets.QGroupBox):
             item.setFlags(item.flags() | editable if exists else item.flags() & ~editable)
             item.setIcon(_NAME, swatch(of_region(each.region), tree))
             item.setText(_CAGE, each.cage)
+            item.setToolTip(_CAGE, "Number of cage vertices. Tick: show the cage")
             item.setText(_VOLUME, each.volume)
             item.setTextAlignment(_VOLUME, RIGHT)
             if each.visible is None:

@@ -19,7 +19,6 @@ from ..editor import (
     Mode,
     binding_of,
     exporting,
-    key_cap,
     opening,
     save,
     saving,
@@ -32,7 +31,6 @@ from .view_menu import add_view_entries
 
 Qt = QtCore.Qt
 _SESSIONS = "Sessions (*.segdeform)"
-_VIEW_KEYS = "w", "shift+g", "c", "o", "i"
 _HEIGHT = 32  # pixels of a row
 
 
@@ -69,7 +67,7 @@ class Toolbar(QtWidgets.QWidget):
         self.compare.pressed.connect(lambda: editor.do(show_rest))
         self.compare.released.connect(lambda: editor.do(show_pose, while_busy=True))
         self.view = tool_button("View", "What is shown")
-        self._view_entries = self._fill_view()
+        add_view_entries(self._menu(self.view), lambda: editor)
         self.help = doing(editor, tool_button("Keys", "Show keys", "h"), "h", Mode.REGIONS)
         self._icons = {
             "open": self.open, "save": self.save, "undo": self.undo, "redo": self.redo,
@@ -133,32 +131,6 @@ class Toolbar(QtWidgets.QWidget):
         button.setMenu(menu)
         button.setPopupMode(QtWidgets.QToolButton.ToolButtonPopupMode.InstantPopup)
         return menu
-
-    def _fill_view(self) -> list[Any]:
-        """Fill the menu of what is shown; the key of each entry is shown beside it."""
-        menu, entries = self._menu(self.view), []
-        menu.aboutToShow.connect(self._update_view)
-        for key in _VIEW_KEYS:
-            binding = binding_of(key, Mode.DEFORM)
-            if binding is None or binding.action is None:
-                raise ValueError(f"{key!r} has no action in mode 4")
-            entry = menu.addAction(f"{binding.label}\t{key_cap(key)}")
-            entry.triggered.connect(lambda _=False, do=binding.action: self._editor.do(do))
-            entries.append(entry)
-        menu.addSeparator()
-        add_view_entries(menu, lambda: self._editor)
-        return entries
-
-    def _update_view(self) -> None:
-        widgets = self._editor.widgets
-        _, regions, cages, overlay, _ = self._view_entries
-        for entry, on in (
-            (regions, widgets.regions_wanted),
-            (cages, widgets.cages.is_shown),
-            (overlay, widgets.overlay_wanted),
-        ):
-            entry.setCheckable(True)
-            entry.setChecked(on)
 
     def _draw_icons(self) -> None:
         for name, button in self._icons.items():

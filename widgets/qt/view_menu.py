@@ -1,4 +1,4 @@
-"""Menu entries for the camera: framing, named views, up axis, projection, orientation cube."""
+"""Menu entries for what is shown and for the camera: views, up axis, projection, cube."""
 
 from __future__ import annotations
 
@@ -8,14 +8,26 @@ from typing import Any
 from ..editor import (
     Action,
     DeformEditor,
+    Mode,
+    binding_of,
     frame_all,
     frame_selection,
+    key_cap,
     looking_from,
     toggle_cube,
     toggle_projection,
     with_up,
 )
 
+_Test = Callable[[DeformEditor], bool]
+# What is shown: the key of the entry, whether there is something to show, and whether it is shown.
+_SHOWN: tuple[tuple[str, _Test, _Test | None], ...] = (
+    ("w", lambda _: True, None),
+    ("shift+g", lambda e: e.session.regions is not None, lambda e: e.widgets.regions_wanted),
+    ("c", lambda e: bool(e.session.cages), lambda e: e.widgets.cages.is_shown),
+    ("o", lambda _: True, lambda e: e.widgets.overlay_wanted),
+    ("i", lambda _: True, None),
+)
 _VIEWS = (
     ("&Front\tNum 1", "front"),
     ("&Back\tCtrl+Num 1", "back"),
@@ -39,16 +51,26 @@ def add_view_entries(menu: Any, editor_of: Callable[[], DeformEditor | None]) ->
         Returns the editor to control; without one, the entries are disabled.
     """
 
-    def add(where: Any, text: str, action: Action) -> Any:
+    def add(where: Any, text: str, action: Action, *, while_busy: bool = True) -> Any:
         def act() -> None:
             editor = editor_of()
             if editor is not None:
-                editor.do(action, while_busy=True)
+                editor.do(action, while_busy=while_busy)
 
         entry = where.addAction(text)
         entry.triggered.connect(act)
         return entry
 
+    shown = []
+    for key, exists, is_shown in _SHOWN:
+        binding = binding_of(key, Mode.DEFORM)
+        if binding is None or binding.action is None:
+            raise ValueError(f"{key!r} has no action in mode 4")
+        text = f"{binding.label}\t{key_cap(key)}"
+        entry = add(menu, text, binding.action, while_busy=binding.while_busy)
+        entry.setCheckable(is_shown is not None)
+        shown.append((entry, exists, is_shown))
+    menu.addSeparator()
     entries = [
         add(menu, "&Fit to view\t,", frame_all),
         add(menu, "Fit &selection\t.", frame_selection),
@@ -67,6 +89,9 @@ def add_view_entries(menu: Any, editor_of: Callable[[], DeformEditor | None]) ->
         editor = editor_of()
         for entry in entries:
             entry.setEnabled(editor is not None)
+        for entry, exists, is_shown in shown:
+            entry.setEnabled(editor is not None and exists(editor))
+            entry.setChecked(editor is not None and is_shown is not None and is_shown(editor))
         if editor is not None:
             up = editor.controller.camera.viewpoint.up
             for axis, entry in enumerate(axes):

@@ -135,7 +135,7 @@ class View(Projection):
         def called(*_: object) -> None:
             consumed: bool | None = True
             try:
-                with self.guarded(), self._render_afterwards():
+                with self.guarded(), self.drawing_once():
                     consumed = callback()
             finally:  # even if a failure listener raises: the camera must not see half a drag
                 command = self.interactor.GetCommand(tag)
@@ -187,7 +187,7 @@ class View(Projection):
         as_callable(callback, "callback")
 
         def ticked(*_: object) -> None:
-            with self.guarded(), self._render_afterwards():
+            with self.guarded(), self.drawing_once():
                 callback()
 
         tag = self.interactor.AddObserver("TimerEvent", ticked, ABOVE_CAMERA)
@@ -207,7 +207,7 @@ class View(Projection):
         as_callable(callback, "callback")
 
         def ticked(*_: object) -> None:
-            with self.guarded(), self._render_afterwards():
+            with self.guarded(), self.drawing_once():
                 callback()
 
         tag = self.interactor.AddObserver("TimerEvent", ticked)
@@ -261,8 +261,8 @@ class View(Projection):
                     stack.callback(listener, error)
 
     @contextmanager
-    def _render_afterwards(self) -> Iterator[None]:
-        """Draw once at the end of the outermost callback if any callback requested it."""
+    def drawing_once(self) -> Iterator[None]:
+        """Draw once, if at all, at the end of the outermost ``with`` block or event."""
         self._depth += 1
         try:
             yield

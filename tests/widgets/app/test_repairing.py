@@ -17,6 +17,8 @@ from vtk_segdeform.io import read_polydata
 from vtk_segdeform.widgets.app.autosave import Autosaves
 from vtk_segdeform.widgets.app.repair_dialog import RepairDialog
 
+pytestmark = pytest.mark.usefixtures("unprepared")
+
 
 @pytest.fixture
 def boxes():

@@ -31,10 +31,14 @@ from vtk_segdeform.cli.main import main
 from vtk_segdeform.io import convert
 from vtk_segdeform.io.surface import Surface
 from vtk_segdeform.session.store import load_session, save_session
+from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.app import documents
 from vtk_segdeform.widgets.app.autosave import About, Autosaves, Slot
+from vtk_segdeform.widgets.editor import preparing
 
 BALL = models.sphere(300)
+PREPARED = preparing.lacking
+pytestmark = pytest.mark.usefixtures("unprepared")
 
 
 @pytest.fixture(scope="module")
@@ -357,8 +361,8 @@ def test_the_view_menu_shows_hides_and_ticks(start, arm_file):
     hand = start(arm_file)
     hand.view_hand()
     for name, is_shown in (
-        ("Cages", lambda: hand.window.editor.widgets.cages.is_shown),
-        ("Local volume change", lambda: hand.window.editor.widgets.overlay.is_shown),
+        ("Show cages in all modes", lambda: hand.window.editor.widgets.cages.is_shown),
+        ("Show local volume change", lambda: hand.window.editor.widgets.overlay.is_shown),
     ):
         assert hand.reads("View")[name] == (True, False)
         hand.choose("View", name)
@@ -547,6 +551,37 @@ def bent(arm):
 
 
 # Closing.
+
+
+def test_a_file_is_prepared_for_pulls_without_a_change_and_closed_meanwhile_at_once(
+    start, ball_file, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(preparing, "lacking", PREPARED)
+    hand = start(ball_file)
+    until(lambda: hand.window.session.is_bound, "the preparation")
+    hand.settle()
+    assert hand.title == "ball.vtp - segdeform"
+    assert slots(tmp_path) == []
+    hand.window.editor.mode = Mode.CAGES
+    drawn = []
+    hand.window.editor.view.window.AddObserver("StartEvent", lambda *_: drawn.append(1))
+    assert hand.window.close()  # no question
+    assert len(drawn) <= 1
+    go_on, waiting = threading.Event(), threading.Event()
+
+    def lacking(_):
+        def work(progress):
+            waiting.set()
+            assert go_on.wait(30.0)
+            progress(1.0, "")  # cancelled
+
+        return work
+
+    monkeypatch.setattr(preparing, "lacking", lacking)
+    hand = start(ball_file)
+    until(waiting.is_set, "another preparation")
+    assert hand.window.close()
+    go_on.set()
 
 
 @pytest.mark.parametrize("times", [1, pytest.param(30, marks=pytest.mark.campaign)])

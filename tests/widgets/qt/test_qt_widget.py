@@ -39,6 +39,7 @@ from vtk_segdeform.widgets import Mode, Paint, Tool
 from vtk_segdeform.widgets.qt.widget import DeformDock, DeformWidget, deform_dock
 
 MESH = models.cactus(500)
+pytestmark = pytest.mark.usefixtures("unprepared")
 
 
 @pytest.fixture
@@ -121,6 +122,7 @@ def make():
         made.append(Seen(DeformWidget(mesh)))
         made[-1].editor.wait()
         made[-1].editor.mode = Mode.REGIONS
+        made[-1].settle()
         return made[-1]
 
     yield over
@@ -164,7 +166,7 @@ def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
     assert seen.session.regions.n_regions == len(rows(panel.regions.list)) > 1
     seen.mode(Mode.CAGES)
     seen.click(panel.cages.fit)
-    assert [f"{cage.n_vertices} vertices" for cage in seen.session.cages] == [
+    assert [str(cage.n_vertices) for cage in seen.session.cages] == [
         cage for _, cage, _ in rows(panel.regions.list)
     ]
 
@@ -179,7 +181,7 @@ def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
     assert set(seen.session.fixed) <= set(np.flatnonzero(height < 0.12))
     (name,) = seen.session.handles
     counts = [len(seen.session.fixed), len(seen.session.handles[name])]
-    assert [int(count) for _, count in rows(panel.handles.list)] == counts
+    assert [int(count) for _, count, *_ in rows(panel.handles.list)] == counts
     assert min(counts) > 5
 
     seen.mode(Mode.DEFORM)
@@ -234,7 +236,7 @@ def rename(tree, name):
     """Type another name for the selected row."""
     tree.setFocus()
     QtTest.QTest.keyClick(tree, Qt.Key_F2)
-    field = tree.viewport().findChild(QtWidgets.QLineEdit)
+    field = tree.viewport().findChildren(QtWidgets.QLineEdit)[-1]  # an earlier one may be closing
     field.setText(name)  # a keyboard lacks some of its letters
     QtTest.QTest.keyClick(field, Qt.Key_Return)
 
@@ -294,14 +296,14 @@ def test_handles_are_renamed_selected_and_removed_in_the_list(seen):
     assert seen.editor.widgets.selector.paints is Paint.HANDLE
     seen.click(seen.panel.handles.remove)
     assert not seen.session.handles
-    assert [name for name, _ in rows(tree)] == ["Fixed", "New handle (not painted yet)"]
+    assert [name for name, *_ in rows(tree)] == ["Fixed", "New handle (not painted yet)"]
 
 
 def test_a_handle_called_fixed_is_not_mistaken_for_the_fixed_vertices(seen):
     seen.session.rename_handle(next(iter(seen.session.handles)), "Fixed")
     seen.mode(Mode.HANDLES)
     tree, selector = seen.panel.handles.list, seen.editor.widgets.selector
-    assert [name for name, _ in rows(tree)][:2] == ["Fixed", "Fixed"]
+    assert [name for name, *_ in rows(tree)][:2] == ["Fixed", "Fixed"]
     seen.click_row(tree, 0)
     assert selector.paints is Paint.FIXED
     assert not seen.panel.handles.remove.isEnabled()
@@ -614,8 +616,8 @@ def test_two_widgets_and_a_dock_in_one_window_are_independent(state):
     hands = [Seen(widget, window) for widget in (first, second, dock)]
     window.resize(1500, 650)
     app.processEvents()
-    hands[0].mode(Mode.DEFORM)
-    hands[2].mode(Mode.CAGES)
+    for seen, mode in zip(hands, (Mode.DEFORM, Mode.REGIONS, Mode.CAGES), strict=True):
+        seen.mode(mode)
     assert [seen.editor.mode for seen in hands] == [Mode.DEFORM, Mode.REGIONS, Mode.CAGES]
     bend(hands[0])
     assert [len(seen.deformed) for seen in hands] == [1, 0, 0]
@@ -779,9 +781,8 @@ def test_the_example_of_an_application_runs(tmp_path):
         [sys.executable, example, "--picture", tmp_path / "window.png"],
         env={**os.environ, **screen}, check=True, timeout=100,
     )  # fmt: skip
-    colours = np.array(Image.open(tmp_path / "window.png").convert("RGB")).astype(int)
-    body = (np.ptp(colours, axis=2) > 10) & (colours.mean(axis=2) < 220)
-    assert 0.04 < body.mean() < 0.5  # the cactus, the current mode, the status line
+    grey = np.array(Image.open(tmp_path / "window.png").convert("L"))
+    assert 0.1 < (grey < 215).mean() < 0.5  # the cactus; the status line is 0.04
 
 
 def test_a_bad_argument_is_one_of_our_errors_before_anything_is_created():
