@@ -70,6 +70,12 @@ Both depend on the shape only: for a mesh of a million vertices they take 1.5 s 
 DECIMATED_POINTS = 12_000
 """Vertices of the decimated mesh, about: several hundred for each limb."""
 
+DRAFT = 60_000
+"""Vertices beyond which a moving mesh may be drawn decimated, if drawing it is slow.
+
+In software a picture takes 15 ms of processor time instead of 310 at 250,000 vertices, and instead
+of 1,200 at a million."""
+
 SCALED_VOLUME = 20_000
 """Vertices beyond which a pose is scaled to its exact volume instead of moved along a direction.
 
