@@ -65,7 +65,7 @@ FIRST_CLUSTERS_EACH = 6
 DECIMATED = 20_000
 """Vertices beyond which regions are detected, and cages fitted, on a decimated mesh.
 
-Both depend on the shape only: for a mesh of a million vertices they take 1.5 s instead of 24."""
+Both depend on the shape only: for a million vertices they take 2.7 s of processor time."""
 
 DECIMATED_POINTS = 12_000
 """Vertices of the decimated mesh, about: several hundred for each limb."""
@@ -110,7 +110,7 @@ CUBATURE_FACTOR = 8
 """Vertices for each sampled one from which the sample is used: 8 x 36,000 = 288,000 vertices.
 
 The triangles at a sampled vertex have six other corners, so that a denser sample would cost as
-much as all vertices.  A mesh of 350,000 vertices is bound in 13 s instead of 15."""
+much as all vertices."""
 
 SINGLE_PRECISION = 8_000_000
 """Vertices in regions times cage vertices, in a region, beyond which W~ is in single precision.
