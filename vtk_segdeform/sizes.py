@@ -65,10 +65,16 @@ FIRST_CLUSTERS_EACH = 6
 DECIMATED = 20_000
 """Vertices beyond which regions are detected, and cages fitted, on a decimated mesh.
 
-Both depend on the shape only: for a mesh of a million vertices they take 1.5 s instead of 24."""
+Both depend on the shape only: for a million vertices they take 2.7 s of processor time."""
 
 DECIMATED_POINTS = 12_000
 """Vertices of the decimated mesh, about: several hundred for each limb."""
+
+DRAFT = 60_000
+"""Vertices beyond which a moving mesh may be drawn decimated, if drawing it is slow.
+
+In software a picture takes 15 ms of processor time instead of 310 at 250,000 vertices, and instead
+of 1,200 at a million."""
 
 SCALED_VOLUME = 20_000
 """Vertices beyond which a pose is scaled to its exact volume instead of moved along a direction.
@@ -104,7 +110,7 @@ CUBATURE_FACTOR = 8
 """Vertices for each sampled one from which the sample is used: 8 x 36,000 = 288,000 vertices.
 
 The triangles at a sampled vertex have six other corners, so that a denser sample would cost as
-much as all vertices.  A mesh of 350,000 vertices is bound in 13 s instead of 15."""
+much as all vertices."""
 
 SINGLE_PRECISION = 8_000_000
 """Vertices in regions times cage vertices, in a region, beyond which W~ is in single precision.

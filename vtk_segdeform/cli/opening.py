@@ -7,6 +7,8 @@ pressed at a random vertex, and the pointer moves on until the surface has follo
     press       handling the press, which may draw the view
     followed    from opening the file to the first picture in which the grabbed vertex moved by at
                 least half the motion of the pointer
+    cpu         processor time of all threads from opening the file until then: what it takes on an
+                idle machine if nothing ran in parallel
     draw        drawing one picture by OpenGL, median
     gap         longest turn of the event loop until then, without the drawing in it
     again       a second press, at another vertex, and the first move after it
@@ -44,7 +46,8 @@ _SIZE = (800, 600)  # window size in pixels
 _GOALS = {5430: 1.0, 50_000: 2.5, 1_000_000: 8.0}  # seconds until the surface follows
 DRAWN_SIZES = tuple(_GOALS)
 _HEAD = (
-    "| vertices | drawn s | press ms | followed s | goal | draw ms | gap ms | again ms | error |"
+    "| vertices | drawn s | press ms | followed s | goal | cpu s | draw ms | gap ms | again ms "
+    "| error |"
 )
 _STEP, _MOVES, _TURN = 5.0, 20, 0.01  # pixels per move, moves that are followed, seconds per turn
 _NEAR = 0.02  # between a visible vertex and the surface at its pixel
@@ -93,8 +96,8 @@ def opening_row(size: int) -> str:
     goal = next((f"{s / run.followed:.2g} x" for n, s in _GOALS.items() if n == size), "–")
     return (
         f"| {size} | {run.drawn:.2f} | {1e3 * run.press:.0f} | {run.followed:.2f} | {goal} "
-        f"| {1e3 * median(run.draws):.0f} | {1e3 * run.gap:.0f} | {1e3 * run.again:.0f} "
-        f"| {run.error:.1e} |"
+        f"| {run.cpu:.2f} | {1e3 * median(run.draws):.0f} | {1e3 * run.gap:.0f} "
+        f"| {1e3 * run.again:.0f} | {run.error:.1e} |"
     )
 
 
@@ -105,6 +108,7 @@ class _Run:
     drawn: float = np.nan
     press: float = np.nan
     followed: float = np.nan
+    cpu: float = np.nan
     gap: float = 0.0
     again: float = np.nan
     error: float = 0.0
@@ -126,7 +130,7 @@ class _Run:
 
     def _measure(self, editor: DeformEditor, path: Path) -> None:
         view, first, rng = editor.view, editor.session, np.random.default_rng(3)
-        began = time.perf_counter()
+        began, cpu = time.perf_counter(), time.process_time()
         place: FloatArray | None = None
         at = np.zeros(2)
 
@@ -139,7 +143,7 @@ class _Run:
             if session.is_dragging:
                 self.error = max(self.error, abs(session.volume_change))
                 if np.isnan(self.followed) and _follows(editor, at):
-                    self.followed = now
+                    self.followed, self.cpu = now, time.process_time() - cpu
 
         drawing: list[float] = []
         tags = [

@@ -16,6 +16,7 @@ in orientation.  At its vertices the normals of the faces that are `turned` coun
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -80,6 +81,19 @@ class VertexNormals:
             return out
         out[:] = self._summed(x, self._faces, self._around)
         return out
+
+    def subset(self, vertices: IntArray) -> Callable[[FloatArray], FloatArray]:
+        """Return a function of a pose (n, 3) for the normals (k, 3) of these *vertices* (k,)."""
+        row = np.full(self._n, -1)
+        row[vertices] = np.arange(len(vertices))
+        faces = np.flatnonzero((row[self._faces] >= 0).any(axis=1))
+        corners = 3 * np.repeat(faces, 3) + np.tile(np.arange(3), len(faces))
+        signs = np.where(np.isin(corners, self.turned), -1.0, 1.0)
+        rows, columns = row[self._faces.ravel()[corners]], np.repeat(np.arange(len(faces)), 3)
+        kept = rows >= 0
+        entries = signs[kept], (rows[kept], columns[kept])
+        around = sparse.coo_array(entries, shape=(len(vertices), len(faces))).tocsr()
+        return lambda x: self._summed(x, self._faces[faces], around)
 
     def _summed(self, x: FloatArray, faces: IntArray, around: sparse.csr_array) -> FloatArray:
         """Return the unit sums of the normals of *faces*, as *around* has them at vertices."""

@@ -7,7 +7,7 @@ The number of steps per event follows from the measured time of the last steps. 
 its step limit, a timer refines the pose until it has converged or makes no more progress.  A replay
 uses the recorded numbers of steps; see `StepBudget`.
 
-While targets move, pictures are drawn without anti-aliasing.
+While targets move, pictures are drafts; see `Draft`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,6 @@ _REFINE_TIME = 0.080  # seconds per refinement, when no event is pending
 _MOST_STEPS = 8  # per event: following the pointer matters more than converging
 _LEAST_STEPS = 3  # per event: fewer often stop between two poses that may be shown
 _LEAST_REFINE_STEPS = 3  # with fewer per call, Anderson acceleration has no effect
-_REST = 0.2  # seconds without a move, after which pictures are drawn in full quality
 _PERIOD = 40  # milliseconds between two refinements
 
 
@@ -56,7 +55,7 @@ class LiveSolve:
         self._seconds: deque[float] = deque(maxlen=5)  # per step; their median is used
         self._stop: Stop | None = None
         self._budget = StepBudget(view.interactor)
-        self._draft, self._moved_at = Draft(view), 0.0
+        self._draft = Draft(view)
 
     @property
     def steps(self) -> int:
@@ -74,7 +73,6 @@ class LiveSolve:
             self._session.bind()  # beforehand, so that it is not measured as part of a step
         self._draft.begin()
         self._measure(solve, self.steps)
-        self._moved_at = time.perf_counter()
         self.resume()
 
     def resume(self) -> None:
@@ -85,16 +83,14 @@ class LiveSolve:
         solution = self._session.solution
         is_final = solution is None or solution.status is not Status.STEP_LIMIT
         if is_final or not self.is_enabled or not self._session.is_bound:
-            self.pause()
+            self._stop_refining()
         elif self._stop is None:
             self._stop = self._view.every(_PERIOD, self._tick)
 
     def pause(self) -> None:
         """Stop refining until `resume`, and draw in full quality."""
         self._draft.end()
-        if self._stop is not None:
-            self._stop()
-            self._stop = None
+        self._stop_refining()
 
     def remove(self) -> None:
         """Stop permanently."""
@@ -105,8 +101,6 @@ class LiveSolve:
         self.resume()  # the pose may have changed since the last tick
         if self._stop is None:
             return
-        if time.perf_counter() - self._moved_at > _REST:
-            self._draft.end()
         is_done = False
         try:
             steps = self._steps_in(_REFINE_TIME, _LEAST_REFINE_STEPS)
@@ -117,6 +111,11 @@ class LiveSolve:
                 self.pause()
                 self._failed()
         self.resume()
+
+    def _stop_refining(self) -> None:
+        if self._stop is not None:
+            self._stop()
+            self._stop = None
 
     def _steps_in(self, seconds: float, fewest: int) -> int:
         if not self._seconds:

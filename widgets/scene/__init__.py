@@ -13,7 +13,8 @@ The files, in reading order:
     navigation         the camera by mouse
     orientation_cube   a cube that shows the directions of the model
     foreground         a renderer that draws over another one
-    draft              drawing without anti-aliasing while something moves
+    draft              drawing fast while something moves
+    decimated_surface  a large mesh in motion, by fewer vertices
     labels             rectangles and text in display coordinates
     wireframe          edges and vertices of a mesh
     highlights         loops and vertices of a mesh, marked

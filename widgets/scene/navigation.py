@@ -27,6 +27,7 @@ import numpy as np
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.checks import as_switch
 
+from .draft import Draft
 from .gestures import Phase, Pointer
 from .view import Stop, View
 from .viewpoint import Viewpoint
@@ -74,6 +75,7 @@ class Navigation:
         self._button = ""
         self._last = np.zeros(2)
         self._click: tuple[float, Pointer, object] | None = None  # the last press
+        self._draft = Draft(view)
         self._withheld: list[tuple[Any, int]] = []  # observers of styles, for one event
 
     @property
@@ -105,6 +107,7 @@ class Navigation:
         self.viewpoint.finish()
         self._move = self._click = None
         self._end_withholding()
+        self._draft.end()
         for stop in self._stops:
             stop()
         self._stops = []
@@ -164,6 +167,7 @@ class Navigation:
             dx, dy = place - self._last
             self._last = place
             if dx or dy:
+                self._draft.begin()
                 self._move(float(dx), float(dy))
         return False
 
@@ -186,6 +190,7 @@ class Navigation:
         self.viewpoint.finish()
         point = self._point_at(pointer)
         pivot = self.viewpoint.pivot_at(pointer) if point is None else point
+        self._draft.begin()
         self.viewpoint.zoom(_WHEEL**clicks, pivot)
         return False
 

@@ -7,6 +7,9 @@ wireframe.
 A surface with one side has a seam, where neighbouring faces differ in orientation and light needs
 opposite normals.  The vertices there are drawn twice: the second ones, with opposite normals, are
 the corners that `VertexNormals.turned` lists.
+
+While something moves, a mesh that takes longer to draw than smooth motion allows is drawn
+decimated; its positions still follow, its normals are computed when it has come to rest.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
+from vtk_segdeform import sizes
 from vtk_segdeform.arrays import plain
 from vtk_segdeform.checks import as_flag, require
 from vtk_segdeform.errors import ArgumentError
@@ -28,6 +32,8 @@ from vtk_segdeform.io import polydata_of
 from vtk_segdeform.pictures import BODY, INK, rgb
 from vtk_segdeform.session import Change, Session
 
+from .decimated_surface import DecimatedSurface, Decimating
+from .draft import SLOW, observe_drafts
 from .view import View
 
 
@@ -87,7 +93,13 @@ class SurfaceDisplay:
         surface.SetEdgeColor(*(rgb(INK) / 255.0))
         surface.SetEdgeOpacity(0.4)
         self.view.renderer.AddActor(self.actor)
-        self._stop = session.on_change(self._changed)
+        self._decimating = Decimating(mesh)
+        self._decimated: DecimatedSurface | None = None
+        self._is_draft = False
+        self._stops = [
+            session.on_change(self._changed),
+            observe_drafts(self.view.renderer, self._set_draft),
+        ]
 
     @property
     def points(self) -> NDArray[np.float64]:
@@ -138,6 +150,8 @@ class SurfaceDisplay:
             array = numpy_to_vtk(np.ascontiguousarray(colours_drawn, dtype=np.uint8), deep=True)
             array.SetName("colours")
             self.polydata.GetPointData().SetScalars(array)
+        if self._decimated is not None:
+            self._decimated.set_colours(top)
         self.view.request_render()
 
     def update(self) -> None:
@@ -147,7 +161,10 @@ class SurfaceDisplay:
         self._drawn[len(self._points) :] = self._points[self._twice]
         self.polydata.GetPoints().GetData().Modified()
         self.polydata.GetPoints().Modified()
-        self.update_normals()
+        if self._is_draft and self._decimated is not None:
+            self._decimated.update(self._points)
+        else:
+            self.update_normals()
         self.view.request_render()
 
     def update_normals(self) -> None:
@@ -159,8 +176,39 @@ class SurfaceDisplay:
 
     def remove(self) -> None:
         """Remove the mesh from the view permanently."""
-        self._stop()
+        for stop in self._stops:
+            stop()
         self.view.renderer.RemoveActor(self.actor)
+        if self._decimated is not None:
+            self.view.renderer.RemoveActor(self._decimated.actor)
+
+    def _set_draft(self, begins: bool) -> None:
+        """Draw the mesh decimated if it is large and slow to draw, or completely again."""
+        if begins == self._is_draft:
+            return
+        if not begins:
+            self._is_draft = False
+            assert self._decimated is not None
+            self._decimated.actor.VisibilityOff()
+            self.actor.VisibilityOn()
+            self.update_normals()
+            self.view.request_render()
+            return
+        is_plain = self._style is SurfaceStyle.SHADED and bool(self.actor.GetVisibility())
+        seconds = self.view.renderer.GetLastRenderTimeInSeconds()
+        if self.session.mesh.n_vertices <= sizes.DRAFT or seconds <= SLOW or not is_plain:
+            return
+        if self._decimated is None:
+            surface = self.actor.GetProperty()
+            self._decimated = self._decimating.result(self._vertex_normals, surface)
+            if self._decimated is None:
+                return
+            self.view.renderer.AddActor(self._decimated.actor)
+            self._decimated.set_colours(next(reversed(self._layers.values()), None))
+        self._is_draft = True
+        self._decimated.update(self._points)
+        self._decimated.actor.VisibilityOn()
+        self.actor.VisibilityOff()
 
     def _checked(self, colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
         array = plain(colours, "colours")

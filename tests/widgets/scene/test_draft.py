@@ -1,0 +1,87 @@
+"""Drafts: a large mesh that moves is drawn decimated, and in full when it has come to rest."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from hands import picture, plain_view
+from vtkmodules.util.numpy_support import vtk_to_numpy
+
+from vtk_segdeform import Session, models, sizes
+from vtk_segdeform.geometry import VertexNormals, decimated
+from vtk_segdeform.widgets.scene import Draft, draft, surface_display
+from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
+
+
+@pytest.fixture
+def shown(monkeypatch):
+    """Return a display whose mesh counts as large and slow to draw."""
+    monkeypatch.setattr(sizes, "DRAFT", 0)
+    monkeypatch.setattr(sizes, "DECIMATED_POINTS", 400)
+    monkeypatch.setattr(surface_display, "SLOW", -1.0)
+    view = plain_view()
+    surface = SurfaceDisplay(view, Session(models.sphere(4000)))
+    decimated(surface.session.mesh, 400)  # as binding does; otherwise another thread does it
+    view.renderer.ResetCamera()
+    view.render()
+    return surface
+
+
+def test_a_moving_mesh_is_drawn_by_few_of_its_vertices_and_then_in_full_again(shown, monkeypatch):
+    view, session, mesh = shown.view, shown.session, shown.session.mesh
+    shades = np.full((mesh.n_vertices, 3), 90, dtype=np.uint8)
+    shown.set_colours("grey", shades)
+    at_rest = picture(view)
+    drafts = Draft(view)
+    drafts.begin()
+    view.render()
+    few = shown._decimated
+    assert not shown.actor.GetVisibility()
+    assert few.actor.GetVisibility()
+    assert few._polydata.GetNumberOfPoints() < 800
+    assert np.abs(picture(view).astype(float) - at_rest).mean() < 1.0  # of 255
+
+    pose = mesh.vertices * [1.0, 0.5, 1.0]
+    monkeypatch.setattr(type(session), "vertices", property(lambda _: pose))
+    shown.update()
+    assert np.array_equal(shown.points, pose)  # for picking
+    assert np.array_equal(few._points, pose[few._kept])
+    normals = VertexNormals(mesh).of(pose)
+    np.testing.assert_allclose(few._normals, normals[few._kept], atol=1e-5)
+    shown.set_colours("grey", shades // 2)
+    assert vtk_to_numpy(few._polydata.GetPointData().GetScalars()).max() == 45
+
+    drafts.end()
+    assert shown.actor.GetVisibility()
+    assert not few.actor.GetVisibility()
+    drawn = vtk_to_numpy(shown.polydata.GetPointData().GetNormals())
+    np.testing.assert_array_equal(drawn[: mesh.n_vertices], normals)
+
+
+def test_drafts_end_once_nothing_has_moved_for_a_while(shown, monkeypatch):
+    drafts = Draft(shown.view)
+    drafts.begin()
+    shown.view.interactor.InvokeEvent("TimerEvent")
+    assert not shown.actor.GetVisibility()
+    later = time.perf_counter() + 1.0
+    monkeypatch.setattr(draft.time, "perf_counter", lambda: later)
+    shown.view.interactor.InvokeEvent("TimerEvent")
+    assert shown.actor.GetVisibility()
+
+
+@pytest.mark.parametrize("why", ["small", "fast", "hidden", "edges"])
+def test_other_meshes_are_drawn_as_always(shown, monkeypatch, why):
+    if why == "small":
+        monkeypatch.setattr(sizes, "DRAFT", 4001)
+    elif why == "fast":
+        monkeypatch.setattr(surface_display, "SLOW", 100.0)
+    elif why == "hidden":
+        shown.actor.VisibilityOff()
+    else:
+        shown.style = surface_display.SurfaceStyle.EDGES
+    before = shown.actor.GetVisibility()
+    Draft(shown.view).begin()
+    assert shown.actor.GetVisibility() == before
+    assert shown._decimated is None
