@@ -15,7 +15,7 @@ from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.pictures import INK, rgb
 
 from ..picking import contour
-from ..scene import SurfaceDisplay
+from ..scene import Draft, SurfaceDisplay
 
 _DESIGN_HEIGHT = 600  # pixels; lines are wider in a higher window
 _RIM_WIDTH, _LINE_WIDTH = 5.5, 2.5  # pixels
@@ -37,6 +37,7 @@ class BrushRing:
     def __init__(self, surface: SurfaceDisplay) -> None:
         self._surface = surface
         self._ring = vtkPolyData()
+        self._draft = Draft(surface.view)
         self._actors = [self._actor(offset) for offset in _UNIT_OFFSETS]
 
     def draw(self, distance: FloatArray, radius: float, colour: NDArray[np.uint8]) -> None:
@@ -84,12 +85,14 @@ class BrushRing:
 
     def remove(self) -> None:
         """Remove the ring from the view permanently."""
+        self._draft.end()
         for actor in self._actors:
             self._surface.view.renderer.RemoveActor(actor)
 
     def _show(self, visible: bool) -> None:
         for actor in self._actors:
             actor.SetVisibility(visible)
+        self._draft.begin(if_slow=True)
         self._surface.view.request_render()
 
     def _actor(self, offset: float) -> Any:
