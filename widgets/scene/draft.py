@@ -2,7 +2,7 @@
 
 In software, multi-sampling takes half the time of a picture or more, and a mesh of a million
 vertices half a second without it; in motion nobody sees the difference.  `Draft.begin` turns off
-the anti-aliasing of a view, and announces the motion over its renderer: a `SurfaceDisplay` then
+the anti-aliasing of a view, and announces the motion over its interactor: a `SurfaceDisplay` then
 draws a large mesh decimated.
 """
 
@@ -24,15 +24,17 @@ _REST = 0.2  # seconds without a move, after which pictures are drawn in full qu
 _PERIOD = 50  # milliseconds between two looks at the time
 
 
-def observe_drafts(renderer: Any, callback: Callable[[bool], None]) -> Stop:
+def observe_drafts(interactor: Any, callback: Callable[[bool], None]) -> Stop:
     """Call ``callback(True)`` when pictures become drafts, ``callback(False)`` when they end."""
 
     def called(_: Any, __: str, begins: int) -> None:
         callback(bool(begins))
 
     called.CallDataType = VTK_INT  # type: ignore[attr-defined]
-    tag = renderer.AddObserver(_ANNOUNCED, called)
-    return lambda: renderer.RemoveObserver(tag)
+    tag = interactor.AddObserver(_ANNOUNCED, called)
+    # During a camera drag the style withholds all events except from passive observers.
+    interactor.GetCommand(tag).SetPassiveObserver(True)
+    return lambda: interactor.RemoveObserver(tag)
 
 
 class Draft:
@@ -61,7 +63,9 @@ class Draft:
             return
         if self._stop is None and if_slow and renderer.GetLastRenderTimeInSeconds() <= SLOW:
             return
-        renderer.InvokeEvent(_ANNOUNCED, 1)  # again at each move: what was not ready may be now
+        self._view.interactor.InvokeEvent(
+            _ANNOUNCED, 1
+        )  # again at each move: what was not ready may be now
         if self._stop is not None:
             return
         if samples := window.GetMultiSamples():
@@ -87,7 +91,7 @@ class Draft:
             restore = self._restore.pop()
             if is_open:
                 restore()
-        self._view.renderer.InvokeEvent(_ANNOUNCED, 0)
+        self._view.interactor.InvokeEvent(_ANNOUNCED, 0)
         if changes:
             self._view.request_render()
 

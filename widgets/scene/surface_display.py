@@ -98,7 +98,7 @@ class SurfaceDisplay:
         self._is_draft = False
         self._stops = [
             session.on_change(self._changed),
-            observe_drafts(self.view.renderer, self._set_draft),
+            observe_drafts(self.view.interactor, self._set_draft),
         ]
 
     @property
