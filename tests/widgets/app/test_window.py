@@ -377,9 +377,12 @@ def test_the_view_menu_shows_hides_and_ticks(start, arm_file):
     plotter = hand.window.editor_widget.plotter
     plotter.camera.zoom(5.0)
     hand.choose("View", "Fit to view")
-    places = hand.window.editor.view.to_display(hand.window.session.vertices)[:, :2]
-    assert (places > 0).all()
-    assert (places < plotter.window_size).all()
+
+    def is_framed():
+        places = hand.window.editor.view.to_display(hand.window.session.vertices)[:, :2]
+        return (places > 0).all() and (places < plotter.window_size).all()
+
+    until(is_framed, "the mesh in the view")
 
 
 def test_about_names_the_program(start, boxes):
