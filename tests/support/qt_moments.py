@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from key_moments import Stand, aim, plain_stand, ready
+from key_moments import Stand, aim, ready
 from qt_hands import QtCore, QtHand, application, until
 
 from vtk_segdeform.widgets.qt.widget import DeformWidget
@@ -27,12 +27,6 @@ class QtStand(Stand):
             view.render = lambda: None
         hand = QtHand(self.widget.plotter.interactor, self.widget.editor.view)
         super().__init__(self.widget.editor, hand, folder)
-        (folder / "plain").mkdir()
-        self._plain = plain_stand(folder / "plain")
-
-    def long_after(self, mode, *keys):
-        """Return the story of keys after a drag in a plain host, which is faster."""
-        return self._plain.long_after(mode, *keys) if keys else super().long_after(mode)
 
     def loop(self):
         application().processEvents()
@@ -59,7 +53,6 @@ class QtStand(Stand):
         assert panel.toolbar.undo.isEnabled() is self.session.can_undo
 
     def close(self):
-        self._plain.close()
         self.widget.close()
         assert not self.has_timers()
         self.widget.deleteLater()

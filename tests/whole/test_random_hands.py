@@ -13,7 +13,7 @@ from monkey import Monkey
 @pytest.mark.parametrize(
     ("seed", "count"),
     [
-        (1, 300),
+        (1, 150),
         pytest.param(9, 300, marks=pytest.mark.campaign),
         pytest.param(3, 10_000, marks=pytest.mark.campaign),
     ],

@@ -760,6 +760,7 @@ def test_in_a_dark_palette_the_panel_is_dark_and_its_text_is_light(seen, tmp_pat
         application().setPalette(before)
 
 
+@pytest.mark.campaign
 def test_it_works_where_pixels_are_smaller_than_points():
     application()  # or skip
     done = subprocess.run(
