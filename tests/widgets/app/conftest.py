@@ -8,8 +8,6 @@ from collections.abc import Iterator
 import pytest
 import pyvista as pv
 
-from vtk_segdeform.widgets.editor import preparing
-
 
 @pytest.fixture(scope="module", autouse=True)
 def in_haste() -> Iterator[None]:
@@ -23,9 +21,3 @@ def in_haste() -> Iterator[None]:
     gc.enable()
     gc.unfreeze()
     pv.global_theme.anti_aliasing = smooth
-
-
-@pytest.fixture
-def unprepared(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Do not prepare sessions for pulls in the background: for tests of the other modes."""
-    monkeypatch.setattr(preparing, "lacking", lambda _: None)

@@ -30,6 +30,8 @@ from vtk_segdeform.widgets.scene.surface_display import SurfaceStyle
 from vtk_segdeform.widgets.scene.view import View
 from vtk_segdeform.widgets.volume_overlay.volume_overlay import VolumeOverlay
 
+pytestmark = pytest.mark.usefixtures("unprepared")
+
 ROOT = Path(__file__).resolve().parents[3]
 
 
@@ -73,7 +75,7 @@ class Bench:
         return [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
 
 
-@pytest.fixture(params=["plain", "pyvista"])
+@pytest.fixture(params=["plain", pytest.param("pyvista", marks=pytest.mark.campaign)])
 def any_view(request):
     """Yield a view with pyvista, and one without."""
     if request.param == "plain":

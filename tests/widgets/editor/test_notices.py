@@ -15,6 +15,8 @@ from vtk_segdeform.widgets import DeformEditor
 from vtk_segdeform.widgets.editor import notices_of
 from vtk_segdeform.widgets.scene.highlights import DOT, LOOP
 
+pytestmark = pytest.mark.usefixtures("unprepared")
+
 LOOP_RGB, DOT_RGB = (np.array(list(bytes.fromhex(c[1:])), int) for c in (LOOP, DOT))
 
 

@@ -14,6 +14,8 @@ from vtk_segdeform import Regions, Session, Surface
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.widgets import DeformEditor, Mode, Paint, Tool
 
+pytestmark = pytest.mark.usefixtures("unprepared")
+
 
 def finned():
     """Return a ball of more than 1000 vertices with a fin: an edge with three faces."""

@@ -16,6 +16,8 @@ from vtk_segdeform.widgets.editor.editor import Mode
 from vtk_segdeform.widgets.recording.recording import replay
 from vtk_segdeform.widgets.region_selector.region_selector import Tool
 
+pytestmark = pytest.mark.usefixtures("unprepared")
+
 
 def test_the_input_is_recorded_and_replayed_from_two_files(bench, tmp_path):  # noqa: F811
     bench.editor.path = tmp_path / "work.segdeform"

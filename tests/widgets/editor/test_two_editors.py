@@ -11,6 +11,8 @@ from vtkmodules.vtkRenderingCore import vtkRenderer
 from vtk_segdeform.widgets import DeformEditor, Mode
 from vtk_segdeform.widgets.scene.view import View
 
+pytestmark = pytest.mark.usefixtures("unprepared")
+
 LEFT, RIGHT = (200, 200), (600, 200)
 
 

@@ -1,4 +1,4 @@
-"""Settings for the tests of the editor in Qt."""
+"""Settings for the tests of the widgets."""
 
 from __future__ import annotations
 
