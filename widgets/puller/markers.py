@@ -28,7 +28,7 @@ _DESIGN_HEIGHT = 600  # pixels; dots are larger in a higher window
 
 
 class Markers:
-    """The handles of one vertex, and those that pulls left behind; hidden until `show`.
+    """Markers of pins and of pulled points; hidden until `show`.
 
     Parameters
     ----------
