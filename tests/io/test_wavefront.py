@@ -215,3 +215,38 @@ def test_text_in_utf_16_is_named_and_what_to_save_it_as(tmp_path, encoding, name
         read_polydata(tmp_path / name)
     (tmp_path / name).write_text(TETRA if name == "a.obj" else off, encoding="utf-8-sig")
     assert read_polydata(tmp_path / name).n_points == 4
+
+
+FORMS = ("{0}", "{0}/{1}", "{0}//{2}", "{0}/{1}/{2}", "-{0}", "-{0}//-{2}")
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_lines_parsed_at_once_are_those_parsed_one_by_one(tmp_path, form):
+    rng = np.random.default_rng(4)
+    v, vt, vn = rng.normal(size=(9, 6)), rng.normal(size=(5, 2)), rng.normal(size=(7, 3))
+    rows = [(word, row) for word, rows in (("v", v), ("vn", vn), ("vt", vt)) for row in rows]
+    lines = [f"{word} {' '.join(map(repr, row.tolist()))}" for word, row in rows]
+    for size in (3, 5, 4):
+        ends = rng.permutation(9)[:size], rng.integers(5, size=size), rng.integers(7, size=size)
+        corners = zip(*(end + 1 for end in ends), strict=True)
+        lines.append("f " + " ".join(form.format(*corner) for corner in corners))
+    (tmp_path / "a.obj").write_text("\n".join(lines))
+    once = read_polydata(tmp_path / "a.obj")
+    (tmp_path / "a.obj").write_text("\n".join(f"  {line}\t# comment" for line in lines))
+    slowly = read_polydata(tmp_path / "a.obj")
+    assert np.abs(once.points - v[:, :3]).max() == 0.0
+    assert once == slowly
+    assert once.n_cells == 3
+
+
+@pytest.mark.parametrize("line", ["f 1-2 3 4", "f 1-2/ 3/4 1/1", "f 1+2/ 1/1 1/1", "f 1/2 3 4/1/"])
+def test_words_that_are_several_numbers_are_no_indices(tmp_path, line):
+    (tmp_path / "a.obj").write_text(f"vt 0 0\n{TETRA}".replace("f 1 3 2", line))
+    with pytest.raises(MeshError, match="a face refers to"):
+        read_polydata(tmp_path / "a.obj")
+
+
+def test_a_plane_is_no_surface_in_space(tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0\nv 1 0\nv 0 1\nf 1 2 3")
+    with pytest.raises(MeshError, match="vertex 1 is '0 0'; must be 3 numbers"):
+        read_polydata(tmp_path / "a.obj")

@@ -31,6 +31,7 @@ from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
 from .array_names import get_names, plain_names, set_names, text_of, warn_left_out, warn_renamed
 from .moving import CORNER_NORMALS
+from .number_lines import Lines, numbers_of, table_of, words_per_line
 from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of
 
 _CORNER_TEXTURE = "TextureCorners"
@@ -38,6 +39,7 @@ _OF_CORNERS = {
     "texture coordinate": ("TextureCoordinates", _CORNER_TEXTURE),
     "normal": ("Normals", CORNER_NORMALS),
 }
+_WORDS = ("v", "vt", "vn", "f")
 _NAMED = {"o": "Object", "g": "Group", "usemtl": "Material"}
 _SMOOTHING, _LIBRARY = "Smoothing", "MaterialLibrary"
 _MOST = 2**62  # an index
@@ -47,69 +49,61 @@ _Runs: TypeAlias = dict[str, list[tuple[tuple[int, int, int], str]]]
 
 def read_obj(path: Path) -> pv.PolyData:
     """Read the polygons of an OBJ file."""
-    points: list[list[str]] = []
-    textures: list[list[str]] = []
-    normals: list[list[str]] = []
-    counts: list[int] = []
-    corners: list[int] = []
-    texture_of: list[int] = []
-    normal_of: list[int] = []
-    others: dict[str, list[list[int]]] = {"p": [], "l": []}
+    text = text_of(path.read_bytes())
+    if "\r" in text:
+        text = text.replace("\r\n", "\n").replace("\r", "\n")
+    if "\\" in text:
+        text = text.replace("\\\n", " ")
+    lines = Lines(text, _WORDS)
+    statements = [(number, *_statement(line)) for number, line in lines.others()]
+    if any(word in _WORDS for _, word, _ in statements):  # with other blanks before or after it
+        lines = Lines("\n".join(" ".join(_statement(line)) for line in text.split("\n")), _WORDS)
+        statements = [(number, *_statement(line)) for number, line in lines.others()]
+    above = np.stack([lines.above(word) for word in _WORDS], axis=1)
+    cells: dict[str, list[list[int]]] = {"p": [], "l": []}
     runs: _Runs = {word: [] for word in (*_NAMED, "s")}
     libraries = []
-    text = text_of(path.read_bytes()).replace("\r\n", "\n").replace("\r", "\n")
-    for line in text.replace("\\\n", " ").split("\n"):
-        word, rest = (*line.split(None, 1), "", "")[:2]
-        if word == "v":
-            points.append(_words(rest))
-        elif word == "vt":
-            textures.append((_words(rest) + ["0", "0"])[:2])
-        elif word == "f":
-            face = _words(rest)
-            counts.append(len(face))
-            for corner in face:
-                vertex, _, more = corner.partition("/")
-                texture, _, normal = more.partition("/")
-                corners.append(_number(vertex, len(points)))
-                texture_of.append(_number(texture, len(textures)) if texture else -1)
-                normal_of.append(_number(normal, len(normals)) if normal else -1)
-        elif word == "vn":
-            normals.append(_words(rest))
-        elif word in others:
+    for number, word, rest in statements:
+        n_points, *_, n_faces = above[number].tolist()
+        if word in cells:
             ends = [each.partition("/")[0] for each in _words(rest)]
             if len(ends) > (word == "l"):
-                others[word].append([_number(each, len(points)) for each in ends])
+                cells[word].append([_number(each, n_points) for each in ends])
         elif word in runs:
-            begun = len(others["p"]), len(others["l"]), len(counts)
+            begun = len(cells["p"]), len(cells["l"]), n_faces
             runs[word].append((begun, rest.strip()))
         elif word == "mtllib":
             libraries.append(rest.strip())
-    most = max(map(max, (corners or [0], *others["p"], *others["l"])))
-    if most >= len(points) and (corners or others["p"] or others["l"]):
+    counts, indices = _faces(lines.of("f"), above[lines.at("f"), :3])
+    table = _table("vertex", lines.of("v"), "v", (3, 4, 6, 7))
+    corners = np.ascontiguousarray(indices[:, 0])
+    most = max([corners.max(initial=-1), *map(max, (*cells["p"], *cells["l"]))])
+    if most >= len(table):
         raise MeshError(
-            f"a face refers to vertex {most + 1} of {len(points)}; the file is truncated "
+            f"a face refers to vertex {most + 1} of {len(table)}; the file is truncated "
             "or damaged, export it again"
         )
-    table = _table("vertex", points, (3, 4, 6, 7))
-    surface = polydata_of(
-        table[:, :3], np.array(counts, dtype=np.int64), np.array(corners, dtype=np.int64)
-    )
+    surface = polydata_of(table[:, :3], counts, corners)
     if table.shape[1] >= 6:
         colour = np.nan_to_num(table[:, 3:6]).clip(0.0, 1.0)
         surface.point_data["RGB"] = np.round(255.0 * colour).astype(np.uint8)
-    for name, cells in (("verts", others["p"]), ("lines", others["l"])):
-        if cells:
-            setattr(surface, name, [n for each in cells for n in (len(each), *each)])
-    widths = {"texture coordinate": 2, "normal": 3}
-    for (what, width), listed, of_corner in zip(
-        widths.items(), (textures, normals), (texture_of, normal_of), strict=True
-    ):
-        values = _table(what, listed, (width,))
-        _keep_corners(surface, what, values, np.array(of_corner, dtype=np.int64))
+    for name, rows in (("verts", cells["p"]), ("lines", cells["l"])):
+        if rows:
+            setattr(surface, name, [n for row in rows for n in (len(row), *row)])
+    texture = _table("texture coordinate", lines.of("vt"), "vt", (2, 3))[:, :2]
+    _keep_corners(surface, "texture coordinate", texture, indices[:, 1])
+    normals = _table("normal", lines.of("vn"), "vn", (3,))
+    _keep_corners(surface, "normal", normals, indices[:, 2])
     _keep_runs(surface, runs)
     if libraries:
         set_names(surface, _LIBRARY, libraries)
     return surface
+
+
+def _statement(line: str) -> tuple[str, str]:
+    """Return the first word of a line, and the rest."""
+    parts = line.split(None, 1)
+    return (*parts, "", "")[0], (*parts, "", "")[1]
 
 
 def _words(rest: str) -> list[str]:
@@ -129,16 +123,84 @@ def _number(word: str, count: int) -> int:
     return number - 1 if number > 0 else count + number
 
 
-def _table(what: str, lines: list[list[str]], widths: tuple[int, ...]) -> FloatArray:
+def _faces(lines: bytes, above: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the number of corners (m,) of the faces, and the indices (c, 3); -1 for none.
+
+    *above* (m, 3) are the numbers of vertices, texture coordinates and normals above each line.
+    """
+    plain = _plain_faces(lines, above)
+    if plain is not None:
+        return plain
+    counts, indices = [], []
+    for line, sizes in zip(lines.decode().split("\n"), above.tolist(), strict=False):
+        words = _words(line)[1:]
+        counts.append(len(words))
+        for word in words:
+            parts = (*word.split("/", 2), "", "")[:3]
+            vertex = _number(parts[0], sizes[0])
+            others = zip(parts[1:], sizes[1:], strict=True)
+            indices.append((vertex, *(_number(part, n) if part else -1 for part, n in others)))
+    return np.array(counts, dtype=np.int64), np.array(indices, dtype=np.int64).reshape(-1, 3)
+
+
+def _plain_faces(lines: bytes, above: IntArray) -> tuple[IntArray, IntArray] | None:
+    """Return `_faces` if all corners are valid, and alike: a, a/t, a//n or a/t/n."""
+    begins, n_words = words_per_line(lines)
+    counts = n_words - 1
+    n_corners = int(counts.sum())
+    data = np.frombuffer(lines, dtype=np.uint8)
+    slashes = np.flatnonzero(data == ord("/"))
+    per_word = np.diff(np.searchsorted(slashes, np.append(begins, len(data))))
+    per_corner = np.delete(per_word, np.cumsum(n_words) - n_words)
+    minus = np.flatnonzero(data == ord("-"))
+    before = data[minus - 1]
+    if b"+" in lines or ((before > ord(" ")) & (before != ord("/"))).any():  # "1-2" is a number
+        return None
+    n_slashes = int(per_corner[0]) if n_corners else 0
+    columns = ([0], [0, 1], [0, 1, 2])[min(n_slashes, 2)]
+    if n_slashes > 2 or (per_corner != n_slashes).any():
+        return None
+    if n_slashes == 2 and (doubled := lines.count(b"//")):
+        if doubled != n_corners:
+            return None
+        columns = [0, 2]
+    text = lines.replace(b"f", b" ").replace(b"/", b" ")
+    numbers = numbers_of(text, np.int64, n_corners * len(columns))
+    if numbers is None:
+        return None
+    table = numbers.reshape(n_corners, len(columns))
+    if (table == 0).any() or (table > _MOST).any():
+        return None
+    indices = np.full((n_corners, 3), -1)
+    indices[:, columns] = table - 1
+    if (table < 0).any():
+        from_end = table + np.repeat(above[:, columns], counts, axis=0)
+        if (from_end < 0).any():
+            return None
+        indices[:, columns] = np.where(table > 0, table - 1, from_end)
+    return counts, indices
+
+
+def _table(what: str, lines: bytes, word: str, widths: tuple[int, ...]) -> FloatArray:
+    """Return the numbers (k, w) of *lines*, as many as the least of *widths* if they differ."""
     if not lines:
-        return np.empty((0, 3))
-    if len({len(row) for row in lines}) > 1 or len(lines[0]) not in widths:
-        lines = [row[: min(widths)] for row in lines]
+        return np.empty((0, min(widths)))
+    table = table_of(lines, word)
+    if table is not None and table.shape[1] in widths:
+        return table
+    rows = [_words(line)[1:] for line in lines.decode().split("\n")[:-1]]
+    if word == "vt":
+        rows = [(row + ["0", "0"])[:2] for row in rows]
+    if len({len(row) for row in rows}) > 1 or len(rows[0]) not in widths:
+        rows = [row[: min(widths)] for row in rows]
     try:
-        return np.array(lines, dtype=float)
+        table = np.array(rows, dtype=float)
+        if table.shape[1] < min(widths):
+            raise ValueError
+        return table
     except ValueError:
-        number = next(k for k, row in enumerate(lines, 1) if not _are_numbers(row, min(widths)))
-        row = " ".join(lines[number - 1])[:60]
+        number = next(k for k, row in enumerate(rows, 1) if not _are_numbers(row, min(widths)))
+        row = " ".join(rows[number - 1])[:60]
         raise MeshError(f"{what} {number} is {row!r}; must be {min(widths)} numbers") from None
 
 
