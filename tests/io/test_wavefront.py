@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import pyvista as pv
@@ -239,11 +241,19 @@ def test_lines_parsed_at_once_are_those_parsed_one_by_one(tmp_path, form):
     assert once.n_cells == 3
 
 
-@pytest.mark.parametrize("line", ["f 1-2 3 4", "f 1-2/ 3/4 1/1", "f 1+2/ 1/1 1/1", "f 1/2 3 4/1/"])
-def test_words_that_are_several_numbers_are_no_indices(tmp_path, line):
-    (tmp_path / "a.obj").write_text(f"vt 0 0\n{TETRA}".replace("f 1 3 2", line))
-    with pytest.raises(MeshError, match="a face refers to"):
+@pytest.mark.parametrize("word", ["1-2/", "1+2/", "1/2-", "1-2"])
+def test_a_word_of_several_numbers_is_no_index(tmp_path, word):
+    text = f"vt 0 0\nvt 1 0\n{TETRA}".replace("f 1 3 2", f"f {word} 3/1 2/1")
+    (tmp_path / "a.obj").write_text(re.sub(r"f (\d) (\d) (\d)", r"f \1/1 \2/1 \3/1", text))
+    with pytest.raises(MeshError, match="a face refers to '[12]"):
         read_polydata(tmp_path / "a.obj")
+
+
+def test_corners_of_one_face_may_be_of_different_forms(tmp_path):
+    (tmp_path / "a.obj").write_text(f"vt 5 6\nvn 0 0 1\n{TETRA[: TETRA.index('f')]}f 1/1 2 3/1/1")
+    surface = read_polydata(tmp_path / "a.obj")
+    assert_array_equal(surface.regular_faces[-1], [0, 1, 2])
+    assert_array_equal(surface.cell_data["TextureCorners"][-1], [5, 6, np.nan, np.nan, 5, 6])
 
 
 def test_a_plane_is_no_surface_in_space(tmp_path):
