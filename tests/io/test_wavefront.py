@@ -245,7 +245,7 @@ def test_lines_parsed_at_once_are_those_parsed_one_by_one(tmp_path, form):
 def test_a_word_of_several_numbers_is_no_index(tmp_path, word):
     text = f"vt 0 0\nvt 1 0\n{TETRA}".replace("f 1 3 2", f"f {word} 3/1 2/1")
     (tmp_path / "a.obj").write_text(re.sub(r"f (\d) (\d) (\d)", r"f \1/1 \2/1 \3/1", text))
-    with pytest.raises(MeshError, match="a face refers to '[12]"):
+    with pytest.raises(MeshError, match=r"a face refers to '[12]"):
         read_polydata(tmp_path / "a.obj")
 
 

@@ -152,10 +152,6 @@ def _plain_faces(lines: bytes, above: IntArray) -> tuple[IntArray, IntArray] | N
     slashes = np.flatnonzero(data == ord("/"))
     per_word = np.diff(np.searchsorted(slashes, np.append(begins, len(data))))
     per_corner = np.delete(per_word, np.cumsum(n_words) - n_words)
-    minus = np.flatnonzero(data == ord("-"))
-    before = data[minus - 1]
-    if b"+" in lines or ((before > ord(" ")) & (before != ord("/"))).any():  # "1-2" is a number
-        return None
     n_slashes = int(per_corner[0]) if n_corners else 0
     columns = ([0], [0, 1], [0, 1, 2])[min(n_slashes, 2)]
     if n_slashes > 2 or (per_corner != n_slashes).any():
