@@ -70,7 +70,7 @@ def numbers_of(text: bytes, dtype: Any, count: int) -> Any:
     """Return the numbers (count,) of *text*; None if it is anything else than so many numbers."""
     try:
         numbers = np.fromstring(text, dtype=dtype, sep=" ")
-    except ValueError:
+    except (ValueError, DeprecationWarning):  # a warning before numpy 2.3
         return None
     return numbers if len(numbers) == count else None
 

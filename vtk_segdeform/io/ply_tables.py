@@ -19,6 +19,7 @@ import numpy as np
 
 from ..errors import MeshError
 from .array_names import decoded
+from .number_lines import numbers_of, words_per_line
 
 TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -72,7 +73,7 @@ def tables_of(data: bytes) -> dict[str, Table]:
     order = _ORDERS[kind]
     stored = elements
     if kind == "ascii":
-        data, start = _doubles(data[start:].split()).tobytes(), 0
+        data, start = _doubles(data[start:]).astype("<f8").tobytes(), 0
         stored = [_as_doubles(element) for element in elements]
     tables: dict[str, Table] = {}
     for element, rows in zip(elements, stored, strict=True):
@@ -125,9 +126,15 @@ def _type(name: str, line: bytes) -> str:
     return TYPES[name]
 
 
-def _doubles(words: list[bytes]) -> Any:
+def _doubles(text: bytes) -> Any:
+    """Return the numbers in *text*; MeshError if anything else is in it."""
+    begins, _ = words_per_line(text)
+    numbers = numbers_of(text, np.float64, len(begins))
+    if numbers is not None:
+        return numbers
+    words = text.split()
     try:
-        return np.array(words, dtype="<f8")
+        return np.array(words, dtype=np.float64)
     except ValueError:
         wrong = next(word for word in words if not _is_number(word))
         raise MeshError(
