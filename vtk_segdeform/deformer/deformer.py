@@ -205,7 +205,8 @@ class Deformer:
         False: only closed ones do.  Without any volume, as `has_volume` tells, nothing is
         preserved and volume changes are 0.
     stretch : float
-        Strength of the stretch term relative to the detail term; 0 is the paper's energy.
+        Strength of the stretch term relative to the detail term; 0 is the paper's energy.  A
+        larger value distorts triangles slightly less, but changes the angles between them more.
     rotation_groups : int or None
         Number of rotation clusters; None gives each vertex its own rotation, as in the paper.
     tolerance, max_steps : float, int

@@ -300,7 +300,9 @@ def _without_outliers(traces: FloatArray, areas: FloatArray) -> float:
     """Return the sum of *traces* (n,), clipped where their density over *areas* (n,) is an outlier.
 
     The sum scales the weights of the method.  Unclipped, it is not robust: a needle's density can
-    be a million times the maximum of a good mesh.
+    be a million times the maximum of a good mesh.  Without this function and `intrinsic`, ten bad
+    triangles among 100,000 of a koala multiplied it by 37, and with it the stretch: poses had up to
+    4 % less distortion, but the change of their dihedral angles was 5 to 23 % larger.
     """
     has_area = areas > 0.0
     traces, areas = traces[has_area], areas[has_area]
