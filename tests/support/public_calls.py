@@ -474,7 +474,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "Surface.vertices_at.points": lambda: [0, 5],
     "Surface.write.path": lambda: Path("written.vtp"),
     "Surface.write.vertices": lambda: given().mesh.vertices,
-    "SurfaceDisplay.shows_rest.value": lambda: True,
+    "SurfaceDisplay.instead.value": lambda: None,
     "SurfaceDisplay.style.value": lambda: SurfaceStyle.EDGES,
     "VolumeOverlay.wanted_range.value": lambda: 0.2,
     "blend_at.points": lambda: mesh().vertices[:4],

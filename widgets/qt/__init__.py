@@ -4,7 +4,7 @@ The files, in reading order:
 
     widget      `DeformWidget` and `deform_dock`
     panel       the panel beside the view
-    toolbar pulling painting regions handles options status log
+    toolbar pulling painting regions handles options status history
                 the parts of the panel
     view_menu   menu entries for the camera
     event_filter    what pyvistaqt does not tell VTK of Qt's events
