@@ -248,7 +248,8 @@ class Session(Timeline):
         None if its cages are no longer bound, so that it could take seconds; `jump` binds them.
         """
         state = self._state_at(position)
-        return self.mesh.vertices if state.pose is None else self._pose_solver.peek(state, state.pose)
+        pose = state.pose
+        return self.mesh.vertices if pose is None else self._pose_solver.peek(state, pose)
 
     def _vertices_of(self, state: State) -> FloatArray:
         pose = state.pose

@@ -21,7 +21,6 @@ from vtk_segdeform.errors import Cancelled, SessionError
 from vtk_segdeform.progress import Progress
 
 from ..scene import Stop, View
-from .messages import error_text
 
 T = TypeVar("T")
 
@@ -235,9 +234,7 @@ class Worker:
         name = f"Busy. {self._name}" if self._has_refused else self._name
         return ": ".join(filter(None, (name, step)))
 
-    def start(
-        self, name: str, work: Callable[[Progress], T], done: Callable[[T], object]
-    ) -> None:
+    def start(self, name: str, work: Callable[[Progress], T], done: Callable[[T], object]) -> None:
         """Run *work* in another thread, then call *done* in this one with its result.
 
         Parameters

@@ -91,7 +91,7 @@ class HistoryPart(QtWidgets.QWidget):
 
     @property
     def _row_height(self) -> int:
-        return round(1.4 * self.fontMetrics().height())
+        return int(1.4 * self.fontMetrics().height())
 
     def _show(self, names: tuple[str, ...], position: int) -> None:
         """Show the states with their *names*, the one at *position* as the current one."""

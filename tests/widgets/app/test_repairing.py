@@ -183,6 +183,8 @@ def test_undo_returns_from_a_repaired_copy_to_the_original_with_its_edits(hand, 
     original.set_fixed([0, 1, 2])
     boxes.answers.append("Discard")
     repair(hand, lambda dialog: click(dialog.accepting))
+    rows = hand.window.editor_widget.panel.history.list
+    assert [rows.item(row).text() for row in range(rows.count())] == ["Opened", "Repair"]
     hand.choose("Edit", "Undo repair")
     until(lambda: hand.window.has_mesh and hand.window.session is original, "the original")
     hand.settle()

@@ -418,8 +418,8 @@ def test_the_history_previews_under_the_pointer_and_jumps_at_a_click_or_enter(se
         return rows.visualItemRect(rows.item(row)).center()
 
     def hover(row):
-        QtTest.QTest.mouseMove(rows.viewport(), place(row))
-        application().processEvents()
+        QtTest.QTest.mouseMove(rows.viewport(), place(row))  # by the X server, a moment later
+        until(lambda: rows.currentRow() == row, "the pointer")
 
     def looks(position, shown):
         seen.settle()
