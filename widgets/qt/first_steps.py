@@ -97,29 +97,21 @@ class FirstSteps(QtWidgets.QWidget):
 
     def _place(self) -> None:
         """Put the cards side by side or one below the other, where they hide less of the body."""
-        widest = _SIZE[0] + 3 * _MARGIN + _LETTERS * self.fontMetrics().averageCharWidth()
-        room = self._view.width() - _CUBE - 2 * _MARGIN
-        places = [self._row(min(widest, (room - 2 * _MARGIN) // 3)), self._column(min(widest, room))]
+        width = _SIZE[0] + 3 * _MARGIN + _LETTERS * self.fontMetrics().averageCharWidth()
+        height = max(card.heightForWidth(width) for card in self._cards)
+        right, down = width + _MARGIN, height + _MARGIN
+        steps = [(0, down)]
+        if 3 * right <= self._view.width() - _CUBE:
+            steps.append((right, 0))
+        places = [[QtCore.QRect(k * x, k * y, width, height) for k in range(3)] for x, y in steps]
         body = self._body()
-        cards = min(places, key=lambda cards: sum(_inside(card, body) for card in cards))
-        for card, place in zip(self._cards, cards, strict=True):
-            card.setGeometry(place)
-        right, bottom = (max(edge) for edge in zip(*((c.right(), c.bottom()) for c in cards)))
-        self.setGeometry(_MARGIN, _MARGIN, right + 1, bottom + 1)
+        place = min(places, key=lambda cards: sum(_inside(card, body) for card in cards))
         shape = QtGui.QRegion()
-        for card in cards:
-            shape = shape.united(QtGui.QRegion(card))
+        for card, rectangle in zip(self._cards, place, strict=True):
+            card.setGeometry(rectangle)
+            shape = shape.united(QtGui.QRegion(rectangle))
+        self.setGeometry(shape.boundingRect().translated(_MARGIN, _MARGIN))
         self.setMask(shape)  # the view receives clicks between them
-
-    def _row(self, width: int) -> list[Any]:
-        """Return the rectangles of the cards side by side, in pixels of this widget."""
-        height = max(card.heightForWidth(width) for card in self._cards)
-        return [QtCore.QRect(k * (width + _MARGIN), 0, width, height) for k in range(3)]
-
-    def _column(self, width: int) -> list[Any]:
-        """Return the rectangles of the cards one below the other."""
-        height = max(card.heightForWidth(width) for card in self._cards)
-        return [QtCore.QRect(0, k * (height + _MARGIN), width, height) for k in range(3)]
 
     def _body(self) -> NDArray[np.float64]:
         """Return points (k, 2) of the surface, in pixels of this widget."""

@@ -14,7 +14,7 @@ from ..editor import DeformEditor, jumping_to, position_of, preview, states_of
 from .controls import column, shortcut
 
 Qt = QtCore.Qt
-_ROWS = 6
+_LEAST = 2  # rows
 
 
 class HistoryPart(QtWidgets.QWidget):
@@ -143,5 +143,7 @@ class HistoryPart(QtWidgets.QWidget):
     def _unfold(self, down: bool) -> None:
         self.fold.setArrowType(Qt.ArrowType.DownArrow if down else Qt.ArrowType.RightArrow)
         self.list.setVisible(down)
-        self.list.setFixedHeight(_ROWS * self._row_height + 2 * self.list.frameWidth())
+        self.list.setMinimumHeight(_LEAST * self._row_height + 2 * self.list.frameWidth())
+        policies = QtWidgets.QSizePolicy.Policy
+        self.setSizePolicy(policies.Preferred, policies.Expanding if down else policies.Fixed)
         self.refresh()

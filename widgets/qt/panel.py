@@ -133,9 +133,9 @@ class DeformPanel(QtWidgets.QWidget):
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         layout = QtWidgets.QVBoxLayout(self)
         layout.addWidget(self.toolbar)
-        layout.addWidget(area, 1)
+        layout.addWidget(area, 3)
         layout.addWidget(self.status)
-        layout.addWidget(self.history)
+        layout.addWidget(self.history, 1)
         # The widest part fits beside a scroll bar.
         widest = max(part.minimumSizeHint().width() for part in self._parts)
         widest += area.verticalScrollBar().sizeHint().width() + 2 * layout.contentsMargins().left()
