@@ -1,7 +1,7 @@
 """The first steps, as three cards over the view: pin, pull, done.
 
 They are shown once to each user who has not seen them, in applications that ask for it, until a
-click on them, Escape, or the first deformation.  Pictures and videos of the view lack them.
+click on them, Escape, or the first pull.  Pictures and videos of the view lack them.
 """
 
 from __future__ import annotations
@@ -50,6 +50,7 @@ class FirstSteps(QtWidgets.QWidget):
             _Card(self, _pull, "Pull", "Drag the surface: it follows."),
             _Card(self, _done, "Done", "Release. The volume is preserved."),
         ]
+        self._stop: Callable[[], None] = _nothing
         self.hide()
         view.installEventFilter(self)
 
@@ -73,10 +74,17 @@ class FirstSteps(QtWidgets.QWidget):
         self.dismiss()
 
     def showEvent(self, event: Any) -> None:  # noqa: N802
-        """Place the cards."""
+        """Place the cards, and wait for a pull."""
         super().showEvent(event)
         self._place()
         self.raise_()
+        self._stop()
+        self._stop = self._editor.controller.messages.on_change(self._dismiss_at_pull)
+
+    def hideEvent(self, event: Any) -> None:  # noqa: N802
+        """Unsubscribe from the editor."""
+        super().hideEvent(event)
+        self._stop()
 
     def eventFilter(self, watched: Any, event: Any) -> bool:  # noqa: N802
         """Follow the size of the view; dismiss the cards when Escape is pressed there."""
@@ -94,6 +102,10 @@ class FirstSteps(QtWidgets.QWidget):
         super().changeEvent(event)
         if event.type() == QtCore.QEvent.Type.FontChange:
             self._place()
+
+    def _dismiss_at_pull(self) -> None:
+        if self._editor.session.is_dragging or self._editor.widgets.puller.is_waiting:
+            self.dismiss()
 
     def _place(self) -> None:
         """Put the cards side by side or one below the other, where they hide less of the body."""
@@ -152,6 +164,10 @@ class _Card(QtWidgets.QWidget):
         painter.setPen(_pen(palette.color(roles.Text)))
         self._draw(painter)
         painter.end()
+
+
+def _nothing() -> None:
+    pass
 
 
 def _inside(card: Any, points: NDArray[np.float64]) -> int:

@@ -74,7 +74,6 @@ class DeformWidget(QtWidgets.QWidget):
         self.deformed, self.regions_changed = self.panel.deformed, self.panel.regions_changed
         self.session_changed, self.error = self.panel.session_changed, self.panel.error
         self.first_steps = FirstSteps(self.plotter, self.editor, first_run)
-        self.deformed.connect(self.first_steps.dismiss)
         halves = QtWidgets.QSplitter(self)
         halves.addWidget(self.plotter)
         halves.addWidget(self.panel)

@@ -460,6 +460,35 @@ def test_the_history_previews_under_the_pointer_and_jumps_at_a_click_or_enter(se
     assert not rows.isVisible()
 
 
+def test_the_first_steps_are_shown_once_until_a_click_escape_or_a_pull(make, state, tmp_path):
+    settings = QtCore.QSettings(str(tmp_path / "a.ini"), QtCore.QSettings.Format.IniFormat)
+    session = Session(state[0], state=state[1])
+    seen = Seen(DeformWidget(session, first_run=settings))
+    cards, plotter = seen.widget.first_steps, seen.widget.plotter
+    assert cards.isVisible()
+    assert not settings.contains("first steps seen")
+    before = seen.session.state
+    plotter.setFocus()
+    QtTest.QTest.keyClick(plotter, Qt.Key_Escape)
+    assert not cards.isVisible()
+    for dismiss in (
+        lambda: QtTest.QTest.mouseClick(cards, Qt.LeftButton, Qt.NoModifier, QtCore.QPoint(9, 9)),
+        lambda: bend(seen),
+    ):
+        cards.show()
+        for size in ((1400, 500), (500, 700)):  # side by side and below each other
+            seen.widget.resize(*size)
+            until(lambda size=size: seen.widget.width() == size[0], "the size")
+            assert plotter.rect().contains(cards.geometry())
+        assert seen.session.state is before
+        dismiss()
+        assert not cards.isVisible()
+    seen.widget.close()
+    again = Seen(DeformWidget(Session(state[0]), first_run=settings))
+    assert not again.widget.first_steps.isVisible()
+    again.widget.close()
+
+
 def test_the_colour_range_is_typed_and_kept_for_the_next_session(seen, tmp_path):
     seen.mode(Mode.DEFORM)
     part, overlay = seen.panel.deform, lambda: seen.editor.widgets.overlay
