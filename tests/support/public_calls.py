@@ -378,6 +378,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "points": lambda: mesh().vertices[:4],
     "polydata": surface,
     "preparation": _preparation,
+    "position": lambda: 0,
     "preserve_region_volumes": lambda: False,
     "preserve_volume": lambda: True,
     "progress": lambda: lambda _fraction, _message: None,

@@ -23,7 +23,7 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from vtk_segdeform import sizes
-from vtk_segdeform.arrays import FloatArray, plain
+from vtk_segdeform.arrays import FloatArray, as_points, plain
 from vtk_segdeform.checks import require
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.freezing import read_only
@@ -130,8 +130,8 @@ class SurfaceDisplay:
 
     @instead.setter
     def instead(self, vertices: FloatArray | None) -> None:
-        if vertices is not None and np.shape(vertices) != self._points.shape:
-            raise ArgumentError(f"instead must be points {self._points.shape} or None")
+        if vertices is not None:
+            as_points(vertices, "instead", len(self._points))
         if vertices is not self._instead:
             self._instead = vertices
             self.update()
