@@ -244,6 +244,7 @@ class Window(QtWidgets.QMainWindow):
         if request.original is not None:
             undo = partial(self._undo_repair, request.original)
             widget.editor.controller.earlier = "repair", undo
+            widget.editor.controller.refresh()  # and with it the history in the panel
         self._stops.append(widget.editor.controller.messages.on_change(self._update_title))
         widget.session_changed.connect(lambda _: self._autosave())
         self._autosave(request.slot)
