@@ -288,7 +288,7 @@ def test_a_preparation_is_no_step_and_is_accepted_only_by_what_it_was_made_for()
     assert session.accept(prepared)
     assert session.is_bound
     assert len(heard) == 1
-    assert session.undo_label == "change options"
+    assert session.undo_label == "change total cage vertices"
     session.pull(HIGH, X[HIGH] + UP, max_steps=2)
     while session.can_undo:
         session.undo()

@@ -120,6 +120,14 @@ def test_any_sequence_of_actions_is_undone_and_redone_bit_for_bit(seed):
             where += step
             _ = session.redo() if step > 0 else session.undo()
             assert snapshot(session) == after[::-1][where]
+    assert session.history == ("opened", *labels[::-1])
+    for position in rng.integers(0, len(labels) + 1, 20):
+        now, seen = snapshot(session), session.vertices_at(position)
+        assert snapshot(session) == now
+        session.jump(position)
+        assert session.position == position
+        assert snapshot(session) == after[::-1][position]
+        assert seen is None or seen.tobytes() == session.vertices.tobytes()
 
 
 def test_the_volume_is_exact_at_every_move_and_after_undo_and_redo():
@@ -221,8 +229,31 @@ def test_history_is_bounded_and_the_oldest_steps_go_first():
     labels = [session.undo() for _ in range(4)]
     assert labels == ["set fixed vertices"] * 3 + [None]
     assert session.fixed.tolist() == [2]
+    assert session.history == ("set fixed vertices",) * 4  # the oldest state has a name too
+    for wrong in (-1, 4, 1.5, "1"):
+        with pytest.raises(SessionError, match="position must be from 0 to 3"):
+            session.jump(wrong)
     with pytest.raises(SessionError, match="number of steps"):
         History(0)
+
+
+def test_a_jump_during_a_drag_ends_it_as_one_step():
+    session, heard = ready(), []
+    count = len(session.history)
+    session.move_handle("tip", up(0.2), max_steps=2)
+    dragged = session.vertices
+    assert session.history[count:] == ("drag tip",)
+    assert session.position == count
+    assert session.vertices_at(count) is dragged
+    assert session.vertices_at(count - 1) is session.mesh.vertices
+    session.on_change(heard.append)
+    session.jump(count)
+    assert (session.is_dragging, heard) == (False, [Change.HISTORY])
+    session.move_handle("tip", up(0.3), max_steps=2)
+    session.jump(0)
+    assert session.history[count:] == ("drag tip", "drag tip")
+    session.jump(count)
+    assert session.vertices.tobytes() == dragged.tobytes()
 
 
 def test_a_drag_is_one_step_and_its_label_names_what_was_dragged():

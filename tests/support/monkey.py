@@ -87,7 +87,7 @@ class Monkey:
         self.frames += 1
         assert np.isfinite(session.vertices).all()
         surface = self.editor.widgets.surface
-        shown = session.mesh.vertices if surface.shows_rest else session.vertices
+        shown = session.vertices if surface.instead is None else surface.instead
         assert np.array_equal(surface.points, shown)
         self.posed += session.vertices is not session.mesh.vertices
         self.pulled += bool(session.state.pulls)

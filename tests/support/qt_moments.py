@@ -47,7 +47,7 @@ class QtStand(Stand):
         panel = self.widget.panel
         assert panel.isEnabled()
         assert panel.toolbar.open.isEnabled()
-        assert panel.log.isEnabled()
+        assert panel.history.isEnabled()
         assert not panel.status.cancel.isVisible()
         assert panel.regions.isEnabledTo(panel)
         assert panel.toolbar.undo.isEnabled() is self.session.can_undo

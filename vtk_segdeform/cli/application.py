@@ -35,7 +35,7 @@ def app(options: Namespace, say: Say, progress: Progress) -> bool:
     require_screen()
     QtWidgets.QApplication.setApplicationName("segdeform")
     program = QtWidgets.QApplication.instance() or QtWidgets.QApplication(["segdeform"])
-    window = Window()
+    window = Window(first_run=True)
     window.show()
     path: Path | None = options.input
     QtCore.QTimer.singleShot(0, lambda: window.begin(path))

@@ -1,8 +1,8 @@
-"""Undo and redo.
+"""Undo, redo, and jumps to any state of the history.
 
 A *step* leads from one committed state to the next and has a label.  A *drag* consists of many
 moves that become one step: the first move starts it, `Timeline.commit` ends it and
-`Timeline.revert` cancels it.  A step, undo or redo during a drag commits the drag first.
+`Timeline.revert` cancels it.  A step, undo, redo or jump during a drag commits the drag first.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from ..checks import as_callable, require, shown
 from ..errors import SessionError
 from .listeners import Change, Listener, Listeners
 from .state import State
+
+_OPENED = "opened"
 
 
 @final
@@ -34,13 +36,33 @@ class History:
             raise SessionError(f"history must be a number of steps, 1 or more; got {shown(limit)}")
         self._past: deque[tuple[str, State]] = deque(maxlen=int(limit))
         self._future: list[tuple[str, State]] = []
+        self._oldest = _OPENED  # the label of the step that led to the oldest state
 
     def copy(self) -> History:
         """Return an independent copy of the history."""
         other = History(self._past.maxlen or 1)
         other._past.extend(self._past)
         other._future.extend(self._future)
+        other._oldest = self._oldest
         return other
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The labels of all states, the oldest first: of each, the step that led to it."""
+        past = (label for label, _ in self._past)
+        return self._oldest, *past, *(label for label, _ in reversed(self._future))
+
+    @property
+    def position(self) -> int:
+        """The index of the current state among all states."""
+        return len(self._past)
+
+    def state(self, position: int, now: State) -> State:
+        """Return the state at *position*; *now* is the current state."""
+        ahead = position - len(self._past)
+        if ahead == 0:
+            return now
+        return self._past[position][1] if ahead < 0 else self._future[-ahead][1]
 
     @property
     def undo_label(self) -> str | None:
@@ -61,6 +83,8 @@ class History:
 
     def record(self, label: str, before: State, after: State) -> None:
         """Add the step *label* from *before* to *after*, and clear the steps to redo."""
+        if len(self._past) == self._past.maxlen:
+            self._oldest = self._past[0][0]
         self._past.append((label, before))
         self._future.clear()
         _drop_weights(before, after)
@@ -78,6 +102,14 @@ class History:
         self._past.append((label, now))
         _drop_weights(now, state)
         return state
+
+    def jump(self, position: int, now: State) -> State:
+        """Return the state at *position* after all steps between; *now* is the current state."""
+        while len(self._past) > position:
+            now = self.undo(now)
+        while len(self._past) < position:
+            now = self.redo(now)
+        return now
 
 
 def _drop_weights(stored: State, current: State) -> None:
@@ -134,6 +166,38 @@ class Timeline:
     def can_redo(self) -> bool:
         """Whether there is a step to redo."""
         return self.redo_label is not None
+
+    @property
+    def history(self) -> tuple[str, ...]:
+        """The labels of all states, the oldest first: of each, the step that led to it.
+
+        The first one is "opened", unless steps beyond the limit were discarded.  An ongoing drag is
+        the last one.
+        """
+        labels = self._history.labels
+        if self.is_dragging:
+            return *labels[: self._history.position + 1], self._drag_label()
+        return labels
+
+    @property
+    def position(self) -> int:
+        """The index of the current state in `history`."""
+        return self._history.position + self.is_dragging
+
+    def jump(self, position: int) -> None:
+        """Undo or redo as many steps as lead to the state at *position* of `history`.
+
+        The states after it remain until the next step.
+
+        Raises
+        ------
+        SessionError
+            If there is no such state.
+        """
+        self._require_position(position)
+        ended = self._end_drag(None)
+        if ended or position != self.position:
+            self._set_state(self._history.jump(int(position), self._state), Change.HISTORY)
 
     def undo(self) -> str | None:
         """Undo the last step; return its label, or None if there is none."""
@@ -203,6 +267,20 @@ class Timeline:
         change |= self._state.changes(state)
         self._state = state
         self._listeners.notify(change)
+
+    def _state_at(self, position: int) -> State:
+        """Return the state at *position* of `history`."""
+        self._require_position(position)
+        if position == self.position:
+            return self._state
+        if self._drag_start is not None and position == self._history.position:
+            return self._drag_start
+        return self._history.state(int(position), self._state)
+
+    def _require_position(self, position: int) -> None:
+        last = len(self.history) - 1
+        if not is_whole(position, 0, last):
+            raise SessionError(f"position must be from 0 to {last}; got {shown(position)}")
 
     def _drag_label(self) -> str:
         return "drag " + ", ".join(self._dragged)

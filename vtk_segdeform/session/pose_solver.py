@@ -118,6 +118,17 @@ class PoseSolver:
         """Return the mesh (n, 3) in *pose* of *state*; read-only."""
         return self._evaluate(state, pose)[0]
 
+    def peek(self, state: State, pose: Pose) -> FloatArray | None:
+        """Return `vertices` of a pose that may not be the current one; None if that would bind."""
+        if not self.is_bound(state):
+            return None
+        known = self._evaluated
+        if known is not None and known[0].cage_vertices is pose.cage_vertices:
+            return known[2]
+        x = self.bind(state).surface(pose.cage_vertices)
+        frozen(x)
+        return x
+
     def volume_change(self, state: State, pose: Pose) -> float:
         """Return (V - V0) / V0 of *pose*, signed."""
         return self._evaluate(state, pose)[1]()

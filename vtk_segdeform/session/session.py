@@ -51,7 +51,7 @@ from . import handles, naming, painting, pulling
 from .history import Timeline
 from .listeners import Change
 from .pose_solver import PoseSolver
-from .state import Options, Pose, State, checked_state, fitting_cages, of_mesh
+from .state import Options, Pose, State, checked_state, fitting_cages, label_of_change, of_mesh
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -241,6 +241,15 @@ class Session(Timeline):
         If necessary, the cages are bound first, as by `bind`.
         """
         return self._vertices_of(self._state)
+
+    def vertices_at(self, position: int) -> FloatArray | None:
+        """Return the vertices (n, 3) of a state of `history`, without changing the session.
+
+        None if its cages are no longer bound, so that it could take seconds; `jump` binds them.
+        """
+        state = self._state_at(position)
+        pose = state.pose
+        return self.mesh.vertices if pose is None else self._pose_solver.peek(state, pose)
 
     def _vertices_of(self, state: State) -> FloatArray:
         pose = state.pose
@@ -628,7 +637,7 @@ class Session(Timeline):
             If there is no such vertex, or it is fixed or in a handle already.
         """
         name, after = pulling.pinned(self.mesh, self._state, vertex)
-        self._set_handles(after, f"add {name}")
+        self._set_handles(after, "pin")
         return name
 
     def move_handle(
@@ -726,7 +735,7 @@ class Session(Timeline):
             known = ", ".join(vars(self.options))
             raise SessionError(f"there is no option {', '.join(unknown)}; there are {known}")
         options = replace(self.options, **changes)  # type: ignore[arg-type]  # `Options` checks them
-        self._step("change options", replace(self._state, options=options))
+        self._step(label_of_change(self.options, options), replace(self._state, options=options))
 
     def _drag(
         self,

@@ -29,6 +29,16 @@ from .naming import Names, checked_names, fault_of, region_name
 
 _TINY = float(np.finfo(np.float64).tiny)
 _FARTHEST = 1e6  # mesh diagonals; poses farther away are damaged, since no drag reaches so far
+# The options, as undo steps name them.
+_WORDS = {
+    "n_cage_vertices": "total cage vertices",
+    "offset": "cage offset",
+    "preserve_volume": "volume preservation",
+    "preserve_region_volumes": "volume preservation per region",
+    "lids": "volume of open parts",
+    "stretch": "stretch resistance",
+    "rotation_groups": "rotation clusters",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +89,15 @@ class Options:
             _require_number("offset", self.offset, _TINY)
         if self.rotation_groups is not None:
             _require_number("rotation_groups", self.rotation_groups, 1, whole=True)
+
+
+def label_of_change(before: Options, after: Options) -> str:
+    """Return the label of an undo step that changes options: "volume preservation off"."""
+    names = [name for name in _WORDS if getattr(before, name) != getattr(after, name)]
+    if len(names) != 1:
+        return "change options"
+    value, words = getattr(after, names[0]), _WORDS[names[0]]
+    return f"{words} {'on' if value else 'off'}" if isinstance(value, bool) else f"change {words}"
 
 
 @dataclass(frozen=True, eq=False)

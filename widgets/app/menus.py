@@ -79,7 +79,11 @@ class Menus:
         menu = self._menu("&Help")
         keys = self._add(menu, "&Keyboard shortcuts\tH", self._doing(actions.toggle_help))
         self._need_mesh.append(keys)
+        self._need_mesh.append(self._add(menu, "&First steps", self._show_first_steps))
         self._add(menu, "&About segdeform", self._show_about).setMenuRole(_role("AboutRole"))
+
+    def _show_first_steps(self) -> None:
+        self._window.editor_widget.first_steps.show()
 
     def _show_about(self) -> None:
         show_about(self._window, __version__)

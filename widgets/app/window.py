@@ -57,6 +57,8 @@ class Window(QtWidgets.QMainWindow):
         Where unsaved work is stored; by default the user's folder.
     interval : float
         Longest part of an ongoing drag that a crash may lose, in seconds.
+    first_run : bool
+        Whether to show the first steps to users who have not seen them yet.
 
     Attributes
     ----------
@@ -76,9 +78,12 @@ class Window(QtWidgets.QMainWindow):
         autosaves: Autosaves | None = None,
         *,
         interval: float = INTERVAL,
+        first_run: bool = False,
     ) -> None:
         super().__init__()
-        self.recent = Recent(settings or QtCore.QSettings("vtk_segdeform", "segdeform"))
+        settings = settings or QtCore.QSettings("vtk_segdeform", "segdeform")
+        self.recent = Recent(settings)
+        self._first_run = settings if first_run else None
         self.autosaves = autosaves or Autosaves()
         self.autosaver = Autosaver(self.autosaves, self, interval=interval)
         self.autosaver.failed.connect(self._say)
@@ -227,7 +232,7 @@ class Window(QtWidgets.QMainWindow):
         self.pages.delete_views()
         self.document, session = opened
         self.mesh_state, self._is_new = None, request.is_new
-        widget = self.editor_widget = DeformWidget(session, self)
+        widget = self.editor_widget = DeformWidget(session, self, first_run=self._first_run)
         widget.editor.controller.file = self.document.file(session, is_unsaved=bool(request.slot))
         widget.editor.show_cube = True
         path = self.document.session_path or self.document.source
@@ -239,6 +244,7 @@ class Window(QtWidgets.QMainWindow):
         if request.original is not None:
             undo = partial(self._undo_repair, request.original)
             widget.editor.controller.earlier = "repair", undo
+            widget.editor.controller.refresh()  # and with it the history in the panel
         self._stops.append(widget.editor.controller.messages.on_change(self._update_title))
         widget.session_changed.connect(lambda _: self._autosave())
         self._autosave(request.slot)

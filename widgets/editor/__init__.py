@@ -13,8 +13,9 @@ The files, in reading order:
     preparing        the preparation for pulls, while the editor remains usable
     session_file     the file that the session is saved to
     recordings       recordings of input and video
-    messages hints status_line help_card log
-                     messages, hints, the help card and the history
+    messages hints status_line help_card
+                     messages, hints and the help card
+    history          the states of the session by name, jumps and previews
     notices notice_line
                      how the mesh differs from what was given, and where
     wrapping         text that fits into a window
@@ -36,8 +37,8 @@ from .bindings import BEFORE_AFTER, binding_of, key_cap
 from .controller import Controller
 from .editor import DeformEditor
 from .hints import hint
+from .history import jumping_to, position_of, preview, states_of
 from .job import Job, Timer
-from .log import Entry
 from .messages import error_text
 from .mode import Mode
 from .notices import Notice, Notices, notices_of
@@ -76,7 +77,6 @@ __all__ = [
     "Action",
     "Controller",
     "DeformEditor",
-    "Entry",
     "Job",
     "Mode",
     "Notice",
@@ -94,6 +94,7 @@ __all__ = [
     "hiding_handle",
     "hint",
     "is_mesh",
+    "jumping_to",
     "key_cap",
     "locking_handle",
     "looking_from",
@@ -102,6 +103,8 @@ __all__ = [
     "notices_of",
     "opening",
     "painting",
+    "position_of",
+    "preview",
     "pulling_with",
     "read_session",
     "renaming",
@@ -114,6 +117,7 @@ __all__ = [
     "show_rest",
     "showing_cage",
     "split_region",
+    "states_of",
     "toggle_cages",
     "toggle_cube",
     "toggle_overlay",

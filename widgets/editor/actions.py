@@ -150,12 +150,12 @@ def next_style(controller: Controller) -> None:
 
 def show_rest(controller: Controller) -> None:
     """Show the mesh at rest until `show_pose`; the session is unchanged."""
-    controller.show_rest(True)
+    controller.show_instead(controller.session.mesh.vertices, "The mesh at rest")
 
 
 def show_pose(controller: Controller) -> None:
     """Show the current pose again."""
-    controller.show_rest(False)
+    controller.show_instead(None)
 
 
 def toggle_overlay(controller: Controller) -> None:

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
+from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.kernels import advice
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Change, Preparation, Session, saved_view
@@ -23,7 +24,6 @@ from .camera import Camera, has_y_up
 from .help_card import HelpCard, Section
 from .hints import hint
 from .job import Worker, view_timer
-from .log import Log
 from .messages import Messages
 from .mode import Mode
 from .notices import Notices
@@ -59,8 +59,6 @@ class Controller:
         The status line.
     notices : Notices
         How the mesh differs from what was given, and where; above the status line.
-    log : Log
-        The drags and jobs so far, and how they ended.
     earlier : tuple of str and callable, or None
         A step before the first of the session: its label, and a function that undoes it.
     recordings : Recordings
@@ -79,8 +77,8 @@ class Controller:
         self.recordings = Recordings(view)
         self._mode = Mode.PULL
         self._is_on = False
-        self.log = Log()
-        self._worker = Worker(view_timer(view), self.log, self._job_changed)
+        self._instead = ""
+        self._worker = Worker(view_timer(view), self._job_changed)
         self._preparing = Preparing(
             view_timer(view), self._may_accept, self._accept, self._prepare_pulls, self.refresh
         )
@@ -139,7 +137,6 @@ class Controller:
         self.is_on = False
         self._stop_listening()
         self._stop_failures()
-        self.log.unfollow()
         self.recordings.remove()
         self.camera.remove()
         self.widgets.remove()
@@ -171,7 +168,8 @@ class Controller:
         elif self._is_on:
             fraction = self._preparing.fraction
             preparing = None if fraction == 1.0 else fraction  # finished, but not accepted yet
-            text = "The mesh at rest" if self.shows_rest else hint(self.widgets, self._mode)
+            is_current = self.widgets.surface.instead is None
+            text = hint(self.widgets, self._mode) if is_current else self._instead
             self.messages.show(mode, text, preparing)
         else:
             self.messages.hide()
@@ -197,16 +195,17 @@ class Controller:
     @property
     def shows_rest(self) -> bool:
         """Whether the mesh at rest is shown instead of the current pose."""
-        return self.widgets.surface.shows_rest
+        return self.widgets.surface.instead is self.session.mesh.vertices
 
-    def show_rest(self, rest: bool) -> None:
-        """Show the mesh at rest, without widgets, or else the current pose with them."""
-        if rest == self.shows_rest:
+    def show_instead(self, vertices: FloatArray | None, text: str = "") -> None:
+        """Show *vertices* (n, 3) without widgets, and *text*; or None for the current pose."""
+        surface, self._instead = self.widgets.surface, text
+        if vertices is not None:
+            self.widgets.show_instead(vertices)
+        elif surface.instead is None:
             return
-        if rest:
-            self.widgets.show_rest()
         else:
-            self.widgets.surface.shows_rest = False
+            surface.instead = None
             self._switch_widgets()
             self.widgets.show(self._mode)
         self.refresh()
@@ -216,7 +215,6 @@ class Controller:
         self.refresh()
 
     def _listen(self) -> None:
-        self.log.follow(self.session)
         self._stop_listening = self.session.on_change(self._session_changed)
         for widget in self.widgets.interactive:
             widget.AddObserver("EndInteractionEvent", self._gesture_ended)
@@ -236,6 +234,7 @@ class Controller:
     def _session_changed(self, change: Change) -> None:
         if change & Change.HISTORY:
             self.messages.clear()
+            self.show_instead(None)
         self.notices.changed(change)
         replaced = change & Change.POSE and change & (Change.REGIONS | Change.CAGES)
         if replaced and self.session.state.pose is None:
@@ -260,17 +259,16 @@ class Controller:
     def start(
         self, name: str, work: Callable[[Progress], T], done: Callable[[T], str | None]
     ) -> None:
-        """Run *work* in another thread, then *done* here; show and log the outcome it returns.
+        """Run *work* in another thread, then *done* here; show the outcome it returns.
 
         An ongoing drag or stroke is finished before the work starts.  See `Worker.start`.
         """
 
-        def deliver(result: T) -> str | None:
+        def deliver(result: T) -> None:
             outcome = done(result)
             if outcome:
                 self.messages.note(outcome)
             self._apply_mode()
-            return outcome
 
         self.widgets.finish()  # before the job starts, because it may fail
         self._preparing.interrupt()

@@ -256,7 +256,7 @@ class DeformEditor:
         controller.messages.clear()
         self._stop_waiting()
         if action is not show_rest:
-            controller.show_rest(False)
+            controller.show_instead(None)
         action(controller)
         if (
             not while_busy and action is not show_rest

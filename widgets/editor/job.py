@@ -21,8 +21,6 @@ from vtk_segdeform.errors import Cancelled, SessionError
 from vtk_segdeform.progress import Progress
 
 from ..scene import Stop, View
-from .log import Log
-from .messages import error_text
 
 T = TypeVar("T")
 
@@ -213,21 +211,18 @@ class _Shared:
 
 
 class Worker:
-    """Run the jobs of an editor, one at a time, and log how each one ended.
+    """Run the jobs of an editor, one at a time.
 
     Parameters
     ----------
     timer : callable
         Polls the jobs; see `Job`.
-    log : Log
-        Receives an entry for each job.
     watch : callable
         Called when the job has made progress or has ended.
     """
 
-    def __init__(self, timer: Timer, log: Log, watch: Callable[[], object]) -> None:
-        self._timer, self._log, self._watch = timer, log, watch
-        self._started = 0.0
+    def __init__(self, timer: Timer, watch: Callable[[], object]) -> None:
+        self._timer, self._watch = timer, watch
         self._name, self._has_refused = "", False
         self.job: Job[Any] | None = None
         """The running job, if any."""
@@ -239,9 +234,7 @@ class Worker:
         name = f"Busy. {self._name}" if self._has_refused else self._name
         return ": ".join(filter(None, (name, step)))
 
-    def start(
-        self, name: str, work: Callable[[Progress], T], done: Callable[[T], str | None]
-    ) -> None:
+    def start(self, name: str, work: Callable[[Progress], T], done: Callable[[T], object]) -> None:
         """Run *work* in another thread, then call *done* in this one with its result.
 
         Parameters
@@ -251,7 +244,7 @@ class Worker:
         work : callable
             ``work(progress)``; see `Job`.
         done : callable
-            ``done(result)``; returns the outcome for the log, if there is more to say than "Done".
+            ``done(result)``; see `Job`.
 
         Raises
         ------
@@ -260,10 +253,8 @@ class Worker:
         """
         if self.job is not None:
             raise SessionError(self.refusal)
-        self._name, self._has_refused, self._started = name, False, time.monotonic()
-        self.job = Job(
-            self._timer, work, done=lambda result: self._finish(done, result), watch=self._update
-        )
+        self._name, self._has_refused = name, False
+        self.job = Job(self._timer, work, done=done, watch=self._update)
 
     def wait(self) -> None:
         """Block until no job is running."""
@@ -287,18 +278,4 @@ class Worker:
     def _update(self, job: Job[Any]) -> None:
         if not job.is_running:
             self.job = None
-            if job.is_cancelled:
-                self._add_entry("Cancelled")
-            elif job.error is not None:
-                self._add_entry(error_text(job.error))
         self._watch()
-
-    def _finish(self, done: Callable[[T], str | None], result: T) -> None:
-        outcome: str | None = "Failed"
-        try:
-            outcome = done(result)
-        finally:
-            self._add_entry(outcome or "Done")
-
-    def _add_entry(self, outcome: str) -> None:
-        self._log.add_job(self._name, time.monotonic() - self._started, outcome)

@@ -80,7 +80,7 @@ class WidgetSet:
             self.selector.paints = Paint.REGION
         elif mode is Mode.HANDLES and self.selector.paints is Paint.REGION:
             self.selector.paints = Paint.HANDLE if len(self.session.fixed) else Paint.FIXED
-        self.surface.shows_rest = False
+        self.surface.instead = None
         self.show(mode)
         self.cages.SetEnabled(mode is Mode.CAGES)
         self.selector.SetEnabled(mode in (Mode.REGIONS, Mode.HANDLES))
@@ -107,13 +107,13 @@ class WidgetSet:
         else:
             self.overlay.hide()
 
-    def show_rest(self) -> None:
-        """Show the mesh at rest, and none of the widgets, until `enter`."""
+    def show_instead(self, vertices: FloatArray) -> None:
+        """Show *vertices* (n, 3) of the mesh, and none of the widgets, until `enter`."""
         self.switch_off()
         self.overlay.hide()
         self.cages.hide()
         self.outlines.show(lines=False, numbers=False)
-        self.surface.shows_rest = True
+        self.surface.instead = vertices
 
     def wants_overlay(self, mode: Mode) -> bool:
         """Return whether volume changes are shown in *mode*; painting hides them."""

@@ -4,8 +4,9 @@ The files, in reading order:
 
     widget      `DeformWidget` and `deform_dock`
     panel       the panel beside the view
-    toolbar pulling painting regions handles options status log
+    toolbar pulling painting regions handles options status history
                 the parts of the panel
+    first_steps three cards for the first run
     view_menu   menu entries for the camera
     event_filter    what pyvistaqt does not tell VTK of Qt's events
     controls    buttons, fields and layouts of the parts

@@ -20,7 +20,7 @@ from vtk_segdeform.session import Change
 from ..editor import DeformEditor, Mode, binding_of
 from .controls import shortcut
 from .handles import HandlesPart
-from .log import LogPart
+from .history import HistoryPart
 from .options import CagesPart, DeformPart
 from .painting import PaintingPart
 from .pulling import PullPart
@@ -57,7 +57,8 @@ class DeformPanel(QtWidgets.QWidget):
     def __init__(self, editor: DeformEditor, parent: Any = None) -> None:
         super().__init__(parent)
         self.editor = editor
-        self.toolbar, self.status, self.log = Toolbar(editor), StatusPart(editor), LogPart(editor)
+        self.toolbar, self.status = Toolbar(editor), StatusPart(editor)
+        self.history = HistoryPart(editor)
         self.painting, self.regions = PaintingPart(editor), RegionsPart(editor)
         self.handles = HandlesPart(editor)
         self.cages, self.deform = CagesPart(editor), DeformPart(editor)
@@ -98,7 +99,7 @@ class DeformPanel(QtWidgets.QWidget):
         self._inside.setEnabled(not busy)
         self.toolbar.refresh()
         self.status.refresh()
-        self.log.refresh()
+        self.history.refresh()
         if busy:  # the job owns the session
             return
         for part, modes in self._parts.items():
@@ -132,16 +133,16 @@ class DeformPanel(QtWidgets.QWidget):
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         layout = QtWidgets.QVBoxLayout(self)
         layout.addWidget(self.toolbar)
-        layout.addWidget(area, 1)
+        layout.addWidget(area, 3)
         layout.addWidget(self.status)
-        layout.addWidget(self.log)
+        layout.addWidget(self.history, 1)
         # The widest part fits beside a scroll bar.
         widest = max(part.minimumSizeHint().width() for part in self._parts)
         widest += area.verticalScrollBar().sizeHint().width() + 2 * layout.contentsMargins().left()
         letters = _WIDTH * self.fontMetrics().averageCharWidth()
         self.setMinimumWidth(max(widest, letters))
         for keys, key in _KEYS.items():
-            for part in (self.toolbar, area, self.status, self.log):
+            for part in (self.toolbar, area, self.status, self.history):
                 self._add_shortcut(part, keys, key)
 
     def _add_shortcut(self, part: Any, keys: str, key: str) -> None:

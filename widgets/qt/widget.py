@@ -24,6 +24,7 @@ from .. import plugin  # registers `segdeform` on plotters even without entry po
 from ..editor import DeformEditor
 from ..scene import View, set_background, set_lights
 from .event_filter import EventFilter
+from .first_steps import FirstSteps
 from .panel import DeformPanel
 
 _DARK = 128  # lightness of a window, 0 to 255, below which its palette is dark
@@ -38,6 +39,9 @@ class DeformWidget(QtWidgets.QWidget):
         What to edit.
     parent : QWidget, optional
         The parent widget.
+    first_run : QSettings, optional
+        Show three cards with the first steps to users who have not seen them yet, which is stored
+        there; by default they are not shown.
 
     Attributes
     ----------
@@ -47,11 +51,15 @@ class DeformWidget(QtWidgets.QWidget):
         The editor in the view.
     panel : DeformPanel
         The panel beside it.
+    first_steps : FirstSteps
+        The cards; ``first_steps.show()`` shows them again.
     deformed, regions_changed, session_changed, error : signals
         The signals of the panel.
     """
 
-    def __init__(self, mesh: Any, parent: Any = None) -> None:
+    def __init__(self, mesh: Any, parent: Any = None, *, first_run: Any = None) -> None:
+        if first_run is not None:
+            require(first_run, QtCore.QSettings, "first_run")
         session = plugin.session_of(mesh)
         super().__init__(_checked(parent))
         self._is_closed = False
@@ -65,6 +73,7 @@ class DeformWidget(QtWidgets.QWidget):
         self.panel = DeformPanel(self.editor, self)
         self.deformed, self.regions_changed = self.panel.deformed, self.panel.regions_changed
         self.session_changed, self.error = self.panel.session_changed, self.panel.error
+        self.first_steps = FirstSteps(self.plotter, self.editor, first_run)
         halves = QtWidgets.QSplitter(self)
         halves.addWidget(self.plotter)
         halves.addWidget(self.panel)
@@ -98,6 +107,7 @@ class DeformWidget(QtWidgets.QWidget):
         if self._camera_position == tuple(self.plotter.camera.position):
             self.editor.controller.camera.viewpoint.frame(animate=False)
         self._camera_position = None
+        self.first_steps.begin()
 
     def changeEvent(self, event: Any) -> None:  # noqa: N802
         """Use the background for a new palette, light or dark."""

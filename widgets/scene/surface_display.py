@@ -23,8 +23,8 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from vtk_segdeform import sizes
-from vtk_segdeform.arrays import plain
-from vtk_segdeform.checks import as_flag, require
+from vtk_segdeform.arrays import FloatArray, as_points, plain
+from vtk_segdeform.checks import require
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.freezing import read_only
 from vtk_segdeform.geometry import VertexNormals
@@ -60,7 +60,8 @@ class SurfaceDisplay:
         self.view = View.of(view)
         self.session = require(session, Session, "session")
         self._layers: dict[str, NDArray[np.uint8]] = {}
-        self._style, self._shows_rest = SurfaceStyle.SHADED, False
+        self._style = SurfaceStyle.SHADED
+        self._instead: FloatArray | None = None
         mesh = session.mesh
         self._vertex_normals = VertexNormals(mesh)
         faces, turned = mesh.faces.ravel(), self._vertex_normals.turned
@@ -123,14 +124,16 @@ class SurfaceDisplay:
         self.view.request_render()
 
     @property
-    def shows_rest(self) -> bool:
-        """Whether the mesh at rest is shown instead of the current pose."""
-        return self._shows_rest
+    def instead(self) -> FloatArray | None:
+        """(n, 3) float: vertices shown instead of the current pose; None to show that."""
+        return self._instead
 
-    @shows_rest.setter
-    def shows_rest(self, rest: bool) -> None:
-        if as_flag(rest, "shows_rest") != self._shows_rest:
-            self._shows_rest = bool(rest)
+    @instead.setter
+    def instead(self, vertices: FloatArray | None) -> None:
+        if vertices is not None:
+            as_points(vertices, "instead", len(self._points))
+        if vertices is not self._instead:
+            self._instead = vertices
             self.update()
 
     def set_colours(self, layer: str, colours: NDArray[np.uint8] | None) -> None:
@@ -156,7 +159,7 @@ class SurfaceDisplay:
 
     def update(self) -> None:
         """Show the session's current pose; called automatically when it changes."""
-        self._shown = self.session.mesh.vertices if self._shows_rest else self.session.vertices
+        self._shown = self.session.vertices if self._instead is None else self._instead
         self._points[:] = self._shown
         self._drawn[len(self._points) :] = self._points[self._twice]
         self.polydata.GetPoints().GetData().Modified()

@@ -183,6 +183,9 @@ def test_undo_returns_from_a_repaired_copy_to_the_original_with_its_edits(hand, 
     original.set_fixed([0, 1, 2])
     boxes.answers.append("Discard")
     repair(hand, lambda dialog: click(dialog.accepting))
+    rows = hand.window.editor_widget.panel.history.list
+    until(lambda: rows.count() == 2, "the history")
+    assert [rows.item(row).text() for row in range(2)] == ["Opened", "Repair"]
     hand.choose("Edit", "Undo repair")
     until(lambda: hand.window.has_mesh and hand.window.session is original, "the original")
     hand.settle()

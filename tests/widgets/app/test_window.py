@@ -374,6 +374,10 @@ def test_the_view_menu_shows_hides_and_ticks(start, arm_file):
         assert not is_shown()
     hand.choose("Help", "Keyboard shortcuts")
     assert hand.window.editor.controller.help.is_shown
+    cards = hand.window.editor_widget.first_steps
+    assert not cards.isVisible()
+    hand.choose("Help", "First steps")
+    assert cards.isVisible()
     plotter = hand.window.editor_widget.plotter
     plotter.camera.zoom(5.0)
     hand.choose("View", "Fit to view")

@@ -92,7 +92,7 @@ def test_shift_click_pins_and_unpins_and_markers_are_grabbed(bench):
     place, _ = bench.on(0.5)
     hand.click(place, shift=True)
     assert list(session.handles) == ["pin 1"]
-    assert session.undo_label == "add pin 1"
+    assert session.undo_label == "pin"
     hand.press(place + [4, 0])  # near it
     hand.move(place + [4, 25])
     assert list(session.handles) == ["pin 1"]

@@ -81,7 +81,7 @@ def settings(panel) -> list:
 )  # fmt: skip
 def test_any_action_in_the_panel_finishes_the_drag(stand, during):
     panel = stand.widget.panel
-    panel.log.fold.setChecked(True)
+    panel.history.fold.setChecked(True)
     dragged(stand, during=False)
     stand.settle()
     controls = settings(panel)
@@ -97,7 +97,7 @@ def test_any_action_in_the_panel_finishes_the_drag(stand, during):
         stand.hand.move(place + [-40.0, -30.0])
         stand.hand.move(place)
         assert len(is_kept(stand, place).labels) <= 2
-        panel.log.fold.setChecked(True)
+        panel.history.fold.setChecked(True)
 
 
 @MOMENTS

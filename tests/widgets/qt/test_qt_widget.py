@@ -404,32 +404,89 @@ def bend(seen, height=0.4):
     seen.session.commit()
 
 
-def test_the_history_unfolds_is_copied_and_cleared(seen):
-    part, clipboard = seen.panel.log, application().clipboard()
-    bend(seen)
+def test_the_history_previews_under_the_pointer_and_jumps_at_a_click_or_enter(seen):
+    part, surface = seen.panel.history, lambda: seen.editor.widgets.surface
+    rows, keys = part.list, lambda key: QtTest.QTest.keyClick(part.list, key)
+    poses = [seen.session.vertices]
+    for height in (0.4, 0.2):
+        bend(seen, height)
+        poses.append(seen.session.vertices)
+    until(lambda: rows.count() == len(seen.session.history), "the second drag")
+    start = rows.count() - 3
+
+    def place(row):
+        return rows.visualItemRect(rows.item(row)).center()
+
+    def hover(row):
+        QtTest.QTest.mouseMove(rows.viewport(), place(row))  # by the X server, a moment later
+        until(lambda: rows.currentRow() == row, "the pointer")
+
+    def looks(position, shown):
+        seen.settle()
+        assert seen.session.position == start + position
+        assert_array_equal(surface().points, poses[shown])
+        assert [rows.item(k).font().bold() for k in range(rows.count())].index(True) == (
+            start + position
+        )
+        return rows.currentRow() - start
+
+    state = seen.session.state
+    for row in (2, 1, 0):
+        hover(start + row)
+        assert looks(2, row) == row
+    assert seen.session.state is state
+    assert "History: " in seen.editor.status
+    hover(start + 1)
+    QtTest.QTest.mouseClick(rows.viewport(), Qt.LeftButton, Qt.NoModifier, place(start + 1))
+    assert looks(1, 1) == 1
+    assert rows.item(start + 2).foreground() != rows.item(start + 1).foreground()
+    hover(start + 2)
+    assert looks(1, 2) == 2
+    application().sendEvent(rows, QtCore.QEvent(QtCore.QEvent.Leave))
+    assert looks(1, 1) == 1
+    rows.setFocus()
+    keys(Qt.Key_Up)
+    assert looks(1, 0) == 0
+    keys(Qt.Key_Escape)
+    assert looks(1, 1) == 1
+    keys(Qt.Key_Down)
+    keys(Qt.Key_Return)
+    assert looks(2, 2) == 2
+    assert seen.session.state is state
+    keys(Qt.Key_Up)
+    seen.widget.plotter.setFocus()
+    assert looks(2, 2) == 2
     seen.click(part.fold)
-    texts = [entry.text for entry in seen.editor.controller.log.entries]
-    assert [part.list.item(k).text() for k in range(part.list.count())] == texts
-    assert "drag handle 1" in texts[-1]
-    bend(seen, 0.3)
-    until(lambda: part.list.count() == len(texts) + 1, "the second drag")
-    seen.click(part.copy)
-    assert clipboard.text() == "\n\n".join(e.text for e in seen.editor.controller.log.entries)
-    part.list.setCurrentRow(part.list.count() - 2)
-    part.list.setFocus()
-    QtTest.QTest.keyClick(part.list, Qt.Key_C, Qt.ControlModifier)
-    assert clipboard.text() == texts[-1]
-    for _ in range(2):  # more than the limit of the log
-        for k in range(150):
-            seen.editor.controller.log.add_job(f"job {k}", 1.0, "done")
-        part.refresh()
-    assert part.list.count() == 200
-    assert "job 149" in part.list.item(199).text()
-    seen.click(part.clear)
-    assert part.list.count() == 0
-    assert not part.copy.isEnabled()
-    seen.click(part.fold)
-    assert not part.list.isVisible()
+    assert not rows.isVisible()
+
+
+def test_the_first_steps_are_shown_once_until_a_click_escape_or_a_pull(make, state, tmp_path):
+    settings = QtCore.QSettings(str(tmp_path / "a.ini"), QtCore.QSettings.Format.IniFormat)
+    session = Session(state[0], state=state[1])
+    seen = Seen(DeformWidget(session, first_run=settings))
+    cards, plotter = seen.widget.first_steps, seen.widget.plotter
+    assert cards.isVisible()
+    assert not settings.contains("first steps seen")
+    before = seen.session.state
+    plotter.setFocus()
+    QtTest.QTest.keyClick(plotter, Qt.Key_Escape)
+    assert not cards.isVisible()
+    for dismiss in (
+        lambda: QtTest.QTest.mouseClick(cards, Qt.LeftButton, Qt.NoModifier, QtCore.QPoint(9, 9)),
+        lambda: bend(seen),
+    ):
+        cards.show()
+        for size in ((1400, 500), (500, 700)):  # side by side and below each other
+            seen.widget.resize(*size)
+            until(lambda size=size: seen.widget.width() == size[0], "the size")
+            assert plotter.rect().contains(cards.geometry())
+        assert seen.session.state is before
+        dismiss()
+        assert not cards.isVisible()
+    seen.widget.close()
+    again = Seen(DeformWidget(Session(state[0]), first_run=settings))
+    assert not again.widget.first_steps.isVisible()
+    again.widget.close()
 
 
 def test_the_colour_range_is_typed_and_kept_for_the_next_session(seen, tmp_path):

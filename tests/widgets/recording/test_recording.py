@@ -317,7 +317,7 @@ def test_pulls_pins_turns_and_numbers_are_replayed_bit_by_bit(monkeypatch):
     steps = []
     while (step := slow.session.undo()) is not None:
         steps.append(step)
-    assert steps[:4] == ["pull", "pull", "pull", "add pin 1"]
+    assert steps[:4] == ["pull", "pull", "pull", "pin"]
 
 
 def test_two_widgets_of_one_window_share_the_prescribed_steps():

@@ -1,0 +1,210 @@
+"""The first steps, as three cards over the view: pin, pull, done.
+
+They are shown once to each user who has not seen them, in applications that ask for it, until a
+click on them, Escape, or the first pull.  Pictures and videos of the view lack them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from qtpy import QtCore, QtGui, QtWidgets
+
+from ..editor import DeformEditor
+
+Qt = QtCore.Qt
+_KEY = "first steps seen"
+_SIZE = 44, 32  # pixels of a drawing
+_LETTERS = 14  # of a line in a card, at most
+_SAMPLES = 2000  # points of the surface that the cards avoid
+_MARGIN = 8
+_CUBE = 100  # pixels at the right end, for the orientation cube
+_ACCENT = "#2f7fc1"
+_OPACITY = 0.9
+
+
+class FirstSteps(QtWidgets.QWidget):
+    """The three cards, hidden until `begin`.
+
+    Parameters
+    ----------
+    view : QWidget
+        The widget of the view, which they are drawn over.
+    editor : DeformEditor
+        The editor in the view; the cards avoid its surface.
+    settings : QSettings, optional
+        Where it is stored that the user has seen them.  Without it, `begin` does nothing.
+    """
+
+    def __init__(self, view: Any, editor: DeformEditor, settings: Any = None) -> None:
+        super().__init__(view)
+        self._view, self._editor, self._settings = view, editor, settings
+        self.setAccessibleName("First steps")
+        self.setToolTip("Click to close (Esc)")
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self._cards = [
+            _Card(self, _pin, "Pin", "Shift-click a point to keep it in place."),
+            _Card(self, _pull, "Pull", "Drag the surface: it follows."),
+            _Card(self, _done, "Done", "Release. The volume is preserved."),
+        ]
+        self._stop: Callable[[], None] = _nothing
+        self.hide()
+        view.installEventFilter(self)
+
+    def begin(self) -> None:
+        """Show the cards if the user has not seen them yet."""
+        if self._settings is not None and not self._settings.value(_KEY, False, type=bool):
+            self.show()
+
+    def dismiss(self) -> None:
+        """Hide the cards, and do not show them to this user again."""
+        if self.isHidden():
+            return
+        self.hide()
+        if self._settings is not None:
+            self._settings.setValue(_KEY, True)
+            self._settings.sync()
+
+    def mousePressEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
+        """Dismiss the cards."""
+        event.accept()
+        self.dismiss()
+
+    def showEvent(self, event: Any) -> None:  # noqa: N802
+        """Place the cards, and wait for a pull."""
+        super().showEvent(event)
+        self._place()
+        self.raise_()
+        self._stop()
+        self._stop = self._editor.controller.messages.on_change(self._dismiss_at_pull)
+
+    def hideEvent(self, event: Any) -> None:  # noqa: N802
+        """Unsubscribe from the editor."""
+        super().hideEvent(event)
+        self._stop()
+
+    def eventFilter(self, watched: Any, event: Any) -> bool:  # noqa: N802
+        """Follow the size of the view; dismiss the cards when Escape is pressed there."""
+        if watched is self._view and not self.isHidden():
+            kinds = QtCore.QEvent.Type
+            if event.type() == kinds.Resize:
+                self._place()
+            elif event.type() == kinds.KeyPress and event.key() == Qt.Key.Key_Escape:
+                self.dismiss()
+                return True
+        return bool(super().eventFilter(watched, event))
+
+    def changeEvent(self, event: Any) -> None:  # noqa: N802
+        """Place the cards anew in another font."""
+        super().changeEvent(event)
+        if event.type() == QtCore.QEvent.Type.FontChange:
+            self._place()
+
+    def _dismiss_at_pull(self) -> None:
+        if self._editor.session.is_dragging or self._editor.widgets.puller.is_waiting:
+            self.dismiss()
+
+    def _place(self) -> None:
+        """Put the cards side by side or one below the other, where they hide less of the body."""
+        width = _SIZE[0] + 3 * _MARGIN + _LETTERS * self.fontMetrics().averageCharWidth()
+        height = max(card.heightForWidth(width) for card in self._cards)
+        right, down = width + _MARGIN, height + _MARGIN
+        steps = [(0, down)]
+        if 3 * right <= self._view.width() - _CUBE:
+            steps.append((right, 0))
+        places = [[QtCore.QRect(k * x, k * y, width, height) for k in range(3)] for x, y in steps]
+        body = self._body()
+        place = min(places, key=lambda cards: sum(_inside(card, body) for card in cards))
+        shape = QtGui.QRegion()
+        for card, rectangle in zip(self._cards, place, strict=True):
+            card.setGeometry(rectangle)
+            shape = shape.united(QtGui.QRegion(rectangle))
+        self.setGeometry(shape.boundingRect().translated(_MARGIN, _MARGIN))
+        self.setMask(shape)  # the view receives clicks between them
+
+    def _body(self) -> NDArray[np.float64]:
+        """Return points (k, 2) of the surface, in pixels of this widget."""
+        x = self._editor.session.vertices
+        points = self._editor.view.to_display(x[:: max(1, len(x) // _SAMPLES)])[:, :2]
+        points = points / self._view.devicePixelRatioF()
+        points[:, 1] = self._view.height() - points[:, 1]
+        return np.asarray(points - _MARGIN)
+
+
+class _Card(QtWidgets.QWidget):
+    """A drawing, a word and a sentence."""
+
+    def __init__(self, parent: Any, draw: Callable[[Any], None], word: str, sentence: str) -> None:
+        super().__init__(parent)
+        self._draw = draw
+        words = QtWidgets.QLabel(f"<b>{word}</b><br>{sentence}")
+        words.setWordWrap(True)
+        layout = QtWidgets.QHBoxLayout(self)
+        layout.setContentsMargins(_MARGIN, _MARGIN, _MARGIN, _MARGIN)
+        layout.setSpacing(0)
+        layout.addSpacing(_SIZE[0] + _MARGIN)
+        layout.addWidget(words, 1)
+
+    def paintEvent(self, event: Any) -> None:  # noqa: N802, ARG002 - Qt's name
+        """Draw the card."""
+        palette, roles = self.palette(), QtGui.QPalette.ColorRole
+        painter = QtGui.QPainter(self)
+        painter.setRenderHint(QtGui.QPainter.RenderHint.Antialiasing)
+        fill, line = palette.color(roles.Base), palette.color(roles.Text)
+        fill.setAlphaF(_OPACITY)
+        line.setAlphaF(0.25)
+        painter.setPen(line)
+        painter.setBrush(fill)
+        painter.drawRoundedRect(QtCore.QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5), 6, 6)
+        painter.translate(_MARGIN, 0.5 * (self.height() - _SIZE[1]))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.setPen(_pen(palette.color(roles.Text)))
+        self._draw(painter)
+        painter.end()
+
+
+def _nothing() -> None:
+    pass
+
+
+def _inside(card: Any, points: NDArray[np.float64]) -> int:
+    """Return how many of the *points* (k, 2) are in a rectangle."""
+    low, high = (card.left(), card.top()), (card.right(), card.bottom())
+    return int(np.all((points >= low) & (points <= high), axis=1).sum())
+
+
+def _pen(colour: Any) -> Any:
+    caps, joins = Qt.PenCapStyle, Qt.PenJoinStyle
+    return QtGui.QPen(colour, 2.0, Qt.PenStyle.SolidLine, caps.RoundCap, joins.RoundJoin)
+
+
+def _surface(painter: Any, height: float) -> None:
+    """Draw a surface with a bump of this *height*."""
+    path = QtGui.QPainterPath(QtCore.QPointF(2.0, 28.0))
+    path.cubicTo(12.0, 28.0, 14.0, 28.0 - height, 20.0, 28.0 - height)
+    path.cubicTo(26.0, 28.0 - height, 28.0, 28.0, 38.0, 28.0)
+    painter.drawPath(path)
+
+
+def _pin(painter: Any) -> None:
+    _surface(painter, 6.0)
+    painter.setPen(_pen(QtGui.QColor(_ACCENT)))
+    painter.setBrush(QtGui.QColor(_ACCENT))
+    painter.drawEllipse(QtCore.QPointF(20.0, 8.0), 4.0, 4.0)
+    painter.drawLine(QtCore.QPointF(20.0, 12.0), QtCore.QPointF(20.0, 21.0))
+
+
+def _pull(painter: Any) -> None:
+    _surface(painter, 14.0)
+    painter.setPen(_pen(QtGui.QColor(_ACCENT)))
+    painter.drawPolyline([QtCore.QPointF(x, y) for x, y in ((15, 7), (20, 2), (25, 7))])
+    painter.drawLine(QtCore.QPointF(20.0, 2.0), QtCore.QPointF(20.0, 11.0))
+
+
+def _done(painter: Any) -> None:
+    _surface(painter, 20.0)
+    painter.setPen(_pen(QtGui.QColor(_ACCENT)))
+    painter.drawPolyline([QtCore.QPointF(x, y) for x, y in ((28, 7), (32, 11), (40, 2))])
