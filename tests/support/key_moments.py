@@ -240,7 +240,7 @@ class Stand:
         shift = np.array(
             [6.0, 24.0] if mode in (Mode.PULL, Mode.CAGES, Mode.DEFORM) else [4.0, 2.0]
         )
-        return [np.round(self.hand.at(at) + share * shift) for share in (0.0, 0.4, 0.7, 1.0)]
+        return [np.round(self.hand.at(at) + share * shift) for share in (0.0, 0.6, 1.0)]
 
     def drag(self, mode: Mode) -> np.ndarray:
         """Press and drag, and return the place without releasing the button."""
@@ -288,7 +288,12 @@ class Stand:
 
     def just_after(self, mode: Mode, *keys: str) -> None:
         """Type *keys* after a drag, while the pose still converges."""
-        expected, dragged = self.long_after(mode, *keys), self.long_after(mode)
+        dragged = self.long_after(mode)
+        bindings = [binding_of(key, mode) for key in keys]
+        if all(binding is not None and binding.while_busy for binding in bindings):
+            expected = dragged  # which is what keys must leave that are allowed in a job
+        else:
+            expected = self.long_after(mode, *keys)
         self.begin(mode)
         self.hand.release(self.drag(mode))
         assert any(widget.is_refining for widget in self.refining)
@@ -440,6 +445,8 @@ class HandStand(Stand):
 
     def loop(self):
         self._host.tick()
+        if self.editor.is_busy:
+            time.sleep(0.001)  # leave the interpreter to the thread of the job
 
     def has_timers(self):
         return self._host.is_running
