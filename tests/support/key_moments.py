@@ -34,6 +34,7 @@ from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.widgets import DeformEditor, Mode, Paint, Tool
 from vtk_segdeform.widgets.editor.bindings import BINDINGS, binding_of
 from vtk_segdeform.widgets.handle_dragger import live_solve
+from vtk_segdeform.widgets.scene import draft, viewpoint
 from vtk_segdeform.widgets.scene.view import View
 
 KEYS = sorted(
@@ -90,9 +91,14 @@ def ends_the_drag(key: str, mode: Mode) -> bool:
 
 
 def slow_down(monkeypatch) -> None:
-    """Limit every move and every tick to one step, so that converging takes a while."""
+    """Limit every move and every tick to one step, so that converging takes a while.
+
+    What lasts a fixed time, drafts and turns of the camera, is shortened instead.
+    """
     for name in ("_MOST_STEPS", "_LEAST_REFINE_STEPS"):
         monkeypatch.setattr(live_solve, name, 1)
+    monkeypatch.setattr(draft, "_REST", 0.0)
+    monkeypatch.setattr(viewpoint, "_DURATION", 0.001)
 
 
 @dataclass(frozen=True)
