@@ -104,7 +104,7 @@ def ready():
 def bench(ready):
     """Yield an editor over a session that is ready, in a plain view."""
     mesh, state = ready
-    made = Bench(plain_view((500, 400)), Session(mesh, state=state))
+    made = Bench(plain_view((400, 320)), Session(mesh, state=state))
     yield made
     assert made.hand.failures == []
     made.editor.remove()
@@ -113,7 +113,7 @@ def bench(ready):
 @pytest.fixture
 def bare():
     """Yield an editor over a mesh without regions."""
-    made = Bench(plain_view((500, 400)), sausage().mesh)
+    made = Bench(plain_view((400, 320)), sausage().mesh)
     yield made
     made.editor.remove()
 
