@@ -34,6 +34,7 @@ from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.widgets import DeformEditor, Mode, Paint, Tool
 from vtk_segdeform.widgets.editor.bindings import BINDINGS, binding_of
 from vtk_segdeform.widgets.handle_dragger import live_solve
+from vtk_segdeform.widgets.scene import draft, viewpoint
 from vtk_segdeform.widgets.scene.view import View
 
 KEYS = sorted(
@@ -90,9 +91,14 @@ def ends_the_drag(key: str, mode: Mode) -> bool:
 
 
 def slow_down(monkeypatch) -> None:
-    """Limit every move and every tick to one step, so that converging takes a while."""
+    """Limit every move and every tick to one step, so that converging takes a while.
+
+    What lasts a fixed time, drafts and turns of the camera, is shortened instead.
+    """
     for name in ("_MOST_STEPS", "_LEAST_REFINE_STEPS"):
         monkeypatch.setattr(live_solve, name, 1)
+    monkeypatch.setattr(draft, "_REST", 0.0)
+    monkeypatch.setattr(viewpoint, "_DURATION", 0.001)
 
 
 @dataclass(frozen=True)
@@ -240,7 +246,7 @@ class Stand:
         shift = np.array(
             [6.0, 24.0] if mode in (Mode.PULL, Mode.CAGES, Mode.DEFORM) else [4.0, 2.0]
         )
-        return [np.round(self.hand.at(at) + share * shift) for share in (0.0, 0.4, 0.7, 1.0)]
+        return [np.round(self.hand.at(at) + share * shift) for share in (0.0, 0.6, 1.0)]
 
     def drag(self, mode: Mode) -> np.ndarray:
         """Press and drag, and return the place without releasing the button."""
@@ -288,7 +294,12 @@ class Stand:
 
     def just_after(self, mode: Mode, *keys: str) -> None:
         """Type *keys* after a drag, while the pose still converges."""
-        expected, dragged = self.long_after(mode, *keys), self.long_after(mode)
+        dragged = self.long_after(mode)
+        bindings = [binding_of(key, mode) for key in keys]
+        if all(binding is not None and binding.while_busy for binding in bindings):
+            expected = dragged  # which is what keys must leave that are allowed in a job
+        else:
+            expected = self.long_after(mode, *keys)
         self.begin(mode)
         self.hand.release(self.drag(mode))
         assert any(widget.is_refining for widget in self.refining)
@@ -440,6 +451,8 @@ class HandStand(Stand):
 
     def loop(self):
         self._host.tick()
+        if self.editor.is_busy:
+            time.sleep(0.001)  # leave the interpreter to the thread of the job
 
     def has_timers(self):
         return self._host.is_running

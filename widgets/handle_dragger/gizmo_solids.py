@@ -5,6 +5,7 @@ The outline is a slightly thicker copy of the solid, of which only the back face
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -80,8 +81,12 @@ class Solid:
             self._renderer.RemoveActor(actor)
 
 
+@functools.cache
 def solid_of(part: Part, *, outline: float = 0.0) -> Any:
-    """Return a part as vtkPolyData, thicker by the thickness of an *outline*."""
+    """Return a part as vtkPolyData, thicker by the thickness of an *outline*.
+
+    It is made once and shared by all gizmos: do not modify it.
+    """
     line = line_of(part)
     if part.kind is Kind.FREE:
         ball = vtkSphereSource()

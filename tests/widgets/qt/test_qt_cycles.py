@@ -37,7 +37,7 @@ from vtk_segdeform.session.session import Session
 from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.qt.widget import DeformWidget, deform_dock
 
-WARM = 2  # cycles until caches, fonts and shaders are loaded
+WARM = 1  # cycles until caches, fonts and shaders are loaded
 # Memory is stable after a dozen cycles.  A leak per cycle would be 0.45 MiB for a bound session,
 # 0.8 for the actors of the mesh, 4 for an editor; allocators vary by a few MiB in all.  A window of
 # plain VTK with a sphere loses 0.3 by itself.
