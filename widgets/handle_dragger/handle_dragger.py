@@ -6,8 +6,8 @@ vertices of any handle activates that handle and moves it in the view plane.
 
     x, y, z     while moving: constrain to the axis; again: to the plane perpendicular to it;
                 again: no constraint.  While rotating: about the axis; again: no constraint
-    shift       move slowly
-    control     rotate in steps of 15 degrees
+    control     move in steps of about 1 % of the diagonal, rotate in steps of 5 degrees
+    shift       move slowly; with control in finer steps
     a number, enter             move by exactly that much; see `number_entry`
     escape, right button        cancel
 
@@ -33,7 +33,7 @@ from ..scene import Gesture, Phase, Pointer, SurfaceDisplay, Widget
 from .gizmo import Gizmo
 from .gizmo_shapes import FREE, Kind, Part
 from .handle_marks import HandleMarks
-from .handle_motion import Grip, Motion, next_constraint
+from .handle_motion import Grip, Motion, next_constraint, step_of
 from .live_solve import LiveSolve
 from .number_entry import NumberEntry
 
@@ -217,7 +217,8 @@ class HandleDragger(Widget):
         assert gizmo.centre is not None  # the press was on the gizmo or on a visible handle
         tolerance = 0.0 if point is None else _CLICK_TOLERANCE
         point = gizmo.centre if point is None else point
-        grip = Grip(point, gizmo.centre, gizmo.axes, gizmo.radius)
+        step = step_of(session.mesh.diagonal)
+        grip = Grip(point, gizmo.centre, gizmo.axes, gizmo.radius, step)
         motion = self._motion_of(part, grip, press)
         self._grabbed, self._constraint = part, None
         entry = self._entry = NumberEntry()
