@@ -38,11 +38,12 @@ from ..deformer import (
     Deformer,
     checked_constraints,
     checked_locality,
+    checked_point,
     checked_radius,
     checked_vertex,
 )
 from ..errors import CageError, RegionError, SessionError
-from ..geometry import Lids, local_volume_change
+from ..geometry import Lids, local_volume_change, rigid_fit
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part
 from ..regions import Regions, segment
@@ -513,6 +514,39 @@ class Session(Timeline):
         after = handles.renamed(self._state, name, new_name)
         if name != new_name:
             self._step(f"rename {name}", after)
+
+    def pivot(self, name: str) -> FloatArray:
+        """Return the point (3,) about which a handle rotates: by default its centre."""
+        handles.require_handle(self.handles, name)
+        ids, at_rest = self.handles[name], self._state.pivots.get(name)
+        if at_rest is None:
+            return np.asarray(self.vertices[ids].mean(axis=0))
+        R, shift = rigid_fit(self.mesh.vertices[ids], self.targets[name])
+        return np.asarray(R @ at_rest + shift)
+
+    def set_pivot(self, name: str, point: ArrayLike | None) -> None:
+        """Move the pivot of a handle to *point* (3,), from where it moves with the handle.
+
+        None resets it to the centre of the handle.
+
+        Raises
+        ------
+        ConstraintError
+            If there is no such handle, or *point* is not a point or too far away.
+        """
+        handles.require_handle(self.handles, name)
+        pivots = {other: at for other, at in self._state.pivots.items() if other != name}
+        if point is not None:
+            place = checked_point(point, "point")
+            handles.require_near(self.mesh, place, "coordinates of point")
+            ids = self.handles[name]
+            R, shift = rigid_fit(self.mesh.vertices[ids], self.targets[name])
+            pivots[name] = (place - shift) @ R
+            frozen(pivots[name])
+        elif name not in self._state.pivots:
+            return
+        label = f"{'reset' if point is None else 'move'} the pivot of {name}"
+        self._step(label, replace(self._state, pivots=MappingProxyType(pivots)))
 
     # The pose.
 

@@ -19,7 +19,7 @@ A, so that R is constant within a step and refitted at each new pose.  Its step 
     `GaussNewton._retract`    p + h, moved along Z onto g = 0
     `GaussNewton.minimise`    the iteration
 
-Four things are added; the numbers are of the cactus bent by 60 degrees:
+Five things are added; the numbers are of the cactus bent by 60 degrees:
 
 1. *Exact volume.*  Along Z the volume is a cubic of the step length; its root is the last operation
    of every step (`exact_volume`).  |dV| / V is then about 1e-15; (21) alone leaves 1e-4.  For a
@@ -32,6 +32,8 @@ Four things are added; the numbers are of the cactus bent by 60 degrees:
    since H was factored.
 4. *Safeguard.*  All iterates meet the constraints, so the objective itself is the merit: where it
    rises, the plain step replaces the accelerated one, and is shortened (epsilon, section 3.3).
+5. *Extrapolation.*  Targets of a drag move on as they did before, and the cages with them: a solve
+   starts farther along the way of the last two, if the objective is lower there.
 
 Source
 ------
@@ -67,6 +69,7 @@ _CLOSE = 1e-2  # of the paper's step: below it multipliers are accurate enough f
 _FAR = 2e-2  # beyond it volume Hessians are not valid at the end of the step
 _LONG = 1e-2  # beyond it H is computed again
 _OLD = 20  # steps after which H is computed again
+_FARTHEST = 2.0  # of the way between the last two solves: farther the next one does not start
 _NO_SURFACE = np.empty((0, 3))
 
 
@@ -126,6 +129,15 @@ class _Iterate:
         """Return the same pose for other targets."""
         value, slope = term.value_and_slope(self.p)
         return replace(self, merit=self.shape + value, slope=self.shape_slope + slope)
+
+
+@dataclass(frozen=True, eq=False)
+class _End:
+    """Where a solve ended."""
+
+    p: FloatArray
+    targets: FloatArray
+    directions: tuple[FloatArray, ...]
 
 
 @dataclass(eq=False)
@@ -191,6 +203,7 @@ class GaussNewton:
     _factor: Factor = field(init=False, repr=False)
     _state: _State | None = field(init=False, repr=False, default=None)
     _last: _Iterate | None = field(init=False, repr=False, default=None)
+    _ends: tuple[_End, ...] = field(init=False, repr=False, default=())  # of the last two targets
 
     def __post_init__(self) -> None:
         hessian = self.energy.quadratic + self.positions.quadratic()
@@ -219,6 +232,7 @@ class GaussNewton:
     def forget(self) -> None:
         """Discard the running state: the next call begins like the first."""
         self._state = self._last = None
+        self._ends = ()
 
     def minimise(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> SolverResult:
         """Iterate from cage vertices *p* (m, 3) for positions *targets* (k, 3).
@@ -227,7 +241,7 @@ class GaussNewton:
         """
         state = self._begin(p, targets, options)
         term = self.positions.toward(targets)
-        here = self._iterate_at(p, term)
+        here = self._ahead(self._iterate_at(p, term), targets, term, options)
         merits = [here.merit]
         multipliers = np.zeros(len(self.volumes.constraints))
         directions: list[FloatArray] = []
@@ -274,6 +288,8 @@ class GaussNewton:
             here = ahead
             merits.append(here.merit)
         self._state, self._last = state.ended_at(here.p, targets, options), here
+        others = [end for end in self._ends if not np.array_equal(end.targets, targets)]
+        self._ends = (*others[-1:], _End(here.p, targets, tuple(directions)))
         return SolverResult(
             p=here.p,
             multipliers=multipliers,
@@ -367,6 +383,21 @@ class GaussNewton:
         if last is None or last.p is not p:
             return self._evaluate(p, self._surface(p), term)
         return last.toward(term)
+
+    def _ahead(
+        self, here: _Iterate, targets: FloatArray, term: TargetTerm, options: SolverOptions
+    ) -> _Iterate:
+        """Return the start for *targets*: *here*, or on along the way between the last two ends."""
+        if not options.acceleration or len(self._ends) < 2:
+            return here
+        before, last = self._ends
+        way = last.targets - before.targets
+        share = min(float(np.vdot(targets - last.targets, way) / np.vdot(way, way)), _FARTHEST)
+        if not share > 0.0 or len(last.directions) != len(self.volumes.constraints):
+            return here
+        guess = here.p + share * (last.p - before.p)
+        ahead = self._retract(guess, last.directions, term, options)
+        return ahead if ahead.merit < here.merit else here
 
     def _shortened(
         self,

@@ -1,6 +1,6 @@
 """Moving and rotating handles with the mouse; the mesh follows at every move.
 
-The active handle has a gizmo at its centre.  The ball moves it in the view plane, an arrow along an
+The active handle has a gizmo at its pivot, by default its centre.  The ball moves it in the view plane, an arrow along an
 axis, a square in a plane; a ring rotates it, the outer one about the line of sight.  A press on the
 vertices of any handle activates that handle and moves it in the view plane.
 
@@ -303,4 +303,4 @@ class HandleDragger(Widget):
         axes = np.eye(3)
         if self._local:
             axes = rigid_fit(session.mesh.vertices[ids], session.targets[name])[0].T
-        self.gizmo.place(session.vertices[ids].mean(axis=0), axes)
+        self.gizmo.place(session.pivot(name), axes)
