@@ -665,6 +665,31 @@ class Session(Timeline):
         self._set_handles(after, f"add {name}")
         return name
 
+    def make_handle(self, name: str, *, radius: float | None = None) -> str:
+        """Make a pin or pulled point a handle of the surface around it, and return its new name.
+
+        Unlike a single vertex, the handle can rotate.
+
+        Parameters
+        ----------
+        name : str
+            The pin or pulled point.
+        radius : float, optional
+            As in `pull`; the handle has the surface within half of it.
+        """
+        handles.require_handle(self.handles, name)
+        radius = checked_radius(self.mesh, radius)
+        new, after = pulling.as_handle(self.mesh, self._state, name, radius)
+        self._replace_handles(after, f"make {name} {new}")
+        return new
+
+    def make_pin(self, name: str) -> str:
+        """Make a handle a pin at its middle vertex, and return its new name."""
+        handles.require_handle(self.handles, name)
+        new, after = pulling.as_pin(self.mesh, self._state, name)
+        self._replace_handles(after, f"make {name} {new}")
+        return new
+
     def move_handle(
         self,
         name: str,
@@ -813,10 +838,17 @@ class Session(Timeline):
         self._step(label, replace(self._state, cages=cages, pose=None, locality=None))
 
     def _set_handles(self, after: Mapping[str, IntArray], label: str) -> None:
+        pivots = self._state.pivots
+        if pivots.keys() - after.keys():
+            pivots = MappingProxyType({name: pivots[name] for name in pivots if name in after})
+        self._replace_handles(replace(self._state, handles=after, pivots=pivots), label)
+
+    def _replace_handles(self, after: State, label: str) -> None:
+        """Record a step to *after* with targets for its handles; the mesh does not move."""
         pose = self._state.pose
         if pose is not None:
-            pose = handles.with_handles(pose, self.handles, after, self.vertices)
-        self._step(label, replace(self._state, handles=after, pose=pose))
+            pose = handles.with_handles(pose, self.handles, after.handles, self.vertices)
+        self._step(label, replace(after, pose=pose))
 
 
 def _prepared(state: State, *, regions: Regions, cages: tuple[Cage, ...]) -> State:

@@ -297,7 +297,7 @@ def remove_handle(controller: Controller) -> None:
     """Remove the selected handle."""
     _handle_names(controller)
     widgets = controller.widgets
-    name = widgets.dragger.handle if controller.mode is Mode.DEFORM else widgets.selector.handle
+    name = widgets.selector.handle if controller.mode is Mode.HANDLES else widgets.dragger.handle
     if name is None:
         raise ConstraintError("No handle selected. Press N to select one")
     controller.session.remove_handle(name)
@@ -319,6 +319,32 @@ def move_pivot(controller: Controller) -> None:
         raise ConstraintError("Point at the surface where the pivot should be")
     session.set_pivot(name, point)
     controller.say(f"Pivot of {name} {'reset' if point is None else 'moved'}")
+
+
+def convert_handle(controller: Controller) -> None:
+    """Make the pin under the pointer, or else the handle with the gizmo, a handle or a pin."""
+    if controller.mode is Mode.PULL:
+        name = controller.widgets.puller.marker_under_pointer()
+        if name is None:
+            raise ConstraintError("Point at a pin to make it a handle")
+    else:
+        name = _dragged_handle(controller)
+    converting(name)(controller)
+
+
+def converting(name: str) -> Action:
+    """Return the action that makes a pin or pulled point a handle, and a handle a pin."""
+
+    def convert(controller: Controller) -> None:
+        session, widgets = controller.session, controller.widgets
+        if name in widgets.puller.marked:
+            new = session.make_handle(name, radius=widgets.puller.radius)
+        else:
+            new = session.make_pin(name)
+        widgets.selector.handle = widgets.dragger.handle = new
+        controller.say(f"{name} is {new} now")
+
+    return convert
 
 
 def reset_pivot(controller: Controller) -> None:

@@ -87,6 +87,7 @@ BINDINGS = (
     Binding(("a",), frozenset({H}), "New handle", actions.new_handle),
     Binding(("n", "tab"), frozenset({H, D}), "Next handle", actions.next_handle),
     Binding(("delete", "backspace"), frozenset({H, D}), "Remove handle", actions.remove_handle),
+    Binding(("m",), DRAGGING, "Make a pin a handle, or back", actions.convert_handle),
     Binding(("l",), frozenset({D}), "Local or global axes", actions.toggle_local_axes),
     Binding(("v",), frozenset({D}), "Pivot under the pointer, or reset", actions.move_pivot),
     Binding(("o",), frozenset({P, C, D}), "Show local volume change", actions.toggle_overlay),

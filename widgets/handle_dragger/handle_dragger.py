@@ -1,8 +1,9 @@
 """Moving and rotating handles with the mouse; the mesh follows at every move.
 
-The active handle has a gizmo at its pivot, by default its centre.  The ball moves it in the view plane, an arrow along an
-axis, a square in a plane; a ring rotates it, the outer one about the line of sight.  A press on the
-vertices of any handle activates that handle and moves it in the view plane.
+The active handle has a gizmo at its pivot, by default its centre.  The ball moves it in the view
+plane, an arrow along an axis, a square in a plane; a ring rotates it, the outer one about the line
+of sight.  A press on the vertices of any handle activates that handle and moves it in the view
+plane.
 
     x, y, z     while moving: constrain to the axis; again: to the plane perpendicular to it;
                 again: no constraint.  While rotating: about the axis; again: no constraint

@@ -149,6 +149,10 @@ class Puller(Widget):
         """The names of the pins and pulled points."""
         return tuple(marked_vertices(self.session))
 
+    def marker_under_pointer(self) -> str | None:
+        """Return the pin or pulled point under the pointer, or None."""
+        return self._markers.at(self.view.pointer(Phase.HOVER))
+
     def On(self) -> None:  # noqa: N802 - VTK's word
         """Start handling events, and show pins and pulled points."""
         if not self.GetEnabled():
