@@ -82,6 +82,18 @@ def test_acceleration_finds_the_plain_iterations_answer_in_fewer_steps():
     assert fast.steps < 0.5 * plain.steps
 
 
+def test_a_steady_drag_starts_ahead_and_ends_in_the_same_poses():
+    ahead, behind = SCENE.held(), SCENE.held()
+    for angle in (3.0, 6.0, 9.0, 12.0):
+        behind._continuation.solver._ends = ()
+        fast, slow = (each.solve(SCENE.turned(angle), max_steps=50) for each in (ahead, behind))
+        assert abs(fast.volume_change) < 1e-13
+        assert distance(fast, slow) < 1e-4
+        if angle > 6.0:
+            assert np.ptp(fast.merits) < 0.3 * np.ptp(slow.merits)
+    assert distance(*(each.solve(SCENE.turned(12.0)) for each in (ahead, behind))) < 1e-5
+
+
 def test_rotation_clusters_stay_close_to_a_rotation_for_each_vertex():
     targets = SCENE.turned(30)
     fine = SCENE.deformer(rotation_groups=None).solve(targets)

@@ -187,10 +187,9 @@ class Motion:
 
 def _grid(projection: Projection, part: Part, axes: FloatArray) -> FloatArray:
     """Return the directions (k, 3) along which a translation by *part* is stepped."""
-    if part.kind is Kind.AXIS:
-        return axes[[part.axis]]
-    if part.kind is Kind.PLANE:
-        return np.delete(axes, part.axis, axis=0)
+    if part.axis is not None:
+        is_grid = (np.arange(3) == part.axis) == (part.kind is Kind.AXIS)
+        return np.asarray(axes[is_grid])
     right = np.cross(projection.view_direction, projection.camera.GetViewUp())
     right = right / np.linalg.norm(right)
     return np.stack([right, np.cross(right, projection.view_direction)])

@@ -470,6 +470,34 @@ def test_control_moves_in_whole_steps(part):
     assert not bench.hand.failures
 
 
+def test_typed_degrees_rotate_about_a_moved_pivot_and_escape_restores(bench):
+    session, hand = bench.session, bench.hand
+    pivot = bench.gizmo.centre + [0.3, -0.2, 0.1]
+    session.set_pivot(TIP, pivot)
+    assert np.allclose(bench.gizmo.centre, pivot, atol=1e-12)
+    start = bench.targets()
+    for keys, degrees, caption in (
+        (["6", "5", "BackSpace", "minus"], -6.0, "z -6_°"),
+        (["minus", "2", "period", "5"], -2.5, "z -2.5_°"),
+    ):
+        hand.press(bench.aim(VIEW_RING))
+        hand.key("z")
+        for key in keys:
+            hand.key(key)
+        hand.move((200, 200))  # ignored from now on
+        assert bench.captions == [caption]
+        R = rotation([0.0, 0.0, 1.0], np.radians(degrees))
+        assert np.allclose(bench.targets(), (start - pivot) @ R.T + pivot, atol=1e-9)
+        assert np.allclose(bench.gizmo.centre, pivot, atol=1e-9)
+        hand.key("Escape")
+        hand.release()
+        assert np.array_equal(bench.targets(), start)
+    hand.press(bench.aim(VIEW_RING))
+    for key in ("z", "3", "Return"):
+        hand.key(key)
+    assert session.undo_label == "rotate handle 1"
+
+
 # Handles.
 
 
