@@ -24,14 +24,14 @@ class Change(enum.Flag):
     """`Session.cages`, at rest."""
     CONSTRAINTS = enum.auto()
     """`Session.fixed`, or the names or vertices of `Session.handles`."""
-    PIVOTS = enum.auto()
-    """`Session.pivot` of a handle."""
     POSE = enum.auto()
     """`Session.vertices`, `Session.cage_vertices`, `Session.targets`."""
     OPTIONS = enum.auto()
     """`Session.options`."""
     HISTORY = enum.auto()
     """The steps to undo or redo."""
+    PIVOTS = enum.auto()
+    """`Session.pivot` of a handle."""
 
 
 Listener = Callable[[Change], None]
