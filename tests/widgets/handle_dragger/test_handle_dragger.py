@@ -446,7 +446,7 @@ def test_control_rotates_in_steps_of_five_degrees_and_with_shift_of_one():
 @pytest.mark.parametrize("part", [FREE, Part(Kind.AXIS, 0), Part(Kind.PLANE, 2)])
 def test_control_moves_in_whole_steps(part):
     bench = Bench(parallel=True)
-    view, step = bench.view, 0.05  # 1 % of a diagonal of 5.3
+    view, step = bench.view, 0.05  # about 1 % of the diagonal
     right = np.cross(view.view_direction, view.camera.GetViewUp())
     right /= np.linalg.norm(right)
     grid = {
