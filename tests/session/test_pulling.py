@@ -368,3 +368,29 @@ def test_in_a_live_pull_the_grabbed_vertex_keeps_to_the_pointer():
     while session.refine(max_steps=3, within=0.0025).status is Status.STEP_LIMIT:
         pass
     assert moved(session, pulled(shift=2.0 * UP).vertices) < 1e-4
+
+
+def test_a_pin_becomes_a_handle_that_can_rotate_and_a_pin_again():
+    session = pulled()
+    session.pin(LOW)
+    before = session.vertices
+    handle = session.make_handle("pin 1", radius=0.15 * D)
+    other = session.make_handle("pull 1")
+    assert (handle, other) == ("handle 1", "handle 2") == tuple(sorted(session.handles))
+    assert session.state.pulls == ()
+    for name, vertex in ((handle, LOW), (other, HIGH)):
+        ids = session.handles[name]
+        assert vertex in ids
+        assert len(ids) > 3
+        assert np.linalg.norm(X[ids] - X[vertex], axis=1).max() < 0.15 * D
+        assert_array_equal(session.targets[name], session.vertices[ids])
+    assert_array_equal(session.vertices, before)
+    session.move_handle(handle, np.diag([1.0, 1.0, 1.1, 1.0]))
+    session.commit()
+    assert session.make_pin(handle) == "pin 1"
+    assert session.handles["pin 1"].shape == (1,)
+    for label in ("make handle 1 pin 1", "drag handle 1", "make pull 1 handle 2"):
+        assert session.undo() == label
+    assert session.undo() == "make pin 1 handle 1"
+    assert (set(session.handles), session.state.pulls) == ({"pull 1", "pin 1"}, ("pull 1",))
+    assert_array_equal(session.vertices, before)

@@ -21,6 +21,7 @@ from vtk_segdeform.session.history import History
 from vtk_segdeform.session.listeners import Change
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.session.state import Options, State
+from vtk_segdeform.session.store import load_session, save_session
 from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.subspace.subspace import cage_subspace
 from vtk_segdeform.widgets.volume_overlay.region_volumes import RegionVolumes
@@ -940,3 +941,32 @@ def test_letting_the_volume_go_binds_nothing_anew_and_it_comes_back_exactly():
     assert session.is_bound
     session.move_handle("tip", up(0.1))
     assert volume_error(session) < 1e-12
+
+
+def test_a_pivot_moves_with_its_handle_is_undone_and_saved(tmp_path):
+    session = Session(SCENE.mesh, state=State(SCENE.regions, SCENE.cages))
+    name = session.add_handle(SCENE.handle)
+    assert_allclose(session.pivot(name), SCENE.mesh.vertices[SCENE.handle].mean(axis=0))
+    turn = np.eye(4)
+    turn[:3, :3], turn[:3, 3] = rotation([1.0, 2.0, 0.5], 0.2), [0.1, 0.2, 0.0]
+    session.set_pivot(name, [0.5, 0.1, 0.2])
+    session.move_handle(name, turn, max_steps=2)
+    there = turn[:3, :3] @ [0.5, 0.1, 0.2] + turn[:3, 3]
+    assert_allclose(session.pivot(name), there, atol=1e-12)
+    session.rename_handle(name, "tip")
+    assert_allclose(session.pivot("tip"), there, atol=1e-12)
+    save_session(tmp_path / "pivot.segdeform", session)
+    assert_array_equal(
+        load_session(tmp_path / "pivot.segdeform").pivot("tip"), session.pivot("tip")
+    )
+    session.set_pivot("tip", None)
+    assert session.undo_label == "reset the pivot of tip"
+    assert not session.state.pivots
+    session.undo()
+    session.remove_handle("tip")
+    assert not session.state.pivots
+    for point in ([1.0, 2.0], [np.nan, 0.0, 0.0], [1e9, 0.0, 0.0]):
+        session.undo()
+        with pytest.raises(ConstraintError, match="point"):
+            session.set_pivot(*session.handles, point)
+        session.redo()

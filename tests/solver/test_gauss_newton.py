@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scenes import sausage
 
+from vtk_segdeform.solver.extrapolation import Way
 from vtk_segdeform.solver.solution import Status
 
 SCENE = sausage(2)  # 1026 vertices in two overlapping cages
@@ -80,6 +81,18 @@ def test_acceleration_finds_the_plain_iterations_answer_in_fewer_steps():
     assert plain.status is fast.status is Status.CONVERGED
     assert distance(plain, fast) < 1e-4
     assert fast.steps < 0.5 * plain.steps
+
+
+def test_a_steady_drag_starts_ahead_and_ends_in_the_same_poses():
+    ahead, behind = SCENE.held(), SCENE.held()
+    for angle in (1.0, 2.0, 3.0, 4.0):
+        behind._continuation.solver._way = Way()
+        fast, slow = (each.solve(SCENE.turned(angle), max_steps=50) for each in (ahead, behind))
+        assert abs(fast.volume_change) < 1e-13
+        assert distance(fast, slow) < 1e-4
+        if angle > 2.0:
+            assert np.ptp(fast.merits) < 0.3 * np.ptp(slow.merits)
+    assert distance(*(each.solve(SCENE.turned(4.0)) for each in (ahead, behind))) < 1e-5
 
 
 def test_rotation_clusters_stay_close_to_a_rotation_for_each_vertex():

@@ -169,7 +169,7 @@ def test_a_session_rejects_a_state_with_bad_parts(cls, bounded):
                 message = ""
                 accepted += 1
             assert len(message) < LONGEST, (each.name, kind)
-    assert accepted < 20
+    assert accepted < 22  # pivots may be any mapping: names of no handle do not count
 
 
 def _paths() -> list[tuple[Call, str]]:

@@ -109,13 +109,13 @@ def reach_and_follows(radius: float, locality: float) -> tuple[float, float]:
     return (radius / math.sqrt(locality) if locality else math.inf), 1.0 - locality
 
 
-def checked_point(to: ArrayLike) -> FloatArray:
-    """Return *to* as a point (3,); ConstraintError if it is none."""
-    array = plain(to, "to")
+def checked_point(to: ArrayLike, name: str = "to") -> FloatArray:
+    """Return *to* as a point (3,), checked as *name*; ConstraintError if it is none."""
+    array = plain(to, name)
     if array.shape != (3,):
-        raise ConstraintError(f"to must be a point (3,); got shape {array.shape}")
+        raise ConstraintError(f"{name} must be a point (3,); got shape {array.shape}")
     try:
-        return np.asarray(as_points(array[None], "to")[0])
+        return np.asarray(as_points(array[None], name)[0])
     except ValueError as fault:
         raise ConstraintError(str(fault)) from None
 

@@ -70,6 +70,9 @@ def renamed(state: State, name: str, new_name: str) -> State:
         return new_name if other == name else other
 
     handles = MappingProxyType({name_after(other): ids for other, ids in state.handles.items()})
+    if state.pivots:
+        pivots = {name_after(other): point for other, point in state.pivots.items()}
+        state = replace(state, pivots=MappingProxyType(pivots))
     if state.pose is None:
         return replace(state, handles=handles)
     targets = {name_after(other): points for other, points in state.pose.targets.items()}

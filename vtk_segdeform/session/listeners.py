@@ -30,6 +30,8 @@ class Change(enum.Flag):
     """`Session.options`."""
     HISTORY = enum.auto()
     """The steps to undo or redo."""
+    PIVOTS = enum.auto()
+    """`Session.pivot` of a handle."""
 
 
 Listener = Callable[[Change], None]

@@ -6,7 +6,8 @@ pulled points within the radius are carried along, the farther away the less.  A
 moves: all handles stay where they are, whether or not the solver had put them into their places.
 
 A pin is a handle of one vertex that stays in its place, "pin 1".  Both are handles like any other:
-they can be moved, named, and removed.
+they can be moved, named, and removed.  `as_handle` makes one a patch that can be rotated, and
+`as_pin` makes a handle a pin.
 
 The surface beyond the reach is kept where it was at the press, softly; see `Deformer.local`.  The
 more local a pull, the shorter its reach.
@@ -26,7 +27,15 @@ from ..arrays import FloatArray, IntArray, frozen, plain
 from ..deformer import LOCALITY, SPREAD, checked_point, checked_vertex, reach_and_follows
 from ..errors import ConstraintError
 from ..mesh import Mesh
-from .handles import Targets, moved, require_near, targets_at, with_handle
+from .handles import (
+    Targets,
+    moved,
+    new_name,
+    renamed,
+    require_near,
+    targets_at,
+    with_handle,
+)
 from .state import Locality, Pose, State
 
 _SAME_POINT = 0.25  # of the radius: a pulled point so close is grabbed again
@@ -105,9 +114,7 @@ def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
         handles = with_handle(mesh, state, name, [vertex])
         pulls = (*pulls, name)
     if turns and len(handles[name]) == 1:
-        patch = _patch(mesh, vertex, SPREAD * radius)
-        taken = [state.fixed, *(ids for other, ids in handles.items() if other != name)]
-        patch = np.setdiff1d(patch, np.concatenate(taken))
+        patch = _free_patch(mesh, replace(state, handles=handles), name, SPREAD * radius)
         handles = with_handle(mesh, state, name, patch)
     places = tuple(cage.vertices for cage in state.cages)
     places = places if state.pose is None else state.pose.cage_vertices
@@ -126,6 +133,37 @@ def pinned(mesh: Mesh, state: State, vertex: int) -> tuple[str, Mapping[str, Int
     return name, with_handle(mesh, state, name, [checked_vertex(mesh, vertex)])
 
 
+def as_handle(mesh: Mesh, state: State, name: str, radius: float) -> tuple[str, State]:
+    """Return a new name, and *state* with the pin or pulled point *name* as a handle of that name.
+
+    The handle has the surface within half of *radius*, which can rotate, and at least the vertices
+    beside it.  The pose in the returned state still has the targets of before.
+    """
+    new = new_name(state.handles)
+    after = renamed(state, name, new)
+    after = replace(after, pulls=tuple(other for other in state.pulls if other != name))
+    if len(after.handles[new]) == 1:
+        patch = _free_patch(mesh, after, new, SPREAD * radius)
+        after = replace(after, handles=with_handle(mesh, after, new, patch))
+    return new, after
+
+
+def as_pin(mesh: Mesh, state: State, name: str) -> tuple[str, State]:
+    """Return a new name, and *state* with the handle *name* as a pin: its middle vertex."""
+    new = _new_name(state, "pin")
+    after = renamed(state, name, new)
+    after = replace(after, pulls=tuple(other for other in state.pulls if other != name))
+    return new, replace(
+        after, handles=with_handle(mesh, after, new, [middle_vertex(mesh, after.handles[new])])
+    )
+
+
+def middle_vertex(mesh: Mesh, ids: IntArray) -> int:
+    """Return the vertex among *ids* (k,) that is nearest to their centre at rest."""
+    x = mesh.vertices[ids]
+    return int(ids[np.linalg.norm(x - x.mean(axis=0), axis=1).argmin()])
+
+
 def checked_motion(mesh: Mesh, to: ArrayLike) -> FloatArray:
     """Return *to* as a point (3,) or a matrix (4, 4); ConstraintError if it is neither."""
     array = plain(to, "to")
@@ -141,6 +179,14 @@ def checked_motion(mesh: Mesh, to: ArrayLike) -> FloatArray:
 def _new_name(state: State, kind: str) -> str:
     numbers = range(1, len(state.handles) + 2)
     return next(name for n in numbers if (name := f"{kind} {n}") not in state.handles)
+
+
+def _free_patch(mesh: Mesh, state: State, name: str, radius: float) -> IntArray:
+    """Return the patch around the handle *name*, of one vertex, that is free for it, (k,)."""
+    (vertex,) = state.handles[name]
+    others = [ids for other, ids in state.handles.items() if other != name]
+    patch = np.union1d(_patch(mesh, vertex, radius), mesh.adjacency[[vertex]].indices)
+    return np.setdiff1d(patch, np.concatenate([state.fixed, *others]))
 
 
 def _patch(mesh: Mesh, vertex: int, radius: float) -> IntArray:

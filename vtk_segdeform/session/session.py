@@ -38,11 +38,12 @@ from ..deformer import (
     Deformer,
     checked_constraints,
     checked_locality,
+    checked_point,
     checked_radius,
     checked_vertex,
 )
 from ..errors import CageError, RegionError, SessionError
-from ..geometry import Lids, local_volume_change
+from ..geometry import Lids, local_volume_change, rigid_fit
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part
 from ..regions import Regions, segment
@@ -523,6 +524,39 @@ class Session(Timeline):
         if name != new_name:
             self._step(f"rename {name}", after)
 
+    def pivot(self, name: str) -> FloatArray:
+        """Return the point (3,) about which a handle rotates: by default its centre."""
+        handles.require_handle(self.handles, name)
+        ids, at_rest = self.handles[name], self._state.pivots.get(name)
+        if at_rest is None:
+            return np.asarray(self.vertices[ids].mean(axis=0))
+        R, shift = rigid_fit(self.mesh.vertices[ids], self.targets[name])
+        return np.asarray(R @ at_rest + shift)
+
+    def set_pivot(self, name: str, point: ArrayLike | None) -> None:
+        """Move the pivot of a handle to *point* (3,), from where it moves with the handle.
+
+        None resets it to the centre of the handle.
+
+        Raises
+        ------
+        ConstraintError
+            If there is no such handle, or *point* is not a point or too far away.
+        """
+        handles.require_handle(self.handles, name)
+        pivots = {other: at for other, at in self._state.pivots.items() if other != name}
+        if point is not None:
+            place = checked_point(point, "point")
+            handles.require_near(self.mesh, place, "coordinates of point")
+            ids = self.handles[name]
+            R, shift = rigid_fit(self.mesh.vertices[ids], self.targets[name])
+            pivots[name] = (place - shift) @ R
+            frozen(pivots[name])
+        elif name not in self._state.pivots:
+            return
+        label = f"{'reset' if point is None else 'move'} the pivot of {name}"
+        self._step(label, replace(self._state, pivots=MappingProxyType(pivots)))
+
     # The pose.
 
     def drag(
@@ -639,6 +673,31 @@ class Session(Timeline):
         name, after = pulling.pinned(self.mesh, self._state, vertex)
         self._set_handles(after, "pin")
         return name
+
+    def make_handle(self, name: str, *, radius: float | None = None) -> str:
+        """Make a pin or pulled point a handle of the surface around it, and return its new name.
+
+        Unlike a single vertex, the handle can rotate.
+
+        Parameters
+        ----------
+        name : str
+            The pin or pulled point.
+        radius : float, optional
+            As in `pull`; the handle has the surface within half of it.
+        """
+        handles.require_handle(self.handles, name)
+        radius = checked_radius(self.mesh, radius)
+        new, after = pulling.as_handle(self.mesh, self._state, name, radius)
+        self._replace_handles(after, f"make {name} {new}")
+        return new
+
+    def make_pin(self, name: str) -> str:
+        """Make a handle a pin at its middle vertex, and return its new name."""
+        handles.require_handle(self.handles, name)
+        new, after = pulling.as_pin(self.mesh, self._state, name)
+        self._replace_handles(after, f"make {name} {new}")
+        return new
 
     def move_handle(
         self,
@@ -788,10 +847,17 @@ class Session(Timeline):
         self._step(label, replace(self._state, cages=cages, pose=None, locality=None))
 
     def _set_handles(self, after: Mapping[str, IntArray], label: str) -> None:
+        pivots = self._state.pivots
+        if pivots.keys() - after.keys():
+            pivots = MappingProxyType({name: pivots[name] for name in pivots if name in after})
+        self._replace_handles(replace(self._state, handles=after, pivots=pivots), label)
+
+    def _replace_handles(self, after: State, label: str) -> None:
+        """Record a step to *after* with targets for its handles; the mesh does not move."""
         pose = self._state.pose
         if pose is not None:
-            pose = handles.with_handles(pose, self.handles, after, self.vertices)
-        self._step(label, replace(self._state, handles=after, pose=pose))
+            pose = handles.with_handles(pose, self.handles, after.handles, self.vertices)
+        self._step(label, replace(after, pose=pose))
 
 
 def _prepared(state: State, *, regions: Regions, cages: tuple[Cage, ...]) -> State:

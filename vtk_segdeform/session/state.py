@@ -27,6 +27,7 @@ from ..regions import Regions
 from .listeners import Change
 from .naming import Names, checked_names, fault_of, region_name
 
+_NO_PIVOTS: Mapping[str, FloatArray] = MappingProxyType({})
 _TINY = float(np.finfo(np.float64).tiny)
 _FARTHEST = 1e6  # mesh diagonals; poses farther away are damaged, since no drag reaches so far
 # The options, as undo steps name them.
@@ -146,6 +147,8 @@ class State(Frozen):
     """Names of handles made by pulls; those of no handle do not count."""
     locality: Locality | None = None
     """Of the last pull, if the pose comes from a pull."""
+    pivots: Mapping[str, FloatArray] = field(default_factory=lambda: _NO_PIVOTS)
+    """For handles by name, (3,): the point about which they rotate, at rest, if it was moved."""
 
     @property
     def handle(self) -> IntArray:
@@ -159,6 +162,7 @@ class State(Frozen):
             (Change.NAMES, self.region_names == other.region_names),
             (Change.CAGES, self.cages == other.cages),  # cages are equal only if identical
             (Change.CONSTRAINTS, self.fixed is other.fixed and self.handles is other.handles),
+            (Change.PIVOTS, self.pivots is other.pivots),
             (Change.POSE, self.pose is other.pose),
             (Change.OPTIONS, self.options == other.options),
         )
@@ -206,9 +210,10 @@ def checked_state(mesh: Mesh, state: State) -> State:
     pulls, locality = all_of(state.pulls, str, "state.pulls"), state.locality
     if locality is not None:
         locality = _checked_locality(mesh, cages, require(locality, Locality, "state.locality"))
+    pivots = _checked_pivots(mesh, handles, require(state.pivots, Mapping, "state.pivots"))
     owned = MappingProxyType({name: _frozen_copy(ids) for name, ids in handles.items()})
     constraints = _frozen_copy(fixed), owned
-    return State(regions, cages, *constraints, pose, state.options, names, pulls, locality)
+    return State(regions, cages, *constraints, pose, state.options, names, pulls, locality, pivots)
 
 
 def of_mesh(mesh: Mesh, regions: Regions) -> Regions:
@@ -285,6 +290,22 @@ def _checked_locality(mesh: Mesh, cages: Sequence[Cage], locality: Locality) -> 
     if not (is_number(locality.follows, 0.0) and locality.follows <= 1.0):
         raise ConstraintError(f"follows must be from 0 to 1; got {shown(locality.follows)}")
     return replace(locality, cage_vertices=start.cage_vertices)
+
+
+def _checked_pivots(
+    mesh: Mesh, handles: Mapping[str, IntArray], pivots: Mapping[str, FloatArray]
+) -> Mapping[str, FloatArray]:
+    """Return the pivots of *handles*; ConstraintError unless they are points near *mesh*."""
+    if not pivots.keys() & handles.keys():
+        return _NO_PIVOTS
+    found = {}
+    for name in pivots.keys() & handles.keys():
+        (point,) = as_points([pivots[name]], f"pivot of {name}")
+        away = np.abs(point - mesh.vertices.mean(axis=0)).max() / mesh.diagonal
+        if not away <= _FARTHEST:
+            raise ConstraintError(f"the pivot of {name} is {away:.0e} mesh diagonals away")
+        found[name] = _frozen_copy(point)
+    return MappingProxyType(found)
 
 
 def _require_plausible(mesh: Mesh, pose: Pose) -> None:

@@ -180,6 +180,8 @@ def _write(
         vertex, reach, *lengths, _ = vars(state.locality).values()
         header["locality"] = [vertex, None if reach == math.inf else reach, *lengths]
         arrays["locality"] = np.concatenate(state.locality.cage_vertices)
+    if state.pivots:
+        header["pivots"] = {name: point.tolist() for name, point in state.pivots.items()}
     if given is not None:
         from .surface_store import surface_parts  # imports pyvista
 
@@ -234,7 +236,8 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
         reach = math.inf if reach is None else reach
         locality = Locality(_whole(vertex, "locality"), reach, spread, follows, tuple(kept))
     handles = dict(zip(sizes, ids, strict=True))
-    state = State(regions, cages, fixed, handles, pose, options, names, pulls, locality)
+    more = {"pivots": header["pivots"]} if "pivots" in header else {}
+    state = State(regions, cages, fixed, handles, pose, options, names, pulls, locality, **more)
     if "surface" not in header:
         return mesh, state
     from .surface_store import read_surface  # imports pyvista

@@ -7,6 +7,7 @@ The files, in reading order:
     position_constraints    fixed vertices and handles, eqs. (6) and (7)
     weights                 continuation of the position weights
     anderson                Anderson acceleration
+    extrapolation           where a solve starts in a drag
     exact_volume            motion of a pose onto its exact volumes
     coarse_volume           volume of a large mesh from a coarse surface
     waypoints               intermediate targets for large motions

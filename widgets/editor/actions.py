@@ -17,7 +17,7 @@ from vtk_segdeform.regions import Regions
 from vtk_segdeform.regions import segment as segment_mesh
 
 from ..region_selector import Paint, Tool
-from ..scene import SurfaceStyle
+from ..scene import Phase, SurfaceStyle
 from .controller import Controller
 from .mode import Mode
 
@@ -297,11 +297,70 @@ def remove_handle(controller: Controller) -> None:
     """Remove the selected handle."""
     _handle_names(controller)
     widgets = controller.widgets
-    name = widgets.dragger.handle if controller.mode is Mode.DEFORM else widgets.selector.handle
+    name = widgets.selector.handle if controller.mode is Mode.HANDLES else widgets.dragger.handle
     if name is None:
         raise ConstraintError("No handle selected. Press N to select one")
     controller.session.remove_handle(name)
     controller.say(f"Removed {name}")
+
+
+def toggle_local_axes(controller: Controller) -> None:
+    """Let the axes of the gizmo rotate with the handle, or use those of the world."""
+    dragger = controller.widgets.dragger
+    dragger.local = not dragger.local
+    controller.say(f"Axes: {'local' if dragger.local else 'global'}")
+
+
+def move_pivot(controller: Controller) -> None:
+    """Move the pivot of the handle to the surface under the pointer; beside it, reset it."""
+    name, session = _dragged_handle(controller), controller.session
+    point = controller.widgets.point_at(controller.view.pointer(Phase.HOVER))
+    if point is None and name not in session.state.pivots:
+        raise ConstraintError("Point at the surface where the pivot should be")
+    session.set_pivot(name, point)
+    controller.say(f"Pivot of {name} {'reset' if point is None else 'moved'}")
+
+
+def convert_handle(controller: Controller) -> None:
+    """Make the pin under the pointer, or else the handle with the gizmo, a handle or a pin."""
+    if controller.mode is Mode.PULL:
+        name = controller.widgets.puller.marker_under_pointer()
+        if name is None:
+            raise ConstraintError("Point at a pin to make it a handle")
+    else:
+        name = _dragged_handle(controller)
+    converting(name)(controller)
+
+
+def converting(name: str) -> Action:
+    """Return the action that makes a pin or pulled point a handle, and a handle a pin."""
+
+    def convert(controller: Controller) -> None:
+        session, widgets = controller.session, controller.widgets
+        if name in widgets.puller.marked:
+            new = session.make_handle(name, radius=widgets.puller.radius)
+        else:
+            new = session.make_pin(name)
+        widgets.selector.handle = widgets.dragger.handle = new
+        controller.say(f"{name} is {new} now")
+
+    return convert
+
+
+def reset_pivot(controller: Controller) -> None:
+    """Reset the pivot of the handle to its centre."""
+    name = _dragged_handle(controller)
+    controller.session.set_pivot(name, None)
+    controller.say(f"Pivot of {name} reset")
+
+
+def _dragged_handle(controller: Controller) -> str:
+    """Return the handle with the gizmo; raise if there is none."""
+    _handle_names(controller)
+    name = controller.widgets.dragger.handle
+    if name is None:
+        raise ConstraintError("No handle selected. Press N to select one")
+    return name
 
 
 def _require_regions(controller: Controller, verb: str) -> None:

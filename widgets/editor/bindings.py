@@ -87,6 +87,9 @@ BINDINGS = (
     Binding(("a",), frozenset({H}), "New handle", actions.new_handle),
     Binding(("n", "tab"), frozenset({H, D}), "Next handle", actions.next_handle),
     Binding(("delete", "backspace"), frozenset({H, D}), "Remove handle", actions.remove_handle),
+    Binding(("m",), DRAGGING, "Make a pin a handle, or back", actions.convert_handle),
+    Binding(("l",), frozenset({D}), "Local or global axes", actions.toggle_local_axes),
+    Binding(("v",), frozenset({D}), "Pivot under the pointer, or reset", actions.move_pivot),
     Binding(("o",), frozenset({P, C, D}), "Show local volume change", actions.toggle_overlay),
     Binding(("x", "y", "z"), DRAGGING, "While dragging: constrain to axis", None),
     Binding(("return",), DRAGGING, "After a number: drag by exactly that", None),
@@ -119,6 +122,7 @@ _HEADINGS = {
     PAINTING: "1 Regions, 3 Handles",
     frozenset({H}): "3 Handles",
     frozenset({H, D}): "3 Handles, 4 Deform",
+    frozenset({D}): "4 Deform",
     frozenset({P, C, D}): "0 Pull, 2 Cages, 4 Deform",
 }
 # How the mouse moves the camera; see `scene.navigation`.

@@ -98,7 +98,8 @@ def _deform_hint(widgets: WidgetSet) -> str:
     if solution is not None and solution.status not in (Status.CONVERGED, Status.STEP_LIMIT):
         return str(solution.status)
     next_step = "" if len(session.fixed) else " · 3, S: paint fixed vertices"
-    return f"Move or rotate a handle{next_step}"
+    axes = " · Local axes (L)" if widgets.dragger.local else ""
+    return f"Move or rotate a handle{axes}{next_step}"
 
 
 def _next_step(widgets: WidgetSet, mode: Mode) -> str:

@@ -16,7 +16,7 @@ The files, in reading order:
 from .gizmo import AXIS_COLOURS, Gizmo
 from .gizmo_shapes import FREE, Kind, Part
 from .handle_dragger import HandleDragger
-from .handle_motion import Grip, Motion, next_constraint
+from .handle_motion import Grip, Motion, next_constraint, step_of
 from .live_solve import LiveSolve
 from .number_entry import NumberEntry
 
@@ -32,4 +32,5 @@ __all__ = [
     "NumberEntry",
     "Part",
     "next_constraint",
+    "step_of",
 ]

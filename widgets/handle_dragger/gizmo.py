@@ -102,7 +102,7 @@ class Gizmo:
             self.view.request_render()
 
     def show_only(self, part: Part | None) -> None:
-        """Show only *part*, and all of it; with None, show all parts again."""
+        """Show only *part*, and all of it, and of a ring its centre; with None, all parts."""
         if part != self._only:
             self._only = part
             self._update_clipping()
@@ -167,8 +167,10 @@ class Gizmo:
         return self._axes
 
     def _is_visible(self, part: Part) -> bool:
-        if self._centre is None or self._only not in (None, part):
+        if self._centre is None:
             return False
+        if self._only not in (None, part):  # only the ball, the centre of a shown ring
+            return part.kind is Kind.FREE and self._only.kind is Kind.ROTATION
         if self._only == part or part.axis is None or part.kind is Kind.ROTATION:
             return True
         cosine = abs(float(self._axes[part.axis] @ self._to_viewer()))

@@ -1,13 +1,14 @@
 """Moving and rotating handles with the mouse; the mesh follows at every move.
 
-The active handle has a gizmo at its centre.  The ball moves it in the view plane, an arrow along an
-axis, a square in a plane; a ring rotates it, the outer one about the line of sight.  A press on the
-vertices of any handle activates that handle and moves it in the view plane.
+The active handle has a gizmo at its pivot, by default its centre.  The ball moves it in the view
+plane, an arrow along an axis, a square in a plane; a ring rotates it, the outer one about the line
+of sight.  A press on the vertices of any handle activates that handle and moves it in the view
+plane.
 
     x, y, z     while moving: constrain to the axis; again: to the plane perpendicular to it;
                 again: no constraint.  While rotating: about the axis; again: no constraint
-    shift       move slowly
-    control     rotate in steps of 15 degrees
+    control     move in steps of about 1 % of the diagonal, rotate in steps of 5 degrees
+    shift       move slowly; with control in finer steps
     a number, enter             move by exactly that much; see `number_entry`
     escape, right button        cancel
 
@@ -33,7 +34,7 @@ from ..scene import Gesture, Phase, Pointer, SurfaceDisplay, Widget
 from .gizmo import Gizmo
 from .gizmo_shapes import FREE, Kind, Part
 from .handle_marks import HandleMarks
-from .handle_motion import Grip, Motion, next_constraint
+from .handle_motion import Grip, Motion, next_constraint, step_of
 from .live_solve import LiveSolve
 from .number_entry import NumberEntry
 
@@ -217,7 +218,8 @@ class HandleDragger(Widget):
         assert gizmo.centre is not None  # the press was on the gizmo or on a visible handle
         tolerance = 0.0 if point is None else _CLICK_TOLERANCE
         point = gizmo.centre if point is None else point
-        grip = Grip(point, gizmo.centre, gizmo.axes, gizmo.radius)
+        step = step_of(session.mesh.diagonal)
+        grip = Grip(point, gizmo.centre, gizmo.axes, gizmo.radius, step)
         motion = self._motion_of(part, grip, press)
         self._grabbed, self._constraint = part, None
         entry = self._entry = NumberEntry()
@@ -302,4 +304,4 @@ class HandleDragger(Widget):
         axes = np.eye(3)
         if self._local:
             axes = rigid_fit(session.mesh.vertices[ids], session.targets[name])[0].T
-        self.gizmo.place(session.vertices[ids].mean(axis=0), axes)
+        self.gizmo.place(session.pivot(name), axes)

@@ -15,6 +15,7 @@ Motions are measured from the press: when the pointer returns there, so does the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -29,8 +30,10 @@ from .gizmo_shapes import Kind, Part
 _EDGE_ON = 0.2  # sine of the angle of a plane to the line of sight below which pixels are counted
 _FACE_ON = 0.9  # the same sine, above which a ring grabbed at its centre is turned by its top
 _LEAST_SLOPE = 0.1  # sine of the angle to which a line of sight is tilted during the drag
-_SLOW_FACTOR = 0.2  # with Shift
-_SNAP = np.radians(15.0)  # with Control
+_SLOW_FACTOR = 0.2  # with Shift, also of the steps
+_TURN_STEP = 5.0  # degrees, with Control
+_MOVE_STEP = 0.01  # of the diagonal, with Control, rounded to 1, 2 or 5 times a power of ten
+_ROUND = np.array([1.0, 2.0, 5.0, 10.0])
 
 Tracker = Callable[[Pointer], FloatArray]
 """Returns the displacement (3,) of the grip, or an angle (1,), for a position of the pointer."""
@@ -48,6 +51,17 @@ def next_constraint(grabbed: Part, constraint: Part | None, axis: int) -> Part |
     return choices[following] if following < len(choices) else None
 
 
+def step_of(diagonal: float) -> float:
+    """Return the step of translations with Control: 1 % of *diagonal*, rounded to 1, 2 or 5.
+
+    >>> [step_of(diagonal) for diagonal in (1.0, 2.4, 430.0, 800.0)]
+    [0.01, 0.02, 5.0, 10.0]
+    """
+    power = math.floor(math.log10(_MOVE_STEP * diagonal) + 1e-9)
+    ratios = np.abs(np.log(_MOVE_STEP * diagonal / (_ROUND * 10.0**power)))
+    return float(f"{_ROUND[ratios.argmin()]:.0f}e{power}")
+
+
 @dataclass(frozen=True, eq=False)
 class Grip:
     """The grabbed point, and the gizmo, at the press."""
@@ -60,6 +74,8 @@ class Grip:
     """(3, 3) float: x, y and z as rows, each of length 1."""
     radius: float
     """Of a ring; where pixels are counted, a pointer motion of this length rotates by a radian."""
+    step: float
+    """Of translations with Control; see `step_of`."""
     has_arm: bool = True
     """Whether the pointer rotates about the centre; if it is pressed there, pixels are counted."""
 
@@ -89,17 +105,25 @@ class Motion:
         # The displacement is *_base* plus the pointer's motion since *_start*, slowed by Shift.
         self._last = self._start = self._track(press)
         self._base = self._applied = np.zeros_like(self._last)
-        self._is_slow = False
+        self._is_slow = self._is_stepped = False
+        self._step, self._grid = _TURN_STEP, np.eye(1)
+        if part.kind is not Kind.ROTATION:
+            self._step, self._grid = grip.step, _grid(projection, part, grip.axes)
         self._direction = np.ones(1) if part.kind is Kind.ROTATION else np.zeros(3)
         if part.kind is Kind.AXIS:
             self._direction = self._axis
 
     @property
     def amount(self) -> str:
-        """The size of the motion as text: "30.0°", or a length in the mesh's unit."""
+        """The size of the motion as text: "30.0°", or a length in the mesh's unit.
+
+        With Control the step follows: "0.25, step 0.05".
+        """
         if self.part.kind is Kind.ROTATION:
-            return f"{np.degrees(self._applied[0]):.1f}°"
-        return f"{np.linalg.norm(self._applied):.3g}"
+            amount, unit = f"{np.degrees(self._applied[0]):.1f}°", "°"
+        else:
+            amount, unit = f"{np.linalg.norm(self._applied):.3g}", ""
+        return f"{amount}, step {self._current_step:.3g}{unit}" if self._is_stepped else amount
 
     def matrix(self, pointer: Pointer) -> FloatArray:
         """Return the translation or rotation from the press to *pointer* as a (4, 4) matrix."""
@@ -114,6 +138,7 @@ class Motion:
 
         A rotation is by *amount* degrees.  Without a direction yet, nothing moves.
         """
+        self._is_stepped = False
         factor = np.radians(amount) if self.part.kind is Kind.ROTATION else amount
         return self._by(factor * self._direction)
 
@@ -138,13 +163,36 @@ class Motion:
             tracked = tracked + 2.0 * np.pi * np.round((self._last - tracked) / (2.0 * np.pi))
         if np.isfinite(tracked).all():
             self._last = tracked
-        if self.part.kind is Kind.ROTATION and pointer.control:
-            return np.asarray(np.round(self._displacement() / _SNAP) * _SNAP)
-        return self._displacement()
+        self._is_stepped = pointer.control
+        return self._stepped(self._displacement()) if pointer.control else self._displacement()
 
     def _displacement(self) -> FloatArray:
-        factor = _SLOW_FACTOR if self._is_slow else 1.0
-        return np.asarray(self._base + factor * (self._last - self._start))
+        return np.asarray(self._base + self._factor * (self._last - self._start))
+
+    def _stepped(self, displacement: FloatArray) -> FloatArray:
+        """Return *displacement* rounded to whole steps along each direction of the grid."""
+        step = self._current_step
+        if self.part.kind is Kind.ROTATION:
+            step = np.radians(step)
+        return np.asarray(step * np.round(self._grid @ displacement / step) @ self._grid)
+
+    @property
+    def _current_step(self) -> float:
+        return self._factor * self._step
+
+    @property
+    def _factor(self) -> float:
+        return _SLOW_FACTOR if self._is_slow else 1.0
+
+
+def _grid(projection: Projection, part: Part, axes: FloatArray) -> FloatArray:
+    """Return the directions (k, 3) along which a translation by *part* is stepped."""
+    if part.axis is not None:
+        is_grid = (np.arange(3) == part.axis) == (part.kind is Kind.AXIS)
+        return np.asarray(axes[is_grid])
+    right = np.cross(projection.view_direction, projection.camera.GetViewUp())
+    right = right / np.linalg.norm(right)
+    return np.stack([right, np.cross(right, projection.view_direction)])
 
 
 # One tracker for each kind of motion.

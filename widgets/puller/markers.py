@@ -15,7 +15,7 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.pictures import COLOURS, PAPER, rgb
-from vtk_segdeform.session import Session
+from vtk_segdeform.session import Session, middle_vertex
 
 from ..picking import Picker
 from ..scene import Phase, Pointer, SurfaceDisplay
@@ -133,11 +133,10 @@ class Markers:
 
 def marked_vertices(session: Session) -> dict[str, int]:
     """Return the vertex of every pin and pulled point of a session by its name."""
-    found, x = {}, session.mesh.vertices
+    found = {}
     for name, ids in session.handles.items():
         if len(ids) == 1 or name in session.state.pulls:
-            middle = x[ids].mean(axis=0)
-            found[name] = int(ids[np.linalg.norm(x[ids] - middle, axis=1).argmin()])
+            found[name] = middle_vertex(session.mesh, ids)
     return found
 
 

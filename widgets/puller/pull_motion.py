@@ -25,15 +25,18 @@ class PullMotion:
         The position of the press.
     arm : float
         Pixels by which the pointer moves to turn by one radian.
+    step : float
+        Of translations with Control; see `step_of`.
     """
 
     def __init__(
-        self, projection: Projection, point: FloatArray, press: Pointer, arm: float
+        self, projection: Projection, point: FloatArray, press: Pointer, arm: float, step: float
     ) -> None:
         self.entry = NumberEntry()
         self.is_turning = False
         self.has_turned = False
         self._projection, self._point, self._arm = projection, point, arm
+        self._step = step
         self._constraint: Part | None = None
         # What the finished parts of the motion amount to, and the current part.
         self._base_shift, self._base_turn = np.zeros(3), np.eye(3)
@@ -95,5 +98,5 @@ class PullMotion:
     def _begin(self) -> None:
         place = self._point + self._base_shift
         radius = self._arm * self._projection.pixel_at(place)
-        grip = Grip(place, place, np.eye(3), radius, has_arm=False)
+        grip = Grip(place, place, np.eye(3), radius, self._step, has_arm=False)
         self._motion = Motion(self._projection, self.part, grip, self._start)

@@ -9,8 +9,8 @@ shows the radius.  A press on a pin or a pulled point, shown as dots, grabs that
     x, y, z     constrain to the axis; again: to the plane perpendicular to it; again: no constraint
     r           turn the surface around the point instead of moving it, about the line of sight or
                 the axis of x, y, z; again: move it
-    control     turn in steps of 15 degrees
-    shift       pull slowly
+    control     pull in steps of about 1 % of the diagonal, turn in steps of 5 degrees
+    shift       pull slowly; with control in finer steps
     a number, enter             pull by exactly that much along the axis, or in the direction so far
     escape, right button        cancel
 """
@@ -32,7 +32,7 @@ from vtk_segdeform.pictures import PAPER, rgb
 from vtk_segdeform.session import Change, Session
 from vtk_segdeform.solver import Solution
 
-from ..handle_dragger import Gizmo, LiveSolve
+from ..handle_dragger import Gizmo, LiveSolve, step_of
 from ..picking import Hit, Picker
 from ..region_selector import BrushRing
 from ..scene import Gesture, Phase, Pointer, Stop, SurfaceDisplay, Widget
@@ -149,6 +149,10 @@ class Puller(Widget):
         """The names of the pins and pulled points."""
         return tuple(marked_vertices(self.session))
 
+    def marker_under_pointer(self) -> str | None:
+        """Return the pin or pulled point under the pointer, or None."""
+        return self._markers.at(self.view.pointer(Phase.HOVER))
+
     def On(self) -> None:  # noqa: N802 - VTK's word
         """Start handling events, and show pins and pulled points."""
         if not self.GetEnabled():
@@ -244,7 +248,8 @@ class Puller(Widget):
         session.commit()  # keeps an unfinished drag from elsewhere out of our undo step
         self._live.pause()
         start = np.array(self._surface.points[vertex])
-        motion = self._motion = PullMotion(self.view, point, press, self._gizmo.size)
+        step = step_of(session.mesh.diagonal)
+        motion = self._motion = PullMotion(self.view, point, press, self._gizmo.size, step)
         pull = partial(session.pull, vertex, radius=self.radius, locality=self.locality)
         to: FloatArray | None = None  # where to pull to, once the pointer has moved
         has_moved = wants = committed = False

@@ -14,13 +14,16 @@ from ..editor import (
     DeformEditor,
     Mode,
     choosing_handle,
+    converting,
     hiding_handle,
     locking_handle,
     painting,
     renaming,
+    reset_pivot,
+    toggle_local_axes,
 )
 from ..region_selector import Paint
-from .controls import RIGHT, column, key_button, row, swatch, table
+from .controls import RIGHT, check_box, column, key_button, push_button, put, row, swatch, table
 
 Qt = QtCore.Qt
 _NAME, _VERTICES, _SHOWN, _LOCKED = range(4)
@@ -41,7 +44,7 @@ class _Row(NamedTuple):
 
 
 class HandlesPart(QtWidgets.QGroupBox):
-    """A list with a row for the fixed vertices and one for each handle.
+    """A list with a row for the fixed vertices and one for each handle, pin and pulled point.
 
     Parameters
     ----------
@@ -58,7 +61,16 @@ class HandlesPart(QtWidgets.QGroupBox):
         self.list.itemChanged.connect(self._item_edited)
         self.new = key_button(editor, "a", Mode.HANDLES, "New")
         self.remove = key_button(editor, "delete", Mode.HANDLES, "Remove")
-        column(self, self.list, row(self.new, self.remove))
+        tip = "A handle can be rotated; a pin or pulled point is a single vertex"
+        self.convert = push_button("Make handle", tip, "m")
+        self.convert.clicked.connect(self._convert)
+        self.local = check_box("Local axes", "The axes rotate with the handle (L)")
+        self.local.clicked.connect(lambda: editor.do(toggle_local_axes))
+        tip = "Rotate about the centre of the handle again. V: about the point under the pointer"
+        self.pivot = push_button("Reset pivot", tip)
+        self.pivot.clicked.connect(lambda: editor.do(reset_pivot))
+        buttons = row(self.new, self.remove, self.convert)
+        column(self, self.list, buttons, row(self.local, self.pivot))
 
     def refresh(self) -> None:
         """Show the current handles, and which one is selected."""
@@ -69,7 +81,7 @@ class HandlesPart(QtWidgets.QGroupBox):
             _Row(Paint.HANDLE, name, name, len(ids), name not in hidden, name in locked)
             for name, ids in session.handles.items()
         ]
-        if marking or len(session.fixed):
+        if marking or (len(session.fixed) and mode is not Mode.PULL):
             rows.insert(0, _Row(Paint.FIXED, None, "Fixed", len(session.fixed)))
         painted = selector.handle if selector.handle in session.handles else None
         if marking and selector.paints is Paint.HANDLE and painted is None:
@@ -81,6 +93,14 @@ class HandlesPart(QtWidgets.QGroupBox):
         self._select(paints, handle)
         self.new.setVisible(marking)
         self.remove.setEnabled(handle in session.handles)
+        self.convert.setEnabled(handle in session.handles)
+        self.convert.setText("Make handle" if handle in widgets.puller.marked else "Make pin")
+        for each in (self.local, self.pivot):
+            each.setVisible(mode is Mode.DEFORM)
+        put(self.local, widgets.dragger.local)
+        self.pivot.setEnabled(handle in session.state.pivots)
+        if mode is Mode.PULL:
+            self.setVisible(bool(rows))
 
     def _show(self, rows: list[_Row]) -> None:
         self._rows = rows
@@ -115,6 +135,12 @@ class HandlesPart(QtWidgets.QGroupBox):
                 self._editor.do(choosing_handle(selected.handle))
             elif selected.paints is Paint.FIXED and self._editor.mode is Mode.HANDLES:
                 self._editor.do(painting(Paint.FIXED))
+
+    def _convert(self) -> None:
+        for item in self.list.selectedItems():
+            handle = self._rows[self.list.indexOfTopLevelItem(item)].handle
+            if handle is not None:
+                self._editor.do(converting(handle))
 
     def _item_edited(self, item: Any, which: int) -> None:
         handle = self._rows[self.list.indexOfTopLevelItem(item)].handle

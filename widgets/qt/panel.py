@@ -65,7 +65,7 @@ class DeformPanel(QtWidgets.QWidget):
         self.pulling = PullPart(editor)
         self._parts: dict[Any, set[Mode]] = {
             self.pulling: {Mode.PULL},
-            self.handles: {Mode.HANDLES, Mode.DEFORM},
+            self.handles: {Mode.PULL, Mode.HANDLES, Mode.DEFORM},
             self.cages: {Mode.CAGES},
             self.deform: {Mode.DEFORM},
             self.regions: {Mode.REGIONS, Mode.CAGES, Mode.DEFORM},

@@ -452,6 +452,38 @@ def test_handles_are_selected_and_removed(bench):
     ]
 
 
+def test_keys_for_axes_the_pivot_and_pins(bench):
+    session, dragger, hand = bench.session, bench.editor.widgets.dragger, bench.hand
+    bench.type("4", "l")
+    assert dragger.local
+    hand.hover(hand.at([0.0, 0.0, 0.0]))
+    assert "Local axes (L)" in bench.editor.status
+    bench.type("l", "v")
+    assert not dragger.local
+    x, _, z = dragger.gizmo.centre
+    assert np.hypot(x, z) < 0.05
+    hand.hover((3, 3))
+    bench.type("v")
+    middle = session.mesh.vertices[session.handles["handle 1"]].mean(axis=0)
+    assert np.allclose(dragger.gizmo.centre, middle)
+    bench.type("v")
+    assert "Point at the surface" in bench.editor.status
+    hand.failures.clear()
+    bench.type("m")
+    assert len(session.handles["pin 1"]) == 1
+    bench.type("0", "m")
+    assert "Point at a pin" in bench.editor.status
+    hand.failures.clear()
+    hand.click(hand.at([0.0, 0.0, 0.0]), shift=True)
+    bench.type("m")
+    assert len(session.handles["handle 1"]) > 3
+    assert list(map(str, (session.undo(), session.undo(), session.undo()))) == [
+        "make pin 2 handle 1",
+        "add pin 2",
+        "make handle 1 pin 1",
+    ]
+
+
 def test_resetting_the_pose_and_turning_volume_preservation_off(bench):
     bench.type("4")
     pull_handle(bench)

@@ -80,6 +80,13 @@ class Bench:
         assert 20.0 < place.min() <= place.max() < 380.0
         return place
 
+    @property
+    def captions(self):
+        """The visible texts of the gizmo."""
+        self.view.render()
+        texts = [p for p in self.view.foreground.GetViewProps() if isinstance(p, vtkTextActor)]
+        return [text.GetInput() for text in texts if text.GetVisibility()]
+
     def watch_timers(self):
         """Keep the numbers of the running timers in `timers`, as a window would."""
         interactor = self.view.interactor
@@ -280,7 +287,7 @@ def test_every_motion_is_rigid_and_bounded(parallel, tilt):
     view.camera.SetParallelProjection(parallel)
     view.camera.SetParallelScale(3.0)
     centre, axes = np.array([0.4, 0.3, 0.2]), rotation([1.0, 2.0, 3.0], 0.5).T
-    grip = Grip(centre + 0.1, centre, axes, 0.7)
+    grip = Grip(centre + 0.1, centre, axes, 0.7, 0.05)
     corners = [(x, y) for x in (0, 150, 399) for y in (0, 210, 399)]
     for axis, side in itertools.product(range(3), (-1.0, 1.0)):
         look = axes[axis] + side * tilt * axes[axis - 1]
@@ -420,17 +427,75 @@ def test_a_slow_rotation_continues_past_half_a_turn_of_the_pointer():
     assert not bench.hand.failures
 
 
-def test_control_rotates_in_steps_of_fifteen_degrees():
+def test_control_rotates_in_steps_of_five_degrees_and_with_shift_of_one():
     bench = Bench((0.0, -12.0, 0.0), parallel=True)
     middle, start = np.array(bench.hand.at(bench.gizmo.centre)), bench.targets()
     place = bench.aim(VIEW_RING)
     bench.hand.press(place, control=True)
-    for seen, snapped in ((5.0, 0.0), (10.0, 15.0), (37.0, 30.0), (-8.0, -15.0)):
+    for seen, snapped in ((2.0, 0.0), (3.5, 5.0), (37.0, 35.0), (-8.0, -10.0)):
         arm = rotation([0.0, 0.0, 1.0], np.radians(seen))[:2, :2] @ (place - middle)
         bench.hand.move(middle + arm, control=True)
         R, _ = rigid_fit(start, bench.targets())
         assert np.allclose(R, rotation([0.0, -1.0, 0.0], np.radians(snapped)), atol=1e-9)
+    bench.hand.move(middle + arm, control=True, shift=True)
+    R, _ = rigid_fit(start, bench.targets())
+    assert np.allclose(R, rotation([0.0, -1.0, 0.0], np.radians(-8.0)), atol=1e-9)
     assert not bench.hand.failures
+
+
+@pytest.mark.parametrize("part", [FREE, Part(Kind.AXIS, 0), Part(Kind.PLANE, 2)])
+def test_control_moves_in_whole_steps(part):
+    bench = Bench(parallel=True)
+    view, step = bench.view, 0.05  # about 1 % of the diagonal
+    right = np.cross(view.view_direction, view.camera.GetViewUp())
+    right /= np.linalg.norm(right)
+    grid = {
+        Kind.FREE: [right, np.cross(right, view.view_direction)],
+        Kind.AXIS: [np.eye(3)[0]],
+        Kind.PLANE: np.eye(3)[:2],
+    }[part.kind]
+    place = bench.aim(part)
+    bench.hand.press(place)
+    for k in (2, 7, 19):  # of which the first is less than half a step
+        bench.hand.move(place + [k, -0.6 * k])
+        free = bench.shift()
+        bench.hand.move(place + [k, -0.6 * k], control=True)
+        steps = np.array(grid) @ bench.shift() / step
+        assert np.allclose(steps, np.round(np.array(grid) @ free / step), atol=1e-9)
+        assert np.allclose(bench.shift(), step * steps @ grid, atol=1e-9)
+    assert np.abs(steps).max() >= 1.0
+    assert bench.captions[-1].endswith(", step 0.05")
+    bench.hand.key("3")
+    assert bench.captions[-1].endswith("3_")
+    assert not bench.hand.failures
+
+
+def test_typed_degrees_rotate_about_a_moved_pivot_and_escape_restores(bench):
+    session, hand = bench.session, bench.hand
+    pivot = bench.gizmo.centre + [0.3, -0.2, 0.1]
+    session.set_pivot(TIP, pivot)
+    assert np.allclose(bench.gizmo.centre, pivot, atol=1e-12)
+    start = bench.targets()
+    for keys, degrees, caption in (
+        (["6", "5", "BackSpace", "minus"], -6.0, "z -6_°"),
+        (["minus", "2", "period", "5"], -2.5, "z -2.5_°"),
+    ):
+        hand.press(bench.aim(VIEW_RING))
+        hand.key("z")
+        for key in keys:
+            hand.key(key)
+        hand.move((200, 200))  # ignored from now on
+        assert bench.captions == [caption]
+        R = rotation([0.0, 0.0, 1.0], np.radians(degrees))
+        assert np.allclose(bench.targets(), (start - pivot) @ R.T + pivot, atol=1e-9)
+        assert np.allclose(bench.gizmo.centre, pivot, atol=1e-9)
+        hand.key("Escape")
+        hand.release()
+        assert np.array_equal(bench.targets(), start)
+    hand.press(bench.aim(VIEW_RING))
+    for key in ("z", "3", "Return"):
+        hand.key(key)
+    assert session.undo_label == "rotate handle 1"
 
 
 # Handles.
@@ -782,25 +847,20 @@ def test_idle_hover_and_active_look_different_and_off_shows_nothing(bench):
 
 
 def test_the_caption_shows_the_angle_during_a_rotation(bench):
-    def captions():
-        texts = [p for p in bench.view.foreground.GetViewProps() if isinstance(p, vtkTextActor)]
-        return [text.GetInput() for text in texts if text.GetVisibility()]
-
     before = picture(bench.view)
     place = bench.aim(VIEW_RING)
     bench.hand.press(place, control=True)
     pressed = picture(bench.view)
     bench.hand.move(place + [1.0, 0.0], control=True)
-    assert np.array_equal(picture(bench.view), pressed)  # less than half a step of 15 degrees
+    assert np.array_equal(picture(bench.view), pressed)  # less than half a step
     middle = np.array(bench.hand.at(bench.gizmo.centre))
     R = rotation([0.0, 0.0, 1.0], np.radians(31.0))[:2, :2]
     bench.hand.move(middle + R @ (place - middle), control=True)
-    bench.view.render()
-    assert captions() == ["30.0°"]
+    assert bench.captions == ["30.0°, step 5°"]
     bench.hand.key("Escape")
     bench.hand.hover((5, 5))
     assert np.array_equal(picture(bench.view), before)
-    assert captions() == ["x", "y", "z"]
+    assert bench.captions == ["x", "y", "z"]
 
 
 # Poses that are shown.

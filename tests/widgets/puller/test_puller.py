@@ -139,6 +139,18 @@ def test_x_constrains_to_the_axis_and_then_to_the_plane(bench):
     bench.hand.release()
 
 
+def test_control_pulls_in_whole_steps(bench):
+    place, vertex = bench.on()
+    start = bench.session.vertices[vertex]
+    bench.hand.press(place, control=True)
+    bench.hand.key("x")
+    bench.hand.move(place + [21, 9], control=True)
+    steps = (bench.target - start) / 0.05  # about 1 % of the diagonal
+    assert steps[0] >= 1.0
+    np.testing.assert_allclose(steps, [np.round(steps[0]), 0.0, 0.0], atol=1e-9)
+    bench.hand.release()
+
+
 def test_r_turns_about_the_point_and_a_number_is_degrees(bench):
     place, vertex = bench.on(2.6)
     bench.hand.press(place)

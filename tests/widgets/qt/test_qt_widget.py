@@ -281,6 +281,30 @@ def test_a_tick_shows_one_cage_and_hides_it(seen):
     assert cages.is_visible(1)
 
 
+def test_a_pin_is_made_a_handle_in_the_list_of_mode_pull(seen):
+    panel, session = seen.panel, seen.session
+    session.remove_handle(*session.handles)
+    seen.mode(Mode.PULL)
+    assert not panel.handles.isVisible()
+    session.pin(int(np.setdiff1d(np.arange(session.mesh.n_vertices), session.fixed)[0]))
+    seen.settle()
+    seen.click_row(panel.handles.list, 0)
+    assert panel.handles.convert.text() == "Make handle"
+    seen.click(panel.handles.convert)
+    assert rows(panel.handles.list)[0][0] == "handle 1"
+    seen.mode(Mode.DEFORM)
+    seen.click(panel.handles.local)
+    assert seen.editor.widgets.dragger.local
+    assert not panel.handles.pivot.isEnabled()
+    session.set_pivot("handle 1", session.mesh.vertices[0])
+    seen.settle()
+    seen.click(panel.handles.pivot)
+    assert session.undo_label == "reset the pivot of handle 1"
+    assert panel.handles.convert.text() == "Make pin"
+    seen.click(panel.handles.convert)
+    assert list(session.handles) == ["pin 1"]
+
+
 def test_handles_are_renamed_selected_and_removed_in_the_list(seen):
     seen.mode(Mode.HANDLES)
     tree = seen.panel.handles.list
