@@ -78,8 +78,7 @@ def test_at_the_press_the_objective_of_a_local_deformer_is_at_rest():
 def test_the_reach_is_free_and_parts_beyond_it_follow_if_they_are_small(follows, free):
     weights = np.diag(chain().quadratic(8, 2.0, follows)) * 12
     assert set(np.flatnonzero(weights == 0.0)) == set(free)
-    assert weights[0:5] == pytest.approx(1.0)
-    assert weights[5] == pytest.approx(0.5)
+    assert weights[:6] == pytest.approx((np.arange(8, 2, -1) ** 2 / 4.0 - 1.0) ** 2)
 
 
 def test_another_body_stays():
@@ -90,7 +89,7 @@ def test_another_body_stays():
         samples.cells, samples.rows, samples.points, samples.areas, edges.tocsr()
     )
     weights = np.diag(apart.quadratic(8, 3.0, 1.0)) * 12
-    assert_allclose(weights[:4], 1.0)
+    assert (weights[:4] > 1e3).all()
     assert not np.diag(apart.quadratic(8, np.inf, 0.0)).any()
 
 
