@@ -88,7 +88,7 @@ from .frame import Frame
 from .locality import SurfaceSamples
 
 _POSITION_WEIGHT = 90.0  # of a handle or fixed patch, times the scale of the shape energy
-_ANCHOR_WEIGHT = 0.3  # kappa of a local deformer, in weights of a handle; see `locality`
+_ANCHOR_WEIGHT = 1.0  # kappa of a local deformer, in weights of a handle; see `locality`
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most
 _CORRECTIONS, _GAIN = 8, 0.7  # of pulled points: at most, and the factor by which errors must fall
