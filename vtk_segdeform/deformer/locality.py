@@ -8,7 +8,7 @@ the grabbed point and their position x_s^0 at the press.  Within the reach the s
 Cages are coarse: the cage vertices that move the grabbed point also move much of their region.
 Where this is compensated depends on the ratios of the weights.  With equal weights beyond the
 reach, a thousand times the weight moves the far surface as much; weights that grow with the
-distance move it a tenth as much, and the smaller ones nearby take fewer steps of the solver.
+distance move it a fifth as much, and the smaller ones nearby take fewer steps of the solver.
 
 What lies beyond the reach may fall into several parts: who grabs an elbow divides the hand from the
 body.  Parts that are small beside the largest one follow the grabbed point, too.
