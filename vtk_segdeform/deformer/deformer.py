@@ -352,8 +352,8 @@ class Deformer:
             The grabbed vertex.
         reach : float
             Distance along the surface, in the mesh's unit, up to which the surface is free.  Beyond
-            it the surface is held the more, the farther away; from 4 times this distance it hardly moves.
-            Infinite: all of it is free.
+            it the surface is held the more, the farther away; from 4 times this distance it hardly
+            moves.  Infinite: all of it is free.
         spread : float
             Distance along the surface, from a handle of one vertex, within which it pulls, so that
             it makes no spike.
