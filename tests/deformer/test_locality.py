@@ -78,8 +78,7 @@ def test_at_the_press_the_objective_of_a_local_deformer_is_at_rest():
 def test_the_reach_is_free_and_parts_beyond_it_follow_if_they_are_small(follows, free):
     weights = np.diag(chain().quadratic(8, 2.0, follows)) * 12
     assert set(np.flatnonzero(weights == 0.0)) == set(free)
-    assert weights[0:5] == pytest.approx(1.0)
-    assert weights[5] == pytest.approx(0.5)
+    assert weights[:6] == pytest.approx((np.arange(8, 2, -1) ** 2 / 4.0 - 1.0) ** 2)
 
 
 def test_another_body_stays():
@@ -90,7 +89,7 @@ def test_another_body_stays():
         samples.cells, samples.rows, samples.points, samples.areas, edges.tocsr()
     )
     weights = np.diag(apart.quadratic(8, 3.0, 1.0)) * 12
-    assert_allclose(weights[:4], 1.0)
+    assert (weights[:4] > 1e3).all()
     assert not np.diag(apart.quadratic(8, np.inf, 0.0)).any()
 
 
@@ -123,25 +122,27 @@ def real(name):
 
 
 BODIES = {
-    "cactus": dense,
-    "hand": functools.partial(real, "hand.off"),
+    "cactus": (dense, 0.15, 5),
+    # With equal weights beyond the reach the far surface would move by 0.6 % of the diagonal.
+    "hand": (functools.partial(real, "hand.off"), 0.1, 57),
 }
 
 
 @pytest.mark.parametrize("name", BODIES)
 def test_a_pull_reaches_its_target_without_a_spike_and_far_away_nothing_moves(name):
-    mesh = BODIES[name]()
-    rng = np.random.default_rng(5)
+    body, radius, seed = BODIES[name]
+    mesh, rng = body(), np.random.default_rng(seed)
+    radius *= mesh.diagonal
     vertex = int(rng.integers(mesh.n_vertices))
     x, away = mesh.vertices, np.linalg.norm(mesh.vertices - mesh.vertices[vertex], axis=1)
     way = rng.normal(size=3)
     to = x[vertex] + 0.1 * mesh.diagonal * way / np.linalg.norm(way)
-    solution = pull(mesh, vertex, to, locality=1.0)
+    solution = pull(mesh, vertex, to, radius, locality=1.0)
     assert solution.status is Status.CONVERGED
     assert abs(solution.volume_change) < 1e-12
     assert np.linalg.norm(solution.vertices[vertex] - to) < 6e-4 * mesh.diagonal
     assert spike(mesh, solution.vertices, vertex) - spike(mesh, x, vertex) < 0.1
-    far = np.linalg.norm(solution.vertices - x, axis=1)[away > 4.0 * 0.15 * mesh.diagonal]
+    far = np.linalg.norm(solution.vertices - x, axis=1)[away > 4.0 * radius]
     assert far.max(initial=0.0) < 2e-3 * mesh.diagonal
 
 

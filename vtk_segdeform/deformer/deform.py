@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from ..cages import fit_cages
+from ..cages import fit_cages, suggested_size
 from ..checks import as_flag
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part
@@ -21,7 +21,7 @@ def deform(
     targets: ArrayLike,
     *,
     n_regions: int | None = 3,
-    n_cage_vertices: int = 155,
+    n_cage_vertices: int | None = None,
     preserve_volume: bool = True,
     lids: bool | None = None,
     progress: Progress | None = None,
@@ -41,8 +41,8 @@ def deform(
         mask).
     n_regions : int or None
         How many regions; None lets `segment` choose.
-    n_cage_vertices : int
-        Total number of cage vertices.
+    n_cage_vertices : int, optional
+        Total number of cage vertices; by default it follows the number of regions.
     preserve_volume : bool
         Preserve the enclosed volume exactly.
     lids : bool or None
@@ -66,7 +66,8 @@ def deform(
     _, held = checked_constraints(mesh, fixed, handle)
     checked_targets(targets, len(held))
     regions = segment(mesh, n_regions, progress=part(progress, 0.0, 0.2))
-    cages = fit_cages(mesh, regions, n_cage_vertices, progress=part(progress, 0.2, 0.7))
+    size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
+    cages = fit_cages(mesh, regions, size, progress=part(progress, 0.2, 0.7))
     deformer = Deformer(
         mesh,
         regions,

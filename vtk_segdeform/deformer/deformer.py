@@ -88,7 +88,7 @@ from .frame import Frame
 from .locality import SurfaceSamples
 
 _POSITION_WEIGHT = 90.0  # of a handle or fixed patch, times the scale of the shape energy
-_ANCHOR_WEIGHT = 100.0  # of the whole surface in a local deformer, in weights of a handle
+_ANCHOR_WEIGHT = 1.0  # kappa of a local deformer, in weights of a handle; see `locality`
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most
 _CORRECTIONS, _GAIN = 8, 0.7  # of pulled points: at most, and the factor by which errors must fall
@@ -353,8 +353,8 @@ class Deformer:
             The grabbed vertex.
         reach : float
             Distance along the surface, in the mesh's unit, up to which the surface is free.  Beyond
-            it the surface is held more and more; from twice this distance on it hardly moves.
-            Infinite: all of it is free.
+            it the surface is held the more, the farther away; from 4 times this distance it hardly
+            moves.  Infinite: all of it is free.
         spread : float
             Distance along the surface, from a handle of one vertex, within which it pulls, so that
             it makes no spike.

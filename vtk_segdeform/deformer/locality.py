@@ -1,10 +1,14 @@
 """Locality of a pull: what is far from the grabbed point, along the surface, softly stays.
 
-    sum_s w_s |x_s - x_s^0|^2,    w_s = kappa a_s smoothstep(d_s / reach - 1)
+    sum_s w_s |x_s - x_s^0|^2,    w_s = kappa a_s ((d_s / reach)^2 - 1)^2    beyond the reach
 
 The sum is over samples s of the surface, with their share a_s of the area, their distance d_s from
-the grabbed point and their position x_s^0 at the press.  Within the reach the surface is free; from
-twice the reach on, and on other bodies, it has the whole weight.
+the grabbed point and their position x_s^0 at the press.  Within the reach the surface is free.
+
+Cages are coarse: the cage vertices that move the grabbed point also move much of their region.
+Where this is compensated depends on the ratios of the weights.  With equal weights beyond the
+reach, a thousand times the weight moves the far surface as much; weights that grow with the
+distance move it a fifth as much, and the smaller ones nearby take fewer steps of the solver.
 
 What lies beyond the reach may fall into several parts: who grabs an elbow divides the hand from the
 body.  Parts that are small beside the largest one follow the grabbed point, too.
@@ -36,6 +40,7 @@ from ..geometry import faces_between
 from ..mesh import Mesh
 from ..solver import CoarseVolume
 
+_LARGEST = 1e4  # (d^2 - 1)^2, reached at ten times the reach; also the weight of other bodies
 _FEWEST = 4  # samples that determine an affine motion
 _SHORTEST = 1e-12  # reach and spread; the mesh has size 1
 _FLAT = 1e-3  # of the moments: thinner patches count as flat
@@ -90,15 +95,15 @@ class SurfaceSamples:
         return np.asarray(found, dtype=np.float64)
 
     def quadratic(self, vertex: int, reach: float, follows: float) -> FloatArray:
-        """Return sum_s w_s W~_s^T W~_s, (m, m), of total weight at most 1.
+        """Return sum_s w_s W~_s^T W~_s, (m, m), for kappa = 1.
 
         Parts beyond the *reach* that are smaller than the largest by the factor *follows* are free.
         """
         if np.isinf(reach):
             return np.zeros((self.rows.shape[1],) * 2)
         away = self.distances(vertex) / max(reach, _SHORTEST)
-        beyond = np.clip(away - 1.0, 0.0, 1.0)
-        weights = self.areas * beyond**2 * (3.0 - 2.0 * beyond)
+        nearer = np.clip(away, 1.0, 1e2)
+        weights = self.areas * np.minimum((nearer**2 - 1.0) ** 2, _LARGEST)
         far = np.flatnonzero((away > 1.0) & np.isfinite(away))
         if len(far):
             _, part = csgraph.connected_components(self.edges[far][:, far], directed=False)

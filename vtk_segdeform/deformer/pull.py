@@ -53,7 +53,7 @@ def pull(
     pins : (k,) int or (n,) bool
         Vertices that stay in place.  With pins the surface between them is free.
     locality : float, optional
-        1 keeps the surface in place; beyond four radii, of 15 % of the diagonal or more, it hardly
+        1 keeps the surface in place; beyond four radii, of 10 % of the diagonal or more, it hardly
         moves.  With less, more of it follows, above all the ends of limbs; with 0 all is free.
         By default 0.2 without pins, and 0 with pins.
     n_regions : int or None

@@ -436,12 +436,12 @@ class Session(Timeline):
         """Fit cages to the regions and return them, without changing the session.
 
         This may run in another thread; pass the result to `set_cages` in the session's thread.
+        Unless the options have another number of cage vertices, it follows the number of regions.
         """
         if self.regions is None:
             raise RegionError("there are no regions to fit cages to; segment or paint them first")
-        number, offset = self.options.n_cage_vertices, self.options.offset
         regions = self.regions
-        cages = fit_cages(self.mesh, regions, number, offset=offset, progress=progress)
+        cages = self._cages_around(regions, progress)
         self._fitted = regions, cages
         return cages
 
@@ -456,18 +456,14 @@ class Session(Timeline):
     def preparation(self, progress: Progress | None = None) -> Preparation:
         """Return the regions and cages that the session lacks, bound, without changing it.
 
-        This may run in another thread; pass the result to `accept` in the session's thread.  Unless
-        the options have another number of cage vertices, it follows the number of regions.
+        This may run in another thread; pass the result to `accept` in the session's thread.
         """
         regions, options = self.regions, self.options
         if regions is None:
             regions = segment(self.mesh, None, progress=part(progress, 0.0, 0.2))
         cages = self.cages
         if not cages:
-            share = part(progress, 0.2, 0.5)
-            wanted = options.n_cage_vertices
-            size = suggested_size(regions) if wanted == Options().n_cage_vertices else wanted
-            cages = fit_cages(self.mesh, regions, size, offset=options.offset, progress=share)
+            cages = self._cages_around(regions, part(progress, 0.2, 0.5))
         state = State(regions, cages, options=options)
         deformer = PoseSolver(self.mesh).bind(state, part(progress, 0.5, 1.0))
         return Preparation(regions, cages, deformer)
@@ -842,6 +838,11 @@ class Session(Timeline):
             cages = self.cages if _still_fit(old, regions, self.cages) else ()
         after = replace(self._state, regions=regions, cages=cages, region_names=names)
         self._step(label, replace(after, pose=None, locality=None))
+
+    def _cages_around(self, regions: Regions, progress: Progress | None) -> tuple[Cage, ...]:
+        wanted, offset = self.options.n_cage_vertices, self.options.offset
+        size = suggested_size(regions) if wanted == Options().n_cage_vertices else wanted
+        return fit_cages(self.mesh, regions, size, offset=offset, progress=progress)
 
     def _set_cages(self, cages: tuple[Cage, ...], label: str) -> None:
         self._step(label, replace(self._state, cages=cages, pose=None, locality=None))

@@ -49,7 +49,8 @@ class Options:
     Parameters
     ----------
     n_cage_vertices : int
-        Total cage vertices, used at the next fit.
+        Total cage vertices, used at the next fit; the default follows the number of regions, as
+        `suggested_size`.
     offset : float, optional
         Cage offset from the surface, in the unit of the mesh, used at the next fit; by default
         chosen automatically.

@@ -91,8 +91,8 @@ def open_file(controller: Controller) -> None:
         controller.open(path)
 
 
-def segment(controller: Controller) -> None:
-    """Segment the mesh into regions."""
+def segment(controller: Controller, n_regions: int | None = None) -> None:
+    """Segment the mesh into regions, *n_regions* if given."""
     session, widgets = controller.session, controller.widgets
 
     def show(regions: Regions) -> str:
@@ -101,7 +101,7 @@ def segment(controller: Controller) -> None:
         return f"{_count(regions.n_regions, 'region')} found"
 
     def work(progress: Progress) -> Regions:
-        return segment_mesh(session.mesh, progress=progress)
+        return segment_mesh(session.mesh, n_regions, progress=progress)
 
     controller.start("Detecting regions", work, show)
 

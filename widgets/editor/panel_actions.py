@@ -11,7 +11,7 @@ from pathlib import Path
 from vtk_segdeform.errors import RegionError, SessionError
 
 from ..region_selector import Paint
-from .actions import Action
+from .actions import Action, fit_cages, segment
 from .controller import Controller
 from .mode import Mode
 
@@ -44,6 +44,22 @@ def naming_region(region: int, name: str) -> Action:
         controller.say(f"Renamed {before} to {controller.session.region_name(region)}")
 
     return rename
+
+
+def segmenting(n_regions: int) -> Action:
+    """Return the action that segments the mesh into *n_regions* regions."""
+    return lambda controller: segment(controller, n_regions)
+
+
+def fitting_with(n_cage_vertices: int) -> Action:
+    """Return the action that sets the total number of cage vertices, and fits cages with it."""
+
+    def fit(controller: Controller) -> None:
+        controller.session.change_options(n_cage_vertices=n_cage_vertices)
+        if controller.session.regions is not None:
+            fit_cages(controller)
+
+    return fit
 
 
 def showing_cage(region: int, visible: bool) -> Action:

@@ -83,6 +83,19 @@ def number_box(box: Any, tip: str) -> Any:
     return box
 
 
+def slider(least: int, most: int, tip: str) -> Any:
+    """Return a slider that reports its value when it is released, and shows it meanwhile."""
+    bar = QtWidgets.QSlider(Qt.Orientation.Horizontal)
+    bar.setRange(least, most)
+    bar.setTracking(False)
+    bar.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+    bar.setToolTip(tip)
+    bar.sliderMoved.connect(
+        lambda value: QtWidgets.QToolTip.showText(QtGui.QCursor.pos(), str(value), bar)
+    )
+    return bar
+
+
 def check_box(text: str, tip: str) -> Any:
     """Return a check box with a tooltip."""
     box = QtWidgets.QCheckBox(text)
@@ -168,7 +181,7 @@ def shortcut(keys: Any, parent: Any, do: Callable[[], object], *, alone: bool = 
 
 
 def put(widget: Any, value: Any) -> None:
-    """Show *value* in a checkable button, check box, combo box or spin box; emit no signals."""
+    """Show *value* in a button, check box, combo box, spin box or slider; emit no signals."""
     if isinstance(widget, QtWidgets.QPushButton | QtWidgets.QToolButton):
         widget.setChecked(value)  # only clicks trigger its action
         return
@@ -177,6 +190,9 @@ def put(widget: Any, value: Any) -> None:
         widget.setChecked(value)
     elif isinstance(widget, QtWidgets.QComboBox):
         widget.setCurrentIndex(value)
+    elif isinstance(widget, QtWidgets.QSlider):
+        if not widget.isSliderDown():
+            widget.setValue(value)
     elif not widget.hasFocus() or not widget.lineEdit().isModified():  # else the user types
         widget.setValue(value)
     quiet.unblock()

@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
-from qtpy import QtWidgets
+from qtpy import QtCore, QtWidgets
 
-from ..editor import DeformEditor, Mode, setting, setting_colour_range, toggle_cages, toggle_overlay
+from ..editor import (
+    DeformEditor,
+    Mode,
+    fitting_with,
+    setting,
+    setting_colour_range,
+    toggle_cages,
+    toggle_overlay,
+)
 from ..volume_overlay import percent
-from .controls import check_box, choice_box, column, form, key_button, number_box, put, row
+from .controls import check_box, choice_box, column, form, key_button, number_box, put, row, slider
 
 _MOST = 100_000
+_EACH, _MOST_DETAIL = 12, 800  # cage vertices: fewest for each region, and most of the slider
 _LIDS = {"Auto": None, "Under lids": True, "Off": False}
 
 
@@ -32,6 +41,9 @@ class CagesPart(QtWidgets.QGroupBox):
         self.total.setRange(8, _MOST)
         self.total.setSingleStep(10)
         self.total.valueChanged.connect(lambda n: editor.do(setting(n_cage_vertices=n)))
+        self.detail = slider(_EACH, _MOST_DETAIL, "Detail of cages: release to refit them")
+        self.detail.setPageStep(50)
+        self.detail.valueChanged.connect(lambda n: editor.do(fitting_with(n)))
         self.offset = number_box(
             QtWidgets.QDoubleSpinBox(), "Cage offset from the surface (used at next fit)"
         )
@@ -40,7 +52,9 @@ class CagesPart(QtWidgets.QGroupBox):
         self.fit = key_button(editor, "f", Mode.CAGES, "Fit cages")
         self.shown = check_box("Show cages in all modes", "Show cages outside mode 2 as well (C)")
         self.shown.clicked.connect(lambda: editor.do(toggle_cages))
-        fields = form(("Total cage vertices", self.total), ("Offset", self.offset))
+        fields = form(
+            ("Detail", self.detail), ("Total cage vertices", self.total), ("Offset", self.offset)
+        )
         column(self, fields, self.fit, self.shown)
 
     def refresh(self) -> None:
@@ -49,6 +63,13 @@ class CagesPart(QtWidgets.QGroupBox):
         options, diagonal = session.options, session.mesh.diagonal
         _fit(self.offset, 0.2 * diagonal)
         put(self.total, options.n_cage_vertices)
+        self.detail.setEnabled(session.regions is not None)
+        if not self._editor.controller.is_busy:
+            total = sum(cage.n_vertices for cage in session.cages) or options.n_cage_vertices
+            quiet = QtCore.QSignalBlocker(self.detail)
+            self.detail.setMinimum(_EACH * max(1, widgets.n_regions))
+            quiet.unblock()
+            put(self.detail, total)
         put(self.offset, options.offset or 0.0)
         self.fit.setText("Refit cages" if session.cages else "Fit cages")
         self.fit.setEnabled(session.regions is not None)

@@ -14,14 +14,16 @@ from ..editor import (
     choosing_region,
     merging,
     naming_region,
+    segmenting,
     showing_cage,
     split_region,
 )
 from ..volume_overlay import RegionVolumes, percent
-from .controls import RIGHT, column, key_button, push_button, row, swatch, table
+from .controls import RIGHT, column, form, key_button, push_button, put, row, slider, swatch, table
 
 Qt = QtCore.Qt
 _NAME, _CAGE, _VOLUME = 0, 1, 2
+_MOST = 20  # regions of a segmentation
 _TIP = "The selected region is painted in mode 1. Tick: show its cage. F2: rename"
 
 
@@ -53,12 +55,17 @@ class RegionsPart(QtWidgets.QGroupBox):
         self.list.itemSelectionChanged.connect(self._selection_changed)
         self.list.itemChanged.connect(self._item_edited)
         self.segment = key_button(editor, "g", Mode.REGIONS, "Auto-segment")
+        self.count = slider(1, _MOST, "Number of regions: release to segment again")
+        self.count.valueChanged.connect(lambda n: editor.do(segmenting(n)))
+        self._count = QtWidgets.QWidget()
+        column(self._count, form(("Number", self.count)))
+        self._count.layout().setContentsMargins(0, 0, 0, 0)
         self.new = key_button(editor, "a", Mode.REGIONS, "New")
         self.merge = push_button("Merge", "Merge the selected regions")
         self.merge.clicked.connect(lambda: editor.do(merging(self.selected)))
         self.split = push_button("Split", "Split the selected region", "x")
         self.split.clicked.connect(lambda: editor.do(split_region))
-        column(self, self.segment, self.list, row(self.new, self.merge, self.split))
+        column(self, self.segment, self._count, self.list, row(self.new, self.merge, self.split))
 
     @property
     def selected(self) -> list[int]:
@@ -74,8 +81,10 @@ class RegionsPart(QtWidgets.QGroupBox):
         if rows != self._rows:
             self._show(rows)
         self._select(editor.widgets.selector.region)
-        for button in (self.segment, self.new, self.merge, self.split):
-            button.setVisible(painting)
+        for control in (self.segment, self._count, self.new, self.merge, self.split):
+            control.setVisible(painting)
+        if not editor.controller.is_busy:
+            put(self.count, max(1, editor.widgets.n_regions))
         existing = [region for region in self.selected if region < editor.widgets.n_regions]
         self.merge.setEnabled(len(existing) > 1)
         self.split.setEnabled(len(existing) == 1)

@@ -363,6 +363,23 @@ def test_options_are_steps_and_are_shown_when_they_are_undone(make):
     assert seen.panel.toolbar.undo.toolTip() == "Nothing to undo"
 
 
+def test_sliders_set_the_number_of_regions_and_the_detail_of_cages_at_once(seen):
+    session, before = seen.session, seen.session.cages
+    seen.mode(Mode.REGIONS)
+    seen.panel.regions.count.setValue(3)
+    seen.settle()
+    assert session.regions.n_regions == seen.panel.regions.count.value() == 3
+    seen.mode(Mode.CAGES)
+    seen.panel.cages.detail.setValue(40)
+    seen.settle()
+    assert sum(cage.n_vertices for cage in session.cages) == 40
+    assert seen.panel.cages.detail.value() == seen.panel.cages.total.value() == 40
+    for _ in range(3):  # the cages, their number, the regions
+        seen.click(seen.panel.toolbar.undo)
+    assert session.cages == before
+    assert seen.panel.cages.detail.value() == sum(cage.n_vertices for cage in before)
+
+
 def test_the_panel_follows_keys_and_the_wheel(seen):
     hand, part = seen.view_hand(), seen.panel.painting
     hand.key("l")
