@@ -7,7 +7,6 @@ The files, in reading order:
     toolbar pulling painting regions handles options status log
                 the parts of the panel
     view_menu   menu entries for the camera
-    event_filter    what pyvistaqt does not tell VTK of Qt's events
     controls    buttons, fields and layouts of the parts
     icons       the icons of the toolbar
 """

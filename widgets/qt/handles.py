@@ -56,8 +56,8 @@ class HandlesPart(QtWidgets.QGroupBox):
         self.list = table(["Name", "Vertices", "Show", "Lock"], _TIP, rows=6)
         self.list.itemSelectionChanged.connect(self._selection_changed)
         self.list.itemChanged.connect(self._item_edited)
-        self.new = key_button(editor, "a", Mode.HANDLES, "New")
-        self.remove = key_button(editor, "delete", Mode.HANDLES, "Remove")
+        self.new = key_button(editor, "new_handle", "New")
+        self.remove = key_button(editor, "remove_handle", "Remove")
         column(self, self.list, row(self.new, self.remove))
 
     def refresh(self) -> None:
