@@ -198,10 +198,7 @@ def keys_of(choice: KeyChoice | Keys) -> Keys:
         return Keys(BINDINGS, found[0])
     if not isinstance(choice, Mapping):
         raise ArgumentError(f"keys must be a preset or a mapping; got {shown(choice)}")
-    return Keys(
-        BINDINGS,
-        {
-            name: (keys,) if isinstance(keys, str) else require_sequence(keys, "keys")
-            for name, keys in choice.items()
-        },
-    )
+    changes = {name: (keys,) if isinstance(keys, str) else keys for name, keys in choice.items()}
+    for keys in changes.values():
+        require_sequence(keys, "keys")
+    return Keys(BINDINGS, changes)

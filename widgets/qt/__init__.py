@@ -11,11 +11,12 @@ The files, in reading order:
     icons       the icons of the toolbar
 """
 
-from .view_menu import add_view_entries
+from .view_menu import add_view_entries, name_keys
 from .widget import DeformWidget, deform_dock
 
 __all__ = [
     "DeformWidget",
     "add_view_entries",
     "deform_dock",
+    "name_keys",
 ]
