@@ -46,9 +46,9 @@ def menu_keys(bar: Any) -> dict[str, str]:
     """Return the keys of the entries of a menu bar, with the entries."""
     found = {}
     for top in bar.actions():
-        title, _, letter = top.text(), *top.text().partition("&")[1:]
-        if letter:
-            found[key_name(f"Alt+{letter[0]}")] = f"menu {title.replace('&', '')}"
+        before, _, after = top.text().partition("&")
+        if after:
+            found[key_name(f"Alt+{after[0]}")] = f"menu {before}{after}"
         for entry in top.menu().actions():
             for keys in entry.shortcuts():
                 text = keys.toString(QtGui.QKeySequence.SequenceFormat.PortableText)
@@ -185,7 +185,8 @@ class KeysDialog(QtWidgets.QDialog):
 
     @property
     def _selected(self) -> str:
-        return self._names[self.table.indexOfTopLevelItem(self.table.currentItem())]
+        row: int = self.table.indexOfTopLevelItem(self.table.currentItem())
+        return self._names[row]
 
     def _wait(self) -> None:
         self._is_waiting = True

@@ -7,7 +7,7 @@ from typing import Any
 
 from qtpy import QtWidgets
 
-from ..editor import DeformEditor, selecting_through, with_radius
+from ..editor import DeformEditor, Mode, selecting_through, with_radius
 from ..region_selector import Tool
 from .controls import check_box, choice_button, column, form, key_button, number_box, put, row
 
@@ -74,6 +74,8 @@ class PaintingPart(QtWidgets.QGroupBox):
             self._fit_to = diagonal
             _fit(self.radius, diagonal)
         put(self.tools[selector.tool], True)
+        for button in (self.none, self.invert):  # no region can be empty
+            button.setVisible(self._editor.mode is Mode.HANDLES)
         put(self.radius, selector.radius)
         put(self.through, selector.through)
         self.radius.setEnabled(selector.tool is Tool.BRUSH)

@@ -102,8 +102,9 @@ class Toolbar(QtWidgets.QWidget):
                 else f"Nothing to {verb.lower()}"
             )
             button.setToolTip(text)
-        for each in (self.open, self.save, self.compare, self.view, *self.modes.values()):
+        for each in (self.open, self.save, self.view, *self.modes.values()):
             each.setEnabled(not busy)
+        self.compare.setEnabled(not busy and session.state.pose is not None)
         put(self.modes[self._editor.mode], True)
 
     def resizeEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name

@@ -24,7 +24,7 @@ _SHOWN: tuple[tuple[str, _Test, _Test | None], ...] = (
     ("show_regions", lambda e: e.session.regions is not None, lambda e: e.widgets.regions_wanted),
     ("show_cages", lambda e: bool(e.session.cages), lambda e: e.widgets.cages.is_shown),
     ("show_volume_change", lambda _: True, lambda e: e.widgets.overlay_wanted),
-    ("show_holes", lambda _: True, None),
+    ("show_holes", lambda e: bool(e.controller.notices.text), None),
 )
 _VIEWS = (
     ("&Front", "view_front"),
@@ -69,7 +69,7 @@ def add_view_entries(menu: Any, editor_of: Callable[[], DeformEditor | None]) ->
     for name, exists, is_shown in _SHOWN:
         entry = add(menu, _DEFAULT[name].label, name)
         entry.setCheckable(is_shown is not None)
-        shown.append((entry, exists, is_shown))
+        shown.append((entry, name, exists, is_shown))
     menu.addSeparator()
     entries = [
         add(menu, "&Fit to view", "frame_all"),
@@ -91,8 +91,9 @@ def add_view_entries(menu: Any, editor_of: Callable[[], DeformEditor | None]) ->
         name_keys(with_keys, _DEFAULT if editor is None else editor.keys)
         for entry in entries:
             entry.setEnabled(editor is not None)
-        for entry, exists, is_shown in shown:
-            entry.setEnabled(editor is not None and exists(editor))
+        for entry, name, exists, is_shown in shown:
+            works = editor is not None and editor.mode in editor.keys[name].modes
+            entry.setEnabled(works and editor is not None and exists(editor))
             entry.setChecked(editor is not None and is_shown is not None and is_shown(editor))
         if editor is not None:
             up = editor.controller.camera.viewpoint.up
