@@ -51,18 +51,15 @@ class PaintingPart(QtWidgets.QGroupBox):
         self.grow = key_button(editor, "grow", "Grow")
         self.shrink = key_button(editor, "shrink", "Shrink")
         self.all = key_button(editor, "select_all", "All")
-        self.none = key_button(editor, "select_none", "None")
         self.invert = key_button(editor, "invert", "Invert")
         tools = list(self.tools.values())
         column(
             self,
-            row(*tools[:2]),
-            row(*tools[2:4]),
-            tools[4],
+            row(*tools[:3]),
+            row(*tools[3:]),
             form(("Brush radius", self.radius)),
             self.through,
-            row(self.all, self.none, self.invert),
-            row(self.grow, self.shrink),
+            row(self.grow, self.shrink, self.all, self.invert),
         )
         self._fit_to: float | None = None
 
@@ -74,8 +71,8 @@ class PaintingPart(QtWidgets.QGroupBox):
             self._fit_to = diagonal
             _fit(self.radius, diagonal)
         put(self.tools[selector.tool], True)
-        for button in (self.none, self.invert):  # no region can be empty
-            button.setVisible(self._editor.mode is Mode.HANDLES)
+        # A region is inverted only if others contain all its vertices, which is rare.
+        self.invert.setVisible(self._editor.mode is Mode.HANDLES)
         put(self.radius, selector.radius)
         put(self.through, selector.through)
         self.radius.setEnabled(selector.tool is Tool.BRUSH)
