@@ -33,7 +33,7 @@ from vtk_segdeform.regions import segment
 from vtk_segdeform.session import Session
 
 if TYPE_CHECKING:
-    from .editor import DeformEditor
+    from .editor import DeformEditor, KeyChoice
     from .volume_overlay import VolumeOverlay
 
 _Path = str | os.PathLike[str] | None
@@ -43,12 +43,18 @@ _HANDLE_MET = 1e-3  # of the diagonal
 
 
 @overload
-def edit(mesh: Mesh, *, path: _Path = None, title: str = ...) -> Mesh: ...
+def edit(mesh: Mesh, *, path: _Path = None, title: str = ..., keys: KeyChoice = ...) -> Mesh: ...
 @overload
-def edit(mesh: Session, *, path: _Path = None, title: str = ...) -> Session: ...
+def edit(
+    mesh: Session, *, path: _Path = None, title: str = ..., keys: KeyChoice = ...
+) -> Session: ...
 @overload
-def edit(mesh: pv.PolyData | Surface, *, path: _Path = None, title: str = ...) -> pv.PolyData: ...
-def edit(mesh: Any, *, path: _Path = None, title: str = "segdeform") -> Any:
+def edit(
+    mesh: pv.PolyData | Surface, *, path: _Path = None, title: str = ..., keys: KeyChoice = ...
+) -> pv.PolyData: ...
+def edit(
+    mesh: Any, *, path: _Path = None, title: str = "segdeform", keys: KeyChoice = "pyvista"
+) -> Any:
     """Open a window to deform *mesh*; return the deformed mesh when the window closes.
 
     Parameters
@@ -59,6 +65,8 @@ def edit(mesh: Any, *, path: _Path = None, title: str = "segdeform") -> Any:
         The file that the editor's keys save and open.
     title : str
         Title of the window.
+    keys : str or mapping of str to str or sequence of str
+        "pyvista", "Blender" or the keys of some actions, as in ``{"undo": "Ctrl+Z"}``.
 
     Returns
     -------
@@ -86,7 +94,7 @@ def edit(mesh: Any, *, path: _Path = None, title: str = "segdeform") -> Any:
     set_background(plotter.renderer, dark=is_dark)
     set_lights(plotter.renderer)
     try:
-        editor = plotter.segdeform.edit(session, path=path)
+        editor = plotter.segdeform.edit(session, path=path, keys=keys)
         plotter.show()
     finally:
         plotter.close()
@@ -114,7 +122,11 @@ class PlotterTools:
         self.added: list[DeformEditor | VolumeOverlay] = []
 
     def edit(
-        self, mesh: pv.PolyData | Surface | Mesh | Session, *, path: _Path = None
+        self,
+        mesh: pv.PolyData | Surface | Mesh | Session,
+        *,
+        path: _Path = None,
+        keys: KeyChoice = "pyvista",
     ) -> DeformEditor:
         """Add the editor to the current subplot of the plotter, and switch it on.
 
@@ -126,6 +138,8 @@ class PlotterTools:
             What to edit; not changed.  ``editor.session.deformed`` is the deformed surface.
         path : path, optional
             The file that the editor's keys save and open.
+        keys : str or mapping of str to str or sequence of str
+            As in `edit`.
         """
         from .editor import DeformEditor
 
@@ -135,7 +149,7 @@ class PlotterTools:
             for actor in self._plotter.renderer.actors.values():
                 if getattr(getattr(actor, "mapper", None), "dataset", None) is mesh:
                     actor.visibility = False
-        editor = DeformEditor(self._plotter, session)
+        editor = DeformEditor(self._plotter, session, keys=keys)
         self.added.append(editor)
         if path is not None:
             editor.path = path

@@ -6,7 +6,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from vtk_segdeform.widgets.editor.bindings import help_sections
+from vtk_segdeform.widgets.editor.bindings import DEFAULT_KEYS
 
 Row = tuple[str, str]
 
@@ -18,7 +18,7 @@ class Keys(SphinxDirective):
         """Return the sections."""
         self.env.note_dependency("../widgets/editor/bindings.py")
         found = []
-        for heading, rows in help_sections():
+        for heading, rows in DEFAULT_KEYS.sections():
             section = nodes.section("", nodes.title("", heading), ids=[nodes.make_id(heading)])
             section += table(rows)
             found.append(section)

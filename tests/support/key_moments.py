@@ -32,7 +32,7 @@ from soaking import session_of, slender
 from vtk_segdeform import Session, save_session
 from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.widgets import DeformEditor, Mode, Paint, Tool
-from vtk_segdeform.widgets.editor.bindings import BINDINGS, binding_of
+from vtk_segdeform.widgets.editor.bindings import BINDINGS, DEFAULT_KEYS
 from vtk_segdeform.widgets.handle_dragger import live_solve
 from vtk_segdeform.widgets.scene import draft, viewpoint
 from vtk_segdeform.widgets.scene.view import View
@@ -86,7 +86,7 @@ def ends_the_drag(key: str, mode: Mode) -> bool:
         return mode in (Mode.PULL, Mode.DEFORM)
     if any(b.action is None and key in b.keys and mode in b.modes for b in BINDINGS):
         return False  # the key belongs to the dragging widget
-    binding = binding_of(key, mode)
+    binding = DEFAULT_KEYS.binding_of(key, mode)
     return key == "escape" or (binding is not None and not binding.while_busy)
 
 
@@ -295,7 +295,7 @@ class Stand:
     def just_after(self, mode: Mode, *keys: str) -> None:
         """Type *keys* after a drag, while the pose still converges."""
         dragged = self.long_after(mode)
-        bindings = [binding_of(key, mode) for key in keys]
+        bindings = [DEFAULT_KEYS.binding_of(key, mode) for key in keys]
         if all(binding is not None and binding.while_busy for binding in bindings):
             expected = dragged  # which is what keys must leave that are allowed in a job
         else:

@@ -54,6 +54,7 @@ GRANTED = {
     "filters": VTK,
     "filters.paraview_plugin": {"paraview"},
     **{room: VTK for room in ROOMS if room.startswith("widgets")},
+    "widgets.scene.qt_events": {"qtpy"},
     "widgets.plugin": {"pyvista"},
     "widgets.qt": VTK | {"qtpy"},
     "widgets.qt.widget": {"pyvista", "pyvistaqt"},

@@ -21,7 +21,7 @@ from vtk_segdeform.errors import MissingDependencyError
 from vtk_segdeform.io import meshlab
 from vtk_segdeform.io.convert import is_mesh_file
 from vtk_segdeform.pictures.canvas import require_offscreen
-from vtk_segdeform.widgets.editor.bindings import help_sections
+from vtk_segdeform.widgets.editor.bindings import DEFAULT_KEYS
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -179,7 +179,9 @@ def test_the_examples_on_a_page_print_what_they_say(page, monkeypatch, tmp_path,
 
 @pytest.mark.parametrize("page", [name for name, text in PAGES.items() if ":kbd:" in text])
 def test_every_key_on_a_page_has_an_action(page):
-    keys = {key for _, rows in help_sections() for caps, _ in rows for key in caps.split("  ")}
+    keys = {
+        key for _, rows in DEFAULT_KEYS.sections() for caps, _ in rows for key in caps.split("  ")
+    }
     assert set(re.findall(r":kbd:`(.+?)`", PAGES[page].replace(r"\\", "\\"))) <= keys | MODIFIERS
 
 

@@ -11,7 +11,7 @@ from qtpy import QtCore, QtGui, QtWidgets
 from vtk_segdeform.version import __version__
 
 from ..editor import actions
-from ..qt import add_view_entries
+from ..qt import add_view_entries, name_keys
 from . import saving
 from .dialogs import show_about
 from .start_page import home_as_tilde
@@ -77,8 +77,11 @@ class Menus:
 
     def _help(self) -> None:
         menu = self._menu("&Help")
-        keys = self._add(menu, "&Keyboard shortcuts\tH", self._doing(actions.toggle_help))
-        self._need_mesh.append(keys)
+        card = self._add(menu, "&Keyboard shortcuts", self._doing(actions.toggle_help))
+        self._need_mesh.append(card)
+        named = [(card, card.text(), "help")]
+        menu.aboutToShow.connect(lambda: name_keys(named, self._window.keys))
+        self._add(menu, "&Change keys ...", self._window.choose_keys)
         self._need_mesh.append(self._add(menu, "&First steps", self._show_first_steps))
         self._add(menu, "&About segdeform", self._show_about).setMenuRole(_role("AboutRole"))
 
@@ -110,12 +113,12 @@ class Menus:
         window = self._window
         session = window.session if window.has_mesh else None
         is_free = session is not None and not window.editor.is_busy
-        for action, verb, label, keys in (
-            (self._undo, "&Undo", session and window.editor.controller.undo_label, "Ctrl+Z"),
-            (self._redo, "&Redo", session and session.redo_label, "Ctrl+Y"),
+        for action, verb, label in (
+            (self._undo, "undo", session and window.editor.controller.undo_label),
+            (self._redo, "redo", session and session.redo_label),
         ):
             name = str(label or "").replace("&", "&&")
-            action.setText(f"{verb} {name}\t{keys}" if name else f"{verb}\t{keys}")
+            name_keys([(action, f"&{verb.capitalize()} {name}".rstrip(), verb)], window.keys)
             action.setEnabled(is_free and bool(label))
 
     # Pieces.

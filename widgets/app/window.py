@@ -34,6 +34,7 @@ from .documents import (
     sample_model,
 )
 from .drops import Drops
+from .keys_dialog import choose_keys, menu_keys, read_keys, write_keys
 from .menus import Menus, connect_panel
 from .opening import Request
 from .pages import Pages
@@ -66,6 +67,8 @@ class Window(QtWidgets.QMainWindow):
         The open document.
     editor_widget : DeformWidget or None
         The widget that edits it.
+    keys : Keys
+        The user's keys.
     autosaver, autosaves, recent : Autosaver, Autosaves, Recent
         The autosave, its folder, and the recently opened files.
     mesh_state : object
@@ -81,9 +84,10 @@ class Window(QtWidgets.QMainWindow):
         first_run: bool = False,
     ) -> None:
         super().__init__()
-        settings = settings or QtCore.QSettings("vtk_segdeform", "segdeform")
-        self.recent = Recent(settings)
-        self._first_run = settings if first_run else None
+        self._settings = settings or QtCore.QSettings("vtk_segdeform", "segdeform")
+        self.recent = Recent(self._settings)
+        self._first_run = self._settings if first_run else None
+        self.keys, self._fault_of_keys = read_keys(self._settings)
         self.autosaves = autosaves or Autosaves()
         self.autosaver = Autosaver(self.autosaves, self, interval=interval)
         self.autosaver.failed.connect(self._say)
@@ -199,6 +203,16 @@ class Window(QtWidgets.QMainWindow):
             slot.release()
         return slot
 
+    def choose_keys(self) -> None:
+        """Ask for other keys; use and store them."""
+        keys = choose_keys(self, self.keys, menu_keys(self.menuBar()))
+        if keys is None:
+            return
+        self.keys = keys
+        write_keys(self._settings, keys)
+        if self.has_mesh:
+            self.editor.keys = keys
+
     def clear_recent(self) -> None:
         """Clear the list of recent files."""
         self.recent.clear()
@@ -235,6 +249,7 @@ class Window(QtWidgets.QMainWindow):
         widget = self.editor_widget = DeformWidget(session, self, first_run=self._first_run)
         widget.editor.controller.file = self.document.file(session, is_unsaved=bool(request.slot))
         widget.editor.show_cube = True
+        widget.editor.keys = self.keys
         path = self.document.session_path or self.document.source
         if path is not None and request.slot is None:
             widget.editor.controller.restore_view(path)
@@ -255,6 +270,9 @@ class Window(QtWidgets.QMainWindow):
         widget.setFocus()
         if request.slot is not None:
             self._say("Recovered (unsaved)")
+        elif self._fault_of_keys:
+            self._say(self._fault_of_keys)
+            self._fault_of_keys = ""
 
     def _failed(self, request: Request, error: BaseException) -> None:
         self._cancel_opening()

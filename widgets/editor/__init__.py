@@ -6,9 +6,9 @@ The files, in reading order:
     controller       session, widgets, mode, job and file of the editor
     mode widget_set  the modes, and the widgets of each
     camera           navigation, views, up axis and orientation cube
-    actions recording_actions panel_actions view_actions
+    actions recording_actions panel_actions
                      the actions behind keys, menus and panels
-    bindings         the table of keys
+    keys bindings    tables of keys, and the editor's own one
     job              background work, with progress and cancellation
     preparing        the preparation for pulls, while the editor remains usable
     session_file     the file that the session is saved to
@@ -36,12 +36,13 @@ from .actions import (
     toggle_overlay,
     toggle_regions,
 )
-from .bindings import BEFORE_AFTER, binding_of, key_cap
+from .bindings import PRESETS, KeyChoice, keys_of
 from .controller import Controller
 from .editor import DeformEditor
 from .hints import hint
 from .history import jumping_to, position_of, preview, states_of
 from .job import Job, Timer
+from .keys import Binding, Keys, key_cap, key_name
 from .messages import error_text
 from .mode import Mode
 from .notices import Notice, Notices, notices_of
@@ -50,8 +51,11 @@ from .panel_actions import (
     choosing_region,
     exporting,
     fitting_with,
+    frame_all,
+    frame_selection,
     hiding_handle,
     locking_handle,
+    looking_from,
     merging,
     naming_region,
     opening,
@@ -63,33 +67,30 @@ from .panel_actions import (
     setting,
     setting_colour_range,
     showing_cage,
-    with_radius,
-)
-from .session_file import MESH_FILES, READABLE_FILES, SessionFile, is_mesh, read_session
-from .view_actions import (
-    frame_all,
-    frame_selection,
-    looking_from,
     toggle_cube,
     toggle_projection,
+    with_radius,
     with_up,
 )
+from .session_file import MESH_FILES, READABLE_FILES, SessionFile, is_mesh, read_session
 
 __all__ = [
-    "BEFORE_AFTER",
     "MESH_FILES",
+    "PRESETS",
     "READABLE_FILES",
     "Action",
+    "Binding",
     "Controller",
     "DeformEditor",
     "Job",
+    "KeyChoice",
+    "Keys",
     "Mode",
     "Notice",
     "Notices",
     "SessionFile",
     "Timer",
     "actions",
-    "binding_of",
     "choosing_handle",
     "choosing_region",
     "converting",
@@ -103,6 +104,8 @@ __all__ = [
     "is_mesh",
     "jumping_to",
     "key_cap",
+    "key_name",
+    "keys_of",
     "locking_handle",
     "looking_from",
     "merging",

@@ -1,7 +1,8 @@
 """The actions behind the keys of the editor.
 
-Every action is a function of the `Controller`; `bindings` assigns keys to actions.  Long operations
-are started as jobs.  An action reports its result in the status line unless the view shows it.
+Every action is a function of the `Controller`; `bindings` names them and assigns keys.  Long
+operations are started as jobs.  An action reports its result in the status line unless the view
+shows it.
 """
 
 from __future__ import annotations
@@ -110,11 +111,12 @@ def fit_cages(controller: Controller) -> None:
     """Fit cages to the regions."""
     session, regions = controller.session, controller.session.regions
     if regions is None:
-        raise RegionError("No regions to fit cages to. Press G to detect them, or paint one")
+        raise RegionError(f"No regions to fit cages to. {_detecting(controller)}, or paint one")
 
     def show(cages: Sequence[Cage]) -> str:
         if session.regions is not regions:  # changed in another view of the same session
-            raise RegionError("The regions changed while cages were being fitted. Press F to refit")
+            again = f"Press {controller.keys.cap('fit_cages')} to refit"
+            raise RegionError(f"The regions changed while cages were being fitted. {again}")
         session.set_cages(cages, label="fit cages")
         total = sum(cage.n_vertices for cage in cages)
         return f"{_count(len(cages), 'cage')} fitted, {total} vertices in total"
@@ -125,7 +127,8 @@ def fit_cages(controller: Controller) -> None:
 def toggle_cages(controller: Controller) -> None:
     """Show cages in all modes, or in their own mode only."""
     if not controller.session.cages:
-        raise CageError("No cages to show yet. Press F to fit them to the regions")
+        fitting = f"Press {controller.keys.cap('fit_cages')} to fit them to the regions"
+        raise CageError(f"No cages to show yet. {fitting}")
     controller.widgets.cages_wanted = not controller.widgets.cages_wanted
     controller.widgets.show(controller.mode)
     controller.say("Cages shown" if controller.widgets.cages.is_shown else "Cages hidden")
@@ -134,7 +137,8 @@ def toggle_cages(controller: Controller) -> None:
 def toggle_regions(controller: Controller) -> None:
     """Show the outlines and numbers of the regions in all modes, or only while painting them."""
     if controller.session.regions is None:
-        raise RegionError("No regions to show yet. Press G to detect them, or 1 to paint one")
+        paint = f"{controller.keys.cap('regions')} to paint one"
+        raise RegionError(f"No regions to show yet. {_detecting(controller)}, or {paint}")
     widgets = controller.widgets
     widgets.regions_wanted = not widgets.regions_wanted
     widgets.show(controller.mode)
@@ -240,6 +244,24 @@ def shrink(controller: Controller) -> None:
     controller.widgets.selector.shrink()
 
 
+def select_all(controller: Controller) -> None:
+    """Add all vertices that are free to the painted region, fixed vertices or handle."""
+    selector = controller.widgets.selector
+    selector.select_all()
+    if selector.remark:
+        controller.say(selector.remark)
+
+
+def select_none(controller: Controller) -> None:
+    """Remove all vertices from the painted fixed vertices or handle."""
+    controller.widgets.selector.select_none()
+
+
+def invert(controller: Controller) -> None:
+    """Exchange the painted fixed vertices or handle, or region, for the vertices outside it."""
+    controller.widgets.selector.invert()
+
+
 def next_region(controller: Controller) -> None:
     """Select the next region for painting."""
     widgets = controller.widgets
@@ -299,7 +321,8 @@ def remove_handle(controller: Controller) -> None:
     widgets = controller.widgets
     name = widgets.selector.handle if controller.mode is Mode.HANDLES else widgets.dragger.handle
     if name is None:
-        raise ConstraintError("No handle selected. Press N to select one")
+        key = controller.keys.cap("next_handle")
+        raise ConstraintError(f"No handle selected. Press {key} to select one")
     controller.session.remove_handle(name)
     controller.say(f"Removed {name}")
 
@@ -366,18 +389,24 @@ def _dragged_handle(controller: Controller) -> str:
 def _require_regions(controller: Controller, verb: str) -> None:
     region, count = controller.widgets.selector.region, controller.widgets.n_regions
     if not count:
-        raise RegionError(f"No regions to {verb} yet. Press G to detect them, or paint one")
+        raise RegionError(f"No regions to {verb} yet. {_detecting(controller)}, or paint one")
     if region >= count:
         name = controller.session.region_name(region)
-        raise RegionError(f"Cannot {verb} {name}: not painted yet. Press N to select another")
+        another = f"Press {controller.keys.cap('next_region')} to select another"
+        raise RegionError(f"Cannot {verb} {name}: not painted yet. {another}")
 
 
 def _handle_names(controller: Controller) -> list[str]:
     """Return the names of all handles; raise if there are none."""
     names = list(controller.session.handles)
     if not names:
-        raise ConstraintError("No handle yet. In mode 3, press D and paint one")
+        key = controller.keys.cap("paint_handle")
+        raise ConstraintError(f"No handle yet. In mode 3, press {key} and paint one")
     return names
+
+
+def _detecting(controller: Controller) -> str:
+    return f"Press {controller.keys.cap('segment')} to detect them"
 
 
 def _change_locality(controller: Controller, change: float) -> None:

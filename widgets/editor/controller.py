@@ -21,9 +21,10 @@ from vtk_segdeform.session import Change, Preparation, Session, saved_view
 from ..recording import confined_path
 from ..scene import View, Widget
 from .camera import Camera, has_y_up
-from .help_card import HelpCard, Section
+from .help_card import HelpCard
 from .hints import hint
 from .job import Worker, view_timer
+from .keys import Keys
 from .messages import Messages
 from .mode import Mode
 from .notices import Notices
@@ -44,8 +45,8 @@ class Controller:
         Where everything is drawn.
     session : Session
         The first session to edit.
-    keys : sequence of sections
-        The content of the help card.
+    keys : Keys
+        The keys that start actions; set by the editor.
 
     Attributes
     ----------
@@ -67,9 +68,9 @@ class Controller:
         Navigation, views and the orientation cube.
     """
 
-    def __init__(self, view: View, session: Session, keys: list[Section]) -> None:
-        self.view = view
-        self.help = HelpCard(view, keys)
+    def __init__(self, view: View, session: Session, keys: Keys) -> None:
+        self.view, self.keys = view, keys
+        self.help = HelpCard(view, keys.sections())
         self.messages = Messages(view)
         self.messages.note(advice())
         self.notices = Notices(view, lambda: self.messages.height)
@@ -169,7 +170,8 @@ class Controller:
             fraction = self._preparing.fraction
             preparing = None if fraction == 1.0 else fraction  # finished, but not accepted yet
             is_current = self.widgets.surface.instead is None
-            text = hint(self.widgets, self._mode) if is_current else self._instead
+            current = hint(self.widgets, self._mode, self.keys)
+            text = current if is_current else self._instead
             self.messages.show(mode, text, preparing)
         else:
             self.messages.hide()

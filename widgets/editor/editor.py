@@ -4,9 +4,9 @@
     editor.On()
 
 The status line shows the next step; H shows the keys, which `bindings` lists and `actions`
-implements.  Long operations (segmentation, fitting cages, binding) are jobs in another thread:
-meanwhile only the camera works, and Escape cancels the job.  In mode PULL all of them run together
-in the background, and everything else works meanwhile.
+implements; `keys` assigns other ones.  Long operations (segmentation, fitting cages, binding) are
+jobs in another thread: meanwhile only the camera works, and Escape cancels the job.  In mode PULL
+all of them run together in the background, and everything else works meanwhile.
 
 An action during a drag or a stroke first finishes it, as if the button had been released, as one
 undo step.  Only Escape cancels it; the help card does not interrupt it.
@@ -27,10 +27,12 @@ from vtk_segdeform.errors import ArgumentError, SessionError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.session import Session
 
+from ..recording import recorded_keys
 from ..scene import Stop, View
 from .actions import Action, show_pose, show_rest
-from .bindings import BEFORE_AFTER, binding_of, help_sections, key_cap, modes_of, pressed_key
+from .bindings import KeyChoice, keys_of
 from .controller import Controller
+from .keys import Keys, key_cap, pressed_key
 from .mode import Mode
 from .widget_set import WidgetSet
 
@@ -47,14 +49,19 @@ class DeformEditor:
         Where it is drawn.  Call `remove` before its window closes.
     session : Session or Mesh
         What to edit; a new session is created for a mesh.
+    keys : str or mapping of str to str or sequence of str
+        "pyvista", "Blender" or the keys of some actions; see `keys_of`.
     """
 
-    def __init__(self, view: Any, session: Session | Mesh) -> None:
+    def __init__(
+        self, view: Any, session: Session | Mesh, *, keys: KeyChoice | Keys = "pyvista"
+    ) -> None:
         require(session, (Session, Mesh), "session")
+        table = keys_of(keys)
         self.view = View.of(view)
         has_camera = _is_aimed(self.view.renderer)
         session = session if isinstance(session, Session) else Session(session)
-        self._controller = Controller(self.view, session, help_sections())
+        self._controller = Controller(self.view, session, table)
         self._controller.camera.begin(is_aimed=has_camera)
         self._took_key = False
         self._is_removed = False
@@ -88,6 +95,19 @@ class DeformEditor:
                 f"mode must be one of {', '.join(map(str, Mode))}; got {shown(mode)}"
             )
         self._controller.mode = mode
+
+    @property
+    def keys(self) -> Keys:
+        """The keys that start actions; may be set to anything that `keys_of` accepts."""
+        return self._controller.keys
+
+    @keys.setter
+    def keys(self, keys: KeyChoice | Keys) -> None:
+        controller = self._controller
+        controller.keys = table = keys_of(keys)
+        controller.help.list_keys(table.sections())
+        controller.recordings.assign(table.changes)
+        controller.refresh()
 
     @property
     def show_cube(self) -> bool:
@@ -157,6 +177,11 @@ class DeformEditor:
                 raise
         return error
 
+    def run(self, name: str) -> Exception | None:
+        """Run the action *name* of `keys` as if its key had been pressed; see `do`."""
+        binding = self.keys[name]
+        return self.do(binding.action, while_busy=binding.while_busy)  # type: ignore[arg-type]
+
     def save(self, path: str | os.PathLike[str] | None = None) -> None:
         """Write the session to `path`, after setting it to *path* if given; see `save_session`."""
         if path is not None:
@@ -182,6 +207,7 @@ class DeformEditor:
             raise RuntimeError("this editor was removed; create another one over its session")
         if not self._stops:
             self._stops = [
+                self.view.complete_events(),
                 self.view.observe("KeyPressEvent", self._key, _AFTER_WIDGETS),
                 self.view.observe("CharEvent", lambda: self._took_key, _AFTER_WIDGETS),
                 self.view.observe("KeyReleaseEvent", self._release, _AFTER_WIDGETS),
@@ -217,16 +243,24 @@ class DeformEditor:
 
     # Keys.
 
+    @property
+    def _table(self) -> Keys:
+        """The keys that work now: those of a recording while it is replayed."""
+        recorded = recorded_keys(self.view.interactor)
+        return self.keys if recorded is None else keys_of(recorded)
+
     def _key(self) -> bool:
         key = pressed_key(self.view.interactor)
-        self._took_key = self.view.is_addressed and bool(modes_of(key))  # even if the action fails
+        # Even if the action fails.
+        self._took_key = self.view.is_addressed and bool(self._table.modes_of(key))
         if self._took_key:
             self._type(key)
         return self._took_key
 
     def _release(self) -> None:
         """Show the pose again, unless the release is followed by a press: a key that repeats."""
-        if pressed_key(self.view.interactor).endswith(BEFORE_AFTER):
+        held = {key.rpartition("+")[2] for key in self._table["before_after"].keys}
+        if pressed_key(self.view.interactor).rpartition("+")[2] in held:
             self._stop_waiting()
             self._stop_waiting = self.view.every(_REPEAT, self._show_pose)
 
@@ -235,11 +269,11 @@ class DeformEditor:
         show_pose(self._controller)
 
     def _type(self, key: str) -> None:
-        binding = binding_of(key, self.mode)
+        binding = self._table.binding_of(key, self.mode)
         if binding is not None and binding.action is not None:
             self._do(binding.action, binding.while_busy)
             return
-        modes = ", ".join(f"{mode.value} ({label})" for mode, label in modes_of(key))
+        modes = ", ".join(f"{mode.value} ({label})" for mode, label in self._table.modes_of(key))
         if self.is_busy:
             self._controller.refuse()
         else:  # no action, so a drag continues

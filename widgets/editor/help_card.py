@@ -62,6 +62,12 @@ class HelpCard:
             self._clear()
             self.view.request_render()
 
+    def list_keys(self, sections: Sequence[Section]) -> None:
+        """List other keys."""
+        self.sections, self._laid_out = tuple(sections), (0, 0)
+        if self.is_shown:
+            self.view.request_render()
+
     def toggle(self) -> None:
         """Show or hide it."""
         if self.is_shown:

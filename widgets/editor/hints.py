@@ -10,6 +10,7 @@ from vtk_segdeform.solver import Status
 
 from ..region_selector import Paint, Tool
 from ..volume_overlay import brief, signed
+from .keys import Keys
 from .mode import Mode
 from .widget_set import WidgetSet
 
@@ -18,33 +19,35 @@ _TOOLS = {
     Tool.LASSO: "Lasso",
     Tool.RECTANGLE: "Rectangle",
     Tool.COMPONENT: "Connected part",
+    Tool.REGION: "Whole region",
 }
 
 
-def missing(session: Session, mode: Mode) -> str:
+def missing(session: Session, mode: Mode, keys: Keys) -> str:
     """Return what *mode* lacks and the key that adds it, or "" if nothing is missing."""
     if session.regions is None and mode is Mode.REGIONS:
-        return "No regions yet. Press G to detect them, or paint one"
+        return f"No regions yet. Press {keys.cap('segment')} to detect them, or paint one"
     if session.regions is None and mode is not Mode.HANDLES:
-        return "No regions yet. Press G to detect them, or 1 to paint one"
+        paint = f"{keys.cap('regions')} to paint one"
+        return f"No regions yet. Press {keys.cap('segment')} to detect them, or {paint}"
     if not session.cages and mode in (Mode.CAGES, Mode.DEFORM):
-        return "No cages yet. Press F to fit them to the regions"
+        return f"No cages yet. Press {keys.cap('fit_cages')} to fit them to the regions"
     if not session.handles and mode is Mode.DEFORM:
-        return "No handle yet. Press 3 to paint one"
+        return f"No handle yet. Press {keys.cap('handles')} to paint one"
     return ""
 
 
-def hint(widgets: WidgetSet, mode: Mode) -> str:
+def hint(widgets: WidgetSet, mode: Mode, keys: Keys) -> str:
     """Return the hint for *mode*: the current action, and the next step."""
     if mode is Mode.PULL:
-        return _pull_hint(widgets)
-    lacking = missing(widgets.session, mode)
+        return _pull_hint(widgets, keys)
+    lacking = missing(widgets.session, mode, keys)
     if lacking:
         return lacking
     if mode is Mode.DEFORM:
-        return _deform_hint(widgets)
+        return _deform_hint(widgets, keys)
     now = "Drag a cage vertex" if mode is Mode.CAGES else _painting_hint(widgets)
-    next_step = _next_step(widgets, mode)
+    next_step = _next_step(widgets, mode, keys)
     return f"{now} · {next_step}" if next_step else now
 
 
@@ -62,25 +65,25 @@ def _painting_hint(widgets: WidgetSet) -> str:
     return f"{_TOOLS[selector.tool]}: paint {target}{through}. Ctrl: erase"
 
 
-def _pull_hint(widgets: WidgetSet) -> str:
+def _pull_hint(widgets: WidgetSet, keys: Keys) -> str:
     session = widgets.session
     if widgets.puller.is_waiting:
         return "Preparing: the pull starts in a moment · Esc to cancel"
     if session.is_dragging:
         return _drag_hint(session, "X Y Z: axis. R: turn. ")
     if _is_volume_off(session):
-        return "Drag the surface · Volume preservation off (P to turn on)"
+        return f"Drag the surface · {_volume_off(keys)}"
     if session.undo_label == "pull":
-        return "Drag the surface. Shift-click pins. Z: undo"
+        return f"Drag the surface. Shift-click pins. {keys.cap('undo')}: undo"
     radius = 100.0 * widgets.puller.radius / session.mesh.diagonal
     return f"Drag the surface. Shift-click pins. [ ]: radius ({radius:.3g} %)"
 
 
-def _drag_hint(session: Session, keys: str = "") -> str:
+def _drag_hint(session: Session, own: str = "") -> str:
     volume = f"Volume {signed(100.0 * session.volume_change, 2)} %"
     if not session.has_volume:
         volume = "No volume to preserve"
-    return f"{volume} · {keys}Esc to cancel"
+    return f"{volume} · {own}Esc to cancel"
 
 
 def _is_volume_off(session: Session) -> bool:
@@ -88,29 +91,36 @@ def _is_volume_off(session: Session) -> bool:
     return session.has_volume and not (options.preserve_volume or options.preserve_region_volumes)
 
 
-def _deform_hint(widgets: WidgetSet) -> str:
+def _volume_off(keys: Keys) -> str:
+    return f"Volume preservation off ({keys.cap('preserve_volume')} to turn on)"
+
+
+def _deform_hint(widgets: WidgetSet, keys: Keys) -> str:
     session = widgets.session
     if session.is_dragging:
         return _drag_hint(session)
     if _is_volume_off(session):
-        return "Move or rotate a handle · Volume preservation off (P to turn on)"
+        return f"Move or rotate a handle · {_volume_off(keys)}"
     solution = session.solution
     if solution is not None and solution.status not in (Status.CONVERGED, Status.STEP_LIMIT):
         return str(solution.status)
-    next_step = "" if len(session.fixed) else " · 3, S: paint fixed vertices"
-    axes = " · Local axes (L)" if widgets.dragger.local else ""
+    fixing = f" · {keys.cap('handles')}, {keys.cap('paint_fixed')}: paint fixed vertices"
+    next_step = "" if len(session.fixed) else fixing
+    axes = f" · Local axes ({keys.cap('local_axes')})" if widgets.dragger.local else ""
     return f"Move or rotate a handle{axes}{next_step}"
 
 
-def _next_step(widgets: WidgetSet, mode: Mode) -> str:
+def _next_step(widgets: WidgetSet, mode: Mode, keys: Keys) -> str:
     """Return the key for the next step after the work of *mode*."""
     session = widgets.session
     if mode is Mode.HANDLES and widgets.selector.paints is Paint.FIXED and not session.handles:
-        return "Next: D, paint a handle"
+        return f"Next: {keys.cap('paint_handle')}, paint a handle"
     if mode is Mode.HANDLES and not session.handles:
-        return "S: paint fixed vertices"
+        return f"{keys.cap('paint_fixed')}: paint fixed vertices"
     if session.regions is None:
-        return "Next: G, detect regions"
+        return f"Next: {keys.cap('segment')}, detect regions"
     if not session.cages:
-        return "Next: F, fit cages"
-    return "Next: 4, deform" if session.handles else "Next: 3, paint a handle"
+        return f"Next: {keys.cap('fit_cages')}, fit cages"
+    if session.handles:
+        return f"Next: {keys.cap('deform')}, deform"
+    return f"Next: {keys.cap('handles')}, paint a handle"

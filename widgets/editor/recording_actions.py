@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from vtk_segdeform.deformer import LOCALITY
 
+from ..recording import Input
 from ..region_selector import Tool
 from .controller import Controller
+from .keys import event_key
 from .mode import Mode
 from .recordings import film_place
 
 _FILMED = Mode.PULL, Mode.DEFORM
-_KEY_OF = {Tool.BRUSH: "b", Tool.LASSO: "l", Tool.RECTANGLE: "t", Tool.COMPONENT: "k"}
+_KEY_OF = {Tool.BRUSH: "b", Tool.LASSO: "l", Tool.RECTANGLE: "t", Tool.COMPONENT: "k",
+           Tool.REGION: "r"}  # fmt: skip
 
 
 def record_input(controller: Controller) -> None:
@@ -22,8 +25,20 @@ def record_input(controller: Controller) -> None:
     selector = controller.widgets.selector
     keys = f"3{_KEY_OF[selector.tool]}" + "v" * selector.through + _pull_keys(controller)
     keys += str(controller.mode.value)
-    path = recordings.start_recording(controller.place, controller.session, keys)
-    controller.say(f"Recording input to {path}. Ctrl+R to stop")
+
+    def is_left_out(event: Input) -> bool:
+        key = event_key(event.key, control=event.control, alt=event.alt, shift=event.shift)
+        table = controller.keys
+        return any(key in table[name].keys for name in ("record_input", "record_video"))
+
+    path = recordings.start_recording(
+        controller.place,
+        controller.session,
+        keys=keys,
+        assigned=controller.keys.changes,
+        skips=is_left_out,
+    )
+    controller.say(f"Recording input to {path}. {controller.keys.cap('record_input')} to stop")
 
 
 def _pull_keys(controller: Controller) -> str:
@@ -51,7 +66,7 @@ def record_video(controller: Controller) -> None:
         film_place(controller.place)  # report an unwritable place before filming
         recordings.start_film(lambda: controller.mode in _FILMED and not controller.is_busy)
         where = "" if controller.mode in _FILMED else " of modes 0 and 4"
-        controller.say(f"Recording video{where}. Ctrl+M to stop")
+        controller.say(f"Recording video{where}. {controller.keys.cap('record_video')} to stop")
         return
     path, frames = film_place(controller.place), recordings.end_film()
     if not len(frames):

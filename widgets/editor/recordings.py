@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from vtk_segdeform.errors import MissingDependencyError, SessionError
 from vtk_segdeform.session import Session, save_session
@@ -52,8 +51,29 @@ class Recordings:
         """Labels of the current recordings, for the status line."""
         return ["recording input"] * self.is_recording + ["recording video"] * self.is_filming
 
-    def start_recording(self, beside: Path, session: Session, keys: str) -> Path:
-        """Start recording the input; return the file.  *keys* select the current mode and tool.
+    def start_recording(
+        self,
+        beside: Path,
+        session: Session,
+        *,
+        keys: str,
+        assigned: Mapping[str, Sequence[str]],
+        skips: Callable[[Input], bool],
+    ) -> Path:
+        """Start recording the input; return the file.
+
+        Parameters
+        ----------
+        beside : Path
+            The file of the session.
+        session : Session
+            Saved beside the recording.
+        keys : str
+            Default keys that select the current mode and tool.
+        assigned : mapping of str to sequence of str
+            The keys of actions in the recorded input, as far as they differ from the default ones.
+        skips : callable
+            Whether to leave out an `Input`.
 
         Raises
         ------
@@ -65,9 +85,16 @@ class Recordings:
             raise SessionError("Finish the drag before recording the input")
         save_session(path.with_suffix(".segdeform"), session)
         session.start_afresh()  # as the session that the replay loads
-        self._recorder = Recorder(self._view, path, keys=keys, skips=_is_recording_key)
+        self._recorder = Recorder(self._view, path, keys=keys, skips=skips)
+        if assigned:
+            self._recorder.assign(assigned)
         self._path = path
         return path
+
+    def assign(self, keys: Mapping[str, Sequence[str]]) -> None:
+        """Note in the current recording, if there is one, that actions have other *keys*."""
+        if self._recorder is not None:
+            self._recorder.assign(keys)
 
     def end_recording(self) -> Path:
         """Stop recording the input; return the file."""
@@ -123,8 +150,3 @@ def free_place(beside: Path, ending: str) -> Path:
         if not os.path.lexists(path):
             return path
     raise AssertionError  # unreachable: `count` never ends
-
-
-def _is_recording_key(event: Any) -> bool:
-    """Return whether an event is of a key that starts or stops recordings; replays omit those."""
-    return isinstance(event, Input) and event.control and (event.key or "").lower() in ("r", "m")

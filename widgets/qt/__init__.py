@@ -8,16 +8,16 @@ The files, in reading order:
                 the parts of the panel
     first_steps three cards for the first run
     view_menu   menu entries for the camera
-    event_filter    what pyvistaqt does not tell VTK of Qt's events
     controls    buttons, fields and layouts of the parts
     icons       the icons of the toolbar
 """
 
-from .view_menu import add_view_entries
+from .view_menu import add_view_entries, name_keys
 from .widget import DeformWidget, deform_dock
 
 __all__ = [
     "DeformWidget",
     "add_view_entries",
     "deform_dock",
+    "name_keys",
 ]

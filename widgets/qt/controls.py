@@ -13,31 +13,48 @@ import numpy as np
 from numpy.typing import NDArray
 from qtpy import QtCore, QtGui, QtWidgets
 
-from ..editor import DeformEditor, Mode, binding_of, key_cap
+from ..editor import DeformEditor, Keys, key_cap
 from .icons import SIZE
 
 Qt = QtCore.Qt
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 _LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 _GAP = 6
+_TIP, _ACTION = "plain tip", "action"  # properties of widgets
 
 
-def key_button(editor: DeformEditor, key: str, mode: Mode, text: str = "") -> Any:
-    """Return a button for the action of *key* in *mode*, with its label or *text*."""
-    binding = binding_of(key, mode)
-    label = "" if binding is None else binding.label
-    return doing(editor, push_button(text or label, label, key), key, mode)
+def key_button(editor: DeformEditor, action: str, text: str = "") -> Any:
+    """Return a button for an *action* of the table of keys, with its label or *text*."""
+    label = editor.keys[action].label
+    return doing(editor, push_button(text or label, label, action), action)
 
 
-def choice_button(editor: DeformEditor, key: str, mode: Mode, text: str) -> Any:
+def choice_button(editor: DeformEditor, action: str, text: str) -> Any:
     """Return a `key_button` that stays down and is then highlighted."""
-    return highlighted(key_button(editor, key, mode, text))
+    return highlighted(key_button(editor, action, text))
 
 
-def push_button(text: str, tip: str, key: str = "") -> Any:
-    """Return a button with a tooltip that also names the *key* for the same action."""
-    button = QtWidgets.QPushButton(text)
-    button.setToolTip(f"{tip} ({key_cap(key)})" if key else tip)
+def with_key(widget: Any, tip: str, action: str) -> Any:
+    """Return *widget* with a tooltip, which `name_keys` completes by the key of *action*."""
+    widget.setToolTip(tip)
+    widget.setProperty(_TIP, tip)
+    widget.setProperty(_ACTION, action)
+    return widget
+
+
+def name_keys(parent: Any, keys: Keys) -> None:
+    """Name the keys of actions in the tooltips of *parent*, after `with_key`."""
+    for widget in parent.findChildren(QtWidgets.QWidget):
+        action = widget.property(_ACTION)
+        if action:
+            caps = " ".join(key_cap(key) for key in keys[action].keys[:1])
+            tip = widget.property(_TIP)
+            widget.setToolTip(f"{tip} ({caps})" if caps else tip)
+
+
+def push_button(text: str, tip: str, action: str = "") -> Any:
+    """Return a button with a tooltip that also names the key of *action*."""
+    button = with_key(QtWidgets.QPushButton(text), tip, action)
     button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
     button.setMinimumWidth(1)  # the row determines its width, not the text
     button.setSizePolicy(_policy("Preferred"), _policy("Fixed"))
@@ -45,11 +62,10 @@ def push_button(text: str, tip: str, key: str = "") -> Any:
     return button
 
 
-def tool_button(text: str, tip: str, key: str = "") -> Any:
+def tool_button(text: str, tip: str, action: str = "") -> Any:
     """Return a flat button for an icon and *text*, with the tooltip of a `push_button`."""
-    button = QtWidgets.QToolButton()
+    button = with_key(QtWidgets.QToolButton(), tip, action)
     button.setText(text)
-    button.setToolTip(f"{tip} ({key_cap(key)})" if key else tip)
     button.setAutoRaise(True)
     button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
     button.setIconSize(QtCore.QSize(SIZE, SIZE))
@@ -65,13 +81,9 @@ def highlighted(button: Any) -> Any:
     return button
 
 
-def doing(editor: DeformEditor, button: Any, key: str, mode: Mode) -> Any:
-    """Return *button*, which runs the action of *key* in *mode* when it is clicked."""
-    binding = binding_of(key, mode)
-    if binding is None or binding.action is None:
-        raise ValueError(f"{key!r} has no action in {mode}")
-    action, while_busy = binding.action, binding.while_busy
-    button.clicked.connect(lambda: editor.do(action, while_busy=while_busy))
+def doing(editor: DeformEditor, button: Any, action: str) -> Any:
+    """Return *button*, which runs an *action* of the table of keys when it is clicked."""
+    button.clicked.connect(lambda: editor.run(action))
     return button
 
 
@@ -96,10 +108,9 @@ def slider(least: int, most: int, tip: str) -> Any:
     return bar
 
 
-def check_box(text: str, tip: str) -> Any:
-    """Return a check box with a tooltip."""
-    box = QtWidgets.QCheckBox(text)
-    box.setToolTip(tip)
+def check_box(text: str, tip: str, action: str = "") -> Any:
+    """Return a check box with a tooltip that also names the key of *action*."""
+    box = with_key(QtWidgets.QCheckBox(text), tip, action)
     box.setFocusPolicy(Qt.FocusPolicy.TabFocus)
     return box
 
@@ -170,14 +181,15 @@ def form(*rows: tuple[str, Any]) -> Any:
     return layout
 
 
-def shortcut(keys: Any, parent: Any, do: Callable[[], object], *, alone: bool = False) -> None:
+def shortcut(keys: Any, parent: Any, do: Callable[[], object], *, alone: bool = False) -> Any:
     """Call *do* for *keys* if *parent* or, unless *alone*, one of its children has the focus."""
     # Qt 5 has it in QtWidgets, Qt 6 in QtGui.
     shortcut_class = getattr(QtWidgets, "QShortcut", None) or QtGui.QShortcut
     contexts = Qt.ShortcutContext
     key = shortcut_class(QtGui.QKeySequence(keys), parent)
     key.setContext(contexts.WidgetShortcut if alone else contexts.WidgetWithChildrenShortcut)
-    key.activated.connect(do)
+    key.activated.connect(lambda: do())
+    return key
 
 
 def put(widget: Any, value: Any) -> None:

@@ -59,15 +59,15 @@ class HandlesPart(QtWidgets.QGroupBox):
         self.list = table(["Name", "Vertices", "Show", "Lock"], _TIP, rows=6)
         self.list.itemSelectionChanged.connect(self._selection_changed)
         self.list.itemChanged.connect(self._item_edited)
-        self.new = key_button(editor, "a", Mode.HANDLES, "New")
-        self.remove = key_button(editor, "delete", Mode.HANDLES, "Remove")
+        self.new = key_button(editor, "new_handle", "New")
+        self.remove = key_button(editor, "remove_handle", "Remove")
         tip = "A handle can be rotated; a pin or pulled point is a single vertex"
-        self.convert = push_button("Make handle", tip, "m")
+        self.convert = push_button("Make handle", tip, "convert_handle")
         self.convert.clicked.connect(self._convert)
-        self.local = check_box("Local axes", "The axes rotate with the handle (L)")
+        self.local = check_box("Local axes", "The axes rotate with the handle", "local_axes")
         self.local.clicked.connect(lambda: editor.do(toggle_local_axes))
-        tip = "Rotate about the centre of the handle again. V: about the point under the pointer"
-        self.pivot = push_button("Reset pivot", tip)
+        tip = "Rotate about the centre of the handle again"
+        self.pivot = push_button("Reset pivot", tip, "pivot")
         self.pivot.clicked.connect(lambda: editor.do(reset_pivot))
         buttons = row(self.new, self.remove, self.convert)
         column(self, self.list, buttons, row(self.local, self.pivot))

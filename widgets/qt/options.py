@@ -8,7 +8,6 @@ from qtpy import QtCore, QtWidgets
 
 from ..editor import (
     DeformEditor,
-    Mode,
     fitting_with,
     setting,
     setting_colour_range,
@@ -49,8 +48,10 @@ class CagesPart(QtWidgets.QGroupBox):
         )
         self.offset.setSpecialValueText("Auto")
         self.offset.valueChanged.connect(lambda x: editor.do(setting(offset=x or None)))
-        self.fit = key_button(editor, "f", Mode.CAGES, "Fit cages")
-        self.shown = check_box("Show cages in all modes", "Show cages outside mode 2 as well (C)")
+        self.fit = key_button(editor, "fit_cages", "Fit cages")
+        self.shown = check_box(
+            "Show cages in all modes", "Show cages outside mode 2 as well", "show_cages"
+        )
         self.shown.clicked.connect(lambda: editor.do(toggle_cages))
         fields = form(
             ("Detail", self.detail), ("Total cage vertices", self.total), ("Offset", self.offset)
@@ -92,7 +93,9 @@ class DeformPart(QtWidgets.QGroupBox):
         self.volume = QtWidgets.QLabel()
         self.volume.setToolTip("Relative volume change of the whole mesh")
         self.overlay = check_box(
-            "Show local volume change", "Colour the mesh by its local volume change (O)"
+            "Show local volume change",
+            "Colour the mesh by its local volume change",
+            "show_volume_change",
         )
         self.overlay.clicked.connect(lambda: editor.do(toggle_overlay))
         self.range = number_box(
@@ -105,7 +108,9 @@ class DeformPart(QtWidgets.QGroupBox):
         self.range.setPrefix("± ")
         self.range.setSuffix(" %")
         self.range.valueChanged.connect(lambda x: editor.do(setting_colour_range(0.01 * x or None)))
-        self.preserve = check_box("Preserve volume", "Preserve the enclosed volume exactly (P)")
+        self.preserve = check_box(
+            "Preserve volume", "Preserve the enclosed volume exactly", "preserve_volume"
+        )
         self.preserve.clicked.connect(lambda on: editor.do(setting(preserve_volume=on)))
         self.per_region = check_box("Per region", "Preserve the volume of each region as well")
         self.per_region.clicked.connect(lambda on: editor.do(setting(preserve_region_volumes=on)))
@@ -126,7 +131,7 @@ class DeformPart(QtWidgets.QGroupBox):
         self.clusters.setSingleStep(50)
         self.clusters.setSpecialValueText("One per vertex")
         self.clusters.valueChanged.connect(lambda n: editor.do(setting(rotation_groups=n or None)))
-        self.reset = key_button(editor, "home", Mode.DEFORM, "Reset pose")
+        self.reset = key_button(editor, "reset_pose")
         column(
             self,
             form(("Volume change", self.volume)),

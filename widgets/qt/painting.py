@@ -12,10 +12,11 @@ from ..region_selector import Tool
 from .controls import check_box, choice_button, column, form, key_button, number_box, put, row
 
 _TOOLS = {
-    Tool.BRUSH: ("b", "Brush"),
-    Tool.LASSO: ("l", "Lasso"),
-    Tool.RECTANGLE: ("t", "Rectangle"),
-    Tool.COMPONENT: ("k", "Connected part"),
+    Tool.BRUSH: "brush",
+    Tool.LASSO: "lasso",
+    Tool.RECTANGLE: "rectangle",
+    Tool.COMPONENT: "connected_part",
+    Tool.REGION: "whole_region",
 }
 
 
@@ -31,30 +32,34 @@ class PaintingPart(QtWidgets.QGroupBox):
     def __init__(self, editor: DeformEditor) -> None:
         super().__init__("Paint with")
         self._editor = editor
-        mode = Mode.REGIONS  # mode 3 has the same keys
         self.tools = {
-            tool: choice_button(editor, key, mode, text) for tool, (key, text) in _TOOLS.items()
+            tool: choice_button(editor, action, editor.keys[action].label)
+            for tool, action in _TOOLS.items()
         }
         group = QtWidgets.QButtonGroup(self)
         for button in self.tools.values():
             group.addButton(button)
         self.radius = number_box(
             QtWidgets.QDoubleSpinBox(),
-            "Brush radius along the surface, in mesh units ([ ] or the wheel)",
+            "Brush radius along the surface, in mesh units ([ ] or Shift+wheel)",
         )
         self.radius.valueChanged.connect(lambda radius: editor.do(with_radius(radius)))
-        self.through = check_box("Select through (X-ray)", "Paint hidden vertices as well (V)")
+        self.through = check_box(
+            "Select through (X-ray)", "Paint hidden vertices as well", "select_through"
+        )
         self.through.toggled.connect(lambda through: editor.do(selecting_through(through)))
-        self.grow = key_button(editor, "plus", mode, "Grow")
-        self.shrink = key_button(editor, "minus", mode, "Shrink")
+        self.grow = key_button(editor, "grow", "Grow")
+        self.shrink = key_button(editor, "shrink", "Shrink")
+        self.all = key_button(editor, "select_all", "All")
+        self.invert = key_button(editor, "invert", "Invert")
         tools = list(self.tools.values())
         column(
             self,
-            row(*tools[:2]),
-            row(*tools[2:]),
+            row(*tools[:3]),
+            row(*tools[3:]),
             form(("Brush radius", self.radius)),
             self.through,
-            row(self.grow, self.shrink),
+            row(self.grow, self.shrink, self.all, self.invert),
         )
         self._fit_to: float | None = None
 
@@ -66,6 +71,8 @@ class PaintingPart(QtWidgets.QGroupBox):
             self._fit_to = diagonal
             _fit(self.radius, diagonal)
         put(self.tools[selector.tool], True)
+        # A region is inverted only if others contain all its vertices, which is rare.
+        self.invert.setVisible(self._editor.mode is Mode.HANDLES)
         put(self.radius, selector.radius)
         put(self.through, selector.through)
         self.radius.setEnabled(selector.tool is Tool.BRUSH)

@@ -11,14 +11,15 @@ panel subscribes to them and refreshes all its parts together, a moment later.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from qtpy import QtCore, QtWidgets
 
 from vtk_segdeform.session import Change
 
-from ..editor import DeformEditor, Mode, binding_of
-from .controls import shortcut
+from ..editor import DeformEditor, Keys, Mode, key_cap
+from .controls import name_keys, shortcut
 from .handles import HandlesPart
 from .history import HistoryPart
 from .options import CagesPart, DeformPart
@@ -31,7 +32,7 @@ from .toolbar import Toolbar
 Qt = QtCore.Qt
 _DELAY = 30  # milliseconds; longer than between two moves of a drag
 _WIDTH = 40  # letters
-_KEYS = {"Ctrl+Z": "ctrl+z", "Ctrl+Y": "ctrl+y", "Ctrl+Shift+Z": "ctrl+y", "Escape": "escape"}
+_SHORTCUTS = ("undo", "redo", "cancel")  # work in the panel, too, with Ctrl or Alt, or as Escape
 
 
 class DeformPanel(QtWidgets.QWidget):
@@ -71,6 +72,8 @@ class DeformPanel(QtWidgets.QWidget):
             self.regions: {Mode.REGIONS, Mode.CAGES, Mode.DEFORM},
             self.painting: {Mode.REGIONS, Mode.HANDLES},
         }
+        self._keys: Keys | None = None  # those that are shown
+        self._shortcuts: list[Any] = []
         self._build()
         self._delay = QtCore.QTimer(self)
         self._delay.setSingleShot(True)
@@ -96,6 +99,8 @@ class DeformPanel(QtWidgets.QWidget):
         editor, busy = self.editor, self.editor.is_busy
         for each in (self, self.toolbar):  # which may be beside the panel
             each.setEnabled(editor.GetEnabled())
+        if editor.keys is not self._keys:
+            self._show_keys(editor.keys)
         self._inside.setEnabled(not busy)
         self.toolbar.refresh()
         self.status.refresh()
@@ -141,16 +146,22 @@ class DeformPanel(QtWidgets.QWidget):
         widest += area.verticalScrollBar().sizeHint().width() + 2 * layout.contentsMargins().left()
         letters = _WIDTH * self.fontMetrics().averageCharWidth()
         self.setMinimumWidth(max(widest, letters))
-        for keys, key in _KEYS.items():
-            for part in (self.toolbar, area, self.status, self.history):
-                self._add_shortcut(part, keys, key)
+        self._with_shortcuts = self.toolbar, area, self.status, self.history
 
-    def _add_shortcut(self, part: Any, keys: str, key: str) -> None:
-        binding = binding_of(key, Mode.REGIONS)
-        if binding is None or binding.action is None:
-            raise ValueError(f"{key!r} has no action in all modes")
-        action, while_busy = binding.action, binding.while_busy
-        shortcut(keys, part, lambda: self.editor.do(action, while_busy=while_busy))
+    def _show_keys(self, keys: Keys) -> None:
+        """Name *keys* in tooltips, and use some of them in the panel, too."""
+        self._keys = keys
+        for each in (self, self.toolbar):  # which may be beside the panel
+            name_keys(each, keys)
+        while self._shortcuts:
+            self._shortcuts.pop().deleteLater()
+        for name in _SHORTCUTS:
+            do = partial(self.editor.run, name)
+            for key in keys[name].keys:
+                if key == "escape" or key.startswith(("ctrl+", "alt+")):
+                    self._shortcuts += [
+                        shortcut(key_cap(key), part, do) for part in self._with_shortcuts
+                    ]
 
     # Events.
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from qtpy import QtCore, QtWidgets
 
-from ..editor import DeformEditor, Mode, pulling_with, setting
+from ..editor import DeformEditor, pulling_with, setting
 from ..volume_overlay import percent
-from .controls import check_box, column, form, key_button, number_box, put, row
+from .controls import check_box, column, form, key_button, number_box, put, row, with_key
 
 Qt = QtCore.Qt
 
@@ -35,23 +35,27 @@ class PullPart(QtWidgets.QGroupBox):
         self.local.setRange(0, 100)
         self.local.setPageStep(10)
         self.local.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self.local.setToolTip(
+        with_key(
+            self.local,
             "How much of the surface stays in place: all of it follows at the left, "
-            "only the surface near the pointer at the right (+ -)"
+            "only the surface near the pointer at the right",
+            "more_local",
         )
         self.local.valueChanged.connect(
             lambda share: editor.do(pulling_with(locality=0.01 * share))
         )
         self.auto = check_box(
-            "Auto local", "Free between pins and fixed vertices, otherwise halfway (A)"
+            "Auto local", "Free between pins and fixed vertices, otherwise halfway", "auto_locality"
         )
         self.auto.clicked.connect(self._set_auto)
-        self.unpin = key_button(editor, "u", Mode.PULL, "Remove all pins")
+        self.unpin = key_button(editor, "remove_pins")
         self.volume = QtWidgets.QLabel()
         self.volume.setToolTip("Relative volume change of the whole mesh")
-        self.preserve = check_box("Preserve volume", "Preserve the enclosed volume exactly (P)")
+        self.preserve = check_box(
+            "Preserve volume", "Preserve the enclosed volume exactly", "preserve_volume"
+        )
         self.preserve.clicked.connect(lambda on: editor.do(setting(preserve_volume=on)))
-        self.reset = key_button(editor, "home", Mode.PULL, "Reset pose")
+        self.reset = key_button(editor, "reset_pose")
         column(
             self,
             form(

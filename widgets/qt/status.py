@@ -10,12 +10,10 @@ import re
 
 from qtpy import QtCore, QtGui, QtWidgets
 
-from ..editor import DeformEditor, Mode, binding_of, hint
-from .controls import column, key_button, sentence
+from ..editor import DeformEditor, Keys, Mode, hint, key_cap
+from .controls import column, doing, push_button, sentence
 
 _LINES = 2
-# A key after "Press", "or" or "Next:", or before ":" or "to", as hints name it.
-_KEY = re.compile(r"((?:Press|or|Next:) |\(|· |, )([0-9A-Z])(?=[ :,.)]|$)")
 
 
 class StatusPart(QtWidgets.QWidget):
@@ -46,8 +44,9 @@ class StatusPart(QtWidgets.QWidget):
         self.hint.linkActivated.connect(self._press)
         self.bar = QtWidgets.QProgressBar()
         self.bar.setRange(0, 1000)
-        self.cancel = key_button(editor, "escape", Mode.REGIONS, "Cancel")
-        self.cancel.setToolTip("Cancel it; nothing is changed (Esc)")
+        self.cancel = doing(
+            editor, push_button("Cancel", "Cancel it; nothing is changed", "cancel"), "cancel"
+        )
         for each in (self.bar, self.cancel):
             policy = each.sizePolicy()
             policy.setRetainSizeWhenHidden(True)  # keep the layout when a job starts
@@ -69,8 +68,8 @@ class StatusPart(QtWidgets.QWidget):
         self.sign.setVisible(bool(messages.error) and not busy)
         if not busy:
             ink = self.palette().color(QtGui.QPalette.ColorRole.WindowText).name()
-            mode = self._editor.mode
-            links = with_links(hint(self._editor.widgets, mode), mode, ink)
+            mode, keys = self._editor.mode, self._editor.keys
+            links = with_links(hint(self._editor.widgets, mode, keys), keys, mode, ink)
             if self.hint.text() != links:
                 self.hint.setText(links)
         is_running = messages.fraction is not None
@@ -80,18 +79,21 @@ class StatusPart(QtWidgets.QWidget):
             self.bar.setValue(round(1000.0 * (messages.fraction or 0.0)))
 
     def _press(self, key: str) -> None:
-        binding = binding_of(key, self._editor.mode)
-        if binding is not None and binding.action is not None:
-            self._editor.do(binding.action, while_busy=binding.while_busy)
+        binding = self._editor.keys.binding_of(key, self._editor.mode)
+        if binding is not None:
+            self._editor.run(binding.name)
 
 
-def with_links(text: str, mode: Mode, ink: str) -> str:
+def with_links(text: str, keys: Keys, mode: Mode, ink: str) -> str:
     """Return the rich text of a hint, in which keys that work in *mode* are links, in *ink*."""
+    names = {key_cap(b.keys[0]): b.keys[0] for b in keys.bindings if mode in b.modes and b.keys}
+    names = {html.escape(cap, quote=False): key for cap, key in names.items()}
+    # A key after "Press", "or" or "Next:", or before ":" or "to", as hints name it.
+    caps = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
+    pattern = rf"((?:Press|or|Next:) |\(|· |, )({caps})(?=[ :,.)]|$)"
 
     def link(found: re.Match[str]) -> str:
-        before, key = found.groups()
-        if binding_of(key.lower(), mode) is None:
-            return f"{before}{key}"
-        return f'{before}<a href="{key.lower()}" style="color: {ink}">{key}</a>'
+        before, cap = found.groups()
+        return f'{before}<a href="{names[cap]}" style="color: {ink}">{cap}</a>'
 
-    return _KEY.sub(link, html.escape(text, quote=False))
+    return re.sub(pattern, link, html.escape(text, quote=False))

@@ -12,12 +12,10 @@ from typing import Any
 from qtpy import QtCore, QtWidgets
 
 from ..editor import (
-    BEFORE_AFTER,
     MESH_FILES,
     READABLE_FILES,
     DeformEditor,
     Mode,
-    binding_of,
     exporting,
     opening,
     save,
@@ -46,8 +44,8 @@ class Toolbar(QtWidgets.QWidget):
     def __init__(self, editor: DeformEditor) -> None:
         super().__init__()
         self._editor = editor
-        self.open = tool_button("Open", "Open a mesh or a session", "ctrl+o")
-        self.save = tool_button("Save", "Save the session or the deformed mesh", "ctrl+s")
+        self.open = tool_button("Open", "Open a mesh or a session", "open")
+        self.save = tool_button("Save", "Save the session or the deformed mesh", "save")
         self.open.clicked.connect(self.ask_and_open)
         menu = self._menu(self.save)
         for text, do in (
@@ -56,19 +54,19 @@ class Toolbar(QtWidgets.QWidget):
             ("Save mesh as ...", self.ask_and_export),
         ):
             menu.addAction(text).triggered.connect(do)
-        self.undo = doing(editor, tool_button("Undo", "Undo", "z"), "z", Mode.REGIONS)
-        self.redo = doing(editor, tool_button("Redo", "Redo", "y"), "y", Mode.REGIONS)
+        self.undo = doing(editor, tool_button("Undo", "Undo"), "undo")
+        self.redo = doing(editor, tool_button("Redo", "Redo"), "redo")
         self.modes = {mode: self._mode_button(mode) for mode in Mode}
         self._group = QtWidgets.QButtonGroup(self)
         for button in self.modes.values():
             self._group.addButton(button)
         tip = "Show the mesh at rest while the button is held"
-        self.compare = tool_button("Before/After", tip, BEFORE_AFTER)
+        self.compare = tool_button("Before/After", tip, "before_after")
         self.compare.pressed.connect(lambda: editor.do(show_rest))
         self.compare.released.connect(lambda: editor.do(show_pose, while_busy=True))
         self.view = tool_button("View", "What is shown")
         add_view_entries(self._menu(self.view), lambda: editor)
-        self.help = doing(editor, tool_button("Keys", "Show keys", "h"), "h", Mode.REGIONS)
+        self.help = doing(editor, tool_button("Keys", "Show keys", "help"), "help")
         self._icons = {
             "open": self.open, "save": self.save, "undo": self.undo, "redo": self.redo,
             "compare": self.compare, "view": self.view, "help": self.help,
@@ -92,16 +90,21 @@ class Toolbar(QtWidgets.QWidget):
 
     def refresh(self) -> None:
         """Show the steps to undo and redo, and the mode."""
-        session, busy = self._editor.session, self._editor.is_busy
-        for button, label, verb, key in (
-            (self.undo, self._editor.controller.undo_label, "Undo", "Z"),
-            (self.redo, session.redo_label, "Redo", "Y"),
+        session, busy, keys = self._editor.session, self._editor.is_busy, self._editor.keys
+        for button, label, verb in (
+            (self.undo, self._editor.controller.undo_label, "Undo"),
+            (self.redo, session.redo_label, "Redo"),
         ):
             button.setEnabled(label is not None and not busy)
-            text = f"{verb}: {label} ({key})" if label else f"Nothing to {verb.lower()}"
+            text = (
+                f"{verb}: {label} ({keys.cap(verb.lower())})"
+                if label
+                else f"Nothing to {verb.lower()}"
+            )
             button.setToolTip(text)
-        for each in (self.open, self.save, self.compare, self.view, *self.modes.values()):
+        for each in (self.open, self.save, self.view, *self.modes.values()):
             each.setEnabled(not busy)
+        self.compare.setEnabled(not busy and session.state.pose is not None)
         put(self.modes[self._editor.mode], True)
 
     def resizeEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
@@ -120,11 +123,9 @@ class Toolbar(QtWidgets.QWidget):
     # Pieces.
 
     def _mode_button(self, mode: Mode) -> Any:
-        key = str(mode.value)
-        binding = binding_of(key, mode)
-        tip = mode.name.title() if binding is None else binding.label
-        button = tool_button(mode.name.title(), tip, key)
-        return highlighted(doing(self._editor, button, key, mode))
+        action = mode.name.lower()
+        button = tool_button(mode.name.title(), self._editor.keys[action].label, action)
+        return highlighted(doing(self._editor, button, action))
 
     def _menu(self, button: Any) -> Any:
         menu = QtWidgets.QMenu(button)

@@ -23,7 +23,6 @@ from vtk_segdeform.session import Session
 from .. import plugin  # registers `segdeform` on plotters even without entry points
 from ..editor import DeformEditor
 from ..scene import View, set_background, set_lights
-from .event_filter import EventFilter
 from .first_steps import FirstSteps
 from .panel import DeformPanel
 
@@ -69,7 +68,6 @@ class DeformWidget(QtWidgets.QWidget):
         self._set_background()
         self.editor: DeformEditor = self.plotter.segdeform.edit(session)
         self._camera_position: tuple[float, ...] | None = tuple(self.plotter.camera.position)
-        self._filter = EventFilter(self.plotter)
         self.panel = DeformPanel(self.editor, self)
         self.deformed, self.regions_changed = self.panel.deformed, self.panel.regions_changed
         self.session_changed, self.error = self.panel.session_changed, self.panel.error
@@ -187,8 +185,6 @@ def deform_dock(view: Any, mesh: Any, parent: Any = None) -> DeformDock:
     else:
         editor = DeformEditor(view, plugin.session_of(mesh))
         editor.On()
-    if isinstance(view, QtWidgets.QWidget):
-        EventFilter(view)
     return DeformDock(editor, parent)
 
 

@@ -7,13 +7,13 @@ The files, in reading order:
     reading         reading and checking a recording
     parsing         parsing the numbers in a line
     limits          limits of a replay
-    confinement     the folder a replay may access
+    confinement     the folder a replay may access, and its keys
     film            `film` and `Film`
     film_files      GIF, MP4 and PNG files
     off_screen      a session in an off-screen window
 """
 
-from .confinement import confined_path
+from .confinement import confined_path, recorded_keys
 from .film import Film, film
 from .film_files import require_film
 from .limits import Clock, ReplayLimits
@@ -32,6 +32,7 @@ __all__ = [
     "confined_path",
     "film",
     "read_recording",
+    "recorded_keys",
     "replay",
     "require_film",
 ]

@@ -1,11 +1,12 @@
-"""Confinement of a replay: its keys read and write files only below a given folder, or not at all.
+"""Replays: their keys read and write files only below a given folder, or not at all.
 
 The recording may come from an untrusted source, and its Ctrl+S must not overwrite any other file.
+The keys of its actions are those of the recording, whatever the user's own keys are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -14,20 +15,36 @@ from weakref import WeakKeyDictionary
 from vtk_segdeform.errors import SessionError
 
 _folders: WeakKeyDictionary[Any, Path | None] = WeakKeyDictionary()
+_keys: WeakKeyDictionary[Any, Mapping[str, Sequence[str]]] = WeakKeyDictionary()
 
 
 @contextmanager
 def confined(interactor: Any, folder: Path | None) -> Iterator[None]:
     """Confine file access of editors on *interactor* to *folder*; None forbids it."""
     was_confined, before = interactor in _folders, _folders.get(interactor)
-    _folders[interactor] = folder
+    keys = _keys.get(interactor, {})
+    _folders[interactor], _keys[interactor] = folder, {}
     try:
         yield
     finally:
         if was_confined:
-            _folders[interactor] = before
+            _folders[interactor], _keys[interactor] = before, keys
         else:
-            del _folders[interactor]
+            del _folders[interactor], _keys[interactor]
+
+
+def recorded_keys(interactor: Any) -> Mapping[str, Sequence[str]] | None:
+    """Return the keys of actions in the recording that is replayed; None if none is.
+
+    Actions that are not in the mapping have their default keys.
+    """
+    return _keys.get(interactor)
+
+
+def set_recorded_keys(interactor: Any, keys: Mapping[str, Sequence[str]]) -> None:
+    """Set the keys of actions in the recording that is replayed."""
+    if interactor in _keys:
+        _keys[interactor] = keys
 
 
 def confined_path(interactor: Any, path: Path) -> Path:

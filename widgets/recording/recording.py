@@ -13,6 +13,9 @@ changed, so a replay is exact even if a program moved the camera.
     2.004 KeyPress 412 300 control key=z code=26
     2.310 Timer 3
     2.310 Steps 5
+    2.900 Keys undo=u
+
+`Keys` are those keys of the editor that differ from the default ones; they hold for the replay.
 
 Empty lines and lines that begin with # are ignored.  `Steps` is the number of solver steps of one
 solve.  A replay uses the same number and ends in the same pose on any machine, bit by bit if numpy
@@ -30,7 +33,7 @@ import itertools
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TextIO
 
 from vtkmodules.vtkCommonCore import vtkVersion
@@ -45,7 +48,7 @@ from ..scene import View, observe_steps, prescribe_steps
 from .confinement import confined
 from .limits import Clock, ReplayLimits
 from .reading import Moment, read_recording
-from .transcript import EVENTS, TITLE, Camera, Entry, Input, Steps, Ticks, Window
+from .transcript import EVENTS, TITLE, Camera, Entry, Input, Keys, Steps, Ticks, Window
 
 _LONGEST_PAUSE = 2.0  # seconds
 _MOST_KEYS = 1000
@@ -112,6 +115,11 @@ class Recorder:
         self._record_scene()
         if self._file is not None:
             self._file.close()
+
+    def assign(self, keys: Mapping[str, Sequence[str]]) -> None:
+        """Note that actions of the editor have other *keys* from now on."""
+        self._record_ticks()
+        self._record(Keys(tuple((name, tuple(each)) for name, each in keys.items())))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the recording so far to a text file; SessionError if that fails."""

@@ -5,6 +5,7 @@
     MouseMove X Y [shift] [control] [alt] [key=NAME] [code=NUMBER]      and all other `EVENTS`
     Timer TIMES
     Steps NUMBER                    solver steps of a solve caused by the last event or tick
+    Keys ACTION=KEY[,KEY ...] ...   the keys of actions from here on, others than the default ones
 
 Lines are not trusted: only the names above are accepted, and numbers must be finite and within
 limits.  A replay does nothing but send these events.
@@ -12,12 +13,14 @@ limits.  A replay does nothing but send these events.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
 from vtk_segdeform.errors import SessionError
 
 from ..scene import View
+from .confinement import set_recorded_keys
 from .parsing import parse_float, parse_int, require_count
 
 TITLE = "vtk_segdeform recording 1"
@@ -32,6 +35,8 @@ EVENTS = (
 _FARTHEST = 100_000  # pixels, of the pointer from the window's corner
 _LARGEST = 16_384  # pixels, width or height of the window
 _MOST_TICKS, _MOST_STEPS = 100_000, 100
+_MOST_ACTIONS = 200
+_ASSIGNED = re.compile(r"([a-z0-9_]{1,40})=([a-z0-9_+,]{0,200})")
 
 
 class Entry(Protocol):
@@ -228,6 +233,29 @@ class Steps:
         """Do nothing; see `step_budget.prescribe_steps`."""
 
 
+@dataclass(frozen=True)
+class Keys:
+    """The keys of actions of the editor; the other actions have their default keys."""
+
+    assigned: tuple[tuple[str, tuple[str, ...]], ...]
+
+    @classmethod
+    def read(cls, words: list[str]) -> Keys:
+        """Parse the *words* after the name."""
+        found = [_ASSIGNED.fullmatch(word) for word in words[: _MOST_ACTIONS + 1]]
+        if len(found) > _MOST_ACTIONS or not all(found):
+            raise ValueError("expected actions with their keys, as in undo=ctrl+z,u")
+        pairs = [each.groups() for each in found if each is not None]
+        return cls(tuple((name, tuple(filter(None, keys.split(",")))) for name, keys in pairs))
+
+    def __str__(self) -> str:
+        return " ".join(["Keys", *(f"{name}={','.join(keys)}" for name, keys in self.assigned)])
+
+    def send(self, view: View) -> None:
+        """Use these keys until the replay ends."""
+        set_recorded_keys(view.interactor, dict(self.assigned))
+
+
 def read_entry(text: str) -> tuple[float, Entry]:
     """Parse a line into its time and its entry; a ValueError describes the fault."""
     moment, *words = text.split()
@@ -244,4 +272,6 @@ def read_entry(text: str) -> tuple[float, Entry]:
         return time, Ticks(parse_int(require_count(rest, 1)[0], 1, _MOST_TICKS))
     if name == "Steps":
         return time, Steps(parse_int(require_count(rest, 1)[0], 1, _MOST_STEPS))
+    if name == "Keys":
+        return time, Keys.read(rest)
     raise ValueError(f"{name[:40]!r} is not an event of a recording")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vtk_segdeform.arrays import BoolArray
-from vtk_segdeform.errors import ConstraintError
+from vtk_segdeform.errors import ConstraintError, RegionError
 from vtk_segdeform.pictures import FIXED, of_handle, of_region, rgb
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
@@ -63,6 +63,13 @@ class PaintTarget:
             return np.zeros(session.mesh.n_vertices, dtype=bool)
         ids = session.fixed if self.paint is Paint.FIXED else session.handles.get(self.handle or "")
         return self._mask([] if ids is None else ids)
+
+    def members_to(self, verb: str) -> BoolArray:
+        """Return `members`; raise ConstraintError, "Nothing to *verb*", if there are none."""
+        members = self.members()
+        if not members.any():
+            raise ConstraintError(f"Nothing to {verb}: {self._name} has no vertices")
+        return members
 
     def changed(self, vertices: BoolArray, *, erase: bool) -> BoolArray:
         """Return those of *vertices*, a mask (n,), that `add`, or `erase`, would change."""
@@ -135,6 +142,73 @@ class PaintTarget:
             self.session.remove_handle(str(self.handle))
             return None
         return self.handle
+
+    def select_all(self) -> str | None:
+        """Add all vertices that are free; return the name of the handle, if the target is one.
+
+        Raises
+        ------
+        ConstraintError
+            If none is free.
+        """
+        everything = np.ones(self.session.mesh.n_vertices, dtype=bool)
+        if not self._candidates(False).any():
+            raise ConstraintError(f"All vertices are already in {self._name}")
+        return self.add(everything)
+
+    def select_none(self) -> str | None:
+        """Remove all vertices; a handle is removed, and None is returned.
+
+        Raises
+        ------
+        ConstraintError
+            If the target is empty.
+        RegionError
+            If it is a region, which cannot be empty.
+        """
+        members = self.members_to("deselect")
+        if self.paint is Paint.REGION:
+            raise RegionError(
+                f"{self._name} cannot become empty; merge it with another region instead"
+            )
+        return self.erase(members)
+
+    def invert(self) -> str | None:
+        """Exchange the vertices for all others that are free; return the name of the handle.
+
+        Raises
+        ------
+        ConstraintError
+            If none is free.
+        RegionError
+            If the target is a region and one of its vertices is in no other region.
+        """
+        members = self.members()
+        if not members.any():
+            return self.select_all()
+        if self.paint is Paint.REGION:
+            self.session.invert_region(self.region)
+            return self.handle
+        others = ~members & ~self._protected(False)
+        if not others.any():
+            raise ConstraintError(
+                f"Cannot invert {self._name}: all other vertices are fixed or in a handle"
+                if not members.all()
+                else f"Cannot invert {self._name}: it contains all vertices"
+            )
+        if self.paint is Paint.FIXED:
+            self.session.set_fixed(others)
+            return self.handle
+        return self.session.add_handle(others, self.handle)
+
+    @property
+    def _name(self) -> str:
+        """The target in messages."""
+        if self.paint is Paint.REGION:
+            return self.session.region_name(self.region)
+        if self.paint is Paint.FIXED:
+            return "the set of fixed vertices"
+        return "the new handle" if self.handle is None else self.handle
 
     def _candidates(self, erase: bool) -> BoolArray:
         """Return the vertices inside the target if *erase*, else those outside."""

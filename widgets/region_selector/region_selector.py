@@ -3,7 +3,8 @@
 A stroke adds vertices; with Control held it erases.  The vertices to change are previewed during
 the stroke, the release records one undo step, and Escape cancels.
 
-brush, component    a press beside the mesh moves the camera
+brush, component, region
+                    a press beside the mesh moves the camera
 lasso, rectangle    start anywhere in the view
 all tools           a press with Alt held moves the camera
 ``[``  ``]``        smaller, larger brush; with Shift held the wheel over the mesh does the same
@@ -21,7 +22,7 @@ import numpy as np
 
 from vtk_segdeform.arrays import BoolArray, is_number
 from vtk_segdeform.checks import require, shown
-from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.errors import ArgumentError, RegionError
 from vtk_segdeform.pictures import PAPER, rgb
 from vtk_segdeform.session import Change, Session
 
@@ -31,7 +32,7 @@ from .brush_ring import BrushRing
 from .outline import Outline
 from .paint_target import Paint, PaintTarget, dominant_region
 from .region_colours import RegionColours
-from .strokes import Brush, Component, Lasso, Rectangle, Stroke, Tool, hits_at
+from .strokes import Brush, Lasso, Rectangle, Stroke, Tool, Whole, hits_at
 
 __all__ = ["Paint", "RegionSelector", "Tool"]
 
@@ -123,12 +124,27 @@ class RegionSelector(Widget):
 
     def grow(self) -> None:
         """Add one ring of neighbours to the painted region, fixed vertices or handle."""
-        self.handle = self._target.add(self._neighbours(self._target.members()))
+        members = self._target.members_to("grow")
+        self.handle = self._target.add(self._neighbours(members))
 
     def shrink(self) -> None:
         """Remove the outermost ring of the painted region, fixed vertices or handle."""
-        members = self._target.members()
+        members = self._target.members_to("shrink")
         self.handle = self._target.erase(members & self._neighbours(~members))
+
+    def select_all(self) -> None:
+        """Add all vertices that are free to the painted region, fixed vertices or handle."""
+        target = self._target
+        self.remark = target.remark(np.ones(self.session.mesh.n_vertices, bool), erase=False)
+        self.handle = target.select_all()
+
+    def select_none(self) -> None:
+        """Remove all vertices from the painted fixed vertices or handle."""
+        self.handle = self._target.select_none()
+
+    def invert(self) -> None:
+        """Exchange the painted region, fixed vertices or handle for the other vertices."""
+        self.handle = self._target.invert()
 
     def region_under_pointer(self) -> int | None:
         """Return the region of largest blend weight at the pointer, or None beside the mesh."""
@@ -198,8 +214,17 @@ class RegionSelector(Widget):
         if hit is None:
             return None
         if self.tool is Tool.COMPONENT:
-            return Component(picker, hit.vertex)
+            return Whole(picker.component(hit.vertex))
+        if self.tool is Tool.REGION:
+            return Whole(self._region_at(hit.vertex))
         return Brush(picker, press, radius=self.radius, through=through)
+
+    def _region_at(self, vertex: int) -> BoolArray:
+        """Return the vertices, (n,) bool, of the region of largest blend weight at *vertex*."""
+        regions = self.session.regions
+        if regions is None:
+            raise RegionError("No regions yet: detect or paint them first")
+        return np.array(regions.membership[dominant_region(regions, vertex)], dtype=bool)
 
     def _follow(self, stroke: Stroke, target: PaintTarget, erase: bool) -> Gesture:
         """Preview the changes of *stroke* until the release, then apply them."""

@@ -4,6 +4,7 @@ brush       within a radius, along the surface, of the path of the pointer
 lasso       inside a drawn line
 rectangle   inside the rectangle from the press to the pointer
 component   the connected part under the press
+region      the region under the press
 
 The first three select visible vertices only, or also hidden ones (X-ray).
 """
@@ -32,6 +33,7 @@ class Tool(enum.Enum):
     LASSO = enum.auto()
     RECTANGLE = enum.auto()
     COMPONENT = enum.auto()
+    REGION = enum.auto()
 
 
 class Stroke(Protocol):
@@ -149,16 +151,16 @@ class Rectangle:
         return np.array([[a, b], [c, b], [c, d], [a, d]])
 
 
-class Component:
-    """Selects the connected part that contains a vertex, including its far side."""
+class Whole:
+    """Selects a whole connected part or region, (n,) bool, including its far side."""
 
     outline = None
 
-    def __init__(self, picker: Picker, vertex: int) -> None:
-        self.mask = picker.component(vertex)
+    def __init__(self, mask: BoolArray) -> None:
+        self.mask = mask
 
     def extend(self, pointer: Pointer) -> None:
-        """Keep the connected part under the press."""
+        """Keep the part under the press."""
         del pointer
 
 

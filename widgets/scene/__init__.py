@@ -3,6 +3,7 @@
 The files, in reading order:
 
     view               a renderer with its interactor: callbacks, timers, rendering
+    qt_events          the events that a view in Qt omits
     widget             the base class of the widgets
     gestures           press, move and release as one generator
     surface_display    the mesh of a session as an actor

@@ -57,6 +57,7 @@ class View(Projection):
     def __init__(self, renderer: Any, interactor: Any) -> None:
         super().__init__(renderer)
         self.interactor = interactor
+        self._widget: Any = None  # of Qt, if the view is known to be in one
         self._timer = _SharedTimer.of(interactor)
         self._failures: list[Callable[[Exception], None]] = []
         self._foreground: Foreground | None = None
@@ -74,7 +75,9 @@ class View(Projection):
         if hasattr(view, "iren") and hasattr(view, "renderer"):
             if view.iren is None:
                 raise ArgumentError("view: this plotter has no interactor, or was closed")
-            return cls(view.renderer, view.iren.interactor)
+            made = cls(view.renderer, view.iren.interactor)
+            made._widget = view if hasattr(view, "installEventFilter") else None
+            return made
         raise ArgumentError(
             f"view must be a pyvista plotter or (renderer, interactor); got {shown(view)}"
         )
@@ -119,6 +122,17 @@ class View(Projection):
             self.render()
 
     # Events.
+    def complete_events(self) -> Stop:
+        """Give VTK the events, or parts of them, that the host omits, until the returned call.
+
+        pyvistaqt omits the Alt key and the keypad, among others.
+        """
+        if self._widget is None:
+            return lambda: None
+        from .qt_events import EventFilter
+
+        return EventFilter(self._widget).remove
+
     def observe(
         self, event: str, callback: Callable[[], bool | None], priority: float = ABOVE_CAMERA
     ) -> Stop:

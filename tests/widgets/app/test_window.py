@@ -389,6 +389,88 @@ def test_the_view_menu_shows_hides_and_ticks(start, arm_file):
     until(is_framed, "the mesh in the view")
 
 
+def test_menus_and_start_page_are_reached_by_keys(start, monkeypatch, boxes):
+    monkeypatch.setattr(models, "cactus", lambda: BALL)
+    hand = start()
+    window, page = hand.window, hand.page
+    chain = set()
+    page.open.setFocus()
+    until(page.open.hasFocus, "the focus")
+    for _ in range(4):
+        chain.add(application().focusWidget())
+        QtTest.QTest.keyClick(application().focusWidget(), Qt.Key_Tab)
+    assert {page.open, page.sample} <= chain
+    page.sample.setFocus()
+    QtTest.QTest.keyClick(page.sample, Qt.Key_Return)
+    hand.settle()
+    assert hand.title == "cactus - segdeform"
+    view = window.editor_widget.plotter
+    assert view.hasFocus()
+    boxes.answers.append("OK")
+    QtTest.QTest.keyClick(view, Qt.Key_H, Qt.AltModifier)  # from the view
+    menu = window.menuBar().actions()[-1].menu()
+    until(menu.isVisible, "the menu")
+    QtTest.QTest.keyClick(menu, Qt.Key_A)
+    until(lambda: boxes.seen, "the dialog")
+    QtTest.QTest.keyClick(view, Qt.Key_Tab)
+    assert not view.hasFocus()  # but a control of the panel
+
+
+def test_keys_are_changed_in_a_dialog_by_keys_and_kept(start, arm_file):
+    hand = start(arm_file)
+    window = hand.window
+    window.editor.mode = Mode.HANDLES
+    seen = []
+
+    def answer(*pressed):
+        """Press keys in the dialog once it is open: (row, key, modifiers)."""
+
+        def act():
+            dialog = application().activeModalWidget()
+            if not isinstance(dialog, QtWidgets.QDialog):
+                QtCore.QTimer.singleShot(10, act)
+                return
+            for row, key, held in pressed:
+                (item,) = dialog.table.findItems(row, Qt.MatchFlag.MatchExactly)
+                dialog.table.setCurrentItem(item)
+                QtTest.QTest.keyClick(dialog.table, Qt.Key_Return)
+                QtTest.QTest.keyClick(dialog.table, key, held)
+                seen.append(dialog.message.text())
+            dialog.accept()
+
+        QtCore.QTimer.singleShot(10, act)
+        hand.choose("Help", "Change keys")
+
+    answer(
+        ("Undo", Qt.Key_J, Qt.ControlModifier),
+        ("Redo", Qt.Key_Escape, Qt.NoModifier),
+        ("Redo", Qt.Key_S, Qt.ControlModifier),
+        ("Grow by one ring", Qt.Key_BracketLeft, Qt.NoModifier),
+        ("Shrink by one ring", Qt.Key_V, Qt.NoModifier),
+        ("Redo", Qt.Key_F5, Qt.ShiftModifier),
+    )
+    assert "Save session" in seen[2]
+    assert "[ is used by: Smaller, larger brush" in seen[3]
+    assert "V was the key of another action: Select through (X-ray) has no key now" in seen[4]
+    changed = {"undo": ("ctrl+j",), "redo": ("f5",), "shrink": ("v",), "select_through": ()}
+    assert window.editor.keys.changes == changed
+    hand.settle()
+    panel = window.editor_widget.panel
+    until(lambda: panel.is_up_to_date, "the panel")
+    assert panel.painting.shrink.toolTip() == "Shrink by one ring (V)"
+    assert panel.painting.through.toolTip() == "Paint hidden vertices as well"
+    window.session.set_fixed([1])
+    hand.settle()
+    before = len(window.session.fixed)
+    panel.painting.radius.setFocus()
+    until(panel.painting.radius.hasFocus, "the focus")
+    QtTest.QTest.keyClick(panel.painting.radius, Qt.Key_J, Qt.ControlModifier)
+    assert len(window.session.fixed) != before
+    QtTest.QTest.keyClick(window.editor_widget.plotter, Qt.Key_F5)
+    assert len(window.session.fixed) == before
+    assert start().window.keys.changes == changed  # another run of the program
+
+
 def test_about_names_the_program(start, boxes):
     hand = start()
     boxes.answers.append("OK")

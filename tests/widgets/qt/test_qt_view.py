@@ -145,6 +145,29 @@ def test_the_camera_rotates_beside_the_mesh_and_ctrl_erases(qt):
     assert len(editor.session.fixed) == 0
 
 
+def test_alt_the_keypad_and_ctrl_i_arrive_while_the_editor_is_on(qt):
+    _, editor, hand, _ = qt
+    editor.mode = Mode.HANDLES
+    middle = hand.at(MESH.vertices.mean(axis=0))
+    camera = editor.view.camera
+    before = camera.GetPosition()
+    way = [middle, *((middle[0] + d, middle[1] + d) for d in (20, 40))]
+    hand.drag(way, held=Qt.AltModifier)
+    assert camera.GetPosition() != before
+    assert not len(editor.session.fixed)
+    hand.key("i", Qt.ControlModifier)
+    assert len(editor.session.fixed) == MESH.n_vertices
+    hand.key("7", Qt.KeypadModifier)
+    until(lambda: abs(camera.GetDirectionOfProjection()[2]) > 0.99, "the view from the top")
+    assert editor.mode is Mode.HANDLES
+    interactor = editor.view.interactor
+    editor.Off()
+    interactor.SetAltKey(False)
+    hand.press(middle, Qt.AltModifier)
+    assert not interactor.GetAltKey()
+    hand.release(middle, Qt.AltModifier)
+
+
 def test_closing_a_window_removes_the_editor(qt):
     plotter, editor, hand, window = qt
     hand.key("g")  # during a job

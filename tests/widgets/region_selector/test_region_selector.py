@@ -532,3 +532,89 @@ def test_remove_restores_the_view():
     idle = picture(view)
     Hand(view).drag([(200, 200), (210, 210)])
     assert (picture(view) == idle).all()
+
+
+# Without a stroke.
+
+
+def targets(desk):
+    """Return the vertices of the fixed set, of the handle and of region 2, as masks."""
+    session, found = desk.session, np.zeros((3, desk.session.mesh.n_vertices), dtype=bool)
+    found[0, session.fixed] = True
+    found[1, session.handles.get("tip", [])] = True
+    found[2] = session.regions.membership[1]
+    return found
+
+
+def test_all_none_and_invert_skip_what_is_taken_and_are_single_undo_steps(desk):
+    selector, session, z = desk.selector, desk.session, desk.points[:, 2]
+    session.add_handle(z > 0.5, "tip")
+    selector.paints = Paint.FIXED
+    selector.select_all()
+    assert selector.remark == f"{(z > 0.5).sum()} vertices skipped: already fixed or in a handle"
+    assert np.array_equal(targets(desk)[0], z <= 0.5)
+    selector.select_none()
+    assert not targets(desk)[0].any()
+    session.set_fixed(z < -0.5)
+    selector.invert()
+    assert np.array_equal(targets(desk)[0], (z >= -0.5) & (z <= 0.5))
+    assert session.undo() == "set fixed vertices"
+    assert np.array_equal(targets(desk)[0], z < -0.5)
+    selector.paints, selector.handle = Paint.HANDLE, "tip"
+    selector.invert()
+    assert np.array_equal(targets(desk)[1], (z <= 0.5) & (z >= -0.5))
+    selector.select_none()
+    assert selector.handle is None
+    assert not session.handles
+    selector.handle = "tip"
+    selector.invert()  # of nothing: everything that is free
+    assert np.array_equal(targets(desk)[1], z >= -0.5)
+    selector.paints, selector.region = Paint.REGION, 1
+    selector.select_all()
+    assert targets(desk)[2].all()
+    assert session.undo() == "paint region 2"
+    session.paint_region(0, z < 9.0)
+    before = targets(desk)[2]
+    selector.invert()
+    assert np.array_equal(targets(desk)[2], ~before)
+    assert session.undo() == "invert region 2"
+
+
+@pytest.mark.parametrize(
+    ("act", "paint", "message"),
+    [
+        ("grow", Paint.FIXED, "Nothing to grow: the set of fixed vertices has no vertices"),
+        ("shrink", Paint.HANDLE, "Nothing to shrink: the new handle has no vertices"),
+        ("select_none", Paint.FIXED, "Nothing to deselect"),
+        ("select_none", Paint.REGION, "region 2 cannot become empty"),
+        ("invert", Paint.REGION, "of its vertices are in no other region"),
+    ],
+)
+def test_what_a_selection_cannot_do_is_named(desk, act, paint, message):
+    desk.selector.paints, desk.selector.region = paint, 1
+    before = desk.session.state
+    with pytest.raises(SegDeformError, match=message):
+        getattr(desk.selector, act)()
+    assert desk.session.state is before
+
+
+def test_a_click_takes_a_whole_region_as_fixed_vertices_or_names_what_is_missing(desk):
+    selector, session = desk.selector, desk.session
+    selector.paints, selector.tool = Paint.FIXED, Tool.REGION
+    desk.hand.click(desk.under(0.2, 0.7))
+    assert np.array_equal(targets(desk)[0], session.regions.membership[0])
+    desk.hand.click(desk.under(0.2, 0.7), control=True)
+    assert not len(session.fixed)
+    session.set_fixed(session.regions.membership[0])
+    selector.select_all()
+    with pytest.raises(ConstraintError, match="All vertices are already in"):
+        selector.select_all()
+    with pytest.raises(ConstraintError, match="it contains all vertices"):
+        selector.invert()
+    while session.undo():
+        pass
+    assert session.regions is None
+    desk.hand.click(desk.under(0.2, 0.7))
+    (failure,) = desk.hand.failures
+    assert "No regions yet" in str(failure)
+    desk.hand.failures.clear()

@@ -1,11 +1,12 @@
-"""What pyvistaqt does not tell VTK of Qt's events.
+"""What pyvistaqt does not tell VTK of Qt's events; imported for views in Qt only.
 
-These are the Alt key, the keypad, whose digits would arrive as those of the main row, and the
-modifiers and the position of the wheel.
+These are the Alt key, the keypad, whose digits would arrive as those of the main row, Ctrl+I, which
+would arrive as Tab, and the modifiers and the position of the wheel.
 """
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 from qtpy import QtCore
@@ -22,7 +23,7 @@ _KEYPAD |= {getattr(_KEYS, f"Key_{digit}"): f"KP_{digit}" for digit in range(10)
 
 
 class EventFilter(QtCore.QObject):
-    """Completes the events of a view; lives as long as its widget.
+    """Completes the events of a view until `remove`.
 
     Parameters
     ----------
@@ -35,8 +36,14 @@ class EventFilter(QtCore.QObject):
         self._plotter = plotter
         plotter.installEventFilter(self)
 
+    def remove(self) -> None:
+        """Leave the events as they are."""
+        with contextlib.suppress(RuntimeError):  # Qt has deleted the widget, with this filter
+            self._plotter.removeEventFilter(self)
+            self.deleteLater()
+
     def eventFilter(self, watched: Any, event: Any) -> bool:  # noqa: N802 - Qt's name
-        """Tell VTK; return True for a key of the keypad, which VTK has received then."""
+        """Tell VTK; return True for a key that VTK has received then."""
         kind = event.type()
         if kind not in (*_MOUSE, _Kind.Wheel, _Kind.KeyPress, _Kind.KeyRelease):
             return False
@@ -53,8 +60,10 @@ class EventFilter(QtCore.QObject):
             scale, place = watched.devicePixelRatioF(), event.position()
             x, y = place.x() * scale, (watched.height() - place.y() - 1) * scale
             interactor.SetEventInformation(round(x), round(y), control, shift, chr(0), 0, None)
-        elif kind in (_Kind.KeyPress, _Kind.KeyRelease) and held & _MODIFIERS.KeypadModifier:
-            name = _KEYPAD.get(event.key())
+        elif kind in (_Kind.KeyPress, _Kind.KeyRelease):
+            name = _KEYPAD.get(event.key()) if held & _MODIFIERS.KeypadModifier else None
+            if control and event.key() == _KEYS.Key_I:
+                name = "i"
             if name is not None:
                 x, y = interactor.GetEventPosition()
                 interactor.SetEventInformation(x, y, control, shift, chr(0), 0, name)

@@ -1,0 +1,121 @@
+"""Keys by choice: presets, conflicts, and what an editor shows and does with them."""
+
+from __future__ import annotations
+
+import pytest
+from hands import Hand, plain_view
+from scenes import sausage
+
+from vtk_segdeform import Session, load_session
+from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.widgets.editor.bindings import BINDINGS, PRESETS, keys_of
+from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
+from vtk_segdeform.widgets.editor.hints import hint
+from vtk_segdeform.widgets.editor.keys import event_key, key_cap, key_name
+from vtk_segdeform.widgets.recording.recording import replay
+
+pytestmark = pytest.mark.usefixtures("unprepared")
+
+
+@pytest.fixture
+def editor():
+    """Yield an editor of a session without regions, in mode 3, and a hand."""
+    view = plain_view()
+    made = DeformEditor(view, Session(sausage().mesh))
+    made.mode = Mode.HANDLES
+    made.On()
+    view.render()
+    hand = Hand(view)
+    yield made, hand
+    made.remove()
+
+
+def test_every_action_has_a_name_and_every_preset_is_without_conflicts():
+    names = [b.name for b in BINDINGS if b.action]
+    assert "" not in names
+    assert len(names) == len(set(names))
+    assert not any(b.name for b in BINDINGS if b.action is None)
+    for preset in PRESETS:
+        keys = keys_of(preset.upper())
+        assert all(keys[name].keys for name in names)
+        for b in keys.bindings:
+            assert [key_name(key_cap(key)) for key in b.keys] == [*b.keys]
+
+
+@pytest.mark.parametrize(
+    ("choice", "message"),
+    [
+        ({"undo": "y"}, "Y is assigned to both 'Undo' and 'Redo'"),
+        ({"grow": "["}, r"\[ is assigned to both 'Grow by one ring' and 'Smaller, larger brush'"),
+        ({"und": "k"}, "no action 'und'; did you mean 'undo'"),
+        ({"undo": "Ctrl+Foo Bar"}, "no such key as 'Ctrl.Foo Bar'"),
+        ({"undo": 3}, "must be a sequence"),
+        ({"undo": [3]}, "a key must be a text"),
+        ("emacs", "'pyvista' or 'Blender'"),
+        (3, "a preset or a mapping"),
+    ],
+)
+def test_an_invalid_choice_is_named(choice, message):
+    with pytest.raises(ArgumentError, match=message):
+        keys_of(choice)
+
+
+def test_shift_counts_with_letters_only_and_modifiers_have_one_order():
+    assert key_name("shift+ctrl+Z") == "ctrl+shift+z"
+    assert key_name("Shift+?") == event_key("question", control=False, alt=False, shift=True)
+    assert key_name("Ctrl++") == event_key("KP_Add", control=True, alt=False, shift=False)
+
+
+def test_the_chosen_keys_act_and_are_named_in_hints_errors_and_help(editor):
+    editor, hand = editor
+    editor.keys = {"undo": "j", "next_handle": "Ctrl+J", "paint_handle": "f5", "record_video": []}
+    session = editor.session
+    session.set_fixed([1, 2])
+    hand.key("z")
+    assert len(session.fixed) == 2
+    hand.key("j")
+    assert len(session.fixed) == 0
+    editor.widgets.selector.paints = editor.widgets.selector.paints.FIXED
+    assert "Next: F5, paint a handle" in hint(editor.widgets, Mode.HANDLES, editor.keys)
+    hand.key("j", control=True)
+    assert "In mode 3, press F5 and paint one" in editor.status
+    hand.failures.clear()
+    rows = [row for _, rows in editor.controller.help.sections for row in rows]
+    assert ("J", "Undo") in rows
+    assert not any(label == "Record video" for _, label in rows)
+    with pytest.raises(ArgumentError):
+        editor.keys = {"undo": "y"}
+    assert editor.keys.cap("undo") == "J"
+    assert editor.keys.cap("record_video") == "Record video"
+
+
+def test_a_replay_uses_the_recorded_keys_whatever_the_users_are(editor, tmp_path):
+    editor, hand = editor
+    editor.keys = {"undo": "j", "paint_handle": "z", "record_input": "F6"}
+    editor.path = tmp_path / "work.segdeform"
+    hand.key("F6")
+    hand.key("z")
+    hand.key("a", control=True)
+    editor.keys = "Blender"  # the recording goes on
+    hand.key("i", control=True)
+    hand.failures.clear()  # no vertex is left
+    hand.key("z", control=True)
+    hand.key("a")
+    hand.key("r", control=True)
+    assert "Recording saved" in editor.status
+    lines = (tmp_path / "work.recording.txt").read_text()
+    assert lines.count(" Keys ") == 2
+    assert "undo=j" in lines
+    assert "key=F6" not in lines
+
+    start = load_session(tmp_path / "work.recording.segdeform")
+    view = plain_view()
+    again = DeformEditor(view, start, keys={"undo": "w", "style": "z"})
+    again.On()
+    replay(view, tmp_path / "work.recording.txt")
+    assert [*again.session.handles] == [*editor.session.handles] == ["handle 1"]
+    assert len(again.session.handles["handle 1"]) == start.mesh.n_vertices
+    assert again.mode is Mode.HANDLES
+    assert again.widgets.surface.style is editor.widgets.surface.style
+    assert again.keys.cap("undo") == "W"
+    again.remove()
