@@ -155,6 +155,11 @@ class Controller:
         """Text of the status line."""
         return self.messages.text
 
+    @property
+    def hint(self) -> str:
+        """The next step, or what is shown."""
+        return "The mesh at rest" if self.shows_rest else hint(self.widgets, self._mode)
+
     def say(self, text: str) -> None:
         """Show the result of an action, before the hint for the next step."""
         self.messages.note(text)
@@ -171,8 +176,7 @@ class Controller:
         elif self._is_on:
             fraction = self._preparing.fraction
             preparing = None if fraction == 1.0 else fraction  # finished, but not accepted yet
-            text = "The mesh at rest" if self.shows_rest else hint(self.widgets, self._mode)
-            self.messages.show(mode, text, preparing)
+            self.messages.show(mode, self.hint, preparing)
         else:
             self.messages.hide()
         self.notices.enable(self._is_on)

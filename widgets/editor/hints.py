@@ -73,7 +73,7 @@ def _pull_hint(widgets: WidgetSet) -> str:
     if session.undo_label == "pull":
         return "Drag the surface. Shift-click pins. Z: undo"
     radius = 100.0 * widgets.puller.radius / session.mesh.diagonal
-    return f"Drag the surface. Shift-click pins. [ ]: radius ({radius:.3g} %)"
+    return f"Drag the surface. Shift-click pins. Shift+wheel: radius ({radius:.3g} %)"
 
 
 def _drag_hint(session: Session, keys: str = "") -> str:
@@ -96,7 +96,8 @@ def _deform_hint(widgets: WidgetSet) -> str:
         return "Move or rotate a handle · Volume preservation off (P to turn on)"
     solution = session.solution
     if solution is not None and solution.status not in (Status.CONVERGED, Status.STEP_LIMIT):
-        return str(solution.status)
+        text = str(solution.status)
+        return text[:1].upper() + text[1:]
     next_step = "" if len(session.fixed) else " · 3, S: paint fixed vertices"
     return f"Move or rotate a handle{next_step}"
 

@@ -6,6 +6,7 @@ The files, in reading order:
     widget             the base class of the widgets
     gestures           press, move and release as one generator
     surface_display    the mesh of a session as an actor
+    handle_colours     the colours of the handles of a session
     backdrop           background and light of a window that belongs to the editor
     projection         projection between world and display coordinates
     viewpoint          movements of the camera, named views, framing, the up axis
@@ -24,6 +25,7 @@ The files, in reading order:
 from .backdrop import set_background, set_lights
 from .draft import Draft
 from .gestures import Gesture, Phase, Pointer
+from .handle_colours import handle_colour
 from .highlights import Highlights
 from .labels import Panel, Text
 from .navigation import Navigation
@@ -56,6 +58,7 @@ __all__ = [
     "Viewpoint",
     "Widget",
     "Wireframe",
+    "handle_colour",
     "observe_steps",
     "prescribe_steps",
     "set_background",

@@ -1,10 +1,14 @@
 """Rectangles and text, placed in pixels from the lower left corner of a renderer.
 
-They are drawn over everything else in their renderer.  The font is VTK's built-in Arial.
+They are drawn over everything else in their renderer.  The font is the DejaVu of
+matplotlib, which pyvista installs, or else VTK's built-in Arial, whose brackets look like parentheses.
 """
 
 from __future__ import annotations
 
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +17,12 @@ import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - both are required to draw 
 from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
-from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D, vtkTextActor
+from vtkmodules.vtkRenderingCore import (
+    VTK_FONT_FILE,
+    vtkActor2D,
+    vtkPolyDataMapper2D,
+    vtkTextActor,
+)
 
 from vtk_segdeform.pictures import rgb
 
@@ -86,7 +95,7 @@ class Text:
     bold : bool
         Whether the font is bold.
     monospace : bool
-        Whether to use Courier, in which brackets and commas are easier to tell apart.
+        Whether all letters have the same width.
     layer : int
         Higher layers are drawn over lower ones, as in `Panel`.
     """
@@ -107,9 +116,14 @@ class Text:
         self._actor.PickableOff()
         style = self._actor.GetTextProperty()
         style.SetColor(*(rgb(colour) / 255.0))
-        style.SetBold(bold)
-        if monospace:
-            style.SetFontFamilyToCourier()
+        font = _font_file(bold, monospace)
+        if font:
+            style.SetFontFamily(VTK_FONT_FILE)
+            style.SetFontFile(font)
+        else:
+            style.SetBold(bold)
+            if monospace:
+                style.SetFontFamilyToCourier()
         style.SetVerticalJustificationToCentered()
         renderer.AddViewProp(self._actor)
 
@@ -143,3 +157,14 @@ class Text:
     def remove(self) -> None:
         """Remove the text from the renderer permanently."""
         self._renderer.RemoveViewProp(self._actor)
+
+
+@cache
+def _font_file(bold: bool, monospace: bool) -> str:
+    """Return the path of a font, or "" without matplotlib, which is not imported."""
+    found = find_spec("matplotlib")
+    if found is None or not found.submodule_search_locations:
+        return ""
+    name = f"DejaVuSans{'Mono' * monospace}{'-Bold' * bold}.ttf"
+    path = Path(found.submodule_search_locations[0]) / "mpl-data" / "fonts" / "ttf" / name
+    return str(path) if path.is_file() else ""
