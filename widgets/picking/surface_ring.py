@@ -1,8 +1,8 @@
 """The ring around a point of the surface: all points at one distance from it along the surface.
 
 So the ring does not appear on a finger beside the one under the pointer.  The distances of a large
-mesh are those of its decimated mesh, whose vertices lie on the surface; another thread makes that.
-Until it is finished, and for a ring of a few of its triangles, the ring is a plane circle.
+mesh are those of its decimated mesh, whose vertices lie on the surface; another thread makes that,
+and until it is finished there is no ring.  A ring of a few of its triangles is a plane circle.
 """
 
 from __future__ import annotations
@@ -58,18 +58,19 @@ class SurfaceRing:
         """
         corner = self._mesh.faces[face]
         sample = self._ready_sample()
-        if sample is not None:
-            x = points[sample.kept]
-            start = sample.face_of[sample.cluster[corner]]
-            start = np.unique(start[start >= 0])
-            sides = x[sample.faces[start]]
-            length = np.linalg.norm(sides - np.roll(sides, 1, axis=1), axis=2)
-            if len(start) and radius >= _SMALLEST * length.mean():
-                centres = np.broadcast_to(centre, (len(start), 3))
-                away = sample.distance.within(x, centres, start, radius)
-                near = (away[sample.faces] <= radius).any(axis=1)
-                faces = sample.faces[near]
-                return contour(x[faces], away[faces], radius)
+        if sample is None:
+            return np.empty((0, 2, 3))
+        x = points[sample.kept]
+        start = sample.face_of[sample.cluster[corner]]
+        start = np.unique(start[start >= 0])
+        sides = x[sample.faces[start]]
+        length = np.linalg.norm(sides - np.roll(sides, 1, axis=1), axis=2)
+        if len(start) and radius >= _SMALLEST * length.mean():
+            centres = np.broadcast_to(centre, (len(start), 3))
+            away = sample.distance.within(x, centres, start, radius)
+            near = (away[sample.faces] <= radius).any(axis=1)
+            faces = sample.faces[near]
+            return contour(x[faces], away[faces], radius)
         return _circle(points[corner], centre, radius)
 
     def _ready_sample(self) -> _Sample | None:

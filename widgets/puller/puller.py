@@ -368,8 +368,8 @@ class Puller(Widget):
         self._gizmo.show_only(part)
         place = None if motion is None else motion.place
         self._gizmo.place(place)
-        self._guide.show(part, place)
-        self._caption.show("" if motion is None else motion.caption, place)
+        lines = self._guide.show(part, place)
+        self._caption.show("" if motion is None else motion.caption, place, lines)
 
     def _left(self) -> None:
         self._ring.hide()

@@ -27,7 +27,7 @@ from .draft import Draft
 from .gestures import Gesture, Phase, Pointer
 from .handle_colours import handle_colour
 from .highlights import Highlights
-from .labels import Panel, Text
+from .labels import Panel, Text, set_font
 from .navigation import Navigation
 from .orientation_cube import OrientationCube
 from .projection import Projection
@@ -62,5 +62,6 @@ __all__ = [
     "observe_steps",
     "prescribe_steps",
     "set_background",
+    "set_font",
     "set_lights",
 ]

@@ -1,7 +1,7 @@
 """Rectangles and text, placed in pixels from the lower left corner of a renderer.
 
-They are drawn over everything else in their renderer.  The font is the DejaVu of
-matplotlib, which pyvista installs, or else VTK's built-in Arial, whose brackets look like parentheses.
+They are drawn over everything else in their renderer.  The font is DejaVu of
+matplotlib, which pyvista requires, or else VTK's own, whose brackets look like parentheses.
 """
 
 from __future__ import annotations
@@ -15,10 +15,9 @@ import numpy as np
 import vtkmodules.vtkRenderingFreeType
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - both are required to draw in 2D
 from vtkmodules.util.numpy_support import numpy_to_vtk
-from vtkmodules.vtkCommonCore import vtkPoints
+from vtkmodules.vtkCommonCore import VTK_FONT_FILE, vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkRenderingCore import (
-    VTK_FONT_FILE,
     vtkActor2D,
     vtkPolyDataMapper2D,
     vtkTextActor,
@@ -116,14 +115,7 @@ class Text:
         self._actor.PickableOff()
         style = self._actor.GetTextProperty()
         style.SetColor(*(rgb(colour) / 255.0))
-        font = _font_file(bold, monospace)
-        if font:
-            style.SetFontFamily(VTK_FONT_FILE)
-            style.SetFontFile(font)
-        else:
-            style.SetBold(bold)
-            if monospace:
-                style.SetFontFamilyToCourier()
+        set_font(style, bold=bold, monospace=monospace)
         style.SetVerticalJustificationToCentered()
         renderer.AddViewProp(self._actor)
 
@@ -157,6 +149,17 @@ class Text:
     def remove(self) -> None:
         """Remove the text from the renderer permanently."""
         self._renderer.RemoveViewProp(self._actor)
+
+
+def set_font(style: Any, *, bold: bool = False, monospace: bool = False) -> None:
+    """Set the font of a vtkTextProperty to that of `Text`."""
+    path = _font_file(bold, monospace)
+    style.SetBold(bold and not path)
+    if path:
+        style.SetFontFamily(VTK_FONT_FILE)
+        style.SetFontFile(path)
+    elif monospace:
+        style.SetFontFamilyToCourier()
 
 
 @cache
