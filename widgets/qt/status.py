@@ -17,6 +17,7 @@ from .controls import key_button, sentence
 
 # A key after "Press", "or" or "Next:", or before ":" or "to", as hints name it.
 _KEY = re.compile(r"((?:Press|or|Next:) |\(|· |, )([0-9A-Z])(?=[ :,.)]|$)")
+_LINES = 2
 _BAR_LETTERS = 18  # width of the progress bar
 
 
@@ -59,19 +60,19 @@ class StatusPart(QtWidgets.QWidget):
         self._layout.setContentsMargins(0, 0, 0, 0)
         self._layout.addLayout(message, 1)
         self._layout.addLayout(job)
-        self._keep_height(lines=2)
+        self.words.setMinimumHeight(_LINES * self.fontMetrics().lineSpacing())
 
     def lie_down(self) -> None:
         """Be one row, for the lower edge of a window."""
         self._layout.setDirection(QtWidgets.QBoxLayout.Direction.LeftToRight)
         self._layout.setContentsMargins(8, 3, 8, 3)
-        self._keep_height(lines=1)
+        self.setFixedHeight(self.minimumSizeHint().height())  # the size of the view stays
 
     def refresh(self) -> None:
         """Show the current message and progress."""
         messages, busy = self._editor.controller.messages, self._editor.is_busy
         if busy:
-            text = _escaped(messages.text)
+            text = _escaped(sentence(messages.text))
         elif messages.error:
             text = _escaped(sentence(messages.error))
         else:
@@ -84,6 +85,7 @@ class StatusPart(QtWidgets.QWidget):
         text = " · ".join([*(f"<b>{_escaped(label)}</b>" for label in labels), text])
         if self.words.text() != text:
             self.words.setText(text)
+            self.words.setToolTip(text)  # which may be too long for its place
         self.sign.setVisible(bool(messages.error) and not busy)
         is_running = messages.fraction is not None
         self.bar.setVisible(is_running)
@@ -101,13 +103,6 @@ class StatusPart(QtWidgets.QWidget):
         super().hideEvent(event)
         if self._editor.GetEnabled():
             self._editor.controller.messages.show_line(True)
-
-    def _keep_height(self, lines: int) -> None:
-        """Keep the layout when a job starts or a text is longer."""
-        metrics = self.fontMetrics()
-        self.words.setMinimumHeight(
-            max(lines * metrics.lineSpacing(), self.cancel.sizeHint().height())
-        )
 
     def _press(self, key: str) -> None:
         binding = binding_of(key, self._editor.mode)
