@@ -15,7 +15,7 @@ from vtk_segdeform.errors import SegDeformError
 from ..scene import Stop, View
 from .status_line import StatusLine
 
-_SECONDS = 6.0  # for which a result is shown; it disappears with the next picture
+_SECONDS = 6.0  # for which a result is shown; it disappears at the next change
 
 
 def error_text(error: BaseException) -> str:
@@ -39,9 +39,7 @@ class Messages:
     """
 
     def __init__(self, view: View) -> None:
-        self._stop = view.before_render(self._expire)
         self._line = StatusLine(view)
-        self._shown: tuple[str, str] = "", ""  # the mode and the hint
         self._noted = 0.0
         self._note = self._error = self._question = self._last_question = ""
         self._preparing: float | None = None
@@ -108,7 +106,9 @@ class Messages:
 
         At the right, show which fraction of the preparation is complete, if any is *preparing*.
         """
-        self._preparing, self._shown = preparing, (mode, hint)
+        self._preparing = preparing
+        if time.monotonic() > self._noted + _SECONDS and not self._question:
+            self._note = ""
         aside = "" if preparing is None else f"Preparing ... {100.0 * preparing:.0f} % (Esc)"
         if self._error:
             self._line.warn(self._error, mode, aside)
@@ -137,16 +137,7 @@ class Messages:
 
     def remove(self) -> None:
         """Remove the line from the view, permanently."""
-        self._stop()
         self._line.remove()
-
-    def _expire(self) -> None:
-        """Show the hint alone once the result is old, unless it is a question."""
-        is_old = time.monotonic() > self._noted + _SECONDS
-        if is_old and self._note and not (self._question or self._error):
-            self._note = ""
-            if self._line.text and self._line.fraction is None:
-                self.show(*self._shown, self._preparing)
 
     def _notify(self) -> None:
         for listener in list(self._listeners.values()):

@@ -129,10 +129,10 @@ def test_a_result_yields_to_the_hint_after_some_seconds_a_question_does_not(monk
         shown.show("0 PULL", "Drag the surface")
         assert shown.text == f"{text} · Drag the surface"
         now += 3.0
-        view.render()
+        shown.show("0 PULL", "Drag the surface")
         assert shown.text == f"{text} · Drag the surface"
         now += 4.0
-        view.render()
+        shown.show("0 PULL", "Drag the surface")
         assert shown.text.endswith("Drag the surface")
         assert (text in shown.text) == (text == "Sure?")
     shown.remove()
