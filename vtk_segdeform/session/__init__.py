@@ -19,7 +19,7 @@ The files, in reading order:
 from .handles import require_handle
 from .listeners import Change
 from .naming import region_name
-from .pulling import middle_vertex
+from .pulling import automatic_locality, middle_vertex
 from .session import Effort, Preparation, Session
 from .state import Options, State
 from .store import load_session, save_session, saved_view
@@ -31,6 +31,7 @@ __all__ = [
     "Preparation",
     "Session",
     "State",
+    "automatic_locality",
     "load_session",
     "middle_vertex",
     "region_name",

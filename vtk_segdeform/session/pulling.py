@@ -38,6 +38,8 @@ from .handles import (
 )
 from .state import Locality, Pose, State
 
+_PINNED_LOCALITY = 0.05  # with too few fixed points to keep the body from turning
+_ENOUGH = 3  # fixed points
 _SAME_POINT = 0.25  # of the radius: a pulled point so close is grabbed again
 
 
@@ -48,7 +50,7 @@ class Grip(NamedTuple):
     radius: float
     """Of the pulled surface, in the mesh's unit."""
     locality: float | None
-    """0 to 1; None is 0 if there are fixed vertices, pins or other handles, and else 0.2."""
+    """0 to 1; None is `automatic_locality`."""
     turns: bool
     """Whether a patch around the vertex turns with the motion, which a single vertex cannot."""
 
@@ -90,6 +92,19 @@ class Grasp:
         return MappingProxyType({self.name: own, **more})
 
 
+def automatic_locality(state: State) -> float:
+    """Return the locality of a pull if none is given: 0.2, or less if something else is fixed.
+
+    Fixed vertices, pins and other handles divide the motion among the surface between them: 0.
+    One or two points do not keep the body from turning about them: 0.05.
+    """
+    others = (ids for name, ids in state.handles.items() if name not in state.pulls)
+    count = len(state.fixed) + sum(map(len, others))
+    if count == 0:
+        return LOCALITY
+    return 0.0 if count >= _ENOUGH else _PINNED_LOCALITY
+
+
 def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
     """Grab the pose *vertices* (n, 3) of *state*; ConstraintError if the vertex is fixed."""
     vertex, radius, locality, turns = grip
@@ -107,7 +122,7 @@ def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
         near = [each for each in pulls if away[each] < _SAME_POINT * radius]
         name = min(near, key=away.__getitem__, default=None)
     if locality is None:
-        locality = 0.0 if len(state.fixed) or set(names) - set(pulls) else LOCALITY
+        locality = automatic_locality(state)
     handles = state.handles
     if name is None:
         name = _new_name(state, "pull")

@@ -622,8 +622,8 @@ class Session(Timeline):
         locality : float, optional
             1 keeps the surface in place; beyond four radii, of 15 % of the diagonal or more, it
             hardly moves.  With less, more of it follows, above all the ends of limbs; with 0 all is
-            free.  By default 0.2, and 0 between fixed vertices, pins and handles that were not
-            made by pulls.
+            free.  By default 0.2; 0 if fixed vertices, pins and handles that were not made by pulls
+            are three points or more, and 0.05 if they are fewer.
         max_steps, within : int and float, optional
             As in `drag`.
 

@@ -153,6 +153,13 @@ class Controller:
         """Text of the status line."""
         return self.messages.text
 
+    @property
+    def hint(self) -> str:
+        """The next step, or what is shown."""
+        if self.widgets.surface.instead is not None:
+            return self._instead
+        return hint(self.widgets, self._mode, self.keys)
+
     def say(self, text: str) -> None:
         """Show the result of an action, before the hint for the next step."""
         self.messages.note(text)
@@ -169,10 +176,7 @@ class Controller:
         elif self._is_on:
             fraction = self._preparing.fraction
             preparing = None if fraction == 1.0 else fraction  # finished, but not accepted yet
-            is_current = self.widgets.surface.instead is None
-            current = hint(self.widgets, self._mode, self.keys)
-            text = current if is_current else self._instead
-            self.messages.show(mode, text, preparing)
+            self.messages.show(mode, self.hint, preparing)
         else:
             self.messages.hide()
         self.notices.enable(self._is_on)

@@ -76,7 +76,7 @@ def _pull_hint(widgets: WidgetSet, keys: Keys) -> str:
     if session.undo_label == "pull":
         return f"Drag the surface. Shift-click pins. {keys.cap('undo')}: undo"
     radius = 100.0 * widgets.puller.radius / session.mesh.diagonal
-    return f"Drag the surface. Shift-click pins. [ ]: radius ({radius:.3g} %)"
+    return f"Drag the surface. Shift-click pins. Shift+wheel: radius ({radius:.3g} %)"
 
 
 def _drag_hint(session: Session, own: str = "") -> str:
@@ -103,7 +103,8 @@ def _deform_hint(widgets: WidgetSet, keys: Keys) -> str:
         return f"Move or rotate a handle · {_volume_off(keys)}"
     solution = session.solution
     if solution is not None and solution.status not in (Status.CONVERGED, Status.STEP_LIMIT):
-        return str(solution.status)
+        text = str(solution.status)
+        return text[:1].upper() + text[1:]
     fixing = f" · {keys.cap('handles')}, {keys.cap('paint_fixed')}: paint fixed vertices"
     next_step = "" if len(session.fixed) else fixing
     axes = f" · Local axes ({keys.cap('local_axes')})" if widgets.dragger.local else ""

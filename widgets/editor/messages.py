@@ -1,17 +1,21 @@
 """The messages in the status line: the last result and the next step, or an error.
 
-A result stays until the next action; so does an error, which replaces everything else.  Other
-views of the messages, such as a panel, subscribe with `Messages.on_change`.
+A result stays until the next action, or for some seconds; an error, which replaces everything else,
+until the next action.  Other views of the messages, such as a panel, subscribe with
+`Messages.on_change`.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 from vtk_segdeform.errors import SegDeformError
 
 from ..scene import Stop, View
 from .status_line import StatusLine
+
+_SECONDS = 6.0  # for which a result is shown; it disappears at the next change
 
 
 def error_text(error: BaseException) -> str:
@@ -36,6 +40,7 @@ class Messages:
 
     def __init__(self, view: View) -> None:
         self._line = StatusLine(view)
+        self._noted = 0.0
         self._note = self._error = self._question = self._last_question = ""
         self._preparing: float | None = None
         self._listeners: dict[int, Callable[[], object]] = {}
@@ -77,7 +82,7 @@ class Messages:
 
     def note(self, text: str) -> None:
         """Set the result of the last action; this clears an error."""
-        self._note, self._error = text, ""
+        self._note, self._error, self._noted = text, "", time.monotonic()
 
     def report_error(self, error: Exception) -> None:
         """Set the error."""
@@ -102,6 +107,8 @@ class Messages:
         At the right, show which fraction of the preparation is complete, if any is *preparing*.
         """
         self._preparing = preparing
+        if time.monotonic() > self._noted + _SECONDS and not self._question:
+            self._note = ""
         aside = "" if preparing is None else f"Preparing ... {100.0 * preparing:.0f} % (Esc)"
         if self._error:
             self._line.warn(self._error, mode, aside)
@@ -123,6 +130,10 @@ class Messages:
         """Hide the line until something is shown again."""
         self._line.say("")
         self._notify()
+
+    def show_line(self, shown: bool) -> None:
+        """Draw the line in the view, or not because a panel shows its text."""
+        self._line.show(shown)
 
     def remove(self) -> None:
         """Remove the line from the view, permanently."""

@@ -37,6 +37,7 @@ class StatusLine:
         self._content: tuple[str, str, bool, float | None, str] = "", "", False, None, ""
         self._laid_out: tuple[Any, ...] = ()
         self._height = 0.0
+        self._is_shown = True
         self._stop = self.view.before_render(self._lay_out)
 
     @property
@@ -76,6 +77,13 @@ class StatusLine:
         """Show the progress of a job, 0..1, and its description."""
         self._set(tag, text, False, min(max(fraction, 0.0), 1.0))
 
+    def show(self, shown: bool) -> None:
+        """Show the line, or hide it because its text is shown elsewhere."""
+        if shown != self._is_shown:
+            self._is_shown = shown
+            self._laid_out = ()
+            self.view.request_render()
+
     def remove(self) -> None:
         """Remove it from the view, permanently."""
         self._stop()
@@ -96,7 +104,8 @@ class StatusLine:
         if (width, height, self._content) == self._laid_out:
             return
         self._laid_out = width, height, self._content
-        tag, text, warning, fraction, aside = self._content
+        content = self._content if self._is_shown else ("", "", False, None, "")
+        tag, text, warning, fraction, aside = content
         size = letter_size(width, height)
         margin, leading = 0.7 * size, 1.45 * size
         self._tag.set_text(tag, size)

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from vtk_segdeform.pictures import COLOURS, of_handle, rgb
+from vtk_segdeform.pictures import COLOURS, rgb
 from vtk_segdeform.session import Session
 
-from ..scene import View, Wireframe
+from ..scene import View, Wireframe, handle_colour
 
 _HIGHLIGHT = COLOURS[4]
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)
@@ -78,9 +78,10 @@ class HandleMarks:
 
     def _set_sizes(self) -> None:
         scale = float(np.clip(self.view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.7, 3.0))
-        for number, name in enumerate(self.session.handles):
+        for name in self.session.handles:
             if name not in self._dots:
                 continue
             dots, highlighted = self._dots[name], name == self._highlighted
-            colour, size = (rgb(_HIGHLIGHT), 6.0) if highlighted else (of_handle(number), 4.0)
+            colour = rgb(_HIGHLIGHT) if highlighted else handle_colour(self.session, name)
+            size = 6.0 if highlighted else 4.0
             dots.set_style(colour, line_width=1.0, sphere_size=scale * size)

@@ -112,12 +112,11 @@ class Picker:
         return self._distance.within(self._surface.points, points, faces, radius)
 
     def ring(self, hit: Hit, radius: float) -> FloatArray:
-        """Return the segments (k, 2, 3) where the surface leaves the ball of *radius* at *hit*."""
+        """Return the segments (k, 2, 3) of the line at *radius* from *hit* along the surface."""
         if self._ring is None:
             self._ring = SurfaceRing(self._mesh)
-        pose = self._data.GetPoints().GetMTime()
         return self._ring.around(
-            self._surface.points, pose=pose, centre=hit.point, face=hit.face, radius=radius
+            self._surface.points, centre=hit.point, face=hit.face, radius=radius
         )
 
     def component(self, vertex: int) -> BoolArray:

@@ -1,22 +1,26 @@
-"""The ring around a point of the surface: where the surface leaves a ball about that point.
+"""The ring around a point of the surface: all points at one distance from it along the surface.
 
-Cheap on large meshes.  The mesh is divided into connected blocks, once; only triangles of blocks
-that the sphere crosses are looked at.  Blocks that are far away along the surface are left out, so
-the ring does not appear on a finger beside the one under the pointer.
+So the ring does not appear on a finger beside the one under the pointer.  The distances of a large
+mesh are those of its decimated mesh, whose vertices lie on the surface; another thread makes that,
+and until it is finished there is no ring.  A ring of a few of its triangles is a plane circle.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
+from dataclasses import dataclass
+from threading import Thread
 
-from vtk_segdeform.arrays import BoolArray, FloatArray
+import numpy as np
+
+from vtk_segdeform import sizes
+from vtk_segdeform.arrays import FloatArray, IntArray
+from vtk_segdeform.geometry import decimated
 from vtk_segdeform.mesh import Mesh
 
-_CELLS = 32  # along the diagonal; each has one block for each connected piece of surface in it
-_DETOUR = 1.6  # radii along the surface, from block to block, at which a block is still near
-_CORNERS = 48  # of a circle that is smaller than the triangle
+from .surface_distance import SurfaceDistance
+
+_SMALLEST = 1.5  # sides of the triangles, at least, in the radius of a ring that follows them
+_CORNERS = 48  # of a circle
 
 
 class SurfaceRing:
@@ -29,28 +33,15 @@ class SurfaceRing:
     """
 
     def __init__(self, mesh: Mesh) -> None:
-        self._triangles = mesh.faces
-        x, edges, n = mesh.vertices, mesh.edges, mesh.n_vertices
-        self._size = mesh.diagonal / _CELLS
-        i, j, k = ((x - x.min(axis=0)) / self._size).astype(np.int64).T
-        cell = ((2 * _CELLS) * i + j) * (2 * _CELLS) + k
-        start, end = edges.T
-        inside = cell[start] == cell[end]
-        ones = np.ones(np.count_nonzero(inside), dtype=np.int8)
-        graph = sparse.coo_array((ones, (start[inside], end[inside])), shape=(n, n))
-        self._count, self._block = csgraph.connected_components(graph, directed=False)
-        self._by_block = np.argsort(self._block, kind="stable")
-        owner = self._block[mesh.faces[:, 0]]
-        self._faces = np.argsort(owner, kind="stable")
-        self._first = np.searchsorted(owner[self._faces], np.arange(self._count + 1))
-        across = self._block[edges[~inside]]
-        self._links = np.unique(np.concatenate([across, across[:, ::-1]]), axis=0)
-        self._graph = sparse.csr_array((self._count, self._count))
-        self._pose: int | None = None
-        self._low = self._high = np.empty((0, 3))
+        self._mesh = mesh
+        self._sample: _Sample | None = None
+        self._thread: Thread | None = None
+        if mesh.n_vertices <= sizes.DECIMATED_POINTS:
+            every = np.arange(mesh.n_vertices)
+            self._sample = _Sample.of(mesh.faces, every, every)
 
     def around(
-        self, points: FloatArray, *, pose: int, centre: FloatArray, face: int, radius: float
+        self, points: FloatArray, *, centre: FloatArray, face: int, radius: float
     ) -> FloatArray:
         """Return the segments (k, 2, 3) of the ring about *centre*.
 
@@ -58,8 +49,6 @@ class SurfaceRing:
         ----------
         points : (n, 3) float
             The pose.
-        pose : int
-            Its number; another one for every pose.
         centre : (3,) float
             On the surface.
         face : int
@@ -67,42 +56,56 @@ class SurfaceRing:
         radius : float
             Above 0.
         """
-        if pose != self._pose:
-            self._pose = pose
-            self._measure(points)
-        corner = self._triangles[face]
-        near = self._near(int(self._block[corner[0]]), radius)
-        outside = np.maximum(np.maximum(self._low - centre, centre - self._high), 0.0)
-        beyond = np.maximum(centre - self._low, self._high - centre)
-        square = radius * radius
-        crossed = (outside**2).sum(axis=1) <= square
-        crossed &= (beyond**2).sum(axis=1) >= square
-        a, b = self._links.T
-        reached = crossed.copy()  # a triangle belongs to one block, but reaches into others
-        reached[a[crossed[b]]] = True
-        blocks = np.flatnonzero(reached & near)
-        pieces = [self._faces[self._first[k] : self._first[k + 1]] for k in blocks]
-        corners = points[self._triangles[np.concatenate([[face], *pieces]).astype(np.int64)]]
-        offset = corners - centre
-        ends = contour(corners, np.sqrt(np.einsum("ijk,ijk->ij", offset, offset)), radius)
-        return ends if len(ends) else _circle(points[corner], centre, radius)
+        corner = self._mesh.faces[face]
+        sample = self._ready_sample()
+        if sample is None:
+            return np.empty((0, 2, 3))
+        x = points[sample.kept]
+        start = sample.face_of[sample.cluster[corner]]
+        start = np.unique(start[start >= 0])
+        sides = x[sample.faces[start]]
+        length = np.linalg.norm(sides - np.roll(sides, 1, axis=1), axis=2)
+        if len(start) and radius >= _SMALLEST * length.mean():
+            centres = np.broadcast_to(centre, (len(start), 3))
+            away = sample.distance.within(x, centres, start, radius)
+            near = (away[sample.faces] <= radius).any(axis=1)
+            faces = sample.faces[near]
+            return contour(x[faces], away[faces], radius)
+        return _circle(points[corner], centre, radius)
 
-    def _measure(self, points: FloatArray) -> None:
-        """Find the bounding boxes of the blocks."""
-        x = points[self._by_block]
-        starts = np.searchsorted(self._block[self._by_block], np.arange(self._count))
-        self._low = np.minimum.reduceat(x, starts)
-        self._high = np.maximum.reduceat(x, starts)
-        middle = 0.5 * (self._low + self._high)
-        a, b = self._links.T
-        length = np.maximum(np.linalg.norm(middle[a] - middle[b], axis=1), 1e-9 * self._size)
-        self._graph = sparse.csr_array((length, (a, b)), shape=(self._count, self._count))
+    def _ready_sample(self) -> _Sample | None:
+        """Return the sample; None if it is not finished yet."""
+        if self._sample is None:
+            if self._thread is None:
+                self._thread = Thread(target=self._make, daemon=True)
+                self._thread.start()
+            return None
+        return self._sample
 
-    def _near(self, block: int, radius: float) -> BoolArray:
-        """Return which blocks are near *block* along the surface, (b,) bool."""
-        limit = _DETOUR * radius + 3.0 * self._size
-        away = csgraph.dijkstra(self._graph, indices=np.array([block]), limit=limit)[0]
-        return np.asarray(np.isfinite(away))
+    def _make(self) -> None:
+        coarse, kept, cluster = decimated(self._mesh, sizes.DECIMATED_POINTS)
+        self._sample = _Sample.of(coarse.faces, kept, cluster)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sample:
+    """Some vertices of a mesh, and triangles between them."""
+
+    faces: IntArray
+    """(m, 3) int, of the sample."""
+    kept: IntArray
+    """(k,) int: its vertices in the mesh."""
+    cluster: IntArray
+    """(n,) int: the vertex of the sample that stands for each vertex of the mesh."""
+    face_of: IntArray
+    """(k,) int: a triangle of the sample at each of its vertices, -1 for none."""
+    distance: SurfaceDistance
+
+    @classmethod
+    def of(cls, faces: IntArray, kept: IntArray, cluster: IntArray) -> _Sample:
+        face_of = np.full(len(kept), -1)
+        face_of[faces] = np.arange(len(faces))[:, None]
+        return cls(faces, kept, cluster, face_of, SurfaceDistance(len(kept), faces))
 
 
 def contour(corners: FloatArray, values: FloatArray, level: float) -> FloatArray:

@@ -6,6 +6,7 @@ The files, in reading order:
     pull_motion    from pointer positions to the motion of the grabbed point
     markers        pins and pulled points as dots
     guide          the line of an axis
+    caption        the amount of the pull
 """
 
 from .puller import Puller

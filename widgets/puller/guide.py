@@ -11,6 +11,7 @@ from ..handle_dragger import AXIS_COLOURS, Kind, Part
 from ..scene import View, Wireframe
 
 _HALF_LENGTH = 150.0  # pixels
+_POINTS = 61
 _EDGE = np.array([[0, 1]])
 _NO_DOTS = np.empty(0, dtype=np.int64)
 
@@ -34,8 +35,8 @@ class Guide:
             line.actor.VisibilityOff()
             view.foreground.AddActor(line.actor)
 
-    def show(self, part: Part | None, place: FloatArray | None) -> None:
-        """Show the lines of *part* through *place* (3,), or none."""
+    def show(self, part: Part | None, place: FloatArray | None) -> FloatArray:
+        """Show the lines of *part* through *place* (3,), or none; return points on them (k, 3)."""
         axes: set[int] = set()
         if part is not None and part.axis is not None:
             axes = {0, 1, 2} - {part.axis} if part.kind is Kind.PLANE else {part.axis}
@@ -45,6 +46,10 @@ class Guide:
                 along = _HALF_LENGTH * self._view.pixel_at(place) * np.eye(3)[axis]
                 line.move(np.stack([place - along, place + along]))
         self._view.request_render()
+        if place is None or not axes:
+            return np.empty((0, 3))
+        along = _HALF_LENGTH * self._view.pixel_at(place) * np.linspace(-1.0, 1.0, _POINTS)
+        return np.concatenate([place + along[:, None] * np.eye(3)[axis] for axis in axes])
 
     def remove(self) -> None:
         """Remove the lines from the view permanently."""

@@ -112,23 +112,13 @@ class Markers:
                 ("fill", 1.2 * rim, scale * size, _BLACK, 1.0),
                 ("through", 0.0, scale * size, _BLACK, _THROUGH),
             ):
-                self._dots[is_pin, part].draw(self._lifted(places, lift), colour, width, opacity)
+                self._dots[is_pin, part].draw(
+                    self._view.lifted(places, lift), colour, width, opacity
+                )
         chosen = [] if self._highlighted is None else [self._vertices[self._highlighted]]
         place = self._surface.points[np.array(chosen, dtype=np.int64)]
         size = _PULLED if self._highlighted in pulls else _PIN
-        self._bright.draw(self._lifted(place, 2.0 * scale * size), _HIGHLIGHT, scale * size)
-
-    def _lifted(self, places: FloatArray, pixels: float) -> FloatArray:
-        """Return *places* (k, 3) moved towards the camera, to where they look the same."""
-        if not len(places):
-            return places
-        camera, view = self._view.camera, self._view
-        to_eye = np.broadcast_to(-view.view_direction, places.shape)
-        if not camera.GetParallelProjection():
-            to_eye = camera.GetPosition() - places
-            to_eye = to_eye / np.maximum(np.linalg.norm(to_eye, axis=1), 1e-300)[:, None]
-        step = np.array([view.pixel_at(place) for place in places])
-        return np.asarray(places + (pixels * step)[:, None] * to_eye)
+        self._bright.draw(self._view.lifted(place, 2.0 * scale * size), _HIGHLIGHT, scale * size)
 
 
 def marked_vertices(session: Session) -> dict[str, int]:

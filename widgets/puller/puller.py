@@ -26,16 +26,17 @@ import numpy as np
 
 from vtk_segdeform.arrays import FloatArray, is_number
 from vtk_segdeform.checks import require, shown
-from vtk_segdeform.deformer import LOCALITY, checked_locality
+from vtk_segdeform.deformer import checked_locality
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.pictures import PAPER, rgb
-from vtk_segdeform.session import Change, Session
+from vtk_segdeform.session import Change, Session, automatic_locality
 from vtk_segdeform.solver import Solution
 
 from ..handle_dragger import Gizmo, LiveSolve, step_of
 from ..picking import Hit, Picker
 from ..region_selector import BrushRing
 from ..scene import Gesture, Phase, Pointer, Stop, SurfaceDisplay, Widget
+from .caption import Caption
 from .guide import Guide
 from .markers import Markers, marked_vertices
 from .pull_motion import PullMotion
@@ -44,7 +45,7 @@ _RADIUS = 0.15  # the initial radius, in diagonals of the mesh
 _SMALLEST, _LARGEST = 0.005, 1.0  # in diagonals
 GROWTH = 1.1  # factor for one click of the wheel or one key press
 _CLICK_TOLERANCE = 3.0  # pixels; a press that moves less does not pull
-_RING_THICKNESS = 0.6  # of the ring of a brush
+_RING_THICKNESS = 0.8  # of the ring of a brush
 _POLL = 40  # milliseconds
 _FIXED = "This point is fixed. Grab another one, or erase fixed vertices in mode 3"
 _NO_DIRECTION = "No direction yet. Press X, Y or Z before the number, or drag first"
@@ -82,6 +83,7 @@ class Puller(Widget):
         self._markers = Markers(self._surface, self._picker)
         self._gizmo = Gizmo(self.view)
         self._guide = Guide(self.view)
+        self._caption = Caption(self.view, lambda: self._surface.points)
         self._radius = _RADIUS * session.mesh.diagonal
         self._locality: float | None = None
         self._motion: PullMotion | None = None  # of the running gesture
@@ -128,11 +130,7 @@ class Puller(Widget):
     @property
     def effective_locality(self) -> float:
         """`locality`, or the value that the pins and fixed vertices lead to."""
-        if self._locality is not None:
-            return self._locality
-        session = self.session
-        others = session.handles.keys() - set(session.state.pulls)
-        return 0.0 if len(session.fixed) or others else LOCALITY
+        return automatic_locality(self.session.state) if self._locality is None else self._locality
 
     @property
     def is_waiting(self) -> bool:
@@ -175,6 +173,7 @@ class Puller(Widget):
         self.Off()
         self._stop_listening()
         self._live.remove()
+        self._caption.remove()
         self._guide.remove()
         self._gizmo.remove()
         self._markers.remove()
@@ -297,13 +296,15 @@ class Puller(Widget):
         self.remark = remark
 
     def _toggle_pin(self, vertex: int) -> None:
-        session = self.session
+        session, before = self.session, self.effective_locality
         owners = [name for name, ids in session.handles.items() if vertex in ids]
         if owners:
             session.remove_handle(owners[0])
             self.remark = f"Removed {owners[0]}"
         else:
             self.remark = f"Added {session.pin(vertex)}"
+        if self.effective_locality != before:
+            self.remark += f". Local is now {100.0 * self.effective_locality:.0f} %"
 
     # Pulls that wait for the session.
 
@@ -370,9 +371,10 @@ class Puller(Widget):
         self._markers.highlight(None)
         self._ring.hide()
         self._gizmo.show_only(part)
-        self._gizmo.set_caption("" if motion is None else motion.caption)
-        self._gizmo.place(None if motion is None else motion.place)
-        self._guide.show(part, None if motion is None else motion.place)
+        place = None if motion is None else motion.place
+        self._gizmo.place(place)
+        lines = self._guide.show(part, place)
+        self._caption.show("" if motion is None else motion.caption, place, lines)
 
     def _left(self) -> None:
         self._ring.hide()

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
 from qtpy import QtCore, QtWidgets
 
-from vtk_segdeform.pictures import FIXED, of_handle, rgb
+from vtk_segdeform.pictures import FIXED, rgb
 
 from ..editor import (
     DeformEditor,
@@ -23,6 +21,7 @@ from ..editor import (
     toggle_local_axes,
 )
 from ..region_selector import Paint
+from ..scene import handle_colour
 from .controls import RIGHT, check_box, column, key_button, push_button, put, row, swatch, table
 
 Qt = QtCore.Qt
@@ -106,10 +105,11 @@ class HandlesPart(QtWidgets.QGroupBox):
         self._rows = rows
         tree, quiet = self.list, QtCore.QSignalBlocker(self.list)
         tree.clear()
-        handles = [*self._editor.session.handles]
         for each in rows:
             item = QtWidgets.QTreeWidgetItem([each.text, f"{each.n_vertices}"])
-            colour = _colour(each, handles)
+            colour = rgb(FIXED)
+            if each.paints is Paint.HANDLE:
+                colour = handle_colour(self._editor.session, each.handle)
             item.setIcon(_NAME, swatch(colour, tree))
             item.setTextAlignment(_VERTICES, RIGHT)
             if each.handle is not None:
@@ -151,13 +151,6 @@ class HandlesPart(QtWidgets.QGroupBox):
         if which == _NAME and handle is not None and item.text(0) != handle:
             self._rows = []  # refresh the row even if the name is refused
             self._editor.do(renaming(handle, item.text(0).strip()))
-
-
-def _colour(row: _Row, handles: list[str]) -> NDArray[np.uint8]:
-    """Return the colour of a row, among the names of all *handles*."""
-    if row.paints is Paint.FIXED:
-        return rgb(FIXED)
-    return of_handle(handles.index(row.handle) if row.handle in handles else len(handles))
 
 
 def _tick(on: bool) -> Any:

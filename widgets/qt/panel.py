@@ -1,6 +1,6 @@
 """The panel beside the view: a toolbar, the parts of the current mode, status and history.
 
-The toolbar may be moved out of the panel.
+The toolbar and the status may be moved out of the panel.
 
     DeformPanel(editor)
 
@@ -97,7 +97,7 @@ class DeformPanel(QtWidgets.QWidget):
     def refresh(self) -> None:
         """Update all visible parts."""
         editor, busy = self.editor, self.editor.is_busy
-        for each in (self, self.toolbar):  # which may be beside the panel
+        for each in (self, self.toolbar, self.status):  # which may be beside the panel
             each.setEnabled(editor.GetEnabled())
         if editor.keys is not self._keys:
             self._show_keys(editor.keys)
@@ -120,7 +120,7 @@ class DeformPanel(QtWidgets.QWidget):
         """Unsubscribe from the editor and disable the panel, permanently."""
         _stopper(self._stops, self._stop_session)()
         self._delay.stop()
-        for each in (self, self.toolbar):
+        for each in (self, self.toolbar, self.status):
             each.setEnabled(False)
 
     def _build(self) -> None:

@@ -18,7 +18,7 @@ from ..editor import (
     showing_cage,
     split_region,
 )
-from ..volume_overlay import RegionVolumes, percent
+from ..volume_overlay import RegionVolumes, signed
 from .controls import RIGHT, column, form, key_button, push_button, put, row, slider, swatch, table
 
 Qt = QtCore.Qt
@@ -101,7 +101,7 @@ class RegionsPart(QtWidgets.QGroupBox):
                 editor.session.region_name(region),
                 str(cages[region].n_vertices) if cages else "None",
                 widgets.cages.is_visible(region) if cages else None,
-                percent(volumes[region]) if region in volumes else "",
+                f"{signed(100.0 * volumes[region], 1)} %" if region in volumes else "",
             )
             for region in range(widgets.n_regions)
         ]

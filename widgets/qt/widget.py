@@ -30,7 +30,7 @@ _DARK = 128  # lightness of a window, 0 to 255, below which its palette is dark
 
 
 class DeformWidget(QtWidgets.QWidget):
-    """A toolbar, a view with the editor in it, and the panel beside it.
+    """A toolbar, a view with the editor in it, the panel beside it, and the status below.
 
     Parameters
     ----------
@@ -82,6 +82,8 @@ class DeformWidget(QtWidgets.QWidget):
         layout.setSpacing(0)
         layout.addWidget(self.panel.toolbar)
         layout.addWidget(halves, 1)
+        layout.addWidget(self.panel.status)
+        self.panel.status.lie_down()
         self.setFocusProxy(self.plotter)
         application = QtWidgets.QApplication.instance()
         if application is not None:

@@ -23,6 +23,7 @@ _RIM_WIDTH, _LINE_WIDTH = 5.5, 2.5  # pixels
 # steep surface.  In units of depth: the rim is drawn over the surface, the line over the rim.
 _SLOPE_OFFSET = 4.0
 _UNIT_OFFSETS = (10.0, 40.0)
+_LIFT = 6.0  # pixels towards the camera, so that the line is whole at the silhouette
 
 
 class BrushRing:
@@ -62,7 +63,9 @@ class BrushRing:
         self, segments: FloatArray, colour: NDArray[np.uint8], *, thickness: float = 1.0
     ) -> None:
         """Draw a ring of *segments* (k, 2, 3), *thickness* times as thick as a brush's."""
-        ends = segments.reshape(-1, 3)
+        view = self._surface.view
+        scale = float(np.clip(view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.7, 3.0))
+        ends = view.lifted(segments.reshape(-1, 3), scale * _LIFT)
         points, lines = vtkPoints(), vtkCellArray()
         points.SetData(numpy_to_vtk(ends, deep=True))
         lines.SetData(
@@ -71,11 +74,10 @@ class BrushRing:
         )
         self._ring.SetPoints(points)
         self._ring.SetLines(lines)
-        scale = np.clip(self._surface.view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.7, 3.0)
         shades, widths = (rgb(INK), colour), (_RIM_WIDTH, _LINE_WIDTH)
         for actor, shade, width in zip(self._actors, shades, widths, strict=True):
             actor.GetProperty().SetColor(*(shade / 255.0))
-            actor.GetProperty().SetLineWidth(float(scale * thickness * width))
+            actor.GetProperty().SetLineWidth(scale * thickness * width)
         self._show(True)
 
     def hide(self) -> None:

@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 
 from vtk_segdeform.arrays import BoolArray
 from vtk_segdeform.errors import ConstraintError, RegionError
-from vtk_segdeform.pictures import FIXED, of_handle, of_region, rgb
+from vtk_segdeform.pictures import FIXED, of_region, rgb
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
+
+from ..scene import handle_colour
 
 
 class Paint(enum.Enum):
@@ -50,8 +52,7 @@ class PaintTarget:
             return of_region(self.region)
         if self.paint is Paint.FIXED:
             return rgb(FIXED)
-        names = [*self.session.handles]
-        return of_handle(names.index(self.handle) if self.handle in names else len(names))
+        return handle_colour(self.session, self.handle)
 
     def members(self) -> BoolArray:
         """Return the vertices of the target, (n,) bool."""

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vtk_segdeform.arrays import BoolArray
-from vtk_segdeform.pictures import BODY, FIXED, of_handle, of_region, rgb
+from vtk_segdeform.pictures import BODY, FIXED, of_region, rgb
 from vtk_segdeform.session import Change
 
-from ..scene import SurfaceDisplay
+from ..scene import SurfaceDisplay, handle_colour
 
 LAYER = "regions"
 _PREVIEW_OPACITY = 0.9
@@ -97,9 +97,9 @@ class RegionColours:
             colours = (belongs / belongs.sum(axis=0)).T @ np.array(palette, dtype=float)
         colours[session.fixed] = rgb(FIXED)
         if self._marks_handles:
-            for number, (name, vertices) in enumerate(session.handles.items()):
+            for name, vertices in session.handles.items():
                 if name not in self._hidden:
-                    colours[vertices] = of_handle(number)
+                    colours[vertices] = handle_colour(session, name)
         return colours
 
     def _draw(self) -> None:

@@ -7,6 +7,7 @@ The files, in reading order:
     widget             the base class of the widgets
     gestures           press, move and release as one generator
     surface_display    the mesh of a session as an actor
+    handle_colours     the colours of the handles of a session
     backdrop           background and light of a window that belongs to the editor
     projection         projection between world and display coordinates
     viewpoint          movements of the camera, named views, framing, the up axis
@@ -25,8 +26,9 @@ The files, in reading order:
 from .backdrop import set_background, set_lights
 from .draft import Draft
 from .gestures import Gesture, Phase, Pointer
+from .handle_colours import handle_colour
 from .highlights import Highlights
-from .labels import Panel, Text
+from .labels import Panel, Text, set_font
 from .navigation import Navigation
 from .orientation_cube import OrientationCube
 from .projection import Projection
@@ -57,8 +59,10 @@ __all__ = [
     "Viewpoint",
     "Widget",
     "Wireframe",
+    "handle_colour",
     "observe_steps",
     "prescribe_steps",
     "set_background",
+    "set_font",
     "set_lights",
 ]

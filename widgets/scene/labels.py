@@ -1,19 +1,27 @@
 """Rectangles and text, placed in pixels from the lower left corner of a renderer.
 
-They are drawn over everything else in their renderer.  The font is VTK's built-in Arial.
+They are drawn over everything else in their renderer.  The font is DejaVu of
+matplotlib, which pyvista requires, or else VTK's own, whose brackets look like parentheses.
 """
 
 from __future__ import annotations
 
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import vtkmodules.vtkRenderingFreeType
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - both are required to draw in 2D
 from vtkmodules.util.numpy_support import numpy_to_vtk
-from vtkmodules.vtkCommonCore import vtkPoints
+from vtkmodules.vtkCommonCore import VTK_FONT_FILE, vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
-from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D, vtkTextActor
+from vtkmodules.vtkRenderingCore import (
+    vtkActor2D,
+    vtkPolyDataMapper2D,
+    vtkTextActor,
+)
 
 from vtk_segdeform.pictures import rgb
 
@@ -86,7 +94,7 @@ class Text:
     bold : bool
         Whether the font is bold.
     monospace : bool
-        Whether to use Courier, in which brackets and commas are easier to tell apart.
+        Whether all letters have the same width.
     layer : int
         Higher layers are drawn over lower ones, as in `Panel`.
     """
@@ -107,9 +115,7 @@ class Text:
         self._actor.PickableOff()
         style = self._actor.GetTextProperty()
         style.SetColor(*(rgb(colour) / 255.0))
-        style.SetBold(bold)
-        if monospace:
-            style.SetFontFamilyToCourier()
+        set_font(style, bold=bold, monospace=monospace)
         style.SetVerticalJustificationToCentered()
         renderer.AddViewProp(self._actor)
 
@@ -143,3 +149,25 @@ class Text:
     def remove(self) -> None:
         """Remove the text from the renderer permanently."""
         self._renderer.RemoveViewProp(self._actor)
+
+
+def set_font(style: Any, *, bold: bool = False, monospace: bool = False) -> None:
+    """Set the font of a vtkTextProperty to that of `Text`."""
+    path = _font_file(bold, monospace)
+    style.SetBold(bold and not path)
+    if path:
+        style.SetFontFamily(VTK_FONT_FILE)
+        style.SetFontFile(path)
+    elif monospace:
+        style.SetFontFamilyToCourier()
+
+
+@cache
+def _font_file(bold: bool, monospace: bool) -> str:
+    """Return the path of a font, or "" without matplotlib, which is not imported."""
+    found = find_spec("matplotlib")
+    if found is None or not found.submodule_search_locations:
+        return ""
+    name = f"DejaVuSans{'Mono' * monospace}{'-Bold' * bold}.ttf"
+    path = Path(found.submodule_search_locations[0]) / "mpl-data" / "fonts" / "ttf" / name
+    return str(path) if path.is_file() else ""

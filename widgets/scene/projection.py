@@ -73,6 +73,19 @@ class Projection:
         half = np.tan(0.5 * np.radians(self.camera.GetViewAngle()))
         return float(2.0 * max(away, 1e-12) * half / self._extent()[1])
 
+    def lifted(self, points: FloatArray, pixels: float) -> FloatArray:
+        """Return *points* (k, 3) moved towards the camera, to where they look the same."""
+        camera, direction = self.camera, self.view_direction
+        if camera.GetParallelProjection():
+            step = 2.0 * camera.GetParallelScale() / self._extent()[1]
+            return np.asarray(points - pixels * step * direction)
+        to_eye = np.asarray(camera.GetPosition() - points)
+        depth = np.maximum(-(to_eye @ direction), 1e-12)
+        half = np.tan(0.5 * np.radians(camera.GetViewAngle()))
+        step = 2.0 * depth * half / self._extent()[1]
+        away = np.maximum(np.linalg.norm(to_eye, axis=1), 1e-300)
+        return np.asarray(points + (pixels * step / away)[:, None] * to_eye)
+
     @property
     def view_direction(self) -> FloatArray:
         """(3,) float: the viewing direction of the camera, of length 1."""

@@ -17,7 +17,7 @@ from vtkmodules.vtkRenderingCore import vtkTextActor
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.pictures import ink_on, of_region, rgb
 
-from ..scene import Stop, View
+from ..scene import Stop, View, set_font
 from .diverging import lookup_table
 
 _TICKS = 5
@@ -71,6 +71,7 @@ class Legend:
         for actor, (text, region) in zip(self._lines, lines, strict=True):
             actor.SetInput(f" {text} ".replace("$", r"\$"))  # VTK reads text between two $ as TeX
             style = actor.GetTextProperty()
+            set_font(style)
             style.SetBackgroundOpacity(_BACKGROUND_OPACITY if region is None else 1.0)
             style.SetFrame(region is not None)
             if region is not None:
@@ -160,7 +161,7 @@ def _scalar_bar(title: str) -> Any:
     bar.DrawAnnotationsOn()
     for style in (bar.GetTitleTextProperty(), bar.GetAnnotationTextProperty()):
         style.ItalicOff()
-        style.BoldOff()
+        set_font(style)
         style.ShadowOff()
     return bar
 

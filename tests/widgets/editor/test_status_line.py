@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hands import picture, plain_view
 
+from vtk_segdeform.widgets.editor import messages
 from vtk_segdeform.widgets.editor.status_line import StatusLine
 
 
@@ -107,3 +108,32 @@ def test_a_removed_line_leaves_nothing(line):
     assert (picture(line.view) != blank).any()
     line.remove()
     assert (picture(line.view) == blank).all()
+
+
+def test_a_line_whose_text_a_panel_shows_is_not_drawn(line):
+    before = picture(line.view)
+    line.say("drag a handle", "DEFORM")
+    line.show(False)
+    assert (picture(line.view) == before).all()
+    assert (line.text, line.height) == ("drag a handle", 0.0)
+    line.show(True)
+    assert (picture(line.view) != before).any()
+
+
+def test_a_result_yields_to_the_hint_after_some_seconds_a_question_does_not(monkeypatch):
+    now, view = 100.0, plain_view((500, 300))
+    monkeypatch.setattr(messages.time, "monotonic", lambda: now)
+    shown = messages.Messages(view)
+    for text, tell in (("Added pin 1", shown.note), ("Sure?", shown.confirms)):
+        tell(text)
+        shown.show("0 PULL", "Drag the surface")
+        assert shown.text == f"{text} · Drag the surface"
+        now += 3.0
+        shown.show("0 PULL", "Drag the surface")
+        assert shown.text == f"{text} · Drag the surface"
+        now += 4.0
+        shown.show("0 PULL", "Drag the surface")
+        assert shown.text.endswith("Drag the surface")
+        assert (text in shown.text) == (text == "Sure?")
+    shown.remove()
+    view.remove_foreground()

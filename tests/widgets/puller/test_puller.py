@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 from hands import Hand, plain_view
 from scenes import sausage
+from solids import icosphere
 
 from vtk_segdeform import Session
 from vtk_segdeform.errors import ArgumentError, ConstraintError
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.widgets.picking.surface_ring import SurfaceRing
+from vtk_segdeform.widgets.puller.caption import Caption
 from vtk_segdeform.widgets.puller.puller import Puller
 
 pytestmark = pytest.mark.usefixtures("bound_once")
@@ -237,6 +241,52 @@ def test_the_ring_has_the_radius_at_any_scale_and_place(scale):
         ring = puller._picker.ring(hit, share * mesh.diagonal)
         assert len(ring) > 20
         away = np.linalg.norm(ring - hit.point, axis=2) / mesh.diagonal
-        np.testing.assert_allclose(away, share, rtol=0.02)
+        # Along the surface; the straight way is shorter over a bent one.
+        assert 0.85 * share < away.min()
+        assert away.max() < 1.02 * share
     puller.remove()
     assert hand.failures == []
+
+
+def test_the_ring_is_on_the_part_below_the_pointer_alone():
+    sphere, faces = icosphere(3)
+    both = np.concatenate([sphere, sphere + [2.02, 0.0, 0.0]])
+    mesh = Mesh(both, np.concatenate([faces, faces + len(sphere)]))
+    face = int(np.argmax(sphere[faces].mean(axis=1)[:, 0]))  # beside the gap
+    centre = sphere[faces[face]].mean(axis=0)
+    ring = SurfaceRing(mesh).around(both, centre=centre, face=face, radius=0.8)
+    np.testing.assert_allclose(np.linalg.norm(ring, axis=2), 1.0, atol=0.02)
+    cosine = ring @ centre / np.linalg.norm(centre)
+    np.testing.assert_allclose(np.arccos(np.clip(cosine, -1.0, 1.0)), 0.8, atol=0.04)
+
+
+def test_the_caption_is_beside_the_point_off_the_body_and_in_the_window():
+    view = plain_view((400, 300))
+    view.camera.ParallelProjectionOn()
+    view.camera.SetParallelScale(150.0)  # a pixel is 1 long, the middle of the window at 0
+    body = np.random.default_rng(0).uniform([-60.0, -60.0, 0.0], [60.0, 60.0, 0.0], (2000, 3))
+    caption = Caption(view, lambda: body)
+    for point in ([60.0, 0.0, 0.0], [-60.0, 0.0, 0.0], [0.0, -60.0, 0.0], [195.0, 30.0, 0.0]):
+        caption.show("12.5", np.array(point))
+        view.render()
+        x, y, wide, high = caption.box
+        low, high = np.array([x, y]), np.array([x + wide, y + high])
+        seen = view.to_display(body)[:, :2]
+        assert not ((seen > low) & (seen < high)).all(axis=1).any()
+        at = view.to_display(np.array([point]))[0, :2]
+        assert 0.0 < np.linalg.norm(at - np.clip(at, low, high)) < 60.0
+        assert (low > 0.0).all()
+        assert (high < [400, 300]).all()
+    caption.show("", None)
+    assert caption.text == ""
+    caption.remove()
+
+
+def test_a_pin_says_to_what_it_changes_the_locality():
+    bench = Bench()
+    place, _ = bench.on()
+    bench.hand.click(place, shift=True)
+    assert bench.puller.remark == "Added pin 1. Local is now 5 %"
+    bench.hand.click(place, shift=True)
+    assert bench.puller.remark == "Removed pin 1. Local is now 20 %"
+    bench.puller.remove()

@@ -817,8 +817,8 @@ def test_enter_presses_the_focused_button_and_words_of_the_hint_run_keys(seen):
         seen.settle()
         assert mode is None or seen.editor.mode is mode
     assert seen.editor.widgets.selector.handle is None
-    assert 'href="4"' in panel.status.hint.text()
-    panel.status.hint.linkActivated.emit("4")
+    assert 'href="4"' in panel.status.words.text()
+    panel.status.words.linkActivated.emit("4")
     seen.settle()
     assert seen.editor.mode is Mode.DEFORM
     bar.compare.pressed.emit()
