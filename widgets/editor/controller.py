@@ -18,7 +18,7 @@ from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Change, Preparation, Session, saved_view
 
 from ..recording import confined_path
-from ..scene import View, Widget
+from ..scene import Draft, View, Widget
 from .camera import Camera, has_y_up
 from .help_card import HelpCard, Section
 from .hints import hint
@@ -82,7 +82,7 @@ class Controller:
         self.log = Log()
         self._worker = Worker(view_timer(view), self.log, self._job_changed)
         self._preparing = Preparing(
-            view_timer(view), self._may_accept, self._accept, self._prepare_pulls, self.refresh
+            view_timer(view), self._may_accept, self._accept, self._prepare_pulls, self._show_preparing
         )
         self.widgets = WidgetSet(view, session)
         self.camera = Camera(view, self.widgets)
@@ -328,6 +328,11 @@ class Controller:
         session = self.session
         is_pulling = session.is_bound and any(w.is_grabbing for w in self.widgets.interactive)
         return self._mode is Mode.PULL and not (self.is_busy or session.is_dragging or is_pulling)
+
+    def _show_preparing(self) -> None:
+        """Show how far the preparation is; where pictures are slow, they are drafts meanwhile."""
+        Draft.of(self.view).begin(if_slow=True)
+        self.refresh()
 
     def _accept(self, session: Session, preparation: Preparation) -> None:
         was_modified = self.file.is_modified(session)

@@ -55,7 +55,7 @@ class LiveSolve:
         self._seconds: deque[float] = deque(maxlen=5)  # per step; their median is used
         self._stop: Stop | None = None
         self._budget = StepBudget(view.interactor)
-        self._draft = Draft(view)
+        self._draft = Draft.of(view)
 
     @property
     def steps(self) -> int:
@@ -86,6 +86,11 @@ class LiveSolve:
             self._stop_refining()
         elif self._stop is None:
             self._stop = self._view.every(_PERIOD, self._tick)
+
+    def begin(self) -> None:
+        """Stop refining until `resume`; where pictures are slow, draw drafts from now on."""
+        self._draft.begin(if_slow=True)
+        self._stop_refining()
 
     def pause(self) -> None:
         """Stop refining until `resume`, and draw in full quality."""
