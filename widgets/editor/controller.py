@@ -82,7 +82,11 @@ class Controller:
         self.log = Log()
         self._worker = Worker(view_timer(view), self.log, self._job_changed)
         self._preparing = Preparing(
-            view_timer(view), self._may_accept, self._accept, self._prepare_pulls, self._show_preparing
+            view_timer(view),
+            self._may_accept,
+            self._accept,
+            self._prepare_pulls,
+            self._show_preparing,
         )
         self.widgets = WidgetSet(view, session)
         self.camera = Camera(view, self.widgets)
