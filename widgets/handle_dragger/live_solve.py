@@ -73,6 +73,7 @@ class LiveSolve:
             self._session.bind()  # beforehand, so that it is not measured as part of a step
         self._draft.begin()
         self._measure(solve, self.steps)
+        self._draft.begin()  # again, as a slow solve is no rest
         self.resume()
 
     def resume(self) -> None:

@@ -3,7 +3,8 @@
 In software, multi-sampling takes half the time of a picture or more, and a mesh of a million
 vertices half a second without it; in motion nobody sees the difference.  `Draft.begin` turns off
 the anti-aliasing of a view, and announces the motion over its interactor: a `SurfaceDisplay` then
-draws a large mesh decimated.  Where pictures are slow they remain drafts while the view spares another thread.
+draws a large mesh decimated.  Where pictures are slow they remain drafts while the
+view spares another thread.
 """
 
 from __future__ import annotations
