@@ -86,7 +86,7 @@ class Controller:
             self._may_accept,
             self._accept,
             self._prepare_pulls,
-            self._show_preparing,
+            self.refresh,
         )
         self.widgets = WidgetSet(view, session)
         self.camera = Camera(view, self.widgets)
@@ -326,17 +326,14 @@ class Controller:
         """
         if self._is_on and not self.is_busy:
             self._preparing.update(self.session, start=self._mode is Mode.PULL, again=again)
+            if self._preparing.fraction is not None:
+                Draft.of(self.view).begin(if_slow=True)
 
     def _may_accept(self) -> bool:
         """Return whether the session may be prepared now: nothing is being pulled or painted."""
         session = self.session
         is_pulling = session.is_bound and any(w.is_grabbing for w in self.widgets.interactive)
         return self._mode is Mode.PULL and not (self.is_busy or session.is_dragging or is_pulling)
-
-    def _show_preparing(self) -> None:
-        """Show how far the preparation is; where pictures are slow, they are drafts meanwhile."""
-        Draft.of(self.view).begin(if_slow=True)
-        self.refresh()
 
     def _accept(self, session: Session, preparation: Preparation) -> None:
         was_modified = self.file.is_modified(session)

@@ -17,7 +17,7 @@ _PIECE = 1 << 17  # vertices or faces per task
 
 
 def intersections(
-    points: FloatArray, faces: IntArray, near: FloatArray, far: FloatArray, tolerance: float
+    points: FloatArray, faces: IntArray, near: FloatArray, far: FloatArray, *, tolerance: float
 ) -> tuple[FloatArray, IntArray]:
     """Return where the segment from *near* to *far* meets a surface, in order.
 
@@ -43,7 +43,7 @@ def intersections(
     if not length > 0.0:
         return np.empty((0, 3)), np.empty(0, dtype=np.int64)
     way = (far - near) / length
-    met = faces_in_beam(points, faces, near, way, 2.0 * tolerance)
+    met = faces_in_beam(points, faces, near, way, width=2.0 * tolerance)
     a, b, c = (points[corner] - near for corner in faces[met].T)
     normal = np.cross(b - a, c - a)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -62,7 +62,7 @@ def intersections(
 
 
 def faces_in_beam(
-    points: FloatArray, faces: IntArray, origin: FloatArray, way: FloatArray, width: float
+    points: FloatArray, faces: IntArray, origin: FloatArray, way: FloatArray, *, width: float
 ) -> IntArray:
     """Return faces (k,), among them all that a beam can meet.
 

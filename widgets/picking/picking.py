@@ -71,7 +71,9 @@ class Picker:
         if not (np.isfinite(near).all() and np.isfinite(far).all()):
             return []
         tolerance = _INTERSECTION_TOLERANCE * self._mesh.diagonal
-        places, met = intersections(self._surface.points, self._mesh.faces, near, far, tolerance)
+        places, met = intersections(
+            self._surface.points, self._mesh.faces, near, far, tolerance=tolerance
+        )
         return [self._hit(place, int(face)) for place, face in zip(places, met, strict=True)]
 
     def hit(self, pointer: Pointer) -> Hit | None:

@@ -114,3 +114,5 @@ class Draft:
     def _tick(self) -> None:
         if time.perf_counter() - self._begun > _REST:
             self.end()
+        if self._stop is not None:  # what was not ready at the last move may be now
+            self._view.interactor.InvokeEvent(_ANNOUNCED, 1)

@@ -74,11 +74,11 @@ def test_a_line_through_a_vertex_or_an_edge_meets_the_surface(compiled, monkeypa
         face = vertices[faces[k]]
         for target in (face[0], 0.5 * (face[0] + face[1])):
             near, far = 1e3 + 3.0 * target, 1e3 - 0.5 * target
-            places, met = intersections(x, faces, near, far, 1e-6)
+            places, met = intersections(x, faces, near, far, tolerance=1e-6)
             assert len(met)
             assert np.allclose(places, 1e3 + target, atol=1e-5)  # and not the other side
             assert k in met
-    assert len(intersections(x, faces, near, near, 1e-6)[1]) == 0
+    assert len(intersections(x, faces, near, near, tolerance=1e-6)[1]) == 0
 
 
 def test_hits_are_in_the_displayed_pose():
