@@ -10,6 +10,7 @@ edges with many faces and faces that coincide, which a `Mesh` made by a caller m
 
 from __future__ import annotations
 
+from threading import Lock
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -24,6 +25,7 @@ _ROUNDS, _GAIN = 6, 0.8  # of the search for the spacing; exponent of its correc
 _FEW, _MANY = 0.7, 1.5  # clusters, in numbers requested
 
 _last: WeakKeyDictionary[Mesh, tuple[int, Mesh, IntArray, IntArray]] = WeakKeyDictionary()
+_lock = Lock()  # several threads ask for the same mesh at the same time
 
 
 def decimated(mesh: Mesh, n_points: int) -> tuple[Mesh, IntArray, IntArray]:
@@ -40,11 +42,12 @@ def decimated(mesh: Mesh, n_points: int) -> tuple[Mesh, IntArray, IntArray]:
     cluster : (n,) int
         The vertex of *coarse* that replaces each vertex of *mesh*.
     """
-    found = _last.get(mesh)
-    if found is None or found[0] != n_points:
-        cluster = _clusters(mesh, n_points)
-        kept = _nearest_to_mean(mesh.vertices, cluster)
-        found = _last[mesh] = n_points, _joined(mesh, kept, cluster), kept, cluster
+    with _lock:
+        found = _last.get(mesh)
+        if found is None or found[0] != n_points:
+            cluster = _clusters(mesh, n_points)
+            kept = _nearest_to_mean(mesh.vertices, cluster)
+            found = _last[mesh] = n_points, _joined(mesh, kept, cluster), kept, cluster
     _, coarse, kept, cluster = found
     return coarse, kept, cluster
 

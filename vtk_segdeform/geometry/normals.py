@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ from ..mesh import HalfEdges, Mesh, two_sides
 
 _PIECES = 16  # most tasks
 _PIECE = 1 << 12  # fewest vertices per task
+_all_rings: WeakKeyDictionary[Mesh, tuple[NDArray[np.int32], IntArray]] = WeakKeyDictionary()
 
 
 class VertexNormals:
@@ -113,10 +115,17 @@ class VertexNormals:
 
     @cached_property
     def _rings(self) -> tuple[NDArray[np.int32], IntArray]:
-        """(3m,) and (n + 1,): the neighbours of all vertices, and where each ring begins."""
+        """(3m,) and (n + 1,): the neighbours of all vertices, and where each ring begins.
+
+        They are kept as long as the mesh, so another thread can compute them before it is drawn.
+        """
+        known = _all_rings.get(self._mesh)
+        if known is not None:
+            return known
         starts = np.concatenate([[0], np.cumsum(np.bincount(self._faces.ravel()))])
         ring = np.empty(self._faces.size, dtype=np.int32)
         compiled_kernels().rings(ring, *inputs(self._faces, starts))
+        _all_rings[self._mesh] = ring, starts
         return ring, starts
 
     @cached_property

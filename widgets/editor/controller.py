@@ -19,7 +19,7 @@ from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Change, Preparation, Session, saved_view
 
 from ..recording import confined_path
-from ..scene import View, Widget
+from ..scene import Draft, View, Widget
 from .camera import Camera, has_y_up
 from .help_card import HelpCard
 from .hints import hint
@@ -81,7 +81,11 @@ class Controller:
         self._instead = ""
         self._worker = Worker(view_timer(view), self._job_changed)
         self._preparing = Preparing(
-            view_timer(view), self._may_accept, self._accept, self._prepare_pulls, self.refresh
+            view_timer(view),
+            self._may_accept,
+            self._accept,
+            self._prepare_pulls,
+            self.refresh,
         )
         self.widgets = WidgetSet(view, session)
         self.camera = Camera(view, self.widgets)
@@ -326,6 +330,8 @@ class Controller:
         """
         if self._is_on and not self.is_busy:
             self._preparing.update(self.session, start=self._mode is Mode.PULL, again=again)
+            if self._preparing.fraction is not None:
+                Draft.of(self.view).begin(if_slow=True)
 
     def _may_accept(self) -> bool:
         """Return whether the session may be prepared now: nothing is being pulled or painted."""

@@ -38,11 +38,16 @@ def view_timer(view: View) -> Timer:
     """Return the timer of a *view*; an error in a job reaches `View.on_failure`.
 
     A VTK event loop holds Python's lock while it waits for events, so each tick waits a moment
-    for the worker.  During a camera drag progress is reported but nothing is delivered.
+    for the worker, and pictures leave it most of the time.  During a camera drag progress is
+    reported but nothing is delivered.
     """
 
     def start(job: Job[Any]) -> Stop:
-        stops = view.pulse(lambda: job.report(_SHARE)), view.every(_PERIOD, job.deliver)
+        stops = (
+            view.pulse(lambda: job.report(_SHARE)),
+            view.every(_PERIOD, job.deliver),
+            view.spare(),
+        )
 
         def stop() -> None:
             for each in stops:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vtk_segdeform.errors import MeshError
-from vtk_segdeform.kernels import compiled_kernels
+from vtk_segdeform.geometry import VertexNormals, lids_of
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session, load_session, save_session
 
@@ -100,9 +100,12 @@ def read_session(path: Path, progress: Progress) -> Session:
             surface = Surface(polydata)
         except MeshError as fault:
             raise MeshError(f"{path}: {fault}") from None
-        compiled_kernels(surface.mesh.n_vertices)  # loads them here rather than when drawing
+        session = Session(surface)
+        # Both are kept for the mesh.  The window does not wait for them here.
+        VertexNormals(session.mesh).of(session.vertices)
+        lids_of(session.mesh, session.options.lids)
         progress(1.0, "Drawing mesh")
-        return Session(surface)
+        return session
     session = load_session(path)
     if session.state.pose is not None:
         session.bind(progress)

@@ -55,7 +55,7 @@ class LiveSolve:
         self._seconds: deque[float] = deque(maxlen=5)  # per step; their median is used
         self._stop: Stop | None = None
         self._budget = StepBudget(view.interactor)
-        self._draft = Draft(view)
+        self._draft = Draft.of(view)
 
     @property
     def steps(self) -> int:
@@ -73,6 +73,7 @@ class LiveSolve:
             self._session.bind()  # beforehand, so that it is not measured as part of a step
         self._draft.begin()
         self._measure(solve, self.steps)
+        self._draft.begin()  # again, as a slow solve is no rest
         self.resume()
 
     def resume(self) -> None:
@@ -86,6 +87,11 @@ class LiveSolve:
             self._stop_refining()
         elif self._stop is None:
             self._stop = self._view.every(_PERIOD, self._tick)
+
+    def begin(self) -> None:
+        """Stop refining until `resume`; where pictures are slow, draw drafts from now on."""
+        self._draft.begin(if_slow=True)
+        self._stop_refining()
 
     def pause(self) -> None:
         """Stop refining until `resume`, and draw in full quality."""

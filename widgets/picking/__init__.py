@@ -3,6 +3,7 @@
 The files, in reading order:
 
     picking             rays from the pointer, vertices within a radius, visible vertices
+    line_of_sight       where a line meets the surface
     visibility          which vertices the mesh itself hides
     surface_distance    distance along the surface
     surface_ring        the ring around a point

@@ -1,30 +1,25 @@
 """Queries on the displayed pose: hits of the pointer, distances from it, visible vertices.
 
-Search structures are built on first use and rebuilt only after the pose has changed; the visible
-vertices are recomputed after the camera has changed, too.
+The visible vertices are computed on first use, and again after the pose or the camera has changed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
-from vtkmodules.vtkCommonCore import vtkIdList, vtkPoints
-from vtkmodules.vtkCommonDataModel import vtkPolyData, vtkStaticCellLocator
 
 from vtk_segdeform.arrays import BoolArray, FloatArray
 
 from ..scene import Pointer, SurfaceDisplay
+from .line_of_sight import intersections
 from .surface_distance import SurfaceDistance
 from .surface_ring import SurfaceRing
 from .visibility import visible_vertices
 
 # A ray through an edge must not pass between its two faces.
 _INTERSECTION_TOLERANCE = 1e-7  # of the diagonal
-# All pickers of a surface share its search structure.
-_locators: WeakKeyDictionary[SurfaceDisplay, vtkStaticCellLocator] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,13 +57,6 @@ class Picker:
         self._surface = surface
         self._view = surface.view
         self._mesh = surface.session.mesh
-        # A separate object: a change of colour would modify the displayed one.
-        self._data = vtkPolyData()
-        self._data.SetPoints(surface.polydata.GetPoints())
-        self._data.SetPolys(surface.polydata.GetPolys())
-        self._locator = _locators.setdefault(surface, vtkStaticCellLocator())
-        if self._locator.GetDataSet() is None:
-            self._locator.SetDataSet(self._data)
         self._distance: SurfaceDistance | None = None
         self._ring: SurfaceRing | None = None
         self._visibility: _Visibility | None = None
@@ -82,15 +70,11 @@ class Picker:
         near, far = self._view.ray(pointer)
         if not (np.isfinite(near).all() and np.isfinite(far).all()):
             return []
-        self._locator.BuildLocator()  # does nothing unless the pose has changed
-        points, faces = vtkPoints(), vtkIdList()
-        points.SetDataTypeToDouble()  # far from the origin single precision is coarse
         tolerance = _INTERSECTION_TOLERANCE * self._mesh.diagonal
-        self._locator.IntersectWithLine(near, far, tolerance, points, faces)
-        return [
-            self._hit(np.array(points.GetPoint(k)), faces.GetId(k))
-            for k in range(faces.GetNumberOfIds())
-        ]
+        places, met = intersections(
+            self._surface.points, self._mesh.faces, near, far, tolerance=tolerance
+        )
+        return [self._hit(place, int(face)) for place, face in zip(places, met, strict=True)]
 
     def hit(self, pointer: Pointer) -> Hit | None:
         """Return the visible point of the surface at *pointer*, or None beside the mesh."""
@@ -145,7 +129,7 @@ class Picker:
         return cache.is_visible if among is None else cache.is_visible & among
 
     def _current_visibility(self) -> _Visibility:
-        modified = self._data.GetPoints().GetMTime()
+        modified = self._surface.polydata.GetPoints().GetMTime()
         box = self._view.to_display(self._box_corners)[:, :2]
         cache = self._visibility
         if (

@@ -245,7 +245,7 @@ class Puller(Widget):
         """Pull *vertex*; *point*, on the surface near it, stays under the pointer."""
         session = self.session
         session.commit()  # keeps an unfinished drag from elsewhere out of our undo step
-        self._live.pause()
+        self._live.begin()
         start = np.array(self._surface.points[vertex])
         step = step_of(session.mesh.diagonal)
         motion = self._motion = PullMotion(self.view, point, press, self._gizmo.size, step)
@@ -269,6 +269,7 @@ class Puller(Widget):
                     has_moved = True
                     self._live.solve(partial(pull, to))
                 else:
+                    self._live.begin()
                     self._wait()
             if pointer.phase is Phase.RELEASE:
                 if to is not None and not has_moved:

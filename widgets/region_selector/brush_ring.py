@@ -38,7 +38,7 @@ class BrushRing:
     def __init__(self, surface: SurfaceDisplay) -> None:
         self._surface = surface
         self._ring = vtkPolyData()
-        self._draft = Draft(surface.view)
+        self._draft = Draft.of(surface.view)
         self._actors = [self._actor(offset) for offset in _UNIT_OFFSETS]
 
     def draw(self, distance: FloatArray, radius: float, colour: NDArray[np.uint8]) -> None:

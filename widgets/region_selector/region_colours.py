@@ -83,18 +83,21 @@ class RegionColours:
 
     def _changed(self, change: Change) -> None:
         if change & (Change.REGIONS | Change.CONSTRAINTS):
-            self._base = self._base_colours()
-            self._draw()
+            base = self._base_colours()
+            if not np.array_equal(base, self._base):
+                self._base = base
+                self._draw()
 
-    def _base_colours(self) -> NDArray[np.float64]:
+    def _base_colours(self) -> NDArray[np.uint8]:
         """Return the (n, 3) colours without the preview."""
         session, regions = self._session, self._session.regions
         if regions is None or not self._fills_regions:
-            colours = np.tile(rgb(BODY).astype(float), (session.mesh.n_vertices, 1))
+            colours = np.tile(rgb(BODY).astype(np.uint8), (session.mesh.n_vertices, 1))
         else:
             palette = [of_region(r) for r in range(regions.n_regions)]
             belongs = regions.membership
-            colours = (belongs / belongs.sum(axis=0)).T @ np.array(palette, dtype=float)
+            mixed = (belongs / belongs.sum(axis=0)).T @ np.array(palette, dtype=float)
+            colours = np.rint(mixed).astype(np.uint8)
         colours[session.fixed] = rgb(FIXED)
         if self._marks_handles:
             for name, vertices in session.handles.items():
@@ -109,6 +112,7 @@ class RegionColours:
         colours = self._base
         if self._preview is not None:
             vertices, colour = self._preview
+            own = colours[vertices].astype(float)
             colours = colours.copy()
-            colours[vertices] += _PREVIEW_OPACITY * (colour - colours[vertices])
-        self._surface.set_colours(LAYER, np.rint(colours).astype(np.uint8))
+            colours[vertices] = np.rint(own + _PREVIEW_OPACITY * (colour - own))
+        self._surface.set_colours(LAYER, colours)

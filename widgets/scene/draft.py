@@ -3,14 +3,16 @@
 In software, multi-sampling takes half the time of a picture or more, and a mesh of a million
 vertices half a second without it; in motion nobody sees the difference.  `Draft.begin` turns off
 the anti-aliasing of a view, and announces the motion over its interactor: a `SurfaceDisplay` then
-draws a large mesh decimated.
+draws a large mesh decimated.  Where pictures are slow they remain drafts while the
+view spares another thread.
 """
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 from vtkmodules.util.vtkConstants import VTK_INT
 from vtkmodules.vtkCommonCore import vtkCommand
@@ -51,6 +53,14 @@ class Draft:
         self._restore: list[Callable[[], object]] = []  # what `end` calls
         self._stop: Stop | None = None
         self._begun = 0.0
+        self._is_slow = False
+
+    @classmethod
+    def of(cls, view: View) -> Draft:
+        """Return the one that all widgets in *view* share."""
+        if view.draft is None:
+            view.draft = cls(view)
+        return cast(Draft, view.draft)
 
     def begin(self, *, if_slow: bool = False) -> None:
         """Draw drafts until `end`, or until this was not called for 0.2 s.
@@ -61,8 +71,10 @@ class Draft:
         window, renderer = self._view.window, self._view.renderer
         if window is None:
             return
-        if self._stop is None and if_slow and renderer.GetLastRenderTimeInSeconds() <= SLOW:
-            return
+        if self._stop is None:
+            self._is_slow = renderer.GetLastRenderTimeInSeconds() > SLOW
+            if if_slow and not self._is_slow:
+                return
         self._view.interactor.InvokeEvent(
             _ANNOUNCED, 1
         )  # again at each move: what was not ready may be now
@@ -80,8 +92,12 @@ class Draft:
         self._stop = self._view.every(_PERIOD, self._tick)
 
     def end(self) -> None:
-        """Draw as before `begin`, and once now if that makes a difference."""
-        if self._stop is None:
+        """Draw as before `begin`, and once now if that makes a difference.
+
+        Where pictures are slow, do so once the view spares no other thread.
+        """
+        self._begun = -math.inf
+        if self._stop is None or (self._is_slow and self._view.is_sparing):
             return
         self._stop()
         self._stop = None
@@ -98,3 +114,5 @@ class Draft:
     def _tick(self) -> None:
         if time.perf_counter() - self._begun > _REST:
             self.end()
+        if self._stop is not None:  # what was not ready at the last move may be now
+            self._view.interactor.InvokeEvent(_ANNOUNCED, 1)

@@ -75,7 +75,7 @@ class Navigation:
         self._button = ""
         self._last = np.zeros(2)
         self._click: tuple[float, Pointer, object] | None = None  # the last press
-        self._draft = Draft(view)
+        self._draft = Draft.of(view)
         self._withheld: list[tuple[Any, int]] = []  # observers of styles, for one event
 
     @property

@@ -16,6 +16,8 @@ one timer of their own, and stop it when any VTK timer is destroyed.
 from __future__ import annotations
 
 import logging
+import math
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
@@ -39,6 +41,7 @@ _log = logging.getLogger(__name__)
 Stop = Callable[[], None]
 _LONGEST = 86_400_000  # milliseconds between ticks: a day
 ABOVE_CAMERA = 1.0  # priority: VTK's own widgets have 0.5, camera styles 0
+_SHARE_DRAWN = 0.2  # of the time, at most, while another thread is spared
 _MODIFIERS = ("Shift", "Control", "Alt", "Super", "Meta", "Caps_Lock", "ISO_Level")
 _KEY_MARK = vtkCommand.UserEvent + 411  # never invoked: marks renderers whose views observe keys
 
@@ -64,6 +67,9 @@ class View(Projection):
         self._stop_foreground: Stop | None = None
         self._depth = 0  # number of nested callbacks
         self._render_requested = False
+        self.draft: Any = None  # of `Draft.of`
+        self._n_spared = 0  # threads that drawing must not hold up
+        self._drawn, self._drawing_time = -math.inf, 0.0  # end and duration of the last picture
 
     @classmethod
     def of(cls, view: Any) -> View:
@@ -109,7 +115,10 @@ class View(Projection):
     def render(self) -> None:
         """Draw the window; do nothing once it is closed."""
         if self.window is not None:
+            began = time.perf_counter()
             self.window.Render()
+            self._drawn = time.perf_counter()
+            self._drawing_time = self._drawn - began
 
     def request_render(self) -> None:
         """Draw the window once, at the end of the current event; outside an event, draw it now.
@@ -120,6 +129,28 @@ class View(Projection):
             self._render_requested = True
         elif self.window is not None and not self.window.GetNeverRendered():
             self.render()
+
+    @property
+    def is_sparing(self) -> bool:
+        """Whether another thread is left most of the time; see `spare`."""
+        return self._n_spared > 0
+
+    def spare(self) -> Stop:
+        """Leave most of the time to another thread, until stopped.
+
+        Drawing holds Python's lock, and all processors in software.  Pictures requested by events
+        therefore take at most a fifth of the time: one that comes too soon is drawn by a later
+        event, so a timer must be running.  `render` and the camera still draw at once.
+        """
+        self._n_spared += 1
+
+        def stop() -> None:
+            self._n_spared -= 1
+            if self._render_requested and not self._depth:
+                with self.drawing_once():
+                    pass
+
+        return _once(stop)
 
     # Events.
     def complete_events(self) -> Stop:
@@ -282,9 +313,14 @@ class View(Projection):
             yield
         finally:
             self._depth -= 1
-            if self._render_requested and not self._depth:
+            if self._render_requested and not self._depth and self._is_due():
                 self._render_requested = False
                 self.render()
+
+    def _is_due(self) -> bool:
+        """Return whether a picture may be drawn now; see `spare`."""
+        pause = self._drawing_time * (1.0 / _SHARE_DRAWN - 1.0)
+        return not self._n_spared or time.perf_counter() >= self._drawn + pause
 
 
 class _SharedTimer:

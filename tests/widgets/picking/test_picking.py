@@ -10,6 +10,7 @@ from scipy.sparse import csgraph
 from solids import icosphere, two_components
 
 from vtk_segdeform import Mesh, Session, models
+from vtk_segdeform.widgets.picking.line_of_sight import intersections
 from vtk_segdeform.widgets.picking.picking import Picker
 from vtk_segdeform.widgets.picking.surface_distance import SurfaceDistance
 from vtk_segdeform.widgets.picking.visibility import visible_vertices
@@ -62,6 +63,22 @@ def test_a_hit_is_the_first_intersection_of_the_line_of_sight(parallel):
             assert np.allclose(hit.point, near + share * (far - near), atol=1e-6)
             assert hit.vertex in session.mesh.faces[face]
     assert met > 5
+
+
+@pytest.mark.parametrize("compiled", [0, 10**9])
+def test_a_line_through_a_vertex_or_an_edge_meets_the_surface(compiled, monkeypatch):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED", compiled)
+    vertices, faces = icosphere(2)
+    x = 1e3 + vertices  # away from the origin
+    for k in range(20):
+        face = vertices[faces[k]]
+        for target in (face[0], 0.5 * (face[0] + face[1])):
+            near, far = 1e3 + 3.0 * target, 1e3 - 0.5 * target
+            places, met = intersections(x, faces, near, far, tolerance=1e-6)
+            assert len(met)
+            assert np.allclose(places, 1e3 + target, atol=1e-5)  # and not the other side
+            assert k in met
+    assert len(intersections(x, faces, near, near, tolerance=1e-6)[1]) == 0
 
 
 def test_hits_are_in_the_displayed_pose():

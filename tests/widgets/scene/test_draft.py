@@ -71,6 +71,41 @@ def test_drafts_end_once_nothing_has_moved_for_a_while(shown, monkeypatch):
     assert shown.actor.GetVisibility()
 
 
+def test_slow_drafts_last_as_long_as_another_thread_is_spared(shown, monkeypatch):
+    monkeypatch.setattr(draft, "SLOW", 0.0)
+    view = shown.view
+    monkeypatch.setattr(view, "_drawing_time", 0.0)
+    drafts, stop = Draft.of(view), view.spare()
+    assert Draft.of(view) is drafts
+    drafts.begin(if_slow=True)
+    drafts.end()
+    view.interactor.InvokeEvent("TimerEvent")
+    assert not shown.actor.GetVisibility()
+    stop()
+    view.interactor.InvokeEvent("TimerEvent")
+    assert shown.actor.GetVisibility()
+
+
+def test_a_spared_thread_has_most_of_the_time(shown, monkeypatch):
+    view, pictures = shown.view, []
+    view.window.AddObserver("EndEvent", lambda *_: pictures.append(1))
+    stop = view.spare()
+
+    def ask():
+        with view.drawing_once():
+            view.request_render()
+        return len(pictures)
+
+    view._drawn, view._drawing_time = time.perf_counter(), 100.0
+    assert ask() == 0
+    view._drawn -= 401.0
+    assert ask() == 1
+    view._drawn, view._drawing_time = time.perf_counter(), 100.0
+    assert ask() == 1
+    stop()
+    assert len(pictures) == 2  # the picture that came too soon
+
+
 @pytest.mark.parametrize("why", ["small", "fast", "hidden", "edges"])
 def test_other_meshes_are_drawn_as_always(shown, monkeypatch, why):
     if why == "small":

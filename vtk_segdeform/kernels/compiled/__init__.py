@@ -8,12 +8,14 @@
     rotations       `rotations.closest_rotations`
     factor          `hessian.Factor`
     half_edges      `topology.HalfEdges`, `grouping.connected`
+    beams           `line_of_sight.faces_in_beam`
     triangles       `faults.Search`, `shells.shell_volumes`, `grouping.first_equal_row`
 
 They release the GIL and start no threads; `threads.in_parallel` runs several at a time.  Arguments
 are positional, as numba requires, and outputs are arrays passed as arguments.
 """
 
+from .beams import beam_meets, beyond_sides
 from .factor import solve_factored
 from .half_edges import (
     border_half_edges,
@@ -38,6 +40,8 @@ __all__ = [
     "add_interpolated_adjoint",
     "add_packed_adjoint",
     "add_product",
+    "beam_meets",
+    "beyond_sides",
     "border_half_edges",
     "first_equal_points",
     "flat_faces",
