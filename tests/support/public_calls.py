@@ -449,6 +449,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "Cage.faces": lambda: cages()[0].faces,
     "Cage.vertices": lambda: cages()[0].vertices,
     "CageDisplay.opacity.value": lambda: 0.5,
+    "DeformEditor.keys.value": lambda: "Blender",
     "DeformEditor.load.path": lambda: _file("saved.segdeform"),
     "DeformEditor.mode.value": lambda: sd.widgets.Mode.DEFORM,
     "DeformEditor.show_cube.value": lambda: True,

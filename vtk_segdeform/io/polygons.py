@@ -33,11 +33,9 @@ def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.P
     _require_polygons(len(points), counts, corners)
     surface = pv.PolyData()
     surface.points = points
-    if len(counts) and (counts == 3).all():  # far quicker for a large mesh
-        surface.regular_faces = np.array(corners).reshape(-1, 3)
-        return surface
-    starts = np.insert(np.cumsum(counts), 0, 0)
-    surface.faces = np.insert(corners, starts[:-1], counts)
+    # With offsets even for triangles alone: VTK's coordinates are wrong on cells of a fixed size.
+    offsets = np.append(0, np.cumsum(counts)).astype(np.int64)
+    surface.SetPolys(pv.CellArray.from_arrays(offsets, np.array(corners, dtype=np.int64)))
     return surface
 
 

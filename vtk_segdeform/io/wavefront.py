@@ -16,6 +16,8 @@ its vertices.  Here vertices remain as in the file:
 
 A name is the rest of its line, in UTF-8 or Latin-1; names are written in UTF-8.  Lines have no
 texture coordinates.
+
+Long because reader and writer of the format are side by side.
 """
 
 from __future__ import annotations

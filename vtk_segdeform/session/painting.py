@@ -63,37 +63,6 @@ def painted(
     return Regions(mesh, membership, regions.smoothness)
 
 
-def inverted(regions: Regions, region: int, *, name: str = "") -> Regions:
-    """Return *regions* with one of them exchanged for the vertices outside it.
-
-    Parameters
-    ----------
-    regions : Regions
-        r regions of n vertices.
-    region : int
-        In 0..r-1.
-    name : str, optional
-        The name of the region in error messages.
-
-    Raises
-    ------
-    RegionError
-        If there is no such region, it would become empty, or a vertex would be in no region.
-    """
-    region = _checked(regions, region)
-    membership = regions.membership.copy()
-    membership[region] = ~membership[region]
-    name, uncovered = name or f"region {region}", np.count_nonzero(~membership.any(axis=0))
-    if uncovered:
-        raise RegionError(
-            f"Cannot invert {name}: {uncovered} of its vertices are in no other region; add them "
-            "to another region first"
-        )
-    if not membership[region].any():
-        raise RegionError(f"Cannot invert {name}: it contains all vertices")
-    return Regions(regions.mesh, membership, regions.smoothness)
-
-
 def merged(regions: Regions, which: Sequence[int]) -> Regions:
     """Return *regions* with the regions *which* merged into the first of them.
 

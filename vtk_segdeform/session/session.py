@@ -378,12 +378,6 @@ class Session(Timeline):
         after = painting.painted(regions, region, vertices, subtract=subtract, name=name)
         self._set_regions(after, f"paint {name}", self._state.region_names)
 
-    def invert_region(self, region: int) -> None:
-        """Exchange a region for the vertices outside it; see `painting.inverted`."""
-        name = self.region_name(region)
-        after = painting.inverted(self._some_regions(), region, name=name)
-        self._set_regions(after, f"invert {name}", self._state.region_names)
-
     def merge_regions(self, which: Sequence[int]) -> None:
         """Merge two or more regions into the first of them, which keeps the first name."""
         regions = painting.merged(self._some_regions(), which)

@@ -3,6 +3,8 @@
 Every action is a function of the `Controller`; `bindings` names them and assigns keys.  Long
 operations are started as jobs.  An action reports its result in the status line unless the view
 shows it.
+
+Long because each key has its function here.
 """
 
 from __future__ import annotations
@@ -258,7 +260,7 @@ def select_none(controller: Controller) -> None:
 
 
 def invert(controller: Controller) -> None:
-    """Exchange the painted fixed vertices or handle, or region, for the vertices outside it."""
+    """Exchange the painted fixed vertices or handle for the free vertices outside."""
     controller.widgets.selector.invert()
 
 

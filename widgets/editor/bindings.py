@@ -92,7 +92,7 @@ BINDINGS = (
     Binding("shrink", ("minus",), PAINTING, "Shrink by one ring", actions.shrink),
     Binding("select_all", ("ctrl+a",), PAINTING, "Select all", actions.select_all),
     Binding("select_none", ("ctrl+shift+a",), frozenset({H}), "Select none", actions.select_none),
-    Binding("invert", ("ctrl+i",), PAINTING, "Invert selection", actions.invert),
+    Binding("invert", ("ctrl+i",), frozenset({H}), "Invert selection", actions.invert),
     Binding("next_region", ("n", "tab"), frozenset({R}), "Next region", actions.next_region),
     Binding("new_region", ("a",), frozenset({R}), "New region", actions.new_region),
     Binding(

@@ -4,6 +4,8 @@ One job runs at a time, and the widgets are off meanwhile: a session must not be
 thread binds it.  The preparation for pulls runs in the background instead, with the widgets on; a
 job cancels it.  Every error, in a callback or in a job, is shown in the status line until the next
 action succeeds.
+
+Long because every widget, job and file meets here.
 """
 
 from __future__ import annotations

@@ -71,7 +71,6 @@ class PaintingPart(QtWidgets.QGroupBox):
             self._fit_to = diagonal
             _fit(self.radius, diagonal)
         put(self.tools[selector.tool], True)
-        # A region is inverted only if others contain all its vertices, which is rare.
         self.invert.setVisible(self._editor.mode is Mode.HANDLES)
         put(self.radius, selector.radius)
         put(self.through, selector.through)

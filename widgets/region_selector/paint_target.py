@@ -182,14 +182,13 @@ class PaintTarget:
         ConstraintError
             If none is free.
         RegionError
-            If the target is a region and one of its vertices is in no other region.
+            If the target is a region.
         """
+        if self.paint is Paint.REGION:
+            raise RegionError("Only fixed vertices and handles can be inverted; paint the region")
         members = self.members()
         if not members.any():
             return self.select_all()
-        if self.paint is Paint.REGION:
-            self.session.invert_region(self.region)
-            return self.handle
         others = ~members & ~self._protected(False)
         if not others.any():
             raise ConstraintError(

@@ -143,7 +143,7 @@ class RegionSelector(Widget):
         self.handle = self._target.select_none()
 
     def invert(self) -> None:
-        """Exchange the painted region, fixed vertices or handle for the other vertices."""
+        """Exchange the painted fixed vertices or handle for the free vertices outside."""
         self.handle = self._target.invert()
 
     def region_under_pointer(self) -> int | None:

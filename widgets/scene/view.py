@@ -11,6 +11,8 @@ modifier therefore ends the camera drag first.
 `View.every` shares a single repeating timer among all views of an interactor, and nothing else in
 this package creates or destroys timers.  Some hosts, pyvistaqt among them, drive all VTK timers by
 one timer of their own, and stop it when any VTK timer is destroyed.
+
+Long because events, timers and drawing of one window depend on each other.
 """
 
 from __future__ import annotations

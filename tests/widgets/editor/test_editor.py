@@ -479,7 +479,7 @@ def test_keys_for_axes_the_pivot_and_pins(bench):
     assert len(session.handles["handle 1"]) > 3
     assert list(map(str, (session.undo(), session.undo(), session.undo()))) == [
         "make pin 2 handle 1",
-        "add pin 2",
+        "pin",
         "make handle 1 pin 1",
     ]
 

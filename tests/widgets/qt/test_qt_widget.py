@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import threading
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -789,16 +790,18 @@ def test_every_control_is_reached_by_tab_and_has_a_tooltip(seen, mode):
     }
     assert len(wanted) > 8
     assert [each for each in wanted if not each.toolTip()] == []
-    reached, heights = set(), []
+    reached, rows = set(), []
     seen.panel.toolbar.open.setFocus()
     until(seen.panel.toolbar.open.hasFocus, "the focus")
     for _ in range(60):
         here = application().focusWidget()
         if here in wanted and here not in reached:
             reached.add(here)
-            heights.append(here.mapTo(seen.widget, here.rect().topLeft()).y())
+            top = here.mapTo(seen.widget, here.rect().topLeft()).y()
+            rows.append((top, top + here.height()))
         QtTest.QTest.keyClick(here, Qt.Key_Tab)
-    assert heights == sorted(heights)  # from the top down
+    # From the top down: none ends above the top of the one before.
+    assert all(end > top for (top, _), (_, end) in pairwise(rows))
     assert {each for each in wanted if each.focusPolicy() != Qt.NoFocus} <= reached
     exclusive = {each for each in wanted - reached if each.group() is not None}
     assert wanted - reached == exclusive  # reached by the arrow keys

@@ -573,11 +573,6 @@ def test_all_none_and_invert_skip_what_is_taken_and_are_single_undo_steps(desk):
     selector.select_all()
     assert targets(desk)[2].all()
     assert session.undo() == "paint region 2"
-    session.paint_region(0, z < 9.0)
-    before = targets(desk)[2]
-    selector.invert()
-    assert np.array_equal(targets(desk)[2], ~before)
-    assert session.undo() == "invert region 2"
 
 
 @pytest.mark.parametrize(
@@ -587,7 +582,7 @@ def test_all_none_and_invert_skip_what_is_taken_and_are_single_undo_steps(desk):
         ("shrink", Paint.HANDLE, "Nothing to shrink: the new handle has no vertices"),
         ("select_none", Paint.FIXED, "Nothing to deselect"),
         ("select_none", Paint.REGION, "region 2 cannot become empty"),
-        ("invert", Paint.REGION, "of its vertices are in no other region"),
+        ("invert", Paint.REGION, "Only fixed vertices and handles can be inverted"),
     ],
 )
 def test_what_a_selection_cannot_do_is_named(desk, act, paint, message):
