@@ -53,7 +53,16 @@ WIDGETS = ("vtk_segdeform.widgets", "vtk_segdeform.widgets.recording.film")
 
 # Hooks that `Widget` calls with its own objects, and arithmetic of a view at every event.
 NOT_CALLED = {"on_press", "on_hover", "on_wheel", "on_key"}
-NOT_CALLED |= {"contains", "guarded", "pixel_at", "pointer", "ray", "to_display", "to_world"}
+NOT_CALLED |= {
+    "contains",
+    "guarded",
+    "lifted",
+    "pixel_at",
+    "pointer",
+    "ray",
+    "to_display",
+    "to_world",
+}
 NOT_CALLED |= {"FillInputPortInformation", "RequestData"}  # by VTK's pipeline
 NOT_CALLED |= {"add_surface", "draw_mesh"}  # in a plotter created by `pictures`
 

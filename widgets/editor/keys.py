@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -125,10 +125,7 @@ class Keys:
         names = [b.name for b in table if b.name]
         own: dict[str, tuple[str, ...]] = {}
         for name, keys in (changes or {}).items():
-            if name not in names:
-                near = difflib.get_close_matches(str(name), names, n=1)
-                hint = f"; did you mean {near[0]!r}?" if near else ""
-                raise ArgumentError(f"keys: there is no action {shown(name)}{hint}")
+            _require_action(name, names)
             own[name] = tuple(dict.fromkeys(key_name(key) for key in keys))
         self.bindings = tuple(replace(b, keys=own.get(b.name, b.keys)) for b in table)
         """The table with these keys, in its order."""
@@ -138,7 +135,8 @@ class Keys:
         self._require_distinct()
 
     def __getitem__(self, name: str) -> Binding:
-        """Return the binding of the action *name*."""
+        """Return the binding of the action *name*; ArgumentError if there is none."""
+        _require_action(name, self._by_name)
         return self._by_name[name]
 
     def cap(self, name: str) -> str:
@@ -230,3 +228,10 @@ def _with_modifiers(key: str, held: Mapping[str, bool]) -> str:
     # Shift is needed to type "?" or "+", so it counts as a modifier of letters only.
     counts = {"ctrl", "alt", *(["shift"] if len(key) == 1 and key.isalpha() else [])}
     return "".join(f"{name}+" for name in _MODIFIERS if name in counts and held.get(name)) + key
+
+
+def _require_action(name: object, names: Collection[str]) -> None:
+    if not isinstance(name, str) or name not in names:
+        near = difflib.get_close_matches(str(name), names, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise ArgumentError(f"there is no action {shown(name)}{hint}")

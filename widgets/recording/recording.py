@@ -118,6 +118,7 @@ class Recorder:
 
     def assign(self, keys: Mapping[str, Sequence[str]]) -> None:
         """Note that actions of the editor have other *keys* from now on."""
+        require(keys, Mapping, "keys")
         self._record_ticks()
         self._record(Keys(tuple((name, tuple(each)) for name, each in keys.items())))
 
