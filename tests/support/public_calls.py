@@ -462,6 +462,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "DeformEditor.load.path": lambda: _file("saved.segdeform"),
     "DeformEditor.mode.value": lambda: sd.widgets.Mode.DEFORM,
     "DeformEditor.show_cube.value": lambda: True,
+    "DeformEditor.run.name": lambda: "undo",
     "DeformEditor.path.value": lambda: Path("other.segdeform"),
     "Film.save.path": lambda: Path("saved.gif"),
     "HandleDragger.handle.value": lambda: "handle 1",

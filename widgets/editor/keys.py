@@ -125,7 +125,7 @@ class Keys:
         names = [b.name for b in table if b.name]
         own: dict[str, tuple[str, ...]] = {}
         for name, keys in (changes or {}).items():
-            _require_action(name, names)
+            _require_action(name, names, "keys")
             own[name] = tuple(dict.fromkeys(key_name(key) for key in keys))
         self.bindings = tuple(replace(b, keys=own.get(b.name, b.keys)) for b in table)
         """The table with these keys, in its order."""
@@ -136,7 +136,7 @@ class Keys:
 
     def __getitem__(self, name: str) -> Binding:
         """Return the binding of the action *name*; ArgumentError if there is none."""
-        _require_action(name, self._by_name)
+        _require_action(name, self._by_name, "name")
         return self._by_name[name]
 
     def cap(self, name: str) -> str:
@@ -230,8 +230,8 @@ def _with_modifiers(key: str, held: Mapping[str, bool]) -> str:
     return "".join(f"{name}+" for name in _MODIFIERS if name in counts and held.get(name)) + key
 
 
-def _require_action(name: object, names: Collection[str]) -> None:
+def _require_action(name: object, names: Collection[str], argument: str) -> None:
     if not isinstance(name, str) or name not in names:
         near = difflib.get_close_matches(str(name), names, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise ArgumentError(f"there is no action {shown(name)}{hint}")
+        raise ArgumentError(f"{argument}: there is no action {shown(name)}{hint}")

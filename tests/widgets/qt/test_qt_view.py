@@ -118,7 +118,7 @@ def test_a_job_is_stopped_by_escape_while_qt_runs(qt, monkeypatch):
     _, editor, hand, _ = qt
     end = time.monotonic() + 60.0
 
-    def endless(mesh, *, progress):  # the real one may end before the key is pressed
+    def endless(mesh, n_regions, *, progress):  # the real one may end before the key is pressed
         while time.monotonic() < end:
             progress(0.5, "looking everywhere")
             time.sleep(0.001)
