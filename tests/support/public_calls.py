@@ -468,6 +468,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "HandleDragger.handle.value": lambda: "handle 1",
     "HandleDragger.local.value": lambda: True,
     "HandleDragger.refine_while_resting.value": lambda: False,
+    "Recorder.assign.keys": lambda: {"undo": ("u",)},
     "Recorder.path": lambda: Path("events.txt"),
     "RegionSelector.radius.value": lambda: 0.1,
     "RegionSelector.tool.value": lambda: sd.widgets.Tool.LASSO,
