@@ -25,7 +25,7 @@ from vtk_segdeform.widgets.scene.step_budget import prescribe_steps
 
 pytestmark = pytest.mark.usefixtures("bound_once")
 
-SCENE = sausage()
+SCENE = sausage(is_coarse=True)
 TIP, TOP = "handle 1", "handle 2"
 LOOKS = [(10.0, -8.0, 6.0), (9.0, 7.0, 4.0), (-5.0, 6.0, -8.0)]
 VIEW_RING = Part(Kind.ROTATION)
