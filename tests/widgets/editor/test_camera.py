@@ -17,6 +17,8 @@ from vtk_segdeform import Mesh, models
 from vtk_segdeform.session import saved_view
 from vtk_segdeform.widgets import DeformEditor, Mode
 
+pytestmark = pytest.mark.usefixtures("unprepared")
+
 STYLES = {
     each.__name__: each
     for each in (

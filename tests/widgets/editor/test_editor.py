@@ -91,7 +91,7 @@ def any_view(request):
 @pytest.fixture(scope="module")
 def ready():
     """Return the state of a small session, complete except for a pose."""
-    scene = sausage()
+    scene = sausage(is_coarse=True)
     session = Session(scene.mesh)
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
@@ -113,7 +113,7 @@ def bench(ready):
 @pytest.fixture
 def bare():
     """Yield an editor over a mesh without regions."""
-    made = Bench(plain_view((400, 320)), sausage().mesh)
+    made = Bench(plain_view((400, 320)), sausage(is_coarse=True).mesh)
     yield made
     made.editor.remove()
 
@@ -438,7 +438,7 @@ def test_regions_are_merged_split_grown_and_shrunk(bench):
 def test_handles_are_selected_and_removed(bench):
     bench.type("3", "d", "a", "t")
     x = bench.session.mesh.vertices[:, 0]
-    corners = bench.around((x > 0.0) & (x < 0.4))
+    corners = bench.around((x > 0.0) & (x < 0.7))
     bench.hand.drag([corners[0], corners[2]])
     assert list(bench.session.handles) == ["handle 1", "handle 2"]
     bench.type("4", "n")
@@ -544,7 +544,7 @@ def test_the_help_card_is_shown_and_hidden(bench):
 
 def test_without_numba_the_status_line_says_so_until_the_first_action(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "numba" else name)
-    made = Bench(plain_view((500, 400)), sausage().mesh, mode=None)
+    made = Bench(plain_view((500, 400)), sausage(is_coarse=True).mesh, mode=None)
     said = "numba is not installed: frames take 3 to 6 times as long. pip install numba"
     assert made.editor.status.startswith(said)
     made.type("1")
@@ -735,7 +735,7 @@ def test_another_session_can_be_opened_and_edited(bench, tmp_path):
 
 
 def test_tools_and_display_options_survive_opening_another_session(bench, tmp_path):
-    half = sausage().transformed(scale=0.5).mesh
+    half = sausage(is_coarse=True).transformed(scale=0.5).mesh
     path = tmp_path / "half.segdeform"
     save_session(path, Session(half))
     bench.type("3", "t", "v", "c", "4", "o", "3")

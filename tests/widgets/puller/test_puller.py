@@ -17,7 +17,7 @@ from vtk_segdeform.widgets.puller.puller import Puller
 
 pytestmark = pytest.mark.usefixtures("bound_once")
 
-SCENE = sausage()
+SCENE = sausage(is_coarse=True)
 SIZE = SCENE.mesh.diagonal
 
 
