@@ -112,7 +112,7 @@ class _Pointer(QtCore.QObject):
         self.place = None
         widget.installEventFilter(self)
 
-    def eventFilter(self, _, event):
+    def eventFilter(self, _, event):  # noqa: N802 - Qt's name
         if event.type() in (QtCore.QEvent.MouseMove, QtCore.QEvent.MouseButtonPress):
             self.place = event.position().toPoint() if hasattr(event, "position") else event.pos()
         return False
