@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
-from hands import Hand, picture, plain_view
+from hands import Hand, draw_seldom, picture, plain_view
 from numpy.testing import assert_array_equal
 from scenes import sausage
 from scipy.spatial.transform import Rotation
@@ -46,6 +46,7 @@ class Bench:
         view.camera.SetViewUp(0.0, 0.0, 1.0)
         view.renderer.ResetCamera()
         view.render()
+        draw_seldom(view)
         self.hand = Hand(view)
         if mode is not None:
             self.editor.mode = mode
@@ -129,6 +130,7 @@ def pull_handle(bench, shift=(20, 30), moves=4):
 def test_the_whole_story(any_view, tmp_path, request):
     mesh = models.cactus(800)
     bench = Bench(any_view, mesh)
+    del bench.view.render  # drawn at every event
     hand, z = bench.hand, mesh.vertices[:, 2]
     volume = signed_volume(mesh.vertices, mesh.faces)
     drawn = []
@@ -291,7 +293,7 @@ def test_regions_are_filled_only_where_they_are_painted_and_outlined_on_demand(b
     for mode in Mode:
         bench.editor.mode = mode
         bench.settle()
-        bench.view.render()
+        View.render(bench.view)
         assert (n_colours() > 1) == (mode is Mode.REGIONS)
         assert (widgets.outlines.n_numbers > 0) == (mode is Mode.REGIONS)
     before = picture(bench.view)
@@ -875,8 +877,9 @@ def test_only_a_session_or_a_mesh_can_be_edited():
 
 
 def test_a_window_of_one_pixel_is_drawn_without_warnings(bench, capfd):
+    del bench.view.render  # drawn at every event
     bench.type("4", "o", "h")
     for size in ((1, 300), (300, 1), (1, 1), (300, 300)):
         bench.view.window.SetSize(*size)
-        bench.view.render()
+        View.render(bench.view)
     assert capfd.readouterr() == ("", "")
