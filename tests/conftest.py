@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import gc
 import os
 import sys
 from collections.abc import Iterator
@@ -30,6 +31,12 @@ from vtk_segdeform.io import isolated, reading_child  # noqa: E402
 pv.global_theme.multi_samples = 1  # multisampling makes software rendering five times slower
 
 _MODELS = {name: functools.cache(getattr(models, name)) for name in ("cactus", "dinosaur")}
+
+
+def pytest_collection_finish() -> None:
+    """Exempt what is alive now, half a million objects, from every later garbage collection."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture

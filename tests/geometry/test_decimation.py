@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 from open_meshes import sheet, together
@@ -12,7 +14,10 @@ from vtk_segdeform.geometry import decimated, signed_volume
 from vtk_segdeform.mesh import connected
 from vtk_segdeform.regions import segment
 
-CACTUS = models.cactus(4000)
+
+@functools.cache
+def cactus():
+    return models.cactus(4000)
 
 
 def two_close_sheets():
@@ -20,8 +25,9 @@ def two_close_sheets():
     return together(flat, flat.with_vertices(flat.vertices + [0.0, 0.0, 1e-4]))
 
 
-@pytest.mark.parametrize("mesh", [CACTUS, two_close_sheets()], ids=["cactus", "sheets"])
-def test_clusters_are_connected_and_never_join_two_sheets(mesh):
+@pytest.mark.parametrize("made", [cactus, two_close_sheets])
+def test_clusters_are_connected_and_never_join_two_sheets(made):
+    mesh = made()
     coarse, kept, cluster = decimated(mesh, mesh.n_vertices // 8)
     assert 0.3 < coarse.n_vertices / (mesh.n_vertices // 8) < 3.0
     i, j = mesh.edges.T
@@ -33,21 +39,21 @@ def test_clusters_are_connected_and_never_join_two_sheets(mesh):
 
 
 def test_the_shape_is_the_same_in_any_place_and_size():
-    coarse, kept, _ = decimated(CACTUS, 1000)
-    volumes = [signed_volume(each.vertices, each.faces) for each in (coarse, CACTUS)]
+    coarse, kept, _ = decimated(cactus(), 1000)
+    volumes = [signed_volume(each.vertices, each.faces) for each in (coarse, cactus())]
     assert volumes[0] == pytest.approx(volumes[1], rel=0.05)
-    assert decimated(CACTUS, 1000)[0] is coarse  # known
-    moved = CACTUS.with_vertices(1e-7 * CACTUS.vertices[:, [1, 2, 0]] + 3.0)
+    assert decimated(cactus(), 1000)[0] is coarse  # known
+    moved = cactus().with_vertices(1e-7 * cactus().vertices[:, [1, 2, 0]] + 3.0)
     assert np.mean(np.isin(decimated(moved, 1000)[1], kept)) > 0.9
 
 
 def test_regions_and_cages_of_a_large_mesh_are_those_of_a_decimated_one(monkeypatch):
-    plain = segment(CACTUS)
+    plain = segment(cactus())
     monkeypatch.setattr(sizes, "DECIMATED", 3500)
     monkeypatch.setattr(sizes, "DECIMATED_POINTS", 3200)
-    regions = segment(CACTUS)
+    regions = segment(cactus())
     assert regions.n_regions == plain.n_regions == 3
     assert np.mean(regions.labels == plain.labels) > 0.9
-    cages = fit_cages(CACTUS, regions, 100)
+    cages = fit_cages(cactus(), regions, 100)
     for cage, members in zip(cages, regions.membership, strict=True):
-        cage.require_encloses(CACTUS.vertices[members], "vertices")
+        cage.require_encloses(cactus().vertices[members], "vertices")

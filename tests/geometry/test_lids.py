@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 
 import numpy as np
@@ -28,7 +29,6 @@ from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 
 BALL = models.sphere(1500)
-CACTUS = models.cactus(2500)
 RNG = np.random.default_rng(0)
 
 
@@ -41,40 +41,42 @@ def shaken(mesh: Mesh, size: float) -> Mesh:
 
 
 BODIES = {
-    "hemisphere": cut(BALL, 2, 0.5),
-    "coarse hemisphere": cut(models.sphere(162), 2, 0.5),
-    "noisy hemisphere": shaken(cut(BALL, 2, 0.5), 0.03),
-    "three quarters of a ball": cut(BALL, 2, 0.75),
-    "ball with a small hole": cut(BALL, 2, 0.97),
-    "egg, cut lengthwise": cut(scaled(BALL, 1, 1, 2), 0, 0.5),
-    "egg, cut across": cut(scaled(BALL, 1, 1, 2), 2, 0.5),
-    "half of a dinosaur": cut(models.dinosaur(3000), 1, 0.5),
-    "half of a ring": cut(models.torus(1500), 0, 0.5),
-    "box without a face": open_box(),
-    "box of five quadrilaterals": open_box(1),
-    "bar without ends": pipe(lambda u, v: (np.cos(u), np.sin(u), 12 * v), 4, 12),
-    "tube": tube(),
-    "tube of 100 radii": tube(100.0, 20, 100),
-    "short tube": tube(2.0),
-    "bent tube": pipe(
+    "hemisphere": lambda: cut(BALL, 2, 0.5),
+    "coarse hemisphere": lambda: cut(models.sphere(162), 2, 0.5),
+    "noisy hemisphere": lambda: shaken(cut(BALL, 2, 0.5), 0.03),
+    "three quarters of a ball": lambda: cut(BALL, 2, 0.75),
+    "ball with a small hole": lambda: cut(BALL, 2, 0.97),
+    "egg, cut lengthwise": lambda: cut(scaled(BALL, 1, 1, 2), 0, 0.5),
+    "egg, cut across": lambda: cut(scaled(BALL, 1, 1, 2), 2, 0.5),
+    "half of a dinosaur": lambda: cut(models.dinosaur(3000), 1, 0.5),
+    "half of a ring": lambda: cut(models.torus(1500), 0, 0.5),
+    "box without a face": lambda: open_box(),
+    "box of five quadrilaterals": lambda: open_box(1),
+    "bar without ends": lambda: pipe(lambda u, v: (np.cos(u), np.sin(u), 12 * v), 4, 12),
+    "tube": lambda: tube(),
+    "tube of 100 radii": lambda: tube(100.0, 20, 100),
+    "short tube": lambda: tube(2.0),
+    "bent tube": lambda: pipe(
         lambda u, v: ((6 + np.cos(u)) * np.cos(4 * v), (6 + np.cos(u)) * np.sin(4 * v), -np.sin(u))
     ),
-    "tube turned inside out": pipe(lambda u, v: (np.cos(u), -np.sin(u), 6 * v)),
-    "cup": revolved([0.02, 1.0, 1.0], [0.0, 0.0, 2.0]),
-    "cone": revolved([1.0, 0.02], [0.0, 2.0]),
-    "bottle": bottle(),
-    "bust with an open neck": cut(CACTUS, 2, 0.6),
-    "body with 12 holes": with_holes(CACTUS, 12, 0.03),
-    "body with many holes": with_holes(CACTUS, 40, 0.02),
-    "hollow blade": cut(models.bar((4, 0.1, 4), divisions=(16, 2, 16)), 2, 0.97),
+    "tube turned inside out": lambda: pipe(lambda u, v: (np.cos(u), -np.sin(u), 6 * v)),
+    "cup": lambda: revolved([0.02, 1.0, 1.0], [0.0, 0.0, 2.0]),
+    "cone": lambda: revolved([1.0, 0.02], [0.0, 2.0]),
+    "bottle": lambda: bottle(),
+    "bust with an open neck": lambda: cut(models.cactus(2500), 2, 0.6),
+    "body with 12 holes": lambda: with_holes(models.cactus(2500), 12, 0.03),
+    "body with many holes": lambda: with_holes(models.cactus(2500), 40, 0.02),
+    "hollow blade": lambda: cut(models.bar((4, 0.1, 4), divisions=(16, 2, 16)), 2, 0.97),
 }
 SHEETS = {
-    "plane": sheet(lambda u, v: (u, v, 0 * u)),
-    "two triangles": sheet(lambda u, v: (u, v, 0 * u), 2, 2),
-    "wavy sheet": sheet(lambda u, v: (u, v, 0.1 * np.sin(9 * u) * np.cos(9 * v))),
-    "wrinkled cloth": sheet(lambda u, v: (u, v, 0.3 * np.sin(15 * u) * np.cos(15 * v)), 90, 90),
-    "pleats": sheet(lambda u, v: (u, v, 0.5 * np.sin(20 * u)), 120, 20),
-    "crumpled paper": sheet(
+    "plane": lambda: sheet(lambda u, v: (u, v, 0 * u)),
+    "two triangles": lambda: sheet(lambda u, v: (u, v, 0 * u), 2, 2),
+    "wavy sheet": lambda: sheet(lambda u, v: (u, v, 0.1 * np.sin(9 * u) * np.cos(9 * v))),
+    "wrinkled cloth": lambda: sheet(
+        lambda u, v: (u, v, 0.3 * np.sin(15 * u) * np.cos(15 * v)), 90, 90
+    ),
+    "pleats": lambda: sheet(lambda u, v: (u, v, 0.5 * np.sin(20 * u)), 120, 20),
+    "crumpled paper": lambda: sheet(
         lambda u, v: (
             u + 0.2 * np.sin(7 * v),
             v + 0.2 * np.sin(8 * u),
@@ -83,30 +85,33 @@ SHEETS = {
         90,
         90,
     ),
-    "noisy sheet": shaken(sheet(lambda u, v: (u, v, 0 * u)), 0.02),
-    "saddle": sheet(lambda u, v: (u, v, u * u - v * v)),
-    "shallow cap": cut(BALL, 2, 0.07),
-    "cap of 90 degrees": cut(BALL, 2, 0.146),
-    "face scan": cut(scaled(BALL, 1, 1.3, 0.5), 2, 0.5),
-    "quarter of a pipe": sheet(lambda u, v: (np.cos(0.785 * u), np.sin(0.785 * u), 5 * v)),
-    "half of a pipe": sheet(lambda u, v: (np.cos(1.57 * u), np.sin(1.57 * u), 5 * v)),
-    "rolled carpet": sheet(
+    "noisy sheet": lambda: shaken(sheet(lambda u, v: (u, v, 0 * u)), 0.02),
+    "saddle": lambda: sheet(lambda u, v: (u, v, u * u - v * v)),
+    "shallow cap": lambda: cut(BALL, 2, 0.07),
+    "cap of 90 degrees": lambda: cut(BALL, 2, 0.146),
+    "face scan": lambda: cut(scaled(BALL, 1, 1.3, 0.5), 2, 0.5),
+    "quarter of a pipe": lambda: sheet(lambda u, v: (np.cos(0.785 * u), np.sin(0.785 * u), 5 * v)),
+    "half of a pipe": lambda: sheet(lambda u, v: (np.cos(1.57 * u), np.sin(1.57 * u), 5 * v)),
+    "rolled carpet": lambda: sheet(
         lambda u, v: ((1.2 + u) * np.cos(9 * u), (1.2 + u) * np.sin(9 * u), 5 * v), 120, 20
     ),
-    "ring": tube(0.2),
-    "wide ring": tube(1.0),
-    "annulus": pipe(lambda u, v: ((1 + v) * np.cos(u), (1 + v) * np.sin(u), 0 * v)),
-    "flag": sheet(lambda u, v: (u, 0.6 * v, 0.15 * np.sin(5 * u) + 0.05 * np.sin(9 * v))),
-    "sheet with holes": with_holes(sheet(lambda u, v: (u, v, 0 * u)), 8, 0.04),
-    "twisted scarf": sheet(
+    "ring": lambda: tube(0.2),
+    "wide ring": lambda: tube(1.0),
+    "annulus": lambda: pipe(lambda u, v: ((1 + v) * np.cos(u), (1 + v) * np.sin(u), 0 * v)),
+    "flag": lambda: sheet(lambda u, v: (u, 0.6 * v, 0.15 * np.sin(5 * u) + 0.05 * np.sin(9 * v))),
+    "sheet with holes": lambda: with_holes(sheet(lambda u, v: (u, v, 0 * u)), 8, 0.04),
+    "twisted scarf": lambda: sheet(
         lambda u, v: (6 * u, 0.4 * v * np.cos(6 * u), 0.4 * v * np.sin(6 * u)), 120, 10
     ),
 }
+BODIES, SHEETS = (
+    {name: functools.cache(made) for name, made in kind.items()} for kind in (BODIES, SHEETS)
+)
 
 
 @pytest.mark.parametrize("name", BODIES)
 def test_a_body_encloses_a_volume(name):
-    mesh = BODIES[name]
+    mesh = BODIES[name]()
     print(f"{name}: q = {mean_winding(mesh.vertices, mesh.faces):.3f}")
     assert not mesh.is_closed
     assert lids_of(mesh).encloses.all()
@@ -114,7 +119,7 @@ def test_a_body_encloses_a_volume(name):
 
 @pytest.mark.parametrize("name", SHEETS)
 def test_a_sheet_encloses_nothing(name):
-    mesh = SHEETS[name]
+    mesh = SHEETS[name]()
     print(f"{name}: q = {mean_winding(mesh.vertices, mesh.faces):.3f}")
     assert not lids_of(mesh).encloses.any()
 
@@ -125,7 +130,7 @@ def test_the_mean_winding_of_known_surfaces():
 
     assert q(BALL) == pytest.approx(1.0, abs=0.03)
     assert q(scaled(BALL, 1, 1, 8)) == pytest.approx(1.0, abs=0.03)
-    assert q(SHEETS["plane"]) == pytest.approx(0.0, abs=1e-12)
+    assert q(SHEETS["plane"]()) == pytest.approx(0.0, abs=1e-12)
     # An arc of the angle a has a / 2 pi; this gutter is long.
     for a in (1.0, 2.0, 3.0):
         half = a / 2
@@ -135,7 +140,7 @@ def test_the_mean_winding_of_known_surfaces():
 
 @pytest.mark.parametrize("name", ["bottle", "hemisphere", "body with 12 holes"])
 def test_the_answer_does_not_depend_on_place_size_or_direction(name):
-    mesh = BODIES[name]
+    mesh = BODIES[name]()
     moved = 1e-3 * mesh.vertices @ rotation([1, 2, 3], 2.0).T + [7.0, -5.0, 3.0]
     here = mean_winding(mesh.vertices, mesh.faces)
     there = mesh.with_vertices(moved)
@@ -155,7 +160,7 @@ def test_a_lid_of_a_flat_border_restores_the_volume_of_the_box():
 
 @pytest.mark.parametrize("name", [*BODIES, "ring", "annulus", "sheet with holes"])
 def test_faces_and_lids_have_no_boundary(name):
-    mesh = {**BODIES, **SHEETS}[name]
+    mesh = {**BODIES, **SHEETS}[name]()
     lids = lids_of(mesh, lids=True)
     faces = np.concatenate([mesh.faces, lids.faces])
     ends = np.bincount(faces.ravel(), minlength=lids.extension.shape[0])
@@ -173,9 +178,9 @@ def test_a_closed_mesh_has_no_lids_and_its_own_faces():
 
 
 def test_the_option_decides_for_open_components():
-    cap = SHEETS["shallow cap"]
+    cap = SHEETS["shallow cap"]()
     mesh = together(open_box(), cap.with_vertices(cap.vertices + 5))
-    closed = together(BALL, SHEETS["flag"])
+    closed = together(BALL, SHEETS["flag"]())
     assert lids_of(mesh).encloses.tolist() == [True, False]
     assert lids_of(mesh, True).encloses.tolist() == [True, True]
     assert lids_of(mesh, False).encloses.tolist() == [False, False]
@@ -261,20 +266,20 @@ def test_thousands_of_leaves_and_cups_are_told_apart_soon():
         (open_box(), None, "1 hole: volume kept under a lid"),
         (tube(), None, "2 holes: volume kept under lids"),
         (tube(), False, "Open surface, lids off: no volume to preserve"),
-        (SHEETS["plane"], None, "Open sheet: no volume to preserve"),
-        (SHEETS["plane"], True, "No enclosed volume: nothing to preserve"),
+        (SHEETS["plane"](), None, "Open sheet: no volume to preserve"),
+        (SHEETS["plane"](), True, "No enclosed volume: nothing to preserve"),
         (
-            together(SHEETS["plane"], SHEETS["flag"]),
+            together(SHEETS["plane"](), SHEETS["flag"]()),
             None,
             "2 open sheets: no volume to preserve",
         ),
         (
-            together(tube(), SHEETS["flag"]),
+            together(tube(), SHEETS["flag"]()),
             None,
             "2 holes: volume kept under lids; 1 open sheet has no volume",
         ),
         (
-            together(BALL, SHEETS["plane"], SHEETS["flag"]),
+            together(BALL, SHEETS["plane"](), SHEETS["flag"]()),
             None,
             "Closed surface: volume kept; 2 open sheets have no volume",
         ),

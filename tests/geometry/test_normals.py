@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -16,7 +18,12 @@ from vtk_segdeform.geometry.volume import volume_gradient
 from vtk_segdeform.io.polygons import polydata_of
 from vtk_segdeform.kernels import dispatch
 
-MESHES = {"sphere": Mesh(*icosphere(4)), "torus": models.torus(6000), "cactus": models.cactus(3000)}
+MESHES = {
+    "sphere": lambda: Mesh(*icosphere(4)),
+    "torus": lambda: models.torus(6000),
+    "cactus": lambda: models.cactus(3000),
+}
+MESHES = {name: functools.cache(made) for name, made in MESHES.items()}
 
 
 def cone(count: int) -> Mesh:
@@ -46,7 +53,7 @@ def posed(mesh: Mesh) -> np.ndarray:
 @pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("name", MESHES)
 def test_they_agree_with_vtk(name):
-    mesh = MESHES[name]
+    mesh = MESHES[name]()
     x = posed(mesh)
     drawn = vtkTriangleMeshPointNormals()
     drawn.SetInputData(polydata_of(x, np.full(mesh.n_faces, 3), mesh.faces.ravel()))
@@ -58,7 +65,7 @@ def test_they_agree_with_vtk(name):
 @pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("name", MESHES)
 def test_they_have_the_direction_of_the_volume_gradient(name):
-    mesh = MESHES[name]
+    mesh = MESHES[name]()
     x = posed(mesh)
     slope = volume_gradient(x, mesh.faces)
     slope /= np.linalg.norm(slope, axis=1, keepdims=True)
@@ -70,7 +77,7 @@ def test_they_have_the_direction_of_the_volume_gradient(name):
 @pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("unit", [1e-60, 1e-6, 1e60])
 def test_they_rotate_with_the_mesh_and_do_not_depend_on_its_unit(unit):
-    mesh, turn = MESHES["torus"], rotation([1.0, 2.0, -0.5], 1.1)
+    mesh, turn = MESHES["torus"](), rotation([1.0, 2.0, -0.5], 1.1)
     before = VertexNormals(mesh).of(posed(mesh))
     moved = Mesh(unit * mesh.vertices, mesh.faces)
     after = VertexNormals(moved).of(unit * posed(mesh) @ turn.T)
@@ -87,7 +94,7 @@ def test_a_tip_with_thousands_of_faces_points_along_its_axis():
 @pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("coordinate", [0.0, np.nan])
 def test_a_mesh_without_area_has_zero_normals(coordinate):
-    mesh = MESHES["sphere"]
+    mesh = MESHES["sphere"]()
     normals = VertexNormals(mesh).of(np.full(mesh.vertices.shape, coordinate))
     assert_array_equal(normals, np.zeros(mesh.vertices.shape))
 
@@ -148,5 +155,5 @@ def test_on_a_surface_with_one_side_they_agree_with_the_faces_up_to_the_turned_c
 
 
 def test_only_surfaces_with_one_side_have_turned_corners():
-    for mesh in (MESHES["torus"], cut_ball(), finned_ball()):
+    for mesh in (MESHES["torus"](), cut_ball(), finned_ball()):
         assert not len(VertexNormals(mesh).turned)

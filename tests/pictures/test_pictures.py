@@ -147,9 +147,7 @@ def test_a_path_that_cannot_be_written_is_an_error_before_drawing(tmp_path):
 
 
 def test_without_a_gl_library_the_error_names_the_packages(monkeypatch):
-    canvas.require_offscreen.cache_clear()
     monkeypatch.setattr(canvas, "_PROBE", "import os; os.abort()")
     monkeypatch.setattr(canvas.sys, "executable", sys.executable)
     with pytest.raises(MissingDependencyError, match=r"apt-get install .* libegl1 libgl1"):
-        canvas.require_offscreen()
-    canvas.require_offscreen.cache_clear()
+        canvas.require_offscreen.__wrapped__()  # the answer of others is not kept

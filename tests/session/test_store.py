@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import functools
 import io
 import json
 import os
@@ -10,6 +11,7 @@ import re
 import subprocess
 import sys
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -28,19 +30,18 @@ from vtk_segdeform.session.store import load_session, save_session
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.usefixtures("bound_once")
-SCENE = sausage(2)
 
 
 def posed() -> Session:
     """Return a session with regions, cages, fixed vertices, handles and a pose."""
     options = Options(n_cage_vertices=77, offset=0.25, stretch=2.5, rotation_groups=None)
-    session = Session(SCENE.mesh, state=State(options=options))
-    session.set_regions(Regions(SCENE.mesh, SCENE.regions.membership, smoothness=1.5))
-    session.set_cages(SCENE.cages)
+    session = Session(sausage(2).mesh, state=State(options=options))
+    session.set_regions(Regions(sausage(2).mesh, sausage(2).regions.membership, smoothness=1.5))
+    session.set_cages(sausage(2).cages)
     session.rename_region(1, "左腕 \N{WOMAN}\N{ZERO WIDTH JOINER}\N{MICROSCOPE}")
-    session.set_fixed(SCENE.fixed[::-1])
-    session.add_handle(SCENE.handle, "the tip · 1")
-    session.add_handle(np.abs(SCENE.mesh.vertices[:, 0]) < 0.1)
+    session.set_fixed(sausage(2).fixed[::-1])
+    session.add_handle(sausage(2).handle, "the tip · 1")
+    session.add_handle(np.abs(sausage(2).mesh.vertices[:, 0]) < 0.1)
     session.move_handle("the tip · 1", np.diag([1.0, 0.9, 1.1, 1.0]), max_steps=3)
     session.commit()
     return session
@@ -67,9 +68,10 @@ def pulled() -> Session:
     return session
 
 
-POSED = posed()
-TINY = tiny()
-PULLED = pulled()
+@functools.cache
+def shared(make: Callable[[], Session]) -> Session:
+    """Return what *make* returns, the same session for all tests: not to be changed."""
+    return make()
 
 
 def same(a: Session, b: Session) -> bool:
@@ -110,11 +112,12 @@ def saved(session: Session, folder: Path) -> bytes:
 
 
 @pytest.mark.parametrize(
-    "session",
-    [POSED, tiny(pose=False), TINY, PULLED],
+    "make",
+    [posed, functools.partial(tiny, pose=False), tiny, pulled],
     ids=["all", "rest", "tiny", "pulled"],
 )
-def test_what_is_loaded_is_what_was_saved(session, tmp_path):
+def test_what_is_loaded_is_what_was_saved(make, tmp_path):
+    session = shared(make)
     content = saved(session, tmp_path)
     loaded = load_session(tmp_path / "saved.npz")
     assert same(session, loaded)
@@ -125,15 +128,15 @@ def test_what_is_loaded_is_what_was_saved(session, tmp_path):
 
 
 def test_a_session_with_nothing_in_it_is_saved_too(tmp_path):
-    saved(Session(SCENE.mesh), tmp_path)
+    saved(Session(sausage(2).mesh), tmp_path)
     loaded = load_session(tmp_path / "saved.npz")
     assert loaded.regions is None
     assert loaded.state.pose is None
-    assert_array_equal(loaded.vertices, SCENE.mesh.vertices)
+    assert_array_equal(loaded.vertices, sausage(2).mesh.vertices)
 
 
 def test_another_process_loads_the_same_pose_bit_for_bit(tmp_path):
-    saved(POSED, tmp_path)
+    saved(shared(posed), tmp_path)
     program = (
         "import sys; from vtk_segdeform.session.store import load_session;"
         "sys.stdout.buffer.write(load_session(sys.argv[1]).vertices.tobytes())"
@@ -144,7 +147,7 @@ def test_another_process_loads_the_same_pose_bit_for_bit(tmp_path):
         capture_output=True,
         check=True,
     )
-    assert answer.stdout == POSED.vertices.tobytes()
+    assert answer.stdout == shared(posed).vertices.tobytes()
 
 
 def test_a_loaded_session_goes_on_as_the_saved_one_would(tmp_path):
@@ -156,14 +159,14 @@ def test_a_loaded_session_goes_on_as_the_saved_one_would(tmp_path):
         each.move_handle("handle 1", np.diag([1.0, 1.0, 1.1, 1.0]), max_steps=2)
         assert abs(each.volume_change) < 1e-13
     assert loaded.undo() == "drag handle 1"
-    assert same(loaded, POSED)
+    assert same(loaded, shared(posed))
 
 
 def test_a_file_without_names_as_older_programs_wrote_it_is_read_as_before(tmp_path):
-    content = saved(POSED, tmp_path)
+    content = saved(shared(posed), tmp_path)
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         header = json.loads(archive.read("header.json"))
-    assert header.pop("region_names") == ["", POSED.region_names[1]]
+    assert header.pop("region_names") == ["", shared(posed).region_names[1]]
     assert header["version"] == 1  # older programs read files with names, too
     nameless = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(nameless, "w") as new:
@@ -172,35 +175,35 @@ def test_a_file_without_names_as_older_programs_wrote_it_is_read_as_before(tmp_p
     (tmp_path / "old.npz").write_bytes(nameless.getvalue())
     loaded = load_session(tmp_path / "old.npz")
     assert loaded.region_names == ("region 1", "region 2")
-    loaded.rename_region(1, POSED.region_names[1])
-    assert same(loaded, POSED)
+    loaded.rename_region(1, shared(posed).region_names[1])
+    assert same(loaded, shared(posed))
 
 
 def test_numpy_alone_can_read_the_arrays(tmp_path):
-    saved(POSED, tmp_path)
+    saved(shared(posed), tmp_path)
     with np.load(tmp_path / "saved.npz", allow_pickle=False) as arrays:
-        assert_array_equal(arrays["mesh_vertices"], SCENE.mesh.vertices)
+        assert_array_equal(arrays["mesh_vertices"], sausage(2).mesh.vertices)
         assert arrays["membership"].dtype == bool
         assert json.loads(arrays["header.json"])["version"] == 1
 
 
 @pytest.mark.parametrize("call", ["replace", "fsync"])
 def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(call, tmp_path, monkeypatch):
-    before = saved(TINY, tmp_path)
+    before = saved(shared(tiny), tmp_path)
 
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(os, call, full)
     with pytest.raises(SessionError, match=r"saved\.npz: cannot be written \(No space left"):
-        save_session(tmp_path / "saved.npz", POSED)
+        save_session(tmp_path / "saved.npz", shared(posed))
     assert (tmp_path / "saved.npz").read_bytes() == before
     assert os.listdir(tmp_path) == ["saved.npz"]
 
 
 @pytest.mark.parametrize("fault", [OSError(errno.ENOSPC, "full"), KeyboardInterrupt()])
 def test_a_write_that_stops_half_way_leaves_the_old_file(fault, tmp_path, monkeypatch):
-    before = saved(TINY, tmp_path)
+    before = saved(shared(tiny), tmp_path)
     written = []
 
     def stop(_, name, *__):
@@ -210,7 +213,7 @@ def test_a_write_that_stops_half_way_leaves_the_old_file(fault, tmp_path, monkey
 
     monkeypatch.setattr(zipfile.ZipFile, "writestr", stop)
     with pytest.raises((SessionError, KeyboardInterrupt)):
-        save_session(tmp_path / "saved.npz", POSED)
+        save_session(tmp_path / "saved.npz", shared(posed))
     assert (tmp_path / "saved.npz").read_bytes() == before
     assert os.listdir(tmp_path) == ["saved.npz"]
 
@@ -224,25 +227,25 @@ def test_a_full_disk_is_told_and_nothing_is_left(tmp_path, monkeypatch):
     real = open
     monkeypatch.setattr("builtins.open", on_full_disk)
     with pytest.raises(SessionError, match="No space left on device"):
-        save_session(tmp_path / "saved.npz", POSED)
+        save_session(tmp_path / "saved.npz", shared(posed))
     assert os.listdir(tmp_path) == []
 
 
 def test_no_such_folder_is_told(tmp_path):
     with pytest.raises(SessionError, match="cannot be written"):
-        save_session(tmp_path / "nowhere" / "a.npz", TINY)
+        save_session(tmp_path / "nowhere" / "a.npz", shared(tiny))
     assert os.listdir(tmp_path) == []
 
 
 @pytest.mark.skipif(os.name != "posix", reason="modes and links of files")
 def test_a_replaced_file_keeps_its_mode_and_a_link_stays_a_link(tmp_path):
-    saved(TINY, tmp_path)
+    saved(shared(tiny), tmp_path)
     (tmp_path / "saved.npz").chmod(0o640)
     (tmp_path / "link").symlink_to("saved.npz")
-    save_session(tmp_path / "link", POSED)
+    save_session(tmp_path / "link", shared(posed))
     assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "saved.npz").stat().st_mode & 0o777 == 0o640
-    assert same(load_session(tmp_path / "saved.npz"), POSED)
+    assert same(load_session(tmp_path / "saved.npz"), shared(posed))
 
 
 def refuse(content: bytes, folder: Path) -> str:
@@ -254,13 +257,13 @@ def refuse(content: bytes, folder: Path) -> str:
 
 
 def test_a_truncated_file_is_refused_at_every_length(tmp_path):
-    for content in (saved(TINY, tmp_path), saved(POSED, tmp_path)):
+    for content in (saved(shared(tiny), tmp_path), saved(shared(posed), tmp_path)):
         for length in np.linspace(0, len(content) - 1, 60).astype(int):
             refuse(content[:length], tmp_path)
 
 
 def test_a_flipped_bit_is_an_error_or_makes_no_difference(tmp_path):
-    content = saved(TINY, tmp_path)
+    content = saved(shared(tiny), tmp_path)
     rng = np.random.default_rng(1)
     refused = 0
     for place in rng.choice(len(content), 500, replace=False):
@@ -272,7 +275,7 @@ def test_a_flipped_bit_is_an_error_or_makes_no_difference(tmp_path):
         except SessionError:
             refused += 1
         else:
-            assert same(loaded, TINY)
+            assert same(loaded, shared(tiny))
     assert refused > 300
 
 
@@ -300,7 +303,7 @@ def test_what_is_no_file_is_never_replaced(tmp_path):
     folder.mkdir()
     for path, kind in ((pipe, "a device or a pipe"), (folder, "a folder")):
         with pytest.raises(SessionError, match=f"is {kind}, not a file"):
-            save_session(path, TINY)
+            save_session(path, shared(tiny))
     assert pipe.is_fifo()
     assert sorted(tmp_path.iterdir()) == [folder, pipe]
 
@@ -308,7 +311,7 @@ def test_what_is_no_file_is_never_replaced(tmp_path):
 @pytest.mark.parametrize("name", ["x" * 300, "a\0b"])
 def test_an_impossible_name_is_told(name, tmp_path):
     with pytest.raises((SessionError, ArgumentError)):
-        save_session(tmp_path / name, TINY)
+        save_session(tmp_path / name, shared(tiny))
 
 
 def rewritten(content: bytes, *, compress: bool = False, **changes) -> bytes:
@@ -396,15 +399,15 @@ WRONG = [
 @pytest.mark.parametrize(("change", "says"), WRONG)
 def test_a_file_that_was_tampered_with_is_refused_and_the_fault_named(change, says, tmp_path):
     of_pulls = {"locality", "pulls"} & {*change, *change.get("header", {})}
-    content = rewritten(saved(PULLED if of_pulls else TINY, tmp_path), **change)
+    content = rewritten(saved(shared(pulled) if of_pulls else shared(tiny), tmp_path), **change)
     assert re.search(says, refuse(content, tmp_path))
 
 
 def test_arrays_in_another_order_of_bytes_are_refused_and_of_axes_understood(tmp_path):
-    content = saved(TINY, tmp_path)
+    content = saved(shared(tiny), tmp_path)
     columns = np.asfortranarray(OCTAHEDRON[0])
     (tmp_path / "a.npz").write_bytes(rewritten(content, mesh_vertices=columns))
-    assert same(load_session(tmp_path / "a.npz"), TINY)
+    assert same(load_session(tmp_path / "a.npz"), shared(tiny))
     swapped = OCTAHEDRON[0].astype(">f8")
     assert "must be float64" in refuse(rewritten(content, mesh_vertices=swapped), tmp_path)
 
@@ -415,14 +418,14 @@ def test_a_pickle_in_a_file_is_never_run(tmp_path):
             return os.mkdir, (str(tmp_path / "trapped"),)
 
     trap = np.array([[Trap()] * 3] * 6, dtype=object)
-    refuse(rewritten(saved(TINY, tmp_path), mesh_vertices=trap), tmp_path)
+    refuse(rewritten(saved(shared(tiny), tmp_path), mesh_vertices=trap), tmp_path)
     assert not (tmp_path / "trapped").exists()
 
 
 @pytest.mark.skipif(os.name != "posix", reason="forks")
 def test_a_file_that_is_being_saved_is_read_as_the_old_or_the_new_one(tmp_path):
     path = tmp_path / "saved.npz"
-    save_session(path, TINY)
+    save_session(path, shared(tiny))
     writer = subprocess.Popen([sys.executable, "-c", _SAVER, path], stdout=subprocess.PIPE)
     try:
         writer.stdout.readline()  # it has begun
@@ -448,8 +451,8 @@ for turn in itertools.count():
 
 def test_the_size_is_that_of_the_open_file(tmp_path, monkeypatch):
     path, other = tmp_path / "saved.npz", tmp_path / "other.npz"
-    save_session(path, POSED)
-    save_session(other, TINY)
+    save_session(path, shared(posed))
+    save_session(other, shared(tiny))
     real = zipfile.ZipFile
 
     def exchanged(file, *options):
@@ -458,12 +461,12 @@ def test_the_size_is_that_of_the_open_file(tmp_path, monkeypatch):
         return real(file, *options)
 
     monkeypatch.setattr(zipfile, "ZipFile", exchanged)
-    assert same(load_session(path), POSED)
+    assert same(load_session(path), shared(posed))
 
 
 def sparse(path, size, n):
     """Write a session of *n* vertices to a sparse file of *size* bytes without array data."""
-    save_session(path, TINY)
+    save_session(path, shared(tiny))
     with zipfile.ZipFile(path) as archive:
         header = json.loads(archive.read("header.json"))
     header |= {"n_vertices": n}
@@ -497,7 +500,7 @@ def test_an_archive_of_very_many_members_is_refused_before_they_are_listed(tmp_p
 def test_a_session_too_large_to_read_is_not_written(tmp_path, monkeypatch):
     monkeypatch.setattr("vtk_segdeform.session.archive._LARGEST", (1 << 20) + 1000)
     with pytest.raises(SessionError, match=r"saved\.npz: cannot be written \(.* bytes exceed"):
-        save_session(tmp_path / "saved.npz", POSED)
+        save_session(tmp_path / "saved.npz", shared(posed))
     assert os.listdir(tmp_path) == []
 
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -103,14 +105,15 @@ def test_steps_to_volume_meet_every_constraint():
 
 
 OPEN = {
-    "box without a face": open_box(),
-    "bottle": bottle(24, 24),
-    "tube": tube(6.0, 24, 16),
-    "body with holes": with_holes(models.cactus(2000), 12, 0.03),
-    "box beside a sheet": together(
+    "box without a face": lambda: open_box(),
+    "bottle": lambda: bottle(24, 24),
+    "tube": lambda: tube(6.0, 24, 16),
+    "body with holes": lambda: with_holes(models.cactus(2000), 12, 0.03),
+    "box beside a sheet": lambda: together(
         open_box(), sheet(lambda u, v: (4 + u, v, 0.1 * np.sin(9 * u)), 9, 9)
     ),
 }
+OPEN = {name: functools.cache(made) for name, made in OPEN.items()}
 
 
 def thirds(mesh):
@@ -129,7 +132,7 @@ def shaken(mesh, seed=0, size=0.05):
 
 def test_an_open_box_has_the_volume_of_the_box():
     assert_allclose(total_volume(open_box()).target, 2.0, rtol=1e-14)
-    assert_allclose(total_volume(OPEN["box beside a sheet"]).target, 2.0, rtol=1e-14)
+    assert_allclose(total_volume(OPEN["box beside a sheet"]()).target, 2.0, rtol=1e-14)
     wide = tube(6.0, 360, 4)  # a prism over a polygon of 360 sides
     area = 180 * np.sin(2 * np.pi / 360)
     assert_allclose(total_volume(wide).target, 6.0 * area, rtol=1e-13)
@@ -152,7 +155,7 @@ def test_the_volume_of_a_bent_open_box_is_that_under_a_fan_over_its_rim():
 
 @pytest.mark.parametrize("name", OPEN)
 def test_region_volumes_of_open_meshes_add_up_to_the_whole(name):
-    mesh = OPEN[name]
+    mesh = OPEN[name]()
     whole, regions = total_volume(mesh), region_volumes(mesh, thirds(mesh))
     assert len(regions) == 3
     for x in (mesh.vertices, mesh.vertices + shaken(mesh)):
@@ -162,14 +165,14 @@ def test_region_volumes_of_open_meshes_add_up_to_the_whole(name):
 
 @pytest.mark.parametrize("name", OPEN)
 def test_volumes_of_open_meshes_do_not_change_under_a_motion(name):
-    mesh = OPEN[name]
+    mesh = OPEN[name]()
     moved = mesh.vertices @ rotation([1, 2, 3], 2.0).T + [50.0, -20.0, 3.0]
     for constraint in constraints_of(mesh):
         assert abs(constraint.violation(moved)) < 1e-12 * total_volume(mesh).target
 
 
 def test_volumes_of_open_meshes_keep_their_digits_far_from_the_origin():
-    mesh = OPEN["bottle"]
+    mesh = OPEN["bottle"]()
     mesh = mesh.with_vertices(np.round(mesh.vertices * 2.0**28) / 2.0**28)
     bent = np.round((mesh.vertices + shaken(mesh)) * 2.0**28) / 2.0**28
     far = np.array([2.0**22, -(2.0**21), 2.0**22])
@@ -180,7 +183,7 @@ def test_volumes_of_open_meshes_keep_their_digits_far_from_the_origin():
 
 @pytest.mark.parametrize("name", OPEN)
 def test_derivatives_under_lids_are_exact(name):
-    mesh = OPEN[name]
+    mesh = OPEN[name]()
     x, d = mesh.vertices + shaken(mesh, 1), shaken(mesh, 2, 0.3)
     for each in constraints_of(mesh):
         size = total_volume(mesh).target

@@ -29,7 +29,7 @@ INTERVAL = 0.3  # seconds
 
 def ready_session() -> Session:
     """Return a session, complete except for a pose."""
-    scene = sausage()
+    scene = sausage(is_coarse=True)
     session = Session(scene.mesh)
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)

@@ -34,6 +34,11 @@ def plain_view(size: tuple[int, int] = (400, 400)) -> View:
     return View(renderer, interactor)
 
 
+def draw_seldom(view: View) -> None:
+    """Draw *view* only for `picture` and `View.render`: drawing is half the time of a gesture."""
+    view.render = lambda: None  # type: ignore[method-assign]
+
+
 # VTK's names of the keys that the editor's table has in lower case.
 KEYSYMS = {"escape": "Escape", "home": "Home", "f1": "F1", "tab": "Tab", "delete": "Delete",
            "backspace": "BackSpace", "return": "Return",
@@ -78,7 +83,7 @@ def picture(view: View) -> np.ndarray:
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
-    view.render()
+    View.render(view)  # even if it is drawn seldom
     grabbed = vtkWindowToImageFilter()
     grabbed.SetInput(view.window)
     grabbed.ReadFrontBufferOff()

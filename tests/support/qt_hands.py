@@ -104,6 +104,20 @@ def until(seen: Callable[[], object], what: str, seconds: float = 30.0) -> None:
         time.sleep(0.002)
 
 
+class _Pointer(QtCore.QObject):
+    """Where a widget last saw the mouse, in Qt's pixels, or None if it never did."""
+
+    def __init__(self, widget):
+        super().__init__(widget)
+        self.place = None
+        widget.installEventFilter(self)
+
+    def eventFilter(self, _, event):  # noqa: N802 - Qt's name
+        if event.type() in (QtCore.QEvent.MouseMove, QtCore.QEvent.MouseButtonPress):
+            self.place = event.position().toPoint() if hasattr(event, "position") else event.pos()
+        return False
+
+
 class QtHand:
     """A hand on the mouse and the keyboard of a Qt widget that shows a view.
 
@@ -114,6 +128,7 @@ class QtHand:
         self.widget, self.view = widget, view
         self.failures: list[Exception] = []
         view.on_failure(self.failures.append)
+        self._pointer = _Pointer(widget)
 
     def at(self, point: Iterable[float]) -> tuple[float, float]:
         """Return the display coordinates of a world *point*."""
@@ -139,6 +154,8 @@ class QtHand:
         self.press(positions[0], held)
         for position in positions[1:]:
             self.move(position)
+        last = self._pixel(positions[-1])  # the moves come from the X server, the release does not
+        until(lambda: self._pointer.place == last, "the last move")
         self.release(positions[-1], held)
 
     def key(self, key: str, held=Qt.NoModifier) -> None:

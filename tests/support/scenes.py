@@ -60,17 +60,18 @@ def _bound(mesh: Mesh, regions: Regions, cages: tuple[Cage, ...]) -> Deformer:
 
 
 @functools.cache
-def sausage(n_regions: int = 2) -> Scene:
+def sausage(n_regions: int = 2, *, is_coarse: bool = False) -> Scene:
     """Return an ellipsoid along x with bumps, in *n_regions* overlapping cages of 66 vertices.
 
+    A coarse one, for gestures, has a quarter of the vertices: 18 of each cage.
     All tests of a process share it, so they must not change it.
     """
-    sphere, faces = icosphere(4)
+    sphere, faces = icosphere(3 if is_coarse else 4)
     bumps = 1.0 + 0.03 * np.sin(9 * sphere[:, :1]) * np.cos(5 * sphere[:, 1:2])
     mesh = Mesh(sphere * bumps * [3.0, 0.8, 0.8], faces)
     x = mesh.vertices[:, 0]
     edges = np.linspace(x.min(), x.max(), n_regions + 1)
-    ball, ball_faces = icosphere(2)
+    ball, ball_faces = icosphere(1 if is_coarse else 2)
     masks, cages = [], []
     for low, high in itertools.pairwise(edges):
         mask = (x >= low - 0.5) & (x <= high + 0.5)

@@ -30,7 +30,7 @@ from vtk_segdeform.widgets import plugin
 from vtk_segdeform.widgets.scene.view import View
 
 ROOT = Path(__file__).resolve().parents[2]
-SCENE = sausage()
+SCENE = sausage(is_coarse=True)
 
 
 @pytest.fixture

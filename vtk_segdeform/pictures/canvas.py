@@ -34,7 +34,14 @@ _HEIGHT = 800  # pixels of a picture
 _TITLE, _MARGIN = 0.1, 0.04  # of the height: title, and margins
 _SIDEWAYS, _UP = np.radians(14.0), np.radians(10.0)
 _OFFSCREEN = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")  # VTK's windows without a screen
-_PROBE = "import pyvista; pyvista.Plotter(off_screen=True).show()"
+_PROBE = """
+import vtkmodules.vtkRenderingOpenGL2
+from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
+window = vtkRenderWindow()
+window.SetOffScreenRendering(True)
+window.AddRenderer(vtkRenderer())
+window.Render()
+"""
 
 
 @functools.lru_cache(maxsize=1)

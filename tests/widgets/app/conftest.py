@@ -19,5 +19,4 @@ def in_haste() -> Iterator[None]:
     gc.disable()
     yield
     gc.enable()
-    gc.unfreeze()
     pv.global_theme.anti_aliasing = smooth

@@ -7,7 +7,7 @@ import functools
 import numpy as np
 import pytest
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - a plain window needs it
-from hands import Hand, picture, plain_view
+from hands import Hand, draw_seldom, picture, plain_view
 from scenes import Scene, sausage
 from vtkmodules.vtkRenderingCore import vtkTextActor
 
@@ -19,6 +19,7 @@ from vtk_segdeform.session.state import State
 from vtk_segdeform.widgets.cage_display.cage_display import CageDisplay
 from vtk_segdeform.widgets.cage_display.rejected_cage import WARNING
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
+from vtk_segdeform.widgets.scene.view import View
 
 
 @functools.lru_cache(maxsize=1)
@@ -43,6 +44,7 @@ def surface():
     view.camera.SetViewUp(0.0, 0.0, 1.0)
     view.renderer.ResetCamera()
     view.render()
+    draw_seldom(view)
     yield surface
     surface.remove()
 
@@ -273,7 +275,7 @@ def test_of_two_vertices_at_the_pointer_the_nearer_is_dragged(cages, hand):
     view.camera.SetParallelProjection(True)
     view.camera.Azimuth(2.0)
     view.renderer.ResetCamera()
-    view.render()
+    View.render(view)
     p = session.cage_vertices[1]
     above = np.flatnonzero((p[:, 1] < -0.4) & (p[:, 2] > 1.0))  # above the mesh
     front = above[0]

@@ -6,7 +6,7 @@ import functools
 
 import numpy as np
 import pytest
-from hands import Hand, plain_view
+from hands import Hand, draw_seldom, plain_view
 from vtkmodules.vtkInteractionStyle import (
     vtkInteractorStyleJoystickCamera,
     vtkInteractorStyleTerrain,
@@ -16,6 +16,9 @@ from vtkmodules.vtkInteractionStyle import (
 from vtk_segdeform import Mesh, models
 from vtk_segdeform.session import saved_view
 from vtk_segdeform.widgets import DeformEditor, Mode
+from vtk_segdeform.widgets.scene.view import View
+
+pytestmark = pytest.mark.usefixtures("unprepared")
 
 STYLES = {
     each.__name__: each
@@ -42,6 +45,7 @@ class Bench:
         self.editor = DeformEditor(self.view, self.mesh)
         self.editor.On()
         self.view.render()
+        draw_seldom(self.view)
         self.hand = Hand(self.view)
 
     @property
@@ -138,7 +142,7 @@ def test_a_double_click_frames_and_a_click_on_the_cube_turns():
     assert shown.min() > 0.0
     assert shown.max() < 400.0
     bench.editor.show_cube = True
-    bench.view.render()
+    View.render(bench.view)
     left, bottom, right, top = bench.editor.controller.camera.cube.rectangle
     bench.hand.click((0.5 * (left + right), top - 0.3 * (top - bottom)))
     assert bench.editor.session.undo_label is None

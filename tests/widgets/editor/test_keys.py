@@ -21,7 +21,7 @@ pytestmark = pytest.mark.usefixtures("unprepared")
 def editor():
     """Yield an editor of a session without regions, in mode 3, and a hand."""
     view = plain_view()
-    made = DeformEditor(view, Session(sausage().mesh))
+    made = DeformEditor(view, Session(sausage(is_coarse=True).mesh))
     made.mode = Mode.HANDLES
     made.On()
     view.render()

@@ -6,13 +6,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hands import Hand, picture, plain_view
+from hands import Hand, draw_seldom, picture, plain_view
 from open_surfaces import bottle, moebius, polydata, sheet
 from solids import icosphere
 
 from vtk_segdeform import Regions, Session, Surface
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.widgets import DeformEditor, Mode, Paint, Tool
+from vtk_segdeform.widgets.scene.view import View
 
 pytestmark = pytest.mark.usefixtures("unprepared")
 
@@ -45,6 +46,7 @@ class Scene:
         self.editor.controller.notices.close()
         self.hand = Hand(self.view)
         self.view.render()
+        draw_seldom(self.view)
 
     def paint(self, what, point, tool=Tool.BRUSH, *, through=False):
         """Paint at a point of the surface; return the vertices painted."""
@@ -121,7 +123,7 @@ def test_the_visible_surface_includes_the_inside_seen_through_a_hole(open_editor
     scene = open_editor(bottle(1, radius=0.8))  # a cup, open at the top
     scene.view.camera.SetPosition(0.0, -4.0, 10.0)
     scene.view.renderer.ResetCamera()
-    scene.view.render()
+    View.render(scene.view)
     seen, front = scene.lasso(through=False), scene.front()
     assert np.array_equal(seen, np.flatnonzero(front))
     x = scene.session.mesh.vertices

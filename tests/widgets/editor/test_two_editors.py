@@ -25,7 +25,7 @@ def halves():
     renderer.SetViewport(0.5, 0.0, 1.0, 1.0)
     left.window.AddRenderer(renderer)
     right = View(renderer, left.interactor)
-    editors = [DeformEditor(view, sausage(2).mesh) for view in (left, right)]
+    editors = [DeformEditor(view, sausage(2, is_coarse=True).mesh) for view in (left, right)]
     for editor in editors:
         editor.mode = Mode.REGIONS
         editor.On()

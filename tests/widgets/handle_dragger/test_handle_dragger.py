@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hands import Hand, picture, plain_view
+from hands import Hand, draw_seldom, picture, plain_view
 from scenes import sausage
 from solids import rotation
 from vtkmodules.vtkRenderingCore import vtkTextActor
@@ -22,10 +22,11 @@ from vtk_segdeform.widgets.handle_dragger.handle_motion import Grip, Motion
 from vtk_segdeform.widgets.scene import draft
 from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
 from vtk_segdeform.widgets.scene.step_budget import prescribe_steps
+from vtk_segdeform.widgets.scene.view import View
 
 pytestmark = pytest.mark.usefixtures("bound_once")
 
-SCENE = sausage()
+SCENE = sausage(is_coarse=True)
 TIP, TOP = "handle 1", "handle 2"
 LOOKS = [(10.0, -8.0, 6.0), (9.0, 7.0, 4.0), (-5.0, 6.0, -8.0)]
 VIEW_RING = Part(Kind.ROTATION)
@@ -51,6 +52,7 @@ class Bench:
         self.view.renderer.ResetCamera()
         self.view.camera.Zoom(0.7)
         self.view.render()
+        draw_seldom(self.view)
         self.dragger.On()
         self.hand = Hand(self.view)
         self.timers: set[int] = set()
@@ -83,7 +85,7 @@ class Bench:
     @property
     def captions(self):
         """The visible texts of the gizmo."""
-        self.view.render()
+        View.render(self.view)
         texts = [p for p in self.view.foreground.GetViewProps() if isinstance(p, vtkTextActor)]
         return [text.GetInput() for text in texts if text.GetVisibility()]
 
@@ -204,7 +206,7 @@ def test_a_ring_rotates_by_the_angle_on_the_screen(ring, parallel):
         offset = np.array([centre[0], 0.0, centre[2]])
         bench.view.camera.SetPosition(*(offset + [0.0, -12.0, 0.0]))
         bench.view.camera.SetFocalPoint(*offset)
-        bench.view.render()
+        View.render(bench.view)
     middle = bench.view.to_display(centre[None])[0, :2]
     place = bench.aim(ring)
     hand.press(place)
@@ -793,7 +795,7 @@ def test_a_solve_that_fails_is_reported_and_the_drag_cancelled(fails, monkeypatc
 def test_targets_too_far_away_are_refused_and_the_drag_is_cancelled():
     bench = Bench(parallel=True)
     bench.view.camera.SetParallelScale(1e5)
-    bench.view.render()
+    View.render(bench.view)
     place = bench.aim(FREE)
     bench.hand.press(place)
     bench.hand.move(place + [150.0, 0.0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hands import Hand, plain_view
+from hands import Hand, draw_seldom, plain_view
 from scenes import sausage
 from solids import icosphere
 
@@ -14,10 +14,11 @@ from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.widgets.picking.surface_ring import SurfaceRing
 from vtk_segdeform.widgets.puller.caption import Caption
 from vtk_segdeform.widgets.puller.puller import Puller
+from vtk_segdeform.widgets.scene.view import View
 
 pytestmark = pytest.mark.usefixtures("bound_once")
 
-SCENE = sausage()
+SCENE = sausage(is_coarse=True)
 SIZE = SCENE.mesh.diagonal
 
 
@@ -35,6 +36,7 @@ class Bench:
         self.view.renderer.ResetCamera()
         self.view.camera.Zoom(0.7)
         self.view.render()
+        draw_seldom(self.view)
         self.puller.On()
         self.hand = Hand(self.view)
 
@@ -268,7 +270,7 @@ def test_the_caption_is_beside_the_point_off_the_body_and_in_the_window():
     caption = Caption(view, lambda: body)
     for point in ([60.0, 0.0, 0.0], [-60.0, 0.0, 0.0], [0.0, -60.0, 0.0], [195.0, 30.0, 0.0]):
         caption.show("12.5", np.array(point))
-        view.render()
+        View.render(view)
         x, y, wide, high = caption.box
         low, high = np.array([x, y]), np.array([x + wide, y + high])
         seen = view.to_display(body)[:, :2]

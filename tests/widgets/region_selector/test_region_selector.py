@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hands import Hand, picture, plain_view
+from hands import Hand, draw_seldom, picture, plain_view
 from scenes import sausage
 from solids import icosphere, rotation
 
@@ -12,6 +12,7 @@ from vtk_segdeform import Mesh, Regions, Session, models
 from vtk_segdeform.errors import ConstraintError, RegionError, SegDeformError
 from vtk_segdeform.pictures.palette import FIXED, HANDLE, rgb
 from vtk_segdeform.widgets.region_selector.region_selector import Paint, RegionSelector, Tool
+from vtk_segdeform.widgets.scene.view import View
 
 WHOLE = [(2, 2), (398, 2), (398, 398), (2, 398)]
 
@@ -30,6 +31,7 @@ class Desk:
         self.view.camera.SetViewUp(0.0, 0.0, 1.0)
         self.view.renderer.ResetCamera()
         self.view.render()
+        draw_seldom(self.view)
         self.hand = Hand(self.view)
         self.selector.On()
 
@@ -526,7 +528,7 @@ def test_remove_restores_the_view():
     props = view.renderer.GetViewProps().GetNumberOfItems()
     selector = RegionSelector(view, Session(models.sphere(200)))
     selector.On()
-    view.render()
+    View.render(view)
     selector.remove()
     assert view.renderer.GetViewProps().GetNumberOfItems() == props
     idle = picture(view)
