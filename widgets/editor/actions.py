@@ -365,7 +365,7 @@ def converting(name: str) -> Action:
         else:
             new = session.make_pin(name)
         widgets.selector.handle = widgets.dragger.handle = new
-        controller.say(f"{name} is {new} now")
+        controller.say(f"Converted {name} to {new}")
 
     return convert
 
@@ -382,7 +382,8 @@ def _dragged_handle(controller: Controller) -> str:
     _handle_names(controller)
     name = controller.widgets.dragger.handle
     if name is None:
-        raise ConstraintError("No handle selected. Press N to select one")
+        key = controller.keys.cap("next_handle")
+        raise ConstraintError(f"No handle selected. Press {key} to select one")
     return name
 
 

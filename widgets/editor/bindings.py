@@ -117,7 +117,7 @@ BINDINGS = (
         actions.remove_handle,
     ),
     Binding(
-        "convert_handle", ("m",), DRAGGING, "Make a pin a handle, or back", actions.convert_handle
+        "convert_handle", ("m",), DRAGGING, "Convert pin to handle, or back", actions.convert_handle
     ),
     Binding(
         "local_axes", ("l",), frozenset({D}), "Local or global axes", actions.toggle_local_axes

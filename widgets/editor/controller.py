@@ -70,7 +70,7 @@ class Controller:
 
     def __init__(self, view: View, session: Session, keys: Keys) -> None:
         self.view, self.keys = view, keys
-        self.help = HelpCard(view, keys.sections())
+        self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL))
         self.messages = Messages(view)
         self.messages.note(advice())
         self.notices = Notices(view, lambda: self.messages.height)
@@ -115,9 +115,14 @@ class Controller:
     def mode(self, mode: Mode) -> None:
         self.widgets.finish()
         self._mode = mode
+        self.list_keys()
         self.messages.clear()
         self._prepare_pulls(again=True)
         self._apply_mode()
+
+    def list_keys(self) -> None:
+        """List the current keys on the help card, in a small window those of the mode."""
+        self.help.list_keys(self.keys.sections(), self.keys.sections(self._mode))
 
     @property
     def is_on(self) -> bool:

@@ -111,11 +111,12 @@ class StatusPart(QtWidgets.QWidget):
 
 def with_links(text: str, keys: Keys, mode: Mode, ink: str) -> str:
     """Return the rich text of a hint, in which keys that work in *mode* are links, in *ink*."""
-    names = {key_cap(b.keys[0]): b.keys[0] for b in keys.bindings if mode in b.modes and b.keys}
+    working = [b for b in keys.bindings if b.name and mode in b.modes and b.keys]
+    names = {key_cap(b.keys[0]): b.keys[0] for b in working}
     names = {html.escape(cap, quote=False): key for cap, key in names.items()}
     # A key after "Press", "or" or "Next:", or before ":" or "to", as hints name it.
     caps = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
-    pattern = rf"((?:Press|or|Next:) |\(|· |, )({caps})(?=[ :,.)]|$)"
+    pattern = rf"((?:Press|or|Next:) |\(|· |, |\. )({caps})(?=[ :,.)]|$)"
 
     def link(found: re.Match[str]) -> str:
         before, cap = found.groups()
