@@ -114,6 +114,8 @@ class Controller:
     @mode.setter
     def mode(self, mode: Mode) -> None:
         self.widgets.finish()
+        if self._mode is Mode.HANDLES and self.widgets.selector.handle in self.session.handles:
+            self.widgets.dragger.handle = self.widgets.selector.handle
         self._mode = mode
         self.list_keys()
         self.messages.clear()

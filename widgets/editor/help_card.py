@@ -26,7 +26,8 @@ _KEYS = "#0B4F82"
 _LARGEST, _LEGIBLE, _SMALLEST = 24.0, 12.0, 7.0  # pixels
 _LEADING, _MARGIN, _GAP = 1.5, 1.4, 2.0  # line height, margin, space between columns; in ems
 _WIDE, _HIGH, _FOOT = 0.94, 0.86, 0.1  # of the window: largest size, free space below
-_PROBE = 20.0  # font size at which widths are measured
+_PROBE = 20.0  # font size at which widths are measured first
+_DOTS_PER_INCH = 96  # of a screen on which these are pixels
 
 
 class HelpCard:
@@ -101,10 +102,10 @@ class HelpCard:
         self._clear()
         self._laid_out = window[0], window[1]
         size, columns, (keys, labels), (wide, high) = self._fitting(self.sections, window)
-        if size < _LEGIBLE and self.fewer:
+        scale = max(1.0, self.view.window.GetDPI() / _DOTS_PER_INCH)
+        if size < scale * _LEGIBLE and self.fewer:
             size, columns, (keys, labels), (wide, high) = self._fitting(self.fewer, window)
         column = keys + _GAP / 2 + labels
-        size = max(size, _SMALLEST)
         x = 0.5 * (window[0] - wide * size)
         y = 0.5 * ((1.0 + _FOOT) * window[1] - high * size)
         for rim, colour, layer in ((2.0, INK, 5), (0.0, PAPER, 6)):
@@ -117,16 +118,18 @@ class HelpCard:
 
     def _fitting(self, sections: Sequence[Section], window: Sequence[int]) -> _Layout:
         """Return the layout of *sections* with the largest text."""
-        tabs = self._widths(sections)
-        column = sum(tabs) + _GAP / 2
-        choices = []
-        for count in (1, 2, 3):
-            columns = _shared(sections, count)
-            wide = count * column + (count - 1) * _GAP + 2 * _MARGIN  # in ems
-            high = max(map(_n_lines, columns)) * _LEADING + 2 * _MARGIN
-            fitting = min(_WIDE * window[0] / wide, _HIGH * window[1] / high, _LARGEST)
-            choices.append((fitting, -count, columns, (wide, high)))
-        size, _, columns, extent = max(choices, key=lambda choice: choice[:2])
+        size = _PROBE
+        for _ in range(2):  # font sizes are rounded, so widths are measured again at the size found
+            tabs = self._widths(sections, size)
+            column = sum(tabs) + _GAP / 2
+            choices = []
+            for count in (1, 2, 3):
+                columns = _shared(sections, count)
+                wide = count * column + (count - 1) * _GAP + 2 * _MARGIN  # in ems
+                high = max(map(_n_lines, columns)) * _LEADING + 2 * _MARGIN
+                fitting = min(_WIDE * window[0] / wide, _HIGH * window[1] / high, _LARGEST)
+                choices.append((max(fitting, _SMALLEST), -count, columns, (wide, high)))
+            size, _, columns, extent = max(choices, key=lambda choice: choice[:2])
         return size, columns, tabs, extent
 
     def _write(
@@ -153,16 +156,16 @@ class HelpCard:
         self._parts.append(words)
         return words
 
-    def _widths(self, sections: Sequence[Section]) -> tuple[float, float]:
+    def _widths(self, sections: Sequence[Section], size: float) -> tuple[float, float]:
         """Return the widths of the keys and of the actions, in ems."""
         rows = [row for _, rows in sections for row in rows]
         columns = ([key for key, _ in rows], True), ([label for _, label in rows], False)
         widths = [
-            [self._put(text, INK, (0.0, 0.0), _PROBE, key=key).width() for text in texts]
+            [self._put(text, INK, (0.0, 0.0), size, key=key).width() for text in texts]
             for texts, key in columns
         ]
         self._clear_probes()
-        keys, labels = (float(np.max(w, initial=0.0)) / _PROBE for w in widths)
+        keys, labels = (float(np.max(w, initial=0.0)) / size for w in widths)
         return keys, labels
 
     def _clear_probes(self) -> None:
