@@ -128,8 +128,9 @@ class HelpCard:
                 wide = count * column + (count - 1) * _GAP + 2 * _MARGIN  # in ems
                 high = max(map(_n_lines, columns)) * _LEADING + 2 * _MARGIN
                 fitting = min(_WIDE * window[0] / wide, _HIGH * window[1] / high, _LARGEST)
-                choices.append((max(fitting, _SMALLEST), -count, columns, (wide, high)))
+                choices.append((fitting, -count, columns, (wide, high)))
             size, _, columns, extent = max(choices, key=lambda choice: choice[:2])
+            size = max(size, _SMALLEST)
         return size, columns, tabs, extent
 
     def _write(
