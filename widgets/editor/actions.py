@@ -339,7 +339,7 @@ def move_pivot(controller: Controller) -> None:
     name, session = _dragged_handle(controller), controller.session
     point = controller.widgets.point_at(controller.view.pointer(Phase.HOVER))
     if point is None and name not in session.state.pivots:
-        raise ConstraintError("Point at the surface where the pivot should be")
+        raise ConstraintError("Point at the surface to place the pivot")
     session.set_pivot(name, point)
     controller.say(f"Pivot of {name} {'reset' if point is None else 'moved'}")
 

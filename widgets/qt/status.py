@@ -48,7 +48,7 @@ class StatusPart(QtWidgets.QWidget):
         self.bar.setRange(0, 1000)
         self.bar.setFixedWidth(_BAR_LETTERS * self.fontMetrics().averageCharWidth())
         self.cancel = doing(
-            editor, push_button("Cancel", "Cancel it; nothing is changed", "cancel"), "cancel"
+            editor, push_button("Cancel", "Cancel; nothing is changed", "cancel"), "cancel"
         )
         message, job = QtWidgets.QHBoxLayout(), QtWidgets.QHBoxLayout()
         message.addWidget(self.sign)
@@ -62,7 +62,7 @@ class StatusPart(QtWidgets.QWidget):
         self.words.setMinimumHeight(_LINES * self.fontMetrics().lineSpacing())
 
     def lie_down(self) -> None:
-        """Be one row, for the lower edge of a window."""
+        """Lay out all parts in one row, for the lower edge of a window."""
         self._layout.setDirection(QtWidgets.QBoxLayout.Direction.LeftToRight)
         self._layout.setContentsMargins(8, 3, 8, 3)
         self.setFixedHeight(self.minimumSizeHint().height())  # the size of the view stays
