@@ -234,8 +234,8 @@ class Controller:
     def _listen(self) -> None:
         self._stop_listening = self.session.on_change(self._session_changed)
         for widget in self.widgets.interactive:
+            widget.AddObserver("StartInteractionEvent", self._gesture_began)
             widget.AddObserver("EndInteractionEvent", self._gesture_ended)
-        self.widgets.puller.AddObserver("StartInteractionEvent", self._pull_began)
         self.widgets.puller.AddObserver("ModifiedEvent", lambda *_: self.refresh())
 
     def _gesture_ended(self, widget: Widget, _: str) -> None:
@@ -243,9 +243,10 @@ class Controller:
             self.messages.note(widget.remark)
         self.refresh()
 
-    def _pull_began(self, *_: object) -> None:
-        self.messages.clear()
-        self._prepare_pulls(again=True)
+    def _gesture_began(self, *_: object) -> None:
+        self.messages.clear()  # an error would hide the amount and the keys of the drag
+        if self._mode is Mode.PULL:
+            self._prepare_pulls(again=True)
         self.refresh()
 
     def _session_changed(self, change: Change) -> None:
