@@ -20,7 +20,7 @@ Qt = QtCore.Qt
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 _LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 _GAP = 6
-_NAME_LETTERS = 12  # of the first column of a table, with its icon
+_NAME_LETTERS = 15  # of the first column of a table, with its icon
 _TIP, _ACTION = "plain tip", "action"  # properties of widgets
 
 
@@ -242,6 +242,11 @@ class _Table(QtWidgets.QTreeWidget):
         super().__init__()
         triggers = QtWidgets.QAbstractItemView.EditTrigger
         self.setEditTriggers(triggers.DoubleClicked | triggers.EditKeyPressed)
+
+    def resizeEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
+        """Keep the selected row in view."""
+        super().resizeEvent(event)
+        self.scrollTo(self.currentIndex())
 
     def edit(self, index: Any, *how: Any) -> Any:
         triggers = QtWidgets.QAbstractItemView.EditTrigger
