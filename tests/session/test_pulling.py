@@ -396,8 +396,8 @@ def test_a_pin_becomes_a_handle_that_can_rotate_and_a_pin_again():
     session.commit()
     assert session.make_pin(handle) == "pin 1"
     assert session.handles["pin 1"].shape == (1,)
-    for label in ("make handle 1 pin 1", "drag handle 1", "make pull 1 handle 2"):
+    for label in ("convert handle 1 to pin 1", "drag handle 1", "convert pull 1 to handle 2"):
         assert session.undo() == label
-    assert session.undo() == "make pin 1 handle 1"
+    assert session.undo() == "convert pin 1 to handle 1"
     assert (set(session.handles), session.state.pulls) == ({"pull 1", "pin 1"}, ("pull 1",))
     assert_array_equal(session.vertices, before)

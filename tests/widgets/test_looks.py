@@ -23,10 +23,12 @@ from vtk_segdeform.widgets import (
     CageDisplay,
     DeformEditor,
     HandleDragger,
+    Mode,
     RegionSelector,
     Tool,
     VolumeOverlay,
 )
+from vtk_segdeform.widgets.editor import preview
 from vtk_segdeform.widgets.puller import Puller
 from vtk_segdeform.widgets.region_selector.region_colours import RegionColours
 from vtk_segdeform.widgets.scene import set_background
@@ -241,9 +243,53 @@ def test_the_editor(ready):
     editor.remove()
 
 
+def test_the_editor_with_a_bent_body(ready):
+    scene, state = ready
+    view = plain_view(LARGER)
+    set_background(view.renderer)
+    session = Session(scene.mesh, state=state)
+    session.drag(scene.turned(50.0))
+    session.commit()
+    (name,) = session.handles
+    session.set_pivot(name, [0.0, 0.0, 0.0])
+    editor = DeformEditor(view, session)
+    dragger = editor.widgets.dragger
+    dragger.refine_while_resting = False
+    editor.On()
+    editor.mode, dragger.local = Mode.DEFORM, True
+    view.camera.SetPosition(0.0, -20.0, 4.0)
+    view.camera.SetViewUp(0.0, 0.0, 1.0)
+    view.renderer.ResetCamera()
+    view.render()
+    hand = Hand(view)
+    looks("editor-pivot", view, hand)
+    hand.event("KeyPressEvent", key="backslash")
+    looks("editor-before", view, hand)
+    hand.event("KeyReleaseEvent", key="backslash")
+    hand.tick(10)
+    preview(editor.controller, 0)
+    looks("editor-history", view, hand)
+    preview(editor.controller, None)
+    centre = np.array(hand.at(dragger.gizmo.centre))
+    radius = 1.15 * dragger.gizmo.radius / view.pixel_at(dragger.gizmo.centre)
+    hand.press(centre + [0.0, radius])
+    for angle in (0.05, 0.1):
+        place = centre + radius * np.array([np.sin(angle), np.cos(angle)])
+        hand.move(place, control=True)
+    looks("editor-steps", view, hand)
+    hand.key("Escape")
+    hand.release()
+    editor.mode = Mode.HANDLES
+    hand.types("r")
+    hand.press(hand.at(session.vertices[np.argmin(session.vertices[:, 1])]))
+    looks("editor-region", view, hand)
+    hand.key("Escape")
+    editor.remove()
+
+
 def test_no_two_pictures_are_alike():
     kept = {path.stem: np.asarray(pv.read(path).active_scalars) for path in LOOKS.glob("*.png")}
-    assert len(kept) == 27
+    assert len(kept) == 32
     names = sorted(kept)
     for k, name in enumerate(names):
         for other in names[:k]:

@@ -685,14 +685,14 @@ class Session(Timeline):
         handles.require_handle(self.handles, name)
         radius = checked_radius(self.mesh, radius)
         new, after = pulling.as_handle(self.mesh, self._state, name, radius)
-        self._replace_handles(after, f"make {name} {new}")
+        self._replace_handles(after, f"convert {name} to {new}")
         return new
 
     def make_pin(self, name: str) -> str:
         """Make a handle a pin at its middle vertex, and return its new name."""
         handles.require_handle(self.handles, name)
         new, after = pulling.as_pin(self.mesh, self._state, name)
-        self._replace_handles(after, f"make {name} {new}")
+        self._replace_handles(after, f"convert {name} to {new}")
         return new
 
     def move_handle(

@@ -1,13 +1,13 @@
-"""Where a solve starts: on along the way of the last two.
+"""The start of a solve, extrapolated from the ends of the last two.
 
-The targets of a drag move on as they did before, and the cages with them:
+The targets of a drag usually continue in their direction, and the cages with them:
 
     s    = (u - u_1) . (u_1 - u_0) / |u_1 - u_0|^2,  at most 2
     p    = p_1 + s (p_1 - p_0)
 
-The ends of the last two solves are p_0, p_1, and their targets u_0, u_1.  Longer motions start
-where the last one ended: from a guess far off, the length of a step says too little about the
-distance that remains, by which a live drag decides what to show.
+The ends of the last two solves are p_0, p_1, and their targets u_0, u_1.  A longer motion
+starts where the last solve ended: after a guess far from the solution, the length of a step says
+too little about the remaining distance, by which a live drag decides what to show.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ class Way:
     ends: tuple[End, ...] = ()
 
     def on_to(self, end: End) -> Way:
-        """Return the way with another *end*, which replaces one for the same targets."""
+        """Return these ends and *end*, which replaces one for the same targets."""
         others = [each for each in self.ends if not np.array_equal(each.targets, end.targets)]
         return Way((*others[-1:], end))
 
     def ahead(self, targets: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]] | None:
-        """Return how far cages (m, 3) should move on for *targets*, and directions Z there.
+        """Return the extrapolated motion of the cages (m, 3) for *targets*, and the directions Z.
 
-        None if there is no way yet, or the targets turn back or move far.
+        None if there are fewer than two ends, or the targets turn back or move far.
         """
         if len(self.ends) < 2:
             return None

@@ -341,7 +341,7 @@ def move_pivot(controller: Controller) -> None:
     name, session = _dragged_handle(controller), controller.session
     point = controller.widgets.point_at(controller.view.pointer(Phase.HOVER))
     if point is None and name not in session.state.pivots:
-        raise ConstraintError("Point at the surface where the pivot should be")
+        raise ConstraintError("Point at the surface to place the pivot")
     session.set_pivot(name, point)
     controller.say(f"Pivot of {name} {'reset' if point is None else 'moved'}")
 
@@ -367,7 +367,7 @@ def converting(name: str) -> Action:
         else:
             new = session.make_pin(name)
         widgets.selector.handle = widgets.dragger.handle = new
-        controller.say(f"{name} is {new} now")
+        controller.say(f"Converted {name} to {new}")
 
     return convert
 
@@ -384,7 +384,8 @@ def _dragged_handle(controller: Controller) -> str:
     _handle_names(controller)
     name = controller.widgets.dragger.handle
     if name is None:
-        raise ConstraintError("No handle selected. Press N to select one")
+        key = controller.keys.cap("next_handle")
+        raise ConstraintError(f"No handle selected. Press {key} to select one")
     return name
 
 

@@ -117,13 +117,17 @@ BINDINGS = (
         actions.remove_handle,
     ),
     Binding(
-        "convert_handle", ("m",), DRAGGING, "Make a pin a handle, or back", actions.convert_handle
+        "convert_handle", ("m",), DRAGGING, "Convert pin to handle, or back", actions.convert_handle
     ),
     Binding(
         "local_axes", ("l",), frozenset({D}), "Local or global axes", actions.toggle_local_axes
     ),
     Binding(
-        "pivot", ("v",), frozenset({D}), "Pivot under the pointer, or reset", actions.move_pivot
+        "pivot",
+        ("v",),
+        frozenset({D}),
+        "Move pivot to the pointer, or reset it",
+        actions.move_pivot,
     ),
     Binding(
         "show_volume_change",
@@ -133,7 +137,7 @@ BINDINGS = (
         actions.toggle_overlay,
     ),
     Binding("", ("x", "y", "z"), DRAGGING, "While dragging: constrain to axis", None),
-    Binding("", ("return",), DRAGGING, "After a number: drag by exactly that", None),
+    Binding("", ("return",), DRAGGING, "After a number: drag by that amount", None),
     # How the mesh is shown.
     Binding("style", ("w",), ALL, "Shaded, with edges, wireframe", actions.next_style),
     Binding("show_regions", ("shift+g",), ALL, "Show regions", actions.toggle_regions),
@@ -155,7 +159,7 @@ BINDINGS = (
     ),
 )
 
-# For the hands of Blender; the other actions have the same keys.
+# For users of Blender; the other actions have the same keys.
 _BLENDER: dict[str, tuple[str, ...]] = {
     "undo": ("ctrl+z",),
     "redo": ("ctrl+shift+z", "ctrl+y"),

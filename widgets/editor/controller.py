@@ -72,7 +72,7 @@ class Controller:
 
     def __init__(self, view: View, session: Session, keys: Keys) -> None:
         self.view, self.keys = view, keys
-        self.help = HelpCard(view, keys.sections())
+        self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL))
         self.messages = Messages(view)
         self.messages.note(advice())
         self.notices = Notices(view, lambda: self.messages.height)
@@ -116,10 +116,17 @@ class Controller:
     @mode.setter
     def mode(self, mode: Mode) -> None:
         self.widgets.finish()
+        if self._mode is Mode.HANDLES and self.widgets.selector.handle in self.session.handles:
+            self.widgets.dragger.handle = self.widgets.selector.handle
         self._mode = mode
+        self.list_keys()
         self.messages.clear()
         self._prepare_pulls(again=True)
         self._apply_mode()
+
+    def list_keys(self) -> None:
+        """List the current keys on the help card, in a small window those of the mode."""
+        self.help.list_keys(self.keys.sections(), self.keys.sections(self._mode))
 
     @property
     def is_on(self) -> bool:
@@ -229,8 +236,8 @@ class Controller:
     def _listen(self) -> None:
         self._stop_listening = self.session.on_change(self._session_changed)
         for widget in self.widgets.interactive:
+            widget.AddObserver("StartInteractionEvent", self._gesture_began)
             widget.AddObserver("EndInteractionEvent", self._gesture_ended)
-        self.widgets.puller.AddObserver("StartInteractionEvent", self._pull_began)
         self.widgets.puller.AddObserver("ModifiedEvent", lambda *_: self.refresh())
 
     def _gesture_ended(self, widget: Widget, _: str) -> None:
@@ -238,9 +245,10 @@ class Controller:
             self.messages.note(widget.remark)
         self.refresh()
 
-    def _pull_began(self, *_: object) -> None:
-        self.messages.clear()
-        self._prepare_pulls(again=True)
+    def _gesture_began(self, *_: object) -> None:
+        self.messages.clear()  # an error would hide the amount and the keys of the drag
+        if self._mode is Mode.PULL:
+            self._prepare_pulls(again=True)
         self.refresh()
 
     def _session_changed(self, change: Change) -> None:

@@ -105,7 +105,7 @@ class DeformEditor:
     def keys(self, keys: KeyChoice | Keys) -> None:
         controller = self._controller
         controller.keys = table = keys_of(keys)
-        controller.help.list_keys(table.sections())
+        controller.list_keys()
         controller.recordings.assign(table.changes)
         controller.refresh()
 

@@ -2,6 +2,7 @@
 
 White with a dark border, so that it is legible on any background.  The text is as large as the
 window allows, up to a limit, in one, two or three columns, whichever allows the largest size.
+Where the text of all keys would be too small to read, the keys of the current mode are listed.
 """
 
 from __future__ import annotations
@@ -18,11 +19,15 @@ from ..scene import Panel, Stop, Text, View
 Section = tuple[str, Sequence[tuple[str, str]]]
 """A heading, and pairs (key, action)."""
 
+_Layout = tuple[float, list[list[Section]], tuple[float, float], tuple[float, float]]
+# The font size in pixels; the columns; widths of keys and actions, and of the card, in ems.
+
 _KEYS = "#0B4F82"
-_LARGEST, _SMALLEST = 24.0, 7.0  # pixels
+_LARGEST, _LEGIBLE, _SMALLEST = 24.0, 12.0, 7.0  # pixels
 _LEADING, _MARGIN, _GAP = 1.5, 1.4, 2.0  # line height, margin, space between columns; in ems
 _WIDE, _HIGH, _FOOT = 0.94, 0.86, 0.1  # of the window: largest size, free space below
-_PROBE = 20.0  # font size at which widths are measured
+_PROBE = 20.0  # font size at which widths are measured first
+_DOTS_PER_INCH = 96  # of a screen on which these are pixels
 
 
 class HelpCard:
@@ -34,11 +39,15 @@ class HelpCard:
         Where it is drawn, over everything else.  Call `remove` before its window closes.
     sections : sequence of (heading, rows)
         Rows are pairs (key, action); a section stays in one column.
+    fewer : sequence of (heading, rows), optional
+        The sections of a window in which those would be too small to read.
     """
 
-    def __init__(self, view: Any, sections: Sequence[Section]) -> None:
+    def __init__(
+        self, view: Any, sections: Sequence[Section], fewer: Sequence[Section] = ()
+    ) -> None:
         self.view = View.of(view)
-        self.sections = tuple(sections)
+        self.sections, self.fewer = tuple(sections), tuple(fewer)
         self._parts: list[Panel | Text] = []
         self._laid_out = 0, 0
         self._stop: Stop | None = None
@@ -62,9 +71,11 @@ class HelpCard:
             self._clear()
             self.view.request_render()
 
-    def list_keys(self, sections: Sequence[Section]) -> None:
-        """List other keys."""
-        self.sections, self._laid_out = tuple(sections), (0, 0)
+    def list_keys(self, sections: Sequence[Section], fewer: Sequence[Section] = ()) -> None:
+        """List other keys; *fewer* as for the constructor."""
+        if (tuple(sections), tuple(fewer)) == (self.sections, self.fewer):
+            return
+        self.sections, self.fewer, self._laid_out = tuple(sections), tuple(fewer), (0, 0)
         if self.is_shown:
             self.view.request_render()
 
@@ -90,17 +101,11 @@ class HelpCard:
             return
         self._clear()
         self._laid_out = window[0], window[1]
-        keys, labels = self._widths()
+        size, columns, (keys, labels), (wide, high) = self._fitting(self.sections, window)
+        scale = max(1.0, self.view.window.GetDPI() / _DOTS_PER_INCH)
+        if size < scale * _LEGIBLE and self.fewer:
+            size, columns, (keys, labels), (wide, high) = self._fitting(self.fewer, window)
         column = keys + _GAP / 2 + labels
-        choices = []
-        for count in (1, 2, 3):
-            columns = _shared(self.sections, count)
-            wide = count * column + (count - 1) * _GAP + 2 * _MARGIN  # in ems
-            high = max(map(_n_lines, columns)) * _LEADING + 2 * _MARGIN
-            fitting = min(_WIDE * window[0] / wide, _HIGH * window[1] / high, _LARGEST)
-            choices.append((fitting, -count, columns, wide, high))
-        size, _, columns, wide, high = max(choices, key=lambda choice: choice[:2])
-        size = max(size, _SMALLEST)
         x = 0.5 * (window[0] - wide * size)
         y = 0.5 * ((1.0 + _FOOT) * window[1] - high * size)
         for rim, colour, layer in ((2.0, INK, 5), (0.0, PAPER, 6)):
@@ -110,6 +115,23 @@ class HelpCard:
         for k, sections in enumerate(columns):
             left = x + (_MARGIN + k * (column + _GAP)) * size
             self._write(sections, (left, left + (keys + _GAP / 2) * size), y + high * size, size)
+
+    def _fitting(self, sections: Sequence[Section], window: Sequence[int]) -> _Layout:
+        """Return the layout of *sections* with the largest text."""
+        size = _PROBE
+        for _ in range(2):  # font sizes are rounded, so widths are measured again at the size found
+            tabs = self._widths(sections, size)
+            column = sum(tabs) + _GAP / 2
+            choices = []
+            for count in (1, 2, 3):
+                columns = _shared(sections, count)
+                wide = count * column + (count - 1) * _GAP + 2 * _MARGIN  # in ems
+                high = max(map(_n_lines, columns)) * _LEADING + 2 * _MARGIN
+                fitting = min(_WIDE * window[0] / wide, _HIGH * window[1] / high, _LARGEST)
+                choices.append((fitting, -count, columns, (wide, high)))
+            size, _, columns, extent = max(choices, key=lambda choice: choice[:2])
+            size = max(size, _SMALLEST)
+        return size, columns, tabs, extent
 
     def _write(
         self, sections: Sequence[Section], tabs: tuple[float, float], top: float, size: float
@@ -135,16 +157,16 @@ class HelpCard:
         self._parts.append(words)
         return words
 
-    def _widths(self) -> tuple[float, float]:
+    def _widths(self, sections: Sequence[Section], size: float) -> tuple[float, float]:
         """Return the widths of the keys and of the actions, in ems."""
-        rows = [row for _, rows in self.sections for row in rows]
+        rows = [row for _, rows in sections for row in rows]
         columns = ([key for key, _ in rows], True), ([label for _, label in rows], False)
         widths = [
-            [self._put(text, INK, (0.0, 0.0), _PROBE, key=key).width() for text in texts]
+            [self._put(text, INK, (0.0, 0.0), size, key=key).width() for text in texts]
             for texts, key in columns
         ]
         self._clear_probes()
-        keys, labels = (float(np.max(w, initial=0.0)) / _PROBE for w in widths)
+        keys, labels = (float(np.max(w, initial=0.0)) / size for w in widths)
         return keys, labels
 
     def _clear_probes(self) -> None:

@@ -153,17 +153,17 @@ class Keys:
         found = [b for b in self._by_name.values() if key in b.keys]
         return [(mode, b.label) for b in found for mode in Mode if mode in b.modes]
 
-    def sections(self) -> list[Section]:
-        """Return the table for users, grouped by modes; actions without keys are left out."""
+    def sections(self, mode: Mode | None = None) -> list[Section]:
+        """Return the table for users, of *mode* or all, by modes; without actions without keys."""
         sections: dict[str, list[tuple[str, str]]] = {name: [] for name in _HEADINGS.values()}
         sections[VIEW] = list(_MOUSE)
         for b in self.bindings:
             listed = [key for key in b.keys if key not in _UNLISTED] or b.keys
             caps = "  ".join(map(key_cap, listed))
             heading = b.heading or _HEADINGS.get(b.modes)
-            if caps and heading is not None:
+            if caps and heading is not None and (mode is None or mode in b.modes):
                 sections[heading].append((caps, b.label))
-        return list(sections.items())
+        return [(heading, rows) for heading, rows in sections.items() if rows]
 
     def conflicts(self, name: str, key: str) -> list[Binding]:
         """Return the bindings of *key* in modes of the action *name*, other than its own."""

@@ -116,7 +116,8 @@ class Notices:
             if self.are_marked:
                 self._mark()
             self._draw()
-        if change & _EDITS and not self._was_edited:
+        # Preparing sets regions and cages, too, but not as a step.
+        if change & _EDITS and self._session.can_undo and not self._was_edited:
             self._was_edited = True
             self.close()
         elif change & Change.POSE and self.are_marked:

@@ -61,7 +61,7 @@ class Gizmo:
         self._front_half = vtkPlane()
         self._solids = {part: Solid(view.foreground, part) for part in PARTS}
         self._letters = [Label(view.foreground, colour) for colour in AXIS_COLOURS]
-        self._caption = Label(view.foreground, INK)
+        self._caption = Label(view.foreground, PAPER, dark=True)
         self._stop = view.before_render(self._lay_out)
         self._update_colours()
         self._update_clipping()

@@ -20,6 +20,7 @@ Qt = QtCore.Qt
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 _LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 _GAP = 6
+_NAME_LETTERS = 15  # of the first column of a table, with its icon
 _TIP, _ACTION = "plain tip", "action"  # properties of widgets
 
 
@@ -144,6 +145,10 @@ def table(columns: list[str], tip: str, rows: int) -> Any:
     for column in range(len(columns)):
         header.setSectionResizeMode(column, modes.ResizeToContents if column else modes.Stretch)
         tree.headerItem().setTextAlignment(column, RIGHT if column else _LEFT)
+    widths = sum(header.sectionSizeHint(k) for k in range(1, len(columns)))
+    letters = _NAME_LETTERS * tree.fontMetrics().averageCharWidth()
+    bar = tree.verticalScrollBar().sizeHint().width() + 2 * tree.frameWidth()
+    tree.setMinimumWidth(letters + widths + bar)  # names are legible beside a scroll bar
     height = 1.3 * tree.fontMetrics().height()  # of a row
     tree.setMinimumHeight(round((0.5 * rows + 1.5) * height))
     tree.setMaximumHeight(round((rows + 1.5) * height))
@@ -237,6 +242,11 @@ class _Table(QtWidgets.QTreeWidget):
         super().__init__()
         triggers = QtWidgets.QAbstractItemView.EditTrigger
         self.setEditTriggers(triggers.DoubleClicked | triggers.EditKeyPressed)
+
+    def resizeEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
+        """Keep the selected row in view."""
+        super().resizeEvent(event)
+        self.scrollTo(self.currentIndex())
 
     def edit(self, index: Any, *how: Any) -> Any:
         triggers = QtWidgets.QAbstractItemView.EditTrigger

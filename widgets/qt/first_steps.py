@@ -18,8 +18,9 @@ from ..editor import DeformEditor
 Qt = QtCore.Qt
 _KEY = "first steps seen"
 _SIZE = 44, 32  # pixels of a drawing
-_LETTERS = 14  # of a line in a card, at most
+_LETTERS, _WORD_LETTERS = 14, 5  # of a line in a card, at most, and in a brief one
 _SAMPLES = 2000  # points of the surface that the cards avoid
+_MOST = 0.1  # share of the surface that complete cards may cover; otherwise they are brief
 _MARGIN = 8
 _CUBE = 100  # pixels at the right end, for the orientation cube
 _ACCENT = "#2f7fc1"
@@ -108,22 +109,40 @@ class FirstSteps(QtWidgets.QWidget):
             self.dismiss()
 
     def _place(self) -> None:
-        """Put the cards side by side or one below the other, where they hide less of the body."""
-        width = _SIZE[0] + 3 * _MARGIN + _LETTERS * self.fontMetrics().averageCharWidth()
-        height = max(card.heightForWidth(width) for card in self._cards)
-        right, down = width + _MARGIN, height + _MARGIN
-        steps = [(0, down)]
-        if 3 * right <= self._view.width() - _CUBE:
-            steps.append((right, 0))
-        places = [[QtCore.QRect(k * x, k * y, width, height) for k in range(3)] for x, y in steps]
+        """Put the cards where they hide least of the body; without sentences in a small view."""
         body = self._body()
-        place = min(places, key=lambda cards: sum(_inside(card, body) for card in cards))
+        for is_brief in (False, True):
+            for card in self._cards:
+                card.set_brief(is_brief)
+            place = min(self._places(is_brief), key=lambda cards: _covered(cards, body))
+            if _covered(place, body) <= _MOST * len(body):
+                break
         shape = QtGui.QRegion()
         for card, rectangle in zip(self._cards, place, strict=True):
             card.setGeometry(rectangle)
             shape = shape.united(QtGui.QRegion(rectangle))
-        self.setGeometry(shape.boundingRect().translated(_MARGIN, _MARGIN))
-        self.setMask(shape)  # the view receives clicks between them
+        around = shape.boundingRect()
+        for card in self._cards:
+            card.move(card.pos() - around.topLeft())
+        self.setGeometry(around.translated(_MARGIN, _MARGIN))
+        self.setMask(shape.translated(-around.topLeft()))  # the view receives clicks between them
+
+    def _places(self, is_brief: bool) -> list[list[Any]]:
+        """Return the possible rectangles of the cards: a column, and rows where there is room."""
+        letters = _WORD_LETTERS if is_brief else _LETTERS
+        width = _SIZE[0] + 3 * _MARGIN + letters * self.fontMetrics().averageCharWidth()
+        height = max(card.heightForWidth(width) for card in self._cards)
+        height = max(height, _SIZE[1] + _MARGIN)
+        right, down = width + _MARGIN, height + _MARGIN
+        starts = [(0, 0, 0, down)]
+        if 3 * right <= self._view.width() - _CUBE:
+            starts.append((0, 0, right, 0))
+        if 3 * right + _MARGIN <= self._view.width():
+            starts.append((0, self._view.height() - down - _MARGIN, right, 0))
+        return [
+            [QtCore.QRect(x + k * dx, y + k * dy, width, height) for k in range(3)]
+            for x, y, dx, dy in starts
+        ]
 
     def _body(self) -> NDArray[np.float64]:
         """Return points (k, 2) of the surface, in pixels of this widget."""
@@ -140,13 +159,20 @@ class _Card(QtWidgets.QWidget):
     def __init__(self, parent: Any, draw: Callable[[Any], None], word: str, sentence: str) -> None:
         super().__init__(parent)
         self._draw = draw
-        words = QtWidgets.QLabel(f"<b>{word}</b><br>{sentence}")
+        self._word, self._sentence = f"<b>{word}</b>", sentence
+        words = self._words = QtWidgets.QLabel()
         words.setWordWrap(True)
+        self.set_brief(False)
         layout = QtWidgets.QHBoxLayout(self)
         layout.setContentsMargins(_MARGIN, _MARGIN, _MARGIN, _MARGIN)
         layout.setSpacing(0)
         layout.addSpacing(_SIZE[0] + _MARGIN)
         layout.addWidget(words, 1)
+
+    def set_brief(self, is_brief: bool) -> None:
+        """Leave the sentence to the tooltip, or not."""
+        self._words.setText(self._word if is_brief else f"{self._word}<br>{self._sentence}")
+        self.setToolTip(f"{self._sentence} Click to close (Esc)" if is_brief else "")
 
     def paintEvent(self, event: Any) -> None:  # noqa: N802, ARG002 - Qt's name
         """Draw the card."""
@@ -168,6 +194,11 @@ class _Card(QtWidgets.QWidget):
 
 def _nothing() -> None:
     pass
+
+
+def _covered(cards: list[Any], points: NDArray[np.float64]) -> int:
+    """Return how many of the *points* (k, 2) the rectangles contain."""
+    return sum(_inside(card, points) for card in cards)
 
 
 def _inside(card: Any, points: NDArray[np.float64]) -> int:

@@ -123,7 +123,10 @@ class HandlesPart(QtWidgets.QGroupBox):
         quiet = QtCore.QSignalBlocker(self.list)
         keys = [(each.paints, each.handle) for each in self._rows]
         if (paints, handle) in keys:
-            self.list.setCurrentItem(self.list.topLevelItem(keys.index((paints, handle))))
+            item = self.list.topLevelItem(keys.index((paints, handle)))
+            if item is not self.list.currentItem():
+                self.list.setCurrentItem(item)
+                self.list.scrollToItem(item)
         else:
             self.list.clearSelection()
         quiet.unblock()

@@ -45,7 +45,9 @@ class PullPart(QtWidgets.QGroupBox):
             lambda share: editor.do(pulling_with(locality=0.01 * share))
         )
         self.auto = check_box(
-            "Auto local", "Free between pins and fixed vertices, otherwise halfway", "auto_locality"
+            "Auto local",
+            "0 between three pins or fixed vertices, otherwise mostly free",
+            "auto_locality",
         )
         self.auto.clicked.connect(self._set_auto)
         self.unpin = key_button(editor, "remove_pins")

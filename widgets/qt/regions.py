@@ -35,6 +35,12 @@ class _Row(NamedTuple):
     volume: str
 
 
+def _percent(share: float) -> str:
+    """Return *share* with as many decimals as in the other rows; without any if it is zero."""
+    number = signed(100.0 * share, 1)
+    return f"{number} %" if number == "0" or "." in number else f"{number}.0 %"
+
+
 class RegionsPart(QtWidgets.QGroupBox):
     """A list with a row for each region.
 
@@ -101,7 +107,7 @@ class RegionsPart(QtWidgets.QGroupBox):
                 editor.session.region_name(region),
                 str(cages[region].n_vertices) if cages else "None",
                 widgets.cages.is_visible(region) if cages else None,
-                f"{signed(100.0 * volumes[region], 1)} %" if region in volumes else "",
+                _percent(volumes[region]) if region in volumes else "",
             )
             for region in range(widgets.n_regions)
         ]

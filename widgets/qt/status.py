@@ -48,7 +48,7 @@ class StatusPart(QtWidgets.QWidget):
         self.bar.setRange(0, 1000)
         self.bar.setFixedWidth(_BAR_LETTERS * self.fontMetrics().averageCharWidth())
         self.cancel = doing(
-            editor, push_button("Cancel", "Cancel it; nothing is changed", "cancel"), "cancel"
+            editor, push_button("Cancel", "Cancel; nothing is changed", "cancel"), "cancel"
         )
         message, job = QtWidgets.QHBoxLayout(), QtWidgets.QHBoxLayout()
         message.addWidget(self.sign)
@@ -62,7 +62,7 @@ class StatusPart(QtWidgets.QWidget):
         self.words.setMinimumHeight(_LINES * self.fontMetrics().lineSpacing())
 
     def lie_down(self) -> None:
-        """Be one row, for the lower edge of a window."""
+        """Lay out all parts in one row, for the lower edge of a window."""
         self._layout.setDirection(QtWidgets.QBoxLayout.Direction.LeftToRight)
         self._layout.setContentsMargins(8, 3, 8, 3)
         self.setFixedHeight(self.minimumSizeHint().height())  # the size of the view stays
@@ -111,11 +111,12 @@ class StatusPart(QtWidgets.QWidget):
 
 def with_links(text: str, keys: Keys, mode: Mode, ink: str) -> str:
     """Return the rich text of a hint, in which keys that work in *mode* are links, in *ink*."""
-    names = {key_cap(b.keys[0]): b.keys[0] for b in keys.bindings if mode in b.modes and b.keys}
+    working = [b for b in keys.bindings if b.name and mode in b.modes and b.keys]
+    names = {key_cap(b.keys[0]): b.keys[0] for b in working}
     names = {html.escape(cap, quote=False): key for cap, key in names.items()}
     # A key after "Press", "or" or "Next:", or before ":" or "to", as hints name it.
     caps = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
-    pattern = rf"((?:Press|or|Next:) |\(|· |, )({caps})(?=[ :,.)]|$)"
+    pattern = rf"((?:Press|or|Next:) |\(|· |, |\. )({caps})(?=[ :,.)]|$)"
 
     def link(found: re.Match[str]) -> str:
         before, cap = found.groups()

@@ -1,4 +1,4 @@
-"""What pyvistaqt does not tell VTK of Qt's events; imported for views in Qt only.
+"""Qt events that pyvistaqt does not pass on to VTK; imported for views in Qt only.
 
 These are the Alt key, the keypad, whose digits would arrive as those of the main row, Ctrl+I, which
 would arrive as Tab, and the modifiers and the position of the wheel.

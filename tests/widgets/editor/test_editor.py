@@ -480,9 +480,9 @@ def test_keys_for_axes_the_pivot_and_pins(bench):
     bench.type("m")
     assert len(session.handles["handle 1"]) > 3
     assert list(map(str, (session.undo(), session.undo(), session.undo()))) == [
-        "make pin 2 handle 1",
+        "convert pin 2 to handle 1",
         "pin",
-        "make handle 1 pin 1",
+        "convert handle 1 to pin 1",
     ]
 
 
