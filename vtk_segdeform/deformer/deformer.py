@@ -392,7 +392,8 @@ class Deformer:
         pulled.offsets = rows[pulled.places] @ p - places[pulled.places]
         solver = GaussNewton(before.energy, positions, self._constraints.volumes)
         load = solver.unbalanced(p, pulled.moved(places))
-        anchors = Anchors(weight * quadratic, p, load)
+        steady = self._samples.steadying(p, load)
+        anchors = Anchors(weight * quadratic + steady, p, load)
         solver = replace(solver, positions=positions.local(rows, anchors))
         other = self._shared()
         other._constraints = replace(self._constraints, solver=solver, pulled=pulled)

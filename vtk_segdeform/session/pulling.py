@@ -23,8 +23,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import deformer
 from ..arrays import FloatArray, IntArray, frozen, plain
-from ..deformer import LOCALITY, SPREAD, checked_point, checked_vertex, reach_and_follows
+from ..deformer import SPREAD, checked_point, checked_vertex, reach_and_follows
 from ..errors import ConstraintError
 from ..mesh import Mesh
 from .handles import (
@@ -38,8 +39,6 @@ from .handles import (
 )
 from .state import Locality, Pose, State
 
-_PINNED_LOCALITY = 0.05  # with too few fixed points to keep the body from turning
-_ENOUGH = 3  # fixed points
 _ROOM = 0.5  # of the distance between a patch and what stays
 _SAME_POINT = 0.25  # of the radius: a pulled point so close is grabbed again
 
@@ -97,16 +96,9 @@ class Grasp:
 
 
 def automatic_locality(state: State) -> float:
-    """Return the locality of a pull if none is given: 0.2, or less if something else is fixed.
-
-    Fixed vertices, pins and other handles divide the motion among the surface between them: 0.
-    One or two points do not keep the body from turning about them: 0.05.
-    """
+    """Return the locality of a pull if none is given, by fixed vertices, pins and other handles."""
     others = (ids for name, ids in state.handles.items() if name not in state.pulls)
-    count = len(state.fixed) + sum(map(len, others))
-    if count == 0:
-        return LOCALITY
-    return 0.0 if count >= _ENOUGH else _PINNED_LOCALITY
+    return deformer.automatic_locality(len(state.fixed) + sum(map(len, others)))
 
 
 def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
