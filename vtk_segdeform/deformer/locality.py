@@ -33,8 +33,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg
-from scipy import sparse
+from scipy import linalg, sparse
 from scipy.sparse import csgraph
 
 from ..arrays import FloatArray, IntArray
@@ -117,7 +116,7 @@ class SurfaceSamples:
         return np.asarray((rows.T * weights[kept]) @ rows)
 
     def steadying(self, p: FloatArray, load: FloatArray) -> FloatArray:
-        """Return the anchors (m, m) that keep a *load* (m, 3) at cages *p* (m, 3) from turning them.
+        """Return anchors (m, m) that keep a *load* (m, 3) at cages *p* (m, 3) from turning them.
 
         A constant load does not turn with the surface: it is in balance, but if it is compressive,
         like a weight on a tip.  Turned by w, it does the work <w, (tr(B) - B) w>, and anchors of
