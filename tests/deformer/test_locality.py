@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from real_meshes import path_of
 from scenes import sausage
 from scipy import sparse
+from solids import rotation
 
 from vtk_segdeform import models
 from vtk_segdeform.deformer.deformer import Deformer
@@ -102,6 +103,41 @@ def test_a_soft_row_reproduces_affine_maps():
     assert_allclose(row @ (cages @ affine), rest[HIGH] @ affine, atol=1e-3)
     assert row.sum() == pytest.approx(1.0)
     assert samples.soft_row(HIGH, rest[HIGH], 1e-6) is None
+
+
+@pytest.mark.parametrize("push", [-1.0, 1.0])
+def test_anchors_resist_a_load_that_topples_the_surface_and_no_other(push):
+    corners = np.indices((2, 2, 2)).reshape(3, 8).T * [1.0, 2.0, 3.0] - [0.5, 1.0, 1.5]
+    edges = sparse.csr_array(np.ones((8, 8)))
+    samples = SurfaceSamples(np.arange(8), np.eye(8), corners, np.full(8, 1 / 8), edges)
+    load = np.outer(push * np.sign(corners[:, 2]), [0.0, 0.0, 1.0])  # pushes or stretches
+    steady = samples.steadying(corners + 7.0, load)
+    assert steady.any() == (push < 0.0)
+    turned = corners @ rotation([1.0, 0.0, 0.0], 0.1).T - corners
+    work = 2.0 * np.vdot(load, turned)
+    assert np.vdot(turned, steady @ turned) >= max(work, 0.0)
+
+
+def test_a_pose_out_of_all_proportion_is_not_shown_and_the_status_says_so(monkeypatch):
+    deformer = held().local(HIGH, 0.2 * D, 0.1 * D)
+    before = deformer.solve(X[[HIGH]] + 0.1 * UP)
+    own = Deformer._with_exact_volume
+
+    def explode(self, result):
+        x, scaled_by = own(self, result)
+        self._p = 50.0 * self._p
+        return 50.0 * x, scaled_by
+
+    with monkeypatch.context() as wrong:
+        wrong.setattr(Deformer, "_with_exact_volume", explode)
+        for within in (None, 0.0025):
+            missed = deformer.solve(X[[HIGH]] + 0.2 * UP, within=within)
+            assert missed.status is Status.MISSED
+            assert_allclose(missed.vertices, before.vertices, atol=1e-12)
+            assert abs(missed.volume_change) < 1e-12
+    after = deformer.solve(X[[HIGH]] + 0.2 * UP)
+    assert after.status is Status.CONVERGED
+    assert np.linalg.norm(after.vertices[HIGH] - X[HIGH] - 0.2 * UP) < 6e-4 * D
 
 
 def spike(mesh, x, vertex):

@@ -17,6 +17,7 @@ from vtk_segdeform.errors import CageError, ConstraintError
 from vtk_segdeform.geometry.lids import lids_of
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
+from vtk_segdeform.session.pulling import automatic_locality
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.session.state import State
 from vtk_segdeform.session.store import load_session, save_session
@@ -218,6 +219,49 @@ def test_a_matrix_turns_the_surface_around_the_point():
     assert session.commit() == "drag pull 1"
     assert session.undo() == "drag pull 1"
     assert not session.can_undo
+
+
+@pytest.mark.parametrize("share", [0.35, 0.7])
+def test_a_turn_beside_an_earlier_pull_does_not_tear_the_surface(share):
+    radius = 0.3 * D
+    session = pulled(TIP, 2.0 * UP)
+    x = session.vertices
+    vertex = int(np.abs(np.linalg.norm(X - X[TIP], axis=1) - share * radius).argmin())
+    for angle in (1.0, 2.0, 3.0):
+        turn = np.eye(4)
+        turn[:3, :3] = rotation([0.0, 1.0, 0.0], angle)
+        turn[:3, 3] = x[vertex] - turn[:3, :3] @ x[vertex]
+        session.pull(vertex, turn, radius=radius, locality=0.0, max_steps=8, within=0.0025)
+        assert moved(session, x) < 0.6  # it was 1.4
+        assert abs(session.volume_change) < 1e-12
+    patch = session.handles["pull 2"]
+    targets = session.targets
+    assert_allclose(targets["pull 2"], x[patch] @ turn[:3, :3].T + turn[:3, 3], atol=1e-12)
+    there = x[[TIP]] @ turn[:3, :3].T + turn[:3, 3]
+    if share < 0.5:  # in the patch
+        assert_allclose(targets["pull 1"], there, atol=1e-12)
+    else:  # beside it, with room between
+        apart = np.linalg.norm(X[patch] - X[TIP], axis=1).min()
+        assert apart > 0.4 * share * radius
+        way, whole = (targets["pull 1"] - x[[TIP]])[0], (there - x[[TIP]])[0]
+        carried = way @ whole / (whole @ whole)
+        assert_allclose(way, carried * whole, atol=1e-9)
+        assert 0.5 < carried < 0.9
+    assert session.refine().status is Status.CONVERGED
+    lengths = [
+        np.linalg.norm(np.diff(each[MESH.faces], axis=1), axis=2) for each in (x, session.vertices)
+    ]
+    assert (lengths[1] / lengths[0]).max() < 3.0  # it was 7.8
+
+
+@pytest.mark.parametrize("pins", [0, 2, 3])
+def test_the_default_locality_is_that_of_a_pull_in_one_call(pins):
+    session = ready()
+    for k in range(pins):
+        session.pin(int(SCENE.fixed[k]))
+    assert automatic_locality(session.state) == {0: 0.2, 2: 0.05, 3: 0.0}[pins]
+    session.pull(HIGH, X[HIGH] + UP, max_steps=1)
+    assert session.state.locality.follows == 1.0 - automatic_locality(session.state)
 
 
 @pytest.mark.parametrize("locality", [0.0, 1.0])

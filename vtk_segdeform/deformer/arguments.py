@@ -16,6 +16,7 @@ from ..mesh import Mesh
 
 _FARTHEST = 1e3  # sizes of the mesh
 _PULL_RADIUS = 0.15  # diagonals of the mesh
+_PINNED_LOCALITY, _ENOUGH = 0.05, 3  # with fewer fixed points, about which the body can turn
 LOCALITY, SPREAD = 0.2, 0.5
 """The locality of a pull without pins; and the share of its radius within which it grabs."""
 FARTHEST_APART = 20.0
@@ -102,6 +103,17 @@ def checked_locality(locality: float | None) -> float | None:
     if locality is not None and not (is_number(locality, 0.0) and locality <= 1.0):
         raise ConstraintError(f"locality must be a number from 0 to 1; got {shown(locality)}")
     return None if locality is None else float(locality)
+
+
+def automatic_locality(n_fixed: int) -> float:
+    """Return the locality of a pull if none is given, with *n_fixed* fixed points elsewhere.
+
+    0.2 without any.  Three or more divide the motion among the surface between them: 0.  One or two
+    do not keep the body from turning about them: 0.05.
+    """
+    if n_fixed >= _ENOUGH:
+        return 0.0
+    return _PINNED_LOCALITY if n_fixed else LOCALITY
 
 
 def reach_and_follows(radius: float, locality: float) -> tuple[float, float]:

@@ -10,9 +10,9 @@ from ..progress import Progress, part
 from ..regions import segment
 from ..solver import Solution
 from .arguments import (
-    LOCALITY,
     SPREAD,
     as_lids,
+    automatic_locality,
     checked_constraints,
     checked_locality,
     checked_point,
@@ -51,11 +51,11 @@ def pull(
     radius : float, optional
         Of the pulled surface, in the mesh's unit; by default 15 % of the mesh's diagonal.
     pins : (k,) int or (n,) bool
-        Vertices that stay in place.  With pins the surface between them is free.
+        Vertices that stay in place.  With three or more the surface between them is free.
     locality : float, optional
         1 keeps the surface in place; beyond four radii, of 10 % of the diagonal or more, it hardly
         moves.  With less, more of it follows, above all the ends of limbs; with 0 all is free.
-        By default 0.2 without pins, and 0 with pins.
+        By default 0.2 without pins, 0.05 with one or two, and 0 with more.
     n_regions : int or None
         How many regions; None lets `segment` choose.
     n_cage_vertices : int, optional
@@ -90,7 +90,7 @@ def pull(
     target = checked_point(to)[None]
     radius, locality = checked_radius(mesh, radius), checked_locality(locality)
     if locality is None:
-        locality = 0.0 if len(fixed) else LOCALITY
+        locality = automatic_locality(len(fixed))
     regions = segment(mesh, n_regions, progress=part(progress, 0.0, 0.2))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
     cages = fit_cages(mesh, regions, size, progress=part(progress, 0.2, 0.7))

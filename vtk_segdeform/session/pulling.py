@@ -15,7 +15,7 @@ more local a pull, the shorter its reach.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import NamedTuple
@@ -23,8 +23,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import deformer
 from ..arrays import FloatArray, IntArray, frozen, plain
-from ..deformer import LOCALITY, SPREAD, checked_point, checked_vertex, reach_and_follows
+from ..deformer import SPREAD, checked_point, checked_vertex, reach_and_follows
 from ..errors import ConstraintError
 from ..mesh import Mesh
 from .handles import (
@@ -38,8 +39,7 @@ from .handles import (
 )
 from .state import Locality, Pose, State
 
-_PINNED_LOCALITY = 0.05  # with too few fixed points to keep the body from turning
-_ENOUGH = 3  # fixed points
+_ROOM = 0.5  # of the distance between a patch and what stays
 _SAME_POINT = 0.25  # of the radius: a pulled point so close is grabbed again
 
 
@@ -85,24 +85,20 @@ class Grasp:
         start = self.state.pose.targets
         if to.shape == (3,):
             shift, own = to - self.point, start[self.name] + (to - self.point)
+            more = {name: start[name] + share * shift for name, share in self.carried.items()}
         else:
-            own = moved(start[self.name], to, "to")
-            shift = moved(self.point[None], to, "to")[0] - self.point
-        more = {name: start[name] + share * shift for name, share in self.carried.items()}
+            own, more = moved(start[self.name], to, "to"), {}
+            for name, share in self.carried.items():
+                there = moved(start[name], to, "to")
+                shift = (there - start[name]).mean(axis=0)
+                more[name] = there if share == 1.0 else start[name] + share * shift
         return MappingProxyType({self.name: own, **more})
 
 
 def automatic_locality(state: State) -> float:
-    """Return the locality of a pull if none is given: 0.2, or less if something else is fixed.
-
-    Fixed vertices, pins and other handles divide the motion among the surface between them: 0.
-    One or two points do not keep the body from turning about them: 0.05.
-    """
+    """Return the locality of a pull if none is given, by fixed vertices, pins and other handles."""
     others = (ids for name, ids in state.handles.items() if name not in state.pulls)
-    count = len(state.fixed) + sum(map(len, others))
-    if count == 0:
-        return LOCALITY
-    return 0.0 if count >= _ENOUGH else _PINNED_LOCALITY
+    return deformer.automatic_locality(len(state.fixed) + sum(map(len, others)))
 
 
 def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
@@ -128,8 +124,13 @@ def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
         name = _new_name(state, "pull")
         handles = with_handle(mesh, state, name, [vertex])
         pulls = (*pulls, name)
+    others = [each for each in pulls if each != name and away.get(each, np.inf) < radius]
+    inner = SPREAD if turns else 0.0  # what is inside moves with the patch
+    beyond = {each: max(0.0, away[each] / radius - inner) / (1.0 - inner) for each in others}
+    carried = {each: (1.0 - share**2) ** 2 for each, share in beyond.items()}
     if turns and len(handles[name]) == 1:
-        patch = _free_patch(mesh, replace(state, handles=handles), name, SPREAD * radius)
+        along = [each for each in others if carried[each] == 1.0]
+        patch = _free_patch(mesh, replace(state, handles=handles), name, SPREAD * radius, along)
         handles = with_handle(mesh, state, name, patch)
     places = tuple(cage.vertices for cage in state.cages)
     places = places if state.pose is None else state.pose.cage_vertices
@@ -137,8 +138,6 @@ def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
     reach, follows = reach_and_follows(radius, locality)
     local = Locality(vertex, reach, SPREAD * radius, follows, pose.cage_vertices)
     after = replace(state, handles=handles, pulls=pulls, pose=pose, locality=local)
-    others = [each for each in pulls if each != name and away.get(each, np.inf) < radius]
-    carried = {each: (1.0 - (away[each] / radius) ** 2) ** 2 for each in others}
     return Grasp(grip, after, name, vertices[vertex], MappingProxyType(carried))
 
 
@@ -196,12 +195,22 @@ def _new_name(state: State, kind: str) -> str:
     return next(name for n in numbers if (name := f"{kind} {n}") not in state.handles)
 
 
-def _free_patch(mesh: Mesh, state: State, name: str, radius: float) -> IntArray:
-    """Return the patch around the handle *name*, of one vertex, that is free for it, (k,)."""
+def _free_patch(
+    mesh: Mesh, state: State, name: str, radius: float, along: Collection[str] = ()
+) -> IntArray:
+    """Return the patch around the handle *name*, of one vertex, that is free for it, (k,).
+
+    Its radius is at most half the distance to fixed vertices and to handles that are not *along*
+    with it, so that there is room to deform between them.
+    """
     (vertex,) = state.handles[name]
-    others = [ids for other, ids in state.handles.items() if other != name]
+    others = {other: ids for other, ids in state.handles.items() if other != name}
+    staying = [ids for other, ids in others.items() if other not in along]
+    ids = np.concatenate([state.fixed, *staying])
+    away = np.linalg.norm(mesh.vertices[ids] - mesh.vertices[vertex], axis=1)
+    radius = min(radius, _ROOM * float(away.min(initial=np.inf)))
     patch = np.union1d(_patch(mesh, vertex, radius), mesh.adjacency[[vertex]].indices)
-    return np.setdiff1d(patch, np.concatenate([state.fixed, *others]))
+    return np.setdiff1d(patch, np.concatenate([state.fixed, *others.values()]))
 
 
 def _patch(mesh: Mesh, vertex: int, radius: float) -> IntArray:
