@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..arrays import FloatArray, IntArray, as_points, frozen
+from ..arrays import FloatArray, IntArray, as_points, bounds_of, frozen
 from ..checks import require
 from ..errors import MeshError
 from ..freezing import Frozen, read_only
@@ -100,7 +100,13 @@ class Mesh(Frozen):
     @cached_property
     def diagonal(self) -> float:
         """Length of the bounding box diagonal, the reference length of tolerances."""
-        return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+        low, high = self.bounds
+        return float(np.linalg.norm(high - low))
+
+    @cached_property
+    def bounds(self) -> FloatArray:
+        """(2, 3) float: the smallest and the largest coordinates."""
+        return read_only(bounds_of(self.vertices))
 
     @property
     def is_closed(self) -> bool:
