@@ -28,7 +28,6 @@ from __future__ import annotations
 
 import copy
 import itertools
-import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -97,8 +96,6 @@ _PULLED = 5e-5  # largest error of pulled points in a final pose
 _FEW_STEPS = 4  # to a pose of a live solve: it may aim farther
 _MOST_CALLS = 4  # of a live solve without a pose: it aims nearer
 _LIVE, _LIVE_CORRECTIONS = 0.6, 2  # of the error of pulled points; and per live solve, at most
-_SIZES, _MOTIONS = 2.0, 1.5  # a pose moves at most so many mesh sizes and motions of targets
-_SEEN = 10_000  # vertices, of which this is checked
 _LEAST_SHARE = 1.0 / 32.0  # of the usual distance between waypoints
 _SCALED = 3e-5  # relative scale from which another solve follows
 _ROUNDING = 1e-7  # relative scale that counts as rounding
@@ -514,53 +511,14 @@ class Deformer:
         require_together(self._rest, goal, self._constraints.fixed_box)
         if within is not None and not is_number(within, 0.0):
             raise ConstraintError(f"within must be a positive number; got {shown(within)}")
-        before, offsets = (self._p, self._targets), self._constraints.pulled.offsets
+        before = self._p, self._targets
         try:
             if within is not None and not np.array_equal(goal, self._targets):
-                solution = self._approach(goal, max_steps, within, _counting(progress))
-            else:
-                solution = self._solve(goal, max_steps, _counting(progress))
+                return self._approach(goal, max_steps, within, _counting(progress))
+            return self._solve(goal, max_steps, _counting(progress))
         except Cancelled:
-            self._return_to(*before, offsets)
+            self._begin(*before)
             raise
-        if self._is_plausible(solution.vertices, goal, before[0]):
-            return solution
-        self._return_to(*before, offsets)
-        return self._missed(goal, solution)
-
-    def _return_to(self, p: FloatArray, targets: FloatArray, offsets: FloatArray) -> None:
-        """Return to an earlier pose, with the offsets of pulled points there."""
-        self._begin(p, targets)
-        self._constraints.pulled.offsets = offsets
-
-    def _is_plausible(self, x: FloatArray, goal: FloatArray, before: FloatArray) -> bool:
-        """Tell whether no vertex of *x* (n, 3) is farther away than a motion to *goal* explains.
-
-        Nor than in the pose with cages *before*, wherever it is.
-        """
-        some, size = slice(None, None, 1 + len(x) // _SEEN), self._frame.size
-        rest = self.mesh.vertices[some]
-        moved = _largest(goal - self._rest.vertices[self.handle])
-        limit = size * (_SIZES + _MOTIONS * moved)
-        if _largest(x[some] - rest) <= limit:
-            return True
-        at = self._frame.in_scene(self._map(before * size))
-        return _largest(x[some] - rest) <= _largest(at[some] - rest)
-
-    def _missed(self, goal: FloatArray, solution: Solution) -> Solution:
-        """Return the current pose instead of *solution*, which is far from every reasonable one."""
-        p = self._p * self._frame.size
-        x = self._frame.in_scene(self._map(p))
-        return replace(
-            solution,
-            vertices=x,
-            cage_vertices=tuple(p[own] + self._frame.centre for own in self.subspace.columns),
-            status=Status.MISSED,
-            errors=partial(self._errors, goal),
-            volume=partial(self._total_volume.relative, x),
-            remaining=np.inf,
-            targets=self._frame.outward(self._targets),
-        )
 
     def _solve(
         self, goal: FloatArray, max_steps: int | None, progress: Progress | None
@@ -577,7 +535,7 @@ class Deformer:
             result, x, more = self._solve_once(goal, options, is_drag)
             steps += more
             off = self._off(goal, x)
-            before, error = error, _largest(off)
+            before, error = error, float(np.linalg.norm(off, axis=1).max(initial=0.0))
             if result.status is Status.STEP_LIMIT or error <= _PULLED:
                 break
             if error > _GAIN * before:
@@ -626,9 +584,9 @@ class Deformer:
         """Correct the pose *reached* while pulled points are off their targets; also return x."""
         steps, pulled = 0, self._constraints.pulled
         x, _ = self._with_exact_volume(reached)
-        off = self._off(self._targets, x)
         for _ in range(_LIVE_CORRECTIONS):
-            error = _largest(off)
+            off = self._off(self._targets, x)
+            error = float(np.linalg.norm(off, axis=1).max(initial=0.0))
             if error <= (options.within or 0.0):
                 break
             before = pulled.offsets
@@ -642,10 +600,7 @@ class Deformer:
                 break
             reached = result
             x, _ = self._with_exact_volume(reached)
-            off = self._off(self._targets, x)
-            if _largest(off) > _GAIN * error:  # out of reach: to aim beyond only distorts
-                return reached, x, steps
-        pulled.correct(_LIVE * off, np.inf)
+        pulled.correct(_LIVE * self._off(self._targets, x), np.inf)
         return reached, x, steps
 
     def _off(self, targets: FloatArray, x: FloatArray) -> FloatArray:
@@ -826,11 +781,6 @@ class Deformer:
     def _errors(self, targets: FloatArray, x: FloatArray) -> tuple[float, ...]:
         places = self._frame.outward(targets), self._constraints.fixed_at
         return errors_at((self.handle, self.fixed), places, self.mesh.diagonal, x)
-
-
-def _largest(vectors: FloatArray) -> float:
-    """Return the largest length of *vectors* (k, 3); 0 if there are none."""
-    return math.sqrt(float(np.einsum("ij,ij->i", vectors, vectors).max(initial=0.0)))
 
 
 def _counting(progress: Progress | None) -> Progress | None:

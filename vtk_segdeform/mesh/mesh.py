@@ -22,8 +22,9 @@ from ..checks import require
 from ..errors import MeshError
 from ..freezing import Frozen, read_only
 from ..kernels import in_parallel
-from .edges import components
+from .edges import components, edge_keys
 from .faults import Search, as_soup, find_faults
+from .grouping import begins
 from .loops import loops_of
 from .topology import HalfEdges
 
@@ -135,8 +136,12 @@ class Mesh(Frozen):
     @cached_property
     def edges(self) -> IntArray:
         """(e, 2) int: the edges, smaller vertex first, in lexicographic order."""
-        keys = HalfEdges(self.faces, self.n_vertices).edge_keys
-        return read_only(np.stack(np.divmod(keys, self.n_vertices), axis=1))
+        # An edge that is not in the boundary has faces in both directions.
+        n, tail, head = self.n_vertices, self.faces, np.roll(self.faces, -1, axis=1)
+        forth = tail < head
+        keys = np.concatenate([tail[forth] * n + head[forth], edge_keys(*self.boundary.T, n)])
+        keys.sort()
+        return read_only(np.stack(np.divmod(keys[begins(keys)], n), axis=1))
 
     @cached_property
     def adjacency(self) -> sparse.csr_array:
