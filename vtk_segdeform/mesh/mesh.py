@@ -139,7 +139,8 @@ class Mesh(Frozen):
         # An edge that is not in the boundary has faces in both directions.
         n, tail, head = self.n_vertices, self.faces, np.roll(self.faces, -1, axis=1)
         forth = tail < head
-        keys = np.concatenate([tail[forth] * n + head[forth], edge_keys(*self.boundary.T, n)])
+        one, other = self.boundary.T
+        keys = np.concatenate([tail[forth] * n + head[forth], edge_keys(one, other, n)])
         keys.sort()
         return read_only(np.stack(np.divmod(keys[begins(keys)], n), axis=1))
 
