@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import sys
 import threading
@@ -29,6 +30,7 @@ from vtk_segdeform.kernels import dispatch, threads
 from vtk_segdeform.mesh import find_faults, mesh_of
 from vtk_segdeform.regions.regions import Regions
 from vtk_segdeform.subspace.subspace import Subspace, _add_product, _adjoint_product
+from vtk_segdeform.widgets.picking.line_of_sight import faces_in_beam
 
 MESH = models.torus(3000)
 RNG = np.random.default_rng(2)
@@ -57,6 +59,24 @@ def test_checks_import_numba_only_where_it_pays(monkeypatch):
     monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 100)
     assert dispatch.compiled_checks(60) is None
     assert dispatch.compiled_checks(60) is not None
+
+
+def test_kernels_are_loaded_early_in_another_thread_and_only_once(monkeypatch):
+    names = []
+    kernels = functools.cache(lambda: names.append(threading.current_thread().name))
+    started = []
+    monkeypatch.setattr(dispatch, "_kernels", kernels)
+    monkeypatch.setattr(dispatch, "Thread", lambda **k: started.append(k) or threading.Thread(**k))
+    for _ in range(2):
+        dispatch.load_early()
+        for thread in threading.enumerate():
+            if thread.name == "segdeform kernels":
+                thread.join()
+        assert names == ["segdeform kernels"]
+    kernels.cache_clear()
+    dispatch.compiled_kernels()
+    dispatch.load_early()
+    assert len(started) == 1
 
 
 def test_any_triangles_become_the_same_mesh(twin, monkeypatch):
@@ -291,6 +311,20 @@ def test_mean_value_coordinates_agree_at_any_point(twin):
     quick, plain = twin(lambda: mean_value_coordinates(points, p, cage.faces))
     assert_allclose(quick, plain, atol=1e-11)
     assert_allclose(quick @ p, points, atol=1e-11)
+
+
+@pytest.mark.parametrize("width", [0.0, 0.02, 0.4])
+def test_the_faces_in_a_beam_agree(twin, width):
+    for origin, way in RNG.normal(size=(6, 2, 3)):
+        way /= np.linalg.norm(way)
+        x = MESH.vertices + 0.02 * MOVE
+        find = partial(faces_in_beam, x, MESH.faces, origin, way, width=width)
+        quick, plain = twin(find)
+        assert_array_equal(quick, plain)
+        sides = (x - origin) - np.outer((x - origin) @ way, way)
+        near = (np.linalg.norm(sides, axis=1) < width)[MESH.faces].any(axis=1)
+        assert np.isin(np.flatnonzero(near), quick).all()
+        assert len(quick) < len(MESH.faces)
 
 
 @pytest.mark.parametrize("columns", [3, 6, 9])

@@ -134,3 +134,9 @@ def test_the_order_of_loops_is_that_of_their_first_edges():
             begin = [int(loop[0]) for loop in loops_of(boundary)]
             places = [boundary[:, 0].tolist().index(v) for v in begin]
             assert places == sorted(places)
+
+
+def test_edges_at_a_border_are_listed_whatever_their_direction():
+    for face in ([0, 1, 2], [2, 1, 0]):
+        mesh = Mesh(np.eye(3), [face])
+        assert mesh.edges.tolist() == [[0, 1], [0, 2], [1, 2]]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, bounds_of
 
 _LAYER = 0.03  # of the height: the vertices that belong to a footprint
 _CLEAR = 0.01  # difference of footprints, in squares of the middle extent; smaller ones are chance
@@ -24,8 +24,8 @@ def guess_up_axis(vertices: FloatArray) -> int:
     vertices : (n, 3) float
         Of any unit and position.
     """
-    low = vertices.min(axis=0)
-    extent = vertices.max(axis=0) - low
+    low, high = bounds_of(vertices)
+    extent = high - low
     unit = float(np.sort(extent)[1])
     if not unit > 0.0:  # points on a line
         return 1 if extent[1] > extent[2] else 2

@@ -7,7 +7,15 @@ The files, in reading order:
     compiled    the kernels, compiled by numba
 """
 
-from .dispatch import advice, compiled_checks, compiled_kernels, inputs, scratch, writable
+from .dispatch import (
+    advice,
+    compiled_checks,
+    compiled_kernels,
+    inputs,
+    load_early,
+    scratch,
+    writable,
+)
 from .threads import in_parallel, n_threads, one_blas_thread
 
 __all__ = [
@@ -16,6 +24,7 @@ __all__ = [
     "compiled_kernels",
     "in_parallel",
     "inputs",
+    "load_early",
     "n_threads",
     "one_blas_thread",
     "scratch",

@@ -2,6 +2,7 @@
 
     kernels = compiled_kernels()        the module `compiled`, or None
     kernels = compiled_checks(size)     the same for short checks, which are not worth an import
+    load_early()                        import them before they are needed
 
 numba is installed with the package on platforms that have wheels of it.  Importing it takes half a
 second, so it is imported for the first array that is large enough.  Without it everything works,
@@ -15,6 +16,7 @@ import importlib
 import importlib.util
 import os
 import sys
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -44,6 +46,16 @@ def compiled_checks(size: int) -> Any:
         if _checked[0] < sizes.COMPILED_CHECKS:
             return None
     return _kernels()
+
+
+def load_early() -> None:
+    """Begin to load the compiled kernels in another thread, if they are not loaded yet.
+
+    An editor needs them for the first mesh that is opened.  Until the thread has ended,
+    `compiled_kernels` waits for it.
+    """
+    if not _kernels.cache_info().currsize:
+        Thread(target=_load, name="segdeform kernels").start()
 
 
 def advice() -> str:
@@ -84,6 +96,12 @@ def scratch(kind: type[np.signedinteger[Any]], *sizes: int) -> list[NDArray[Any]
     ends = np.cumsum(sizes)
     room = np.empty(max(int(ends[-1]), _HUGE // kind().itemsize), dtype=kind)
     return np.split(room[: ends[-1]], ends[:-1])
+
+
+def _load() -> None:
+    kernels = _kernels()
+    if kernels is not None:
+        kernels.number_trees(np.arange(1))  # the first call of a kernel sets up the compiler
 
 
 @functools.cache

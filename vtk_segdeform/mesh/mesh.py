@@ -17,13 +17,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..arrays import FloatArray, IntArray, as_points, frozen
+from ..arrays import FloatArray, IntArray, as_points, bounds_of, frozen
 from ..checks import require
 from ..errors import MeshError
 from ..freezing import Frozen, read_only
 from ..kernels import in_parallel
-from .edges import components
+from .edges import components, edge_keys
 from .faults import Search, as_soup, find_faults
+from .grouping import begins
 from .loops import loops_of
 from .topology import HalfEdges
 
@@ -100,7 +101,13 @@ class Mesh(Frozen):
     @cached_property
     def diagonal(self) -> float:
         """Length of the bounding box diagonal, the reference length of tolerances."""
-        return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+        low, high = self.bounds
+        return float(np.linalg.norm(high - low))
+
+    @cached_property
+    def bounds(self) -> FloatArray:
+        """(2, 3) float: the smallest and the largest coordinates."""
+        return read_only(bounds_of(self.vertices))
 
     @property
     def is_closed(self) -> bool:
@@ -129,8 +136,13 @@ class Mesh(Frozen):
     @cached_property
     def edges(self) -> IntArray:
         """(e, 2) int: the edges, smaller vertex first, in lexicographic order."""
-        keys = HalfEdges(self.faces, self.n_vertices).edge_keys
-        return read_only(np.stack(np.divmod(keys, self.n_vertices), axis=1))
+        # An edge that is not in the boundary has faces in both directions.
+        n, tail, head = self.n_vertices, self.faces, np.roll(self.faces, -1, axis=1)
+        forth = tail < head
+        one, other = self.boundary.T
+        keys = np.concatenate([tail[forth] * n + head[forth], edge_keys(one, other, n)])
+        keys.sort()
+        return read_only(np.stack(np.divmod(keys[begins(keys)], n), axis=1))
 
     @cached_property
     def adjacency(self) -> sparse.csr_array:

@@ -273,12 +273,6 @@ class HalfEdges:
         return inconsistent
 
     @cached_property
-    def edge_keys(self) -> IntArray:
-        """(e,) int: the key of each edge, sorted."""
-        keys: IntArray = self.keys[self.order[self.first]]
-        return keys
-
-    @cached_property
     def net_boundary(self) -> IntArray:
         """(b, 2) int: the sum of the directed edges of the faces: those without opposites, sorted.
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from vtk_segdeform.arrays import FloatArray
-from vtk_segdeform.kernels import advice
+from vtk_segdeform.kernels import advice, load_early
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Change, Preparation, Session, saved_view
 
@@ -71,6 +71,7 @@ class Controller:
     """
 
     def __init__(self, view: View, session: Session, keys: Keys) -> None:
+        load_early()
         self.view, self.keys = view, keys
         self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL))
         self.messages = Messages(view)

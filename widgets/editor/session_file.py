@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vtk_segdeform.errors import MeshError
-from vtk_segdeform.geometry import VertexNormals, lids_of
+from vtk_segdeform.geometry import VertexNormals
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session, load_session, save_session
 
@@ -101,9 +101,9 @@ def read_session(path: Path, progress: Progress) -> Session:
         except MeshError as fault:
             raise MeshError(f"{path}: {fault}") from None
         session = Session(surface)
-        # Both are kept for the mesh.  The window does not wait for them here.
+        # They are kept with the mesh or the session.  The window does not wait for them here.
         VertexNormals(session.mesh).of(session.vertices)
-        lids_of(session.mesh, session.options.lids)
+        _ = session.mesh.bounds, session.has_volume
         progress(1.0, "Drawing mesh")
         return session
     session = load_session(path)

@@ -62,8 +62,7 @@ class Picker:
         self._visibility: _Visibility | None = None
         # Their display positions identify the camera.  The clipping range would not: it changes
         # whenever other actors are drawn.
-        ends = np.stack([self._mesh.vertices.min(axis=0), self._mesh.vertices.max(axis=0)])
-        self._box_corners = ends[np.indices((2, 2, 2)).reshape(3, -1).T, np.arange(3)]
+        self._box_corners = self._mesh.bounds[np.indices((2, 2, 2)).reshape(3, -1).T, np.arange(3)]
 
     def hits(self, pointer: Pointer) -> list[Hit]:
         """Return all intersections of the line of sight at *pointer*, the nearest first."""

@@ -6,6 +6,8 @@ another thread computes it, and until then there is none.  Its normals are those
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from threading import Thread
 from typing import Any
 
@@ -23,6 +25,28 @@ from vtk_segdeform.mesh import Mesh
 _PATIENCE = 0.02  # seconds until it is clear that the decimated mesh does not exist yet
 
 
+@dataclass(frozen=True, eq=False)
+class _Shape:
+    """The vertices (k,) of a mesh that are drawn, faces between them, and their normals."""
+
+    kept: IntArray
+    faces: IntArray
+    normals: FloatArray  # (k, 3), at rest
+    normals_of: Callable[[FloatArray], FloatArray]  # in a pose (n, 3)
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> _Shape:
+        """Return the shape of a large *mesh*."""
+        coarse, kept, _ = decimated(mesh, sizes.DECIMATED_POINTS)
+        normals_of = VertexNormals(mesh).subset(kept)
+        x, normals = mesh.vertices[kept], normals_of(mesh.vertices)
+        # Clusters may fold a face over, which light would show as a black dot.
+        faces = coarse.faces
+        a, b, c = (x[corner] for corner in faces.T)
+        folded = (np.cross(b - a, c - a) * normals[faces].sum(axis=1)).sum(axis=1) < 0.0
+        return cls(kept, np.where(folded[:, None], faces[:, ::-1], faces), normals, normals_of)
+
+
 class DecimatedSurface:
     """The decimated mesh as an actor; invisible at first.
 
@@ -30,29 +54,18 @@ class DecimatedSurface:
     ----------
     mesh : Mesh
         n vertices at rest.
-    kept : (k,) int
-        Its vertices that are drawn.
-    faces : (m, 3) int
-        Triangles between them.
-    normals : VertexNormals
-        Of *mesh*.
+    shape : _Shape
+        What is drawn.
     surface : vtkProperty
         How it is drawn.
     """
 
-    def __init__(
-        self, mesh: Mesh, kept: IntArray, faces: IntArray, normals: VertexNormals, surface: Any
-    ) -> None:
-        self._kept = kept
-        self._normals_of = normals.subset(kept)
-        x, normal = mesh.vertices, self._normals_of(mesh.vertices)
-        # Clusters may fold a face over, which light would show as a black dot.
-        a, b, c = (x[kept[corner]] for corner in faces.T)
-        folded = (np.cross(b - a, c - a) * normal[faces].sum(axis=1)).sum(axis=1) < 0.0
-        faces = np.where(folded[:, None], faces[:, ::-1], faces)
-        self._polydata = polydata_of(x[kept], np.full(len(faces), 3), faces.ravel())
+    def __init__(self, mesh: Mesh, shape: _Shape, surface: Any) -> None:
+        self._kept, self._normals_of = shape.kept, shape.normals_of
+        corners = np.full(len(shape.faces), 3), shape.faces.ravel()
+        self._polydata = polydata_of(mesh.vertices[self._kept], *corners)
         self._points: NDArray[np.float64] = vtk_to_numpy(self._polydata.GetPoints().GetData())
-        self._normals = np.array(normal, dtype=np.float32)
+        self._normals = np.array(shape.normals, dtype=np.float32)
         self._normal_array = numpy_to_vtk(self._normals)
         self._normal_array.SetName("Normals")
         self._polydata.GetPointData().SetNormals(self._normal_array)
@@ -95,15 +108,19 @@ class Decimating:
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh
         self._thread: Thread | None = None
+        self._shapes: list[_Shape] = []  # one, once the thread has made it
 
-    def result(self, normals: VertexNormals, surface: Any) -> DecimatedSurface | None:
+    def result(self, surface: Any) -> DecimatedSurface | None:
         """Return the surface; None if it is not finished yet."""
         if self._thread is None:
-            arguments = self._mesh, sizes.DECIMATED_POINTS
-            self._thread = Thread(target=decimated, args=arguments, daemon=True)
+            self._thread = Thread(target=self._work, daemon=True)
             self._thread.start()
         self._thread.join(_PATIENCE)
         if self._thread.is_alive():
             return None
-        coarse, kept, _ = decimated(self._mesh, sizes.DECIMATED_POINTS)
-        return DecimatedSurface(self._mesh, kept, coarse.faces, normals, surface)
+        if not self._shapes:
+            self._work()  # and raise what it raised
+        return DecimatedSurface(self._mesh, self._shapes[0], surface)
+
+    def _work(self) -> None:
+        self._shapes.append(_Shape.of(self._mesh))

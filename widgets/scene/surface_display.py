@@ -203,7 +203,7 @@ class SurfaceDisplay:
             return
         if self._decimated is None:
             surface = self.actor.GetProperty()
-            self._decimated = self._decimating.result(self._vertex_normals, surface)
+            self._decimated = self._decimating.result(surface)
             if self._decimated is None:
                 return
             self.view.renderer.AddActor(self._decimated.actor)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vtk_segdeform.arrays import FloatArray
+from vtk_segdeform.arrays import FloatArray, bounds_of
 from vtk_segdeform.checks import shown
 from vtk_segdeform.errors import ArgumentError
 
@@ -120,7 +120,7 @@ class Viewpoint:
         """Show everything that is visible in three-quarter front view."""
         points = self._points()
         bounds = np.array(self.view.renderer.ComputeVisiblePropBounds()).reshape(3, 2).T
-        low, high = points.min(axis=0), points.max(axis=0)
+        low, high = bounds_of(points)
         reach = 1e-3 * self._diagonal()
         if (bounds[0] <= bounds[1]).all() and (
             (bounds[0] < low - reach).any() or (bounds[1] > high + reach).any()
@@ -302,9 +302,10 @@ class Viewpoint:
         camera, (width, height) = self.view.camera, self.view.renderer.GetSize()
         slope = _MARGIN * math.tan(0.5 * math.radians(camera.GetViewAngle()))
         slopes = slope * np.array([max(width, 1) / max(height, 1), 1.0])
-        origin = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        low, high = bounds_of(points)
+        origin = 0.5 * (low + high)
         local = (points - origin) @ axes.T
-        low, high = local.min(axis=0), local.max(axis=0)
+        low, high = bounds_of(local)
         middle = 0.5 * (low + high)
         local -= middle
         smallest = _SMALLEST * self._diagonal()

@@ -10,8 +10,8 @@ from hands import picture, plain_view
 from vtkmodules.util.numpy_support import vtk_to_numpy
 
 from vtk_segdeform import Session, models, sizes
-from vtk_segdeform.geometry import VertexNormals, decimated
-from vtk_segdeform.widgets.scene import Draft, draft, surface_display
+from vtk_segdeform.geometry import VertexNormals
+from vtk_segdeform.widgets.scene import Draft, decimated_surface, draft, surface_display
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 
 
@@ -21,9 +21,9 @@ def shown(monkeypatch):
     monkeypatch.setattr(sizes, "DRAFT", 0)
     monkeypatch.setattr(sizes, "DECIMATED_POINTS", 400)
     monkeypatch.setattr(surface_display, "SLOW", -1.0)
+    monkeypatch.setattr(decimated_surface, "_PATIENCE", 60.0)
     view = plain_view()
     surface = SurfaceDisplay(view, Session(models.sphere(4000)))
-    decimated(surface.session.mesh, 400)  # as binding does; otherwise another thread does it
     view.renderer.ResetCamera()
     view.render()
     return surface
