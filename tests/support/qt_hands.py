@@ -154,9 +154,27 @@ class QtHand:
         self.press(positions[0], held)
         for position in positions[1:]:
             self.move(position)
-        last = self._pixel(positions[-1])  # the moves come from the X server, the release does not
-        until(lambda: self._pointer.place == last, "the last move")
+        self._wait_for_move(positions[-1])
         self.release(positions[-1], held)
+
+    def _wait_for_move(self, position) -> None:
+        """Wait until the widget has seen the mouse at *position*.
+
+        Moves come through the X server and the release does not, so it could arrive first.  The
+        server sends nothing if the mouse is where it was, so the move is repeated now and then.
+        """
+        place, x, y = self._pixel(position), *position
+        end = time.monotonic() + 0.5
+
+        def seen() -> bool:
+            nonlocal end
+            if time.monotonic() > end:
+                end += 0.5
+                self.move((x + 3, y))
+                self.move(position)
+            return self._pointer.place == place
+
+        until(seen, "the last move")
 
     def key(self, key: str, held=Qt.NoModifier) -> None:
         """Type a letter, a digit, or "Escape", "plus" and the like."""

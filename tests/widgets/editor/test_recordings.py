@@ -51,6 +51,7 @@ def test_the_input_is_recorded_and_replayed_from_two_files(bench, tmp_path):  # 
 
 def test_the_video_contains_the_drags_and_nothing_else(bench, tmp_path):  # noqa: F811
     bench.editor.path = tmp_path / "work.segdeform"
+    del bench.editor.view.render  # draw at every event again
     bench.type("ctrl+m")
     assert "Recording video" in bench.editor.status
     bench.hand.key("h")
