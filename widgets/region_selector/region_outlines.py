@@ -112,11 +112,14 @@ class RegionOutlines:
             self._place(text, vertices, max(1, round(scale)))
 
     def _place(self, text: Any, vertices: IntArray, frame: int) -> None:
+        display = self._view.to_display(self._surface.points[vertices])
+        in_front = np.isfinite(display).all(axis=1)  # of the camera
+        vertices, display = vertices[in_front], display[in_front]
         points = self._surface.points[vertices]
         normals = vtk_to_numpy(self._surface.polydata.GetPointData().GetNormals())[vertices]
         turned_away = normals @ self._view.view_direction > _FACING  # last choice: at a silhouette
-        display = self._view.to_display(points)
-        away = np.linalg.norm(display[:, :2] - np.nanmean(display[:, :2], axis=0), axis=1)
+        middle = display[:, :2].mean(axis=0) if len(display) else np.zeros(2)
+        away = np.linalg.norm(display[:, :2] - middle, axis=1)
         order = np.lexsort((away, turned_away))
         place = next((display[k] for k in order if self._sees(display[k], points[k])), None)
         text.SetVisibility(place is not None)
@@ -127,8 +130,6 @@ class RegionOutlines:
 
     def _sees(self, at: FloatArray, point: FloatArray) -> bool:
         """Return whether nothing is in front of *point* (3,), displayed at *at*."""
-        if not np.isfinite(at).all():
-            return False
         pointer = Pointer(Phase.HOVER, float(at[0]), float(at[1]))
         if not self._view.contains(pointer):
             return False

@@ -300,6 +300,12 @@ def test_regions_are_filled_only_where_they_are_painted_and_outlined_on_demand(b
     bench.hand.types("shift+g")
     assert (picture(bench.view) != before).any()
     assert 0 < widgets.outlines.n_numbers <= regions
+    camera = bench.view.camera
+    place, focus = np.array(camera.GetPosition()), np.array(camera.GetFocalPoint())
+    camera.SetFocalPoint(2 * place - focus)  # the mesh is behind it
+    bench.view.window.Render()
+    assert widgets.outlines.n_numbers == 0
+    camera.SetFocalPoint(focus)
     bench.hand.types("shift+g")
     bench.editor.controller.messages.clear()
     bench.editor.controller.refresh()
