@@ -25,7 +25,12 @@ def two_close_sheets():
     return together(flat, flat.with_vertices(flat.vertices + [0.0, 0.0, 1e-4]))
 
 
-@pytest.mark.parametrize("made", [cactus, two_close_sheets])
+def noisy_cactus():
+    noise = 0.1 * np.random.default_rng(0).normal(size=(4000, 3))  # several edge lengths
+    return cactus().with_vertices(cactus().vertices + noise)
+
+
+@pytest.mark.parametrize("made", [cactus, two_close_sheets, noisy_cactus])
 def test_clusters_are_connected_and_never_join_two_sheets(made):
     mesh = made()
     coarse, kept, cluster = decimated(mesh, mesh.n_vertices // 8)

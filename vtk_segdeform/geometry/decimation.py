@@ -14,6 +14,7 @@ from threading import Lock
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from scipy import sparse
 
 from ..arrays import FloatArray, IntArray
 from ..freezing import read_only
@@ -23,6 +24,8 @@ from .sampling import faces_between, unique_edges
 _PER_CELL = 1.5  # clusters in a surface, for each square of the grid that would cover it
 _ROUNDS, _GAIN = 6, 0.8  # of the search for the spacing; exponent of its correction
 _FEW, _MANY = 0.7, 1.5  # clusters, in numbers requested
+_SCATTERED = 2.0  # clusters of a noisy mesh, in numbers requested, at which its grid is smoothed
+_SMOOTHING = 8, 24, 72, 216  # passes of smoothing, one after the other, until that is enough
 
 _last: WeakKeyDictionary[Mesh, tuple[int, Mesh, IntArray, IntArray]] = WeakKeyDictionary()
 _lock = Lock()  # several threads ask for the same mesh at the same time
@@ -55,8 +58,20 @@ def decimated(mesh: Mesh, n_points: int) -> tuple[Mesh, IntArray, IntArray]:
 def _clusters(mesh: Mesh, n_points: int) -> IntArray:
     """Return the cluster of each vertex, (n,) int."""
     x = _in_own_frame(mesh.vertices)
-    i, j = mesh.edges.T
     spacing = np.sqrt(_PER_CELL * mesh.face_areas.sum() / n_points)
+    most = _SCATTERED * n_points + mesh.components.max() + 1
+    cluster, spacing = _in_cells(mesh, x, spacing, n_points)
+    for passes in _SMOOTHING:
+        if cluster.max() < most:
+            break
+        x = _smoothed(mesh, x, passes)
+        cluster, spacing = _in_cells(mesh, x, spacing, n_points)
+    return cluster
+
+
+def _in_cells(mesh: Mesh, x: FloatArray, spacing: float, n_points: int) -> tuple[IntArray, float]:
+    """Return clusters (n,) for vertices at *x* (n, 3), and the spacing, searched from *spacing*."""
+    i, j = mesh.edges.T
     least = np.ptp(x, axis=0).max() / (1 << 20)
     for _ in range(_ROUNDS):
         spacing = max(spacing, least)
@@ -69,7 +84,17 @@ def _clusters(mesh: Mesh, n_points: int) -> IntArray:
             break
         spacing *= ratio**_GAIN
     same = key[i] == key[j]
-    return connected(len(x), i[same], j[same])
+    return connected(len(x), i[same], j[same]), spacing
+
+
+def _smoothed(mesh: Mesh, x: FloatArray, passes: int) -> FloatArray:
+    """Return *x* (n, 3) after *passes* that average each point with its neighbours."""
+    near = mesh.adjacency
+    ones = sparse.csr_array((np.ones(len(near.data)), near.indices, near.indptr), near.shape)
+    size = 1.0 + np.diff(near.indptr)[:, None]
+    for _ in range(passes):
+        x = (x + ones @ x) / size
+    return np.asarray(x - x.min(axis=0))
 
 
 def _in_own_frame(positions: FloatArray) -> FloatArray:
