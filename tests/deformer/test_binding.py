@@ -63,9 +63,7 @@ OTHERS = {
         [type(c)(c.vertices * [1.0, 1.0, 1.0 + 1e-12], c.faces) for c in SCENE.cages],
         cache=cache,
     ),
-    "regions": lambda cache: Deformer(
-        SCENE.mesh, SCENE.regions.grow(1), SCENE.cages, cache=cache
-    ),
+    "regions": lambda cache: Deformer(SCENE.mesh, SCENE.regions.grow(1), SCENE.cages, cache=cache),
     "blend": lambda cache: SCENE.deformer(
         cache=cache, blend=SCENE.regions.membership / SCENE.regions.membership.sum(axis=0)
     ),

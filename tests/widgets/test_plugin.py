@@ -220,7 +220,7 @@ def test_pyvista_finds_the_plugin_by_its_entry_points():
         ),
     ],
 )
-def test_it_is_registered_whichever_is_imported_first_and_pyvista_is_not_loaded_by_the_package(imports, there):
+def test_it_is_registered_in_any_order_and_the_package_alone_does_not_load_pyvista(imports, there):
     code = (
         f"{imports}; import pyvista.plotting as p; "
         "print([hasattr(c, 'segdeform') for c in (pyvista.BasePlotter, pyvista.PolyData)])"
