@@ -68,7 +68,7 @@ def test_the_cage_of_a_sheet_follows_it_and_leaves_its_hollow_side_empty():
 def test_the_cage_of_a_sheet_does_not_depend_on_its_orientation():
     flat, faces = plate(24, 24)
     vertices = bent(flat, 1.0 / 3.0)
-    one, other = (single_cage(Mesh(vertices, f)) for f in (faces, faces[:, ::-1]))
+    one, other = (single_cage(Mesh(vertices, f), 60) for f in (faces, faces[:, ::-1]))
     np.testing.assert_allclose(one.vertices, other.vertices, atol=1e-12)
 
 

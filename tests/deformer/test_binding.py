@@ -14,7 +14,7 @@ from vtk_segdeform import Deformer, Mesh, Regions, Session, sizes
 from vtk_segdeform.deformer import binding, binding_cache
 from vtk_segdeform.errors import Cancelled
 
-SCENE = sausage(2)
+SCENE = sausage(is_coarse=True)
 TARGETS = SCENE.turned(20)
 
 
@@ -63,9 +63,7 @@ OTHERS = {
         [type(c)(c.vertices * [1.0, 1.0, 1.0 + 1e-12], c.faces) for c in SCENE.cages],
         cache=cache,
     ),
-    "regions": lambda cache: Deformer(
-        SCENE.mesh, SCENE.regions.grow(1), sausage(2).cages, cache=cache
-    ),
+    "regions": lambda cache: Deformer(SCENE.mesh, SCENE.regions.grow(1), SCENE.cages, cache=cache),
     "blend": lambda cache: SCENE.deformer(
         cache=cache, blend=SCENE.regions.membership / SCENE.regions.membership.sum(axis=0)
     ),

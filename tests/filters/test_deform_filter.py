@@ -13,15 +13,32 @@ from numpy.testing import assert_allclose, assert_array_equal
 from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 
 import vtk_segdeform as sd
+from vtk_segdeform.filters import deform_filter
 from vtk_segdeform.filters.deform_filter import SegmentedCageDeformFilter
 from vtk_segdeform.io.convert import to_polydata
 
-pytestmark = pytest.mark.usefixtures("bound_once")
+pytestmark = pytest.mark.usefixtures("bound_once", "fitted_once")
 
-MESH = sd.models.cactus(800)
+MESH = sd.models.cactus(500)
 HEIGHT = MESH.vertices[:, 2]
 FIXED, HANDLE = np.flatnonzero(HEIGHT < 0.1), np.flatnonzero(HEIGHT > 0.9)
 SHIFT = np.array([0.25, 0.0, -0.05])
+
+
+@pytest.fixture(scope="module")
+def fitted_once():
+    """Let the filter fit cages to equal regions once."""
+    known, fit = {}, deform_filter.fit_cages
+
+    def fitted(mesh, regions, n_vertices, **options):
+        key = mesh.vertices.tobytes(), regions.membership.tobytes(), n_vertices
+        if key not in known:
+            known[key] = fit(mesh, regions, n_vertices, **options)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(deform_filter, "fit_cages", fitted)
+        yield
 
 
 @pytest.fixture

@@ -28,7 +28,7 @@ def closed():
 class Scene:
     """An editor over a session, seen from the front, and a hand."""
 
-    def __init__(self, session, size=(900, 600)):
+    def __init__(self, session, size=(640, 420)):
         self.view = plain_view(size)
         self.view.camera.SetPosition(0.0, -10.0, 2.0)
         self.view.camera.SetViewUp(0.0, 0.0, 1.0)
@@ -59,7 +59,7 @@ class Scene:
 def open_editor():
     made = []
 
-    def start(session, size=(900, 600)):
+    def start(session, size=(640, 420)):
         made.append(Scene(session, size))
         return made[-1]
 
