@@ -10,7 +10,8 @@ from numpy.testing import assert_array_equal
 from solids import CUBE, icosphere, rotation, together, torus
 
 from vtk_segdeform.geometry.volume import signed_volume
-from vtk_segdeform.mesh import find_faults, mesh_of
+from vtk_segdeform.mesh import find_faults, mesh_of, winding_number
+from vtk_segdeform.mesh.shells import shell_depths
 
 SPHERE = icosphere(2)
 TURN = rotation([1.0, 2.0, 3.0], 0.7).T
@@ -159,3 +160,23 @@ def test_sheets_that_meet_along_a_line_agree_where_they_continue_each_other():
         corners = (mesh.vertices @ TURN.T)[mesh.faces[:32]]
         up = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
         assert (up > 0.0).all() or (up < 0.0).all()
+
+
+@pytest.mark.parametrize("is_closed", [True, False])
+def test_many_shells_are_found_inside_a_surface_by_columns_as_by_winding_numbers(is_closed):
+    ball, faces = icosphere(3)
+    small, small_faces = icosphere(1)
+    rng = np.random.default_rng(2)
+    places = rng.normal(size=(80, 3))
+    places *= (rng.choice([0.4, 0.8, 0.97, 1.2], size=80) / np.linalg.norm(places, axis=1))[:, None]
+    points = np.concatenate([ball, *(0.02 * small + place for place in places)])
+    if not is_closed:
+        faces = faces[1:]
+    many = [faces, *(small_faces + len(ball) + k * len(small) for k in range(80))]
+    shells = np.repeat(np.arange(81), [len(each) for each in many])
+    depth = shell_depths(points, np.concatenate(many), shells, np.ones(81, dtype=bool))
+    extremes = points[len(ball) :].reshape(80, -1, 3)
+    number = winding_number(extremes.reshape(-1, 3), ball, faces).reshape(80, -1)
+    assert_array_equal(depth[1:], (number > 0.5).all(axis=1))
+    assert depth[0] == 0
+    assert 20 < depth.sum() < 70

@@ -119,9 +119,14 @@ def inside_nodes(vertices: FloatArray, faces: IntArray, shape: tuple[int, int, i
 
 def inside_points(points: FloatArray, vertices: FloatArray, faces: IntArray) -> BoolArray:
     """Return which of (n, 3) *points* are inside a closed, outward oriented surface."""
+    return winding_by_columns(points, vertices, faces) > 0.5
+
+
+def winding_by_columns(points: FloatArray, vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the winding number of a closed surface at each of (n, 3) *points*, (n,) whole."""
     low, high = _boxes(vertices[:, :2], faces)
     order = np.argsort(points[:, 0], kind="stable")
-    inside = np.empty(len(points), dtype=bool)
+    number = np.empty(len(points))
 
     def work(start: int, stop: int) -> None:  # a band in x; each face meets a range in y of it
         band = order[start:stop]
@@ -132,14 +137,17 @@ def inside_points(points: FloatArray, vertices: FloatArray, faces: IntArray) -> 
         first = np.searchsorted(y, low[near, 1], side="left")
         last = np.searchsorted(y, high[near, 1], side="right")
         winding = np.zeros(len(band))
-        for f, i, j in zip(near, first, last, strict=True):
-            met, height, sign = _crossings(vertices, faces[f], x[i:j], y[i:j])
-            below = height < z[i:j][met]
-            winding[i + met[below]] += sign[below]
-        inside[band] = winding > 0.5
+        for f, k in _pairs(last - first):
+            at, its_faces = first[f] + k, near[f]
+            beside = (x[at] >= low[its_faces, 0]) & (x[at] <= high[its_faces, 0])
+            at, its_faces = at[beside], its_faces[beside]
+            met, height, sign = _crossings(vertices, faces[its_faces], x[at], y[at])
+            below = height < z[at[met]]
+            winding += np.bincount(at[met[below]], sign[below], minlength=len(band))
+        number[band] = winding
 
     in_parallel(work, len(points), _BAND)
-    return inside
+    return number
 
 
 def _between(xy: FloatArray, faces: IntArray, nx: int, ny: int) -> BoolArray:

@@ -13,16 +13,18 @@ winding numbers", ACM Trans. Graph. 32(4), 33, 2013.
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..kernels import compiled_checks, in_parallel, inputs
 from .grouping import first_members
-from .inside import winding_number
+from .inside import winding_by_columns, winding_number
 from .topology import HalfEdges
 from .triangles import corner_columns, cross, norm
 
 _PIECE = 10_000  # faces per task; their data fit into the cache
 NO_VOLUME = 1e-14  # relative to area times size: about the rounding error for a flat shell
+_MANY = 100  # points for which columns are quicker
 _INSIDE = 0.5 + 1e-6  # at a flat part of a shell it is 0.5: not inside
 
 
@@ -138,12 +140,39 @@ def shell_depths(
         owned, its_faces = _owned(faces[by_shell[starts[outer] : ends[outer]]])
         if its_faces[0, 1] > its_faces[0, 2]:  # the same rounding for both orientations
             its_faces = its_faces[:, [0, 2, 1]]
-        for one in near[within]:
+        inside = near[within]
+        extremes = []
+        for one in inside:
             points = vertices[_owned(faces[by_shell[starts[one] : ends[one]]])[0]]
-            extremes = np.unique([points.argmin(axis=0), points.argmax(axis=0)])
-            w = winding_number(points[extremes], vertices[owned], its_faces)
-            depth[one] += bool((np.abs(w) > _INSIDE).all())
+            extremes.append(points[np.unique([points.argmin(axis=0), points.argmax(axis=0)])])
+        begins = np.cumsum([0, *map(len, extremes[:-1])])
+        is_inside = _surrounded(np.concatenate(extremes), vertices[owned], its_faces)
+        depth[inside] += np.logical_and.reduceat(is_inside, begins)
     return depth
+
+
+def _surrounded(points: FloatArray, vertices: FloatArray, faces: IntArray) -> BoolArray:
+    """Return around which of *points* (n, 3) the winding number of a shell is 1 or -1 or more.
+
+    Columns are far quicker for many points, but they need a closed shell, and do not say whether a
+    point is on it; a point is not if the nearest vertex is farther than any edge is long.
+    """
+    by_columns = np.zeros(len(points), dtype=bool)
+    if len(points) >= _MANY and _is_closed(faces):
+        corners = vertices[faces]
+        longest = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max()
+        by_columns = cKDTree(vertices).query(points)[0] > longest
+    found = np.zeros(len(points), dtype=bool)
+    found[by_columns] = np.abs(winding_by_columns(points[by_columns], vertices, faces)) > _INSIDE
+    found[~by_columns] = np.abs(winding_number(points[~by_columns], vertices, faces)) > _INSIDE
+    return found
+
+
+def _is_closed(faces: IntArray) -> bool:
+    """Return whether each edge has as many faces in one direction as in the other."""
+    tail, head = faces.T, faces[:, [1, 2, 0]].T
+    n = int(faces.max(initial=0)) + 1
+    return np.array_equal(np.sort((tail * n + head).ravel()), np.sort((head * n + tail).ravel()))
 
 
 def _owned(faces: IntArray) -> tuple[IntArray, IntArray]:
