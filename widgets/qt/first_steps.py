@@ -70,9 +70,19 @@ class FirstSteps(QtWidgets.QWidget):
             self._settings.sync()
 
     def mousePressEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
-        """Dismiss the cards."""
-        event.accept()
+        """Dismiss the cards, and leave the press to the view: it may be the first pull."""
         self.dismiss()
+        place = event.globalPosition().toPoint() if hasattr(event, "globalPosition") else None
+        place = event.globalPos() if place is None else place  # of Qt 5
+        press = QtGui.QMouseEvent(
+            event.type(),
+            QtCore.QPointF(self._view.mapFromGlobal(place)),
+            QtCore.QPointF(place),
+            event.button(),
+            event.buttons(),
+            event.modifiers(),
+        )
+        QtWidgets.QApplication.sendEvent(self._view, press)
 
     def showEvent(self, event: Any) -> None:  # noqa: N802
         """Place the cards, and wait for a pull."""

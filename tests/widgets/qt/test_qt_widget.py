@@ -513,10 +513,16 @@ def test_the_first_steps_are_shown_once_until_a_click_escape_or_a_pull(make, sta
     plotter.setFocus()
     QtTest.QTest.keyClick(plotter, Qt.Key_Escape)
     assert not cards.isVisible()
-    for dismiss in (
-        lambda: QtTest.QTest.mouseClick(cards, Qt.LeftButton, Qt.NoModifier, QtCore.QPoint(9, 9)),
-        lambda: bend(seen),
-    ):
+
+    def press() -> None:
+        camera, corner = seen.editor.view.camera, QtCore.QPoint(9, 9)
+        place, start = camera.GetPosition(), cards.mapTo(plotter, corner)
+        QtTest.QTest.mousePress(cards, Qt.LeftButton, Qt.NoModifier, corner)
+        QtTest.QTest.mouseMove(plotter, start + QtCore.QPoint(60, 90))
+        until(lambda: camera.GetPosition() != place, "the view to be pressed")
+        QtTest.QTest.mouseRelease(plotter, Qt.LeftButton, Qt.NoModifier, start)
+
+    for dismiss in (press, lambda: bend(seen)):
         cards.show()
         for size in ((1400, 500), (500, 700)):  # side by side and below each other
             seen.widget.resize(*size)
