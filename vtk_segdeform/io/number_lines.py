@@ -18,7 +18,7 @@ _LINE_FEED, _SPACE, _TAB = b"\n \t"
 
 
 class Lines:
-    """The lines of a text, those that begin with one of *words* and a blank by that word."""
+    """The lines of a text, grouped by their first word if it is one of *words*."""
 
     def __init__(self, text: str, words: tuple[str, ...]) -> None:
         self._text = text.encode() + b"\n" * (not text.endswith("\n"))

@@ -39,7 +39,7 @@ from .handles import (
 )
 from .state import Locality, Pose, State
 
-_ROOM = 0.5  # of the distance between a patch and what stays
+_ROOM = 0.5  # share of the distance from a patch to the nearest point that stays
 _SAME_POINT = 0.25  # of the radius: a pulled point so close is grabbed again
 
 

@@ -109,7 +109,7 @@ class FirstSteps(QtWidgets.QWidget):
         return bool(super().eventFilter(watched, event))
 
     def changeEvent(self, event: Any) -> None:  # noqa: N802
-        """Place the cards anew in another font."""
+        """Update the layout after a change of font."""
         super().changeEvent(event)
         if event.type() == QtCore.QEvent.Type.FontChange:
             self._place()

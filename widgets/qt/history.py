@@ -83,7 +83,7 @@ class HistoryPart(QtWidgets.QWidget):
         return bool(super().eventFilter(watched, event))
 
     def changeEvent(self, event: Any) -> None:  # noqa: N802
-        """Draw the rows anew in a new palette or font."""
+        """Redraw the rows after a change of palette or font."""
         super().changeEvent(event)
         if event.type() in (QtCore.QEvent.Type.PaletteChange, QtCore.QEvent.Type.FontChange):
             self._shown = (), -1

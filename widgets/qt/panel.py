@@ -72,7 +72,7 @@ class DeformPanel(QtWidgets.QWidget):
             self.regions: {Mode.REGIONS, Mode.CAGES, Mode.DEFORM},
             self.painting: {Mode.REGIONS, Mode.HANDLES},
         }
-        self._keys: Keys | None = None  # those that are shown
+        self._keys: Keys | None = None  # as shown
         self._shortcuts: list[Any] = []
         self._build()
         self._delay = QtCore.QTimer(self)
