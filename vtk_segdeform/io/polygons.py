@@ -47,7 +47,7 @@ def _require_polygons(n_points: int, counts: IntArray, corners: IntArray) -> Non
         )
     if len(counts) and counts.min() < 3:
         raise MeshError(
-            f"{np.count_nonzero(counts < 3)} faces have fewer than three corners; remove them"
+            f"faces with fewer than three corners: {np.count_nonzero(counts < 3)}; remove them"
         )
 
 
