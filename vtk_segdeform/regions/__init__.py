@@ -5,7 +5,7 @@ The files, in reading order:
     regions         `Regions`: membership and blend weights
     blending        blend weights in the overlaps, eqs. (3) and (4)
     segmentation    `segment`: automatic regions
-    necks           cuts between limbs and the rest
+    limbs           limbs, and the curves along which they are cut off
     slices          parts of equal area where there are no limbs
     coarse          the coarse surface on which cuts are searched
     borders         smoothing of the borders between parts on the mesh

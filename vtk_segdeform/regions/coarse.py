@@ -13,6 +13,7 @@ area of a point is the area of its cell, so that the total is exact.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -50,6 +51,12 @@ class Surface:
     graph: sparse.csr_array
     contact: sparse.csr_array
 
+    @cached_property
+    def lines(self) -> tuple[IntArray, IntArray]:
+        """The ends (i, j) of the lines of the graph, each in both directions."""
+        i, j = self.graph.nonzero()
+        return i.astype(np.int64), j.astype(np.int64)
+
     def part(self, ids: IntArray) -> Surface:
         """Return the surface over the points *ids*, renumbered in their order."""
         number = np.full(len(self.areas), -1)
@@ -75,13 +82,20 @@ class Surface:
 
         Both sides are then connected if the surface is.
         """
+        i, j = self.lines
+        uncut = np.append(0, np.cumsum(inside[i] == inside[j]))[self.graph.indptr]
+        kept = self.graph.indices[inside[i] == inside[j]]
+        links = sparse.csr_array((np.ones(len(kept)), kept, uncut), shape=self.graph.shape)
+        count, _ = csgraph.connected_components(links, directed=False)
+        if count == 2:
+            return inside
         outside = np.zeros_like(inside)
         outside[self.pieces(~inside)[0]] = True
         largest = np.zeros_like(inside)
         largest[self.pieces(~outside)[0]] = True
         return largest
 
-    def distances_from_ends(self, rim: FloatArray) -> list[FloatArray]:
+    def distances_from_ends(self, rim: FloatArray, most: int = _ENDS) -> list[FloatArray]:
         """Return distances (k,) from the ends of the surface; their level sets run across limbs.
 
         The first ends are the largest connected pieces of {rim > 0}, with *rim* (k,) the length of
@@ -94,7 +108,7 @@ class Surface:
             loops.sort(key=lambda loop: -rim[loop].sum())
             fields = [self.distance(loop) for loop in loops[:_LOOPS]]
             nearest = np.min(fields, axis=0)
-        for number in range(min(_ENDS, len(rim))):
+        for number in range(min(most, len(rim))):
             fields.append(self.distance(np.array([np.argmax(nearest)])))
             first = number == 0 and not rim.any()  # discard the arbitrary start
             nearest = fields[-1] if first else np.minimum(nearest, fields[-1])

@@ -1,16 +1,18 @@
 """Automatic segmentation: limbs are separated from the trunk, and large parts sliced evenly.
 
-The shape is cut in two at its best neck (`necks`), then the part with the best remaining neck, and
-so on, until the requested number of parts is reached or no neck is left.  If more parts are
-requested than there are limbs, the largest are cut into slices of about equal area (`slices`).
-All this is computed on a coarse surface (`coarse`), so that it costs about the same for every mesh
-and hardly depends on the resolution of the mesh.
+Limbs are the parts behind short curves along which the surface is concave (`limbs`): heads, arms,
+legs, tails, fingers.  If fewer parts are requested than there are limbs, only the most distinct are
+separated; if more, the largest parts are cut into slices of about equal area (`slices`).  All this
+is computed on a coarse surface (`coarse`), so that it costs about the same for every mesh and
+hardly depends on the resolution of the mesh.
 
 Finally the borders between parts are shortened and moved into creases on the mesh (`borders`), or,
 of a large mesh, on a decimated one.
 """
 
 from __future__ import annotations
+
+from operator import itemgetter
 
 import numpy as np
 
@@ -24,13 +26,14 @@ from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part, tell
 from .borders import connected_parts, smooth_borders
 from .coarse import Surface, coarsen
-from .necks import Neck, best_neck
+from .limbs import find_limbs
 from .regions import Regions
 from .slices import fair_slice, quotas
 
-_POINTS = 3000  # of the coarse copy, about
+_POINTS = 2000  # of the coarse copy, about
 _POINTS_PER_REGION = 16  # at least
-_TYPICAL = 6  # without a requested number, a region's typical area is the whole over this
+_SMALL = 16  # without a requested number, a region's typical area is the whole over this
+_LEAST = 0.2  # area of the smallest limb, relative to that of a region
 _OVERLAP = 0.1  # rings, relative to the width of a region in edges
 _TIE_BREAK = 1e-3  # relative to an edge
 
@@ -51,8 +54,8 @@ def segment(
     mesh : Mesh
         n vertices, one or several components.
     n_regions : int, optional
-        Number of regions, 1 to n.  None separates every limb (`necks.NECK`) and nothing else: one
-        region for a sphere, three for a cactus with two arms.
+        Number of regions, 1 to n.  None separates every limb and nothing else: one region for
+        a sphere, three for a cactus with two arms, six for a man: head, arms, legs and trunk.
     overlap : int, optional
         Number of edge rings by which each region grows over its neighbours.  None means a tenth of
         the width of a region in edges, sqrt(n / regions) / 10, at least 2: the same width in space
@@ -130,43 +133,36 @@ def _without_ties(mesh: Mesh) -> Mesh:
 
 def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -> IntArray:
     """Return the part of each point, (k,) int: limbs first, then slices of large parts."""
-    everything = np.ones(len(surface.areas), dtype=bool)
-    labels = np.empty(len(everything), dtype=np.int64)
-    share = surface.areas.sum() / (n_regions or _TYPICAL)
-    wanted = n_regions or np.inf
-
-    def extracted(label: int) -> tuple[IntArray, Surface, FloatArray]:
-        ids = np.flatnonzero(labels == label)
-        part = surface.part(ids)
-        rim = surface.contact[ids].sum(axis=1) - part.contact.sum(axis=1)
-        return ids, part, np.where(rim > 1e-9 * np.sqrt(share), rim, 0.0)
-
-    components = surface.pieces(everything)
+    labels = np.empty(len(surface.areas), dtype=np.int64)
+    share = surface.areas.sum() / (n_regions or _SMALL)
+    components = surface.pieces(np.ones(len(labels), dtype=bool))
+    limbs: list[tuple[float, float, IntArray]] = []
     for label, ids in enumerate(components):
         labels[ids] = label
-    necks: list[Neck | None]
-    necks = []
-    for label in range(len(components)):
-        necks.append(best_neck(*extracted(label)[1:], share))
-        tell(progress, 0.1 + 0.2 * len(necks) / len(components), "detecting limbs")
-    while len(necks) < wanted:
-        ranks = [np.inf if neck is None else neck.rank for neck in necks]
-        label = int(np.argmin(ranks))
-        neck = necks[label]
-        if neck is None:
-            break
-        labels[np.flatnonzero(labels == label)[neck.inside]] = len(necks)
-        necks[label] = best_neck(*extracted(label)[1:], share)
-        necks.append(best_neck(*extracted(len(necks))[1:], share))
-        tell(progress, 0.3 + 0.2 * min(1.0, len(necks) / min(wanted, 20)), "separating limbs")
+        for limb in find_limbs(surface.part(ids), _LEAST * share):
+            rank = limb.score * max(1.0, share / limb.area) ** 2  # large and distinct ones first
+            limbs.append((rank if n_regions else limb.score, limb.area, ids[limb.inside]))
+        tell(progress, 0.1 + 0.4 * (label + 1) / len(components), "detecting limbs")
+    limbs.sort(key=itemgetter(0))
+    if n_regions is not None:
+        limbs = limbs[: n_regions - len(components)]
+    limbs.sort(key=itemgetter(1), reverse=True)  # those inside others last
+    for label, (_, _, ids) in enumerate(limbs, len(components)):
+        labels[ids] = label
+    labels = np.unique(labels, return_inverse=True)[1].astype(np.int64)
 
-    count = len(necks)
+    count = int(labels.max()) + 1
     areas = np.bincount(labels, surface.areas).astype(float)
     to_slice = list(enumerate(quotas(areas, np.bincount(labels), n_regions or count)))
     while to_slice:
         label, quota = to_slice.pop()
-        ids, part, rim = extracted(label)
         if quota > 1:
+            ids = np.flatnonzero(labels == label)
+            part = surface.part(ids)
+            cut = np.asarray(
+                surface.contact[ids].sum(axis=1) - part.contact.sum(axis=1), dtype=float
+            )
+            rim = np.where(cut > 1e-9 * np.sqrt(share), cut, 0.0)
             inside = fair_slice(part, rim, (quota // 2) / quota)
             labels[ids[inside]] = count
             size = int(inside.sum())  # neither side gets more parts than it has points
