@@ -17,7 +17,7 @@ from operator import itemgetter
 import numpy as np
 
 from .. import sizes
-from ..arrays import FloatArray, IntArray, is_whole
+from ..arrays import IntArray, is_whole
 from ..checks import shown
 from ..errors import ArgumentError, RegionError
 from ..geometry import decimated
