@@ -196,8 +196,8 @@ class PolyDataTools:
         handle: ArrayLike,
         targets: ArrayLike,
         *,
-        n_regions: int | None = 3,
-        n_cage_vertices: int = 155,
+        n_regions: int | None = None,
+        n_cage_vertices: int | None = None,
         preserve_volume: bool = True,
         lids: bool | None = None,
         progress: Progress | None = None,
@@ -233,7 +233,9 @@ class PolyDataTools:
             _log.warning("handle error %.2g %% of model size: %s", error, solution.status)
         return surface.moved(solution.vertices)
 
-    def regions(self, n_regions: int | None = 3, progress: Progress | None = None) -> pv.PolyData:
+    def regions(
+        self, n_regions: int | None = None, progress: Progress | None = None
+    ) -> pv.PolyData:
         """Return a copy with the regions used by a deformation, as point arrays.
 
         ``region`` (p,) int is the region with the largest weight, ``regions_here`` (p,) int the
@@ -241,8 +243,8 @@ class PolyDataTools:
 
         Parameters
         ----------
-        n_regions : int or None
-            Number of regions; None lets `vtk_segdeform.segment` choose.
+        n_regions : int, optional
+            Number of regions; by default one for each limb and one for the trunk.
         progress : Progress, optional
             Progress callback; may cancel.
         """

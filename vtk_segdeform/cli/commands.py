@@ -16,7 +16,7 @@ import numpy as np
 
 from .. import io
 from ..arrays import FloatArray, IntArray
-from ..cages import Cage, fit_cages
+from ..cages import Cage, fit_cages, suggested_size
 from ..deformer import Deformer
 from ..errors import ConstraintError, MeshError
 from ..geometry import lids_of
@@ -151,9 +151,11 @@ def _regions(options: Namespace, surface: Surface, progress: Progress | None) ->
 def _subspace(
     options: Namespace, surface: Surface, progress: Progress | None
 ) -> tuple[Regions, tuple[Cage, ...]]:
-    found, number = _regions(options, surface, part(progress, 0.0, 0.3)), options.cage_vertices
+    found = _regions(options, surface, part(progress, 0.0, 0.3))
+    number = options.cage_vertices
+    size = suggested_size(found) if number is None else number
     fitting = part(progress, 0.3, 1.0)
-    return found, fit_cages(surface.mesh, found, n_vertices=number, progress=fitting)
+    return found, fit_cages(surface.mesh, found, n_vertices=size, progress=fitting)
 
 
 def _selected(text: str, surface: Surface, role: Role) -> IntArray:

@@ -307,16 +307,16 @@ def _output_folder(parser: argparse.ArgumentParser, name: str) -> None:
 
 
 def _regions(parser: argparse.ArgumentParser) -> None:
-    text = "number of regions, 'auto', or a point array of region numbers (default: 3)"
-    parser.add_argument("--regions", default="3", metavar="N", help=text)
+    text = "number of regions, 'auto', or a point array of region numbers (default: auto)"
+    parser.add_argument("--regions", default="auto", metavar="N", help=text)
     text = "overlap of regions from a point array, in edge rings (default: 4)"
     parser.add_argument("--overlap", type=_count, default=4, metavar="RINGS", help=text)
 
 
 def _cages(parser: argparse.ArgumentParser) -> None:
     _regions(parser)
-    text = "total cage vertices (default: 155)"
-    parser.add_argument("--cage-vertices", type=_count, default=155, metavar="N", help=text)
+    text = "total cage vertices (default: by the number of regions)"
+    parser.add_argument("--cage-vertices", type=_count, default=None, metavar="N", help=text)
 
 
 def _pull(parser: argparse.ArgumentParser) -> None:

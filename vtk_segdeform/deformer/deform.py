@@ -20,7 +20,7 @@ def deform(
     handle: ArrayLike,
     targets: ArrayLike,
     *,
-    n_regions: int | None = 3,
+    n_regions: int | None = None,
     n_cage_vertices: int | None = None,
     preserve_volume: bool = True,
     lids: bool | None = None,
@@ -39,8 +39,8 @@ def deform(
     targets : (len(handle), 3) float
         Positions of the handle vertices, in the order of *handle* (of its true entries, if it is a
         mask).
-    n_regions : int or None
-        How many regions; None lets `segment` choose.
+    n_regions : int, optional
+        Number of regions; by default one for each limb and one for the trunk, see `segment`.
     n_cage_vertices : int, optional
         Total number of cage vertices; by default it follows the number of regions.
     preserve_volume : bool

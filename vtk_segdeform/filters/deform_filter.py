@@ -33,7 +33,7 @@ from vtkmodules.vtkCommonCore import vtkOutputWindow
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkPolyData
 
 from ..arrays import FloatArray, as_ids
-from ..cages import Cage, fit_cages
+from ..cages import Cage, fit_cages, suggested_size
 from ..deformer import Deformer
 from ..errors import CageError, Cancelled, ConstraintError, SegDeformError
 from ..geometry import lids_of, local_volume_change
@@ -155,9 +155,8 @@ class SegmentedCageDeformFilter(FilterSettings):
         else:
             regions = segment(mesh, settings.n_regions or None, progress=part(progress, 0.0, 0.2))
         if not cages:
-            cages = fit_cages(
-                mesh, regions, settings.n_cage_vertices, progress=part(progress, 0.2, 0.7)
-            )
+            size = settings.n_cage_vertices or suggested_size(regions)
+            cages = fit_cages(mesh, regions, size, progress=part(progress, 0.2, 0.7))
         binding = part(progress, 0.7, 0.95)
         return Deformer(mesh, regions, cages, stretch=settings.stretch, progress=binding)
 

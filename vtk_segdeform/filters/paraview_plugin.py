@@ -78,13 +78,13 @@ class SegmentedCageDeform(SegmentedCageDeformFilter):
     def SetRotationAngle(self, degrees: float) -> None:  # noqa: N802
         super().SetRotationAngle(degrees)
 
-    @smproperty.intvector(name="NumberOfRegions", default_values=3)
+    @smproperty.intvector(name="NumberOfRegions", default_values=0)
     @smdomain.intrange(min=0, max=24)
     def SetNumberOfRegions(self, count: int) -> None:  # noqa: N802
         super().SetNumberOfRegions(count)
 
-    @smproperty.intvector(name="NumberOfCageVertices", default_values=155)
-    @smdomain.intrange(min=12, max=2000)
+    @smproperty.intvector(name="NumberOfCageVertices", default_values=0)
+    @smdomain.intrange(min=0, max=2000)
     def SetNumberOfCageVertices(self, count: int) -> None:  # noqa: N802
         super().SetNumberOfCageVertices(count)
 

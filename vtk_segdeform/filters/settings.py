@@ -18,8 +18,8 @@ from ..errors import ArgumentError
 class Settings:
     """The settings and their defaults."""
 
-    n_regions: int = 3
-    n_cage_vertices: int = 155
+    n_regions: int = 0
+    n_cage_vertices: int = 0
     overlap: int = 4
     region_array: str = ""
     fixed_array: str = "fixed"
@@ -48,7 +48,7 @@ class FilterSettings(VTKPythonAlgorithmBase):  # type: ignore[misc]
         self._set(n_regions=_integer(count, "count"))
 
     def SetNumberOfCageVertices(self, count: int) -> None:  # noqa: N802
-        """Set the total number of vertices of fitted cages."""
+        """Set the total number of vertices of fitted cages; 0 means by the number of regions."""
         self._set(n_cage_vertices=_integer(count, "count"))
 
     def SetRegionArrayName(self, name: str) -> None:  # noqa: N802

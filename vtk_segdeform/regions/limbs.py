@@ -96,11 +96,15 @@ def find_limbs(surface: Surface, least: float) -> list[Limb]:
 
 def _candidates(surface: Surface, least: float, limbs: list[Limb], n_tips: int) -> list[Limb]:
     """Return candidates from the tips of the surface without *limbs*."""
-    bare = ~np.any([np.zeros(len(surface.areas), dtype=bool), *(x.inside for x in limbs)], axis=0)
-    ids = np.flatnonzero(bare)
+    taken = np.zeros(len(surface.areas), dtype=bool)
+    for limb in limbs:
+        taken |= limb.inside
+    ids = surface.pieces(~taken)[0]
     body = surface.part(ids)
+    taken[:] = True
+    taken[ids] = False
     pieces = [
-        (piece, surface.contact[piece][:, ids].sum(axis=0)) for piece in surface.pieces(~bare)
+        (piece, surface.contact[piece][:, ids].sum(axis=0)) for piece in surface.pieces(taken)
     ]
     rim = np.sum([np.zeros(len(ids)), *(touch for _, touch in pieces)], axis=0)
     candidates: list[Limb] = []
@@ -109,7 +113,7 @@ def _candidates(surface: Surface, least: float, limbs: list[Limb], n_tips: int) 
         level = np.zeros(len(surface.areas))
         level[ids] = d
         for piece, touch in pieces:  # all of it on one side
-            level[piece] = touch @ d / touch.sum()
+            level[piece] = touch @ d / max(touch.sum(), _TINY)
         rough = [
             _limb(surface, least, level < t, 0.0 if limbs else length)
             for t, length in _level_sets(body, least, d, _PER_TIP)
