@@ -33,6 +33,7 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from ..kernels import compiled_kernels, inputs
 from ..mesh import Mesh
 
+_FACES = 50  # of a mesh, for which shortest paths take as long as one face of a volume
 _PAIRS_AT_ONCE = 400_000  # point-triangle pairs processed at once, about 100 MB
 
 
@@ -81,7 +82,7 @@ def border_distance(
     is processed on its own.
     """
     distance = np.zeros(membership.shape)
-    kernels, graph = compiled_kernels(mesh.n_faces), mesh.adjacency
+    kernels, graph = compiled_kernels(mesh.n_faces // _FACES), mesh.adjacency
     for d, members, edge in zip(distance, membership, borders(mesh, membership), strict=True):
         if kernels:
             d[members] = np.inf
@@ -104,8 +105,8 @@ def overlap_weights(mesh: Mesh, membership: BoolArray, power: float) -> FloatArr
     shared = np.flatnonzero(np.count_nonzero(membership, axis=0) > 1)
     weights = membership.astype(np.float64)
     if len(shared):
-        distance = border_distance(mesh, membership, shared)[:, shared]
-        weights[:, shared] = blend_weights(membership[:, shared], distance, power)
+        distance = np.take(border_distance(mesh, membership, shared), shared, axis=1)
+        weights[:, shared] = blend_weights(np.take(membership, shared, axis=1), distance, power)
     return weights
 
 

@@ -198,7 +198,8 @@ class Bodies:
             determinants[start:stop] = np.einsum("ij,ij->i", a - points[0], np.cross(e, f))
 
         in_parallel(work, len(faces), _PIECE)
-        return np.bincount(self._component, determinants, len(self.lids.encloses))
+        sums = np.bincount(self._component, determinants, len(self.lids.encloses))
+        return np.asarray(sums, dtype=np.float64)
 
     @cached_property
     def _outer(self) -> IntArray:
