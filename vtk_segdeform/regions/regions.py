@@ -26,7 +26,6 @@ from ..mesh import Mesh, counted, require_mesh
 from .blending import (
     blend_weights,
     border_distance,
-    border_edges,
     distance_to_triangles,
     overlap_weights,
 )
@@ -186,7 +185,7 @@ class Regions(Frozen):
         if not is_whole(rings, 0):
             raise RegionError(f"rings must be a whole number, 0 or more; got {shown(rings)}")
         membership = self.membership.copy()
-        graph, (i, j) = self.mesh.adjacency, border_edges(self.mesh, membership)
+        graph, (i, j) = self.mesh.adjacency, self.mesh.edges.T
         for members in membership:
             border = members[i] != members[j]
             last = np.unique(np.where(members[i[border]], i[border], j[border]))
