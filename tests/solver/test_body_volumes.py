@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from vtk_segdeform import models
+from vtk_segdeform import models, sizes
 from vtk_segdeform.cages import fit_cages
 from vtk_segdeform.deformer import Deformer
 from vtk_segdeform.geometry import lids_of, signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
-from vtk_segdeform.solver import body_volumes, total_volume
+from vtk_segdeform.solver import Bodies, total_volume
 
 BAR = models.bar(size=(0.2, 0.2, 1.0), divisions=(2, 2, 10))
 BALL = models.sphere(162)
@@ -29,12 +29,13 @@ def joined(*parts: tuple[Mesh, float, float, int]) -> Mesh:
 
 def constraints_of(mesh: Mesh, moved=()):
     lids = lids_of(mesh)
-    return body_volumes(mesh, total_volume(mesh, lids), lids, np.array(moved, dtype=np.int64))
+    bodies = Bodies(mesh, total_volume(mesh, lids), lids)
+    return bodies.constraints(bodies.numbers(np.array(moved, dtype=np.int64)))
 
 
 def test_one_body_has_the_constraint_of_the_whole():
-    whole, lids = total_volume(BAR), lids_of(BAR)
-    assert body_volumes(BAR, whole, lids, np.arange(1)) == (whole,)
+    bodies = Bodies(BAR, whole := total_volume(BAR), lids_of(BAR))
+    assert bodies.constraints(bodies.numbers(np.arange(1))) == (whole,)
 
 
 @pytest.mark.parametrize("count", [2, 6, 9])
@@ -51,7 +52,7 @@ def test_a_moved_body_has_its_own_constraint_however_small():
     mesh = joined(*((BALL, 3.0 * k, 1.0 - 0.05 * k, 1) for k in range(10)))
     last = mesh.n_vertices - 1
     target = signed_volume(BALL.vertices, BALL.faces) * 0.55**3
-    assert_allclose(constraints_of(mesh, [last])[0].target, target, rtol=1e-12)
+    assert_allclose(constraints_of(mesh, [last])[5].target, target, rtol=1e-12)
 
 
 def test_a_cavity_belongs_to_the_body_around_it():
@@ -61,10 +62,30 @@ def test_a_cavity_belongs_to_the_body_around_it():
     assert_allclose(targets, [ball * (1 - 0.5**3), ball * 0.8**3], rtol=1e-12)
 
 
-def test_splinters_share_the_constraint_of_the_first_body():
+def test_splinters_share_the_constraint_of_the_largest_body():
     mesh = joined((BALL, 0.0, 1.0, 1), (BALL, 4.0, 0.01, 1), (BALL, 8.0, 0.02, 1))
     (only,) = constraints_of(mesh)
     assert_allclose(only.target, total_volume(mesh).target, rtol=1e-14)
+
+
+@pytest.mark.parametrize("separate", [True, False])
+def test_large_bodies_are_scaled_one_by_one_unless_a_cage_moves_two(separate, monkeypatch):
+    for size in ("COARSE_VOLUME", "SCALED_VOLUME"):
+        monkeypatch.setattr(sizes, size, 300)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 200)
+    mesh = joined((BALL, 0.0, 1.0, 1), (BALL, 5.0, 1.5, 1))
+    regions = Regions.from_labels(mesh, mesh.components) if separate else Regions.single(mesh)
+    deformer = Deformer(mesh, regions, fit_cages(mesh, regions, 40))
+    first, last = int(mesh.vertices[:, 0].argmin()), int(mesh.vertices[:, 0].argmax())
+    deformer = deformer.hold(fixed=[first], handle=[last])
+    solution = deformer.solve(mesh.vertices[[last]] + [0.5, 0.0, 0.7])
+    assert (deformer._constraints.scaled is not None) is separate
+    assert_allclose(
+        [c.relative(solution.vertices) for c in deformer.preserved_volumes], 0, atol=3e-15
+    )
+    assert_allclose(deformer.surface(solution.cage_vertices), solution.vertices, atol=1e-13)
+    assert deformer.hold(handle=[first]).preserved_volumes is deformer.preserved_volumes
+    assert_allclose(solution.vertices[first], mesh.vertices[first], atol=5e-3)
 
 
 def test_pulling_one_body_changes_the_volume_of_none():

@@ -134,4 +134,4 @@ def test_after_a_failure_of_the_gpu_the_processor_is_used(monkeypatch, when):
     deformer = SCENE.deformer()
     there = deformer.solve(TARGETS)
     assert_array_equal(there.vertices, here.vertices)
-    assert deformer._scaled_surface._gpu is None
+    assert deformer._constraints.scaled._gpu is None

@@ -34,7 +34,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from types import EllipsisType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -53,6 +53,7 @@ from ..progress import Progress, tell
 from ..regions import Regions, require_regions
 from ..solver import (
     Anchors,
+    Bodies,
     GaussNewton,
     ScaledSurface,
     Solution,
@@ -62,7 +63,6 @@ from ..solver import (
     VolumeConstraint,
     Volumes,
     WeightContinuation,
-    body_volumes,
     connected_sets,
     errors_at,
     moved_along,
@@ -162,6 +162,17 @@ class _Approach:
         return True
 
 
+class _Preserved(NamedTuple):
+    """The volumes to preserve; the same for all handles on the same bodies."""
+
+    constraints: tuple[VolumeConstraint, ...]
+    """On the mesh."""
+    volumes: Volumes
+    """On the surface of the steps."""
+    scaled: ScaledSurface | None
+    """If poses are scaled to their exact volume."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Constraints:
     """Fixed vertices and handles, in solver coordinates; made by `Deformer._constrain`."""
@@ -172,10 +183,10 @@ class _Constraints:
     places_of_targets: sparse.csr_array  # (s, k), from targets to the places of their sets
     places_of_fixed: FloatArray  # (s, 3)
     fixed_box: FloatArray  # (2, 3), corners of the box around the fixed vertices; or (0, 3)
-    anchor: FloatArray  # (3,), mean of the fixed vertices: the centre when a pose is scaled
+    anchors: FloatArray  # (c, 3), the centres when the c bodies of a pose are scaled
     preserved: tuple[VolumeConstraint, ...]  # on the mesh
     volumes: Volumes  # the same on the surface of the steps
-    is_scaled: bool  # whether exact volume is restored by scaling
+    scaled: ScaledSurface | None  # restores exact volume by scaling
     solver: GaussNewton  # with the initial weights
     pulled: _PulledPoints
 
@@ -246,10 +257,8 @@ class Deformer:
 
     _lids: Lids
     _total_volume: VolumeConstraint
-    _known_volumes: dict[
-        tuple[bool, bool, tuple[int, ...]], tuple[tuple[VolumeConstraint, ...], Volumes]
-    ]
-    _scaled_surface: ScaledSurface
+    _bodies: Bodies
+    _known_volumes: dict[bytes | bool, _Preserved]
     _constraints: _Constraints
     _continuation: WeightContinuation
     _aim: _Approach
@@ -692,22 +701,21 @@ class Deformer:
         self._p, directions, size = result.p, result.directions, self._frame.size
         if not directions or not self._options.exact_volume:
             return self._map(self._p * size), 0.0
-        if self._constraints.is_scaled:
-            return self._scaled()
+        if self._constraints.scaled is not None:
+            return self._scaled(self._constraints.scaled)
         paths = self._map(self._p * size, [z * size for z in directions])
         steps = steps_to_volume(self._constraints.preserved, paths)
         self._p = self._p + sum(tk * z for tk, z in zip(steps, directions, strict=True))
         return moved_along(paths, steps), 0.0
 
-    def _scaled(self) -> tuple[FloatArray, float]:
+    def _scaled(self, surface: ScaledSurface) -> tuple[FloatArray, float]:
         """Scale the mesh and its cages to the exact volume; return the mesh and by how much."""
-        frame, anchor = self._frame, self._constraints.anchor
+        frame, anchors = self._frame, self._constraints.anchors
         moves = (self._p - self._rest_cages) * frame.size
-        centre = frame.centre - frame.origin + anchor
-        x, scale = self._scaled_surface.scaled(moves, centre)
-        inside = anchor / frame.size
-        self._p = inside + scale * (self._p - inside)
-        scaled_by = abs(scale - 1.0)
+        x, scales = surface.scaled(moves, frame.centre - frame.origin + anchors)
+        inside = (anchors / frame.size)[surface.body_of_column]
+        self._p = inside + scales[surface.body_of_column, None] * (self._p - inside)
+        scaled_by = float(np.abs(scales - 1.0).max())
         if scaled_by > _ROUNDING:
             self._continuation.continue_from(self._p)
         return x, scaled_by
@@ -720,22 +728,23 @@ class Deformer:
         moves = offsets - self._rest_cages * self._frame.size
         return self.subspace.map(np.hstack([moves, *directions]), self._rest_pose.vertices)
 
-    def _preserved_volumes(self) -> tuple[tuple[VolumeConstraint, ...], Volumes]:
-        """Return the volumes to preserve, on the mesh and on the surface of the steps.
-
-        They are the same for all handles on the same bodies.
-        """
-        bodies, regions = (), self.has_volume and self._preserve_region_volumes
-        whole = self.has_volume and self._preserve_volume and not regions
-        if whole:
-            bodies = tuple(np.unique(self.mesh.components[self.handle]).tolist())
-        if (found := self._known_volumes.get((regions, whole, bodies))) is None:
+    def _preserved_volumes(self) -> _Preserved:
+        """Return the volumes to preserve for the current handle."""
+        regions = self.has_volume and self._preserve_region_volumes
+        is_whole = self.has_volume and self._preserve_volume and not regions
+        numbers = self._bodies.numbers(self.handle) if is_whole else _NONE
+        key = numbers.tobytes() if is_whole else regions
+        if (found := self._known_volumes.get(key)) is None:
             preserved = self._region_volumes if regions else ()
-            if whole:
-                handle = self.handle
-                preserved = body_volumes(self._rest_pose, self._total_volume, self._lids, handle)
-            volumes = self._binding.coarse_volume.volumes(preserved, self._rest.vertices)
-            found = self._known_volumes[regions, whole, bodies] = preserved, volumes
+            if is_whole:
+                preserved = self._bodies.constraints(numbers)
+            coarse, scaled = self._binding.coarse_volume, None
+            volumes = coarse.volumes(preserved, self._rest.vertices)
+            is_large = self.mesh.n_vertices > sizes.SCALED_VOLUME and coarse.cells is not None
+            if is_whole and is_large:
+                body, rest = numbers[self.mesh.components], self._rest_pose.vertices
+                scaled = ScaledSurface.of(self.subspace, rest, preserved, body)
+            found = self._known_volumes[key] = _Preserved(preserved, volumes, scaled)
         return found
 
     @cached_property
@@ -748,9 +757,7 @@ class Deformer:
         self._known_volumes = {}
         self._lids = lids_of(self._rest_pose, self._lids_option)
         self._total_volume = total_volume(self._rest_pose, self._lids)
-        self._scaled_surface = ScaledSurface(
-            self.subspace, self._rest_pose.vertices, self._total_volume
-        )
+        self._bodies = Bodies(self._rest_pose, self._total_volume, self._lids)
 
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:
         return np.array([each.relative(x) for each in self._region_volumes])
@@ -770,25 +777,40 @@ class Deformer:
             self.subspace, self._rest, [ids[places] for places in order], weight
         )
         gathered = in_order if positions.mean is None else positions.mean @ in_order
-        preserved, volumes = self._preserved_volumes()
+        preserved, volumes, scaled = self._preserved_volumes()
         fixed_at = rest[self.fixed] if len(self.fixed) else np.zeros((1, 3))
         box = np.stack([fixed_at.min(axis=0), fixed_at.max(axis=0)])
-        is_whole = preserved == (self._total_volume,)
-        is_large = mesh.n_vertices > sizes.SCALED_VOLUME
         self._constraints = _Constraints(
             fixed_at=mesh.vertices[self.fixed],
             handles=handles,
             places_of_targets=gathered[:, : len(self.handle)].tocsr(),
             places_of_fixed=gathered[:, len(self.handle) :] @ rest[self.fixed],
             fixed_box=box[: 2 * len(self.fixed)],
-            anchor=fixed_at.mean(axis=0) * self._frame.size,
+            anchors=self._anchors(scaled),
             preserved=preserved,
             volumes=volumes,
-            is_scaled=is_whole and is_large and binding.coarse_volume.cells is not None,
+            scaled=scaled,
             solver=GaussNewton(binding.energy, positions, volumes),
             pulled=_PulledPoints(),
         )
         self.reset()
+
+    def _anchors(self, surface: ScaledSurface | None) -> FloatArray:
+        """Return the centres (c, 3) about which bodies are scaled: means of fixed vertices, if any.
+
+        From the centre of the frame, in scene units.
+        """
+        if surface is None:
+            return np.zeros((1, 3))
+        if len(surface.middles) == 1:
+            centres = np.zeros((1, 3))
+        else:
+            centres = surface.middles - (self._frame.centre - self._frame.origin)
+        body = surface.body[self.fixed]
+        for k in np.unique(body):
+            own = self.fixed[body == k]
+            centres[k] = self._rest.vertices[own].mean(axis=0) * self._frame.size
+        return centres
 
     def _begin(self, p: FloatArray, targets: FloatArray) -> None:
         """Begin at cages *p* (m, 3), which are a pose for *targets* (k, 3)."""
@@ -797,7 +819,7 @@ class Deformer:
         self._continuation = WeightContinuation(solver, p, self._hold_tolerance)
         self._aim = _Approach()
         self._p, self._targets = p, targets
-        if self._constraints.is_scaled and p is not self._rest_cages:
+        if self._constraints.scaled is not None and p is not self._rest_cages:
             self._continuation.continue_from(p)
 
     def _take_trial_step(self) -> None:

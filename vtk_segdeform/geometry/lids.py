@@ -266,8 +266,8 @@ def _enclosing(mesh: Mesh, lids: Lids, wanted: bool | None) -> BoolArray:
     volumes = _volumes(mesh, lids, component, mesh.vertices[first])
     areas = np.bincount(component, mesh.face_areas, count)
     encloses &= np.abs(volumes) > _NO_VOLUME * areas**1.5
-    if wanted is None:
-        asked = np.flatnonzero(encloses & is_open)
+    asked = np.flatnonzero(encloses & is_open)
+    if wanted is None and len(asked):
         sizes = np.bincount(component, minlength=count)
         order = np.argsort(component, kind="stable")
         starts = np.cumsum(sizes) - sizes

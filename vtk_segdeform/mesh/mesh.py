@@ -159,9 +159,12 @@ class Mesh(Frozen):
     @cached_property
     def _edge_numbers(self) -> sparse.csr_array:
         """(n, n) symmetric sparse: 1 + the edge index between neighbouring vertices."""
-        numbers = np.arange(1, len(self.edges) + 1, dtype=np.int32)
-        half = sparse.coo_array((numbers, tuple(self.edges.T)), shape=(self.n_vertices,) * 2)
-        return (half + half.T).tocsr()
+        i, j = self.edges.T
+        numbers = np.arange(1, len(i) + 1, dtype=np.int32)
+        # In this order the neighbours of each vertex are sorted already.
+        ends = np.concatenate([j, i], dtype=np.int32), np.concatenate([i, j], dtype=np.int32)
+        both = np.concatenate([numbers, numbers]), ends
+        return sparse.coo_array(both, shape=(self.n_vertices,) * 2).tocsr()
 
     @cached_property
     def components(self) -> IntArray:

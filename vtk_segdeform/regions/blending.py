@@ -30,14 +30,25 @@ import numpy as np
 from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from ..kernels import compiled_kernels, inputs
 from ..mesh import Mesh
 
+_FACES = 50  # of a mesh, for which shortest paths take as long as one face of a volume
 _PAIRS_AT_ONCE = 400_000  # point-triangle pairs processed at once, about 100 MB
+
+
+def border_edges(mesh: Mesh, membership: BoolArray) -> tuple[IntArray, IntArray]:
+    """Return the edges whose two ends are not in the same regions, (b,) and (b,)."""
+    i, j = np.ascontiguousarray(mesh.edges.T)
+    crosses = np.zeros(len(i), dtype=bool)
+    for regions in np.packbits(membership, axis=0):  # eight at a time
+        crosses |= regions[i] != regions[j]
+    return i[crosses], j[crosses]
 
 
 def borders(mesh: Mesh, membership: BoolArray) -> BoolArray:
     """Return the members of each region that have a neighbour outside, (r, n) bool."""
-    i, j = mesh.edges.T
+    i, j = border_edges(mesh, membership)
     border = np.zeros_like(membership)
     for members, edge in zip(membership, border, strict=True):
         edge[i[members[i] & ~members[j]]] = True
@@ -45,7 +56,9 @@ def borders(mesh: Mesh, membership: BoolArray) -> BoolArray:
     return border
 
 
-def border_distance(mesh: Mesh, membership: BoolArray) -> FloatArray:
+def border_distance(
+    mesh: Mesh, membership: BoolArray, wanted: IntArray | None = None
+) -> FloatArray:
     """Return the distance of each vertex to the border of each region that contains it.
 
     Parameters
@@ -54,6 +67,8 @@ def border_distance(mesh: Mesh, membership: BoolArray) -> FloatArray:
         n vertices.
     membership : (r, n) bool
         The vertices of each region.
+    wanted : (k,) int, optional
+        The vertices whose distances are needed; others may have any.
 
     Returns
     -------
@@ -67,15 +82,32 @@ def border_distance(mesh: Mesh, membership: BoolArray) -> FloatArray:
     is processed on its own.
     """
     distance = np.zeros(membership.shape)
+    kernels, graph = compiled_kernels(mesh.n_faces // _FACES), mesh.adjacency
     for d, members, edge in zip(distance, membership, borders(mesh, membership), strict=True):
+        if kernels:
+            d[members] = np.inf
+            arrays = members, np.flatnonzero(edge), graph.indptr, graph.indices, graph.data
+            some = np.arange(0) if wanted is None else wanted
+            kernels.distances_inside(d, *inputs(*arrays, some))
+            continue
         inside = np.flatnonzero(members)
         start = np.flatnonzero(edge[inside])
         if not len(start):
             d[inside] = np.inf
             continue
-        graph = mesh.adjacency[inside][:, inside]
-        d[inside] = csgraph.dijkstra(graph, directed=False, indices=start, min_only=True)
+        own = graph[inside][:, inside]
+        d[inside] = csgraph.dijkstra(own, directed=False, indices=start, min_only=True)
     return distance
+
+
+def overlap_weights(mesh: Mesh, membership: BoolArray, power: float) -> FloatArray:
+    """Return the `blend_weights` (r, n) of regions, from distances where regions overlap."""
+    shared = np.flatnonzero(np.count_nonzero(membership, axis=0) > 1)
+    weights = membership.astype(np.float64)
+    if len(shared):
+        distance = np.take(border_distance(mesh, membership, shared), shared, axis=1)
+        weights[:, shared] = blend_weights(np.take(membership, shared, axis=1), distance, power)
+    return weights
 
 
 def blend_weights(membership: BoolArray, distance: FloatArray, power: float = 1.0) -> FloatArray:

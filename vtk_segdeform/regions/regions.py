@@ -23,7 +23,12 @@ from ..checks import shown
 from ..errors import RegionError
 from ..freezing import Frozen
 from ..mesh import Mesh, counted, require_mesh
-from .blending import blend_weights, border_distance, distance_to_triangles
+from .blending import (
+    blend_weights,
+    border_distance,
+    distance_to_triangles,
+    overlap_weights,
+)
 
 _EQUAL = 1e-9  # weights that differ by rounding only
 
@@ -162,7 +167,7 @@ class Regions(Frozen):
         Zero outside a region and on its border, except at vertices that are on the border of all
         their regions.
         """
-        return _read_only(blend_weights(self.membership, self.border_distance, self.smoothness))
+        return _read_only(overlap_weights(self.mesh, self.membership, self.smoothness))
 
     @property
     def labels(self) -> IntArray:

@@ -20,9 +20,9 @@ from .gauss_newton import GaussNewton, SolverOptions, SolverResult
 from .position_constraints import Anchors, connected_sets, errors_at, position_term
 from .solution import Solution, Status
 from .volume_constraints import (
+    Bodies,
     VolumeConstraint,
     Volumes,
-    body_volumes,
     region_volumes,
     total_volume,
 )
@@ -31,6 +31,7 @@ from .weights import WeightContinuation
 
 __all__ = [
     "Anchors",
+    "Bodies",
     "CoarseVolume",
     "GaussNewton",
     "ScaledSurface",
@@ -41,7 +42,6 @@ __all__ = [
     "VolumeConstraint",
     "Volumes",
     "WeightContinuation",
-    "body_volumes",
     "connected_sets",
     "errors_at",
     "moved_along",

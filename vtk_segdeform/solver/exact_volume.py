@@ -3,10 +3,10 @@
     along directions    x + sum_k t_k z_k     the root of a cubic; Newton's method for several
     by scaling          c + s (x - c)         s^3 = V_0 / V; for large meshes, whose map takes long
 
-The first is the last operation of every step of the solver, and of a solve; the second, for one
-volume of a large mesh, is the last of a solve only: its steps take the volume over a coarse surface
+The first is the last operation of every step of the solver, and of a solve; the second, for the
+bodies of a large mesh, is the last of a solve only: its steps take the volume over a coarse surface
 (`coarse_volume`), which leaves a small error.  Mean value coordinates scale with the cages, so the
-caller scales these alike, and x = W~ p still holds.
+caller scales these alike, and x = W~ p still holds; for several bodies, only if no cage moves two.
 """
 
 from __future__ import annotations
@@ -17,13 +17,15 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, IntArray
 from ..kernels import in_parallel
 from ..subspace import GPUError, GPUSurface, Subspace, gpu_arrays
 from .volume_constraints import VolumeConstraint
 
 _log = logging.getLogger(__name__)
-_NEWTON_STEPS = 6
+_NEWTON_STEPS = 8
+_EXACT = 1e-15  # error of a volume, as a share of all
+_SMALL = 1e-6  # error below which the derivatives of the last step are near enough
 _CACHED = 1 << 14  # vertices moved together
 _SHARES = 4  # of a mesh that threads scale; smaller ones take less time than waking a thread
 
@@ -36,18 +38,20 @@ def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) 
     """
     if len(constraints) == 1:
         return np.array([constraints[0].exact_step(paths)])
-    x, *directions = np.split(paths, len(constraints) + 1, axis=1)
+    directions = np.split(paths, len(constraints) + 1, axis=1)[1:]
     t = np.zeros(len(constraints))
-    here = x
+    unit = sum(abs(c.target) for c in constraints)
+    here, before, jacobian = paths[:, :3], np.inf, None
     for _ in range(_NEWTON_STEPS):
         g = np.array([c.violation(here) for c in constraints])
-        gradients = [c.gradient(here) for c in constraints]
-        jacobian = np.array([[np.vdot(j, d) for d in directions] for j in gradients])
-        step = np.linalg.lstsq(jacobian, -g, rcond=1e-12)[0]
-        t += step
-        here = x + sum(tk * d for tk, d in zip(t, directions, strict=True))
-        if np.abs(g).max() <= 1e-15 * sum(abs(c.target) for c in constraints):
+        error = float(np.abs(g).max())
+        if error <= _EXACT * unit or (error <= _SMALL * unit and error > 0.5 * before):
             break
+        if jacobian is None or error > _SMALL * unit:
+            gradients = [c.gradient(here) for c in constraints]
+            jacobian = np.array([[np.vdot(j, d) for d in directions] for j in gradients])
+        t += np.linalg.lstsq(jacobian, -g, rcond=1e-12)[0]
+        here, before = moved_along(paths, t), error
     return t
 
 
@@ -88,10 +92,29 @@ def scale_to_volume(constraint: VolumeConstraint, x: FloatArray, centre: FloatAr
     return scale
 
 
+def scale_bodies(
+    constraints: Sequence[VolumeConstraint], x: FloatArray, body: IntArray, centres: FloatArray
+) -> FloatArray:
+    """Do the same for each *body* (n,) of *x* about its own of *centres* (c, 3); return (c,)."""
+    ratios = np.array([constraint.relative(x) for constraint in constraints])
+    scales = np.cbrt(1.0 / (1.0 + np.where(ratios > -1.0, ratios, 0.0)))
+    shifts = (1.0 - scales)[:, None] * centres
+
+    def work(start: int, stop: int) -> None:
+        own = body[start:stop]
+        piece = x[start:stop]
+        piece *= scales[own, None]
+        piece += shifts[own]
+
+    in_parallel(work, len(x), _CACHED)
+    return np.asarray(scales)
+
+
 class ScaledSurface:
     """A large mesh moved by its cages and scaled to its exact volume; on a GPU if there is one.
 
-    The path on a GPU is untested there; see `subspace.gpu`.
+    The path on a GPU is untested there; see `subspace.gpu`.  Several bodies are scaled one by one,
+    on the processor.
 
     Parameters
     ----------
@@ -99,24 +122,68 @@ class ScaledSurface:
         W~.
     rest : (n, 3) float
         The mesh at rest.
-    constraint : VolumeConstraint
-        The total volume.
+    constraints : sequence of VolumeConstraint
+        The volume of each body.
+    body : (n,) int
+        The body of each vertex.
+    body_of_column : (m,) int
+        The body that each cage vertex moves.
     """
 
-    def __init__(self, subspace: Subspace, rest: FloatArray, constraint: VolumeConstraint) -> None:
-        self._subspace, self._rest, self._constraint = subspace, rest, constraint
+    def __init__(
+        self,
+        subspace: Subspace,
+        rest: FloatArray,
+        constraints: Sequence[VolumeConstraint],
+        body: IntArray,
+        body_of_column: IntArray,
+    ) -> None:
+        self._subspace, self._rest, self._constraints = subspace, rest, constraints
+        self.body, self.body_of_column = body, body_of_column
 
-    def scaled(self, moves: FloatArray, centre: FloatArray) -> tuple[FloatArray, float]:
-        """Return the mesh (n, 3) for *moves* (m, 3) of the cages, and its factor about *centre*."""
+    @classmethod
+    def of(
+        cls,
+        subspace: Subspace,
+        rest: FloatArray,
+        constraints: Sequence[VolumeConstraint],
+        body: IntArray,
+    ) -> ScaledSurface | None:
+        """Return the surface; None if a cage moves two bodies, which then cannot be scaled."""
+        owners = []
+        for rows, block in zip(subspace.rows, subspace.blocks, strict=True):
+            own = body[rows]
+            first = own[0] if len(own) else 0
+            if (own != first).any():
+                return None
+            owners.append(np.full(block.shape[1], first))
+        return cls(subspace, rest, constraints, body, np.concatenate(owners))
+
+    @cached_property
+    def middles(self) -> FloatArray:
+        """The mean vertex of each body at rest, (c, 3)."""
+        sizes = np.bincount(self.body)
+        sums = [np.bincount(self.body, axis) for axis in self._rest.T]
+        return np.stack(sums, axis=1) / sizes[:, None]
+
+    def scaled(self, moves: FloatArray, centres: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the mesh (n, 3) for *moves* (m, 3) of the cages, and the factors (c,) of bodies.
+
+        The body k is scaled about ``centres[k]`` (3,).
+        """
+        if len(self._constraints) > 1:
+            x = self._subspace.map(moves, self._rest)
+            return x, scale_bodies(self._constraints, x, self.body, centres)
+        (constraint,), (centre,) = self._constraints, centres
         if self._gpu is not None:
             try:
                 x = self._gpu.map(moves)
-                scale = self._gpu.scale_to_volume(x, self._constraint.target, centre)
-                return self._gpu.host(x), scale
+                scale = self._gpu.scale_to_volume(x, constraint.target, centre)
+                return self._gpu.host(x), np.array([scale])
             except GPUError as fault:
                 self._turn_off_gpu(fault)
         x = self._subspace.map(moves, self._rest)
-        return x, scale_to_volume(self._constraint, x, centre)
+        return x, np.array([scale_to_volume(constraint, x, centre)])
 
     @cached_property
     def _gpu(self) -> GPUSurface | None:
@@ -124,7 +191,8 @@ class ScaledSurface:
         if arrays is None:
             return None
         try:
-            closed = self._constraint.faces, arrays, self._constraint.extension
+            (constraint,) = self._constraints
+            closed = constraint.faces, arrays, constraint.extension
             return GPUSurface(self._subspace, self._rest, *closed)
         except GPUError as fault:
             self._turn_off_gpu(fault)

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -34,11 +35,13 @@ from ..geometry import (
     volume_along_path,
     volume_gradient,
 )
+from ..kernels import in_parallel
 from ..mesh import Mesh
 from ..subspace import Subspace
 
 _MOST_BODIES = 6  # with a constraint of their own, the largest ones: each takes a few solves a step
 _LEAST_BODY = 1e-4  # relative to the largest: too small for one of its own
+_PIECE = 1 << 15  # faces processed together
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,26 +132,91 @@ def total_volume(mesh: Mesh, lids: Lids | None = None) -> VolumeConstraint:
     return replace(free, target=free.violation(mesh.vertices))
 
 
-def body_volumes(
-    mesh: Mesh, whole: VolumeConstraint, lids: Lids, moved: IntArray
-) -> tuple[VolumeConstraint, ...]:
-    """Return one constraint for each body of *mesh*, which add up to the *whole*.
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """The bodies of a mesh, and the constraints that preserve the volume of each.
 
-    At most six bodies have one of their own: first those with vertices among *moved* (k,), then the
-    largest; the others share one, and very small ones that of the first.
+    Parameters
+    ----------
+    mesh : Mesh
+        n vertices, c components.
+    whole : VolumeConstraint
+        The total volume.
+    lids : Lids
+        Of the mesh.
     """
-    if np.count_nonzero(lids.encloses) < 2:
-        return (whole,) if whole.has_volume else ()
-    component = np.concatenate([mesh.components, lids.component])[whole.faces[:, 0]]
-    a, e, f = corner_and_edges(whole.extended(mesh.vertices), whole.faces)
-    determinants = np.einsum("ij,ij->i", a - a[0], np.cross(e, f))
-    volumes = np.asarray(np.bincount(component, determinants, len(lids.encloses)), np.float64)
-    body = _bodies(mesh, volumes, mesh.components[moved])[component]
-    constraints = []
-    for k in range(int(body.max()) + 1):
-        free = replace(whole, faces=whole.faces[body == k], target=0.0)
-        constraints.append(replace(free, target=free.violation(mesh.vertices)))
-    return tuple(constraints)
+
+    mesh: Mesh
+    whole: VolumeConstraint
+    lids: Lids
+
+    def numbers(self, moved: IntArray) -> IntArray:
+        """Return the constraint of each component, (c,) int.
+
+        At most six bodies have one of their own: first those with vertices among *moved* (k,), then
+        the largest; the others share one, and very small ones that of the largest.
+        """
+        if np.count_nonzero(self.lids.encloses) < 2:
+            return np.zeros(len(self.lids.encloses), dtype=np.int64)
+        is_moved = np.zeros(len(self._volumes), dtype=bool)
+        is_moved[self._outer[self.mesh.components[moved]]] = True
+        sizes = np.abs(np.bincount(self._outer, self._volumes, len(is_moved)))
+        least = _LEAST_BODY * sizes.max()
+        alone = np.lexsort((-sizes, ~is_moved))[:_MOST_BODIES]
+        alone = alone[sizes[alone] >= least]
+        alone = alone[np.argsort(-sizes[alone], kind="stable")]
+        number = np.full(len(sizes), len(alone))
+        number[alone] = np.arange(len(alone))
+        if sizes[number == len(alone)].sum() < least:
+            number[number == len(alone)] = 0
+        return np.asarray(number[self._outer])
+
+    def constraints(self, numbers: IntArray) -> tuple[VolumeConstraint, ...]:
+        """Return the constraints for the `numbers` of components; they add up to the whole."""
+        if not numbers.any():
+            return (self.whole,) if self.whole.has_volume else ()
+        body, found = numbers[self._component], []
+        for k in range(int(body.max()) + 1):
+            free = replace(self.whole, faces=self.whole.faces[body == k], target=0.0)
+            found.append(replace(free, target=free.violation(self.mesh.vertices)))
+        return tuple(found)
+
+    @cached_property
+    def _component(self) -> IntArray:
+        """The component of each face of the whole, (m,) int."""
+        each = np.concatenate([self.mesh.components, self.lids.component])
+        return each[self.whole.faces[:, 0]]
+
+    @cached_property
+    def _volumes(self) -> FloatArray:
+        """Six times the signed volume of each component, (c,)."""
+        points, faces = self.whole.extended(self.mesh.vertices), self.whole.faces
+        determinants = np.empty(len(faces))
+
+        def work(start: int, stop: int) -> None:
+            a, e, f = corner_and_edges(points, faces[start:stop])
+            determinants[start:stop] = np.einsum("ij,ij->i", a - points[0], np.cross(e, f))
+
+        in_parallel(work, len(faces), _PIECE)
+        sums = np.bincount(self._component, determinants, len(self.lids.encloses))
+        return np.asarray(sums, dtype=np.float64)
+
+    @cached_property
+    def _outer(self) -> IntArray:
+        """The component around each cavity, and of other components their own number, (c,) int."""
+        mesh, volumes = self.mesh, self._volumes
+        outer = np.arange(len(volumes))
+        if not (volumes < 0.0).any():
+            return outer
+        low, high = np.full((2, len(volumes), 3), [[[np.inf]], [[-np.inf]]])
+        np.minimum.at(low, mesh.components, mesh.vertices)
+        np.maximum.at(high, mesh.components, mesh.vertices)
+        largest = np.argsort(-volumes, kind="stable")
+        for cavity in np.flatnonzero(volumes < 0.0):
+            around = (low[largest] < low[cavity]) & (high[largest] > high[cavity])
+            bodies = largest[around.all(axis=1) & (volumes[largest] > 0.0)]
+            outer[cavity] = bodies[-1] if len(bodies) else cavity  # the smallest around it
+        return outer
 
 
 def region_volumes(
@@ -176,32 +244,6 @@ def region_volumes(
         free = VolumeConstraint(own, 0.0, extension)
         constraints.append(replace(free, target=free.violation(mesh.vertices)))
     return tuple(constraints)
-
-
-def _bodies(mesh: Mesh, volumes: FloatArray, moved: IntArray) -> IntArray:
-    """Return the constraint of each component, (c,) int, by their signed *volumes* (c,).
-
-    *moved* are components that come first.
-    """
-    outer = np.arange(len(volumes))
-    low, high = np.full((2, len(volumes), 3), [[[np.inf]], [[-np.inf]]])
-    np.minimum.at(low, mesh.components, mesh.vertices)
-    np.maximum.at(high, mesh.components, mesh.vertices)
-    largest = np.argsort(-volumes, kind="stable")
-    for cavity in np.flatnonzero(volumes < 0.0):
-        around = (low[largest] < low[cavity]) & (high[largest] > high[cavity])
-        bodies = largest[around.all(axis=1) & (volumes[largest] > 0.0)]
-        outer[cavity] = bodies[-1] if len(bodies) else cavity  # the smallest around it
-    sizes = np.abs(np.bincount(outer, volumes, len(volumes)))
-    least = _LEAST_BODY * sizes.max()
-    is_moved = np.isin(np.arange(len(volumes)), outer[moved])
-    alone = np.lexsort((-sizes, ~is_moved))[:_MOST_BODIES]
-    alone = alone[sizes[alone] >= least]
-    number = np.full(len(volumes), len(alone))
-    number[alone] = np.arange(len(alone))
-    if sizes[number == len(alone)].sum() < least:
-        number[number == len(alone)] = 0
-    return np.asarray(number[outer])
 
 
 def _in_order(faces: IntArray) -> IntArray:

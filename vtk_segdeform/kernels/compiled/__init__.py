@@ -8,6 +8,7 @@
     rotations       `rotations.closest_rotations`
     factor          `hessian.Factor`
     half_edges      `topology.HalfEdges`, `grouping.connected`
+    paths           `blending.border_distance`
     beams           `line_of_sight.faces_in_beam`
     triangles       `faults.Search`, `shells.shell_volumes`, `grouping.first_equal_row`
 
@@ -29,6 +30,7 @@ from .half_edges import (
 from .interpolated import add_interpolated, add_interpolated_adjoint, interpolated_rows
 from .mean_value import weights
 from .normals import ring_normals, rings
+from .paths import distances_inside
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
 from .rotations import rotations
 from .triangles import first_equal_points, flat_faces, shell_sums
@@ -43,6 +45,7 @@ __all__ = [
     "beam_meets",
     "beyond_sides",
     "border_half_edges",
+    "distances_inside",
     "first_equal_points",
     "flat_faces",
     "interpolated_rows",
