@@ -578,12 +578,11 @@ class Deformer:
         x = frame.in_scene(found.vertices)
         is_there = solution.targets is None
         errors = partial(self._errors, self._targets) if is_there else solution.errors
-        status = Status.CONVERGED if found.converged else Status.STEP_LIMIT
         return replace(
             solution,
             vertices=x,
             steps=solution.steps + found.steps,
-            status=Status.MISSED if max(errors(x)) > _MET else status,
+            status=Status.MISSED if max(errors(x)) > _MET else Status.CONVERGED,
             merits=found.merits,
             errors=errors,
             volume=partial(self._total_volume.relative, found.vertices),

@@ -10,7 +10,7 @@ triangles at a vertex also counts for its neighbours: c = P c_0 with
 
 whose columns sum to 1.  The larger its cells, the more the energy resists bending: the only
 resistance to bending of a triangle mesh is that rotations are shared.  So detail is preserved by
-t, and the cost is that of one sparse product: the energy stays a minimum over the rotations, and its
+t, at the cost of one sparse product: the energy stays a minimum over the rotations, and its
 quadratic part is the Laplacian, whatever t,
 
     E(x) = min_R  tr(x^T C x) - 2 sum_i tr(R_i S_i) + tr(X^T C X),     S = P K x,     X at rest
@@ -47,33 +47,28 @@ from ..mesh import Mesh
 class CellEnergy:
     """E(x) of a mesh; made by `CellEnergy.of`."""
 
-    rest: FloatArray  # X, (n, 3)
     laplacian: sparse.csr_array  # C, (n, n)
-    gradients: sparse.csr_array  # (3m, n): A_T J_T^T of every triangle, by rows
-    corners: sparse.csr_array  # (n, m): c_0
-    neighbours: sparse.csr_array  # (n, n): P - I for t = 1, but for its diagonal
+    fans: sparse.csr_array  # K, (3n, n): S_i of c_0, the first rows of all i, then the second ...
+    neighbours: sparse.csr_array  # (n, n): P for t = 1
     constant: float
 
     @classmethod
     def of(cls, mesh: Mesh) -> CellEnergy:
-        """Return the energy of *mesh*; bad triangles count as those around them."""
+        """Return the energy of *mesh*, on its intrinsic triangulation."""
         n = mesh.n_vertices
         surface = IntrinsicTriangulation.of(mesh.vertices, mesh.faces)
-        faces, m = surface.faces, len(surface.faces)
-        gradients = np.swapaxes(area_gradients(surface), 1, 2).ravel()  # by triangle, axis, corner
-        columns = np.repeat(faces, 3, axis=0).ravel()
-        each = sparse.csr_array((gradients, columns, np.arange(0, 9 * m + 1, 3)), (3 * m, n))
-        thirds = np.full(3 * m, 1.0 / 3.0), faces.ravel(), np.arange(0, 3 * m + 1, 3)
+        faces, starts = surface.faces, np.arange(0, surface.faces.size + 1, 3)
+        thirds = np.full(faces.size, 1.0 / 3.0), faces.ravel(), starts
+        corners = sparse.csc_array(thirds, (n, len(faces))).tocsr()
+        gradients = area_gradients(surface)
+        fans = [
+            corners @ sparse.csr_array((along.ravel(), faces.ravel(), starts), (len(faces), n))
+            for along in np.moveaxis(gradients, 2, 0)
+        ]
         laplacian = cotangent_laplacian(faces, surface.cotangents, n)
         relative = mesh.vertices - mesh.vertices.mean(axis=0)
-        return cls(
-            rest=mesh.vertices,
-            laplacian=laplacian,
-            gradients=each,
-            corners=sparse.csc_array(thirds, (n, m)).tocsr(),
-            neighbours=_neighbours(mesh),
-            constant=float(np.vdot(relative, laplacian @ relative)),
-        )
+        constant = float(np.vdot(relative, laplacian @ relative))
+        return cls(laplacian, sparse.vstack(fans).tocsr(), _neighbours(mesh), constant)
 
     def value_and_slope(
         self, x: FloatArray, shares: Sequence[FloatArray]
@@ -82,17 +77,18 @@ class CellEnergy:
 
         *shares* has t (n, 1) of each round in which the cells grow by their neighbours.
         """
-        covariances = self.corners @ np.asarray(self.gradients @ x).reshape(-1, 9)
+        n = len(x)
+        covariances = np.swapaxes((self.fans @ x).reshape(3, n, 3), 0, 1).reshape(n, 9)
         for share in shares:
             covariances += self.neighbours @ (share * covariances) - share * covariances
-        rotations = closest_rotations(covariances.reshape(-1, 3, 3))
-        turned = np.swapaxes(rotations, 1, 2).reshape(-1, 9)
+        rotations = closest_rotations(covariances.reshape(n, 3, 3))
+        turned = np.swapaxes(rotations, 1, 2).reshape(n, 9)
         product = self.laplacian @ x
         value = np.vdot(x, product) - 2.0 * np.vdot(turned, covariances) + self.constant
         for share in reversed(shares):
             turned = turned + share * (self.neighbours.T @ turned - turned)
-        spread = self.corners.T @ turned
-        return float(value), product - self.gradients.T @ spread.reshape(-1, 3)
+        load = self.fans.T @ np.swapaxes(turned.reshape(n, 3, 3), 0, 1).reshape(3 * n, 3)
+        return float(value), product - load
 
 
 def _neighbours(mesh: Mesh) -> sparse.csr_array:

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
@@ -36,15 +36,15 @@ from ..solver import Anderson, VolumeConstraint, moved_along, steps_to_volume
 from .cell_energy import CellEnergy
 from .folds import Folds
 
-SHARE = 0.15  # t of the final cells
-_LARGE = 4  # rounds of t = 1 of the first cells
-_FIRST, _LAST, _UNFOLDING = 10, 26, 8  # steps, at most
-_NEAR, _TOLERANCE = 1e-4, 1e-6  # root mean square of a step, in mesh sizes, after which they end
+SHARE = 0.12  # t of the final cells
+_LARGE = 3  # rounds of t = 1 of the first cells
+_FIRST, _LAST, _UNFOLDING = 10, 12, 6  # steps, at most
+_NEAR, _TOLERANCE = 1e-4, 1e-5  # root mean square of a step, in mesh sizes, after which they end
 _WINDOW, _ROWS = 6, 10_000  # steps that the acceleration remembers, and rows of their residuals
 _Z_STEPS = 4  # for which the directions of the volumes are used
 _RISE = 1e-13  # relative rise of the energy that counts as rounding
 _SHORTEST = 1.0 / 16.0  # least share of a step
-_RINGS, _UNFOLDED = 3, 3  # around folded triangles, in which cells grow; so many times, at most
+_RINGS, _UNFOLDED = 4, 3  # around folded triangles, in which cells grow; so many times, at most
 _BACK = (0.5, 0.25, 0.0)  # shares of the finish that are tried if it folds triangles
 
 
@@ -55,7 +55,6 @@ class Finish:
     vertices: FloatArray  # (n, 3); the start itself if no step was taken
     merits: tuple[float, ...]  # the energy before and after each step with the final cells
     steps: int
-    converged: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +63,10 @@ class _Descent:
 
     x: FloatArray
     merits: tuple[float, ...]
-    converged: bool
 
     @property
     def steps(self) -> int:
+        """Number of steps."""
         return len(self.merits) - 1
 
 
@@ -126,27 +125,31 @@ class Finisher:
         """
         begin = self._at_places(start, places)
         if not len(self._free):
-            return Finish(begin, (), 0, True)
+            return Finish(begin, (), 0)
         folds, ones = Folds.of(self._mesh), np.ones((len(start), 1))
-        few = max(1, np.count_nonzero(folds.at(begin)))
+        few = int(np.count_nonzero(folds.at(begin)))
         small = [SHARE * ones]
         first = self._descend(begin, [ones] * _LARGE, _FIRST, _NEAR, part(progress, 0.0, 0.3))
-        here = self._descend(first.x, small, _LAST, _TOLERANCE, part(progress, 0.3, 0.8))
+        here = self._descend(first.x, small, _LAST, _TOLERANCE, part(progress, 0.3, 0.7))
         steps = first.steps + here.steps
+        if not steps:
+            return Finish(begin, here.merits, 0)
+        best = ahead = here.x
+        least = folded = folds.at(best)
+        grown = np.zeros_like(ones)
         for turn in range(1, _UNFOLDED + 1):
-            folded = folds.at(here.x)
             if not folded.any():
                 break
-            grown = [self._around(folded)] * (_LARGE * turn)
-            share = part(progress, 0.8 + 0.05 * (turn - 1), 0.8 + 0.05 * turn)
-            ahead = self._descend(here.x, small + grown, _UNFOLDING, _NEAR, share)
-            steps += ahead.steps
-            if np.count_nonzero(folds.at(ahead.x)) >= np.count_nonzero(folded):
-                break
-            here = replace(ahead, merits=here.merits, converged=here.converged)
-        x = self._with_few_folds(begin, here.x, folds, few) if steps else begin
+            grown = np.maximum(grown, self._around(folded))
+            share = part(progress, 0.7 + 0.1 * (turn - 1), 0.7 + 0.1 * turn)
+            rounds = [grown] * (_LARGE * turn)
+            found = self._descend(ahead, small + rounds, _UNFOLDING, _NEAR, share)
+            ahead, steps = found.x, steps + found.steps
+            folded = folds.at(ahead)
+            if np.count_nonzero(folded) < np.count_nonzero(least):
+                best, least = ahead, folded
         tell(progress, 1.0, "finished")
-        return Finish(x, here.merits, steps, here.converged)
+        return Finish(self._with_few_folds(begin, best, folds, few), here.merits, steps)
 
     def _at_places(self, start: FloatArray, places: FloatArray) -> FloatArray:
         """Return *start* with the held vertices at *places*, and the others moved smoothly."""
@@ -175,7 +178,6 @@ class Finisher:
         merits, anderson, age = [here.value], Anderson(_WINDOW), _Z_STEPS
         directions: list[FloatArray] = []
         stride = slice(None, None, 1 + len(free) // _ROWS)
-        converged = False
         for count in range(most):
             tell(progress, count / most, "finishing on the mesh")
             if age >= _Z_STEPS:
@@ -183,7 +185,6 @@ class Finisher:
             age += 1
             h = self._step(here, directions)
             if math.sqrt(float(np.vdot(h, h)) / len(h)) <= tolerance * self._size:
-                converged = True
                 break
             guess = anderson.extrapolate(here.x[free], h, h[stride])
             ahead = self._improved(here, guess, directions, shares)
@@ -199,7 +200,7 @@ class Finisher:
             if ahead is not None:
                 here = ahead
                 merits.append(here.value)
-        return _Descent(here.x, tuple(merits), converged)
+        return _Descent(here.x, tuple(merits))
 
     def _directions(self, x: FloatArray) -> list[FloatArray]:
         """Return Z = H^-1 G^T at *x*, (n, 3) for each constraint."""

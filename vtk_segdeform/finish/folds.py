@@ -51,7 +51,7 @@ class Folds:
         area = one * other
         total = one * one + shear * shear + other * other
         largest = 0.5 * (total + np.sqrt(np.maximum(total * total - 4.0 * area * area, 0.0)))
-        folded = self.good & (area * area < _FLAT * _FLAT * largest)
+        folded: BoolArray = self.good & (area * area < _FLAT * _FLAT * largest)
         now = _angles(x, normals, self.edges, self.sides)
         suspects = np.flatnonzero(np.abs(now) > _TURNED)
         change = (now[suspects] - self.angles[suspects] + np.pi) % (2.0 * np.pi) - np.pi
