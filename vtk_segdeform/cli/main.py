@@ -336,6 +336,8 @@ def _pull(parser: argparse.ArgumentParser) -> None:
     add("--cage-vertices", type=_count, default=None, metavar="N", help=text)
     text = "whether open parts enclose a volume under lids over their holes (default: auto)"
     add("--lids", choices=("auto", "on", "off"), default="auto", help=text)
+    text = "finish the pose on the mesh itself: less distorted, handles exact"
+    add("--refine", action="store_true", help=text)
     add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
 
 

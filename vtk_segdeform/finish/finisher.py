@@ -126,15 +126,14 @@ class Finisher:
         begin = self._at_places(start, places)
         if not len(self._free):
             return Finish(begin, (), 0)
-        folds, ones = Folds.of(self._mesh), np.ones((len(start), 1))
-        few = int(np.count_nonzero(folds.at(begin)))
+        ones = np.ones((len(start), 1))
         small = [SHARE * ones]
         first = self._descend(begin, [ones] * _LARGE, _FIRST, _NEAR, part(progress, 0.0, 0.3))
         here = self._descend(first.x, small, _LAST, _TOLERANCE, part(progress, 0.3, 0.7))
         steps = first.steps + here.steps
         if not steps:
             return Finish(begin, here.merits, 0)
-        best = ahead = here.x
+        folds, best, ahead = Folds.of(self._mesh), here.x, here.x
         least = folded = folds.at(best)
         grown = np.zeros_like(ones)
         for turn in range(1, _UNFOLDED + 1):
@@ -149,7 +148,9 @@ class Finisher:
             if np.count_nonzero(folded) < np.count_nonzero(least):
                 best, least = ahead, folded
         tell(progress, 1.0, "finished")
-        return Finish(self._with_few_folds(begin, best, folds, few), here.merits, steps)
+        if least.any():
+            best = self._with_few_folds(begin, best, folds)
+        return Finish(best, here.merits, steps)
 
     def _at_places(self, start: FloatArray, places: FloatArray) -> FloatArray:
         """Return *start* with the held vertices at *places*, and the others moved smoothly."""
@@ -262,10 +263,9 @@ class Finisher:
             near = np.maximum(near, self._energy.neighbours @ near > 0.0)
         return near
 
-    def _with_few_folds(
-        self, begin: FloatArray, end: FloatArray, folds: Folds, few: int
-    ) -> FloatArray:
-        """Return *end*, or a pose nearer to *begin* if more than *few* of its triangles fold."""
+    def _with_few_folds(self, begin: FloatArray, end: FloatArray, folds: Folds) -> FloatArray:
+        """Return *end*, or a pose nearer to *begin* if fewer triangles fold there."""
+        few = np.count_nonzero(folds.at(begin))
         if np.count_nonzero(folds.at(end)) <= few:
             return end
         for share in _BACK:
