@@ -42,6 +42,7 @@ _FIRST, _LAST, _UNFOLDING = 10, 12, 6  # steps, at most
 _NEAR, _TOLERANCE = 1e-4, 1e-5  # root mean square of a step, in mesh sizes, after which they end
 _WINDOW, _ROWS = 6, 10_000  # steps that the acceleration remembers, and rows of their residuals
 _Z_STEPS = 4  # for which the directions of the volumes are used
+_ROUNDING = 1e-15  # mesh sizes by which places may differ from those of the start
 _RISE = 1e-13  # relative rise of the energy that counts as rounding
 _SHORTEST = 1.0 / 16.0  # least share of a step
 _RINGS, _UNFOLDED = 4, 3  # around folded triangles, in which cells grow; so many times, at most
@@ -155,7 +156,7 @@ class Finisher:
     def _at_places(self, start: FloatArray, places: FloatArray) -> FloatArray:
         """Return *start* with the held vertices at *places*, and the others moved smoothly."""
         offsets = places - start[self._held]
-        if not offsets.any():
+        if np.abs(offsets).max(initial=0.0) <= _ROUNDING * self._size:
             return start
         x = start.copy()
         x[self._held] = places
