@@ -36,7 +36,9 @@ from ..solver import Anderson, VolumeConstraint, moved_along, steps_to_volume
 from .cell_energy import CellEnergy
 from .folds import Folds
 
-SHARE = 0.12  # t of the final cells
+# t of the final cells.  On 15 poses of limbs, from 0 to 0.25: distortion 1.21 to 1.33 times that of
+# as-rigid-as-possible without volume, change of dihedral angles 1.28 to 1.15 times the start's.
+SHARE = 0.1
 _LARGE = 3  # rounds of t = 1 of the first cells
 _FIRST, _LAST, _UNFOLDING = 10, 12, 6  # steps, at most
 _NEAR, _TOLERANCE = 1e-4, 1e-5  # root mean square of a step, in mesh sizes, after which they end
