@@ -23,7 +23,7 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 ROOMS = [
     "version", "errors", "sizes", "checks", "arrays", "progress", "freezing", "files", "kernels",
     "mesh", "mesh_repair", "geometry", "regions", "cages", "subspace", "energy", "solver",
-    "deformer", "io", "session", "models", "pictures", "filters",
+    "finish", "deformer", "io", "session", "models", "pictures", "filters",
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
     "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.recording",
     "widgets.editor",

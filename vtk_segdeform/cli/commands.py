@@ -66,7 +66,9 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     )  # fmt: skip
     progress(0.9, "solving")
     start = time.perf_counter()
-    solution = deformer.solve(targets, progress=part(progress, 0.9, 1.0))
+    solution = deformer.solve(targets, progress=part(progress, 0.9, 0.95))
+    if options.refine:
+        solution = deformer.finish(solution, progress=part(progress, 0.95, 1.0))
     report_solution(solution, time.perf_counter() - start, say)
     surface.write(options.output, solution.vertices)
     say(f"written         {options.output}")

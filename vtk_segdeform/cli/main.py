@@ -362,6 +362,8 @@ def _handles(parser: argparse.ArgumentParser) -> None:
     add("--stretch", type=float, default=None, metavar="S", help=text)
     text = "number of rotation clusters; 0: one rotation per vertex (default: 300)"
     add("--rotation-groups", type=_count, default=None, metavar="N", help=text)
+    text = "finish the pose on the mesh itself: less distorted, handles exact"
+    add("--refine", action="store_true", help=text)
     add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
 
 

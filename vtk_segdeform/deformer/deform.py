@@ -24,6 +24,7 @@ def deform(
     n_cage_vertices: int | None = None,
     preserve_volume: bool = True,
     lids: bool | None = None,
+    refine: bool = False,
     progress: Progress | None = None,
 ) -> Solution:
     """Return *mesh* deformed so that its handle vertices are at *targets*.
@@ -48,6 +49,8 @@ def deform(
     lids : bool or None
         Whether an open surface encloses a volume under lids over its borders; None decides it for
         each connected part, as `Deformer` does.
+    refine : bool
+        Finish the pose on the mesh itself (`Deformer.finish`).
     progress : Progress, optional
         Called while cages are fitted and bound, and before every step; may cancel.
 
@@ -63,6 +66,7 @@ def deform(
     require_mesh(mesh)
     as_flag(preserve_volume, "preserve_volume")
     as_lids(lids)
+    as_flag(refine, "refine")
     _, held = checked_constraints(mesh, fixed, handle)
     checked_targets(targets, len(held))
     regions = segment(mesh, n_regions, progress=part(progress, 0.0, 0.2))
@@ -78,4 +82,7 @@ def deform(
         lids=lids,
         progress=part(progress, 0.7, 0.9),
     )
-    return deformer.solve(targets, progress=part(progress, 0.9, 1.0))
+    if not refine:
+        return deformer.solve(targets, progress=part(progress, 0.9, 1.0))
+    solution = deformer.solve(targets, progress=part(progress, 0.9, 0.95))
+    return deformer.finish(solution, progress=part(progress, 0.95, 1.0))

@@ -14,6 +14,7 @@ The files, in reading order:
     solution                `Solution` and `Status`
 """
 
+from .anderson import Anderson
 from .coarse_volume import CoarseVolume
 from .exact_volume import ScaledSurface, moved_along, steps_to_volume
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
@@ -31,6 +32,7 @@ from .weights import WeightContinuation
 
 __all__ = [
     "Anchors",
+    "Anderson",
     "Bodies",
     "CoarseVolume",
     "GaussNewton",

@@ -1,0 +1,233 @@
+"""The finish of a pose on the mesh itself: what is exact, what falls, and what stays."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scenes import sausage
+from scipy import optimize
+from solids import exact_volume_change, icosphere, rotation
+
+from vtk_segdeform.errors import ArgumentError, Cancelled
+from vtk_segdeform.finish import CellEnergy, Finish, Finisher, Folds
+from vtk_segdeform.finish import finisher as finishing
+from vtk_segdeform.geometry import closest_rotations, lids_of, triangle_distortion
+from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.solver import body_volumes, total_volume
+
+SCENE = sausage(2, is_coarse=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A mesh whose ends are held, the right one at other places, and a pose to start from."""
+
+    mesh: Mesh
+    held: np.ndarray
+    places: np.ndarray
+    start: np.ndarray
+
+    def finish(self, progress=None) -> Finish:
+        """Return the finish of the start."""
+        volume = total_volume(self.mesh)
+        lids = lids_of(self.mesh)
+        moved = np.flatnonzero(self.held)
+        constraints = body_volumes(self.mesh, volume, lids, moved)
+        energy = CellEnergy.of(self.mesh)
+        return Finisher(self.mesh, energy, self.held, constraints).run(
+            self.start, self.places, progress
+        )
+
+    def moved(self, turn, scale, shift) -> Problem:
+        """Return the same, turned, scaled and shifted."""
+        places, start = (scale * x @ turn.T + shift for x in (self.places, self.start))
+        mesh = self.mesh.with_vertices(scale * self.mesh.vertices @ turn.T + shift)
+        return Problem(mesh, self.held, places, start)
+
+
+def bent(mesh: Mesh, degrees: float = 60.0) -> Problem:
+    """Return the problem of *mesh*, long along x, with all of it sheared as a start."""
+    x = mesh.vertices
+    h = np.clip((x[:, :1] - x[:, 0].min()) / np.ptp(x[:, 0]), 0.2, 0.8) / 0.6 - 1.0 / 3.0
+    turned = x @ rotation([0, 0, 1], np.radians(degrees)).T
+    start = (1.0 - h) * x + h * turned
+    held = ((h <= 0.0) | (h >= 1.0)).ravel()
+    start += np.where(held[:, None], 0.0, 0.01 * np.sin(7.0 * x[:, [1, 2, 0]]))
+    return Problem(mesh, held, start[held], start)
+
+
+def sheet() -> Mesh:
+    """Return a wavy sheet of 200 triangles, long along x."""
+    u, v = np.meshgrid(np.linspace(0, 4, 21), np.linspace(0, 1, 6), indexing="ij")
+    a = (np.arange(20)[:, None] * 6 + np.arange(5)).ravel()
+    faces = np.concatenate([np.stack([a, a + 6, a + 7], 1), np.stack([a, a + 7, a + 1], 1)])
+    return Mesh(np.stack([u.ravel(), v.ravel(), 0.1 * np.sin(5 * u.ravel())], 1), faces)
+
+
+SAUSAGE = bent(SCENE.mesh)
+
+
+def distortion(problem: Problem, x: np.ndarray) -> float:
+    """Return the root mean square distortion of the triangles."""
+    return float(np.sqrt((triangle_distortion(problem.mesh, x) ** 2).mean()))
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_places_and_volume_are_exact_and_the_energy_falls(closed):
+    problem = SAUSAGE if closed else bent(sheet())
+    found = problem.finish()
+    assert_array_equal(found.vertices[problem.held], problem.places)
+    if closed:
+        assert (
+            abs(exact_volume_change(found.vertices, problem.mesh.vertices, problem.mesh.faces))
+            < 1e-13
+        )
+    rises = np.diff(found.merits) > 1e-12 * found.merits[0]
+    assert found.steps > 4
+    assert not rises.any()
+    assert found.merits[-1] < 0.999 * found.merits[0]
+    assert distortion(problem, found.vertices) < 0.5 * distortion(problem, problem.start)
+
+
+@pytest.mark.parametrize(("scale", "shift"), [(1e-7, 0.0), (1e6, 1e6)])
+def test_a_motion_or_another_unit_moves_the_finish_alike(scale, shift):
+    turn = rotation([1, 2, 3], 1.2)
+    shift = shift * np.array([0.6, -0.8, 0.0])
+    moved = SAUSAGE.moved(turn, scale, shift).finish()
+    plain = SAUSAGE.finish()
+    error = (moved.vertices - shift) / scale - plain.vertices @ turn.T
+    assert np.abs(error).max() < 1e-4 * SCENE.mesh.diagonal
+
+
+def test_at_rest_the_mesh_stays_bit_for_bit():
+    mesh = SCENE.mesh
+    rest = Problem(mesh, SAUSAGE.held, mesh.vertices[SAUSAGE.held], mesh.vertices)
+    found = rest.finish()
+    assert found.vertices is mesh.vertices
+    assert found.steps == 0
+
+
+def test_components_without_places_stay_where_they_are():
+    one, n = SAUSAGE, SCENE.mesh.n_vertices
+    aside = SCENE.mesh.vertices + [0.0, 5.0, 0.0]
+    points = np.concatenate([SCENE.mesh.vertices, aside])
+    mesh = Mesh(points, np.concatenate([SCENE.mesh.faces, SCENE.mesh.faces + n]))
+    held = np.concatenate([one.held, np.zeros(n, bool)])
+    start = np.concatenate([one.start, aside + 0.1])
+    found = Problem(mesh, held, one.places, start).finish()
+    assert_array_equal(found.vertices[n:], start[n:])
+    assert_allclose(found.vertices[:n], one.finish().vertices, atol=1e-6)
+
+
+def test_all_vertices_held_are_put_in_their_places():
+    mesh = SCENE.mesh
+    places = mesh.vertices + 1.0
+    found = Problem(mesh, np.ones(mesh.n_vertices, bool), places, mesh.vertices).finish()
+    assert_array_equal(found.vertices, places)
+
+
+def test_the_energy_and_its_gradient_are_those_of_the_formula():
+    """E is summed here over cells and triangles, and the gradient is a difference of energies."""
+    ball, faces = icosphere(1)
+    mesh = Mesh(ball * [1.0, 0.7, 0.5], faces)
+    energy, rng = CellEnergy.of(mesh), np.random.default_rng(0)
+    x = mesh.vertices + 0.1 * rng.normal(size=mesh.vertices.shape)
+    t = rng.uniform(0.0, 1.0, (mesh.n_vertices, 1))
+
+    n, a = mesh.n_vertices, mesh.adjacency.toarray() > 0.0
+    p = np.diag(1.0 - t.ravel()) + a * (t.ravel() / a.sum(axis=0))
+    share = np.zeros((n, mesh.n_faces))
+    share[mesh.faces.T, np.arange(mesh.n_faces)] = 1.0 / 3.0
+    share = p @ p @ share
+    gradients, areas = [], []
+    for face in mesh.faces:
+        e, y = (np.diff(points[face], axis=0).T for points in (mesh.vertices, x))
+        gradients.append(y @ np.linalg.pinv(e))
+        areas.append(0.5 * np.linalg.norm(np.cross(*e.T)))
+    total = 0.0
+    for i in range(n):
+        weights = share[i] * areas
+        s = sum(w * j.T for w, j in zip(weights, gradients, strict=True))
+        r = closest_rotations(s[None])[0]
+        for w, j, face in zip(weights, gradients, mesh.faces, strict=True):
+            e = np.diff(mesh.vertices[face], axis=0).T
+            total += w * np.sum((j - r @ e @ np.linalg.pinv(e)) ** 2)
+    value, slope = energy.value_and_slope(x, [t, t])
+    assert value == pytest.approx(total, rel=1e-10)
+    way = rng.normal(size=x.shape)
+    both = [energy.value_and_slope(x + h * way, [t, t])[0] for h in (1e-6, -1e-6)]
+    assert 2.0 * np.vdot(slope, way) == pytest.approx((both[0] - both[1]) / 2e-6, rel=1e-6)
+
+
+def test_a_general_minimiser_finds_the_same_minimum(monkeypatch):
+    monkeypatch.setattr(finishing, "_LAST", 200)
+    monkeypatch.setattr(finishing, "_TOLERANCE", 1e-9)
+    ball, faces = icosphere(1)
+    problem = bent(Mesh(ball * [2.0, 0.7, 0.6], faces), 30.0)
+    found = problem.finish().vertices
+    energy, volume = CellEnergy.of(problem.mesh), total_volume(problem.mesh)
+    shares, free = [np.full((len(ball), 1), finishing.SHARE)], ~problem.held
+
+    def at(z):
+        x = found.copy()
+        x[free] = z.reshape(-1, 3)
+        return x
+
+    def value(z):
+        e, slope = energy.value_and_slope(at(z), shares)
+        return e, 2.0 * slope[free].ravel()
+
+    exact = {
+        "type": "eq",
+        "fun": lambda z: volume.violation(at(z)),
+        "jac": lambda z: volume.gradient(at(z))[free].ravel(),
+    }
+    begin = problem.start[free].ravel()
+    told = optimize.minimize(
+        value, begin, jac=True, constraints=[exact], method="SLSQP",
+        options={"ftol": 1e-14, "maxiter": 500},
+    )  # fmt: skip
+    assert_allclose(told.x.reshape(-1, 3), found[free], atol=1e-4)
+
+
+def test_a_start_with_folds_has_none_after_it_and_a_good_one_gets_none():
+    folds = Folds.of(SCENE.mesh)
+    assert not folds.at(SAUSAGE.finish().vertices).any()
+    noise = np.random.default_rng(1).normal(size=SAUSAGE.start.shape)
+    start = SAUSAGE.start + np.where(SAUSAGE.held[:, None], 0.0, 0.15 * noise)
+    crumpled = Problem(SCENE.mesh, SAUSAGE.held, SAUSAGE.places, start)
+    assert np.count_nonzero(folds.at(start)) > 9
+    assert not folds.at(crumpled.finish().vertices).any()
+
+
+def test_cancelling_at_any_step_changes_nothing_of_the_solution():
+    deformer = SCENE.held()
+    targets = SCENE.turned(40)
+    solution = deformer.solve(targets)
+    before, steps = solution.vertices.copy(), itertools.count()
+
+    def cancel(fraction, text):
+        assert 0.0 <= fraction <= 1.0
+        assert text
+        if next(steps) == 5:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        deformer.finish(solution, progress=cancel)
+    assert_array_equal(solution.vertices, before)
+    finished = deformer.finish(solution)
+    assert finished.handle_error < 1e-15
+    assert finished.fixed_error == 0.0
+    assert abs(finished.volume_change) < 1e-13
+    assert_array_equal(finished.cage_vertices, solution.cage_vertices)
+    assert finished.steps > solution.steps
+    assert finished.status is solution.status
+    assert_allclose(deformer.solve(targets).vertices, before, atol=1e-6)
+    assert np.abs(deformer.finish(finished).vertices - finished.vertices).max() < 1e-2
+    deformer.solve(SCENE.turned(10))
+    with pytest.raises(ArgumentError, match="last solve"):
+        deformer.finish(solution)

@@ -1,0 +1,14 @@
+"""The finish of a pose on the mesh itself: every vertex is an unknown, and the cages are its start.
+
+The files, in reading order:
+
+    cell_energy    the stretch energy over all vertices, and the rotations that it is fitted to
+    folds          triangles that a pose turned over
+    finisher       the iteration: fixed vertices, handles and volumes exact
+"""
+
+from .cell_energy import CellEnergy
+from .finisher import Finish, Finisher
+from .folds import Folds
+
+__all__ = ["CellEnergy", "Finish", "Finisher", "Folds"]

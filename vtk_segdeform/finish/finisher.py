@@ -1,0 +1,289 @@
+"""The finish of a pose: a few steps of `cell_energy` over all vertices, from the pose of the cages.
+
+    minimise  E(x)   subject to   x = u at fixed vertices and handles,   g(x) = 0            (9)
+
+The equations are those of `solver.gauss_newton`, with the Laplacian of the free vertices in place
+of H, which is factored once; fixed vertices and handles are eliminated, so they are exact:
+
+    h = -H^-1 (d + G^T lambda),   lambda = (G H^-1 G^T)^-1 (g - G H^-1 d)                    (21)
+
+Every step ends on the volumes, moved along Z = H^-1 G^T (`solver.exact_volume`), so the energy is
+the merit: Anderson acceleration proposes a step, and where the energy rises the plain step replaces
+it, and is halved.
+
+Cells are first large, which removes folds and kinks of the start and moves whole limbs, then small.
+Where triangles are folded after that, the cells around them grow again, and a few more steps
+follow.  A result with more folds than its start is drawn back towards it.
+
+Components without a fixed or handle vertex stay where they are, since nothing determines their
+place; so do vertices in no triangle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from ..arrays import BoolArray, FloatArray
+from ..mesh import Mesh
+from ..progress import Progress, part, tell
+from ..solver import Anderson, VolumeConstraint, moved_along, steps_to_volume
+from .cell_energy import CellEnergy
+from .folds import Folds
+
+# t of the final cells.  Medians of 15 poses of limbs for t = 0, 0.12, 0.15: distortion 1.21, 1.27,
+# 1.28 times that of as-rigid-as-possible, whose volume is not preserved; change of the dihedral
+# angles 1.28, 1.18, 1.17 times that of the start.
+SHARE = 0.1
+_LARGE = 3  # rounds of t = 1 of the first cells
+_FIRST, _LAST, _UNFOLDING = 10, 12, 6  # steps, at most
+_NEAR, _TOLERANCE = 1e-4, 1e-5  # root mean square of a step, in mesh sizes, after which they end
+_WINDOW, _ROWS = 6, 10_000  # steps that the acceleration remembers, and rows of their residuals
+_Z_STEPS = 4  # for which the directions of the volumes are used
+_ROUNDING = 1e-15  # mesh sizes by which places may differ from those of the start
+_RISE = 1e-13  # relative rise of the energy that counts as rounding
+_SHORTEST = 1.0 / 16.0  # least share of a step
+_RINGS, _UNFOLDED = 4, 3  # around folded triangles, in which cells grow; so many times, at most
+_BACK = (0.5, 0.25, 0.0)  # shares of the finish that are tried if it folds triangles
+
+
+@dataclass(frozen=True, eq=False)
+class Finish:
+    """The result of a finish."""
+
+    vertices: FloatArray  # (n, 3); the start itself if no step was taken
+    merits: tuple[float, ...]  # the energy before and after each step with the final cells
+    steps: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Descent:
+    """Where a descent ended, and the energy at its start and after each step."""
+
+    x: FloatArray
+    merits: tuple[float, ...]
+
+    @property
+    def steps(self) -> int:
+        """Number of steps."""
+        return len(self.merits) - 1
+
+
+@dataclass(frozen=True, eq=False)
+class _Evaluated:
+    """A pose, with its energy and half the gradient of it."""
+
+    x: FloatArray
+    value: float
+    slope: FloatArray
+
+
+class Finisher:
+    """The problem of one set of fixed and handle vertices, factored.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        n vertices, at rest, in the coordinates of *constraints*.
+    energy : CellEnergy
+        Of *mesh*.
+    held : (n,) bool
+        Fixed and handle vertices.
+    constraints : sequence of VolumeConstraint
+        The volumes to preserve.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        energy: CellEnergy,
+        held: BoolArray,
+        constraints: Sequence[VolumeConstraint],
+    ) -> None:
+        self._mesh, self._energy = mesh, energy
+        anchored = np.bincount(mesh.components, held) > 0.0
+        free = anchored[mesh.components] & ~held
+        self._held, self._free = held, np.flatnonzero(free)
+        rows = energy.laplacian[self._free]
+        self._to_held = rows[:, np.flatnonzero(held)]
+        self._solve = _factored(rows[:, self._free])
+        corners = (each.faces[each.faces < len(free)] for each in constraints)
+        self._constraints = [
+            each for each, own in zip(constraints, corners, strict=True) if free[own].any()
+        ]
+        self._size = 2.0 * float(
+            np.linalg.norm(mesh.vertices - mesh.vertices.mean(axis=0), axis=1).max()
+        )
+
+    def run(
+        self, start: FloatArray, places: FloatArray, progress: Progress | None = None
+    ) -> Finish:
+        """Return the finish of the pose *start* (n, 3), with its held vertices at *places* (k, 3).
+
+        *places* are in the order of the vertices.
+        """
+        begin = self._at_places(start, places)
+        if not len(self._free):
+            return Finish(begin, (), 0)
+        ones = np.ones((len(start), 1))
+        small = [SHARE * ones]
+        first = self._descend(begin, [ones] * _LARGE, _FIRST, _NEAR, part(progress, 0.0, 0.3))
+        here = self._descend(first.x, small, _LAST, _TOLERANCE, part(progress, 0.3, 0.7))
+        steps = first.steps + here.steps
+        if not steps:
+            return Finish(begin, here.merits, 0)
+        folds, best, ahead = Folds.of(self._mesh), here.x, here.x
+        least = folded = folds.at(best)
+        grown = np.zeros_like(ones)
+        for turn in range(1, _UNFOLDED + 1):
+            if not folded.any():
+                break
+            grown = np.maximum(grown, self._around(folded))
+            share = part(progress, 0.7 + 0.1 * (turn - 1), 0.7 + 0.1 * turn)
+            rounds = [grown] * (_LARGE * turn)
+            found = self._descend(ahead, small + rounds, _UNFOLDING, _NEAR, share)
+            ahead, steps = found.x, steps + found.steps
+            folded = folds.at(ahead)
+            if np.count_nonzero(folded) < np.count_nonzero(least):
+                best, least = ahead, folded
+        tell(progress, 1.0, "finished")
+        if least.any():
+            best = self._with_few_folds(begin, best, folds)
+        return Finish(best, here.merits, steps)
+
+    def _at_places(self, start: FloatArray, places: FloatArray) -> FloatArray:
+        """Return *start* with the held vertices at *places*, and the others moved smoothly."""
+        offsets = places - start[self._held]
+        if np.abs(offsets).max(initial=0.0) <= _ROUNDING * self._size:
+            return start
+        x = start.copy()
+        x[self._held] = places
+        if not len(self._free):
+            return x
+        x[self._free] -= self._solve(self._to_held @ offsets)
+        landed = self._landed(x, self._directions(x))
+        is_near = np.isfinite(landed).all() and np.ptp(landed - x, axis=0).max() < self._size
+        return landed if is_near else x
+
+    def _descend(
+        self,
+        x: FloatArray,
+        shares: Sequence[FloatArray],
+        most: int,
+        tolerance: float,
+        progress: Progress | None,
+    ) -> _Descent:
+        """Take at most so many steps from *x*, for cells grown by *shares*; see `CellEnergy`."""
+        here, free = self._evaluated(x, shares), self._free
+        merits, anderson, age = [here.value], Anderson(_WINDOW), _Z_STEPS
+        directions: list[FloatArray] = []
+        stride = slice(None, None, 1 + len(free) // _ROWS)
+        for count in range(most):
+            tell(progress, count / most, "finishing on the mesh")
+            if age >= _Z_STEPS:
+                directions, age = self._directions(here.x), 0
+            age += 1
+            h = self._step(here, directions)
+            if math.sqrt(float(np.vdot(h, h)) / len(h)) <= tolerance * self._size:
+                break
+            guess = anderson.extrapolate(here.x[free], h, h[stride])
+            ahead = self._improved(here, guess, directions, shares)
+            if ahead is None:
+                anderson.forget()
+                share = 1.0
+                while ahead is None and share >= _SHORTEST:
+                    ahead = self._improved(here, here.x[free] + share * h, directions, shares)
+                    share *= 0.5
+            if ahead is None and age == 1:
+                break
+            age = _Z_STEPS if ahead is None else age
+            if ahead is not None:
+                here = ahead
+                merits.append(here.value)
+        return _Descent(here.x, tuple(merits))
+
+    def _directions(self, x: FloatArray) -> list[FloatArray]:
+        """Return Z = H^-1 G^T at *x*, (n, 3) for each constraint."""
+        directions = []
+        for constraint in self._constraints:
+            direction = np.zeros_like(x)
+            direction[self._free] = self._solve(constraint.gradient(x)[self._free])
+            directions.append(direction)
+        return directions
+
+    def _step(self, here: _Evaluated, directions: Sequence[FloatArray]) -> FloatArray:
+        """Return h of (21) for the free vertices, (f, 3)."""
+        free = self._free
+        h: FloatArray = -self._solve(here.slope[free])
+        if not directions:
+            return h
+        z = [each[free] for each in directions]
+        rows = [each.gradient(here.x)[free] for each in self._constraints]
+        g = np.array([each.violation(here.x) for each in self._constraints])
+        gh = np.array([np.vdot(row, h) for row in rows])
+        gz = np.array([[np.vdot(row, each) for each in z] for row in rows])
+        multipliers = np.linalg.lstsq(gz, g + gh, rcond=1e-12)[0]
+        for multiplier, each in zip(multipliers, z, strict=True):
+            h -= multiplier * each
+        return h
+
+    def _improved(
+        self,
+        here: _Evaluated,
+        free: FloatArray,
+        directions: Sequence[FloatArray],
+        shares: Sequence[FloatArray],
+    ) -> _Evaluated | None:
+        """Return the pose with the *free* vertices (f, 3) on the volumes, if its energy is less."""
+        x = here.x.copy()
+        x[self._free] = free
+        x = self._landed(x, directions)
+        if not np.isfinite(x).all():
+            return None
+        ahead = self._evaluated(x, shares)
+        rise = _RISE * (self._energy.constant + abs(here.value))
+        return ahead if ahead.value <= here.value + rise else None
+
+    def _evaluated(self, x: FloatArray, shares: Sequence[FloatArray]) -> _Evaluated:
+        return _Evaluated(x, *self._energy.value_and_slope(x, shares))
+
+    def _landed(self, x: FloatArray, directions: Sequence[FloatArray]) -> FloatArray:
+        """Return *x* moved along *directions* onto the volumes."""
+        if not directions:
+            return x
+        paths = np.hstack([x, *directions])
+        return moved_along(paths, steps_to_volume(self._constraints, paths))
+
+    def _around(self, folded: BoolArray) -> FloatArray:
+        """Return 1 for the vertices around *folded* triangles (m,), 0 elsewhere, (n, 1)."""
+        near = np.zeros((self._mesh.n_vertices, 1))
+        near[self._mesh.faces[folded]] = 1.0
+        for _ in range(_RINGS):
+            near = np.maximum(near, self._energy.neighbours @ near > 0.0)
+        return near
+
+    def _with_few_folds(self, begin: FloatArray, end: FloatArray, folds: Folds) -> FloatArray:
+        """Return *end*, or a pose nearer to *begin* if fewer triangles fold there."""
+        few = np.count_nonzero(folds.at(begin))
+        if np.count_nonzero(folds.at(end)) <= few:
+            return end
+        for share in _BACK:
+            x = begin + share * (end - begin)
+            x[self._held] = end[self._held]
+            x = self._landed(x, self._directions(x))
+            if np.isfinite(x).all() and np.count_nonzero(folds.at(x)) <= few:
+                return x
+        return begin
+
+
+def _factored(matrix: sparse.csr_array) -> Callable[[FloatArray], FloatArray]:
+    """Return the solution of the symmetric positive definite *matrix* as a function."""
+    if not matrix.shape[0]:
+        return np.zeros_like
+    factor = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    return lambda right: factor.solve(np.ascontiguousarray(right))
