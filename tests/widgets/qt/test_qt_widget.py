@@ -863,6 +863,14 @@ def test_in_a_dark_palette_the_panel_is_dark_and_its_text_is_light(seen, tmp_pat
         grey = np.array(Image.open(tmp_path / "panel.png").convert("L"))
         assert np.median(grey) < 60
         assert grey.max() > 200
+        through, rows = seen.panel.painting.through, seen.panel.regions.list
+        seen.click_row(rows, 1, column=1)  # no tick any more
+        seen.click_row(rows, 0)  # highlights another row
+        tick = rows.visualRect(rows.indexFromItem(rows.topLevelItem(1), 1))
+        for part, box in ((through, through.rect()), (rows.viewport(), tick)):
+            part.grab(box.adjusted(0, 0, 20 - box.width(), 0)).save(str(tmp_path / "box.png"))
+            grey = np.array(Image.open(tmp_path / "box.png").convert("L"))
+            assert grey[:, :18].max() > 90  # the frame of an empty box
     finally:
         application().setPalette(before)
 
