@@ -8,6 +8,8 @@ The cube has a renderer of its own above that of the view, which copies the came
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from vtkmodules.vtkRenderingAnnotation import vtkAnnotatedCubeActor
 from vtkmodules.vtkRenderingCore import vtkRenderer
@@ -40,10 +42,14 @@ class OrientationCube:
         The view to show it in.
     navigation : Navigation
         Moves the camera of the view.
+    is_covered : callable, optional
+        Returns whether something else has its place at present.
     """
 
-    def __init__(self, view: View, navigation: Navigation) -> None:
-        self.view, self._navigation = view, navigation
+    def __init__(
+        self, view: View, navigation: Navigation, is_covered: Callable[[], bool] = lambda: False
+    ) -> None:
+        self.view, self._navigation, self._is_covered = view, navigation, is_covered
         self._renderer: vtkRenderer | None = None
         self._cube = _cube()
         self._labelled: tuple[float, ...] = ()  # the up axis
@@ -90,10 +96,13 @@ class OrientationCube:
 
     @property
     def rectangle(self) -> tuple[float, float, float, float]:
-        """Left, bottom, right and top in pixels of the window; all 0 in a view too small for it."""
+        """Left, bottom, right and top in pixels of the window.
+
+        All 0 in a view too small for it, and while it is covered.
+        """
         x, y = self.view.renderer.GetOrigin()
         width, height = self.view.renderer.GetSize()
-        if min(width, height) < _SMALLEST_VIEW:
+        if min(width, height) < _SMALLEST_VIEW or self._is_covered():
             return 0.0, 0.0, 0.0, 0.0
         size = float(np.clip(_SIZE * height / 600.0, _SIZE, 2.0 * _SIZE))
         right, top = x + width - _MARGIN, y + height - _MARGIN
