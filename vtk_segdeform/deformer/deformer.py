@@ -320,6 +320,7 @@ class Deformer:
         *,
         fixed: ArrayLike = (),
         handle: ArrayLike = (),
+        fixed_at: ArrayLike | None = None,
         preserve_volume: bool | None = None,
         preserve_region_volumes: bool | None = None,
         lids: bool | EllipsisType | None = ...,
@@ -327,7 +328,8 @@ class Deformer:
         """Return a deformer at rest with other constraints, which shares the binding of this one.
 
         ``preserve_volume=None``, ``preserve_region_volumes=None`` and ``lids=...`` are the values
-        of this deformer.
+        of this deformer.  The fixed vertices stay at *fixed_at* (f, 3), in the order of the
+        attribute `fixed`, by default at rest.
         """
         other = self._shared()
         if preserve_volume is not None:
@@ -339,7 +341,7 @@ class Deformer:
         if lids is not ... and as_lids(lids) is not self._lids_option:
             other._lids_option = as_lids(lids)
             other._enclose()
-        other._constrain(fixed, handle)
+        other._constrain(fixed, handle, fixed_at)
         return other
 
     @one_blas_thread()
@@ -755,8 +757,13 @@ class Deformer:
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:
         return np.array([each.relative(x) for each in self._region_volumes])
 
-    def _constrain(self, fixed: ArrayLike, handle: ArrayLike) -> None:
-        """Set fixed vertices and handles, factor their problem and return to rest."""
+    def _constrain(
+        self, fixed: ArrayLike, handle: ArrayLike, places: ArrayLike | None = None
+    ) -> None:
+        """Set fixed vertices and handles, factor their problem and return to rest.
+
+        Fixed vertices stay at their *places* (f, 3), by default at rest.
+        """
         mesh, rest, binding = self.mesh, self._rest.vertices, self._binding
         self.fixed, self.handle = map(read_only, checked_constraints(mesh, fixed, handle))
         handles = connected_sets(mesh, self.handle)
@@ -771,15 +778,20 @@ class Deformer:
         )
         gathered = in_order if positions.mean is None else positions.mean @ in_order
         preserved, volumes = self._preserved_volumes()
-        fixed_at = rest[self.fixed] if len(self.fixed) else np.zeros((1, 3))
+        fixed_in_scene, inside = mesh.vertices[self.fixed], rest[self.fixed]
+        if places is not None:
+            fixed_in_scene = checked_targets(places, len(self.fixed), "fixed_at", "fixed")
+            inside = self._frame.inward(fixed_in_scene)
+            check_distance(inside)
+        fixed_at = inside if len(self.fixed) else np.zeros((1, 3))
         box = np.stack([fixed_at.min(axis=0), fixed_at.max(axis=0)])
         is_whole = preserved == (self._total_volume,)
         is_large = mesh.n_vertices > sizes.SCALED_VOLUME
         self._constraints = _Constraints(
-            fixed_at=mesh.vertices[self.fixed],
+            fixed_at=fixed_in_scene,
             handles=handles,
             places_of_targets=gathered[:, : len(self.handle)].tocsr(),
-            places_of_fixed=gathered[:, len(self.handle) :] @ rest[self.fixed],
+            places_of_fixed=gathered[:, len(self.handle) :] @ inside,
             fixed_box=box[: 2 * len(self.fixed)],
             anchor=fixed_at.mean(axis=0) * self._frame.size,
             preserved=preserved,
