@@ -25,6 +25,7 @@ from .view import Stop, View
 
 _ABOVE_WIDGETS = 1.5  # priority: our widgets have 1
 _SIZE, _SMALLEST_VIEW = 84.0, 240  # pixels
+_SHARE = 0.22  # of a small view, at most
 _MARGIN = 10.0  # pixels, to the corner of the view
 _REACH = 0.9  # half the height of its view; a corner of the cube is at 0.87
 _EDGE = 0.32  # from the centre of a face to where an edge begins; the edge itself is at 0.5
@@ -105,6 +106,7 @@ class OrientationCube:
         if min(width, height) < _SMALLEST_VIEW or self._is_covered():
             return 0.0, 0.0, 0.0, 0.0
         size = float(np.clip(_SIZE * height / 600.0, _SIZE, 2.0 * _SIZE))
+        size = min(size, _SHARE * min(width, height))
         right, top = x + width - _MARGIN, y + height - _MARGIN
         return right - size, top - size, right, top
 
