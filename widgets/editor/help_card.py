@@ -24,7 +24,7 @@ _Layout = tuple[float, list[list[Section]], tuple[float, float], tuple[float, fl
 
 _KEYS, _KEYS_IN_DARK = "#0B4F82", "#8CC8F2"
 _DARK = 0.4  # brightness of the background, 0 to 1, below which the card is dark, too
-_LARGEST, _LEGIBLE, _SMALLEST = 24.0, 12.0, 7.0  # pixels
+_LARGEST, _LEGIBLE, _SMALLEST = 32.0, 12.0, 7.0  # pixels
 _LEADING, _MARGIN, _GAP = 1.5, 1.4, 2.0  # line height, margin, space between columns; in ems
 _WIDE, _HIGH, _FOOT = 0.94, 0.86, 0.1  # of the window: largest size, free space below
 _PROBE = 20.0  # font size at which widths are measured first

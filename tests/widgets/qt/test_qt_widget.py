@@ -501,6 +501,10 @@ def test_the_history_previews_under_the_pointer_and_jumps_at_a_click_or_enter(se
     keys(Qt.Key_Up)
     seen.widget.plotter.setFocus()
     assert looks(2, 2) == 2
+    QtTest.QTest.mousePress(rows.viewport(), Qt.LeftButton, Qt.NoModifier, place(start + 2))
+    rows.itemEntered.emit(rows.item(start))  # with a button down it is no hover
+    assert looks(2, 2) == 2
+    QtTest.QTest.mouseRelease(rows.viewport(), Qt.LeftButton, Qt.NoModifier, place(start + 2))
     seen.click(part.fold)
     assert not rows.isVisible()
 
@@ -866,6 +870,7 @@ def test_in_a_dark_palette_the_panel_is_dark_and_its_text_is_light(seen, tmp_pat
         grey = np.array(Image.open(tmp_path / "panel.png").convert("L"))
         assert np.median(grey) < 60
         assert grey.max() > 200
+        assert seen.panel.history.list.item(0).foreground().color().lightness() > 128
         through, rows = seen.panel.painting.through, seen.panel.regions.list
         seen.click_row(rows, 1, column=1)  # no tick any more
         seen.click_row(rows, 0)  # highlights another row
