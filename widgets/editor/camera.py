@@ -62,6 +62,7 @@ class Camera:
             lambda pointer: self._widgets.point_at(pointer),
             lambda pointer: self._widgets.part_at(pointer),
             lambda: self._widgets.session.state,
+            lambda pointer: self._widgets.dragger.reset_pivot_at(pointer),
         )
         self.cube = OrientationCube(view, self.navigation, lambda: help_card.is_shown)
 
