@@ -277,7 +277,7 @@ class HandleDragger(Widget):
             self._update_gizmo()
 
     def reset_pivot_at(self, pointer: Pointer) -> bool:
-        """Reset the pivot of the active handle if it was moved and is at *pointer*; tell whether."""
+        """Reset the pivot of the active handle if it was moved and is at *pointer*; else False."""
         name, session = self._handle or "", self.session
         is_there = self.GetEnabled() and self.gizmo.part_at(pointer) == FREE
         if not is_there or name not in session.state.pivots:

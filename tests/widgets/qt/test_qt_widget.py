@@ -376,9 +376,11 @@ def test_sliders_set_the_number_of_regions_and_the_detail_of_cages_at_once(seen)
     assert sum(cage.n_vertices for cage in session.cages) == 40
     assert seen.panel.cages.detail.value() == seen.panel.cages.total.value() == 40
     assert seen.panel.cages.total.text() == "40"
+    assert seen.panel.cages.detail.minimum() == 3 * 12  # for each region
     for _ in range(3):  # the cages, their number, the regions
         seen.click(seen.panel.toolbar.undo)
     assert session.cages == before
+    assert seen.panel.regions.count.value() == session.regions.n_regions == 2
     count = sum(cage.n_vertices for cage in before)
     assert seen.panel.cages.detail.value() == count
     assert seen.panel.cages.total.text() == f"155 ({count} fitted)"
