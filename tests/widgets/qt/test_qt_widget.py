@@ -371,7 +371,13 @@ def test_sliders_set_the_number_of_regions_and_the_detail_of_cages_at_once(seen)
     seen.settle()
     assert session.regions.n_regions == seen.panel.regions.count.value() == 3
     seen.mode(Mode.CAGES)
-    seen.panel.cages.detail.setValue(40)
+    slider = seen.panel.cages.detail
+    slider.setSliderDown(True)
+    slider.setSliderPosition(40)
+    seen.panel.refresh()
+    assert slider.sliderPosition() == 40  # a refresh leaves it to the hand
+    assert session.cages == ()
+    slider.setSliderDown(False)
     seen.settle()
     assert sum(cage.n_vertices for cage in session.cages) == 40
     assert seen.panel.cages.detail.value() == seen.panel.cages.total.value() == 40
