@@ -20,12 +20,13 @@ class Window(QtWidgets.QMainWindow):
         self.setCentralWidget(self.editor)
         self.menuBar().addMenu("&File").addAction("&Quit", "Ctrl+Q", self.close)
         self.volume = QtWidgets.QLabel()
-        self.statusBar().addPermanentWidget(self.volume)
-        self.editor.deformed.connect(self.show_volume)
-        self.editor.error.connect(lambda words: self.statusBar().showMessage(words, 5000))
+        self.volume.setContentsMargins(0, 4, 8, 0)
+        self.menuBar().setCornerWidget(self.volume)
+        self.show_volume()
+        self.editor.deformed.connect(self.show_volume)  # the widget itself shows hints and errors
 
     def show_volume(self):
-        """Show the volume change in the status bar."""
+        """Show the volume change beside the menu."""
         self.volume.setText(f"Volume change {self.editor.session.volume_change:+.1e}")
 
     def closeEvent(self, event):  # noqa: N802 - Qt's name

@@ -50,7 +50,11 @@ def edit(
 ) -> Session: ...
 @overload
 def edit(
-    mesh: pv.PolyData | Surface, *, path: _Path = None, title: str = ..., keys: KeyChoice = ...
+    mesh: pv.PolyData | pv.MultiBlock | Surface,
+    *,
+    path: _Path = None,
+    title: str = ...,
+    keys: KeyChoice = ...,
 ) -> pv.PolyData: ...
 def edit(
     mesh: Any, *, path: _Path = None, title: str = "segdeform", keys: KeyChoice = "pyvista"
@@ -59,8 +63,8 @@ def edit(
 
     Parameters
     ----------
-    mesh : pyvista.PolyData, Surface, Mesh or Session
-        Any surface, or a session to continue.
+    mesh : pyvista.PolyData, pyvista.MultiBlock, Surface, Mesh or Session
+        Any surface, or a session to continue.  The surfaces of a MultiBlock are edited as one.
     path : path, optional
         The file that the editor's keys save and open.
     title : str
@@ -72,8 +76,8 @@ def edit(
     -------
     deformed : of the type of *mesh*
         A deformed copy.  Of a PolyData or a Surface it is what was given, apart from coordinates
-        and normals.  A session is returned itself, unless another one was opened in the editor.
-        With pyvista's OFF_SCREEN the window closes at once.
+        and normals; of a MultiBlock it is one PolyData.  A session is returned itself, unless
+        another one was opened in the editor.  With pyvista's OFF_SCREEN the window closes at once.
 
     Raises
     ------
@@ -123,18 +127,19 @@ class PlotterTools:
 
     def edit(
         self,
-        mesh: pv.PolyData | Surface | Mesh | Session,
+        mesh: pv.PolyData | pv.MultiBlock | Surface | Mesh | Session,
         *,
         path: _Path = None,
         keys: KeyChoice = "pyvista",
     ) -> DeformEditor:
         """Add the editor to the current subplot of the plotter, and switch it on.
 
-        Actors of *mesh* in the plotter are hidden, because the editor draws the mesh itself.
+        Actors of *mesh* in the plotter are hidden, because the editor draws the mesh itself; not
+        those of a MultiBlock, whose blocks pyvista copies.
 
         Parameters
         ----------
-        mesh : pyvista.PolyData, Surface, Mesh or Session
+        mesh : pyvista.PolyData, pyvista.MultiBlock, Surface, Mesh or Session
             What to edit; not changed.  ``editor.session.deformed`` is the deformed surface.
         path : path, optional
             The file that the editor's keys save and open.
@@ -283,14 +288,23 @@ class PolyDataTools:
         return closed
 
 
-def session_of(mesh: pv.PolyData | Surface | Mesh | Session) -> Session:
-    """Return a session over *mesh*; a session is returned itself."""
+def session_of(mesh: pv.PolyData | pv.MultiBlock | Surface | Mesh | Session) -> Session:
+    """Return a session over *mesh*; a session is returned itself.
+
+    The blocks of a MultiBlock, as `pyvista.read` returns of a glTF file, become one surface.
+    """
     if isinstance(mesh, Session):
         return mesh
     if isinstance(mesh, Mesh | Surface):
         return Session(mesh)
     if isinstance(mesh, pv.PolyData):
         return Session(Surface(mesh))
+    blocks = list(mesh.recursive_iterator()) if isinstance(mesh, pv.MultiBlock) else []
+    surfaces = [block for block in blocks if block is not None]
+    if surfaces and all(isinstance(block, pv.PolyData) for block in surfaces):
+        first, *others = surfaces
+        return Session(Surface(first.append_polydata(*others)))
     raise ArgumentError(
-        f"mesh must be a PolyData, a Surface, a Mesh or a Session; got {shown(mesh)}"
+        "mesh must be a PolyData, a MultiBlock of PolyData, a Surface, a Mesh or a Session; "
+        f"got {shown(mesh)}"
     )

@@ -101,6 +101,31 @@ def test_nothing_moves_at_the_press_after_loading(tmp_path):
     assert_array_equal(loaded.vertices, session.vertices)
 
 
+def test_vertices_fixed_after_a_pull_stay_where_they_are(tmp_path):
+    session = ready()
+    first = np.flatnonzero(X[:, 0] < -2.9)
+    session.set_fixed(first)
+    session.pull(TIP, X[TIP] + UP, locality=0.0)
+    session.commit()
+    x = session.vertices
+    near = np.flatnonzero((X[:, 0] > 1.0) & (X[:, 0] < 1.4))
+    assert np.linalg.norm(x[near] - X[near], axis=1).min() > 0.01 * D
+    session.set_fixed([*near, *first])
+    save_session(tmp_path / "fixed.segdeform", session)
+    for each in (session, load_session(tmp_path / "fixed.segdeform")):
+        each.pull(TIP, x[TIP], locality=0.0)
+        assert moved(each, x) < 1e-12
+        each.pull(TIP, x[TIP] - 2.0 * UP, locality=0.0)
+        away = np.linalg.norm(each.vertices - x, axis=1)
+        assert away[TIP] > 0.1 * D
+        assert away[near].max() < 1e-3 * D
+        assert np.linalg.norm(each.vertices[first] - X[first], axis=1).max() < 1e-3 * D
+        assert abs(each.volume_change) < 1e-13
+    session.reset_pose()
+    session.pull(TIP, X[TIP] + 0.1 * UP, locality=0.0)
+    assert np.linalg.norm(session.vertices[near] - X[near], axis=1).max() < 1e-3 * D
+
+
 @pytest.mark.parametrize("locality", [None, 0.0, 1.0])
 def test_the_grabbed_vertex_follows_and_the_volume_is_exact_in_every_frame(locality):
     session = ready()

@@ -953,6 +953,9 @@ def test_a_pivot_moves_with_its_handle_is_undone_and_saved(tmp_path):
     session.move_handle(name, turn, max_steps=2)
     there = turn[:3, :3] @ [0.5, 0.1, 0.2] + turn[:3, 3]
     assert_allclose(session.pivot(name), there, atol=1e-12)
+    session.set_pivot(name, there + 0.1)
+    assert_allclose(session.pivot(name), there + 0.1, atol=1e-12)
+    session.undo()
     session.rename_handle(name, "tip")
     assert_allclose(session.pivot("tip"), there, atol=1e-12)
     save_session(tmp_path / "pivot.segdeform", session)

@@ -378,6 +378,7 @@ WRONG = [
     ({"compress": True}, "header.json is compressed"),
     ({"header": {"pulls": "pull 1"}}, "pulls must be a list"),
     ({"header": {"pulls": [[]]}}, r"state\.pulls\[0\] must be"),
+    ({"header": {"fixed_in_pose": True}}, "fixed_at.npy is missing"),
     ({"header": {"pivots": [0, 0, 0]}}, "pivots must be"),
     ({"header": {"pivots": {"h": [0.0, 0.0]}}}, "pivot of h must"),
     ({"header": {"pivots": {"h": [0.0, 0.0, 1e9]}}}, "pivot of h is .* away"),

@@ -15,7 +15,7 @@ import pytest
 import pyvista as pv
 from given_surfaces import GIVEN, holed, require_only_moved, tube
 from hands import Hand, picture
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from solids import OCTAHEDRON
 
@@ -324,6 +324,19 @@ def test_the_command_explains_itself(capsys):
     text = capsys.readouterr().out
     assert "in a window" in text
     assert "-o OUT" in text
+
+
+def test_the_blocks_of_a_file_are_edited_as_one_surface(tmp_path, bar):
+    convert.write_mesh(tmp_path / "bar.glb", bar)
+    whole = pv.read(tmp_path / "bar.glb")
+    assert isinstance(whole, pv.MultiBlock)
+    two = pv.MultiBlock([whole, None, bar.translate((9.0, 0.0, 0.0))])
+    mesh = plugin.session_of(two).mesh
+    assert mesh.n_vertices == 2 * bar.n_points
+    assert_allclose(mesh.vertices.max(axis=0), np.max(bar.points + [9.0, 0.0, 0.0], axis=0))
+    for wrong in (pv.MultiBlock([bar, pv.ImageData()]), pv.MultiBlock()):
+        with pytest.raises(ValueError, match="a MultiBlock of PolyData, a Surface"):
+            plugin.session_of(wrong)
 
 
 def test_other_types_are_refused():

@@ -132,18 +132,20 @@ def checked_point(to: ArrayLike, name: str = "to") -> FloatArray:
         raise ConstraintError(str(fault)) from None
 
 
-def checked_targets(targets: ArrayLike, n_handle: int) -> FloatArray:
-    """Return *targets* as (n_handle, 3), or raise a ConstraintError.
+def checked_targets(
+    targets: ArrayLike, count: int, name: str = "targets", kind: str = "handle"
+) -> FloatArray:
+    """Return *targets* of *count* vertices as (count, 3), or raise a ConstraintError.
 
-    Without handles, any empty sequence is accepted.
+    Without vertices, any empty sequence is accepted.
     """
     try:
-        array = as_points(targets, "targets") if n_handle or np.size(targets) else np.empty((0, 3))
+        array = as_points(targets, name) if count or np.size(targets) else np.empty((0, 3))
     except ValueError as fault:
         raise ConstraintError(str(fault)) from None
-    if len(array) != n_handle:
+    if len(array) != count:
         raise ConstraintError(
-            f"targets must give one point for each of the {n_handle} handle vertices; "
+            f"{name} must give one point for each of the {count} {kind} vertices; "
             f"got shape {array.shape}"
         )
     return array

@@ -331,6 +331,7 @@ class Deformer:
         *,
         fixed: ArrayLike = (),
         handle: ArrayLike = (),
+        fixed_at: ArrayLike | None = None,
         preserve_volume: bool | None = None,
         preserve_region_volumes: bool | None = None,
         lids: bool | EllipsisType | None = ...,
@@ -338,7 +339,8 @@ class Deformer:
         """Return a deformer at rest with other constraints, which shares the binding of this one.
 
         ``preserve_volume=None``, ``preserve_region_volumes=None`` and ``lids=...`` are the values
-        of this deformer.
+        of this deformer.  The fixed vertices stay at *fixed_at* (f, 3), in the order of the
+        attribute `fixed`, by default at rest.
         """
         other = self._shared()
         if preserve_volume is not None:
@@ -350,7 +352,7 @@ class Deformer:
         if lids is not ... and as_lids(lids) is not self._lids_option:
             other._lids_option = as_lids(lids)
             other._enclose()
-        other._constrain(fixed, handle)
+        other._constrain(fixed, handle, fixed_at)
         return other
 
     @one_blas_thread()
@@ -826,8 +828,13 @@ class Deformer:
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:
         return np.array([each.relative(x) for each in self._region_volumes])
 
-    def _constrain(self, fixed: ArrayLike, handle: ArrayLike) -> None:
-        """Set fixed vertices and handles, factor their problem and return to rest."""
+    def _constrain(
+        self, fixed: ArrayLike, handle: ArrayLike, places: ArrayLike | None = None
+    ) -> None:
+        """Set fixed vertices and handles, factor their problem and return to rest.
+
+        Fixed vertices stay at their *places* (f, 3), by default at rest.
+        """
         mesh, rest, binding = self.mesh, self._rest.vertices, self._binding
         self.fixed, self.handle = map(read_only, checked_constraints(mesh, fixed, handle))
         handles = connected_sets(mesh, self.handle)
@@ -842,15 +849,20 @@ class Deformer:
         )
         gathered = in_order if positions.mean is None else positions.mean @ in_order
         preserved, volumes, scaled = self._preserved_volumes()
-        fixed_at = rest[self.fixed] if len(self.fixed) else np.zeros((1, 3))
+        fixed_in_scene, inside = mesh.vertices[self.fixed], rest[self.fixed]
+        if places is not None:
+            fixed_in_scene = checked_targets(places, len(self.fixed), "fixed_at", "fixed")
+            inside = self._frame.inward(fixed_in_scene)
+            check_distance(inside)
+        fixed_at = inside if len(self.fixed) else np.zeros((1, 3))
         box = np.stack([fixed_at.min(axis=0), fixed_at.max(axis=0)])
         self._constraints = _Constraints(
-            fixed_at=mesh.vertices[self.fixed],
+            fixed_at=fixed_in_scene,
             handles=handles,
             places_of_targets=gathered[:, : len(self.handle)].tocsr(),
-            places_of_fixed=gathered[:, len(self.handle) :] @ rest[self.fixed],
+            places_of_fixed=gathered[:, len(self.handle) :] @ inside,
             fixed_box=box[: 2 * len(self.fixed)],
-            anchors=self._anchors(scaled),
+            anchors=self._anchors(scaled, inside),
             preserved=preserved,
             volumes=volumes,
             scaled=scaled,
@@ -859,10 +871,10 @@ class Deformer:
         )
         self.reset()
 
-    def _anchors(self, surface: ScaledSurface | None) -> FloatArray:
+    def _anchors(self, surface: ScaledSurface | None, fixed_at: FloatArray) -> FloatArray:
         """Return the centres (c, 3) about which bodies are scaled: means of fixed vertices, if any.
 
-        From the centre of the frame, in scene units.
+        From the centre of the frame, in scene units; *fixed_at* (k, 3) in solver coordinates.
         """
         if surface is None:
             return np.zeros((1, 3))
@@ -872,8 +884,7 @@ class Deformer:
             centres = surface.middles - (self._frame.centre - self._frame.origin)
         body = surface.body[self.fixed]
         for k in np.unique(body):
-            own = self.fixed[body == k]
-            centres[k] = self._rest.vertices[own].mean(axis=0) * self._frame.size
+            centres[k] = fixed_at[body == k].mean(axis=0) * self._frame.size
         return centres
 
     def _begin(self, p: FloatArray, targets: FloatArray) -> None:

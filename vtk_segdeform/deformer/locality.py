@@ -25,6 +25,11 @@ around it are pulled, with their orientation free: the point that moves is
 with the least psi that decrease with the distance from the vertex v: moving least squares, which
 reproduce every affine motion of these samples.  `Deformer` corrects the target of x~ until the
 vertex itself is in its place.
+
+On a mesh of few vertices a far pull bends the surface within an edge or two, and then the vertex
+leaves the plane of its neighbours: a bump as high as 10 % of the diagonal and four edges wide by
+at least a fifth of an edge.  A spread of 3 edges or more does not help: on a hand of 1,200 vertices
+the worst offset falls from 0.47 to 0.43 edges, while on others the vertex misses its target.
 """
 
 from __future__ import annotations

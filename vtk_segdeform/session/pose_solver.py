@@ -214,11 +214,17 @@ class PoseSolver:
         deformer = bound.hold(
             fixed=state.fixed,
             handle=state.handle,
+            fixed_at=state.fixed_at,
             preserve_volume=state.options.preserve_volume,
             preserve_region_volumes=state.options.preserve_region_volumes,
             lids=state.options.lids,
         )
-        constraints = State(fixed=state.fixed, handles=state.handles, options=state.options)
+        constraints = State(
+            fixed=state.fixed,
+            handles=state.handles,
+            options=state.options,
+            fixed_at=state.fixed_at,
+        )
         self._constrained = bound, constraints, deformer
         self._current = None
         return deformer

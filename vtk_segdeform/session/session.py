@@ -210,7 +210,7 @@ class Session(Timeline):
 
     @property
     def fixed(self) -> IntArray:
-        """(f,) int: vertices fixed at their rest positions."""
+        """(f,) int: vertices that stay where they were when they were fixed."""
         return self._state.fixed
 
     @property
@@ -484,12 +484,31 @@ class Session(Timeline):
     # Fixed vertices and handles.
 
     def set_fixed(self, vertices: ArrayLike) -> None:
-        """Fix *vertices*, ids or a mask, at their rest positions."""
+        """Fix *vertices*, ids or a mask, where they are; those that were fixed stay as before.
+
+        Without a pose, after `reset_pose` or with new regions or cages, they are fixed at rest.
+        """
         fixed, _ = checked_constraints(self.mesh, vertices, self._state.handle)
         if not np.array_equal(fixed, self.fixed):
             own = fixed.copy()
             frozen(own)
-            self._step("set fixed vertices", replace(self._state, fixed=own))
+            after = replace(self._state, fixed=own, fixed_at=self._places_to_fix(own))
+            self._step("set fixed vertices", after)
+
+    def _places_to_fix(self, fixed: IntArray) -> FloatArray | None:
+        """Return where the vertices *fixed* (f,) stay, (f, 3); None: at rest."""
+        before = self._state
+        if before.pose is None:
+            return None
+        at_rest = self.mesh.vertices[fixed]
+        places = self.vertices[fixed]
+        _, new, old = np.intersect1d(fixed, before.fixed, return_indices=True)
+        kept = self.mesh.vertices[before.fixed] if before.fixed_at is None else before.fixed_at
+        places[new] = kept[old]
+        if np.array_equal(places, at_rest):
+            return None
+        frozen(places)
+        return places
 
     def add_handle(self, vertices: ArrayLike, name: str | None = None) -> str:
         """Make *vertices*, ids or a mask, a handle; a handle of the same *name* is replaced.
@@ -781,7 +800,7 @@ class Session(Timeline):
 
     def reset_pose(self) -> None:
         """Reset the pose to rest; an ongoing drag is committed first."""
-        self._step("reset pose", replace(self._state, pose=None, locality=None))
+        self._step("reset pose", self._state.at_rest())
 
     def change_options(self, **changes: float | bool | None) -> None:
         """Change some of the `Options` by name; call `refine` to apply them to the pose."""
@@ -837,7 +856,7 @@ class Session(Timeline):
                 return
             cages = self.cages if _still_fit(old, regions, self.cages) else ()
         after = replace(self._state, regions=regions, cages=cages, region_names=names)
-        self._step(label, replace(after, pose=None, locality=None))
+        self._step(label, after.at_rest())
 
     def _cages_around(self, regions: Regions, progress: Progress | None) -> tuple[Cage, ...]:
         wanted, offset = self.options.n_cage_vertices, self.options.offset
@@ -845,7 +864,7 @@ class Session(Timeline):
         return fit_cages(self.mesh, regions, size, offset=offset, progress=progress)
 
     def _set_cages(self, cages: tuple[Cage, ...], label: str) -> None:
-        self._step(label, replace(self._state, cages=cages, pose=None, locality=None))
+        self._step(label, replace(self._state, cages=cages).at_rest())
 
     def _set_handles(self, after: Mapping[str, IntArray], label: str) -> None:
         pivots = self._state.pivots

@@ -150,11 +150,17 @@ class State(Frozen):
     """Of the last pull, if the pose comes from a pull."""
     pivots: Mapping[str, FloatArray] = field(default_factory=lambda: _NO_PIVOTS)
     """For handles by name, (3,): the point about which they rotate, at rest, if it was moved."""
+    fixed_at: FloatArray | None = None
+    """(f, 3) float: where the fixed vertices stay, if they were fixed in a pose; None: at rest."""
 
     @property
     def handle(self) -> IntArray:
         """(k,) int: the vertices of all handles, concatenated."""
         return np.concatenate([np.empty(0, dtype=np.int64), *self.handles.values()])
+
+    def at_rest(self) -> State:
+        """Return the state without its pose."""
+        return replace(self, pose=None, locality=None, fixed_at=None)
 
     def changes(self, other: State) -> Change:
         """Return the parts in which *other* differs."""
@@ -162,7 +168,12 @@ class State(Frozen):
             (Change.REGIONS, self.regions is other.regions),
             (Change.NAMES, self.region_names == other.region_names),
             (Change.CAGES, self.cages == other.cages),  # cages are equal only if identical
-            (Change.CONSTRAINTS, self.fixed is other.fixed and self.handles is other.handles),
+            (
+                Change.CONSTRAINTS,
+                self.fixed is other.fixed
+                and self.handles is other.handles
+                and self.fixed_at is other.fixed_at,
+            ),
             (Change.PIVOTS, self.pivots is other.pivots),
             (Change.POSE, self.pose is other.pose),
             (Change.OPTIONS, self.options == other.options),
@@ -214,7 +225,10 @@ def checked_state(mesh: Mesh, state: State) -> State:
     pivots = _checked_pivots(mesh, handles, require(state.pivots, Mapping, "state.pivots"))
     owned = MappingProxyType({name: _frozen_copy(ids) for name, ids in handles.items()})
     constraints = _frozen_copy(fixed), owned
-    return State(regions, cages, *constraints, pose, state.options, names, pulls, locality, pivots)
+    places = None if pose is None else _checked_places(mesh, fixed, state)
+    return State(
+        regions, cages, *constraints, pose, state.options, names, pulls, locality, pivots, places
+    )
 
 
 def of_mesh(mesh: Mesh, regions: Regions) -> Regions:
@@ -291,6 +305,21 @@ def _checked_locality(mesh: Mesh, cages: Sequence[Cage], locality: Locality) -> 
     if not (is_number(locality.follows, 0.0) and locality.follows <= 1.0):
         raise ConstraintError(f"follows must be from 0 to 1; got {shown(locality.follows)}")
     return replace(locality, cage_vertices=start.cage_vertices)
+
+
+def _checked_places(mesh: Mesh, fixed: IntArray, state: State) -> FloatArray | None:
+    """Return the places of fixed vertices; ConstraintError unless they are points near *mesh*."""
+    if state.fixed_at is None:
+        return None
+    places = as_points(state.fixed_at, "state.fixed_at")
+    if len(places) != len(fixed) or not np.array_equal(fixed, state.fixed):
+        raise ConstraintError(
+            "state.fixed_at must have a place for each of state.fixed, as numbers"
+        )
+    away = np.abs(places - mesh.vertices.mean(axis=0)).max(initial=0.0) / mesh.diagonal
+    if not away <= _FARTHEST:
+        raise ConstraintError(f"the fixed vertices are {away:.0e} mesh diagonals away")
+    return np.asarray(_frozen_copy(places))
 
 
 def _checked_pivots(

@@ -180,6 +180,9 @@ def _write(
         vertex, reach, *lengths, _ = vars(state.locality).values()
         header["locality"] = [vertex, None if reach == math.inf else reach, *lengths]
         arrays["locality"] = np.concatenate(state.locality.cage_vertices)
+    if state.fixed_at is not None:
+        header["fixed_in_pose"] = True
+        arrays["fixed_at"] = state.fixed_at
     if state.pivots:
         header["pivots"] = {name: point.tolist() for name, point in state.pivots.items()}
     if given is not None:
@@ -237,6 +240,8 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
         locality = Locality(_whole(vertex, "locality"), reach, spread, follows, tuple(kept))
     handles = dict(zip(sizes, ids, strict=True))
     more = {"pivots": header["pivots"]} if "pivots" in header else {}
+    if header.get("fixed_in_pose"):
+        more["fixed_at"] = archive.array("fixed_at", "f", (len(fixed), 3))
     state = State(regions, cages, fixed, handles, pose, options, names, pulls, locality, **more)
     if "surface" not in header:
         return mesh, state

@@ -84,7 +84,7 @@ class Solution:
 
     @property
     def fixed_error(self) -> float:
-        """Largest distance of a fixed vertex from its rest position, in diagonals of the mesh."""
+        """Largest distance of a fixed vertex from its place, in diagonals of the mesh."""
         return self._errors[1]
 
     @cached_property

@@ -16,6 +16,11 @@ Qt = QtCore.Qt
 _SETTING = "keys"
 _ACTION, _MODES, _KEYS = range(3)
 _HOW = "Select an action and press Enter, then its new key"
+_NUMBER = {*"0123456789", "period", "minus", "backspace"}  # with Enter, the amount of a drag
+_NUMBER_LABEL, _NUMBER_MODES = (
+    "While dragging: type the amount",
+    frozenset({Mode.PULL, Mode.DEFORM}),
+)
 _ALONE = (Qt.Key.Key_Shift, Qt.Key.Key_Control, Qt.Key.Key_Alt, Qt.Key.Key_Meta, Qt.Key.Key_AltGr)
 
 
@@ -57,7 +62,7 @@ def menu_keys(bar: Any) -> dict[str, str]:
 
 
 class KeysDialog(QtWidgets.QDialog):
-    """A table of the actions and their keys.
+    """A table of the actions and their keys; below them the keys that are fixed.
 
     Parameters
     ----------
@@ -90,9 +95,10 @@ class KeysDialog(QtWidgets.QDialog):
         self.table.itemDoubleClicked.connect(lambda *_: self._wait())
         for binding in keys.bindings:
             if binding.name:
-                modes = [str(mode.value) for mode in Mode if mode in binding.modes]
-                where = "All" if len(modes) == len(Mode) else ", ".join(modes)
-                QtWidgets.QTreeWidgetItem(self.table, [binding.label, where, ""])
+                QtWidgets.QTreeWidgetItem(self.table, [binding.label, _where(binding.modes), ""])
+        for label, where, caps in self._fixed():
+            fixed = QtWidgets.QTreeWidgetItem(self.table, [label, where, f"{caps} (fixed)"])
+            fixed.setFlags(Qt.ItemFlag.NoItemFlags)
         self._names = [binding.name for binding in keys.bindings if binding.name]
         self.table.setCurrentItem(self.table.topLevelItem(0))
         self.message = QtWidgets.QLabel(_HOW)
@@ -172,11 +178,26 @@ class KeysDialog(QtWidgets.QDialog):
             f"{other.label} has {'no key' if not changes[other.name] else 'other keys'} now"
             for other in others
         ]
-        was = f"{cap} was the key of another action: {'; '.join(lost)}" if lost else _HOW
-        self.message.setText(was)
+        uses = self.keys.fixed_uses(name, key)
+        if key in _NUMBER and self.keys[name].modes & _NUMBER_MODES:
+            uses.append(_NUMBER_LABEL)
+        said = [f"{cap} was the key of another action: {'; '.join(lost)}"] if lost else []
+        said += [f"{cap} also has a fixed use. {use}" for use in uses]
+        self.message.setText(". ".join(said) or _HOW)
         self._show()
 
     # Pieces.
+
+    def _fixed(self) -> list[tuple[str, str, str]]:
+        """Return label, modes and keys of what is fixed: keys of widgets, and of the menus."""
+        rows = [
+            (binding.label, _where(binding.modes), "  ".join(map(key_cap, binding.keys)))
+            for binding in self.keys.bindings
+            if not binding.name
+        ]
+        rows.append((_NUMBER_LABEL, _where(_NUMBER_MODES), "0 ... 9  .  -"))
+        menus = [(label, key_cap(key)) for key, label in self._taken.items()]
+        return rows + [(label[:1].upper() + label[1:], "Menus", cap) for label, cap in menus]
 
     def _show(self) -> None:
         for row, name in enumerate(self._names):
@@ -222,3 +243,9 @@ class KeysDialog(QtWidgets.QDialog):
         self.keys = keys_of(self.preset.currentText())
         self.message.setText(_HOW)
         self._show()
+
+
+def _where(modes: frozenset[Mode]) -> str:
+    """Return *modes* by their keys."""
+    numbers = [str(mode.value) for mode in Mode if mode in modes]
+    return "All" if len(numbers) == len(Mode) else ", ".join(numbers)

@@ -18,6 +18,7 @@ from vtk_segdeform.mesh_repair import Repair
 from vtk_segdeform.progress import Progress, part
 
 from ..editor import Job, error_text
+from ..qt import check_box
 from .qt_timer import qt_timer
 from .repair_preview import Preview
 
@@ -60,7 +61,7 @@ class RepairDialog(QtWidgets.QDialog):
         self.before.setChecked(True)
         self.after.setEnabled(False)
         self.after.toggled.connect(self.preview.show_after)
-        self.fill = QtWidgets.QCheckBox("Close holes up to")
+        self.fill = check_box("Close holes up to", "Close holes with at most so many edges")
         self.fill.setChecked(True)
         self.edges = QtWidgets.QSpinBox()
         self.edges.setRange(3, _MOST_EDGES)

@@ -15,6 +15,7 @@ from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.geometry import guess_up_axis
 
 from ..scene import Navigation, OrientationCube, View, Viewpoint
+from .help_card import HelpCard
 from .mode import Mode
 from .widget_set import WidgetSet
 
@@ -35,6 +36,8 @@ class Camera:
         The view with the camera.
     widgets : WidgetSet
         The widgets over the session; replaced by `follow`.
+    help_card : HelpCard
+        While it is shown, the cube is not.
 
     Attributes
     ----------
@@ -46,7 +49,7 @@ class Camera:
         The cube in the corner; hidden at first.
     """
 
-    def __init__(self, view: View, widgets: WidgetSet) -> None:
+    def __init__(self, view: View, widgets: WidgetSet, help_card: HelpCard) -> None:
         self._widgets = widgets
         self.viewpoint = Viewpoint(
             view,
@@ -59,8 +62,9 @@ class Camera:
             lambda pointer: self._widgets.point_at(pointer),
             lambda pointer: self._widgets.part_at(pointer),
             lambda: self._widgets.session.state,
+            lambda pointer: self._widgets.dragger.reset_pivot_at(pointer),
         )
-        self.cube = OrientationCube(view, self.navigation)
+        self.cube = OrientationCube(view, self.navigation, lambda: help_card.is_shown)
 
     def begin(self, *, is_aimed: bool) -> None:
         """Guess the up axis and show the model, or follow the camera if the host has aimed it."""

@@ -91,7 +91,7 @@ class Controller:
             self.refresh,
         )
         self.widgets = WidgetSet(view, session)
-        self.camera = Camera(view, self.widgets)
+        self.camera = Camera(view, self.widgets, self.help)
         self._listen()
         self.notices.follow(session)
         self.file = SessionFile(Path("session.segdeform"), session)

@@ -22,8 +22,9 @@ Section = tuple[str, Sequence[tuple[str, str]]]
 _Layout = tuple[float, list[list[Section]], tuple[float, float], tuple[float, float]]
 # The font size in pixels; the columns; widths of keys and actions, and of the card, in ems.
 
-_KEYS = "#0B4F82"
-_LARGEST, _LEGIBLE, _SMALLEST = 24.0, 12.0, 7.0  # pixels
+_KEYS, _KEYS_IN_DARK = "#0B4F82", "#8CC8F2"
+_DARK = 0.4  # brightness of the background, 0 to 1, below which the card is dark, too
+_LARGEST, _LEGIBLE, _SMALLEST = 32.0, 12.0, 7.0  # pixels
 _LEADING, _MARGIN, _GAP = 1.5, 1.4, 2.0  # line height, margin, space between columns; in ems
 _WIDE, _HIGH, _FOOT = 0.94, 0.86, 0.1  # of the window: largest size, free space below
 _PROBE = 20.0  # font size at which widths are measured first
@@ -49,7 +50,7 @@ class HelpCard:
         self.view = View.of(view)
         self.sections, self.fewer = tuple(sections), tuple(fewer)
         self._parts: list[Panel | Text] = []
-        self._laid_out = 0, 0
+        self._laid_out: tuple[int, int, bool] | None = None  # the window's size, and if it is dark
         self._stop: Stop | None = None
 
     @property
@@ -75,7 +76,7 @@ class HelpCard:
         """List other keys; *fewer* as for the constructor."""
         if (tuple(sections), tuple(fewer)) == (self.sections, self.fewer):
             return
-        self.sections, self.fewer, self._laid_out = tuple(sections), tuple(fewer), (0, 0)
+        self.sections, self.fewer, self._laid_out = tuple(sections), tuple(fewer), None
         if self.is_shown:
             self.view.request_render()
 
@@ -93,14 +94,23 @@ class HelpCard:
     def _clear(self) -> None:
         for part in self._parts:
             part.remove()
-        self._parts, self._laid_out = [], (0, 0)
+        self._parts, self._laid_out = [], None
+
+    @property
+    def _is_dark(self) -> bool:
+        return self._laid_out is not None and self._laid_out[2]
+
+    @property
+    def _ink(self) -> str:
+        return PAPER if self._is_dark else INK
 
     def _lay_out(self) -> None:
         window = self.view.renderer.GetSize()
-        if tuple(window) == self._laid_out:
+        now = window[0], window[1], max(self.view.renderer.GetBackground()) < _DARK
+        if now == self._laid_out:
             return
         self._clear()
-        self._laid_out = window[0], window[1]
+        self._laid_out = now
         size, columns, (keys, labels), (wide, high) = self._fitting(self.sections, window)
         scale = max(1.0, self.view.window.GetDPI() / _DOTS_PER_INCH)
         if size < scale * _LEGIBLE and self.fewer:
@@ -108,7 +118,7 @@ class HelpCard:
         column = keys + _GAP / 2 + labels
         x = 0.5 * (window[0] - wide * size)
         y = 0.5 * ((1.0 + _FOOT) * window[1] - high * size)
-        for rim, colour, layer in ((2.0, INK, 5), (0.0, PAPER, 6)):
+        for rim, colour, layer in ((2.0, self._ink, 5), (0.0, INK if self._is_dark else PAPER, 6)):
             panel = Panel(self.view.foreground, colour, layer=layer)
             panel.place(x - rim, y - rim, wide * size + 2 * rim, high * size + 2 * rim)
             self._parts.append(panel)
@@ -141,9 +151,10 @@ class HelpCard:
         for heading, rows in sections:
             for left, right in ((heading, ""), *rows):
                 is_heading = left is heading
-                colour = INK if is_heading else _KEYS
+                keys = _KEYS_IN_DARK if self._is_dark else _KEYS
+                colour = self._ink if is_heading else keys
                 self._put(left, colour, (tabs[0], y), size, bold=True, key=not is_heading)
-                self._put(right, INK, (tabs[1], y), size)
+                self._put(right, self._ink, (tabs[1], y), size)
                 y -= _LEADING * size
             y -= 0.5 * _LEADING * size
 

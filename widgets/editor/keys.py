@@ -173,6 +173,11 @@ class Keys:
             if b.name != name and key in b.keys and b.modes & modes and (b.name or b.is_reserved)
         ]  # fmt: skip
 
+    def fixed_uses(self, name: str, key: str) -> list[str]:
+        """Return what *key* does besides, during drags, in modes of the action *name*: labels."""
+        modes = self._by_name[name].modes
+        return [b.label for b in self.bindings if not b.name and key in b.keys and b.modes & modes]
+
     def _require_distinct(self) -> None:
         for binding in self._by_name.values():
             for key in binding.keys:

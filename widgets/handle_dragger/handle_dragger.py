@@ -10,6 +10,8 @@ plane.
     control     move in steps of about 1 % of the diagonal, rotate in steps of 5 degrees
     shift       move slowly; with control in finer steps
     a number, enter             move by exactly that much; see `number_entry`
+    shift + drag the ball       move the pivot; `reset_pivot_at`, the double click of an editor,
+                                puts it back
     escape, right button        cancel
 
 Each move solves once, for about 20 ms, for the current position of the pointer.  While the pointer
@@ -19,6 +21,7 @@ same undo step.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -188,6 +191,8 @@ class HandleDragger(Widget):
     def on_press(self, press: Pointer) -> Gesture | None:
         """Drag the part of the gizmo, or else the handle, under the pointer."""
         part = self.gizmo.part_at(press)
+        if part == FREE and press.shift:
+            return self._move_pivot(press)
         if part is not None:
             return self._drag(part, None, press)
         found = self._handle_at(press)
@@ -248,6 +253,37 @@ class HandleDragger(Widget):
             if not committed:  # last, as listeners of the session may raise
                 session.revert()
             self._live.resume()
+
+    def _move_pivot(self, press: Pointer) -> Gesture:
+        """Move the pivot of the active handle in the view plane, in one undo step."""
+        session, name, gizmo = self.session, str(self._handle), self.gizmo
+        session.commit()
+        assert gizmo.centre is not None  # the press was on the gizmo
+        start, step = gizmo.centre, step_of(session.mesh.diagonal)
+        motion = Motion(self.view, FREE, Grip(start, start, gizmo.axes, gizmo.radius, step), press)
+        point, axes = start, gizmo.axes
+        gizmo.set_caption("Pivot")
+        try:
+            while (pointer := (yield)).phase is Phase.MOVE:
+                if name not in session.handles:
+                    return
+                shift = motion.matrix(replace(pointer, shift=False))[:3, 3]  # which is held
+                point = start + shift
+                gizmo.place(point, axes)
+            if pointer.phase is Phase.RELEASE and (point != start).any():
+                session.set_pivot(name, point)
+        finally:
+            gizmo.set_caption("")
+            self._update_gizmo()
+
+    def reset_pivot_at(self, pointer: Pointer) -> bool:
+        """Reset the pivot of the active handle if it was moved and is at *pointer*; else False."""
+        name, session = self._handle or "", self.session
+        is_there = self.GetEnabled() and self.gizmo.part_at(pointer) == FREE
+        if not is_there or name not in session.state.pivots:
+            return False
+        session.set_pivot(name, None)
+        return True
 
     def _motion_of(self, part: Part, grip: Grip, press: Pointer) -> Motion:
         """Return the motion by *part* since the press, and show only that part."""

@@ -12,12 +12,14 @@ The files, in reading order:
     icons       the icons of the toolbar
 """
 
+from .controls import check_box
 from .view_menu import add_view_entries, name_keys
 from .widget import DeformWidget, deform_dock
 
 __all__ = [
     "DeformWidget",
     "add_view_entries",
+    "check_box",
     "deform_dock",
     "name_keys",
 ]

@@ -21,6 +21,7 @@ RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 _LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 _GAP = 6
 _NAME_LETTERS = 15  # of the first column of a table, with its icon
+_DARK = 128  # lightness of a field, 0 to 255, below which its palette is dark
 _TIP, _ACTION = "plain tip", "action"  # properties of widgets
 
 
@@ -111,7 +112,7 @@ def slider(least: int, most: int, tip: str) -> Any:
 
 def check_box(text: str, tip: str, action: str = "") -> Any:
     """Return a check box with a tooltip that also names the key of *action*."""
-    box = with_key(QtWidgets.QCheckBox(text), tip, action)
+    box = with_key(_CheckBox(text), tip, action)
     box.setFocusPolicy(Qt.FocusPolicy.TabFocus)
     return box
 
@@ -237,9 +238,33 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+class _CheckBox(QtWidgets.QCheckBox):
+    def paintEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
+        """Draw the box with a visible frame."""
+        super().paintEvent(event)
+        how = QtWidgets.QStyleOptionButton()
+        self.initStyleOption(how)
+        kind = QtWidgets.QStyle.SubElement.SE_CheckBoxIndicator
+        painter = QtGui.QPainter(self)
+        _frame(painter, self.style().subElementRect(kind, how, self), self.palette())
+        painter.end()
+
+
+class _Ticks(QtWidgets.QStyledItemDelegate):
+    def paint(self, painter: Any, option: Any, index: Any) -> None:
+        """Draw a cell, its box with a visible frame."""
+        super().paint(painter, option, index)
+        if index.data(Qt.ItemDataRole.CheckStateRole) is not None:
+            how, table = QtWidgets.QStyleOptionViewItem(option), self.parent()
+            self.initStyleOption(how, index)
+            kind = QtWidgets.QStyle.SubElement.SE_ItemViewItemCheckIndicator
+            _frame(painter, table.style().subElementRect(kind, how, table), table.palette())
+
+
 class _Table(QtWidgets.QTreeWidget):
     def __init__(self) -> None:
         super().__init__()
+        self.setItemDelegate(_Ticks(self))
         triggers = QtWidgets.QAbstractItemView.EditTrigger
         self.setEditTriggers(triggers.DoubleClicked | triggers.EditKeyPressed)
 
@@ -255,6 +280,16 @@ class _Table(QtWidgets.QTreeWidget):
         elif how and how[0] == triggers.DoubleClicked and index.column():
             return False
         return super().edit(index, *how)
+
+
+def _frame(painter: Any, box: Any, palette: Any) -> None:
+    """Draw the frame of a check box if the palette is dark: Fusion draws it darker still."""
+    roles = QtGui.QPalette.ColorRole
+    if palette.color(roles.Base).lightness() < _DARK:
+        painter.setRenderHint(QtGui.QPainter.RenderHint.Antialiasing)
+        painter.setPen(QtGui.QPen(palette.color(roles.PlaceholderText), 1.0))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawRoundedRect(QtCore.QRectF(box).adjusted(0.5, 0.5, -0.5, -0.5), 2.0, 2.0)
 
 
 def _highlight(button: Any, down: bool) -> None:

@@ -65,7 +65,7 @@ class HandlesPart(QtWidgets.QGroupBox):
         self.convert.clicked.connect(self._convert)
         self.local = check_box("Local axes", "The axes rotate with the handle", "local_axes")
         self.local.clicked.connect(lambda: editor.do(toggle_local_axes))
-        tip = "Rotate about the centre of the handle again"
+        tip = "Rotate about the centre of the handle again. Shift+drag on the ball moves the pivot"
         self.pivot = push_button("Reset pivot", tip, "pivot")
         self.pivot.clicked.connect(lambda: editor.do(reset_pivot))
         buttons = row(self.new, self.remove, self.convert)

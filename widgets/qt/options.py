@@ -66,7 +66,13 @@ class CagesPart(QtWidgets.QGroupBox):
         put(self.total, options.n_cage_vertices)
         self.detail.setEnabled(session.regions is not None)
         if not self._editor.controller.is_busy:
-            total = sum(cage.n_vertices for cage in session.cages) or options.n_cage_vertices
+            fitted = sum(cage.n_vertices for cage in session.cages)
+            total = fitted or options.n_cage_vertices
+            # The default follows the number of regions, and other numbers are met only nearly.
+            is_other = fitted not in (0, options.n_cage_vertices)
+            suffix = f" ({fitted} fitted)" if is_other else ""
+            if suffix != self.total.suffix():  # otherwise a number being typed would be lost
+                self.total.setSuffix(suffix)
             quiet = QtCore.QSignalBlocker(self.detail)
             self.detail.setMinimum(_EACH * max(1, widgets.n_regions))
             quiet.unblock()

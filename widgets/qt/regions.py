@@ -18,7 +18,7 @@ from ..editor import (
     showing_cage,
     split_region,
 )
-from ..volume_overlay import RegionVolumes, signed
+from ..volume_overlay import RegionVolumes, in_tenths
 from .controls import RIGHT, column, form, key_button, push_button, put, row, slider, swatch, table
 
 Qt = QtCore.Qt
@@ -33,12 +33,6 @@ class _Row(NamedTuple):
     cage: str
     visible: bool | None
     volume: str
-
-
-def _percent(share: float) -> str:
-    """Return *share* with as many decimals as in the other rows; without any if it is zero."""
-    number = signed(100.0 * share, 1)
-    return f"{number} %" if number == "0" or "." in number else f"{number}.0 %"
 
 
 class RegionsPart(QtWidgets.QGroupBox):
@@ -107,7 +101,7 @@ class RegionsPart(QtWidgets.QGroupBox):
                 editor.session.region_name(region),
                 str(cages[region].n_vertices) if cages else "None",
                 widgets.cages.is_visible(region) if cages else None,
-                _percent(volumes[region]) if region in volumes else "",
+                in_tenths(volumes[region]) if region in volumes else "",
             )
             for region in range(widgets.n_regions)
         ]

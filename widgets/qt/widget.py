@@ -34,7 +34,7 @@ class DeformWidget(QtWidgets.QWidget):
 
     Parameters
     ----------
-    mesh : pyvista.PolyData, Surface, Mesh or Session
+    mesh : pyvista.PolyData, pyvista.MultiBlock, Surface, Mesh or Session
         What to edit.
     parent : QWidget, optional
         The parent widget.
@@ -175,7 +175,7 @@ def deform_dock(view: Any, mesh: Any, parent: Any = None) -> DeformDock:
     view : pyvistaqt.QtInteractor, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
         Where to edit.  A plotter removes the editor when it closes; for any other view call
         ``dock.editor.remove()`` before its window closes.
-    mesh : pyvista.PolyData, Surface, Mesh or Session
+    mesh : pyvista.PolyData, pyvista.MultiBlock, Surface, Mesh or Session
         What to edit.
     parent : QWidget, optional
         The parent widget.

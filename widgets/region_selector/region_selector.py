@@ -4,7 +4,7 @@ A stroke adds vertices; with Control held it erases.  The vertices to change are
 the stroke, the release records one undo step, and Escape cancels.
 
 brush, component, region
-                    a press beside the mesh moves the camera
+                    a press beside the mesh moves the camera; the pointer shows what a press changes
 lasso, rectangle    start anywhere in the view
 all tools           a press with Alt held moves the camera
 ``[``  ``]``        smaller, larger brush; with Shift held the wheel over the mesh does the same
@@ -87,6 +87,7 @@ class RegionSelector(Widget):
         self.through = False
         self._tool = Tool.BRUSH
         self._radius = _RADIUS * session.mesh.diagonal
+        self._hovered: tuple[object, ...] = ()  # what the preview under the pointer depends on
         self._cleanup: list[Callable[[], None]] = []  # called in reverse order by `remove`
         if surface is None:
             surface = SurfaceDisplay(self.view, session)
@@ -107,7 +108,7 @@ class RegionSelector(Widget):
     @tool.setter
     def tool(self, tool: Tool) -> None:
         self._tool = require(tool, Tool, "tool")
-        self._ring.hide()
+        self._end_hover()
         self._invoke("ModifiedEvent")
 
     @property
@@ -163,14 +164,14 @@ class RegionSelector(Widget):
         """Start handling events."""
         if not self.GetEnabled():
             super().On()
-            self._stops.append(self.view.observe("LeaveEvent", self._ring.hide))
+            self._stops.append(self.view.observe("LeaveEvent", self._end_hover))
 
     def Off(self) -> None:  # noqa: N802
         """Stop handling events; finish an ongoing stroke."""
         try:
             super().Off()
         finally:
-            self._ring.hide()
+            self._end_hover()
 
     def on_press(self, press: Pointer) -> Gesture | None:
         """Start a stroke; pass the press to the camera beside the mesh."""
@@ -178,9 +179,11 @@ class RegionSelector(Widget):
         return None if stroke is None else self._follow(stroke, self._target, press.control)
 
     def on_hover(self, pointer: Pointer) -> None:
-        """Show the ring of the brush."""
+        """Show the ring of the brush, or the part or region under the pointer."""
         if self.tool is Tool.BRUSH:
             self._draw_ring(pointer, self._target, pointer.control)
+        elif self.tool in (Tool.COMPONENT, Tool.REGION):
+            self._preview_whole(pointer)
 
     def on_wheel(self, pointer: Pointer, clicks: int) -> bool:
         """Resize the brush over the mesh with Shift held; else pass the wheel to the camera."""
@@ -228,6 +231,7 @@ class RegionSelector(Widget):
 
     def _follow(self, stroke: Stroke, target: PaintTarget, erase: bool) -> Gesture:
         """Preview the changes of *stroke* until the release, then apply them."""
+        self._hovered = ()
         try:
             self._preview(stroke, target, erase)
             while (pointer := (yield)).phase is Phase.MOVE:
@@ -247,6 +251,33 @@ class RegionSelector(Widget):
         self.colours.preview(changed, rgb(PAPER) if erase else target.colour)
         if stroke.outline is not None:
             self._outline.draw(stroke.outline)
+
+    def _preview_whole(self, pointer: Pointer) -> None:
+        """Preview what a press at *pointer* would change with the tools for a part or region."""
+        hit = self._picker.hit(pointer) if self.view.contains(pointer) else None
+        regions = self.session.regions
+        if hit is None or (self.tool is Tool.REGION and regions is None):
+            self._end_hover()
+            return
+        if self.tool is Tool.REGION and regions is not None:
+            number = dominant_region(regions, hit.vertex)
+        else:
+            number = int(self.session.mesh.components[hit.vertex])
+        target = self.paints, self.region, self.handle
+        now = self.tool, number, pointer.control, *target, self.session.state
+        if now == self._hovered:
+            return
+        stroke = self._stroke_from(pointer)
+        if stroke is not None:
+            self._preview(stroke, self._target, pointer.control)
+            self._hovered = now
+
+    def _end_hover(self) -> None:
+        """Hide the ring and the preview under the pointer."""
+        self._ring.hide()
+        if self._hovered:
+            self._hovered = ()
+            self.colours.preview(None)
 
     def _apply(self, vertices: BoolArray, target: PaintTarget, erase: bool) -> None:
         self.remark = target.remark(vertices, erase=erase)
@@ -280,3 +311,5 @@ class RegionSelector(Widget):
     def _changed(self, change: Change) -> None:
         if change & Change.POSE:
             self._ring.hide()  # the surface has moved away from it
+        if change & (Change.POSE | Change.REGIONS | Change.CONSTRAINTS) and not self.is_grabbing:
+            self._end_hover()

@@ -58,6 +58,8 @@ class Navigation:
         model.
     state : callable
         Returns an object that is another one after an edit.
+    double_clicked : callable, optional
+        Handles a double click at a pointer; if it returns False, the part there is framed.
     """
 
     def __init__(
@@ -67,9 +69,11 @@ class Navigation:
         point_at: Callable[[Pointer], FloatArray | None],
         part_at: Callable[[Pointer], FloatArray | None],
         state: Callable[[], object],
+        double_clicked: Callable[[Pointer], bool] = lambda _: False,
     ) -> None:
         self.view, self.viewpoint = view, viewpoint
         self._point_at, self._part_at, self._state = point_at, part_at, state
+        self._double_clicked = double_clicked
         self._stops: list[Stop] = []
         self._move: Callable[[float, float], None] | None = None  # of the drag
         self._button = ""
@@ -212,7 +216,8 @@ class Navigation:
             return False
         self._click = None
         self._withhold("LeftButtonPressEvent")
-        self.viewpoint.frame(self._part_at(pointer))
+        if not self._double_clicked(pointer):
+            self.viewpoint.frame(self._part_at(pointer))
         return True
 
     def _is_mine(self, pointer: Pointer) -> bool:

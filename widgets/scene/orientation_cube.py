@@ -8,6 +8,8 @@ The cube has a renderer of its own above that of the view, which copies the came
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from vtkmodules.vtkRenderingAnnotation import vtkAnnotatedCubeActor
 from vtkmodules.vtkRenderingCore import vtkRenderer
@@ -23,6 +25,7 @@ from .view import Stop, View
 
 _ABOVE_WIDGETS = 1.5  # priority: our widgets have 1
 _SIZE, _SMALLEST_VIEW = 84.0, 240  # pixels
+_SHARE = 0.22  # of a small view, at most
 _MARGIN = 10.0  # pixels, to the corner of the view
 _REACH = 0.9  # half the height of its view; a corner of the cube is at 0.87
 _EDGE = 0.32  # from the centre of a face to where an edge begins; the edge itself is at 0.5
@@ -40,10 +43,14 @@ class OrientationCube:
         The view to show it in.
     navigation : Navigation
         Moves the camera of the view.
+    is_covered : callable, optional
+        Returns whether something else has its place at present.
     """
 
-    def __init__(self, view: View, navigation: Navigation) -> None:
-        self.view, self._navigation = view, navigation
+    def __init__(
+        self, view: View, navigation: Navigation, is_covered: Callable[[], bool] = lambda: False
+    ) -> None:
+        self.view, self._navigation, self._is_covered = view, navigation, is_covered
         self._renderer: vtkRenderer | None = None
         self._cube = _cube()
         self._labelled: tuple[float, ...] = ()  # the up axis
@@ -90,12 +97,16 @@ class OrientationCube:
 
     @property
     def rectangle(self) -> tuple[float, float, float, float]:
-        """Left, bottom, right and top in pixels of the window; all 0 in a view too small for it."""
+        """Left, bottom, right and top in pixels of the window.
+
+        All 0 in a view too small for it, and while it is covered.
+        """
         x, y = self.view.renderer.GetOrigin()
         width, height = self.view.renderer.GetSize()
-        if min(width, height) < _SMALLEST_VIEW:
+        if min(width, height) < _SMALLEST_VIEW or self._is_covered():
             return 0.0, 0.0, 0.0, 0.0
         size = float(np.clip(_SIZE * height / 600.0, _SIZE, 2.0 * _SIZE))
+        size = min(size, _SHARE * min(width, height))
         right, top = x + width - _MARGIN, y + height - _MARGIN
         return right - size, top - size, right, top
 

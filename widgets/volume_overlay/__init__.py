@@ -8,7 +8,7 @@ The files, in reading order:
     region_volumes    the volume change of each region
 """
 
-from .legend import brief, percent, signed
+from .legend import brief, in_tenths, percent, signed
 from .region_volumes import RegionVolumes
 from .volume_overlay import VolumeOverlay
 
@@ -16,6 +16,7 @@ __all__ = [
     "RegionVolumes",
     "VolumeOverlay",
     "brief",
+    "in_tenths",
     "percent",
     "signed",
 ]

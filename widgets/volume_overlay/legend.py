@@ -147,6 +147,16 @@ def percent(share: float) -> str:
     return f"{signed(100.0 * share, 4).rstrip('0') or '0'} %"
 
 
+def in_tenths(share: float) -> str:
+    """Format a share in per cent for a column: always with one decimal, unless it is zero.
+
+    >>> in_tenths(0.04), in_tenths(-0.0258), in_tenths(2e-4)
+    ('+4.0 %', '-2.6 %', '0 %')
+    """
+    rounded = round(100.0 * share, 1)
+    return f"{rounded:+.1f} %" if rounded else "0 %"
+
+
 def _scalar_bar(title: str) -> Any:
     bar = vtkScalarBarActor()
     bar.SetTitle(title)

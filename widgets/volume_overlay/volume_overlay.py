@@ -39,7 +39,7 @@ from vtk_segdeform.session import Change, Session, region_name
 
 from ..scene import Stop, SurfaceDisplay, View
 from .diverging import colours_of, half_range_for
-from .legend import Legend, brief, percent, signed
+from .legend import Legend, brief, in_tenths, percent, signed
 from .region_volumes import RegionVolumes
 
 _LAYER = "volume"
@@ -198,7 +198,7 @@ class VolumeOverlay:
             lines.append((f"Local: {low} to {high} %", None))
         regions = self._regions.changes()
         lines += [
-            (f"{self._name(region)}: {signed(100.0 * share, 1)} %", region)
+            (f"{self._name(region)}: {in_tenths(share)}", region)
             for region, share in regions[:_MOST_REGIONS]
         ]
         if len(regions) > _MOST_REGIONS:

@@ -420,7 +420,7 @@ def test_keys_are_changed_in_a_dialog_by_keys_and_kept(start, arm_file):
     hand = start(arm_file)
     window = hand.window
     window.editor.mode = Mode.HANDLES
-    seen = []
+    seen, fixed = [], []
 
     def answer(*pressed):
         """Press keys in the dialog once it is open: (row, key, modifiers)."""
@@ -436,6 +436,8 @@ def test_keys_are_changed_in_a_dialog_by_keys_and_kept(start, arm_file):
                 QtTest.QTest.keyClick(dialog.table, Qt.Key_Return)
                 QtTest.QTest.keyClick(dialog.table, key, held)
                 seen.append(dialog.message.text())
+            rows = [dialog.table.topLevelItem(k) for k in range(dialog.table.topLevelItemCount())]
+            fixed.extend(row.text(0) for row in rows if not row.flags() & Qt.ItemIsEnabled)
             dialog.accept()
 
         QtCore.QTimer.singleShot(10, act)
@@ -448,11 +450,17 @@ def test_keys_are_changed_in_a_dialog_by_keys_and_kept(start, arm_file):
         ("Grow by one ring", Qt.Key_BracketLeft, Qt.NoModifier),
         ("Shrink by one ring", Qt.Key_V, Qt.NoModifier),
         ("Redo", Qt.Key_F5, Qt.ShiftModifier),
+        ("Move pivot to the pointer, or reset it", Qt.Key_X, Qt.NoModifier),
+        ("Local or global axes", Qt.Key_5, Qt.NoModifier),
     )
+    assert seen[6] == "X also has a fixed use. While dragging: constrain to axis"
+    assert seen[7] == "5 also has a fixed use. While dragging: type the amount"
+    assert {"Smaller, larger brush", "Quit"} <= set(fixed)
     assert "Save session" in seen[2]
     assert "[ is used by: Smaller, larger brush" in seen[3]
     assert "V was the key of another action: Select through (X-ray) has no key now" in seen[4]
-    changed = {"undo": ("ctrl+j",), "redo": ("f5",), "shrink": ("v",), "select_through": ()}
+    changed = {"undo": ("ctrl+j",), "redo": ("f5",), "shrink": ("v",), "select_through": (),
+               "pivot": ("x",), "local_axes": ("5",)}  # fmt: skip
     assert window.editor.keys.changes == changed
     hand.settle()
     panel = window.editor_widget.panel

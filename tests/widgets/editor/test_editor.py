@@ -474,6 +474,27 @@ def test_keys_for_axes_the_pivot_and_pins(bench):
     bench.type("v")
     middle = session.mesh.vertices[session.handles["handle 1"]].mean(axis=0)
     assert np.allclose(dragger.gizmo.centre, middle)
+    before, ball = session.state, np.array(hand.at(middle))
+    for key in ("", "Escape"):  # the ball with Shift: the pivot moves, and nothing else
+        hand.press(ball, shift=True)
+        for step in (5.0, 12.0):
+            hand.move(ball + step, shift=True)
+            assert np.allclose(hand.at(dragger.gizmo.centre), ball + step, atol=0.5)
+        assert session.state.pose is None
+        if key:
+            hand.key(key)
+        hand.release()
+        if not key:
+            assert session.undo_label == "move the pivot of handle 1"
+            assert np.allclose(hand.at(session.pivot("handle 1")), ball + 12.0, atol=0.5)
+            for _ in range(2):
+                hand.click(ball + 12.0)
+            assert session.undo_label == "reset the pivot of handle 1"
+        assert np.allclose(dragger.gizmo.centre, middle)
+        assert not session.state.pivots
+    assert session.undo() == "reset the pivot of handle 1"
+    assert session.undo() == "move the pivot of handle 1"
+    assert session.state is before
     bench.type("v")
     assert "Point at the surface" in bench.editor.status
     hand.failures.clear()

@@ -371,14 +371,25 @@ def test_sliders_set_the_number_of_regions_and_the_detail_of_cages_at_once(seen)
     seen.settle()
     assert session.regions.n_regions == seen.panel.regions.count.value() == 3
     seen.mode(Mode.CAGES)
-    seen.panel.cages.detail.setValue(40)
+    slider = seen.panel.cages.detail
+    slider.setSliderDown(True)
+    slider.setSliderPosition(40)
+    seen.panel.refresh()
+    assert slider.sliderPosition() == 40  # a refresh leaves it to the hand
+    assert session.cages == ()
+    slider.setSliderDown(False)
     seen.settle()
     assert sum(cage.n_vertices for cage in session.cages) == 40
     assert seen.panel.cages.detail.value() == seen.panel.cages.total.value() == 40
+    assert seen.panel.cages.total.text() == "40"
+    assert seen.panel.cages.detail.minimum() == 3 * 12  # for each region
     for _ in range(3):  # the cages, their number, the regions
         seen.click(seen.panel.toolbar.undo)
     assert session.cages == before
-    assert seen.panel.cages.detail.value() == sum(cage.n_vertices for cage in before)
+    assert seen.panel.regions.count.value() == session.regions.n_regions == 2
+    count = sum(cage.n_vertices for cage in before)
+    assert seen.panel.cages.detail.value() == count
+    assert seen.panel.cages.total.text() == f"155 ({count} fitted)"
 
 
 def test_the_panel_follows_keys_and_the_wheel(seen):
@@ -498,6 +509,10 @@ def test_the_history_previews_under_the_pointer_and_jumps_at_a_click_or_enter(se
     keys(Qt.Key_Up)
     seen.widget.plotter.setFocus()
     assert looks(2, 2) == 2
+    QtTest.QTest.mousePress(rows.viewport(), Qt.LeftButton, Qt.NoModifier, place(start + 2))
+    rows.itemEntered.emit(rows.item(start))  # with a button down it is no hover
+    assert looks(2, 2) == 2
+    QtTest.QTest.mouseRelease(rows.viewport(), Qt.LeftButton, Qt.NoModifier, place(start + 2))
     seen.click(part.fold)
     assert not rows.isVisible()
 
@@ -863,6 +878,15 @@ def test_in_a_dark_palette_the_panel_is_dark_and_its_text_is_light(seen, tmp_pat
         grey = np.array(Image.open(tmp_path / "panel.png").convert("L"))
         assert np.median(grey) < 60
         assert grey.max() > 200
+        assert seen.panel.history.list.item(0).foreground().color().lightness() > 128
+        through, rows = seen.panel.painting.through, seen.panel.regions.list
+        seen.click_row(rows, 1, column=1)  # no tick any more
+        seen.click_row(rows, 0)  # highlights another row
+        tick = rows.visualRect(rows.indexFromItem(rows.topLevelItem(1), 1))
+        for part, box in ((through, through.rect()), (rows.viewport(), tick)):
+            part.grab(box.adjusted(0, 0, 20 - box.width(), 0)).save(str(tmp_path / "box.png"))
+            grey = np.array(Image.open(tmp_path / "box.png").convert("L"))
+            assert grey[:, :18].max() > 90  # the frame of an empty box
     finally:
         application().setPalette(before)
 

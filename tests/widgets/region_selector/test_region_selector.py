@@ -7,6 +7,7 @@ import pytest
 from hands import Hand, draw_seldom, picture, plain_view
 from scenes import sausage
 from solids import icosphere, rotation
+from vtkmodules.util.numpy_support import vtk_to_numpy
 
 from vtk_segdeform import Mesh, Regions, Session, models
 from vtk_segdeform.errors import ConstraintError, RegionError, SegDeformError
@@ -38,6 +39,12 @@ class Desk:
     @property
     def points(self):
         return self.session.mesh.vertices
+
+    @property
+    def colours(self):
+        """(n, 3) uint8: the colours of the vertices."""
+        shown = self.selector.surface.polydata.GetPointData().GetScalars()
+        return np.array(vtk_to_numpy(shown))
 
     def under(self, x, z):
         """Return the pixel of the point (x, y, z) on the near side of the sphere."""
@@ -598,6 +605,19 @@ def test_what_a_selection_cannot_do_is_named(desk, act, paint, message):
 def test_a_click_takes_a_whole_region_as_fixed_vertices_or_names_what_is_missing(desk):
     selector, session = desk.selector, desk.session
     selector.paints, selector.tool = Paint.FIXED, Tool.REGION
+    plain = desk.colours
+    desk.hand.move(desk.under(0.2, 0.7))  # shows what a click would fix
+    shown = (desk.colours != plain).any(axis=1)
+    assert np.array_equal(shown, session.regions.membership[0])
+    for leave in (
+        lambda: desk.hand.move((1, 1)),
+        lambda: setattr(selector, "tool", Tool.REGION),
+        lambda: desk.view.interactor.InvokeEvent("LeaveEvent"),
+    ):
+        desk.hand.move(desk.under(0.2, 0.7))
+        assert not np.array_equal(desk.colours, plain)
+        leave()
+        assert np.array_equal(desk.colours, plain)
     desk.hand.click(desk.under(0.2, 0.7))
     assert np.array_equal(targets(desk)[0], session.regions.membership[0])
     desk.hand.click(desk.under(0.2, 0.7), control=True)

@@ -361,7 +361,7 @@ def test_a_region_without_a_face_is_left_out():
     assert lines_of(overlay)[2:] == ["region 1: 0 %", "region 3: 0 %"]
     session.change_options(preserve_volume=False)
     move_all(session, np.diag([1.0, 1.0, 1.1]))
-    assert lines_of(overlay)[2:] == ["region 1: +10 %", "region 3: +10 %"]
+    assert lines_of(overlay)[2:] == ["region 1: +10.0 %", "region 3: +10.0 %"]
     overlay.remove()
 
 
