@@ -166,15 +166,17 @@ def _surface(data: pv.DataSet) -> pv.PolyData:
         return pv.PolyData()
     surface, order = pv.PolyData(), []
     surface.points = np.asarray(data.points, dtype=float)
-    starts = pv.convert_array(data.GetCells().GetOffsetsArray())
+    starts, corners = (
+        pv.convert_array(each)
+        for each in (data.GetCells().GetOffsetsArray(), data.GetCells().GetConnectivityArray())
+    )
     for name, types in (
         ("verts", _VERTS), ("lines", _LINES), ("faces", _POLYGONS), ("strips", _STRIPS),
     ):  # fmt: skip
         rows = np.flatnonzero(np.isin(data.celltypes, types))
-        parts = [data.cell_connectivity[starts[k] : starts[k + 1]] for k in rows]
         if name == "faces" and len(rows) == data.n_cells:
-            counts = np.diff(starts)
-            return _with_arrays(polydata_of(surface.points, counts, data.cell_connectivity), data)
+            return _with_arrays(polydata_of(surface.points, np.diff(starts), corners), data)
+        parts = [corners[starts[k] : starts[k + 1]] for k in rows]
         if parts:
             setattr(surface, name, np.concatenate([[len(part), *part] for part in parts]))
         order.append(rows)
