@@ -114,10 +114,10 @@ def _rows_of_text(data: bytes) -> tuple[Any, int, int, bool]:
     kernels = compiled_checks(len(data) // _SHORTEST)
     if kernels is not None:
         (text,) = inputs(np.frombuffer(data, dtype=np.uint8))
-        rows, counts = np.empty((len(data) // _SHORTEST, 3), np.float32), np.empty(4, np.int64)
-        if kernels.facet_corners(text, rows, counts):
+        corners, counts = np.empty((len(data) // _SHORTEST, 3), np.float32), np.empty(4, np.int64)
+        if kernels.facet_corners(text, corners, counts):
             n_rows, facets, ends, n_ends = counts.tolist()
-            return rows[:n_rows], facets, ends, n_ends > 0
+            return corners[:n_rows], facets, ends, n_ends > 0
     rows, facets = _VERTEX.findall(data), len(_FACET.findall(data))
     return rows, facets, len(_END_FACET.findall(data)), _END.search(data) is not None
 

@@ -73,7 +73,7 @@ def _number(text, at, whole):
     if at < n and (text[at] == _MINUS or text[at] == _PLUS):
         negative = text[at] == _MINUS
         at += 1
-    mantissa, power, n_digits = np.int64(0), 0, 0
+    mantissa, power, n_digits = np.int64(0), np.int64(0), 0
     after_point = False
     while at < n:
         letter = text[at]
@@ -96,7 +96,7 @@ def _number(text, at, whole):
         if at < n and (text[at] == _MINUS or text[at] == _PLUS):
             down = text[at] == _MINUS
             at += 1
-        exponent, first = 0, at
+        exponent, first = np.int64(0), at
         while at < n and _ZERO <= text[at] <= _NINE and exponent < 1000:
             exponent = 10 * exponent + (np.int64(text[at]) - _ZERO)
             at += 1
