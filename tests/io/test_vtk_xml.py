@@ -198,3 +198,10 @@ def test_false_counts_of_arrays_are_left_to_vtk(code, coding):
         plain = read_plain_xml(plain_text(sound, its).encode())
         assert bytes(plain.point_data["a"]) == b"abcd"
     assert read_plain_xml(plain_text(code, coding).encode()) is None
+
+
+def test_more_bytes_than_a_share_of_the_file_are_left_to_vtk(monkeypatch):
+    text = plain_text(compressed([1, 4, 0, None]), ZLIB).encode()
+    assert read_plain_xml(text) is not None
+    monkeypatch.setattr("vtk_segdeform.io.vtk_xml._DENSEST", 0)
+    assert read_plain_xml(text) is None
