@@ -76,19 +76,19 @@ def test_pieces_of_a_file_are_one_surface(tmp_path):
 
 
 def test_reading_that_takes_too_long_is_stopped(tmp_path, monkeypatch):
-    write_mesh(tmp_path / "a.vtp", Mesh(*CUBE))
+    write_mesh(tmp_path / "a.vtk", Mesh(*CUBE))
     monkeypatch.setattr(isolated, "_SECONDS", 0.01)
-    with pytest.raises(MeshError, match=r"a\.vtp: .*reading was stopped after 0 s"):
-        read_mesh(tmp_path / "a.vtp")
+    with pytest.raises(MeshError, match=r"a\.vtk: .*reading was stopped after 0 s"):
+        read_mesh(tmp_path / "a.vtk")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs limits of memory")
 def test_reading_that_needs_too_much_memory_is_an_error(tmp_path, monkeypatch):
-    write_mesh(tmp_path / "a.vtp", Mesh(*icosphere(6)))
+    write_mesh(tmp_path / "a.vtk", Mesh(*icosphere(6)))
     monkeypatch.setattr(isolated, "_MEMORY", 1)
     monkeypatch.setattr(isolated, "_PER_BYTE", 0)
-    with pytest.raises(MeshError, match=r"a\.vtp: "):
-        read_mesh(tmp_path / "a.vtp")
+    with pytest.raises(MeshError, match=r"a\.vtk: "):
+        read_mesh(tmp_path / "a.vtk")
 
 
 @pytest.mark.skipif(not meshlab.available(), reason="needs PyMeshLab")
@@ -99,10 +99,10 @@ def test_error_messages_of_pymeshlab_are_passed_on(tmp_path):
 
 
 def test_no_temporary_files_are_left_behind(tmp_path, monkeypatch):
-    write_mesh(tmp_path / "a.vtp", Mesh(*CUBE))
+    write_mesh(tmp_path / "a.vtk", Mesh(*CUBE))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    read_mesh(tmp_path / "a.vtp")
-    (tmp_path / "a.vtp").write_bytes((tmp_path / "a.vtp").read_bytes()[:-200])
+    read_mesh(tmp_path / "a.vtk")
+    (tmp_path / "a.vtk").write_bytes((tmp_path / "a.vtk").read_bytes()[:-200])
     with pytest.raises(MeshError):
-        read_mesh(tmp_path / "a.vtp")
-    assert [path.name for path in tmp_path.iterdir()] == ["a.vtp"]
+        read_mesh(tmp_path / "a.vtk")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.vtk"]

@@ -20,12 +20,14 @@ from vtk_segdeform.cages.fit import fit_cages
 from vtk_segdeform.cages.mean_value import mean_value_coordinates
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.energy.hessian import Factor
-from vtk_segdeform.errors import Cancelled
+from vtk_segdeform.errors import Cancelled, MeshError
 from vtk_segdeform.geometry.lids import lids_of
 from vtk_segdeform.geometry.normals import VertexNormals
 from vtk_segdeform.geometry.rotations import closest_rotations
 from vtk_segdeform.geometry.volume import signed_volume, volume_along, volume_gradient
+from vtk_segdeform.io.number_lines import numbers_of
 from vtk_segdeform.io.polygons import triangles_of
+from vtk_segdeform.io.stl import read_stl
 from vtk_segdeform.kernels import dispatch, threads
 from vtk_segdeform.mesh import find_faults, mesh_of
 from vtk_segdeform.regions.blending import blend_weights, border_distance
@@ -418,3 +420,91 @@ def test_set_up_runs_a_trial_step_so_that_the_first_frame_compiles_nothing(monke
     held = deformer.hold(fixed=mesh.vertices[:, 0] < -1.0, handle=[0, 1, 2])
     assert held.solve(mesh.vertices[:3] + [0.1, 0.0, 0.0]).steps > 0
     assert set(loaded) == before
+
+
+def numbers(kind, count=300):
+    """Return words for *count* numbers."""
+    rng = np.random.default_rng(4)
+    values = rng.normal(size=count) * 10.0 ** rng.integers(-60, 60, size=count)
+    if kind == "shortest":
+        return [repr(value) for value in values.tolist()]
+    if kind == "of single precision":
+        return [f"{value:.17g}" for value in rng.normal(size=count).astype(np.float32).tolist()]
+    if kind == "short":
+        return [f"{value:+.6f}" for value in rng.normal(size=count)]
+    if kind == "between two doubles":  # closer to the middle than any table of doubles can tell
+        halves = 2 * rng.integers(2**53, 2**54, size=count) + 1
+        return [f"{value // 10}.{value % 10}e{k % 9}" for k, value in enumerate(halves.tolist())]
+    return [
+        f"{value}E{k % 90 - 45}" for k, value in enumerate(rng.integers(-(2**61), 2**61, count))
+    ]
+
+
+@pytest.mark.parametrize(
+    "kind", ["shortest", "of single precision", "short", "between two doubles", "long"]
+)
+def test_numbers_are_rounded_correctly_or_left(twin, kind):
+    words = numbers(kind)
+    kernel = dispatch.compiled_kernels().plain_numbers
+    n_left = 0
+    for word in words:
+        value = np.empty(1)
+        if kernel(*dispatch.inputs(np.frombuffer(word.encode(), np.uint8)), False, value) == 1:
+            assert value[0] == float(word)
+        else:
+            n_left += 1
+    assert n_left <= {"between two doubles": len(words), "long": 30}.get(kind, 0)
+
+
+@pytest.mark.parametrize(
+    ("text", "dtype"),
+    [("1 -2.50\n\t+3e2 .5 5. 1e-5 -0 -0.0e0", float), ("1 2 3", int), ("", int), ("0x10 1", float),
+     ("1 2 . 3", float), ("1 2e 3", float), ("1 -", float), ("1 2x", float), ("1 nan inf", float),
+     ("1\0 2", float), ("1 2.0", int), ("9007199254740993 4", int), ("1e400 1e-400 1", float),
+     ("12345678901234567890123 1", float), ("1_0 2", int), ("1,2", float)],
+)  # fmt: skip
+def test_texts_of_numbers_are_parsed_alike(twin, monkeypatch, text, dtype):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    for count in (None, len(text.split()), 3):
+        quick, slow = twin(lambda count=count: numbers_of(text.encode(), dtype, count))
+        assert (quick is None) == (slow is None)
+        if slow is not None:
+            assert quick.dtype == slow.dtype
+            assert quick.tobytes() == slow.tobytes()
+
+
+STL = (
+    "solid a\n"
+    + 30
+    * """ facet normal 0 0 1
+  outer loop
+   vertex 0 0.5 1e-3
+\tVertex -1 2.5 3.25
+   vertex 7 8 0.1
+  endloop
+ endfacet
+"""
+    + "endsolid a\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [("", ""), ("\n", "\r\n"), ("facet", "FACET"), ("0.5", "nan"), ("0.5", "0.5x"), ("0.5", ""),
+     ("endsolid a\n", ""), ("endsolid a\n", " endfacet"), ("vertex 7", "vertices 7"),
+     ("0.1", "0.1 5"), ("0.1\n  endloop", "\n0.1"), (" facet", "vertex 1 2 3\n facet"),
+     ("0.1", "123456789012345678901")],
+)  # fmt: skip
+def test_texts_of_triangles_are_parsed_alike(twin, monkeypatch, tmp_path, before, after):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    (tmp_path / "a.stl").write_text(STL.replace(before, after) if before else STL)
+
+    def read():
+        try:
+            surface = read_stl(tmp_path / "a.stl")
+        except (MeshError, ValueError) as error:
+            return type(error)
+        return surface.points.tobytes(), surface.faces.tobytes()
+
+    quick, slow = twin(read)
+    assert quick == slow

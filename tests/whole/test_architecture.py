@@ -48,6 +48,7 @@ GRANTED = {
     "io.meshlab": {"pymeshlab"},
     "io.polygons": VTK,
     "io.vtk_formats": VTK,
+    "io.vtk_xml": VTK,
     "session.session": {"pyvista"},
     "session.surface_store": VTK | {"pyvista"},
     "pictures": VTK | {"pyvista"},

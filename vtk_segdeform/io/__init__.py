@@ -13,6 +13,7 @@ The files, in reading order:
     stl                STL
     gltf               glTF: a folder with its own contents
     vtk_formats        other formats, by VTK
+    vtk_xml            plain files of VTK's XML formats, without VTK
     isolated reading_child
                        native readers in a child process
     array_names        names and arrays that a format cannot store

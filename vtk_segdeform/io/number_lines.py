@@ -1,8 +1,8 @@
 """Lines of numbers in text, parsed many at once.
 
 Python takes a microsecond for each word, which for a file of a million vertices is many seconds.
-Here numpy finds the lines and words, and parses all numbers in one call.  What is not plain numbers
-is left to the caller: the functions return None for it.
+Here numpy finds the lines and words, and numpy or a compiled kernel parses all numbers in one call.
+What is not plain numbers is left to the caller: the functions return None for it.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
+from ..kernels import compiled_checks, inputs
 
 _LINE_FEED, _SPACE, _TAB = b"\n \t"
 
@@ -66,8 +67,17 @@ def words_per_line(lines: bytes) -> tuple[IntArray, IntArray]:
     return begins, np.diff(np.searchsorted(begins, ends), prepend=0)
 
 
-def numbers_of(text: bytes, dtype: Any, count: int) -> Any:
-    """Return the numbers (count,) of *text*; None if it is anything else than so many numbers."""
+def numbers_of(text: bytes, dtype: Any, count: int | None = None) -> Any:
+    """Return the numbers (k,) of *text*; None if it has anything else, or k is not *count*."""
+    most = len(text) // 2 + 1 if count is None else count
+    kernels = compiled_checks(most)
+    if kernels is not None:
+        (characters,), values = inputs(np.frombuffer(text, dtype=np.uint8)), np.empty(most)
+        found = kernels.plain_numbers(characters, np.dtype(dtype).kind == "i", values)
+        if found in (range(most + 1) if count is None else (count,)):
+            return values[:found].astype(dtype, copy=False)
+    if count is None:
+        count = len(words_per_line(text)[0])
     try:
         numbers = np.fromstring(text, dtype=dtype, sep=" ")
     except (ValueError, DeprecationWarning):  # a warning before numpy 2.3

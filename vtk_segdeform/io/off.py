@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pyvista as pv
@@ -21,33 +21,27 @@ import pyvista as pv
 from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
 from .array_names import text_of, warn_left_out
+from .number_lines import numbers_of, words_per_line
 from .polygons import cells_of, polydata_of, polygons_of, rows
 
 _KIND = re.compile(r"(ST)?(C)?(N)?OFF\b", re.IGNORECASE)
 
+_Tables: TypeAlias = tuple[FloatArray, IntArray, IntArray, str, tuple[FloatArray, bool] | None]
+
 
 def read_off(path: Path) -> pv.PolyData:
     """Read a surface from an OFF file; with normals, texture coordinates and colours."""
-    text = re.sub(r"#[^\r\n]*", "", text_of(path.read_bytes()))
-    lines = [line for line in re.split(r"[\r\n]+", text) if line.strip()]
-    kind = _KIND.match(lines[0].strip()) if lines else None
+    text = text_of(path.read_bytes()).replace("\r", "\n")
+    if "#" in text:
+        text = re.sub(r"#[^\n]*", "", text)
+    text = text.lstrip()
+    kind = _KIND.match(text)
     if kind is None:
         raise MeshError("the first line is not OFF")
-    rest = lines[0].strip()[kind.end() :]
-    lines[:1] = [rest] if rest.strip() else []
-    n, m = (int(word) for word in lines[0].split()[:2])
-    if n < 0 or m < 0:
-        raise MeshError(f"declares {n} vertices and {m} faces")
-    if len(lines) < 1 + n + m:
-        raise MeshError(
-            f"declares {n} vertices and {m} faces, but ends after {len(lines) - 1} lines"
-        )
-    table = np.array([line.split() for line in lines[1 : 1 + n]], dtype=float).reshape(
-        n, -1 if n else 3
-    )
-    counts, corners = _polygons(lines[1 + n : 1 + n + m])
+    found = _plain_tables(text[kind.end() :].encode() + b"\n")
+    table, counts, corners, first, colours = found or _tables(text[kind.end() :])
     surface = polydata_of(table[:, :3], counts, corners)
-    extra, first = table[:, 3:], lines[1] if n else ""
+    extra = table[:, 3:]
     if kind[3] and extra.shape[1] >= 3:
         surface.point_data["Normals"], extra = extra[:, :3], extra[:, 3:]
         surface.point_data.active_normals_name = "Normals"
@@ -57,8 +51,64 @@ def read_off(path: Path) -> pv.PolyData:
     if kind[2] and extra.shape[1] >= 3:
         colour = extra[:, : min(extra.shape[1], 4)]
         _keep_colour(surface.point_data, colour, "." in first)
-    _keep_colours_of_faces(surface, lines[1 + n : 1 + n + m], counts)
+    if colours is not None:
+        _keep_colour(surface.cell_data, *colours)
     return surface
+
+
+def _plain_tables(text: bytes) -> _Tables | None:
+    """Return `_tables` if vertices have rows of equal length, and faces integers only."""
+    begins, lengths = words_per_line(text)
+    lengths = lengths[lengths > 0]
+    sizes = text[: begins[lengths[0]]].split() if len(lengths) > 1 else []
+    if len(sizes) < 2 or not (sizes[0].isdigit() and sizes[1].isdigit()):
+        return None
+    n, m = int(sizes[0]), int(sizes[1])
+    if not 0 < n < len(lengths) - m or not m:
+        return None
+    of_faces = lengths[1 + n : 1 + n + m]
+    ends = np.cumsum([lengths[0], lengths[1 : 1 + n].sum(), of_faces.sum()])
+    start, middle, end = (int(k) for k in np.append(begins, len(text))[ends])
+    width = int(lengths[1])
+    table = numbers_of(text[start:middle], np.float64, n * width)
+    values = numbers_of(text[middle:end], np.int64, int(of_faces.sum()))
+    if (lengths[1 : 1 + n] != width).any() or table is None or values is None:
+        return None
+    starts = np.cumsum(of_faces) - of_faces
+    counts = values[starts]
+    n_colour = int(of_faces[0] - counts[0] - 1)
+    if counts.min() < 0 or (of_faces != counts + (1 + n_colour)).any() or n_colour < 0:
+        return None
+    place = np.arange(len(values)) - np.repeat(starts, of_faces)
+    colour = values[place > np.repeat(counts, of_faces)].reshape(m, n_colour).astype(float)
+    return (
+        table.reshape(n, width),
+        counts,
+        values[(place > 0) & (place <= np.repeat(counts, of_faces))],
+        text[start : begins[lengths[0] + width]].decode() if n * width < len(begins) else "",
+        (colour, False) if n_colour in (3, 4) else None,
+    )
+
+
+def _tables(text: str) -> _Tables:
+    """Return what is after the first word of a file.
+
+    That is a row of numbers for each vertex, the numbers and indices of corners, the line of the
+    first vertex, and if all faces have one, their colours and whether these have a decimal point.
+    """
+    lines = [line for line in text.split("\n") if line.strip()]
+    n, m = (int(word) for word in lines[0].split()[:2])
+    if n < 0 or m < 0:
+        raise MeshError(f"declares {n} vertices and {m} faces")
+    if len(lines) < 1 + n + m:
+        raise MeshError(
+            f"declares {n} vertices and {m} faces, but ends after {len(lines) - 1} lines"
+        )
+    words = [line.split() for line in lines[1 : 1 + n]]
+    table = np.array(words, dtype=float).reshape(n, -1 if n else 3)
+    of_faces = lines[1 + n : 1 + n + m]
+    counts, corners = _polygons(of_faces)
+    return table, counts, corners, lines[1] if n else "", _colours_of_faces(of_faces, counts)
 
 
 def _keep_colour(attributes: Any, colour: FloatArray, fractions: bool) -> None:
@@ -67,16 +117,16 @@ def _keep_colour(attributes: Any, colour: FloatArray, fractions: bool) -> None:
     attributes["RGB" if colour.shape[1] == 3 else "RGBA"] = np.round(colour).astype(np.uint8)
 
 
-def _keep_colours_of_faces(surface: pv.PolyData, lines: list[str], counts: IntArray) -> None:
+def _colours_of_faces(lines: list[str], counts: IntArray) -> tuple[FloatArray, bool] | None:
     words = [line.split()[k + 1 :] for line, k in zip(lines, counts.tolist(), strict=True)]
     widths = {len(row) for row in words}
     if widths != {3} and widths != {4}:
-        return
+        return None
     try:
         colour = np.array(words, dtype=float)
     except ValueError:
-        return
-    _keep_colour(surface.cell_data, colour, any("." in word for row in words for word in row))
+        return None
+    return colour, any("." in word for row in words for word in row)
 
 
 def write_off(path: Path, surface: pv.PolyData) -> None:

@@ -99,7 +99,9 @@ def _corners(table: Table) -> Lists | None:
     if not found:
         return None
     lengths, values = found[0]
-    if not (np.abs(values.astype(float)) < 2**53).all() or (values != np.rint(values)).any():
+    if values.dtype.kind == "f" and not (
+        (np.abs(values) < 2**53).all() and (values == np.rint(values)).all()
+    ):
         raise MeshError("a face of the PLY file has a corner that is not an integer")
     return Lists(lengths, values.astype(np.int64))
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..errors import MeshError
 from .array_names import decoded
-from .number_lines import numbers_of, words_per_line
+from .number_lines import numbers_of
 
 TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -128,8 +128,7 @@ def _type(name: str, line: bytes) -> str:
 
 def _doubles(text: bytes) -> Any:
     """Return the numbers in *text*; MeshError if anything else is in it."""
-    begins, _ = words_per_line(text)
-    numbers = numbers_of(text, np.float64, len(begins))
+    numbers = numbers_of(text, np.float64)
     if numbers is not None:
         return numbers
     words = text.split()

@@ -21,9 +21,11 @@ import numpy as np
 import pyvista as pv
 
 from ..errors import MeshError
+from ..kernels import compiled_checks, inputs
 from .array_names import decoded, get_names, set_names, warn_left_out
 from .polygons import cells_of, cut_into_triangles, polydata_of, polygons_of
 
+_SHORTEST = len("vertex 0 0 0")
 _START, _SIZE = 84, 50  # bytes before the triangles, and per triangle
 _ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
 _HEADER = "Header"
@@ -95,10 +97,8 @@ def _of_bytes(data: bytes, count: int) -> Any:
 
 
 def _of_text(path: Path, data: bytes) -> Any:
-    data = data.replace(b"\r", b"\n")
-    rows, facets = _VERTEX.findall(data), len(_FACET.findall(data))
-    has_end = _END.search(data) is not None
-    is_complete = has_end or (facets > 0 and len(_END_FACET.findall(data)) == facets)
+    rows, facets, ends, has_end = _rows_of_text(data.replace(b"\r", b"\n"))
+    is_complete = has_end or facets == ends > 0
     if len(rows) != 3 * facets or not is_complete:
         raise MeshError("is truncated, or has a facet without three vertices")
     if not has_end:
@@ -107,6 +107,19 @@ def _of_text(path: Path, data: bytes) -> Any:
         )
     with np.errstate(over="ignore"):
         return np.array(rows, dtype=float).reshape(-1, 3).astype(np.float32)
+
+
+def _rows_of_text(data: bytes) -> tuple[Any, int, int, bool]:
+    """Return the corners, the numbers of facet and endfacet, and whether there is an endsolid."""
+    kernels = compiled_checks(len(data) // _SHORTEST)
+    if kernels is not None:
+        (text,) = inputs(np.frombuffer(data, dtype=np.uint8))
+        corners, counts = np.empty((len(data) // _SHORTEST, 3), np.float32), np.empty(4, np.int64)
+        if kernels.facet_corners(text, corners, counts):
+            n_rows, facets, ends, n_ends = counts.tolist()
+            return corners[:n_rows], facets, ends, n_ends > 0
+    rows, facets = _VERTEX.findall(data), len(_FACET.findall(data))
+    return rows, facets, len(_END_FACET.findall(data)), _END.search(data) is not None
 
 
 def _merged(corners: Any) -> tuple[Any, Any]:

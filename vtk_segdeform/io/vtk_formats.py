@@ -1,7 +1,8 @@
 """Surfaces through VTK's own readers and writers, for .vtk, .vtp, .vtu and .vtkhdf.
 
 Reading: the readers of VTK do not validate a file, so they run in a child process (`isolated`);
-afterwards the cells and arrays are checked, and VTK's error messages become a MeshError.
+afterwards the cells and arrays are checked, and VTK's error messages become a MeshError.  Plain XML
+files are read without VTK (`vtk_xml`).
 
 Writing: names that a format cannot store are changed first.  VTK's XML writer does not escape
 names, so that ``<`` makes the file unreadable.  Its HDF writer changes some names, possibly two to
@@ -31,6 +32,7 @@ from ..errors import MeshError
 from .array_names import plain_names, warn_renamed
 from .isolated import read_isolated
 from .polygons import polydata_of
+from .vtk_xml import read_plain_xml
 
 _log = logging.getLogger(__name__)
 _PREFIX = re.compile(r"^\w+ \(\w+\): ")
@@ -62,7 +64,11 @@ def read_with_vtk(path: Path) -> pv.PolyData:
                 "give it the suffix of its format"
             )
     if suffix in _XML:
-        _require_plausible_counts(path)
+        data = path.read_bytes()
+        plain = read_plain_xml(data)
+        if plain is not None:
+            return _surface(plain)
+        _require_plausible_counts(data)
     try:
         with read_isolated("vtk", path) as folder:
             pieces = sorted(folder.iterdir(), key=lambda piece: int(piece.stem))
@@ -125,13 +131,12 @@ def _cell_arrays(data: pv.PolyData) -> list[Any]:
     return [data.GetVerts(), data.GetLines(), data.GetPolys(), data.GetStrips()]
 
 
-def _require_plausible_counts(path: Path) -> None:
+def _require_plausible_counts(data: bytes) -> None:
     """Raise a MeshError if a file declares more than its bytes can contain.
 
     VTK's XML readers would allocate that much memory and crash.  Each block of an array, compressed
     or not, also begins with counts: a few integers in base64.
     """
-    data = path.read_bytes()
     most = _DENSEST * len(data)
     for match in _COUNTS.finditer(data):
         if int(match[2]) > most:
@@ -166,15 +171,17 @@ def _surface(data: pv.DataSet) -> pv.PolyData:
         return pv.PolyData()
     surface, order = pv.PolyData(), []
     surface.points = np.asarray(data.points, dtype=float)
-    starts = pv.convert_array(data.GetCells().GetOffsetsArray())
+    starts, corners = (
+        pv.convert_array(each)
+        for each in (data.GetCells().GetOffsetsArray(), data.GetCells().GetConnectivityArray())
+    )
     for name, types in (
         ("verts", _VERTS), ("lines", _LINES), ("faces", _POLYGONS), ("strips", _STRIPS),
     ):  # fmt: skip
         rows = np.flatnonzero(np.isin(data.celltypes, types))
-        parts = [data.cell_connectivity[starts[k] : starts[k + 1]] for k in rows]
         if name == "faces" and len(rows) == data.n_cells:
-            counts = np.diff(starts)
-            return _with_arrays(polydata_of(surface.points, counts, data.cell_connectivity), data)
+            return _with_arrays(polydata_of(surface.points, np.diff(starts), corners), data)
+        parts = [corners[starts[k] : starts[k + 1]] for k in rows]
         if parts:
             setattr(surface, name, np.concatenate([[len(part), *part] for part in parts]))
         order.append(rows)

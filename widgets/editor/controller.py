@@ -137,15 +137,16 @@ class Controller:
     @is_on.setter
     def is_on(self, on: bool) -> None:
         self._is_on = on
-        self.camera.navigation.SetEnabled(on)
-        try:
-            if not on:
-                self.help.hide()
-                self._preparing.stop()
-                self._worker.cancel()
-                self.wait()
-        finally:
-            self._apply_mode()
+        with self.view.drawing_once():
+            self.camera.navigation.SetEnabled(on)
+            try:
+                if not on:
+                    self.help.hide()
+                    self._preparing.stop()
+                    self._worker.cancel()
+                    self.wait()
+            finally:
+                self._apply_mode()
 
     def remove(self) -> None:
         """Remove everything from the view, permanently."""
@@ -291,11 +292,12 @@ class Controller:
                 self.messages.note(outcome)
             self._apply_mode()
 
-        self.widgets.finish()  # before the job starts, because it may fail
-        self._preparing.interrupt()
-        self._worker.start(name, work, deliver)
-        self.widgets.switch_off()
-        self.refresh()
+        with self.view.drawing_once():
+            self.widgets.finish()  # before the job starts, because it may fail
+            self._preparing.interrupt()
+            self._worker.start(name, work, deliver)
+            self.widgets.switch_off()
+            self.refresh()
 
     def wait(self) -> None:
         """Block until no job is running; for scripts."""

@@ -31,7 +31,7 @@ _log = logging.getLogger(__name__)
 
 _PERIOD = 20  # milliseconds between two polls of a view's timer
 _SHARE = 0.01  # seconds of each period in which the window's thread waits for the worker
-_REPORT_INTERVAL = 0.1  # seconds, at least, between two reports of progress
+_REPORT_INTERVAL = 0.25  # seconds, at least, between two reports of progress
 
 
 def view_timer(view: View) -> Timer:

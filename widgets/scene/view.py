@@ -127,9 +127,11 @@ class View(Projection):
 
         Do nothing before the first picture of the window.
         """
+        if self.window is None or self.window.GetNeverRendered():
+            return
         if self._depth:
             self._render_requested = True
-        elif self.window is not None and not self.window.GetNeverRendered():
+        else:
             self.render()
 
     @property

@@ -11,6 +11,7 @@
     paths           `blending.border_distance`
     beams           `line_of_sight.faces_in_beam`
     triangles       `faults.Search`, `shells.shell_volumes`, `grouping.first_equal_row`
+    text            `number_lines.numbers_of`, `stl.read_stl`
 
 They release the GIL and start no threads; `threads.in_parallel` runs several at a time.  Arguments
 are positional, as numba requires, and outputs are arrays passed as arguments.
@@ -33,6 +34,7 @@ from .normals import ring_normals, rings
 from .paths import distances_inside
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
 from .rotations import rotations
+from .text import facet_corners, plain_numbers
 from .triangles import first_equal_points, flat_faces, shell_sums
 from .volumes import volume_along_sums, volume_gradient, volume_sums
 
@@ -46,6 +48,7 @@ __all__ = [
     "beyond_sides",
     "border_half_edges",
     "distances_inside",
+    "facet_corners",
     "first_equal_points",
     "flat_faces",
     "interpolated_rows",
@@ -55,6 +58,7 @@ __all__ = [
     "number_trees",
     "one_fan_each",
     "pair_half_edges",
+    "plain_numbers",
     "ring_normals",
     "rings",
     "rotations",

@@ -1,0 +1,184 @@
+"""Numbers in text, for `number_lines` and `stl`.
+
+A number is m 10^p with an integer m.  If m is up to 2^53 and p from -22 to 22, both factors are
+doubles, and their product or quotient is rounded once.  Otherwise m and 10^|p| are sums of two
+doubles each, and so is the result, with 40 more bits than a double has: rounding it is correct
+unless the sum is so close to the middle of two doubles that these bits do not decide.  Such a
+number, one with an m above 2^62, or with |p| above 80, is left to the caller.
+
+Sources: W. D. Clinger, How to read floating point numbers accurately, PLDI 1990, 92-101;
+T. J. Dekker, A floating-point technique for extending the available precision, Numerische
+Mathematik 18 (1971), 224-242.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .kernels import kernel
+
+_compile = kernel()
+_POWERS = np.array([float(10**k) for k in range(81)])
+_LOW_POWERS = np.array([float(10**k - int(float(10**k))) for k in range(81)])  # 10^k less these
+_EXACT, _EXACT_POWER, _LARGEST = 2**53, 22, 2**62
+_SPLIT = 2.0**27 + 1.0
+_UNDECIDED = 2.0**-95  # relative error of a sum of two doubles, and a margin
+_LINE_FEED, _SPACE, _TAB, _RETURN = b"\n \t\r"
+_PLUS, _MINUS, _POINT, _ZERO, _NINE, _E = b"+-.09e"
+_LETTER_CASE = 0x20
+_VERTEX, _FACET = np.frombuffer(b"vertex", "u1"), np.frombuffer(b"facet", "u1")
+_END_FACET, _END_SOLID = np.frombuffer(b"endfacet", "u1"), np.frombuffer(b"endsolid", "u1")
+
+
+@_compile
+def _product(a, b):
+    """Return a b as the sum of two doubles, exactly."""
+    x, y = _SPLIT * a, _SPLIT * b
+    a_high, b_high = x - (x - a), y - (y - b)
+    a_low, b_low = a - a_high, b - b_high
+    high = a * b
+    return high, a_low * b_low - (((high - a_high * b_high) - a_low * b_high) - a_high * b_low)
+
+
+@_compile
+def _scaled(mantissa, power):
+    """Return mantissa 10^power, correctly rounded; NaN if that is undecided."""
+    high = np.float64(mantissa)
+    k = abs(power)
+    if mantissa <= _EXACT and k <= _EXACT_POWER:
+        return high / _POWERS[k] if power < 0 else high * _POWERS[k]
+    if k >= len(_POWERS):
+        return np.nan
+    low = np.float64(mantissa - np.int64(high))
+    ten, ten_low = _POWERS[k], _LOW_POWERS[k]
+    if power < 0:
+        value = high / ten
+        back, back_low = _product(value, ten)
+        rest = (((high - back) - back_low) + (low - value * ten_low)) / ten
+    else:
+        value, rest = _product(high, ten)
+        rest += high * ten_low + low * ten
+    margin = value * _UNDECIDED
+    return value + rest if value + (rest - margin) == value + (rest + margin) else np.nan
+
+
+@_compile
+def _number(text, at, whole):
+    """Return the number at text[at], and the index after it; -1 as the index if it is not plain.
+
+    It must end before a blank or the end of *text*.  If *whole*, it has digits and a sign only.
+    """
+    n = len(text)
+    negative = False
+    if at < n and (text[at] == _MINUS or text[at] == _PLUS):
+        negative = text[at] == _MINUS
+        at += 1
+    mantissa, power, n_digits = np.int64(0), np.int64(0), 0
+    after_point = False
+    while at < n:
+        letter = text[at]
+        if _ZERO <= letter <= _NINE:
+            if mantissa > _LARGEST // 10 - 1:
+                return 0.0, -1
+            mantissa = 10 * mantissa + (np.int64(letter) - _ZERO)
+            power -= after_point
+            n_digits += 1
+        elif letter == _POINT and not after_point and not whole:
+            after_point = True
+        else:
+            break
+        at += 1
+    if n_digits == 0:
+        return 0.0, -1
+    if at < n and (text[at] | _LETTER_CASE) == _E and not whole:
+        at += 1
+        down = False
+        if at < n and (text[at] == _MINUS or text[at] == _PLUS):
+            down = text[at] == _MINUS
+            at += 1
+        exponent, first = np.int64(0), at
+        while at < n and _ZERO <= text[at] <= _NINE and exponent < 1000:
+            exponent = 10 * exponent + (np.int64(text[at]) - _ZERO)
+            at += 1
+        if at == first:
+            return 0.0, -1
+        power += -exponent if down else exponent
+    if at < n and text[at] != _SPACE and not _TAB <= text[at] <= _RETURN:
+        return 0.0, -1
+    if whole and mantissa > _EXACT:
+        return 0.0, -1
+    value = _scaled(mantissa, power) if mantissa else 0.0
+    if np.isnan(value):
+        return 0.0, -1
+    return -value if negative else value, at
+
+
+@_compile
+def plain_numbers(text, whole, result):
+    """Put the numbers of *text* (b,) uint8, between blanks, into *result* (n,); return how many.
+
+    Return -1 if they are over n, or if one of them is not plain.  If *whole*, all are integers.
+    """
+    at, count = 0, 0
+    while at < len(text):
+        if text[at] == _SPACE or _TAB <= text[at] <= _RETURN:
+            at += 1
+            continue
+        if count == len(result):
+            return -1
+        result[count], at = _number(text, at, whole)
+        if at < 0:
+            return -1
+        count += 1
+    return count
+
+
+@_compile
+def _after_word(text, at, word):
+    """Return the index after *word* in letters of any case at text[at]; -1 if it is not there."""
+    if at + len(word) > len(text):
+        return -1
+    for k in range(len(word)):
+        if (text[at + k] | _LETTER_CASE) != word[k]:
+            return -1
+    end = at + len(word)
+    if end < len(text) and text[end] != _SPACE and not _TAB <= text[end] <= _RETURN:
+        return -1
+    return end
+
+
+@_compile
+def facet_corners(text, corners, counts):
+    """Put the numbers after each "vertex" of an STL *text* (b,) uint8 into *corners* (k, 3).
+
+    Put into *counts* (4,) the numbers of lines that begin with vertex, facet, endfacet and
+    endsolid.  Return False if a vertex has anything else than three plain numbers, or if there are
+    over k of them.
+    """
+    counts[:] = 0
+    at = 0
+    while at < len(text):
+        while at < len(text) and (text[at] == _SPACE or text[at] == _TAB):
+            at += 1
+        end = _after_word(text, at, _VERTEX)
+        if end >= 0:
+            if counts[0] == len(corners):
+                return False
+            for axis in range(3):
+                while end < len(text) and (text[end] == _SPACE or text[end] == _TAB):
+                    end += 1
+                corners[counts[0], axis], end = _number(text, end, False)
+                if end < 0:
+                    return False
+            counts[0] += 1
+            at = end
+        elif _after_word(text, at, _FACET) >= 0:
+            counts[1] += 1
+        elif _after_word(text, at, _END_FACET) >= 0:
+            counts[2] += 1
+        elif _after_word(text, at, _END_SOLID) >= 0:
+            counts[3] += 1
+        while at < len(text) and text[at] != _LINE_FEED:
+            at += 1
+        at += 1
+    return True
