@@ -53,12 +53,14 @@ from ..progress import Progress, tell
 from ..regions import Regions, require_regions
 from ..solver import (
     Anchors,
+    Barrier,
     GaussNewton,
     ScaledSurface,
     Solution,
     SolverOptions,
     SolverResult,
     Status,
+    Term,
     VolumeConstraint,
     Volumes,
     WeightContinuation,
@@ -226,6 +228,8 @@ class Deformer:
     hold_tolerance : float
         Distance, as a share of the mesh's size, by which a handle or fixed vertex may miss its
         place before its weight is raised.
+    avoid_folds : bool
+        Keep the body below the surface from turning inside out, by a barrier (`solver.barrier`).
     blend : (r, n) float, optional
         Blend weights instead of ``regions.weights``, for comparison; `cage_distance_weights`
         computes those of eq. (4) as printed.
@@ -250,6 +254,7 @@ class Deformer:
         tuple[bool, bool, tuple[int, ...]], tuple[tuple[VolumeConstraint, ...], Volumes]
     ]
     _scaled_surface: ScaledSurface
+    _terms: tuple[Term, ...]
     _constraints: _Constraints
     _continuation: WeightContinuation
     _aim: _Approach
@@ -276,6 +281,7 @@ class Deformer:
         exact_hessian: bool = True,
         exact_volume: bool = True,
         hold_tolerance: float = 5e-4,
+        avoid_folds: bool = True,
         blend: ArrayLike | None = None,
         cache: str | os.PathLike[str] | None = None,
         progress: Progress | None = None,
@@ -291,6 +297,7 @@ class Deformer:
         self._preserve_volume = as_flag(preserve_volume, "preserve_volume")
         self._preserve_region_volumes = as_flag(preserve_region_volumes, "preserve_region_volumes")
         self._lids_option = as_lids(lids)
+        avoid_folds = as_flag(avoid_folds, "avoid_folds")
         self._own_blend = None if blend is None else as_numbers(blend, "blend")
         folder = None if cache is None else as_path(cache, "cache")
 
@@ -308,6 +315,7 @@ class Deformer:
         self._rest_pose = mesh.with_vertices(at_origin) if self._frame.is_far else mesh
         self._enclose()
         self._samples = SurfaceSamples.of(self._rest, self._binding.coarse_volume)
+        self._terms = self._barrier() if avoid_folds else ()
         self._constrain(fixed, handle)
         if compiled_kernels(mesh.n_vertices):
             tell(progress, 0.99, "taking a trial step")
@@ -390,7 +398,7 @@ class Deformer:
         pulled = _PulledPoints(np.array(soft, dtype=np.int64), np.array(of_target, dtype=np.int64))
         pulled.vertices = self.handle[pulled.targets]
         pulled.offsets = rows[pulled.places] @ p - places[pulled.places]
-        solver = GaussNewton(before.energy, positions, self._constraints.volumes)
+        solver = replace(before, positions=positions, volumes=self._constraints.volumes)
         load = solver.unbalanced(p, pulled.moved(places))
         steady = self._samples.steadying(p, load)
         anchors = Anchors(weight * quadratic + steady, p, load)
@@ -752,6 +760,17 @@ class Deformer:
             self.subspace, self._rest_pose.vertices, self._total_volume
         )
 
+    def _barrier(self) -> tuple[Term, ...]:
+        """Return the barrier against folds; none if no part of the mesh has an inside."""
+        samples, surface = self._samples, self._binding.coarse_volume.surface
+        encloses = np.zeros(surface.n_vertices, dtype=bool)
+        encloses[samples.cells] = lids_of(self._rest_pose).encloses[self.mesh.components]
+        if not encloses.any():
+            return ()
+        scale = self._binding.energy.scale
+        rest = self._rest_cages
+        return (Barrier.of(surface, samples.faces, rest, encloses=encloses, strength=scale),)
+
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:
         return np.array([each.relative(x) for each in self._region_volumes])
 
@@ -785,7 +804,7 @@ class Deformer:
             preserved=preserved,
             volumes=volumes,
             is_scaled=is_whole and is_large and binding.coarse_volume.cells is not None,
-            solver=GaussNewton(binding.energy, positions, volumes),
+            solver=GaussNewton(binding.energy, positions, volumes, terms=self._terms),
             pulled=_PulledPoints(),
         )
         self.reset()

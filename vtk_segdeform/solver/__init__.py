@@ -6,6 +6,8 @@ The files, in reading order:
     volume_constraints      volume of the mesh or of each region, eqs. (8) and (9)
     position_constraints    fixed vertices and handles, eqs. (6) and (7)
     weights                 continuation of the position weights
+    terms                   further terms of the objective
+    barrier                 a term against folds
     anderson                Anderson acceleration
     extrapolation           where a solve starts in a drag
     exact_volume            motion of a pose onto its exact volumes
@@ -14,11 +16,13 @@ The files, in reading order:
     solution                `Solution` and `Status`
 """
 
+from .barrier import Barrier
 from .coarse_volume import CoarseVolume
 from .exact_volume import ScaledSurface, moved_along, steps_to_volume
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
 from .position_constraints import Anchors, connected_sets, errors_at, position_term
 from .solution import Solution, Status
+from .terms import Term
 from .volume_constraints import (
     VolumeConstraint,
     Volumes,
@@ -31,6 +35,7 @@ from .weights import WeightContinuation
 
 __all__ = [
     "Anchors",
+    "Barrier",
     "CoarseVolume",
     "GaussNewton",
     "ScaledSurface",
@@ -38,6 +43,7 @@ __all__ = [
     "SolverOptions",
     "SolverResult",
     "Status",
+    "Term",
     "VolumeConstraint",
     "Volumes",
     "WeightContinuation",

@@ -50,7 +50,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 
 import numpy as np
 
@@ -200,6 +200,7 @@ class GaussNewton:
     energy: Energy
     positions: PositionTerm
     volumes: Volumes
+    _: KW_ONLY
     terms: tuple[Term, ...] = ()
     _hessian: FloatArray = field(init=False, repr=False)
     _factor: Factor = field(init=False, repr=False)
