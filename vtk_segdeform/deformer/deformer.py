@@ -67,6 +67,7 @@ from ..solver import (
     body_volumes,
     connected_sets,
     errors_at,
+    is_half_turn,
     moved_along,
     position_term,
     region_volumes,
@@ -260,6 +261,7 @@ class Deformer:
     _aim: _Approach
     _p: FloatArray  # (m, 3), the cages of the last pose, in solver coordinates
     _targets: FloatArray  # (k, 3), the targets of the last pose
+    _half_turned: FloatArray  # (k, 3), the last targets half a turn from rest; empty after `_begin`
 
     @one_blas_thread()
     def __init__(
@@ -577,6 +579,9 @@ class Deformer:
         limit = self._options.max_steps if max_steps is None else max_steps
         options = replace(self._options, max_steps=limit, progress=progress)
         self._aim.next = None
+        if max_steps is None and self._is_from_elsewhere(goal):
+            self.reset()
+            self._half_turned = goal
         steps = self._follow_waypoints(goal, options)
         is_same = np.array_equal(goal, self._targets)
         self._targets, pulled = goal, self._constraints.pulled
@@ -594,6 +599,13 @@ class Deformer:
             pulled.correct(off, error)
             is_same, result = True, replace(result, status=Status.STEP_LIMIT)
         return self._solution(result, x, steps)
+
+    def _is_from_elsewhere(self, goal: FloatArray) -> bool:
+        """Tell whether *goal* is half a turn from rest, which is made from there in one sense."""
+        own = self._constraints
+        if own.solver.positions.anchors is not None or np.array_equal(goal, self._half_turned):
+            return False
+        return is_half_turn(self._rest.vertices[self.handle], goal, own.handles)
 
     def _approach(
         self, goal: FloatArray, max_steps: int | None, within: float, progress: Progress | None
@@ -815,7 +827,7 @@ class Deformer:
         solver.volumes = self._constraints.volumes
         self._continuation = WeightContinuation(solver, p, self._hold_tolerance)
         self._aim = _Approach()
-        self._p, self._targets = p, targets
+        self._p, self._targets, self._half_turned = p, targets, _NO_POINTS
         if self._constraints.is_scaled and p is not self._rest_cages:
             self._continuation.continue_from(p)
 

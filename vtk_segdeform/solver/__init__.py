@@ -30,7 +30,7 @@ from .volume_constraints import (
     region_volumes,
     total_volume,
 )
-from .waypoints import waypoints
+from .waypoints import is_half_turn, waypoints
 from .weights import WeightContinuation
 
 __all__ = [
@@ -50,6 +50,7 @@ __all__ = [
     "body_volumes",
     "connected_sets",
     "errors_at",
+    "is_half_turn",
     "moved_along",
     "position_term",
     "region_volumes",

@@ -4,9 +4,9 @@ A triangle (a, b, c) of a coarse surface and a point d inside the body make a te
 rest to pose it is mapped by F, and J = det F is the local volume change, negative where the body
 is turned inside out.  While J is below a threshold J_0, the objective has the term
 
-    b(J) = -(J - J_0)^2 log(J / J_0)
+    b(J) = (J_0 - J)^3 / (J_0^2 J)
 
-which is twice differentiable and grows without limit towards J = 0.  Poses that are folded
+which is convex, twice differentiable, and grows without limit towards J = 0.  Poses that are folded
 already, such as those of cages moved by hand, must have a way back.  So below a small J b
 continues as a parabola, so steep that no handle pushes through it.
 
@@ -23,8 +23,8 @@ J < J_0 adds a matrix of rank at most 9.
 
 Source
 ------
-M. Li et al., "Incremental potential contact", SIGGRAPH 2020: the function b.  The point inside:
-`geometry.local_volume`.
+C. Schueller, L. Kavan, D. Panozzo, O. Sorkine-Hornung, "Locally injective mappings", Symposium on
+Geometry Processing 2013: barriers of this kind.  The balls: `geometry.local_volume`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from ..subspace import Subspace
 
 _THRESHOLD = 0.5  # J_0
 _STEEPEST = 0.02  # J below which b is a parabola
-_STRENGTH = 0.1  # of all tetrahedra together, in scales of the shape energy
+_STRENGTH = 0.01  # of all tetrahedra together, in scales of the shape energy
 _AROUND, _REACH = 16, 1.3  # points around a ball, within so many of its radii from its middle
 _LEAST_HEIGHT = 0.1  # of a tetrahedron, relative to the root of its triangle's area
 _MOST = 8_000  # tetrahedra
@@ -162,10 +162,10 @@ class Barrier:
 def _barrier(j: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return b and its first two derivatives at *j* (k,), all below the threshold."""
     at = np.maximum(j, _STEEPEST)
-    log, u = np.log(at / _THRESHOLD), at - _THRESHOLD
-    value = -u * u * log
-    first = -2.0 * u * log - u * u / at
-    second = -2.0 * log - 4.0 * u / at + (u / at) ** 2
+    short = _THRESHOLD - at
+    value = short**3 / at / _THRESHOLD**2
+    first = -(short**2) * (2.0 * at + _THRESHOLD) / (at * _THRESHOLD) ** 2
+    second = 2.0 * _THRESHOLD / at**3 - 2.0 / _THRESHOLD**2
     beyond = np.minimum(j - _STEEPEST, 0.0)
     value += first * beyond + 0.5 * second * beyond**2
     return value, first + second * beyond, second
