@@ -8,7 +8,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from solids import rotation
 
+from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.regions.regions import Regions
 
 SCENE = sausage(2)
 FREE = SCENE.deformer(avoid_folds=False)
@@ -98,13 +101,11 @@ def test_while_inactive_it_changes_no_bit():
 
 
 def test_an_open_sheet_has_no_inside():
-    faces = SCENE.mesh.faces
-    x = SCENE.mesh.vertices[faces].mean(axis=1)
-    from vtk_segdeform.mesh.mesh import Mesh
-    from vtk_segdeform.regions.regions import Regions
-
-    kept = faces[x[:, 0] > 0.5]
-    used, place = np.unique(kept, return_inverse=True)
-    sheet = Mesh(SCENE.mesh.vertices[used], place.reshape(-1, 3))
-    regions = Regions(sheet, SCENE.regions.membership[:, used])
-    assert Deformer(sheet, regions, SCENE.cages, lids=False)._terms == ()
+    x, y = np.mgrid[0:1:6j, 0:1:6j].reshape(2, -1)
+    corner = np.add.outer(6 * np.arange(5), np.arange(5)).ravel()
+    faces = np.concatenate([corner[:, None] + [0, 6, 7], corner[:, None] + [0, 7, 1]])
+    sheet = Mesh(np.column_stack([x, y, 0.1 * x * y]), faces)
+    points = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) * 5.0
+    cage = Cage(points, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+    regions = Regions(sheet, np.ones((1, len(x)), dtype=bool))
+    assert Deformer(sheet, regions, [cage])._terms == ()

@@ -84,6 +84,7 @@ def full_factor(
     hessian: FloatArray,
     energy: Energy | None,
     p: FloatArray,
+    *,
     volumes: FloatArray | None = None,
     added: FloatArray | None = None,
 ) -> Factor | None:

@@ -42,7 +42,7 @@ from ..subspace import Subspace
 
 _THRESHOLD = 0.5  # J_0
 _STEEPEST = 0.02  # J below which b is a parabola
-_STRENGTH = 0.01  # of all tetrahedra together, in scales of the shape energy
+_STRENGTH = 0.03  # of all tetrahedra together, in scales of the shape energy
 _AROUND, _REACH = 16, 1.3  # points around a ball, within so many of its radii from its middle
 _LEAST_HEIGHT = 0.1  # of a tetrahedron, relative to the root of its triangle's area
 _MOST = 8_000  # tetrahedra
@@ -231,7 +231,8 @@ def _tetrahedra(x: FloatArray, faces: IntArray) -> IntArray:
     corners = np.column_stack([faces[:, [0, 2, 1]], inner])
     a, b, c = x[corners[:, :3].T]
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return corners[_determinants(x, corners) > _LEAST_HEIGHT * area**1.5]
+    is_solid: BoolArray = _determinants(x, corners) > _LEAST_HEIGHT * area**1.5
+    return np.asarray(corners[is_solid])
 
 
 def _identity(n: int) -> sparse.csr_array:

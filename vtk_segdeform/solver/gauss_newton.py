@@ -363,7 +363,7 @@ class GaussNewton:
         step, multipliers, _ = self._step(here, self._factor)
         if state.is_near and self.volumes.hessian and self._length(step) < _CLOSE:
             of_volumes = self.volumes.hessian(here.p, multipliers)
-        return full_factor(self._hessian, self.energy, here.p, of_volumes, of_terms)
+        return full_factor(self._hessian, self.energy, here.p, volumes=of_volumes, added=of_terms)
 
     def _begin(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> _State:
         """Return the state from which a call with these arguments begins."""
