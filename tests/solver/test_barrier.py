@@ -14,12 +14,14 @@ from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
 
 SCENE = sausage(2)
-FREE = SCENE.deformer(avoid_folds=False)
+BOUND = SCENE.deformer(avoid_folds=True)
+FREE = SCENE.deformer()
+HELD = {"fixed": SCENE.fixed, "handle": SCENE.handle}
 
 
 @pytest.fixture(scope="module")
 def barrier():
-    return SCENE.held()._terms[0]
+    return BOUND._terms[0]
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +79,7 @@ def test_the_way_back_from_a_folded_pose_is_finite_and_downhill(barrier):
     value, slope = barrier.value_and_slope(inverted)
     assert 0.0 < value < np.inf
     assert barrier.value_and_slope(inverted - 1e-6 * slope)[0] < value
-    deformer = SCENE.held()
+    deformer = BOUND.hold(**HELD)
     rest = SCENE.mesh.vertices[SCENE.handle]
     deformer.resume([cage.vertices * [1.0, 1.0, 0.3] for cage in SCENE.cages], rest)
     assert barrier.ratios(deformer.solve(rest) and deformer._p).min() > 0.5
@@ -86,7 +88,7 @@ def test_the_way_back_from_a_folded_pose_is_finite_and_downhill(barrier):
 def test_a_bend_folds_without_the_barrier_only(barrier):
     targets = SCENE.turned(150)
     least = []
-    for deformer in (SCENE.held(), FREE.hold(fixed=SCENE.fixed, handle=SCENE.handle)):
+    for deformer in (BOUND.hold(**HELD), FREE.hold(**HELD)):
         solution = deformer.solve(targets)
         assert abs(solution.volume_change) < 1e-13
         least.append(barrier.ratios(deformer._p).min())
@@ -96,8 +98,8 @@ def test_a_bend_folds_without_the_barrier_only(barrier):
 
 def test_while_inactive_it_changes_no_bit():
     targets = SCENE.turned(20)
-    without = FREE.hold(fixed=SCENE.fixed, handle=SCENE.handle).solve(targets)
-    assert_array_equal(SCENE.held().solve(targets).vertices, without.vertices)
+    without = FREE.hold(**HELD).solve(targets)
+    assert_array_equal(BOUND.hold(**HELD).solve(targets).vertices, without.vertices)
 
 
 def test_an_open_sheet_has_no_inside():
@@ -108,4 +110,4 @@ def test_an_open_sheet_has_no_inside():
     points = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) * 5.0
     cage = Cage(points, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
     regions = Regions(sheet, np.ones((1, len(x)), dtype=bool))
-    assert Deformer(sheet, regions, [cage])._terms == ()
+    assert Deformer(sheet, regions, [cage], avoid_folds=True)._terms == ()

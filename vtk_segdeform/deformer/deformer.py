@@ -231,6 +231,7 @@ class Deformer:
         place before its weight is raised.
     avoid_folds : bool
         Keep the body below the surface from turning inside out, by a barrier (`solver.barrier`).
+        Far bends then fold less, but distort the surface more and take about three times as long.
     blend : (r, n) float, optional
         Blend weights instead of ``regions.weights``, for comparison; `cage_distance_weights`
         computes those of eq. (4) as printed.
@@ -283,7 +284,7 @@ class Deformer:
         exact_hessian: bool = True,
         exact_volume: bool = True,
         hold_tolerance: float = 5e-4,
-        avoid_folds: bool = True,
+        avoid_folds: bool = False,
         blend: ArrayLike | None = None,
         cache: str | os.PathLike[str] | None = None,
         progress: Progress | None = None,
