@@ -100,6 +100,18 @@ def test_a_jump_and_a_drag_end_in_the_same_place():
     assert_allclose(solution.vertices, jump.vertices, atol=1e-4 * SCENE.mesh.diagonal)
 
 
+def test_half_a_turn_ends_in_the_same_pose_by_either_path():
+    x = VERTICES[SCENE.handle].mean(axis=0) - VERTICES.mean(axis=0)
+    poses = []
+    for sense in (1.0, -1.0):
+        deformer = SCENE.held()
+        deformer.solve(SCENE.turned(sense * 90, axis=x))
+        poses.append(deformer.solve(SCENE.turned(sense * 180, axis=x)))
+        again = deformer.solve(SCENE.turned(sense * 180, axis=x))
+        assert_allclose(again.vertices, poses[-1].vertices, atol=1e-4 * SCENE.mesh.diagonal)
+    assert_allclose(poses[1].vertices, poses[0].vertices, atol=1e-4 * SCENE.mesh.diagonal)
+
+
 def test_solving_for_the_rest_targets_and_reset_both_return_to_rest():
     deformer = SCENE.deformer(tolerance=1e-8, max_steps=2000)
     deformer.solve(SCENE.turned(45))

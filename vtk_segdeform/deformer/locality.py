@@ -67,6 +67,8 @@ class SurfaceSamples:
         Their positions at rest.
     areas : (s,) float
         Their shares of the area.
+    faces : (f, 3) int
+        The triangles between them.
     edges : (s, s) sparse
         Lengths of the edges between them.
     """
@@ -75,6 +77,7 @@ class SurfaceSamples:
     rows: FloatArray
     points: FloatArray
     areas: FloatArray
+    faces: IntArray
     edges: sparse.csr_array
 
     @classmethod
@@ -94,7 +97,7 @@ class SurfaceSamples:
         lengths = np.linalg.norm(points[near.row] - points[near.col], axis=1)
         edges = sparse.coo_array((lengths, (near.row, near.col)), (count, count)).tocsr()
         rows = coarse.surface.at(np.arange(count))
-        return cls(cells, rows, points, areas / areas.sum(), edges)
+        return cls(cells, rows, points, areas / areas.sum(), faces, edges)
 
     def distances(self, vertex: int) -> FloatArray:
         """Return the distance of each sample from that of *vertex*, (s,); infinite elsewhere."""

@@ -81,24 +81,35 @@ def quadratic_factor(hessian: FloatArray) -> Factor | None:
 
 
 def full_factor(
-    hessian: FloatArray, energy: Energy, p: FloatArray, volumes: FloatArray | None = None
+    hessian: FloatArray,
+    energy: Energy | None,
+    p: FloatArray,
+    *,
+    volumes: FloatArray | None = None,
+    added: FloatArray | None = None,
 ) -> Factor | None:
-    """Return the factor of *hessian* (m, m) minus the rotations' term at *p* (m, 3).
+    """Return the factor of *hessian* (m, m) minus the rotations' term of *energy* at *p* (m, 3).
 
-    The Hessian of the preserved *volumes*, G (3, m, m) of `volume_constraints.Volumes`, is added.
-    None if no share of the rotations' term leaves the sum convex.
+    The Hessian of the preserved *volumes*, G (3, m, m) of `volume_constraints.Volumes`, is added,
+    and so is *added* (3m, 3m), which is positive semi-definite.  None if no share of the rotations'
+    term leaves the sum convex; with *added*, or without *energy*, no share at all is tried as well.
     """
     m = len(p)
-    term = _rotation_term(energy, p)
-    for share in _SHARES:
+    term = np.zeros((3 * m, 3 * m)) if energy is None else _rotation_term(energy, p)
+    shares = (_SHARES if energy is not None else ()) + (0.0,) * (
+        energy is None or added is not None
+    )
+    for share in shares:
         full = -share * term
         for axis in range(3):
             block = slice(axis * m, (axis + 1) * m)
             full[block, block] += hessian
-        if volumes is not None:  # below the diagonal: eps_abc G_c for a > b
+        if volumes is not None and share:  # below the diagonal: eps_abc G_c for a > b
             full[m : 2 * m, :m] -= volumes[2]
             full[2 * m :, :m] += volumes[1]
             full[2 * m :, m : 2 * m] -= volumes[0]
+        if added is not None:
+            full += added
         try:
             return Factor(
                 linalg.cholesky(full, lower=True, overwrite_a=True, check_finite=False),

@@ -29,7 +29,7 @@ from .distortion import distortion, triangle_distortion
 from .intrinsic import IntrinsicTriangulation
 from .kmeans import cluster_positions, cluster_within_parts, farthest_points
 from .lids import Lids, lids_of, volume_summary
-from .local_volume import LocalVolume, local_volume_change
+from .local_volume import LocalVolume, inner_balls, local_volume_change
 from .normal_transport import NormalTransport
 from .normals import VertexNormals
 from .rotations import closest_rotations, rigid_fit
@@ -62,6 +62,7 @@ __all__ = [
     "faces_between",
     "farthest_points",
     "guess_up_axis",
+    "inner_balls",
     "inner_vertices",
     "lids_of",
     "local_volume_change",

@@ -123,7 +123,7 @@ class _Volumes:
 
     def __init__(self, points: FloatArray, faces: IntArray) -> None:
         self._faces = faces
-        self._opposite, diameter = _opposite_vertices(points, faces)
+        _, self._opposite, diameter = inner_balls(points, faces)
         n, m = len(points), len(faces)
         corners = faces.ravel(), np.repeat(np.arange(m), 3)
         self._around = sparse.coo_array((np.ones(3 * m), corners), (n, m)).tocsr()
@@ -216,8 +216,11 @@ def _edges(faces: IntArray, n: int) -> IntArray:
     return unique_edges(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), n)
 
 
-def _opposite_vertices(x: FloatArray, faces: IntArray) -> tuple[IntArray, FloatArray]:
-    """Return o (n,) and the diameters (n,) of the inner balls that touch vertices i and o(i)."""
+def inner_balls(x: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, FloatArray]:
+    """Return the inward normals (n, 3), o (n,) and the diameters (n,) of the inner balls.
+
+    They are the largest balls inside the surface that touch vertices i and o(i).
+    """
     inward = -volume_gradient(x, faces)
     length = np.linalg.norm(inward, axis=1, keepdims=True)
     inward = np.divide(inward, length, where=length > 0, out=np.zeros_like(inward))
@@ -241,4 +244,4 @@ def _opposite_vertices(x: FloatArray, faces: IntArray) -> tuple[IntArray, FloatA
         if not len(active):
             break
         radius[active], opposite[active] = smaller, touched
-    return opposite, 2.0 * radius
+    return inward, opposite, 2.0 * radius

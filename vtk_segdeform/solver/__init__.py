@@ -6,6 +6,8 @@ The files, in reading order:
     volume_constraints      volume of the mesh or of each region, eqs. (8) and (9)
     position_constraints    fixed vertices and handles, eqs. (6) and (7)
     weights                 continuation of the position weights
+    terms                   further terms of the objective
+    barrier                 a term against folds
     anderson                Anderson acceleration
     extrapolation           where a solve starts in a drag
     exact_volume            motion of a pose onto its exact volumes
@@ -15,11 +17,13 @@ The files, in reading order:
 """
 
 from .anderson import Anderson
+from .barrier import Barrier
 from .coarse_volume import CoarseVolume
 from .exact_volume import ScaledSurface, moved_along, steps_to_volume
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
 from .position_constraints import Anchors, connected_sets, errors_at, position_term
 from .solution import Solution, Status
+from .terms import Term
 from .volume_constraints import (
     Bodies,
     VolumeConstraint,
@@ -27,12 +31,13 @@ from .volume_constraints import (
     region_volumes,
     total_volume,
 )
-from .waypoints import waypoints
+from .waypoints import is_half_turn, waypoints
 from .weights import WeightContinuation
 
 __all__ = [
     "Anchors",
     "Anderson",
+    "Barrier",
     "Bodies",
     "CoarseVolume",
     "GaussNewton",
@@ -41,11 +46,13 @@ __all__ = [
     "SolverOptions",
     "SolverResult",
     "Status",
+    "Term",
     "VolumeConstraint",
     "Volumes",
     "WeightContinuation",
     "connected_sets",
     "errors_at",
+    "is_half_turn",
     "moved_along",
     "position_term",
     "region_volumes",

@@ -19,7 +19,7 @@ A, so that R is constant within a step and refitted at each new pose.  Its step 
     `GaussNewton._retract`    p + h, moved along Z onto g = 0
     `GaussNewton.minimise`    the iteration
 
-Five things are added; the numbers are of the cactus bent by 60 degrees:
+Six things are added; the numbers are of the cactus bent by 60 degrees:
 
 1. *Exact volume.*  Along Z the volume is a cubic of the step length; its root is the last operation
    of every step (`exact_volume`).  |dV| / V is then about 1e-15; (21) alone leaves 1e-4.  For a
@@ -34,6 +34,8 @@ Five things are added; the numbers are of the cactus bent by 60 degrees:
    rises, the plain step replaces the accelerated one, and is shortened (epsilon, section 3.3).
 5. *Extrapolation* (`extrapolation`).  A slow drag starts each solve on along the way of the last
    two, if the objective is lower there.  This saves a step in five.
+6. *Further terms* (`terms`), such as a barrier against folds.  While one of them is active, its
+   Hessian is in H, and no step goes where it is infinite.
 
 Long because the formulas of the iteration are explained here, and the iteration is one class.
 
@@ -48,7 +50,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 
 import numpy as np
 
@@ -62,16 +64,19 @@ from .exact_volume import moved_along, steps_to_volume
 from .extrapolation import End, Way
 from .position_constraints import PositionTerm, TargetTerm
 from .solution import Status
+from .terms import Term, hessian_of, with_terms
 from .volume_constraints import Volumes
 
 _RISE = 1e-13  # relative rise of the merit that counts as rounding
 _DAMPING = 1e-9  # of the mean diagonal of H
 _SHORTEST = 1.0 / 64.0  # least epsilon of section 3.3
+_SHORTEST_ACTIVE = 1.0 / 4096.0  # the same while a term is active
 # Step lengths, root mean square over the surface of a mesh of size 1:
 _CLOSE = 1e-2  # of the paper's step: below it multipliers are accurate enough for volume Hessians
 _FAR = 2e-2  # beyond it volume Hessians are not valid at the end of the step
 _LONG = 1e-2  # beyond it H is computed again
 _OLD = 20  # steps after which H is computed again
+_OLD_ACTIVE = 3  # the same while a term is active
 _NO_SURFACE = np.empty((0, 3))
 
 
@@ -111,7 +116,7 @@ class SolverResult:
     steps: int
     step_size: float  # of the last step, root mean square over the surface
     remaining: float  # estimate of the largest distance to the minimum; infinite without `within`
-    shape: float  # E(p): the objective without the position term
+    shape: float  # E(p) and the further terms: the objective without the position term
     merits: tuple[float, ...]  # the objective at the start and after each step
 
 
@@ -121,11 +126,12 @@ class _Iterate:
 
     p: FloatArray
     x: FloatArray  # the surface of the volumes; empty if no term needs it
-    shape: float  # E
+    shape: float  # E and the further terms
     shape_slope: FloatArray  # half its gradient
     rows: tuple[FloatArray, ...]  # of G, one (m, 3) for each constraint
-    merit: float  # E and the position term
+    merit: float  # E, the further terms and the position term
     slope: FloatArray  # d
+    is_active: bool = False  # whether a further term is
 
     def toward(self, term: TargetTerm) -> _Iterate:
         """Return the same pose for other targets."""
@@ -141,11 +147,13 @@ class _State:
     factor: Factor  # of H
     age: int = _OLD  # of the factor, in steps
     step_size: float = math.inf  # of the last step
+    has_terms: bool = False  # whether the factor is with those terms that were active
     _end: tuple[FloatArray, FloatArray, SolverOptions] | None = None
 
-    @property
-    def factor_is_old(self) -> bool:
-        """Whether H should be computed again."""
+    def needs_factor(self, here: _Iterate) -> bool:
+        """Tell whether H should be computed again."""
+        if here.is_active and (not self.has_terms or self.age >= _OLD_ACTIVE):
+            return True
         return self.age >= _OLD or self.step_size > _LONG
 
     @property
@@ -158,9 +166,9 @@ class _State:
         """Whether the step just computed is too long for a factor from another pose."""
         return self.age > 1 and self.step_size > _LONG
 
-    def renew_factor(self, factor: Factor) -> None:
+    def renew_factor(self, factor: Factor, here: _Iterate) -> None:
         """Use a factor of H at this pose."""
-        self.factor, self.age = factor, 0
+        self.factor, self.age, self.has_terms = factor, 0, here.is_active
 
     def drop_factor(self) -> None:
         """Have H computed again before the next step."""
@@ -171,7 +179,7 @@ class _State:
         self.acceleration.begin_elsewhere()
         is_same = self.acceleration.window == options.acceleration
         acceleration = self.acceleration if is_same else Anderson(options.acceleration)
-        return _State(acceleration, self.factor, self.age, 0.0)
+        return _State(acceleration, self.factor, self.age, 0.0, self.has_terms)
 
     def ended_at(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> _State:
         """Remember where the call ended; return itself."""
@@ -192,6 +200,8 @@ class GaussNewton:
     energy: Energy
     positions: PositionTerm
     volumes: Volumes
+    _: KW_ONLY
+    terms: tuple[Term, ...] = ()
     _hessian: FloatArray = field(init=False, repr=False)
     _factor: Factor = field(init=False, repr=False)
     _state: _State | None = field(init=False, repr=False, default=None)
@@ -244,12 +254,14 @@ class GaussNewton:
         last = options.max_steps + (options.within is not None)  # which estimates what remains
         while len(merits) <= last:
             tell(options.progress, (len(merits) - 1) / options.max_steps, "solving")
-            if newton and state.factor_is_old:
-                state.renew_factor(self._full_factor(here, state) or self._factor)
+            is_coupled = newton or here.is_active or state.has_terms
+            if is_coupled and state.needs_factor(here):
+                factor = self._full_factor(here, state, newton) or self._factor
+                state.renew_factor(factor, here)
             state.age += 1
             step, multipliers, directions = self._step(here, state.factor)
             state.step_size = self._length(step)
-            if newton and state.step_is_doubtful:
+            if is_coupled and state.step_is_doubtful:
                 state.drop_factor()
                 continue
             if options.within is not None:
@@ -269,7 +281,7 @@ class GaussNewton:
                 if not self._improves(ahead, here):
                     state.acceleration.forget()
                     ahead = None
-            is_renewable = newton and state.age > 1  # H is of an earlier pose
+            is_renewable = is_coupled and state.age > 1  # H is of an earlier pose
             if ahead is None and not (is_renewable and options.acceleration):
                 ahead = self._shortened(here, step, directions, term, options)
             if ahead is None and is_renewable:
@@ -337,13 +349,21 @@ class GaussNewton:
         p = p + sum(tk * z for tk, z in zip(t, directions, strict=True))
         return self._evaluate(p, moved_along(paths, t), term)
 
-    def _full_factor(self, here: _Iterate, state: _State) -> Factor | None:
-        """Return the factor of the exact Hessian; None if it is not convex."""
+    def _full_factor(self, here: _Iterate, state: _State, newton: bool) -> Factor | None:
+        """Return the factor of the exact Hessian; None if it is not convex.
+
+        Unless *newton*, it is that of (21) with the further terms; None without them.
+        """
+        of_terms = hessian_of(self.terms, here.p) if here.is_active else None
+        if not newton:
+            return (
+                full_factor(self._hessian, None, here.p, added=of_terms) if here.is_active else None
+            )
         of_volumes = None
         step, multipliers, _ = self._step(here, self._factor)
         if state.is_near and self.volumes.hessian and self._length(step) < _CLOSE:
             of_volumes = self.volumes.hessian(here.p, multipliers)
-        return full_factor(self._hessian, self.energy, here.p, of_volumes)
+        return full_factor(self._hessian, self.energy, here.p, volumes=of_volumes, added=of_terms)
 
     def _begin(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> _State:
         """Return the state from which a call with these arguments begins."""
@@ -366,8 +386,10 @@ class GaussNewton:
             load, *rows = self.volumes.surface.adjoints([load, *gradients])
         else:
             rows = self.volumes.surface.adjoints(gradients)
-        value, slope = self.energy.value_and_slope(p, load)
-        return _Iterate(p, x, value, slope, tuple(rows), value, slope).toward(term)
+        energy, slope = self.energy.value_and_slope(p, load)
+        value, slope = with_terms(self.terms, p, energy, slope)
+        here = _Iterate(p, x, value, slope, tuple(rows), value, slope, value != energy)
+        return here.toward(term)
 
     def _iterate_at(self, p: FloatArray, term: TargetTerm) -> _Iterate:
         """Return the iterate at *p*; where the last call ended only the targets have changed."""
@@ -395,8 +417,8 @@ class GaussNewton:
         options: SolverOptions,
     ) -> _Iterate | None:
         """Return the first of the steps h, h/2, h/4 ... that lowers the objective, or None."""
-        epsilon = 1.0
-        while epsilon >= _SHORTEST:
+        epsilon, shortest = 1.0, _SHORTEST_ACTIVE if here.is_active else _SHORTEST
+        while epsilon >= shortest:
             ahead = self._retract(here.p + epsilon * step, directions, term, options)
             is_merit = self.energy.has_exact_gradient and options.exact_volume
             if self._improves(ahead, here) or (not is_merit and np.isfinite(ahead.merit)):

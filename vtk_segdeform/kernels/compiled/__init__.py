@@ -1,6 +1,7 @@
 """Inner loops compiled by numba; each agrees with its equivalent in numpy up to rounding.
 
-    volumes         `volume.signed_volume`, `volume.volume_along_path`, `volume.volume_gradient`
+    volumes         `volume.signed_volume`, `volume.volume_along_path`, `volume.volume_gradient`,
+                    `barrier.Barrier`
     products        `subspace.Subspace`
     interpolated    `interpolated.InterpolatedBlock`
     mean_value      `mean_value.mean_value_coordinates`
@@ -36,7 +37,7 @@ from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
 from .rotations import rotations
 from .text import facet_corners, plain_numbers
 from .triangles import first_equal_points, flat_faces, shell_sums
-from .volumes import volume_along_sums, volume_gradient, volume_sums
+from .volumes import determinants, volume_along_sums, volume_gradient, volume_sums
 
 __all__ = [
     "add_adjoint",
@@ -47,6 +48,7 @@ __all__ = [
     "beam_meets",
     "beyond_sides",
     "border_half_edges",
+    "determinants",
     "distances_inside",
     "facet_corners",
     "first_equal_points",

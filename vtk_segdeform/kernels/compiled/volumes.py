@@ -52,6 +52,17 @@ def volume_along_sums(x, faces, out, size, first, last):
 
 
 @_compile
+def determinants(x, corners, out):
+    """Write six times the volume of each tetrahedron to *out* (t,)."""
+    for t in range(len(corners)):
+        i, j, k, d = corners[t, 0], corners[t, 1], corners[t, 2], corners[t, 3]
+        ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+        fx, fy, fz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+        gx, gy, gz = x[d, 0] - x[i, 0], x[d, 1] - x[i, 1], x[d, 2] - x[i, 2]
+        out[t] = gx * (ey * fz - ez * fy) + gy * (ez * fx - ex * fz) + gz * (ex * fy - ey * fx)
+
+
+@_compile
 def volume_gradient(x, faces, out):
     """Add dV/dx to *out* (n, 3)."""
     for f in range(len(faces)):

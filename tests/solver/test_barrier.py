@@ -1,0 +1,113 @@
+"""The barrier against folds: derivatives, invariance, and poses with and without it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scenes import sausage
+from solids import rotation
+
+from vtk_segdeform.cages.cage import Cage
+from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.regions.regions import Regions
+
+SCENE = sausage(2)
+BOUND = SCENE.deformer(avoid_folds=True)
+FREE = SCENE.deformer()
+HELD = {"fixed": SCENE.fixed, "handle": SCENE.handle}
+
+
+@pytest.fixture(scope="module")
+def barrier():
+    return BOUND._terms[0]
+
+
+@pytest.fixture(scope="module")
+def squeezed(barrier):
+    """Return cages half as long along one axis, and noise: most tetrahedra are active."""
+    noise = np.random.default_rng(0).normal(size=barrier.rest.shape)
+    return barrier.rest * [0.45, 1.0, 1.0] + 2e-3 * noise
+
+
+def in_order(p):
+    """Return cages as a vector, axis by axis."""
+    return p.T.ravel()
+
+
+def test_at_rest_all_volumes_are_as_they_were(barrier):
+    assert len(barrier.corners) > 1000
+    assert_allclose(barrier.ratios(barrier.rest), 1.0, atol=1e-9)
+    assert barrier.value_and_slope(barrier.rest)[0] == 0.0
+    assert barrier.hessian(barrier.rest) is None
+
+
+def test_the_slope_is_half_the_derivative(barrier, squeezed):
+    value, slope = barrier.value_and_slope(squeezed)
+    direction = np.random.default_rng(1).normal(size=squeezed.shape)
+    errors = []
+    for step in (1e-3, 1e-4):  # of first order: the remainder falls with the square of the step
+        ahead = barrier.value_and_slope(squeezed + step * direction)[0]
+        errors.append(abs(ahead - value - 2.0 * step * np.vdot(slope, direction)))
+    assert 1.8 < np.log10(errors[0] / errors[1]) < 2.2
+
+
+def test_the_hessian_has_no_negative_curvature_and_bounds_the_second_derivative(barrier, squeezed):
+    full = np.tril(barrier.hessian(squeezed))
+    full += np.tril(full, -1).T
+    assert np.linalg.eigvalsh(full)[0] > -1e-10 * np.abs(full).max()
+    for seed in range(3):
+        direction = np.random.default_rng(seed).normal(size=squeezed.shape)
+        step = 1e-6 * direction
+        ahead, behind = (barrier.value_and_slope(squeezed + s * step)[1] for s in (1.0, -1.0))
+        exact = np.vdot(direction, ahead - behind) / 2e-6
+        bound = in_order(direction) @ full @ in_order(direction)
+        assert 0.8 * bound < exact < 1.001 * bound
+
+
+def test_a_rigid_motion_changes_nothing(barrier, squeezed):
+    turn = rotation([1, 2, 3], 1.0)
+    value, slope = barrier.value_and_slope(squeezed)
+    moved, turned = barrier.value_and_slope(squeezed @ turn.T + [1.0, 2.0, 3.0])
+    assert moved == pytest.approx(value, rel=1e-9)
+    assert_allclose(turned, slope @ turn.T, atol=1e-8 * np.abs(slope).max())
+
+
+def test_the_way_back_from_a_folded_pose_is_finite_and_downhill(barrier):
+    inverted = barrier.rest * [-0.3, 1.0, 1.0]
+    value, slope = barrier.value_and_slope(inverted)
+    assert 0.0 < value < np.inf
+    assert barrier.value_and_slope(inverted - 1e-6 * slope)[0] < value
+    deformer = BOUND.hold(**HELD)
+    rest = SCENE.mesh.vertices[SCENE.handle]
+    deformer.resume([cage.vertices * [1.0, 1.0, 0.3] for cage in SCENE.cages], rest)
+    assert barrier.ratios(deformer.solve(rest) and deformer._p).min() > 0.5
+
+
+def test_a_bend_folds_without_the_barrier_only(barrier):
+    targets = SCENE.turned(150)
+    least = []
+    for deformer in (BOUND.hold(**HELD), FREE.hold(**HELD)):
+        solution = deformer.solve(targets)
+        assert abs(solution.volume_change) < 1e-13
+        least.append(barrier.ratios(deformer._p).min())
+    assert least[0] > 0.05
+    assert least[1] < -0.1
+
+
+def test_while_inactive_it_changes_no_bit():
+    targets = SCENE.turned(20)
+    without = FREE.hold(**HELD).solve(targets)
+    assert_array_equal(BOUND.hold(**HELD).solve(targets).vertices, without.vertices)
+
+
+def test_an_open_sheet_has_no_inside():
+    x, y = np.mgrid[0:1:6j, 0:1:6j].reshape(2, -1)
+    corner = np.add.outer(6 * np.arange(5), np.arange(5)).ravel()
+    faces = np.concatenate([corner[:, None] + [0, 6, 7], corner[:, None] + [0, 7, 1]])
+    sheet = Mesh(np.column_stack([x, y, 0.1 * x * y]), faces)
+    points = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) * 5.0
+    cage = Cage(points, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+    regions = Regions(sheet, np.ones((1, len(x)), dtype=bool))
+    assert Deformer(sheet, regions, [cage], avoid_folds=True)._terms == ()

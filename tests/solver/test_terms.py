@@ -1,0 +1,86 @@
+"""Further terms of the solver's objective, by a wall that one vertex cannot pass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from scenes import sausage
+
+from vtk_segdeform.solver.solution import Status
+
+SCENE = sausage(2)
+
+
+@dataclass(frozen=True, eq=False)
+class Wall:
+    """The vertex with this row of W~ stays above a height, by a logarithm near it."""
+
+    row: np.ndarray
+    height: float
+    reach: float
+    weight: float = 1e-3
+
+    def value_and_slope(self, p):
+        gap = self.row @ p[:, 2] - self.height
+        if gap >= self.reach:
+            return 0.0, np.zeros_like(p)
+        if gap <= 0.0:
+            return np.inf, np.zeros_like(p)
+        slope = np.zeros_like(p)
+        log = np.log(gap / self.reach)
+        slope[:, 2] = -1.5 * self.weight * log**2 / gap * self.row
+        return -self.weight * log**3, slope
+
+    def hessian(self, p):
+        gap = self.row @ p[:, 2] - self.height
+        if not 0.0 < gap < self.reach:
+            return None
+        log, m = np.log(gap / self.reach), len(p)
+        full = np.zeros((3 * m, 3 * m))
+        second = self.weight * (3.0 * log**2 - 6.0 * log) / gap**2
+        full[2 * m :, 2 * m :] = 0.5 * second * np.outer(self.row, self.row)
+        return full
+
+
+def solver_with(deformer, *terms):
+    """Give a deformer the solver with these terms."""
+    own = deformer._constraints
+    deformer._constraints = replace(own, solver=replace(own.solver, terms=terms))
+    deformer.reset()
+    return deformer
+
+
+@pytest.fixture(scope="module")
+def free():
+    return SCENE.held().solve(SCENE.turned(40))
+
+
+@pytest.mark.parametrize("exact_hessian", [True, False])
+def test_no_pose_is_beyond_where_a_term_is_infinite(free, exact_hessian):
+    deformer = SCENE.held()
+    deformer._options = replace(deformer._options, exact_hessian=exact_hessian)
+    frame = deformer._frame
+    middle = np.setdiff1d(np.arange(SCENE.mesh.n_vertices), np.r_[SCENE.fixed, SCENE.handle])
+    moved = free.vertices[middle, 2] - SCENE.mesh.vertices[middle, 2]
+    vertex = int(middle[np.argmin(moved)])
+    rest = SCENE.mesh.vertices[vertex, 2]
+    height = rest + 0.6 * (free.vertices[vertex, 2] - rest)
+    row = deformer.subspace.at(np.array([vertex]))[0]
+    wall = Wall(row, (height - frame.centre[2]) / frame.size, -0.2 * moved.min() / frame.size)
+    solution = solver_with(deformer, wall).solve(SCENE.turned(40))
+    assert solution.vertices[vertex, 2] > height
+    assert solution.status in (Status.CONVERGED, Status.MISSED)
+    assert solution.steps < 120
+    assert abs(solution.volume_change) < 1e-13
+    assert (np.diff(solution.merits) <= 1e-9 * solution.merits[0]).all()
+    assert deformer._continuation.solver.terms == (wall,)  # at raised weights, too
+
+
+def test_an_inactive_term_changes_no_bit(free):
+    deformer = SCENE.held()
+    wall = Wall(deformer.subspace.at(np.array([0]))[0], -10.0, 1.0)
+    solution = solver_with(deformer, wall).solve(SCENE.turned(40))
+    assert np.array_equal(solution.vertices, free.vertices)
+    assert deformer.copy()._constraints.solver.terms == (wall,)

@@ -1,0 +1,243 @@
+"""Barrier against folds: the body below the surface does not turn inside out.
+
+A triangle (a, b, c) of a coarse surface and a point d inside the body make a tetrahedron.  From
+rest to pose it is mapped by F, and J = det F is the local volume change, negative where the body
+is turned inside out.  While J is below a threshold J_0, the objective has the term
+
+    b(J) = (J_0 - J)^3 / (J_0^2 J)
+
+which is convex, twice differentiable, and grows without limit towards J = 0.  Poses that are folded
+already, such as those of cages moved by hand, must have a way back.  So below a small J b
+continues as a parabola, so steep that no handle pushes through it.
+
+The inner point d is in the middle of the largest balls inside the body that touch the surface at
+the three corners, as the mean of the surface points around these balls.  So all corners are linear
+in the surface, the coarse one that the solver's steps have anyway; binding computes nothing more.
+
+The Hessian of b(det F) in the nine entries of F is
+
+    b'' C C^T + b' dC/dF,      C = dJ/dF, the cofactors
+
+and its eigenvalues below 0 are left out.  F is linear in the cages, so that each tetrahedron with
+J < J_0 adds a matrix of rank at most 9.
+
+Source
+------
+C. Schueller, L. Kavan, D. Panozzo, O. Sorkine-Hornung, "Locally injective mappings", Symposium on
+Geometry Processing 2013: barriers of this kind.  The balls: `geometry.local_volume`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.spatial import cKDTree
+
+from ..arrays import BoolArray, FloatArray, IntArray
+from ..geometry import inner_balls
+from ..kernels import compiled_kernels, inputs
+from ..subspace import Subspace
+
+_THRESHOLD = 0.5  # J_0
+_STEEPEST = 0.02  # J below which b is a parabola
+_STRENGTH = 0.03  # of all tetrahedra together, in scales of the shape energy
+_AROUND, _REACH = 16, 1.3  # points around a ball, within so many of its radii from its middle
+_LEAST_HEIGHT = 0.1  # of a tetrahedron, relative to the root of its triangle's area
+_MOST = 8_000  # tetrahedra
+_LEAST_EIGENVALUE = 1e-4  # relative to the largest; smaller ones are left out
+
+
+@dataclass(frozen=True, eq=False)
+class Barrier:
+    """A term of the solver (`terms.Term`); made by `Barrier.of`.
+
+    Parameters
+    ----------
+    points : Subspace
+        W~ of the corners.
+    corners : (t, 4) int
+        The tetrahedra: the three corners of a triangle, seen from inside, and the inner point.
+    volumes : (t,) float
+        Six times their volumes at rest, which are positive.
+    weight : float
+        Of each tetrahedron.
+    rest : (m, 3) float
+        The cages at rest.
+    """
+
+    points: Subspace
+    corners: IntArray
+    volumes: FloatArray
+    weight: float
+    rest: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        surface: Subspace,
+        faces: IntArray,
+        rest: FloatArray,
+        *,
+        encloses: BoolArray,
+        strength: float,
+    ) -> Barrier:
+        """Return the barrier of a coarse *surface* with cages at *rest* (m, 3).
+
+        Parameters
+        ----------
+        surface : Subspace
+            W~ of its s points.
+        faces : (f, 3) int
+            Its triangles.
+        rest : (m, 3) float
+            The cages at rest.
+        encloses : (s,) bool
+            Whether each point is on a part that encloses a volume; an open sheet may fold.
+        strength : float
+            The scale of the shape energy.
+        """
+        faces = faces[encloses[faces].all(axis=1)]
+        faces = faces[:: 1 + len(faces) // _MOST]
+        used, place = np.unique(faces, return_inverse=True)
+        points, corners = surface, np.empty((0, 4), dtype=np.int64)
+        if len(faces):
+            surface = surface.averaged(_selection(used, surface.n_vertices))
+            x, faces = surface.map(rest), place.reshape(-1, 3)
+            both = sparse.vstack([_identity(len(x)), _inner_points(x, faces)])
+            points = surface.averaged(sparse.csr_array(both))
+            corners = _tetrahedra(points.map(rest), faces)
+        volumes = _determinants(points.map(rest), corners)
+        weight = _STRENGTH * strength / max(len(corners), 1)
+        return cls(points, corners, volumes, weight, rest)
+
+    def ratios(self, p: FloatArray) -> FloatArray:
+        """Return J of each tetrahedron for cages at *p* (m, 3), (t,)."""
+        return self._ratios(self.points.map(p))
+
+    def value_and_slope(self, p: FloatArray) -> tuple[float, FloatArray]:
+        """Return the barrier at *p* (m, 3) and half its gradient (m, 3)."""
+        x = self.points.map(p)
+        j = self._ratios(x)
+        if j.min(initial=1.0) >= _THRESHOLD:
+            return 0.0, np.zeros_like(p)
+        active = np.flatnonzero(j < _THRESHOLD)
+        corners, (value, first, _) = self.corners[active], _barrier(j[active])
+        edges = x[corners[:, 1:]] - x[corners[:, :1]]
+        force = (
+            _cofactors(edges) * (0.5 * self.weight * first / self.volumes[active])[:, None, None]
+        )
+        slope = np.zeros_like(x)
+        np.add.at(slope, corners[:, 1:], force)
+        np.add.at(slope, corners[:, 0], -force.sum(axis=1))
+        return self.weight * float(value.sum()), self.points.adjoint(slope)
+
+    def hessian(self, p: FloatArray) -> FloatArray | None:
+        """Return half its Hessian at *p* without negative curvature, (3m, 3m); None at 0."""
+        x = self.points.map(p)
+        j = self._ratios(x)
+        active = np.flatnonzero(j < _THRESHOLD)
+        if not len(active):
+            return None
+        corners, (_, first, second) = self.corners[active], _barrier(j[active])
+        x0 = self.points.map(self.rest)
+        inverse = np.linalg.inv(x0[corners[:, 1:]] - x0[corners[:, :1]])
+        of, vectors = _curvatures(inverse @ (x[corners[:, 1:]] - x[corners[:, :1]]), first, second)
+        ids, place = np.unique(corners, return_inverse=True)
+        w, place = self.points.at(ids), place.reshape(corners.shape)
+        gradients = inverse @ (w[place[:, 1:]] - w[place[:, :1]])  # of each coordinate, (k, 3, m)
+        m = len(p)
+        rows = (np.swapaxes(vectors, 1, 2) @ gradients[of]).reshape(-1, 3 * m)
+        return np.asarray(0.5 * self.weight * (rows.T @ rows))
+
+    def _ratios(self, x: FloatArray) -> FloatArray:
+        if kernels := compiled_kernels(len(self.corners)):
+            kernels.determinants(*inputs(x, self.corners), out := np.empty(len(self.corners)))
+            out /= self.volumes
+            return out
+        return _determinants(x, self.corners) / self.volumes
+
+
+def _barrier(j: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return b and its first two derivatives at *j* (k,), all below the threshold."""
+    at = np.maximum(j, _STEEPEST)
+    short = _THRESHOLD - at
+    value = short**3 / at / _THRESHOLD**2
+    first = -(short**2) * (2.0 * at + _THRESHOLD) / (at * _THRESHOLD) ** 2
+    second = 2.0 * _THRESHOLD / at**3 - 2.0 / _THRESHOLD**2
+    beyond = np.minimum(j - _STEEPEST, 0.0)
+    value += first * beyond + 0.5 * second * beyond**2
+    return value, first + second * beyond, second
+
+
+def _determinants(x: FloatArray, corners: IntArray) -> FloatArray:
+    """Return six times the volumes of tetrahedra, (t,)."""
+    a, b, c, d = x[corners.T]
+    return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a))
+
+
+def _cofactors(rows: FloatArray) -> FloatArray:
+    """Return the derivatives of the determinants of 3 x 3 matrices, (k, 3, 3)."""
+    a, b, c = np.moveaxis(rows, 1, 0)
+    return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+
+
+def _curvatures(
+    f: FloatArray, first: FloatArray, second: FloatArray
+) -> tuple[IntArray, FloatArray]:
+    """Return the positive part of the Hessians of b(det F^T) as sums of v v^T.
+
+    *f* (k, 3, 3) are the F^T.  Of each v (r, 3, 3), the number (r,) of its Hessian is returned.
+    """
+    c = _cofactors(f).reshape(-1, 9)
+    full = second[:, None, None] * c[:, :, None] * c[:, None, :]
+    blocks = full.reshape(-1, 3, 3, 3, 3)
+    for i in range(3):
+        cross = np.cross(f[:, i, None, :], np.eye(3)) * first[:, None, None]
+        blocks[:, i - 2, :, i - 1, :] += cross
+        blocks[:, i - 1, :, i - 2, :] += np.swapaxes(cross, 1, 2)
+    values, vectors = np.linalg.eigh(full)
+    of, which = np.nonzero(values > _LEAST_EIGENVALUE * values[:, -1:])
+    scaled = vectors[of, :, which] * np.sqrt(values[of, which])[:, None]
+    return of, scaled.reshape(-1, 3, 3)
+
+
+def _inner_points(x: FloatArray, faces: IntArray) -> sparse.csr_array:
+    """Return the mean (f, s) of the points *x* (s, 3) around the balls at each of the *faces*."""
+    inward, opposite, diameters = inner_balls(x, faces)
+    n = len(x)
+    middle = x + 0.5 * diameters[:, None] * inward
+    away, near = map(np.asarray, cKDTree(x).query(middle, k=min(_AROUND, n)))
+    # Those of another limb nearby face the ball.
+    facing = np.einsum("ijk,ijk->ij", x[near] - middle[:, None], inward[near])
+    is_around = (away <= 0.5 * _REACH * diameters[:, None]) & (facing < 0.0)
+    rows, which = np.nonzero(is_around)
+    own = np.arange(n)
+    places = np.concatenate([own, own, rows]), np.concatenate([own, opposite, near[rows, which]])
+    sums = sparse.coo_array((np.ones(len(places[0])), places), (n, n)).tocsr()
+    around = sparse.diags_array(1.0 / sums.sum(axis=1)) @ sums
+    corners = np.repeat(np.arange(len(faces)), 3), faces.ravel()
+    thirds = sparse.coo_array((np.full(faces.size, 1.0 / 3.0), corners), (len(faces), n))
+    return sparse.csr_array(thirds.tocsr() @ around)
+
+
+def _tetrahedra(x: FloatArray, faces: IntArray) -> IntArray:
+    """Return tetrahedra (t, 4) of *faces* and their inner points; flat ones are left out.
+
+    *x* are the surface points, and after them the inner point of each face.
+    """
+    inner = len(x) - len(faces) + np.arange(len(faces))
+    corners = np.column_stack([faces[:, [0, 2, 1]], inner])
+    a, b, c = x[corners[:, :3].T]
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    is_solid: BoolArray = _determinants(x, corners) > _LEAST_HEIGHT * area**1.5
+    return np.asarray(corners[is_solid])
+
+
+def _identity(n: int) -> sparse.csr_array:
+    return sparse.csr_array(sparse.eye_array(n))
+
+
+def _selection(used: IntArray, n: int) -> sparse.csr_array:
+    return _identity(n)[used]

@@ -1,0 +1,53 @@
+"""Further terms of the objective, such as a barrier against folds or against contact.
+
+A term is smooth where it is finite, and infinite where a pose is not allowed; the line search of
+`gauss_newton` never steps there.  It is inactive, exactly 0, at most poses: then a step costs
+hardly more, and its result is bit for bit that without the term.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from ..arrays import FloatArray
+
+
+class Term(Protocol):
+    """A further term of the objective; see `terms`."""
+
+    def value_and_slope(self, p: FloatArray) -> tuple[float, FloatArray]:
+        """Return the term for cages at *p* (m, 3), and half its gradient (m, 3).
+
+        The value is exactly 0 while the term is inactive, and infinite where *p* is not allowed;
+        the gradient is not used then.
+        """
+        ...
+
+    def hessian(self, p: FloatArray) -> FloatArray | None:
+        """Return half the Hessian at *p*, made positive semi-definite; None while inactive.
+
+        It is (3m, 3m), stacked axis by axis.  Only its lower half is read.
+        """
+        ...
+
+
+def with_terms(
+    terms: Sequence[Term], p: FloatArray, value: float, slope: FloatArray
+) -> tuple[float, FloatArray]:
+    """Return an objective and half its gradient with those of *terms* added."""
+    for term in terms:
+        more, steeper = term.value_and_slope(p)
+        if more:
+            value, slope = value + more, slope + steeper
+    return value, slope
+
+
+def hessian_of(terms: Sequence[Term], p: FloatArray) -> FloatArray | None:
+    """Return half the Hessian of all *terms*, (3m, 3m); None while all are inactive."""
+    total = None
+    for term in terms:
+        own = term.hessian(p)
+        if own is not None:
+            total = own if total is None else total + own
+    return total
