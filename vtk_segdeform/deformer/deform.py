@@ -24,6 +24,7 @@ def deform(
     n_cage_vertices: int | None = None,
     preserve_volume: bool = True,
     lids: bool | None = None,
+    avoid_contact: bool = False,
     progress: Progress | None = None,
 ) -> Solution:
     """Return *mesh* deformed so that its handle vertices are at *targets*.
@@ -48,6 +49,8 @@ def deform(
     lids : bool or None
         Whether an open surface encloses a volume under lids over its borders; None decides it for
         each connected part, as `Deformer` does.
+    avoid_contact : bool
+        Keep parts of the surface from crossing each other; see `Deformer`.
     progress : Progress, optional
         Called while cages are fitted and bound, and before every step; may cancel.
 
@@ -63,6 +66,7 @@ def deform(
     require_mesh(mesh)
     as_flag(preserve_volume, "preserve_volume")
     as_lids(lids)
+    as_flag(avoid_contact, "avoid_contact")
     _, held = checked_constraints(mesh, fixed, handle)
     checked_targets(targets, len(held))
     regions = segment(mesh, n_regions, progress=part(progress, 0.0, 0.2))
@@ -76,6 +80,7 @@ def deform(
         handle=handle,
         preserve_volume=preserve_volume,
         lids=lids,
+        avoid_contact=avoid_contact,
         progress=part(progress, 0.7, 0.9),
     )
     return deformer.solve(targets, progress=part(progress, 0.9, 1.0))

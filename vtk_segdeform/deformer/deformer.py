@@ -30,7 +30,7 @@ import copy
 import itertools
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from types import EllipsisType
@@ -52,13 +52,17 @@ from ..mesh import Mesh, require_mesh
 from ..progress import Progress, tell
 from ..regions import Regions, require_regions
 from ..solver import (
+    LONGEST_MOVE,
     Anchors,
+    Contact,
+    ContactSurface,
     GaussNewton,
     ScaledSurface,
     Solution,
     SolverOptions,
     SolverResult,
     Status,
+    Term,
     VolumeConstraint,
     Volumes,
     WeightContinuation,
@@ -103,6 +107,8 @@ _LEAST_SHARE = 1.0 / 32.0  # of the usual distance between waypoints
 _SCALED = 3e-5  # relative scale from which another solve follows
 _ROUNDING = 1e-7  # relative scale that counts as rounding
 _MET = 1e-3  # position error, in diagonals, below which a target is met
+_CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
+_CONTACT_TOLERANCE = 1e-5  # of a step's length
 _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
@@ -182,6 +188,18 @@ class _Constraints:
     def places(self, targets: FloatArray) -> FloatArray:
         """Return the places (s, 3) of all sets, for *targets* (k, 3) of the handles."""
         return np.asarray(self.places_of_targets @ targets + self.places_of_fixed)
+
+
+@dataclass(eq=False)
+class _Known:
+    contact: ContactSurface | None = None
+
+    def of(self, d: Deformer) -> ContactSurface:
+        if self.contact is None:
+            s = d._samples
+            heights = s.heights(d._rest)
+            self.contact = ContactSurface.of(s.rows, s.points, s.faces, s.areas, s.edges, heights)
+        return self.contact
 
 
 class Deformer:
@@ -276,6 +294,7 @@ class Deformer:
         exact_hessian: bool = True,
         exact_volume: bool = True,
         hold_tolerance: float = 5e-4,
+        avoid_contact: bool = False,
         blend: ArrayLike | None = None,
         cache: str | os.PathLike[str] | None = None,
         progress: Progress | None = None,
@@ -290,6 +309,7 @@ class Deformer:
         self._hold_tolerance = hold_tolerance
         self._preserve_volume = as_flag(preserve_volume, "preserve_volume")
         self._preserve_region_volumes = as_flag(preserve_region_volumes, "preserve_region_volumes")
+        self._avoid_contact = as_flag(avoid_contact, "avoid_contact")
         self._lids_option = as_lids(lids)
         self._own_blend = None if blend is None else as_numbers(blend, "blend")
         folder = None if cache is None else as_path(cache, "cache")
@@ -308,6 +328,7 @@ class Deformer:
         self._rest_pose = mesh.with_vertices(at_origin) if self._frame.is_far else mesh
         self._enclose()
         self._samples = SurfaceSamples.of(self._rest, self._binding.coarse_volume)
+        self._known_contact = _Known()
         self._constrain(fixed, handle)
         if compiled_kernels(mesh.n_vertices):
             tell(progress, 0.99, "taking a trial step")
@@ -390,7 +411,7 @@ class Deformer:
         pulled = _PulledPoints(np.array(soft, dtype=np.int64), np.array(of_target, dtype=np.int64))
         pulled.vertices = self.handle[pulled.targets]
         pulled.offsets = rows[pulled.places] @ p - places[pulled.places]
-        solver = GaussNewton(before.energy, positions, self._constraints.volumes)
+        solver = replace(before, positions=positions, volumes=self._constraints.volumes)
         load = solver.unbalanced(p, pulled.moved(places))
         steady = self._samples.steadying(p, load)
         anchors = Anchors(weight * quadratic + steady, p, load)
@@ -660,6 +681,8 @@ class Deformer:
     ) -> tuple[SolverResult, FloatArray, int]:
         """Solve for *goal* (k, 3) with exact volume; return the mesh and the steps as well."""
         places = self._constraints.pulled.moved(self._constraints.places(goal))
+        if self._contact is not None and self._contact.hessian(self._continuation.p) is not None:
+            options = replace(options, tolerance=max(options.tolerance, _CONTACT_TOLERANCE))
         if is_drag and self._continuation.has_raised_weights:
             result = self._continuation.solve_at_current_weights(places, options)
         else:
@@ -677,12 +700,32 @@ class Deformer:
     def _follow_waypoints(self, goal: FloatArray, options: SolverOptions) -> int:
         """Move through the waypoints before *goal*; return the number of steps."""
         options = replace(options, tolerance=_WAYPOINT_TOLERANCE, max_steps=_WAYPOINT_STEPS)
-        *on_the_way, _ = waypoints(self._targets, goal, self._constraints.handles)
         steps = 0
-        for targets in on_the_way:
+        for targets in self._way_to(goal):
             places = self._constraints.pulled.moved(self._constraints.places(targets))
             steps += self._continuation.solve_at_current_weights(places, options).steps
         return steps
+
+    def _way_to(self, goal: FloatArray) -> Iterator[FloatArray]:
+        """Yield the waypoints before *goal*: near a contact, so near each other that none is missed."""
+        handles, start = self._constraints.handles, self._targets
+        contact = self._contact
+        if contact is None:
+            yield from waypoints(start, goal, handles)[:-1]
+            return
+        shortest = contact.surface.spacing
+        way = [start, *waypoints(start, goal, handles, min(1.0, shortest / LONGEST_MOVE))]
+        done, last = 0, len(way) - 1
+        most = round(LONGEST_MOVE / shortest)
+        while done < last:
+            leg = most
+            while leg > 1 and done + leg > last: leg -= 1
+            free = 0.5 * contact.clearance(self._continuation.p, _CLEARANCE) if leg > 1 else 0.0
+            while leg > 1 and _largest(way[done + leg] - way[done]) > free:
+                leg -= 1
+            done += leg
+            if done < last:
+                yield way[done]
 
     def _with_exact_volume(self, result: SolverResult) -> tuple[FloatArray, float]:
         """Restore the exact volumes; return the mesh and by how much it was scaled.
@@ -785,10 +828,23 @@ class Deformer:
             preserved=preserved,
             volumes=volumes,
             is_scaled=is_whole and is_large and binding.coarse_volume.cells is not None,
-            solver=GaussNewton(binding.energy, positions, volumes),
+            solver=GaussNewton(binding.energy, positions, volumes, self._terms()),
             pulled=_PulledPoints(),
         )
         self.reset()
+
+    def _terms(self) -> tuple[Term, ...]:
+        """Return the further terms of the objective."""
+        if not self._avoid_contact:
+            self._contact = None
+            return ()
+        surface = self._known_contact.of(self)
+        held = np.zeros(self.mesh.n_vertices, dtype=bool)
+        held[self.fixed] = held[self.handle] = True
+        is_held = np.bincount(self._samples.cells, held) >= 0.5 * np.bincount(self._samples.cells)
+        self._contact = Contact.of(surface, is_held, self._binding.energy.scale)
+        return (self._contact,)
+
 
     def _begin(self, p: FloatArray, targets: FloatArray) -> None:
         """Begin at cages *p* (m, 3), which are a pose for *targets* (k, 3)."""

@@ -64,6 +64,8 @@ class SurfaceSamples:
         Their shares of the area.
     edges : (s, s) sparse
         Lengths of the edges between them.
+    faces : (t, 3) int
+        The triangles between them.
     """
 
     cells: IntArray
@@ -71,6 +73,7 @@ class SurfaceSamples:
     points: FloatArray
     areas: FloatArray
     edges: sparse.csr_array
+    faces: IntArray
 
     @classmethod
     def of(cls, rest: Mesh, coarse: CoarseVolume) -> SurfaceSamples:
@@ -89,7 +92,20 @@ class SurfaceSamples:
         lengths = np.linalg.norm(points[near.row] - points[near.col], axis=1)
         edges = sparse.coo_array((lengths, (near.row, near.col)), (count, count)).tocsr()
         rows = coarse.surface.at(np.arange(count))
-        return cls(cells, rows, points, areas / areas.sum(), edges)
+        return cls(cells, rows, points, areas / areas.sum(), edges, faces)
+
+    def heights(self, rest: Mesh) -> FloatArray:
+        """Return the largest height of the surface at *rest* over each sample, (s,); 0 or more."""
+        a, b, c = self.points[self.faces.T]
+        normals = np.zeros_like(self.points)
+        for corner in self.faces.T:
+            np.add.at(normals, corner, np.cross(b - a, c - a))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True) + np.finfo(float).tiny
+        away = rest.vertices - self.points[self.cells]
+        over = np.einsum("ij,ij->i", away, normals[self.cells])
+        heights = np.zeros(len(self.points))
+        np.maximum.at(heights, self.cells, over)
+        return heights
 
     def distances(self, vertex: int) -> FloatArray:
         """Return the distance of each sample from that of *vertex*, (s,); infinite elsewhere."""

@@ -15,10 +15,12 @@ The files, in reading order:
 """
 
 from .coarse_volume import CoarseVolume
+from .contact import Contact, ContactSurface
 from .exact_volume import ScaledSurface, moved_along, steps_to_volume
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
 from .position_constraints import Anchors, connected_sets, errors_at, position_term
 from .solution import Solution, Status
+from .terms import Term
 from .volume_constraints import (
     VolumeConstraint,
     Volumes,
@@ -26,18 +28,22 @@ from .volume_constraints import (
     region_volumes,
     total_volume,
 )
-from .waypoints import waypoints
+from .waypoints import LONGEST_MOVE, waypoints
 from .weights import WeightContinuation
 
 __all__ = [
+    "LONGEST_MOVE",
     "Anchors",
     "CoarseVolume",
+    "Contact",
+    "ContactSurface",
     "GaussNewton",
     "ScaledSurface",
     "Solution",
     "SolverOptions",
     "SolverResult",
     "Status",
+    "Term",
     "VolumeConstraint",
     "Volumes",
     "WeightContinuation",
