@@ -48,14 +48,13 @@ from ..errors import Cancelled, ConstraintError
 from ..freezing import read_only
 from ..geometry import Lids, lids_of
 from ..kernels import compiled_kernels, one_blas_thread
-from ..mesh import Mesh, require_mesh
+from ..mesh import Mesh, new_crossings, require_mesh
 from ..progress import Progress, tell
 from ..regions import Regions, require_regions
 from ..solver import (
     LONGEST_MOVE,
     Anchors,
     Contact,
-    ContactSurface,
     GaussNewton,
     ScaledSurface,
     Solution,
@@ -108,7 +107,7 @@ _SCALED = 3e-5  # relative scale from which another solve follows
 _ROUNDING = 1e-7  # relative scale that counts as rounding
 _MET = 1e-3  # position error, in diagonals, below which a target is met
 _CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
-_CONTACT_TOLERANCE = 1e-5  # of a step's length
+_CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 100  # of a solve with active contacts
 _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
@@ -183,23 +182,12 @@ class _Constraints:
     volumes: Volumes  # the same on the surface of the steps
     is_scaled: bool  # whether exact volume is restored by scaling
     solver: GaussNewton  # with the initial weights
+    contact: Contact | None  # one of its terms
     pulled: _PulledPoints
 
     def places(self, targets: FloatArray) -> FloatArray:
         """Return the places (s, 3) of all sets, for *targets* (k, 3) of the handles."""
         return np.asarray(self.places_of_targets @ targets + self.places_of_fixed)
-
-
-@dataclass(eq=False)
-class _Known:
-    contact: ContactSurface | None = None
-
-    def of(self, d: Deformer) -> ContactSurface:
-        if self.contact is None:
-            s = d._samples
-            heights = s.heights(d._rest)
-            self.contact = ContactSurface.of(s.rows, s.points, s.faces, s.areas, s.edges, heights)
-        return self.contact
 
 
 class Deformer:
@@ -244,6 +232,10 @@ class Deformer:
     hold_tolerance : float
         Distance, as a share of the mesh's size, by which a handle or fixed vertex may miss its
         place before its weight is raised.
+    avoid_contact : bool
+        Keep parts of the surface that are not near each other at rest from crossing; see
+        `solver.contact`.  Handles take precedence: if their targets, or fixed vertices, force a
+        crossing, the solution crosses or its status is MISSED.  `Solution.crossings` tells.
     blend : (r, n) float, optional
         Blend weights instead of ``regions.weights``, for comparison; `cage_distance_weights`
         computes those of eq. (4) as printed.
@@ -328,7 +320,6 @@ class Deformer:
         self._rest_pose = mesh.with_vertices(at_origin) if self._frame.is_far else mesh
         self._enclose()
         self._samples = SurfaceSamples.of(self._rest, self._binding.coarse_volume)
-        self._known_contact = _Known()
         self._constrain(fixed, handle)
         if compiled_kernels(mesh.n_vertices):
             tell(progress, 0.99, "taking a trial step")
@@ -344,11 +335,12 @@ class Deformer:
         preserve_volume: bool | None = None,
         preserve_region_volumes: bool | None = None,
         lids: bool | EllipsisType | None = ...,
+        avoid_contact: bool | None = None,
     ) -> Deformer:
         """Return a deformer at rest with other constraints, which shares the binding of this one.
 
-        ``preserve_volume=None``, ``preserve_region_volumes=None`` and ``lids=...`` are the values
-        of this deformer.
+        ``preserve_volume=None``, ``preserve_region_volumes=None``, ``lids=...`` and
+        ``avoid_contact=None`` are the values of this deformer.
         """
         other = self._shared()
         if preserve_volume is not None:
@@ -357,6 +349,8 @@ class Deformer:
             other._preserve_region_volumes = as_flag(
                 preserve_region_volumes, "preserve_region_volumes"
             )
+        if avoid_contact is not None:
+            other._avoid_contact = as_flag(avoid_contact, "avoid_contact")
         if lids is not ... and as_lids(lids) is not self._lids_option:
             other._lids_option = as_lids(lids)
             other._enclose()
@@ -616,6 +610,9 @@ class Deformer:
         unit = self._frame.size / self.mesh.diagonal
         options = replace(self._options, within=within / unit, progress=progress)
         reached, steps, remaining = None, 0, np.inf
+        self._aim.share = min(
+            self._aim.share, self._longest_leg(min(_largest(goal - self._targets), _CLEARANCE))
+        )
         for targets in self._aim.way(self._targets, goal, self._constraints.handles):
             places = self._constraints.pulled.moved(self._constraints.places(targets))
             options = replace(options, max_steps=limit - steps)
@@ -681,8 +678,11 @@ class Deformer:
     ) -> tuple[SolverResult, FloatArray, int]:
         """Solve for *goal* (k, 3) with exact volume; return the mesh and the steps as well."""
         places = self._constraints.pulled.moved(self._constraints.places(goal))
-        if self._contact is not None and self._contact.hessian(self._continuation.p) is not None:
-            options = replace(options, tolerance=max(options.tolerance, _CONTACT_TOLERANCE))
+        contact = self._constraints.contact
+        if contact is not None and contact.is_active(self._continuation.p):
+            tolerance = max(options.tolerance, _CONTACT_TOLERANCE)
+            steps = min(options.max_steps, _CONTACT_STEPS)
+            options = replace(options, tolerance=tolerance, max_steps=steps)
         if is_drag and self._continuation.has_raised_weights:
             result = self._continuation.solve_at_current_weights(places, options)
         else:
@@ -707,25 +707,32 @@ class Deformer:
         return steps
 
     def _way_to(self, goal: FloatArray) -> Iterator[FloatArray]:
-        """Yield the waypoints before *goal*: near a contact, so near each other that none is missed."""
+        """Yield the waypoints (k, 3) before *goal*; near a contact they are close together."""
         handles, start = self._constraints.handles, self._targets
-        contact = self._contact
-        if contact is None:
-            yield from waypoints(start, goal, handles)[:-1]
-            return
-        shortest = contact.surface.spacing
-        way = [start, *waypoints(start, goal, handles, min(1.0, shortest / LONGEST_MOVE))]
-        done, last = 0, len(way) - 1
-        most = round(LONGEST_MOVE / shortest)
-        while done < last:
-            leg = most
-            while leg > 1 and done + leg > last: leg -= 1
-            free = 0.5 * contact.clearance(self._continuation.p, _CLEARANCE) if leg > 1 else 0.0
-            while leg > 1 and _largest(way[done + leg] - way[done]) > free:
-                leg -= 1
-            done += leg
+        shortest = self._longest_leg(0.0)
+        way = [start, *waypoints(start, goal, handles, shortest)]
+        done, last, most = 0, len(way) - 1, round(1.0 / shortest)
+        while done + 1 < last:
+            ahead = min(most, last - done)
+            if ahead > 1 and most > 1:
+                length = self._longest_leg(_CLEARANCE)
+                while ahead > 1 and _largest(way[done + ahead] - way[done]) > length * LONGEST_MOVE:
+                    ahead -= 1
+            done += ahead
             if done < last:
                 yield way[done]
+
+    def _longest_leg(self, most: float) -> float:
+        """Return how far apart waypoints may be at this pose, as a share of the usual distance.
+
+        With contacts it is half the clearance between parts, which is looked for up to *most*; but
+        at least the distance between samples.
+        """
+        contact = self._constraints.contact
+        if contact is None:
+            return 1.0
+        clearance = contact.clearance(self._continuation.p, most) if most else 0.0
+        return min(1.0, max(0.5 * clearance, contact.surface.spacing) / LONGEST_MOVE)
 
     def _with_exact_volume(self, result: SolverResult) -> tuple[FloatArray, float]:
         """Restore the exact volumes; return the mesh and by how much it was scaled.
@@ -814,6 +821,8 @@ class Deformer:
         )
         gathered = in_order if positions.mean is None else positions.mean @ in_order
         preserved, volumes = self._preserved_volumes()
+        contact = self._contact_of()
+        terms = () if contact is None else (contact,)
         fixed_at = rest[self.fixed] if len(self.fixed) else np.zeros((1, 3))
         box = np.stack([fixed_at.min(axis=0), fixed_at.max(axis=0)])
         is_whole = preserved == (self._total_volume,)
@@ -828,23 +837,21 @@ class Deformer:
             preserved=preserved,
             volumes=volumes,
             is_scaled=is_whole and is_large and binding.coarse_volume.cells is not None,
-            solver=GaussNewton(binding.energy, positions, volumes, self._terms()),
+            solver=GaussNewton(binding.energy, positions, volumes, terms),
+            contact=contact,
             pulled=_PulledPoints(),
         )
         self.reset()
 
-    def _terms(self) -> tuple[Term, ...]:
-        """Return the further terms of the objective."""
+    def _contact_of(self) -> Contact | None:
+        """Return the term that keeps parts of the surface apart, if they are to be."""
         if not self._avoid_contact:
-            self._contact = None
-            return ()
-        surface = self._known_contact.of(self)
-        held = np.zeros(self.mesh.n_vertices, dtype=bool)
-        held[self.fixed] = held[self.handle] = True
-        is_held = np.bincount(self._samples.cells, held) >= 0.5 * np.bincount(self._samples.cells)
-        self._contact = Contact.of(surface, is_held, self._binding.energy.scale)
-        return (self._contact,)
-
+            return None
+        held = np.zeros(self.mesh.n_vertices)
+        held[self.fixed] = held[self.handle] = 1.0
+        cells = self._samples.cells
+        is_held = np.bincount(cells, held) >= 0.5 * np.bincount(cells)
+        return Contact.of(self._samples.contact_surface, is_held, self._binding.energy.scale)
 
     def _begin(self, p: FloatArray, targets: FloatArray) -> None:
         """Begin at cages *p* (m, 3), which are a pose for *targets* (k, 3)."""
@@ -878,6 +885,7 @@ class Deformer:
             errors=errors,
             volume=partial(self._total_volume.relative, x),
             region_volumes=self._region_volume_changes,
+            crossed=partial(new_crossings, rest=self.mesh.vertices, faces=self.mesh.faces),
         )
 
     def _errors(self, targets: FloatArray, x: FloatArray) -> tuple[float, ...]:

@@ -39,7 +39,7 @@ from scipy.sparse import csgraph
 from ..arrays import FloatArray, IntArray
 from ..geometry import faces_between
 from ..mesh import Mesh
-from ..solver import CoarseVolume
+from ..solver import CoarseVolume, ContactSurface
 
 _LARGEST = 1e4  # (d^2 - 1)^2, reached at ten times the reach; also the weight of other bodies
 _STEADY = 10.0  # times the least weight of anchors under a load; still far below those of handles
@@ -64,8 +64,8 @@ class SurfaceSamples:
         Their shares of the area.
     edges : (s, s) sparse
         Lengths of the edges between them.
-    faces : (t, 3) int
-        The triangles between them.
+    rest : Mesh, optional
+        The surface.
     """
 
     cells: IntArray
@@ -73,7 +73,7 @@ class SurfaceSamples:
     points: FloatArray
     areas: FloatArray
     edges: sparse.csr_array
-    faces: IntArray
+    rest: Mesh | None = None
 
     @classmethod
     def of(cls, rest: Mesh, coarse: CoarseVolume) -> SurfaceSamples:
@@ -92,20 +92,21 @@ class SurfaceSamples:
         lengths = np.linalg.norm(points[near.row] - points[near.col], axis=1)
         edges = sparse.coo_array((lengths, (near.row, near.col)), (count, count)).tocsr()
         rows = coarse.surface.at(np.arange(count))
-        return cls(cells, rows, points, areas / areas.sum(), edges, faces)
+        return cls(cells, rows, points, areas / areas.sum(), edges, rest)
 
-    def heights(self, rest: Mesh) -> FloatArray:
-        """Return the largest height of the surface at *rest* over each sample, (s,); 0 or more."""
-        a, b, c = self.points[self.faces.T]
-        normals = np.zeros_like(self.points)
-        for corner in self.faces.T:
-            np.add.at(normals, corner, np.cross(b - a, c - a))
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True) + np.finfo(float).tiny
-        away = rest.vertices - self.points[self.cells]
-        over = np.einsum("ij,ij->i", away, normals[self.cells])
-        heights = np.zeros(len(self.points))
+    @cached_property
+    def contact_surface(self) -> ContactSurface:
+        """The samples as a surface whose parts may come into contact."""
+        assert self.rest is not None
+        faces, n = self.rest.faces, len(self.points)
+        if n < self.rest.n_vertices:
+            faces = faces_between(self.cells, faces)
+        surface = ContactSurface.of(self.rows, self.points, faces, self.areas, self.edges)
+        away = self.rest.vertices - self.points[self.cells]
+        over = np.einsum("ij,ij->i", away, surface.normals(self.points)[self.cells])
+        heights = np.zeros(n)
         np.maximum.at(heights, self.cells, over)
-        return heights
+        return surface.with_heights(heights)
 
     def distances(self, vertex: int) -> FloatArray:
         """Return the distance of each sample from that of *vertex*, (s,); infinite elsewhere."""

@@ -29,8 +29,7 @@ additional distance to which it was searched.
 
 from __future__ import annotations
 
-import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import sparse
@@ -66,8 +65,8 @@ class ContactSurface:
         Their shares of the area; the sum is 1.
     radii : (s,) float
         h_a.
-    margins : (s,) float
-        d_a.
+    margins, gaps : (s,) float
+        d_a, and its limit: the share of the least gap at rest.
     excluded : (k,) int
         Pairs that are no contact: a s + b for a < b, in increasing order.
     """
@@ -77,6 +76,7 @@ class ContactSurface:
     areas: FloatArray
     radii: FloatArray
     margins: FloatArray
+    gaps: FloatArray
     excluded: IntArray
     spacing: float  # median of h_a + h_b
     corners: sparse.csr_array  # (s, t), 1 where a face is at a sample
@@ -90,7 +90,6 @@ class ContactSurface:
         faces: IntArray,
         areas: FloatArray,
         edges: sparse.csr_array,
-        heights: FloatArray,
     ) -> ContactSurface:
         """Return the surface of samples at *points* (s, 3), size about 1.
 
@@ -100,52 +99,45 @@ class ContactSurface:
             Share of the area of each sample.
         edges : (s, s) sparse
             Lengths of the edges between them.
-        heights : (s,) float
-            Height of the true surface over each sample, at most; 0 or more.
         """
         n = len(points)
-        twice = np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]])
-        total = 0.5 * float(np.linalg.norm(twice, axis=1).sum())
+        a, b, c = points[faces.T]
+        total = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
         radii = np.sqrt(areas * total / np.pi)
         radii = np.minimum(radii, _LARGEST * float(np.median(radii)))
-        spacing = 2.0 * float(np.median(radii))
-        ones = np.ones(faces.size)
-        corner = sparse.coo_array(
-            (ones, (faces.ravel(), np.repeat(np.arange(len(faces)), 3))), (n, len(faces))
-        ).tocsr()
-        own = cls(
-            rows,
-            faces,
-            areas,
-            radii,
-            _MARGIN * radii + heights,
-            np.zeros(0, dtype=np.int64),
-            spacing,
-            corner,
-            float(np.abs(rows).sum(axis=1).max(initial=1.0)),
-        )
+        places = faces.ravel(), np.repeat(np.arange(len(faces)), 3)
+        corners = sparse.coo_array((np.ones(faces.size), places), (n, len(faces))).tocsr()
+        no_pairs, spacing = np.zeros(0, dtype=np.int64), 2.0 * float(np.median(radii))
+        norm, free = float(np.abs(rows).sum(axis=1).max(initial=1.0)), np.full(n, np.inf)
+        margins = _MARGIN * radii
+        own = cls(rows, faces, areas, radii, margins, free, no_pairs, spacing, corners, norm)
+        return own._excluding(points, edges)
+
+    def with_heights(self, heights: FloatArray) -> ContactSurface:
+        """Return the same where the true surface has *heights* (s,) over the samples, at most."""
+        return replace(self, margins=np.minimum(self.margins + heights, self.gaps))
+
+    def _excluding(self, points: FloatArray, edges: sparse.csr_array) -> ContactSurface:
+        """Return the same without contact of samples near each other at rest, at *points*."""
+        n, radii, normals = len(points), self.radii, self.normals(points)
         largest = 2.0 * float(radii.max(initial=0.0))
         near = csgraph.dijkstra(edges, directed=False, limit=_NEIGHBOURS * largest)
         i, j = np.nonzero(np.triu(near <= _NEIGHBOURS * np.add.outer(radii, radii), 1))
-        pairs = cKDTree(points).query_pairs(max(2.0 * _DEPTH, 2.0) * largest, output_type="ndarray")
+        pairs = cKDTree(points).query_pairs(2.0 * _DEPTH * largest, output_type="ndarray")
         a, b = np.sort(pairs, axis=1).T
-        normals = own.normals(points)
-        e = points[a] - points[b]
+        e, sums = points[a] - points[b], radii[a] + radii[b]
+        squared = np.einsum("ij,ij->i", e, e)
         gap = 0.5 * np.einsum("ij,ij->i", normals[b] - normals[a], e)
-        away = np.linalg.norm(e, axis=1)
-        sums = radii[a] + radii[b]
-        faces_other = np.einsum("ij,ij->i", normals[a], normals[b]) < -_FACING[0]
-        behind = (gap <= 0.0) & (away < 2.0 * _DEPTH * sums)
-        keys = np.unique(np.concatenate([i * n + j, (a * n + b)[behind]]).astype(np.int64))
-        in_front = (gap > 0.0) & faces_other & (away**2 - gap**2 < (1.5 * _LATERAL * sums) ** 2)
-        in_front &= ~_among(a * n + b, keys)
+        behind = (gap <= 0.0) & (squared < (2.0 * _DEPTH * sums) ** 2)
+        excluded = np.unique(np.concatenate([i * n + j, (a * n + b)[behind]]).astype(np.int64))
+        in_front = (gap > 0.0) & (squared - gap**2 < (_LATERAL * sums) ** 2)
+        in_front &= np.einsum("ij,ij->i", normals[a], normals[b]) < -_FACING[0]
+        in_front &= ~_among(a * n + b, excluded)
         least = np.full(n, np.inf)
         for each in (a, b):
             np.minimum.at(least, each[in_front], gap[in_front])
-        margins = np.minimum(own.margins, _OF_GAP * least)
-        return cls(
-            rows, faces, areas, radii, margins, keys, spacing, corner, own.norm
-        )
+        gaps = _OF_GAP * least
+        return replace(self, margins=np.minimum(self.margins, gaps), gaps=gaps, excluded=excluded)
 
     def normals(self, y: FloatArray) -> FloatArray:
         """Return unit normals (s, 3) of samples at *y* (s, 3)."""
@@ -178,25 +170,17 @@ class Contact:
         """Return the term of *surface* beside a shape energy of this *scale*."""
         return cls(surface, held, _STIFFNESS * scale)
 
-    def stiffer(self, factor: float) -> Contact:
-        """Return the same term with *factor* times the stiffness."""
-        other = copy.copy(self)
-        other.stiffness = factor * self.stiffness
-        return other
-
     def value_and_slope(self, p: FloatArray) -> tuple[float, FloatArray]:
         """Return the term at cages *p* (m, 3), and half its gradient (m, 3)."""
-        y, pairs = self._near(p)
-        found = None if y is None else _Pairs.of(self.surface, y, pairs)
-        if y is None or found is None:
+        found = self._active(p)
+        if found is None:
             return 0.0, np.zeros_like(p)
         weight = 0.5 * self.stiffness
         return 2.0 * weight * found.value, weight * (self.surface.rows.T @ found.gradient())
 
     def hessian(self, p: FloatArray) -> FloatArray | None:
         """Return half the Hessian at *p* with normals and weights held, (3m, 3m); or None."""
-        y, pairs = self._near(p)
-        found = None if y is None else _Pairs.of(self.surface, y, pairs)
+        found = self._active(p)
         if found is None:
             return None
         rows = self.surface.rows
@@ -206,11 +190,9 @@ class Contact:
         flat = jacobian.reshape(len(along), -1)
         return np.asarray(blas.dsyrk(1.0, flat.T, lower=0).T)
 
-    def depth(self, p: FloatArray) -> float:
-        """Return the largest depth by which samples have crossed at *p*; 0 if they have not."""
-        y, pairs = self._near(p)
-        found = None if y is None else _Pairs.of(self.surface, y, pairs)
-        return 0.0 if found is None else max(0.0, -float(found.gap[found.facing > 0.5].min(initial=0.0)))
+    def is_active(self, p: FloatArray) -> bool:
+        """Return whether samples push each other apart at *p*."""
+        return self._active(p) is not None
 
     def clearance(self, p: FloatArray, most: float) -> float:
         """Return the least distance of samples that may come into contact, at most *most*."""
@@ -227,12 +209,18 @@ class Contact:
         pairs = self.surface.pairs_near(y, reach)
         return pairs[~self.held[pairs].all(axis=1)]
 
+    def _active(self, p: FloatArray) -> _Pairs | None:
+        """Return the active pairs at *p*, if there are any."""
+        y, pairs = self._near(p)
+        return None if y is None else _Pairs.of(self.surface, y, pairs)
+
     def _near(self, p: FloatArray) -> tuple[FloatArray | None, IntArray]:
         """Return the samples (s, 3) at *p*, and the pairs within reach; None if there are none."""
         slack = _SLACK * self.surface.spacing
         known = self._listed
         if known is not None and not len(known[2]):
-            if self.surface.norm * float(np.sqrt(((p - known[0]) ** 2).sum(axis=1).max())) <= 0.5 * slack:
+            farthest = float(np.sqrt(((p - known[0]) ** 2).sum(axis=1).max()))
+            if self.surface.norm * farthest <= 0.5 * slack:
                 return None, known[2]
         y = self.surface.rows @ p
         if known is None or float(((y - known[1]) ** 2).sum(axis=1).max()) > (0.5 * slack) ** 2:
