@@ -61,7 +61,6 @@ from ..solver import (
     SolverOptions,
     SolverResult,
     Status,
-    Term,
     VolumeConstraint,
     Volumes,
     WeightContinuation,

@@ -45,9 +45,10 @@ _NEIGHBOURS = 4.0  # (h_a + h_b): distance along the surface
 _MARGIN = 0.2  # of h_a
 _OF_GAP = 0.45  # of the least gap at rest: the most of it that a margin takes
 _FACING = 0.1, 0.6  # -<n_a, n_b> where f begins and ends to rise
+_AWAY = 0.8  # <n_a, n_b> of samples that face away from each other until the next search
 _LARGEST = 2.0  # times the median: radii of samples, at most
 _SLACK = 1.0  # median (h_a + h_b): additional distance of a search
-_STIFFNESS = 1e2  # k, times the scale of the shape energy
+_STIFFNESS = 5e2  # k, times the scale of the shape energy
 _TINY = 1e-30
 
 
@@ -163,7 +164,7 @@ class Contact:
     surface: ContactSurface
     held: BoolArray  # (s,), samples whose places are given: no contact among them
     stiffness: float
-    _listed: tuple[FloatArray, FloatArray, IntArray] | None = field(default=None, repr=False)
+    _listed: _Listed | None = field(default=None, repr=False)
 
     @classmethod
     def of(cls, surface: ContactSurface, held: BoolArray, scale: float) -> Contact:
@@ -216,18 +217,37 @@ class Contact:
 
     def _near(self, p: FloatArray) -> tuple[FloatArray | None, IntArray]:
         """Return the samples (s, 3) at *p*, and the pairs within reach; None if there are none."""
-        slack = _SLACK * self.surface.spacing
         known = self._listed
-        if known is not None and not len(known[2]):
-            farthest = float(np.sqrt(((p - known[0]) ** 2).sum(axis=1).max()))
-            if self.surface.norm * farthest <= 0.5 * slack:
-                return None, known[2]
+        if known is not None and self.surface.norm * _largest(p - known.p) <= known.quiet:
+            return None, known.pairs
         y = self.surface.rows @ p
-        if known is None or float(((y - known[1]) ** 2).sum(axis=1).max()) > (0.5 * slack) ** 2:
-            largest = 2.0 * float(self.surface.radii.max())
-            reach = np.hypot(_DEPTH, _LATERAL) * largest + slack
-            known = self._listed = p.copy(), y, self._pairs_near(y, reach)
-        return (y if len(known[2]) else None), known[2]
+        moved = np.inf if known is None else _largest(y - known.y)
+        if known is None or moved > 0.5 * _SLACK * self.surface.spacing:
+            known, moved = self._list(p, y), 0.0
+            self._listed = known
+        return (None if moved <= known.quiet else y), known.pairs
+
+    def _list(self, p: FloatArray, y: FloatArray) -> _Listed:
+        """Return the pairs that may be in contact before a sample has moved by half the slack."""
+        radii, slack = self.surface.radii, _SLACK * self.surface.spacing
+        largest = 2.0 * float(radii.max())
+        pairs = self._pairs_near(y, np.hypot(_DEPTH, _LATERAL) * largest + slack)
+        a, b = pairs.T
+        normals = self.surface.normals(y)
+        beyond = np.linalg.norm(y[a] - y[b], axis=1)
+        beyond -= np.hypot(_DEPTH, _LATERAL) * (radii[a] + radii[b])
+        kept = (beyond < slack) & (np.einsum("ij,ij->i", normals[a], normals[b]) < _AWAY)
+        return _Listed(p.copy(), y, pairs[kept], 0.5 * float(beyond[kept].min(initial=slack)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Listed:
+    """Pairs of samples near each other at a pose."""
+
+    p: FloatArray  # (m, 3)
+    y: FloatArray  # (s, 3)
+    pairs: IntArray  # (k, 2)
+    quiet: float  # by which samples may move before a pair is active
 
 
 @dataclass(frozen=True, eq=False)
@@ -310,6 +330,11 @@ class _Pairs:
             side = y[:, (k + 1) % 3] - y[:, (k + 2) % 3]
             at_y += _scattered(count, (faces[:, k], np.cross(side, torque)))
         return at_y
+
+
+def _largest(vectors: FloatArray) -> float:
+    """Return the largest length of *vectors* (k, 3)."""
+    return float(np.sqrt(np.einsum("ij,ij->i", vectors, vectors).max()))
 
 
 def _scattered(n: int, *parts: tuple[IntArray, FloatArray]) -> FloatArray:
