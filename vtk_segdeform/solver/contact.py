@@ -46,6 +46,7 @@ _MARGIN = 0.2  # of h_a
 _OF_GAP = 0.45  # of the least gap at rest: the most of it that a margin takes
 _FACING = 0.1, 0.6  # -<n_a, n_b> where f begins and ends to rise
 _AWAY = 0.8  # <n_a, n_b> of samples that face away from each other until the next search
+_OF_MOTION = 0.5  # of a gap, which closes by motion; the rest by rotation of the normals
 _LARGEST = 2.0  # times the median: radii of samples, at most
 _SLACK = 1.0  # median (h_a + h_b): additional distance of a search
 _STIFFNESS = 5e2  # k, times the scale of the shape energy
@@ -92,10 +93,16 @@ class ContactSurface:
         areas: FloatArray,
         edges: sparse.csr_array,
     ) -> ContactSurface:
-        """Return the surface of samples at *points* (s, 3), size about 1.
+        """Return the surface of samples at rest, size about 1.
 
         Parameters
         ----------
+        rows : (s, m) float
+            W~ at the samples.
+        points : (s, 3) float
+            Their positions.
+        faces : (t, 3) int
+            The triangles between them.
         areas : (s,) float
             Share of the area of each sample.
         edges : (s, s) sparse
@@ -234,8 +241,11 @@ class Contact:
         pairs = self._pairs_near(y, np.hypot(_DEPTH, _LATERAL) * largest + slack)
         a, b = pairs.T
         normals = self.surface.normals(y)
-        beyond = np.linalg.norm(y[a] - y[b], axis=1)
-        beyond -= np.hypot(_DEPTH, _LATERAL) * (radii[a] + radii[b])
+        e = y[a] - y[b]
+        beyond = np.linalg.norm(e, axis=1) - np.hypot(_DEPTH, _LATERAL) * (radii[a] + radii[b])
+        gap = 0.5 * np.einsum("ij,ij->i", normals[b] - normals[a], e)
+        gap -= self.surface.margins[a] + self.surface.margins[b]
+        beyond = np.maximum(beyond, _OF_MOTION * gap)
         kept = (beyond < slack) & (np.einsum("ij,ij->i", normals[a], normals[b]) < _AWAY)
         return _Listed(p.copy(), y, pairs[kept], 0.5 * float(beyond[kept].min(initial=slack)))
 
