@@ -30,6 +30,7 @@ additional distance to which it was searched.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -49,7 +50,7 @@ _AWAY = 0.8  # <n_a, n_b> of samples that face away from each other until the ne
 _OF_MOTION = 0.5  # of a gap, which closes by motion; the rest by rotation of the normals
 _LARGEST = 2.0  # times the median: radii of samples, at most
 _SLACK = 1.0  # median (h_a + h_b): additional distance of a search
-_STIFFNESS = 5e2  # k, times the scale of the shape energy
+_STIFFNESS = 2e3  # k, times the scale of the shape energy
 _TINY = 1e-30
 
 
@@ -208,7 +209,7 @@ class Contact:
         a, b = self._pairs_near(y, most).T
         n = self.surface.normals(y)
         e = y[a] - y[b]
-        away = np.einsum("ij,ij->i", n[b], e) > 0.0
+        away = np.asarray(np.einsum("ij,ij->i", n[b], e) > 0.0)
         away &= np.einsum("ij,ij->i", n[a], e) < 0.0
         return float(np.linalg.norm(e[away], axis=1).min(initial=most))
 
@@ -236,18 +237,23 @@ class Contact:
 
     def _list(self, p: FloatArray, y: FloatArray) -> _Listed:
         """Return the pairs that may be in contact before a sample has moved by half the slack."""
-        radii, slack = self.surface.radii, _SLACK * self.surface.spacing
-        largest = 2.0 * float(radii.max())
-        pairs = self._pairs_near(y, np.hypot(_DEPTH, _LATERAL) * largest + slack)
-        a, b = pairs.T
-        normals = self.surface.normals(y)
+        surface, radii = self.surface, self.surface.radii
+        slack = _SLACK * surface.spacing
+        reach = 2.0 * np.hypot(_DEPTH, _LATERAL) * float(radii.max()) + slack
+        a, b = np.sort(cKDTree(y).query_pairs(reach, output_type="ndarray"), axis=1).T
+        normals = surface.normals(y)
+        facing = np.einsum("ij,ij->i", normals[a], normals[b]) < _AWAY
+        a, b = a[facing], b[facing]
         e = y[a] - y[b]
         beyond = np.linalg.norm(e, axis=1) - np.hypot(_DEPTH, _LATERAL) * (radii[a] + radii[b])
         gap = 0.5 * np.einsum("ij,ij->i", normals[b] - normals[a], e)
-        gap -= self.surface.margins[a] + self.surface.margins[b]
+        gap -= surface.margins[a] + surface.margins[b]
         beyond = np.maximum(beyond, _OF_MOTION * gap)
-        kept = (beyond < slack) & (np.einsum("ij,ij->i", normals[a], normals[b]) < _AWAY)
-        return _Listed(p.copy(), y, pairs[kept], 0.5 * float(beyond[kept].min(initial=slack)))
+        kept = np.flatnonzero(beyond < slack)
+        kept = kept[~_among(a[kept] * len(y) + b[kept], surface.excluded)]
+        kept = kept[~(self.held[a[kept]] & self.held[b[kept]])]
+        quiet = 0.5 * float(beyond[kept].min(initial=slack))
+        return _Listed(p.copy(), y, np.stack([a[kept], b[kept]], axis=1), quiet)
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,9 +313,10 @@ class _Pairs:
             return None
         lateral, lateral_slope = q**2, -2.0 * q / r2
         weight = np.minimum(surface.areas[a], surface.areas[b]) * facing * lateral
-        parts = (a, b, e, direction, gap, into, weight, facing, lateral, -facing_slope)
-        parts += (lateral_slope, fading, fading_slope)
-        return cls(surface, y, *(part[kept] for part in parts), lengths, normals)
+        parts = (a, b, e, direction, gap, into, weight, facing, lateral)
+        more = (-facing_slope, lateral_slope, fading, fading_slope)
+        own: list[Any] = [part[kept] for part in (*parts, *more)]
+        return cls(surface, y, *own, lengths=lengths, normals=normals)
 
     @property
     def value(self) -> float:
@@ -332,7 +339,8 @@ class _Pairs:
         at_n = _scattered(count, (b, by_n + by_c[:, None] * n[a]), (a, by_c[:, None] * n[b] - by_n))
         at_n -= np.einsum("ij,ij->i", at_n, n)[:, None] * n
         at_n /= self.lengths[:, None]
-        used = np.flatnonzero(at_n.any(axis=1)[surface.faces].any(axis=1))
+        is_used = np.asarray(at_n.any(axis=1))
+        used = np.flatnonzero(is_used[surface.faces].any(axis=1))
         faces = surface.faces[used]
         torque = at_n[faces].sum(axis=1)
         y = self.y[faces]
