@@ -101,7 +101,9 @@ class SurfaceSamples:
         faces, n = self.rest.faces, len(self.points)
         if n < self.rest.n_vertices:
             faces = faces_between(self.cells, faces)
-        surface = ContactSurface.of(self.rows, self.points, faces, self.areas, self.edges)
+        surface = ContactSurface.of(
+            self.rows, self.points, faces, areas=self.areas, edges=self.edges
+        )
         away = self.rest.vertices - self.points[self.cells]
         over = np.einsum("ij,ij->i", away, surface.normals(self.points)[self.cells])
         heights = np.zeros(n)

@@ -91,6 +91,7 @@ class ContactSurface:
         rows: FloatArray,
         points: FloatArray,
         faces: IntArray,
+        *,
         areas: FloatArray,
         edges: sparse.csr_array,
     ) -> ContactSurface:
@@ -316,7 +317,8 @@ class _Pairs:
         parts = (a, b, e, direction, gap, into, weight, facing, lateral)
         more = (-facing_slope, lateral_slope, fading, fading_slope)
         own: list[Any] = [part[kept] for part in (*parts, *more)]
-        return cls(surface, y, *own, lengths=lengths, normals=normals)
+        every: list[Any] = [surface, y, *own, lengths, normals]
+        return cls(*every)
 
     @property
     def value(self) -> float:
