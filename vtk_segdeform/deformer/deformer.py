@@ -106,7 +106,7 @@ _SCALED = 3e-5  # relative scale from which another solve follows
 _ROUNDING = 1e-7  # relative scale that counts as rounding
 _MET = 1e-3  # position error, in diagonals, below which a target is met
 _CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
-_CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 100  # of a solve with active contacts
+_CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 300  # of a solve with active contacts
 _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
