@@ -177,6 +177,7 @@ def _settings(options: Namespace) -> dict[str, Any]:
     settings: dict[str, Any] = {
         "preserve_volume": not options.no_volume,
         "lids": LIDS[options.lids],
+        "avoid_contact": options.avoid_contact,
     }
     if options.stretch is not None:
         settings["stretch"] = options.stretch

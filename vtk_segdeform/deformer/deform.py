@@ -24,6 +24,7 @@ def deform(
     n_cage_vertices: int | None = None,
     preserve_volume: bool = True,
     lids: bool | None = None,
+    avoid_contact: bool = False,
     refine: bool = False,
     progress: Progress | None = None,
 ) -> Solution:
@@ -49,6 +50,8 @@ def deform(
     lids : bool or None
         Whether an open surface encloses a volume under lids over its borders; None decides it for
         each connected part, as `Deformer` does.
+    avoid_contact : bool
+        Keep parts of the surface from crossing each other; see `Deformer`.
     refine : bool
         Finish the pose on the mesh itself (`Deformer.finish`).
     progress : Progress, optional
@@ -66,6 +69,7 @@ def deform(
     require_mesh(mesh)
     as_flag(preserve_volume, "preserve_volume")
     as_lids(lids)
+    as_flag(avoid_contact, "avoid_contact")
     as_flag(refine, "refine")
     _, held = checked_constraints(mesh, fixed, handle)
     checked_targets(targets, len(held))
@@ -80,6 +84,7 @@ def deform(
         handle=handle,
         preserve_volume=preserve_volume,
         lids=lids,
+        avoid_contact=avoid_contact,
         progress=part(progress, 0.7, 0.9),
     )
     if not refine:

@@ -30,7 +30,7 @@ import copy
 import itertools
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from types import EllipsisType
@@ -49,13 +49,15 @@ from ..finish import CellEnergy, Finisher
 from ..freezing import read_only
 from ..geometry import Lids, lids_of
 from ..kernels import compiled_kernels, one_blas_thread
-from ..mesh import Mesh, require_mesh
+from ..mesh import Mesh, new_crossings, require_mesh
 from ..progress import Progress, tell
 from ..regions import Regions, require_regions
 from ..solver import (
+    LONGEST_MOVE,
     Anchors,
     Barrier,
     Bodies,
+    Contact,
     GaussNewton,
     ScaledSurface,
     Solution,
@@ -108,6 +110,8 @@ _SCALED = 3e-5  # relative scale from which another solve follows
 _ROUNDING = 1e-7  # relative scale that counts as rounding
 _MET = 1e-3  # position error, in diagonals, below which a target is met
 _SAME = 1e-9  # mesh sizes, within which cages are those of a solution
+_CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
+_CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 300  # of a solve with active contacts
 _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
@@ -193,6 +197,7 @@ class _Constraints:
     volumes: Volumes  # the same on the surface of the steps
     scaled: ScaledSurface | None  # restores exact volume by scaling
     solver: GaussNewton  # with the initial weights
+    contact: Contact | None  # one of its terms
     pulled: _PulledPoints
 
     def places(self, targets: FloatArray) -> FloatArray:
@@ -245,6 +250,10 @@ class Deformer:
     avoid_folds : bool
         Keep the body below the surface from turning inside out, by a barrier (`solver.barrier`).
         Far bends then fold less, but distort the surface more and take about three times as long.
+    avoid_contact : bool
+        Keep parts of the surface that are not near each other at rest from crossing; see
+        `solver.contact`.  Handles take precedence: if their targets, or fixed vertices, force a
+        crossing, the solution crosses or its status is MISSED.  `Solution.crossings` tells.
     blend : (r, n) float, optional
         Blend weights instead of ``regions.weights``, for comparison; `cage_distance_weights`
         computes those of eq. (4) as printed.
@@ -296,6 +305,7 @@ class Deformer:
         exact_volume: bool = True,
         hold_tolerance: float = 5e-4,
         avoid_folds: bool = False,
+        avoid_contact: bool = False,
         blend: ArrayLike | None = None,
         cache: str | os.PathLike[str] | None = None,
         progress: Progress | None = None,
@@ -310,6 +320,7 @@ class Deformer:
         self._hold_tolerance = hold_tolerance
         self._preserve_volume = as_flag(preserve_volume, "preserve_volume")
         self._preserve_region_volumes = as_flag(preserve_region_volumes, "preserve_region_volumes")
+        self._avoid_contact = as_flag(avoid_contact, "avoid_contact")
         self._lids_option = as_lids(lids)
         avoid_folds = as_flag(avoid_folds, "avoid_folds")
         self._own_blend = None if blend is None else as_numbers(blend, "blend")
@@ -346,12 +357,13 @@ class Deformer:
         preserve_volume: bool | None = None,
         preserve_region_volumes: bool | None = None,
         lids: bool | EllipsisType | None = ...,
+        avoid_contact: bool | None = None,
     ) -> Deformer:
         """Return a deformer at rest with other constraints, which shares the binding of this one.
 
-        ``preserve_volume=None``, ``preserve_region_volumes=None`` and ``lids=...`` are the values
-        of this deformer.  The fixed vertices stay at *fixed_at* (f, 3), in the order of the
-        attribute `fixed`, by default at rest.
+        ``preserve_volume=None``, ``preserve_region_volumes=None``, ``lids=...`` and
+        ``avoid_contact=None`` are the values of this deformer.  The fixed vertices stay at
+        *fixed_at* (f, 3), in the order of the attribute `fixed`, by default at rest.
         """
         other = self._shared()
         if preserve_volume is not None:
@@ -360,6 +372,8 @@ class Deformer:
             other._preserve_region_volumes = as_flag(
                 preserve_region_volumes, "preserve_region_volumes"
             )
+        if avoid_contact is not None:
+            other._avoid_contact = as_flag(avoid_contact, "avoid_contact")
         if lids is not ... and as_lids(lids) is not self._lids_option:
             other._lids_option = as_lids(lids)
             other._enclose()
@@ -691,6 +705,9 @@ class Deformer:
         unit = self._frame.size / self.mesh.diagonal
         options = replace(self._options, within=within / unit, progress=progress)
         reached, steps, remaining = None, 0, np.inf
+        self._aim.share = min(
+            self._aim.share, self._longest_leg(min(_largest(goal - self._targets), _CLEARANCE))
+        )
         for targets in self._aim.way(self._targets, goal, self._constraints.handles):
             places = self._constraints.pulled.moved(self._constraints.places(targets))
             options = replace(options, max_steps=limit - steps)
@@ -756,6 +773,11 @@ class Deformer:
     ) -> tuple[SolverResult, FloatArray, int]:
         """Solve for *goal* (k, 3) with exact volume; return the mesh and the steps as well."""
         places = self._constraints.pulled.moved(self._constraints.places(goal))
+        contact = self._constraints.contact
+        if contact is not None and contact.is_active(self._continuation.p):
+            tolerance = max(options.tolerance, _CONTACT_TOLERANCE)
+            steps = min(options.max_steps, _CONTACT_STEPS)
+            options = replace(options, tolerance=tolerance, max_steps=steps)
         if is_drag and self._continuation.has_raised_weights:
             result = self._continuation.solve_at_current_weights(places, options)
         else:
@@ -773,12 +795,39 @@ class Deformer:
     def _follow_waypoints(self, goal: FloatArray, options: SolverOptions) -> int:
         """Move through the waypoints before *goal*; return the number of steps."""
         options = replace(options, tolerance=_WAYPOINT_TOLERANCE, max_steps=_WAYPOINT_STEPS)
-        *on_the_way, _ = waypoints(self._targets, goal, self._constraints.handles)
         steps = 0
-        for targets in on_the_way:
+        for targets in self._way_to(goal):
             places = self._constraints.pulled.moved(self._constraints.places(targets))
             steps += self._continuation.solve_at_current_weights(places, options).steps
         return steps
+
+    def _way_to(self, goal: FloatArray) -> Iterator[FloatArray]:
+        """Yield the waypoints (k, 3) before *goal*; near a contact they are close together."""
+        handles, start = self._constraints.handles, self._targets
+        shortest = self._longest_leg(0.0)
+        way = [start, *waypoints(start, goal, handles, shortest)]
+        done, last, most = 0, len(way) - 1, round(1.0 / shortest)
+        while done + 1 < last:
+            ahead = min(most, last - done)
+            if ahead > 1 and most > 1:
+                length = self._longest_leg(_CLEARANCE)
+                while ahead > 1 and _largest(way[done + ahead] - way[done]) > length * LONGEST_MOVE:
+                    ahead -= 1
+            done += ahead
+            if done < last:
+                yield way[done]
+
+    def _longest_leg(self, most: float) -> float:
+        """Return how far apart waypoints may be at this pose, as a share of the usual distance.
+
+        With contacts it is half the clearance between parts, which is looked for up to *most*; but
+        at least the distance between samples.
+        """
+        contact = self._constraints.contact
+        if contact is None:
+            return 1.0
+        clearance = contact.clearance(self._continuation.p, most) if most else 0.0
+        return min(1.0, max(0.5 * clearance, contact.surface.spacing) / LONGEST_MOVE)
 
     def _with_exact_volume(self, result: SolverResult) -> tuple[FloatArray, float]:
         """Restore the exact volumes; return the mesh and by how much it was scaled.
@@ -881,6 +930,8 @@ class Deformer:
         )
         gathered = in_order if positions.mean is None else positions.mean @ in_order
         preserved, volumes, scaled = self._preserved_volumes()
+        contact = self._contact_of()
+        terms = self._terms if contact is None else (*self._terms, contact)
         fixed_in_scene, inside = mesh.vertices[self.fixed], rest[self.fixed]
         if places is not None:
             fixed_in_scene = checked_targets(places, len(self.fixed), "fixed_at", "fixed")
@@ -898,7 +949,8 @@ class Deformer:
             preserved=preserved,
             volumes=volumes,
             scaled=scaled,
-            solver=GaussNewton(binding.energy, positions, volumes, terms=self._terms),
+            solver=GaussNewton(binding.energy, positions, volumes, terms=terms),
+            contact=contact,
             pulled=_PulledPoints(),
         )
         self.reset()
@@ -918,6 +970,16 @@ class Deformer:
         for k in np.unique(body):
             centres[k] = fixed_at[body == k].mean(axis=0) * self._frame.size
         return centres
+
+    def _contact_of(self) -> Contact | None:
+        """Return the term that keeps parts of the surface apart, if they are to be."""
+        if not self._avoid_contact:
+            return None
+        held = np.zeros(self.mesh.n_vertices)
+        held[self.fixed] = held[self.handle] = 1.0
+        cells = self._samples.cells
+        is_held = np.bincount(cells, held) >= 0.5 * np.bincount(cells)
+        return Contact.of(self._samples.contact_surface, is_held, self._binding.energy.scale)
 
     def _begin(self, p: FloatArray, targets: FloatArray) -> None:
         """Begin at cages *p* (m, 3), which are a pose for *targets* (k, 3)."""
@@ -951,6 +1013,7 @@ class Deformer:
             errors=errors,
             volume=partial(self._total_volume.relative, x),
             region_volumes=self._region_volume_changes,
+            crossed=partial(new_crossings, rest=self.mesh.vertices, faces=self.mesh.faces),
         )
 
     def _errors(self, targets: FloatArray, x: FloatArray) -> tuple[float, ...]:

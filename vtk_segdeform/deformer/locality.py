@@ -44,7 +44,7 @@ from scipy.sparse import csgraph
 from ..arrays import FloatArray, IntArray
 from ..geometry import faces_between
 from ..mesh import Mesh
-from ..solver import CoarseVolume
+from ..solver import CoarseVolume, ContactSurface
 
 _LARGEST = 1e4  # (d^2 - 1)^2, reached at ten times the reach; also the weight of other bodies
 _STEADY = 10.0  # times the least weight of anchors under a load; still far below those of handles
@@ -71,6 +71,8 @@ class SurfaceSamples:
         The triangles between them.
     edges : (s, s) sparse
         Lengths of the edges between them.
+    rest : Mesh, optional
+        The surface.
     """
 
     cells: IntArray
@@ -79,6 +81,7 @@ class SurfaceSamples:
     areas: FloatArray
     faces: IntArray
     edges: sparse.csr_array
+    rest: Mesh | None = None
 
     @classmethod
     def of(cls, rest: Mesh, coarse: CoarseVolume) -> SurfaceSamples:
@@ -97,7 +100,21 @@ class SurfaceSamples:
         lengths = np.linalg.norm(points[near.row] - points[near.col], axis=1)
         edges = sparse.coo_array((lengths, (near.row, near.col)), (count, count)).tocsr()
         rows = coarse.surface.at(np.arange(count))
-        return cls(cells, rows, points, areas / areas.sum(), faces, edges)
+        return cls(cells, rows, points, areas / areas.sum(), faces, edges, rest)
+
+    @cached_property
+    def contact_surface(self) -> ContactSurface:
+        """The samples as a surface whose parts may come into contact."""
+        assert self.rest is not None
+        faces, n = self.faces, len(self.points)
+        surface = ContactSurface.of(
+            self.rows, self.points, faces, areas=self.areas, edges=self.edges
+        )
+        away = self.rest.vertices - self.points[self.cells]
+        over = np.einsum("ij,ij->i", away, surface.normals(self.points)[self.cells])
+        heights = np.zeros(n)
+        np.maximum.at(heights, self.cells, over)
+        return surface.with_heights(heights)
 
     def distances(self, vertex: int) -> FloatArray:
         """Return the distance of each sample from that of *vertex*, (s,); infinite elsewhere."""

@@ -21,7 +21,12 @@ from .edges import components, edge_keys, face_edges, next_half_edge, repeats_ve
 from .faults import UNREPAIRABLE, as_soup, connectivity_faults, find_faults
 from .grouping import connected, first_equal_row, first_of_group, ragged_arange, two_sides
 from .inside import distance_to_surface, inside_nodes, inside_points, winding_number
-from .intersections import flat_faces, intersections_of, self_intersections
+from .intersections import (
+    flat_faces,
+    intersections_of,
+    new_crossings,
+    self_intersections,
+)
 from .mesh import Mesh, require_mesh
 from .report import Kind, MeshReport, counted
 from .shells import misoriented_shells
@@ -56,6 +61,7 @@ __all__ = [
     "least_angle",
     "mesh_of",
     "misoriented_shells",
+    "new_crossings",
     "next_half_edge",
     "normals",
     "ragged_arange",

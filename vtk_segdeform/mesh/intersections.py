@@ -33,6 +33,9 @@ _TOUCH = 1e-12  # of a pair's extent: at smaller distances triangles touch and p
 _FOLD = 1e-9  # radians between two faces folded over their common edge
 _NEEDLE = 1e-10  # height over longest edge; the plane of a flatter face is undefined
 _BATCH = 200_000  # pairs of boxes tested at once
+_ALL_FACES = 200_000  # beyond so many `new_crossings` tests only some
+_CUBE, _ELSEWHERE = 8.0, 4.0  # a cube in edges; a distance at rest in cubes
+_WIDER = 1.0 + 1e-12  # for rounding
 _FACES = 10_000  # faces whose neighbourhoods are searched at once
 
 _EDGES = ((0, 1), (1, 2), (2, 0))
@@ -69,6 +72,76 @@ def self_intersections(vertices: ArrayLike, faces: ArrayLike) -> IntArray:
         found.append(pairs[_meet(points, triangles[pairs[:, 0]], triangles[pairs[:, 1]])])
     hits = np.sort(np.concatenate(found), axis=1)
     return hits[np.lexsort((hits[:, 1], hits[:, 0]))]
+
+
+def new_crossings(vertices: FloatArray, rest: FloatArray, faces: IntArray) -> IntArray:
+    """Return the faces (k,) that cross or touch others at *vertices* (n, 3) but not at *rest*.
+
+    A face counts if it is in a pair of `self_intersections` at *vertices* that is none at *rest*.
+    Of more than 200,000 faces, only those are tested that are near others from elsewhere at rest:
+    a fold of a few faces is not found.
+    """
+    corners = vertices[faces]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    some = np.arange(len(faces))
+    if len(faces) > _ALL_FACES:
+        some = _from_elsewhere(vertices, rest, faces)
+    found = [np.empty((0, 2), dtype=np.int64)]
+    for near in _boxes_among(low[some], high[some]):
+        pairs = some[near]
+        pairs = pairs[_meet(vertices, faces[pairs[:, 0]], faces[pairs[:, 1]])]
+        found.append(pairs[~_meet(rest, faces[pairs[:, 0]], faces[pairs[:, 1]])])
+    return np.unique(np.concatenate(found))
+
+
+def _from_elsewhere(vertices: FloatArray, rest: FloatArray, faces: IntArray) -> IntArray:
+    """Return the faces (k,) near others from elsewhere *rest*, some 30 edges away or more.
+
+    Vertices (n, 3) are sorted into cubes, four times over, each time shifted by a quarter: two
+    points less than a quarter apart share one of them.
+    """
+    corners = vertices[faces]
+    size = _CUBE * float(np.quantile(np.ptp(corners, axis=1).max(axis=1), 0.99))
+    is_near = np.zeros(len(vertices), dtype=bool)
+    for shift in range(4):
+        cube = np.floor((vertices - vertices.min(axis=0)) / size + 0.25 * shift).astype(np.int64)
+        width = cube.max(axis=0) + 1
+        key = (cube[:, 0] * width[1] + cube[:, 1]) * width[2] + cube[:, 2]
+        order = np.argsort(key)
+        first = np.flatnonzero(np.diff(key[order], prepend=-1))
+        there = rest[order]
+        spread = np.maximum.reduceat(there, first) - np.minimum.reduceat(there, first)
+        counts = np.diff(first, append=len(order))
+        is_near[order] |= np.repeat((spread > _ELSEWHERE * size).any(axis=1), counts)
+    return np.flatnonzero(is_near[faces].any(axis=1))
+
+
+def _boxes_among(low: FloatArray, high: FloatArray) -> Iterator[IntArray]:
+    """Yield, in batches, the pairs of boxes that overlap or touch.
+
+    As in `_boxes_near` the centres are searched separately for each power of two of the size.
+    """
+    centre, radius = 0.5 * (low + high), 0.5 * np.linalg.norm(high - low, axis=1)
+    size = np.frexp(radius)[1]
+    grades = [np.flatnonzero(size == grade) for grade in np.unique(size)]
+    trees = [(ids, cKDTree(centre[ids]), float(radius[ids].max())) for ids in grades]
+    for k, (ids, tree, largest) in enumerate(trees):
+        pairs = ids[tree.query_pairs(2.0 * largest * _WIDER, output_type="ndarray")]
+        yield from _overlapping(low, high, pairs)
+        for others, smaller, radius_there in trees[:k]:
+            reach = (largest + radius_there) * _WIDER
+            near = tree.sparse_distance_matrix(smaller, reach, output_type="ndarray")
+            yield from _overlapping(
+                low, high, np.stack([ids[near["i"]], others[near["j"]]], axis=1)
+            )
+
+
+def _overlapping(low: FloatArray, high: FloatArray, pairs: IntArray) -> Iterator[IntArray]:
+    """Yield, in batches, those *pairs* (k, 2) of boxes that overlap or touch."""
+    for start in range(0, len(pairs), _BATCH):
+        i, j = pairs[start : start + _BATCH].T
+        keep = ((low[i] <= high[j]) & (low[j] <= high[i])).all(axis=1)
+        yield np.stack([i[keep], j[keep]], axis=1)
 
 
 def intersections_of(vertices: FloatArray, faces: IntArray, some: IntArray) -> IntArray:

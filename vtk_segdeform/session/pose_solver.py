@@ -39,6 +39,7 @@ _CONSTRAINT_OPTIONS = (
     "preserve_volume",
     "preserve_region_volumes",
     "lids",
+    "avoid_contact",
 )  # changed by `Deformer.hold`
 _NO_TARGETS = np.empty((0, 3))
 
@@ -218,6 +219,7 @@ class PoseSolver:
             preserve_volume=state.options.preserve_volume,
             preserve_region_volumes=state.options.preserve_region_volumes,
             lids=state.options.lids,
+            avoid_contact=state.options.avoid_contact,
         )
         constraints = State(
             fixed=state.fixed,

@@ -52,7 +52,10 @@ if TYPE_CHECKING:
 FORMAT = "vtk_segdeform session"
 VERSION = 2
 
-_LATER = {"lids": None}  # options that version 1 does not have, and their defaults
+_LATER = {
+    "lids": None,
+    "avoid_contact": False,
+}  # options that version 1 does not have, and their defaults
 
 # Errors of zipfile, numpy and json on invalid content.
 _ERRORS = (zipfile.BadZipFile, ValueError, KeyError, TypeError, EOFError, OverflowError,

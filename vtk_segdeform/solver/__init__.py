@@ -12,6 +12,8 @@ The files, in reading order:
     extrapolation           where a solve starts in a drag
     exact_volume            motion of a pose onto its exact volumes
     coarse_volume           volume of a large mesh from a coarse surface
+    terms                   further terms of the objective
+    contact                 parts of the surface that push each other apart
     waypoints               intermediate targets for large motions
     solution                `Solution` and `Status`
 """
@@ -19,6 +21,7 @@ The files, in reading order:
 from .anderson import Anderson
 from .barrier import Barrier
 from .coarse_volume import CoarseVolume
+from .contact import Contact, ContactSurface
 from .exact_volume import ScaledSurface, moved_along, steps_to_volume
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
 from .position_constraints import Anchors, connected_sets, errors_at, position_term
@@ -31,15 +34,18 @@ from .volume_constraints import (
     region_volumes,
     total_volume,
 )
-from .waypoints import is_half_turn, waypoints
+from .waypoints import LONGEST_MOVE, is_half_turn, waypoints
 from .weights import WeightContinuation
 
 __all__ = [
+    "LONGEST_MOVE",
     "Anchors",
     "Anderson",
     "Barrier",
     "Bodies",
     "CoarseVolume",
+    "Contact",
+    "ContactSurface",
     "GaussNewton",
     "ScaledSurface",
     "Solution",

@@ -77,6 +77,7 @@ _FAR = 2e-2  # beyond it volume Hessians are not valid at the end of the step
 _LONG = 1e-2  # beyond it H is computed again
 _OLD = 20  # steps after which H is computed again
 _OLD_ACTIVE = 3  # the same while a term is active
+_LONGEST_ACTIVE = 2e-2  # a longer step is shortened while a term is active
 _NO_SURFACE = np.empty((0, 3))
 
 
@@ -264,6 +265,8 @@ class GaussNewton:
             if is_coupled and state.step_is_doubtful:
                 state.drop_factor()
                 continue
+            if here.is_active and state.step_size > _LONGEST_ACTIVE:
+                step *= _LONGEST_ACTIVE / state.step_size
             if options.within is not None:
                 remaining = self._farthest(step)
             if state.step_size <= options.tolerance:

@@ -25,7 +25,8 @@ from ..geometry import rigid_fit
 
 _LONGEST_TURN = np.radians(30.0)
 _SHORT_TURN = np.radians(10.0)
-_LONGEST_MOVE = 0.2  # of the mesh's size
+LONGEST_MOVE = 0.2
+"""Distance between waypoints, at most, as a share of the mesh's size."""
 _MOST_MOTIONS = 50
 _SAMPLE = 500  # vertices of a large handle that are tested for a far motion
 _HALF_TURN = 1e-6  # radians below 180 degrees that count as 180
@@ -75,7 +76,7 @@ def _is_short(start: FloatArray, end: FloatArray, share: float) -> bool:
     the sum of squared distances is least for the axis along which the points are longest.
     """
     move, mean = end - start, np.full(len(start), 1.0 / len(start))
-    if np.einsum("ij,ij->i", move, move).max() > (share * _LONGEST_MOVE) ** 2:
+    if np.einsum("ij,ij->i", move, move).max() > (share * LONGEST_MOVE) ** 2:
         return False
     move -= mean @ move
     arms = start - mean @ start
@@ -107,7 +108,7 @@ class _ScrewMotion:
             arms = np.cross(start - self._centre, self._axis)
             way = np.maximum(way, self._angle * np.linalg.norm(arms, axis=1))
         # In units of the longest motion between two waypoints.
-        self.length = max(self._angle / _LONGEST_TURN, float(way.max()) / _LONGEST_MOVE)
+        self.length = max(self._angle / _LONGEST_TURN, float(way.max()) / LONGEST_MOVE)
 
     def at(self, s: float) -> FloatArray:
         """Return the handle after the fraction *s* of its motion, (k, 3)."""

@@ -1,0 +1,101 @@
+"""Contact: two prongs of a fork that meet, and pass through each other without it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scenes import sausage
+from scipy.spatial.transform import Rotation
+
+import vtk_segdeform as sd
+from vtk_segdeform.mesh import new_crossings, self_intersections
+from vtk_segdeform.models.implicit import Limb, standing_body
+from vtk_segdeform.solver import Contact
+
+SIDE = [(-0.35, 0, 1.2), (-0.35, 0, 0.6), (-0.2, 0, 0.3)]
+CURVE = [*SIDE, (0, 0, 0.2), *((-x, y, z) for x, y, z in reversed(SIDE))]
+LIMBS = [Limb(CURVE, [0.13] * 7), Limb([(0, 0, -0.1), (0, 0, 0.2)], [0.25, 0.2])]
+
+
+@pytest.fixture(scope="module")
+def fork():
+    """Return a deformer of the fork that avoids contact, and targets beside the other prong."""
+    mesh = standing_body(LIMBS, 1200, blend=0.05)
+    x = mesh.vertices
+    regions = sd.segment(mesh, 1)
+    fixed, handle = np.flatnonzero(x[:, 2] < 0.12), np.flatnonzero((x[:, 0] > 0) & (x[:, 2] > 0.85))
+    cages = sd.fit_cages(mesh, regions, 40)
+    deformer = sd.Deformer(mesh, regions, cages, fixed=fixed, handle=handle, avoid_contact=True)
+    return deformer, x[handle] - [0.42, 0.0, 0.0]
+
+
+@pytest.fixture(scope="module")
+def through(fork):
+    """Return the pose without avoiding contact, and its cages in the units of the solver."""
+    deformer, targets = fork
+    free = deformer.hold(fixed=deformer.fixed, handle=deformer.handle, avoid_contact=False)
+    return free.solve(targets), free._p
+
+
+def test_what_crosses_without_it_does_not_with_it(fork, through):
+    deformer, targets = fork
+    solution = deformer.solve(targets)
+    faces = deformer.mesh.faces
+    for each in (through[0], solution):
+        everything = np.unique(self_intersections(each.vertices, faces))
+        assert np.array_equal(each.crossings(), everything)  # the fork itself has none
+        assert abs(each.volume_change) < 1e-12
+    assert len(through[0].crossings()) > 50
+    assert len(solution.crossings()) <= 2
+    assert solution.handle_error < 1.5 * through[0].handle_error
+
+
+def test_crossings_at_rest_do_not_count(through, fork):
+    mesh = fork[0].mesh
+    crossed = mesh.with_vertices(through[0].vertices)
+    regions = sd.segment(crossed, 1)
+    deformer = sd.Deformer(crossed, regions, sd.fit_cages(crossed, regions, 30), avoid_contact=True)
+    contact = deformer._constraints.contact
+    assert contact.value_and_slope(deformer._rest_cages)[0] == 0.0
+    assert not len(deformer.hold(handle=[0]).solve(crossed.vertices[[0]]).crossings())
+
+
+def test_its_gradient_is_that_of_its_value_and_it_moves_along(fork, through):
+    contact, p = fork[0]._constraints.contact, through[1]
+    value, slope = contact.value_and_slope(p)
+    assert value > 0.0
+    step = np.random.default_rng(0).standard_normal(p.shape)
+    off = [
+        contact.value_and_slope(p + e * step)[0] - value - 2.0 * e * np.vdot(slope, step)
+        for e in (2e-5, 1e-5)
+    ]
+    assert off[0] / off[1] == pytest.approx(4.0, rel=0.1)
+    lower = contact.hessian(p)
+    half = np.tril(lower) + np.tril(lower, -1).T
+    assert np.linalg.eigvalsh(half)[0] > -1e-9 * np.abs(half).max()
+    turn = Rotation.from_rotvec([0.3, -1.0, 0.5])
+    there, turned = contact.value_and_slope(turn.apply(p) + [3.0, -2.0, 1.0])
+    assert there == pytest.approx(value, rel=1e-9)
+    assert turned == pytest.approx(turn.apply(slope), abs=1e-9 * np.abs(slope).max())
+    assert Contact(contact.surface, contact.held | True, 1.0).value_and_slope(p)[0] == 0.0
+
+
+def test_far_from_contact_no_bit_changes():
+    scene = sausage(2)
+    free, avoiding = scene.deformer(), scene.deformer(avoid_contact=True)
+    targets = scene.mesh.vertices[scene.handle] + [0.0, 0.0, 0.01]
+    assert avoiding._constraints.contact.surface.spacing < 0.2
+    expected, solution = free.solve(targets), avoiding.solve(targets)
+    assert np.array_equal(solution.vertices, expected.vertices)
+
+
+def test_crossings_of_a_large_mesh_are_searched_where_parts_meet(monkeypatch):
+    monkeypatch.setattr("vtk_segdeform.mesh.intersections._ALL_FACES", 0)
+    ball = sd.models.sphere(6000)
+    two = np.concatenate([ball.faces, ball.faces + ball.n_vertices])
+    rest = np.concatenate([ball.vertices, ball.vertices + [6.0, 0.0, 0.0]])
+    near = np.concatenate([ball.vertices, ball.vertices + [1.9, 0.01, 0.02]])
+    assert len(new_crossings(rest, rest, two)) == 0
+    found = np.unique(self_intersections(near, two))
+    assert np.array_equal(new_crossings(near, rest, two), found)
+    assert len(found) > 50

@@ -1,0 +1,380 @@
+"""Contact: a term that pushes parts of the surface apart where they would cross.
+
+The surface is given by samples a (the cells of the coarse volume, or the vertices of a small mesh),
+each with a position y_a = W~_a p, a unit normal n_a and a radius h_a, about half the distance to
+its neighbours.  Two samples that are no neighbours at rest push each other apart if they face each
+other and are closer than a margin:
+
+    sum over pairs a, b    k w_ab  f(-<n_a, n_b>)  l(s^2 / r_ab^2)  (d_ab - g)^2        for g < d_ab
+
+    e = y_a - y_b,    g = <n_b - n_a, e> / 2,    s^2 = |e|^2 - g^2,    r_ab = 1.1 (h_a + h_b)
+
+g is the gap, negative where the parts have crossed, and s the distance along the surface.  f and l
+fade smoothly to 0 where the samples do not face each other or are not opposite, and the last factor
+where they have crossed by more than D_ab = 1.5 (h_a + h_b): so deep it is unknown which way is out.
+All of it is a smooth function of p that does not depend on how the mesh is moved as a whole.
+
+Three kinds of pairs are no contact, since they are near each other at rest already:
+
+    neighbours      within 4 (h_a + h_b) along the surface
+    two sides       of a thin part: one is behind the other, by at most 2 D_ab
+    crossings       the same, of a mesh that crosses itself at rest
+
+and the margin d_ab = d_a + d_b is at most the gap at rest.  Otherwise d_a is the height of the true
+surface over its sample, and a tenth of the distance between samples.
+
+Only pairs within reach are evaluated.  Their list is valid until a sample has moved by half the
+additional distance to which it was searched.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.linalg import blas
+from scipy.sparse import csgraph
+from scipy.spatial import cKDTree
+
+from ..arrays import BoolArray, FloatArray, IntArray
+
+_LATERAL = 1.1  # r_ab / (h_a + h_b): discs of this radius about the samples cover the surface
+_DEPTH = 1.5  # D_ab / (h_a + h_b)
+_NEIGHBOURS = 4.0  # (h_a + h_b): distance along the surface
+_MARGIN = 0.2  # of h_a
+_OF_GAP = 0.45  # of the least gap at rest: the most of it that a margin takes
+_FACING = 0.1, 0.6  # -<n_a, n_b> where f begins and ends to rise
+_AWAY = 0.8  # <n_a, n_b> of samples that face away from each other until the next search
+_OF_MOTION = 0.5  # of a gap, which closes by motion; the rest by rotation of the normals
+_LARGEST = 2.0  # times the median: radii of samples, at most
+_SLACK = 1.0  # median (h_a + h_b): additional distance of a search
+_STIFFNESS = 2e3  # k, times the scale of the shape energy
+_TINY = 1e-30
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSurface:
+    """Samples of a surface at rest, size about 1, and which of them are in contact with which.
+
+    Parameters
+    ----------
+    rows : (s, m) float
+        W~ at the samples.
+    faces : (t, 3) int
+        The triangles between them.
+    areas : (s,) float
+        Their shares of the area; the sum is 1.
+    radii : (s,) float
+        h_a.
+    margins, gaps : (s,) float
+        d_a, and its limit: the share of the least gap at rest.
+    excluded : (k,) int
+        Pairs that are no contact: a s + b for a < b, in increasing order.
+    """
+
+    rows: FloatArray
+    faces: IntArray
+    areas: FloatArray
+    radii: FloatArray
+    margins: FloatArray
+    gaps: FloatArray
+    excluded: IntArray
+    spacing: float  # median of h_a + h_b
+    corners: sparse.csr_array  # (s, t), 1 where a face is at a sample
+    norm: float  # of W~: largest motion of a sample by motions of cage vertices of length 1
+
+    @classmethod
+    def of(
+        cls,
+        rows: FloatArray,
+        points: FloatArray,
+        faces: IntArray,
+        *,
+        areas: FloatArray,
+        edges: sparse.csr_array,
+    ) -> ContactSurface:
+        """Return the surface of samples at rest, size about 1.
+
+        Parameters
+        ----------
+        rows : (s, m) float
+            W~ at the samples.
+        points : (s, 3) float
+            Their positions.
+        faces : (t, 3) int
+            The triangles between them.
+        areas : (s,) float
+            Share of the area of each sample.
+        edges : (s, s) sparse
+            Lengths of the edges between them.
+        """
+        n = len(points)
+        a, b, c = points[faces.T]
+        total = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+        radii = np.sqrt(areas * total / np.pi)
+        radii = np.minimum(radii, _LARGEST * float(np.median(radii)))
+        places = faces.ravel(), np.repeat(np.arange(len(faces)), 3)
+        corners = sparse.coo_array((np.ones(faces.size), places), (n, len(faces))).tocsr()
+        no_pairs, spacing = np.zeros(0, dtype=np.int64), 2.0 * float(np.median(radii))
+        norm, free = float(np.abs(rows).sum(axis=1).max(initial=1.0)), np.full(n, np.inf)
+        margins = _MARGIN * radii
+        own = cls(rows, faces, areas, radii, margins, free, no_pairs, spacing, corners, norm)
+        return own._excluding(points, edges)
+
+    def with_heights(self, heights: FloatArray) -> ContactSurface:
+        """Return the same where the true surface has *heights* (s,) over the samples, at most."""
+        return replace(self, margins=np.minimum(self.margins + heights, self.gaps))
+
+    def _excluding(self, points: FloatArray, edges: sparse.csr_array) -> ContactSurface:
+        """Return the same without contact of samples near each other at rest, at *points*."""
+        n, radii, normals = len(points), self.radii, self.normals(points)
+        largest = 2.0 * float(radii.max(initial=0.0))
+        near = csgraph.dijkstra(edges, directed=False, limit=_NEIGHBOURS * largest)
+        i, j = np.nonzero(np.triu(near <= _NEIGHBOURS * np.add.outer(radii, radii), 1))
+        pairs = cKDTree(points).query_pairs(2.0 * _DEPTH * largest, output_type="ndarray")
+        a, b = np.sort(pairs, axis=1).T
+        e, sums = points[a] - points[b], radii[a] + radii[b]
+        squared = np.einsum("ij,ij->i", e, e)
+        gap = 0.5 * np.einsum("ij,ij->i", normals[b] - normals[a], e)
+        behind = (gap <= 0.0) & (squared < (2.0 * _DEPTH * sums) ** 2)
+        excluded = np.unique(np.concatenate([i * n + j, (a * n + b)[behind]]).astype(np.int64))
+        in_front = (gap > 0.0) & (squared - gap**2 < (_LATERAL * sums) ** 2)
+        in_front &= np.einsum("ij,ij->i", normals[a], normals[b]) < -_FACING[0]
+        in_front &= ~_among(a * n + b, excluded)
+        least = np.full(n, np.inf)
+        for each in (a, b):
+            np.minimum.at(least, each[in_front], gap[in_front])
+        gaps = _OF_GAP * least
+        return replace(self, margins=np.minimum(self.margins, gaps), gaps=gaps, excluded=excluded)
+
+    def normals(self, y: FloatArray) -> FloatArray:
+        """Return unit normals (s, 3) of samples at *y* (s, 3)."""
+        return self.sums(y)[1]
+
+    def sums(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the lengths (s,) of the sums of face normals, and the unit normals (s, 3)."""
+        a, b, c = y[self.faces.T]
+        total = self.corners @ np.cross(b - a, c - a)
+        length = np.sqrt(np.einsum("ij,ij->i", total, total)) + _TINY
+        return length, total / length[:, None]
+
+    def pairs_near(self, y: FloatArray, reach: float) -> IntArray:
+        """Return the pairs (k, 2) within *reach* at *y* that may be in contact."""
+        pairs = np.sort(cKDTree(y).query_pairs(reach, output_type="ndarray"), axis=1)
+        return pairs[~_among(pairs[:, 0] * len(y) + pairs[:, 1], self.excluded)]
+
+
+@dataclass(eq=False)
+class Contact:
+    """The term of one `ContactSurface`; *stiffness* is k."""
+
+    surface: ContactSurface
+    held: BoolArray  # (s,), samples whose places are given: no contact among them
+    stiffness: float
+    _listed: _Listed | None = field(default=None, repr=False)
+
+    @classmethod
+    def of(cls, surface: ContactSurface, held: BoolArray, scale: float) -> Contact:
+        """Return the term of *surface* beside a shape energy of this *scale*."""
+        return cls(surface, held, _STIFFNESS * scale)
+
+    def value_and_slope(self, p: FloatArray) -> tuple[float, FloatArray]:
+        """Return the term at cages *p* (m, 3), and half its gradient (m, 3)."""
+        found = self._active(p)
+        if found is None:
+            return 0.0, np.zeros_like(p)
+        weight = 0.5 * self.stiffness
+        return 2.0 * weight * found.value, weight * (self.surface.rows.T @ found.gradient())
+
+    def hessian(self, p: FloatArray) -> FloatArray | None:
+        """Return half the Hessian at *p* with normals and weights held, (3m, 3m); or None."""
+        found = self._active(p)
+        if found is None:
+            return None
+        rows = self.surface.rows
+        along = rows[found.a] - rows[found.b]
+        weight = np.sqrt(self.stiffness * found.weight * found.fading)
+        jacobian = np.einsum("ki,kj->kij", weight[:, None] * found.direction, along)
+        flat = jacobian.reshape(len(along), -1)
+        return np.asarray(blas.dsyrk(1.0, flat.T, lower=0).T)
+
+    def is_active(self, p: FloatArray) -> bool:
+        """Return whether samples push each other apart at *p*."""
+        return self._active(p) is not None
+
+    def clearance(self, p: FloatArray, most: float) -> float:
+        """Return the least distance of samples that may come into contact, at most *most*."""
+        y = self.surface.rows @ p
+        a, b = self._pairs_near(y, most).T
+        n = self.surface.normals(y)
+        e = y[a] - y[b]
+        away = np.asarray(np.einsum("ij,ij->i", n[b], e) > 0.0)
+        away &= np.einsum("ij,ij->i", n[a], e) < 0.0
+        return float(np.linalg.norm(e[away], axis=1).min(initial=most))
+
+    def _pairs_near(self, y: FloatArray, reach: float) -> IntArray:
+        """Return the pairs (k, 2) within *reach* at *y* that may come into contact."""
+        pairs = self.surface.pairs_near(y, reach)
+        return pairs[~self.held[pairs].all(axis=1)]
+
+    def _active(self, p: FloatArray) -> _Pairs | None:
+        """Return the active pairs at *p*, if there are any."""
+        y, pairs = self._near(p)
+        return None if y is None else _Pairs.of(self.surface, y, pairs)
+
+    def _near(self, p: FloatArray) -> tuple[FloatArray | None, IntArray]:
+        """Return the samples (s, 3) at *p*, and the pairs within reach; None if there are none."""
+        known = self._listed
+        if known is not None and self.surface.norm * _largest(p - known.p) <= known.quiet:
+            return None, known.pairs
+        y = self.surface.rows @ p
+        moved = np.inf if known is None else _largest(y - known.y)
+        if known is None or moved > 0.5 * _SLACK * self.surface.spacing:
+            known, moved = self._list(p, y), 0.0
+            self._listed = known
+        return (None if moved <= known.quiet else y), known.pairs
+
+    def _list(self, p: FloatArray, y: FloatArray) -> _Listed:
+        """Return the pairs that may be in contact before a sample has moved by half the slack."""
+        surface, radii = self.surface, self.surface.radii
+        slack = _SLACK * surface.spacing
+        reach = 2.0 * np.hypot(_DEPTH, _LATERAL) * float(radii.max()) + slack
+        a, b = np.sort(cKDTree(y).query_pairs(reach, output_type="ndarray"), axis=1).T
+        normals = surface.normals(y)
+        facing = np.einsum("ij,ij->i", normals[a], normals[b]) < _AWAY
+        a, b = a[facing], b[facing]
+        e = y[a] - y[b]
+        beyond = np.linalg.norm(e, axis=1) - np.hypot(_DEPTH, _LATERAL) * (radii[a] + radii[b])
+        gap = 0.5 * np.einsum("ij,ij->i", normals[b] - normals[a], e)
+        gap -= surface.margins[a] + surface.margins[b]
+        beyond = np.maximum(beyond, _OF_MOTION * gap)
+        kept = np.flatnonzero(beyond < slack)
+        kept = kept[~_among(a[kept] * len(y) + b[kept], surface.excluded)]
+        kept = kept[~(self.held[a[kept]] & self.held[b[kept]])]
+        quiet = 0.5 * float(beyond[kept].min(initial=slack))
+        return _Listed(p.copy(), y, np.stack([a[kept], b[kept]], axis=1), quiet)
+
+
+@dataclass(frozen=True, eq=False)
+class _Listed:
+    """Pairs of samples near each other at a pose."""
+
+    p: FloatArray  # (m, 3)
+    y: FloatArray  # (s, 3)
+    pairs: IntArray  # (k, 2)
+    quiet: float  # by which samples may move before a pair is active
+
+
+@dataclass(frozen=True, eq=False)
+class _Pairs:
+    """The active pairs at a pose, and the factors of their sum."""
+
+    surface: ContactSurface
+    y: FloatArray  # (s, 3)
+    a: IntArray  # (k,)
+    b: IntArray
+    e: FloatArray  # (k, 3)
+    direction: FloatArray  # (k, 3), half n_b - n_a
+    gap: FloatArray  # (k,), g
+    into: FloatArray  # d_ab - g
+    weight: FloatArray  # w_ab f l
+    facing: FloatArray  # f
+    lateral: FloatArray  # l
+    facing_slope: FloatArray  # df / d<n_a, n_b>
+    lateral_slope: FloatArray  # dl / ds^2
+    fading: FloatArray  # of deep pairs
+    fading_slope: FloatArray
+    lengths: FloatArray  # (s,)
+    normals: FloatArray  # (s, 3)
+
+    @classmethod
+    def of(cls, surface: ContactSurface, y: FloatArray, pairs: IntArray) -> _Pairs | None:
+        """Return the active ones among *pairs* (k, 2); None if there are none."""
+        a, b = pairs.T
+        radii, margins = surface.radii, surface.margins
+        e = y[a] - y[b]
+        sums = radii[a] + radii[b]
+        near = np.einsum("ij,ij->i", e, e) < (np.hypot(_DEPTH, _LATERAL) * sums) ** 2
+        if not near.any():
+            return None
+        a, b, e, sums = a[near], b[near], e[near], sums[near]
+        lengths, normals = surface.sums(y)
+        direction = 0.5 * (normals[b] - normals[a])
+        gap = np.einsum("ij,ij->i", direction, e)
+        facing, facing_slope = _step(-np.einsum("ij,ij->i", normals[a], normals[b]), *_FACING)
+        squared = np.einsum("ij,ij->i", e, e) - gap**2
+        r2 = (_LATERAL * sums) ** 2
+        q = np.clip(1.0 - squared / r2, 0.0, None)
+        into = margins[a] + margins[b] - gap
+        fading, fading_slope = _step(gap, -_DEPTH * sums, -0.5 * _DEPTH * sums)
+        kept = (into > 0.0) & (facing > 0.0) & (q > 0.0) & (fading > 0.0)
+        if not kept.any():
+            return None
+        lateral, lateral_slope = q**2, -2.0 * q / r2
+        weight = np.minimum(surface.areas[a], surface.areas[b]) * facing * lateral
+        parts = (a, b, e, direction, gap, into, weight, facing, lateral)
+        more = (-facing_slope, lateral_slope, fading, fading_slope)
+        own: list[Any] = [part[kept] for part in (*parts, *more)]
+        every: list[Any] = [surface, y, *own, lengths, normals]
+        return cls(*every)
+
+    @property
+    def value(self) -> float:
+        """The sum over the pairs, for k = 1."""
+        return float((self.weight * self.fading) @ self.into**2)
+
+    def gradient(self) -> FloatArray:
+        """Return the derivative of `value` by the samples, (s, 3)."""
+        surface, a, b, n = self.surface, self.a, self.b, self.normals
+        area = np.minimum(surface.areas[a], surface.areas[b])
+        depth = self.into**2 * self.fading
+        by_s = area * self.facing * self.lateral_slope * depth
+        by_g = self.weight * (self.into**2 * self.fading_slope - 2.0 * self.into * self.fading)
+        by_g -= 2.0 * by_s * self.gap
+        by_c = area * self.lateral * self.facing_slope * depth
+        by_e = by_g[:, None] * self.direction + 2.0 * by_s[:, None] * self.e
+        by_n = 0.5 * by_g[:, None] * self.e
+        count = len(n)
+        at_y = _scattered(count, (a, by_e), (b, -by_e))
+        at_n = _scattered(count, (b, by_n + by_c[:, None] * n[a]), (a, by_c[:, None] * n[b] - by_n))
+        at_n -= np.einsum("ij,ij->i", at_n, n)[:, None] * n
+        at_n /= self.lengths[:, None]
+        is_used = np.asarray(at_n.any(axis=1))
+        used = np.flatnonzero(is_used[surface.faces].any(axis=1))
+        faces = surface.faces[used]
+        torque = at_n[faces].sum(axis=1)
+        y = self.y[faces]
+        for k in range(3):
+            side = y[:, (k + 1) % 3] - y[:, (k + 2) % 3]
+            at_y += _scattered(count, (faces[:, k], np.cross(side, torque)))
+        return at_y
+
+
+def _largest(vectors: FloatArray) -> float:
+    """Return the largest length of *vectors* (k, 3)."""
+    return float(np.sqrt(np.einsum("ij,ij->i", vectors, vectors).max()))
+
+
+def _scattered(n: int, *parts: tuple[IntArray, FloatArray]) -> FloatArray:
+    """Return the sums (n, 3) of vectors (k, 3) by the indices (k,) beside them."""
+    ids = np.concatenate([i for i, _ in parts])
+    vectors = np.concatenate([v for _, v in parts])
+    return np.stack([np.bincount(ids, axis, n) for axis in vectors.T], axis=1)
+
+
+def _step(
+    x: FloatArray, start: FloatArray | float, end: FloatArray | float
+) -> tuple[FloatArray, FloatArray]:
+    """Return a smooth step from 0 at *start* to 1 at *end*, and its derivative."""
+    t = np.clip((x - start) / (end - start), 0.0, 1.0)
+    return t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t) / (end - start)
+
+
+def _among(keys: IntArray, known: IntArray) -> BoolArray:
+    """Return which *keys* are among the increasing *known* ones."""
+    if not len(known):
+        return np.zeros(len(keys), dtype=bool)
+    places = np.minimum(np.searchsorted(known, keys), len(known) - 1)
+    return np.asarray(known[places] == keys)
