@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ..cages import fit_cages, suggested_size
@@ -11,6 +12,7 @@ from ..progress import Progress, part
 from ..regions import segment
 from ..solver import Solution
 from .arguments import as_lids, checked_constraints, checked_targets
+from .clamping import clamped
 from .deformer import Deformer
 
 
@@ -63,11 +65,15 @@ def deform(
     require_mesh(mesh)
     as_flag(preserve_volume, "preserve_volume")
     as_lids(lids)
-    _, held = checked_constraints(mesh, fixed, handle)
-    checked_targets(targets, len(held))
+    stays, moves = checked_constraints(mesh, fixed, handle)
+    places = checked_targets(targets, len(moves))
     regions = segment(mesh, n_regions, progress=part(progress, 0.0, 0.2))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
-    cages = fit_cages(mesh, regions, size, progress=part(progress, 0.2, 0.7))
+    is_fixed = np.zeros(mesh.n_vertices, dtype=bool)
+    is_fixed[stays] = True
+    regions, rigid = clamped(regions, is_fixed, moves, places, size)
+    fitting = part(progress, 0.2, 0.7)
+    cages = fit_cages(mesh, regions, size, fixed=rigid, progress=fitting)
     deformer = Deformer(
         mesh,
         regions,
