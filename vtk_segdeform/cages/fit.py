@@ -147,11 +147,11 @@ def fit_cages(
         ends = _MEASURED + (1.0 - _MEASURED) * np.array([r, r + 1]) / n_regions
         piece = part(progress, *map(float, ends))
         cage = _fit(patch, int(number), offset, piece, spacing)
-        if cluster is not None:
-            if not cage.contains(mesh.vertices[regions.membership[r]]).all():
-                patch = Patch.of(Surface.of(mesh), regions.membership[r])
-                apart = None if spacing is None else spacing[cluster]
-                cage = _fit(patch, int(number), offset, piece, apart)
+        x = mesh.vertices[regions.membership[r]]
+        if cluster is not None and not cage.contains(x).all():
+            patch = Patch.of(Surface.of(mesh), regions.membership[r])
+            apart = None if spacing is None else spacing[cluster]
+            cage = _fit(patch, int(number), offset, piece, apart)
         cages.append(cage)
     tell(progress, 1.0, "cages ready")
     return tuple(cages)

@@ -118,9 +118,7 @@ def roundness(vertices: FloatArray, faces: IntArray) -> FloatArray:
     return _normals(vertices[faces])[1]
 
 
-def _accumulated(
-    vertices: FloatArray, faces: IntArray, density: FloatArray | None
-) -> _Surface:
+def _accumulated(vertices: FloatArray, faces: IntArray, density: FloatArray | None) -> _Surface:
     """Return the surface with a third of the quadric and area of each face at its corners."""
     corners = vertices[faces]
     normal = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

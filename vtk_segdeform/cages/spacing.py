@@ -58,16 +58,16 @@ def cage_spacing(mesh: Mesh, density: FloatArray, n_vertices: int) -> FloatArray
     n, some = mesh.n_vertices, np.flatnonzero(density > 0.0)
     first = density[some] ** -0.5
     ends = np.concatenate([i, np.full(len(some), n)]), np.concatenate([j, some])
-    scale = np.sqrt(max(area @ density, np.finfo(float).tiny) / n_vertices)
+    scale = float(np.sqrt(np.maximum(area @ density, np.finfo(float).tiny) / n_vertices))
     for _ in range(_ROUNDS):
         weights = np.concatenate([length, scale * first])
         graph = sparse.coo_array((weights, ends), shape=(n + 1, n + 1)).tocsr()
-        spacing = csgraph.dijkstra(graph, directed=False, indices=n)[:n]
-        spacing = np.where(np.isfinite(spacing), spacing, mesh.diagonal)  # another component
+        spacing = csgraph.dijkstra(graph, directed=False, indices=np.array([n]))[0, :n]
+        spacing = np.where(np.isfinite(spacing), spacing, mesh.diagonal)  # fixed components
         ratio = (area @ spacing**-2.0) / n_vertices
         if abs(ratio - 1.0) < _CLOSE:
             break
-        scale *= np.sqrt(ratio)
+        scale *= float(np.sqrt(ratio))
     return np.asarray(spacing)
 
 
@@ -93,7 +93,8 @@ def thickness(mesh: Mesh) -> FloatArray:
     radius = np.full(len(x), 0.5 * mesh.diagonal)
     active = np.arange(len(x))
     for _ in range(_SHRINKS):
-        _, other = tree.query(x[active] - radius[active, None] * normal[active], workers=n_threads())
+        centre = x[active] - radius[active, None] * normal[active]
+        _, other = tree.query(centre, workers=n_threads())
         chord = x[active] - x[other]
         square = np.einsum("ij,ij->i", chord, chord)
         height = np.einsum("ij,ij->i", chord, normal[active])

@@ -29,24 +29,34 @@ _EACH = 12  # fewest cage vertices for each region
 
 
 def clamped(
-    regions: Regions, fixed: BoolArray, handle: IntArray, targets: FloatArray, n_vertices: int
+    regions: Regions,
+    *,
+    fixed: BoolArray,
+    handle: IntArray,
+    targets: FloatArray,
+    n_cage_vertices: int,
 ) -> tuple[Regions, BoolArray]:
     """Return *regions* with a region for the fixed parts and for each rigid handle.
 
-    And a mask (n,) of the vertices that keep their shape: the fixed ones and those of such handles.
-    The regions are returned unchanged if there is no fixed part or handle larger than its margin, or if
-    *n_vertices* cage vertices are too few for more regions.
+    They are returned unchanged if there is no fixed part or handle larger than its margin, or if
+    *n_cage_vertices* are too few for more regions.
 
     Parameters
     ----------
     regions : Regions
         Regions of n vertices.
-    fixed : (n,) bool
-    handle : (k,) int
+    fixed, handle : (n,) bool, (k,) int
+        Vertices that stay in place, and that move to *targets*.
     targets : (k, 3) float
-        Where the handle vertices move.
-    n_vertices : int
+        Positions of the handle vertices.
+    n_cage_vertices : int
         Total number of cage vertices.
+
+    Returns
+    -------
+    regions : Regions
+    rigid : (n,) bool
+        The vertices that keep their shape: the fixed ones and those of rigid handles.
     """
     mesh = regions.mesh
     is_handle = np.zeros(mesh.n_vertices, dtype=bool)
@@ -67,7 +77,7 @@ def clamped(
     for k in range(len(left) - 1, -1, -1):  # without regions that others cover
         if not (left[k] & ~np.any(left[:k] + left[k + 1 :], axis=0)).any():
             del left[k]
-    if not added or not left or _EACH * (len(left) + len(added)) > n_vertices:
+    if not added or not left or _EACH * (len(left) + len(added)) > n_cage_vertices:
         return regions, rigid
     return Regions(mesh, np.array(left + added), regions.smoothness), rigid
 

@@ -42,7 +42,8 @@ def deform(
         Positions of the handle vertices, in the order of *handle* (of its true entries, if it is a
         mask).
     n_regions : int or None
-        How many regions; None lets `segment` choose.
+        How many regions; None lets `segment` choose.  Fixed parts and handles that move rigidly
+        become regions of their own.
     n_cage_vertices : int, optional
         Total number of cage vertices; by default it follows the number of regions.
     preserve_volume : bool
@@ -71,7 +72,9 @@ def deform(
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
     is_fixed = np.zeros(mesh.n_vertices, dtype=bool)
     is_fixed[stays] = True
-    regions, rigid = clamped(regions, is_fixed, moves, places, size)
+    regions, rigid = clamped(
+        regions, fixed=is_fixed, handle=moves, targets=places, n_cage_vertices=size
+    )
     fitting = part(progress, 0.2, 0.7)
     cages = fit_cages(mesh, regions, size, fixed=rigid, progress=fitting)
     deformer = Deformer(
