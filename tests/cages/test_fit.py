@@ -14,7 +14,8 @@ from vtk_segdeform.cages.contour import contour_surface
 from vtk_segdeform.cages.fit import fit_cage, fit_cages
 from vtk_segdeform.cages.region_solid import Patch, Surface, _filled, principal_axes
 from vtk_segdeform.cages.simplify import roundness, simplify
-from vtk_segdeform.errors import CageError, Cancelled, RegionError
+from vtk_segdeform.cages.spacing import thickness
+from vtk_segdeform.errors import ArgumentError, CageError, Cancelled, RegionError
 from vtk_segdeform.mesh.inside import (
     distance_to_surface,
     inside_nodes,
@@ -121,6 +122,40 @@ def test_a_cage_of_a_torus_keeps_the_hole():
     cage = fit_cage(mesh, np.arange(mesh.n_vertices), 60)
     assert cage.n_vertices - cage.n_faces // 2 == 0  # Euler's characteristic: one handle
     assert not cage.contains([[0.0, 0.0, 0.0]])[0]
+
+
+def test_a_free_end_has_most_cage_vertices():
+    mesh = Mesh(*squeezed(3.0, 1.0, 1.0))
+    x = mesh.vertices[:, 0]
+    for regions in (Regions.single(mesh), thirds(mesh)):
+        cages = fit_cages(mesh, regions, 60, fixed=x < 1.0)
+        assert sum(cage.n_vertices for cage in cages) == 60
+        corners = np.concatenate([cage.vertices for cage in cages])
+        assert np.count_nonzero(corners[:, 0] > 1.0) > 30  # 16 of 60 for a uniform spacing
+        for cage, members in zip(cages, regions.membership, strict=True):
+            assert cage.contains(mesh.vertices[members]).all()
+
+
+def test_the_cages_of_a_partly_fixed_mesh_move_with_it():
+    mesh = Mesh(*squeezed(3.0, 1.0, 1.0))
+    fixed = mesh.vertices[:, 0] < 0.0
+    moved = Mesh(1e-3 * mesh.vertices @ TURN.T + 0.5, mesh.faces)
+    (cage,) = fit_cages(mesh, Regions.single(mesh), 40, fixed=fixed)
+    (same,) = fit_cages(moved, Regions.single(moved), 40, fixed=np.flatnonzero(fixed))
+    assert_array_equal(same.faces, cage.faces)
+    assert_allclose(same.vertices, 1e-3 * cage.vertices @ TURN.T + 0.5, rtol=0, atol=1e-9)
+
+
+def test_the_thickness_of_a_ball_is_about_its_diameter():
+    mesh = Mesh(*icosphere(3))
+    assert_allclose(thickness(mesh), 2.0, rtol=0.12)
+
+
+@pytest.mark.parametrize("density", [[1.0], -np.ones(642), np.full(642, np.nan)])
+def test_an_invalid_density_is_refused(density):
+    mesh = Mesh(*icosphere(3))
+    with pytest.raises(ArgumentError, match="density"):
+        fit_cages(mesh, Regions.single(mesh), 40, density=density)
 
 
 @pytest.mark.parametrize("name", ["sphere", "two components", "plate"])

@@ -33,7 +33,8 @@ def contour_surface(values: FloatArray, level: float) -> tuple[FloatArray, IntAr
     high[rows, axis] += 1
     at_low, at_high = values[tuple(low.T)] - level, values[tuple(high.T)] - level
     points = low.astype(np.float64)
-    points[rows, axis] += at_low / (at_low - at_high)
+    drop = at_low - at_high
+    points[rows, axis] += at_low / np.where(drop == 0.0, 1.0, drop)  # 0 / 0 on a plateau
     a, b, c = (points - points.mean(axis=0))[faces.T]
     outward = np.einsum("fi,fi", a, np.cross(b, c)) > 0.0
     return points, (faces if outward else faces[:, ::-1]).astype(np.int64)

@@ -13,6 +13,9 @@ which is always valid.
 The n vertices of a cage of area A are about ``sqrt(A / n)`` apart; the default offset is
 proportional to that length, because mean value coordinates degrade close to large faces.
 
+Where the mesh is fixed, cages need few vertices: `spacing` tells how far apart they should be at
+each vertex, and the offset and the faces of a cage follow it.
+
 A large mesh is decimated first, far more finely than its cages; only the last check is on the mesh
 itself.
 """
@@ -27,9 +30,9 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from .. import sizes
-from ..arrays import BoolArray, FloatArray, IntArray, as_ids, is_number, is_whole
+from ..arrays import BoolArray, FloatArray, IntArray, as_ids, as_numbers, is_number, is_whole
 from ..checks import shown
-from ..errors import CageError, RegionError
+from ..errors import ArgumentError, CageError, RegionError
 from ..geometry import decimated
 from ..kernels import n_threads, one_blas_thread
 from ..mesh import Mesh, distance_to_surface, inside_points, require_mesh
@@ -39,6 +42,7 @@ from .cage import MOST_CAGE_VERTICES, Cage, cage_faults
 from .contour import contour_surface
 from .region_solid import Patch, SolidField, Surface, solid_field
 from .simplify import roundness, simplify
+from .spacing import bending_density, cage_spacing
 
 _OFFSET = 0.4  # of sqrt(area of the region / vertices of its cage)
 _STEP = 0.27  # of the grid, of the same length: about thirty contour vertices per cage vertex
@@ -50,6 +54,7 @@ _FEWEST = 8  # vertices of a cage
 _SUGGESTED, _SUGGESTED_EACH = 155, 30  # cage vertices in total, and for each region
 _SHELL = 6  # fewest vertices of each component of a cage with several
 _FLOOR = 12  # vertices of each cage before the rest is distributed
+_CLOSE, _WIDEST = 0.05, 11.9  # quantile of spacings that is the unit; largest, in that unit
 _THINNEST = 1e-3  # width over length that a region counts with, at least
 _CLEARANCE = 0.5  # of the offset: least distance between faces and the surface
 _PUSHES, _NEAREST = 30, 200  # rounds; nearest vertices whose exact distance is computed
@@ -73,6 +78,8 @@ def fit_cages(
     regions: Regions,
     n_vertices: int = 155,
     *,
+    fixed: ArrayLike = (),
+    density: ArrayLike | None = None,
     offset: float | None = None,
     progress: Progress | None = None,
 ) -> tuple[Cage, ...]:
@@ -87,10 +94,16 @@ def fit_cages(
     n_vertices : int
         Exact total number of cage vertices; at least 8 for each region, at most 1600.
         Distributed by area and shape: large and long regions get more.
+    fixed : (k,) int or (n,) bool
+        Vertices of the mesh that keep their shape, fixed or moved rigidly.  Cages have few vertices
+        there, and more where the mesh is free, the more the thinner it is.
+    density : (n,) float, optional
+        Cage vertices per area at each vertex of the mesh, not negative; only ratios matter.  By
+        default, if there are fixed vertices, the inverse of the local thickness.
     offset : float, optional
         Approximate distance of the cages from the surface, in the unit of the mesh.  By default,
         0.4 sqrt(area / vertices of its cage) for each region.  It is increased where no valid
-        cage is found at that distance.
+        cage is found at that distance, and where cage vertices are farther apart than elsewhere.
     progress : callable, optional
         Called with the fraction done and a text; may raise `Cancelled`.
 
@@ -103,6 +116,8 @@ def fit_cages(
     ------
     CageError
         If *n_vertices* is too small or too large, or *offset* is not positive.
+    ArgumentError
+        If *fixed* or *density* is invalid.
     """
     require_mesh(mesh)
     require_regions(regions, mesh)
@@ -111,24 +126,58 @@ def fit_cages(
     _require_enough(n_vertices, n_regions)
     tell(progress, 0.0, "measuring regions")
     shape, membership = mesh, regions.membership
+    held = np.zeros(mesh.n_vertices, dtype=bool)
+    held[as_ids(fixed, mesh.n_vertices, "fixed")] = True
+    wanted = None if density is None else _as_density(density, mesh.n_vertices)
+    cluster = None
     if mesh.n_vertices > sizes.DECIMATED:
         shape, kept, cluster = decimated(mesh, sizes.DECIMATED_POINTS)
         membership = membership[:, kept]
         for members, some in zip(membership, regions.membership, strict=True):
             members[cluster[some]] = True
+        free = np.zeros(shape.n_vertices, dtype=bool)
+        free[cluster[~held]] = True
+        held = ~free
+        wanted = None if wanted is None else wanted[kept]
+    spacing = _spacing(shape, held, wanted, n_vertices)
     patches = _patches(shape, membership, progress)
-    numbers = _distributed(patches, n_vertices)
+    numbers = _distributed(patches, n_vertices, spacing)
     cages = []
     for r, (patch, number) in enumerate(zip(patches, numbers, strict=True)):
         ends = _MEASURED + (1.0 - _MEASURED) * np.array([r, r + 1]) / n_regions
         piece = part(progress, *map(float, ends))
-        cage = _fit(patch, int(number), offset, piece)
-        if shape is not mesh and not cage.contains(mesh.vertices[regions.membership[r]]).all():
+        cage = _fit(patch, int(number), offset, piece, spacing)
+        x = mesh.vertices[regions.membership[r]]
+        if cluster is not None and not cage.contains(x).all():
             patch = Patch.of(Surface.of(mesh), regions.membership[r])
-            cage = _fit(patch, int(number), offset, piece)
+            apart = None if spacing is None else spacing[cluster]
+            cage = _fit(patch, int(number), offset, piece, apart)
         cages.append(cage)
     tell(progress, 1.0, "cages ready")
     return tuple(cages)
+
+
+def _as_density(density: ArrayLike, n: int) -> FloatArray:
+    """Return *density* as an array (n,), or raise an ArgumentError."""
+    array = as_numbers(density, "density")
+    if array.shape != (n,) or not (array >= 0.0).all() or not np.isfinite(array).all():
+        raise ArgumentError(f"density must be {n} finite numbers, one per vertex, 0 or more")
+    return array
+
+
+def _spacing(
+    mesh: Mesh, held: BoolArray, density: FloatArray | None, n_vertices: int
+) -> FloatArray | None:
+    """Return the spacing of cage vertices at each vertex (n,); None if it is the same everywhere.
+
+    *held* (n,) are vertices that keep their shape.
+    """
+    if density is None:
+        if held.all() or not held.any():
+            return None
+        density = bending_density(mesh)
+    density = np.where(held, 0.0, density)
+    return cage_spacing(mesh, density, n_vertices) if density.any() else None
 
 
 def _patches(mesh: Mesh, membership: BoolArray, progress: Progress | None) -> list[Patch]:
@@ -190,26 +239,46 @@ def _check_offset(offset: float | None, mesh: Mesh) -> None:
         )
 
 
-def _distributed(patches: list[Patch], n_vertices: int) -> IntArray:
+def _distributed(patches: list[Patch], n_vertices: int, spacing: FloatArray | None) -> IntArray:
     """Return the number of vertices of each cage, *n_vertices* in total.
 
     A fixed edge length would need numbers proportional to the area, a fixed number of edges around
     a limb the same number for small and large limbs; the square root of the area is in between.
     The square root of length over width gives long regions, which bend, more vertices.
+
+    With a *spacing* at each vertex, the numbers follow from it.
     """
-    area = np.array([patch.area for patch in patches])
-    spread = np.array([patch.spread for patch in patches])
-    length = np.maximum(spread.sum(axis=1), np.finfo(float).tiny)
-    need = np.sqrt(area * length / np.maximum(spread[:, 1:].sum(axis=1), _THINNEST * length))
+    if spacing is not None:
+        need = np.array([patch.weights @ spacing**-2.0 for patch in patches])
+        floor = _FEWEST
+    else:
+        area = np.array([patch.area for patch in patches])
+        spread = np.array([patch.spread for patch in patches])
+        length = np.maximum(spread.sum(axis=1), np.finfo(float).tiny)
+        width = np.maximum(spread[:, 1:].sum(axis=1), _THINNEST * length)
+        need = np.sqrt(area * length / width)
+        floor = min(_FLOOR, n_vertices // len(patches))
     share = np.round(need / need.sum(), 9)  # equal regions get equal numbers
-    floor = min(_FLOOR, n_vertices // len(patches))
     ends = np.rint((n_vertices - floor * len(patches)) * np.cumsum(share) / share.sum())
     return np.asarray(floor + np.diff(ends, prepend=0.0).astype(np.int64))
 
 
-def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) -> Cage:
-    """Return the first good cage, or the better one of the first two valid ones."""
-    length = float(np.sqrt(patch.area / n))
+def _fit(
+    patch: Patch,
+    n: int,
+    offset: float | None,
+    progress: Progress | None,
+    spacing: FloatArray | None = None,
+) -> Cage:
+    """Return the first good cage, or the better one of the first two valid ones.
+
+    With a *spacing* at each vertex, its offset and the size of its faces are proportional to it.
+    """
+    length, stretch = float(np.sqrt(patch.area / n)), None
+    if spacing is not None:
+        least = np.quantile(spacing[patch.members], _CLOSE)
+        stretch = np.clip(spacing / least, 1.0, _WIDEST)
+        length = float(np.sqrt(patch.weights @ stretch**-2.0 / n))
     offset = _OFFSET * length if offset is None else offset
     valid: list[tuple[float, FloatArray, IntArray]] = []
     for attempt in range(_ATTEMPTS):
@@ -217,14 +286,17 @@ def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) 
         tell(progress, attempt / _ATTEMPTS, message)
         larger = _LARGER ** (attempt * (attempt + 1) / 2)
         nodes = max(_NODES, _NODES_PER_VERTEX * n)
-        field = solid_field(patch, offset * larger, _STEP * length * larger, most_nodes=nodes)
+        field = solid_field(
+            patch, offset * larger, _STEP * length * larger, most_nodes=nodes, stretch=stretch
+        )
         tell(progress, (attempt + 0.5) / _ATTEMPTS, message)
         if _SHELL * field.n_shells > n:
             fault = f"it has {field.n_shells} components"
             continue
         share = part(progress, (attempt + 0.5) / _ATTEMPTS, (attempt + 0.8) / _ATTEMPTS)
         contour = contour_surface(field.smooth, field.offset)
-        vertices, faces = simplify(*contour, n, progress=share, message=message)
+        density = None if field.stretch is None else field.stretch_at(contour[0]) ** -2.0
+        vertices, faces = simplify(*contour, n, density=density, progress=share, message=message)
         tell(progress, (attempt + 0.8) / _ATTEMPTS, message)
         vertices = _cleared(vertices, faces, field)
         tell(progress, (attempt + 0.9) / _ATTEMPTS, message)
@@ -271,6 +343,7 @@ def _cleared(vertices: FloatArray, faces: IntArray, field: SolidField) -> FloatA
             break
         away = np.stack([ndimage.map_coordinates(s, at[:, near], order=1) for s in slope])
         away *= (1.1 * least - distance[near]) / np.maximum(np.linalg.norm(away, axis=0), 1e-9)
+        away *= field.stretch_at(at[:, near].T)
         face, sample = np.divmod(near, len(_SAMPLES))
         corner, weight = faces[face].ravel(), _SAMPLES[sample].ravel()
         total = np.bincount(corner, weight, minlength=len(vertices))
@@ -284,11 +357,12 @@ def _cleared(vertices: FloatArray, faces: IntArray, field: SolidField) -> FloatA
 def _quality(vertices: FloatArray, faces: IntArray, field: SolidField) -> float:
     """Return the quality of a cage, 1 or more if no face is a needle or close to the surface."""
     tree = cKDTree((_SAMPLES @ vertices[faces]).reshape(-1, 3))
-    x, bound = field.members, np.inf
-    if len(x) > _SIEVE * _NEAREST:  # a subset bounds the distance of the nearest ones
+    x, bound, unit = field.members, np.inf, field.stretch_at(field.members)
+    if field.stretch is None and len(x) > _SIEVE * _NEAREST:  # a subset bounds the nearest gaps
         few, _ = tree.query(x[::_SIEVE], workers=n_threads())
         bound = np.partition(few, _NEAREST)[_NEAREST] * (1.0 + 1e-12)
     gap, _ = tree.query(x, distance_upper_bound=bound, workers=n_threads())
-    nearest = x[np.argsort(gap, kind="stable")[:_NEAREST]]
-    clearance = distance_to_surface(nearest, vertices, faces).min() / field.offset
+    nearest = np.argsort(gap / unit, kind="stable")[:_NEAREST]
+    clearance = distance_to_surface(x[nearest], vertices, faces) / unit[nearest]
+    clearance = clearance.min() / field.offset
     return float(min(roundness(vertices, faces).min() / _ROUND, clearance / _NEAR))

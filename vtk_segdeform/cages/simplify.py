@@ -9,6 +9,9 @@ Collapsing edge (i, j) to a point p costs
     a       accumulated area; the second term favours edges of equal length, which matter more
             for a cage that bends than a sharp outline
 
+With a density rho of vertices per area, costs are multiplied by rho^2, its mean over the
+accumulated area: edges of equal cost then have lengths proportional to rho^(-1/2).
+
 A collapse is valid if it preserves the topology (the link condition of [DEGN99]: i and j have
 exactly two common neighbours), inverts no face and creates no needle.  Each round collapses many of
 the cheapest edges at once, chosen so that they do not affect each other; all operations are on
@@ -47,6 +50,7 @@ class _Surface:
     points: FloatArray
     faces: IntArray
     area: FloatArray
+    need: FloatArray  # integral of the relative density over the accumulated area
     # Q(p) = p'A p - 2 b'p + c, accumulated in each vertex
     A: FloatArray
     b: FloatArray
@@ -58,6 +62,7 @@ def simplify(
     faces: IntArray,
     n_vertices: int,
     *,
+    density: FloatArray | None = None,
     progress: Progress | None = None,
     message: str = "simplifying",
 ) -> tuple[FloatArray, IntArray]:
@@ -71,6 +76,8 @@ def simplify(
         Closed and oriented; each component keeps at least four vertices.
     n_vertices : int
         Target number of vertices.
+    density : (n,) float, optional
+        Positive; the result has as many more vertices per area where it is larger.
     progress : Progress, optional
         Called between rounds; may cancel.
     message : str
@@ -81,7 +88,7 @@ def simplify(
     vertices, faces : (n', 3) float, (m', 3) int
         Closed, oriented, of the same topology; n' >= *n_vertices*.
     """
-    surface = _accumulated(vertices, faces)
+    surface = _accumulated(vertices, faces, density)
     left = len(vertices)
     reduction = math.log(max(left / max(n_vertices, 1), 2.0))
     rejected = np.empty(0, dtype=np.int64)
@@ -111,7 +118,7 @@ def roundness(vertices: FloatArray, faces: IntArray) -> FloatArray:
     return _normals(vertices[faces])[1]
 
 
-def _accumulated(vertices: FloatArray, faces: IntArray) -> _Surface:
+def _accumulated(vertices: FloatArray, faces: IntArray, density: FloatArray | None) -> _Surface:
     """Return the surface with a third of the quadric and area of each face at its corners."""
     corners = vertices[faces]
     normal = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -128,7 +135,8 @@ def _accumulated(vertices: FloatArray, faces: IntArray) -> _Surface:
         for term in terms
     )
     b, A = np.stack(rest[:3], axis=1), np.stack(rest[3:], axis=1).reshape(-1, 3, 3)
-    return _Surface(vertices.copy(), faces.copy(), area, A, b, c)
+    need = area.copy() if density is None else area * density
+    return _Surface(vertices.copy(), faces.copy(), area, need, A, b, c)
 
 
 def _costs(s: _Surface) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -150,7 +158,9 @@ def _costs(s: _Surface) -> tuple[IntArray, FloatArray, FloatArray]:
     place = middle + np.einsum("eij,ej->ei", inverse, pull) / np.einsum("ei,ei->e", x, yz)[:, None]
     error = np.einsum("eij,ei,ej->e", A, place, place) - 2 * np.einsum("ei,ei->e", b, place) + c
     squared_length = ((s.points[i] - s.points[j]) ** 2).sum(axis=1)
-    cost = error + _LAMBDA * (s.area[i] + s.area[j]) * squared_length
+    area = s.area[i] + s.area[j]
+    cost = error + _LAMBDA * area * squared_length
+    cost *= ((s.need[i] + s.need[j]) / area) ** 2
     valence = np.bincount(s.faces.ravel())
     ends = np.minimum(valence[apex[up][order]], valence[apex[~up][reverse]])
     cost[ends <= 3] = np.inf
@@ -222,7 +232,7 @@ def _collapse(s: _Surface, edges: IntArray, place: FloatArray) -> BoolArray:
 
     i, j = edges[good].T
     s.points[i] = place[good]
-    for accumulated in (s.A, s.b, s.c, s.area):
+    for accumulated in (s.A, s.b, s.c, s.area, s.need):
         accumulated[i] += accumulated[j]
     number = np.arange(len(owner))
     number[j] = i

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import io
 from ..arrays import FloatArray, IntArray
@@ -57,7 +58,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
         say(f"volume          {enclosed.summary(preserved=not options.no_volume)}")
     fixed = _selected(options.fixed, surface, "fixed")
     handle, targets = _handles(options.handles, surface, fixed)
-    regions, cages = _subspace(options, surface, part(progress, 0.0, 0.6))
+    regions, cages = _subspace(options, surface, part(progress, 0.0, 0.6), fixed)
     report_regions(regions, say)
     report_cages(cages, say)
     deformer = Deformer(
@@ -151,13 +152,14 @@ def _regions(options: Namespace, surface: Surface, progress: Progress | None) ->
 
 
 def _subspace(
-    options: Namespace, surface: Surface, progress: Progress | None
+    options: Namespace, surface: Surface, progress: Progress | None, fixed: ArrayLike = ()
 ) -> tuple[Regions, tuple[Cage, ...]]:
     found = _regions(options, surface, part(progress, 0.0, 0.3))
     number = options.cage_vertices
     size = suggested_size(found) if number is None else number
     fitting = part(progress, 0.3, 1.0)
-    return found, fit_cages(surface.mesh, found, n_vertices=size, progress=fitting)
+    made = fit_cages(surface.mesh, found, n_vertices=size, fixed=fixed, progress=fitting)
+    return found, made
 
 
 def _selected(text: str, surface: Surface, role: Role) -> IntArray:

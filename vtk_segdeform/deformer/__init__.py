@@ -8,6 +8,7 @@ The files, in reading order:
     locality         what stays when one point is pulled
     binding          all that is computed once for a mesh, its regions and its cages
     binding_cache    bindings kept on disk
+    clamping         regions of their own for fixed parts and rigid handles
     deform           `deform`: the whole method in one call
     pull             `pull`: one point pulled, in one call
 """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ..cages import fit_cages, suggested_size
@@ -11,6 +12,7 @@ from ..progress import Progress, part
 from ..regions import segment
 from ..solver import Solution
 from .arguments import as_lids, checked_constraints, checked_targets
+from .clamping import clamped
 from .deformer import Deformer
 
 
@@ -42,7 +44,8 @@ def deform(
         Positions of the handle vertices, in the order of *handle* (of its true entries, if it is a
         mask).
     n_regions : int, optional
-        Number of regions; by default one for each limb and one for the trunk, see `segment`.
+        Number of regions; by default one for each limb and one for the trunk, see `segment`.  Fixed
+        parts and handles that move rigidly become regions of their own.
     n_cage_vertices : int, optional
         Total number of cage vertices; by default it follows the number of regions.
     preserve_volume : bool
@@ -71,11 +74,17 @@ def deform(
     as_lids(lids)
     as_flag(avoid_contact, "avoid_contact")
     as_flag(refine, "refine")
-    _, held = checked_constraints(mesh, fixed, handle)
-    checked_targets(targets, len(held))
+    stays, moves = checked_constraints(mesh, fixed, handle)
+    places = checked_targets(targets, len(moves))
     regions = segment(mesh, n_regions, progress=part(progress, 0.0, 0.2))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
-    cages = fit_cages(mesh, regions, size, progress=part(progress, 0.2, 0.7))
+    is_fixed = np.zeros(mesh.n_vertices, dtype=bool)
+    is_fixed[stays] = True
+    regions, rigid = clamped(
+        regions, fixed=is_fixed, handle=moves, targets=places, n_cage_vertices=size
+    )
+    fitting = part(progress, 0.2, 0.7)
+    cages = fit_cages(mesh, regions, size, fixed=rigid, progress=fitting)
     deformer = Deformer(
         mesh,
         regions,

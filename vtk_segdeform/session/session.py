@@ -861,7 +861,9 @@ class Session(Timeline):
     def _cages_around(self, regions: Regions, progress: Progress | None) -> tuple[Cage, ...]:
         wanted, offset = self.options.n_cage_vertices, self.options.offset
         size = suggested_size(regions) if wanted == Options().n_cage_vertices else wanted
-        return fit_cages(self.mesh, regions, size, offset=offset, progress=progress)
+        return fit_cages(
+            self.mesh, regions, size, fixed=self.fixed, offset=offset, progress=progress
+        )
 
     def _set_cages(self, cages: tuple[Cage, ...], label: str) -> None:
         self._step(label, replace(self._state, cages=cages).at_rest())
