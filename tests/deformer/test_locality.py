@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -39,7 +40,8 @@ def chain(count: int = 12) -> SurfaceSamples:
     edges = sparse.coo_array((np.ones(count - 1), (i, i + 1)), (count, count)).tocsr()
     points = np.stack([np.arange(count), *np.zeros((2, count))], axis=1)
     share = np.full(count, 1.0 / count)
-    return SurfaceSamples(np.arange(count), np.eye(count), points, share, edges + edges.T)
+    faces = np.empty((0, 3), dtype=np.int64)
+    return SurfaceSamples(np.arange(count), np.eye(count), points, share, faces, edges + edges.T)
 
 
 def test_the_slope_of_the_objective_is_its_derivative_and_the_hessian_has_the_anchors():
@@ -86,9 +88,7 @@ def test_another_body_stays():
     samples = chain()
     edges = samples.edges.tolil()
     edges[3, 4] = edges[4, 3] = 0.0
-    apart = SurfaceSamples(
-        samples.cells, samples.rows, samples.points, samples.areas, edges.tocsr()
-    )
+    apart = replace(samples, edges=edges.tocsr())
     weights = np.diag(apart.quadratic(8, 3.0, 1.0)) * 12
     assert (weights[:4] > 1e3).all()
     assert not np.diag(apart.quadratic(8, np.inf, 0.0)).any()
@@ -109,7 +109,8 @@ def test_a_soft_row_reproduces_affine_maps():
 def test_anchors_resist_a_load_that_topples_the_surface_and_no_other(push):
     corners = np.indices((2, 2, 2)).reshape(3, 8).T * [1.0, 2.0, 3.0] - [0.5, 1.0, 1.5]
     edges = sparse.csr_array(np.ones((8, 8)))
-    samples = SurfaceSamples(np.arange(8), np.eye(8), corners, np.full(8, 1 / 8), edges)
+    faces = np.empty((0, 3), dtype=np.int64)
+    samples = SurfaceSamples(np.arange(8), np.eye(8), corners, np.full(8, 1 / 8), faces, edges)
     load = np.outer(push * np.sign(corners[:, 2]), [0.0, 0.0, 1.0])  # pushes or stretches
     steady = samples.steadying(corners + 7.0, load)
     assert steady.any() == (push < 0.0)

@@ -17,7 +17,7 @@ from vtk_segdeform.finish import CellEnergy, Finish, Finisher, Folds
 from vtk_segdeform.finish import finisher as finishing
 from vtk_segdeform.geometry import closest_rotations, lids_of, triangle_distortion
 from vtk_segdeform.mesh import Mesh
-from vtk_segdeform.solver import body_volumes, total_volume
+from vtk_segdeform.solver import Bodies, total_volume
 
 SCENE = sausage(2, is_coarse=True)
 
@@ -36,7 +36,8 @@ class Problem:
         volume = total_volume(self.mesh)
         lids = lids_of(self.mesh)
         moved = np.flatnonzero(self.held)
-        constraints = body_volumes(self.mesh, volume, lids, moved)
+        bodies = Bodies(self.mesh, volume, lids)
+        constraints = bodies.constraints(bodies.numbers(moved))
         energy = CellEnergy.of(self.mesh)
         return Finisher(self.mesh, energy, self.held, constraints).run(
             self.start, self.places, progress
