@@ -105,7 +105,7 @@ def test_the_hessian_of_the_volumes_is_added():
     held = energy.quadratic + np.eye(m) * np.trace(energy.quadratic)
     g = 1e-3 * np.trace(energy.quadratic) / m * RNG.normal(size=(3, m, m))
     g -= np.swapaxes(g, 1, 2)
-    with_it, without = (full_factor(held, energy, p, of) for of in (g, None))
+    with_it, without = (full_factor(held, energy, p, volumes=of) for of in (g, None))
     added = with_it.triangle @ with_it.triangle.T - without.triangle @ without.triangle.T
     blocks = added.reshape(3, m, 3, m)
     for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):

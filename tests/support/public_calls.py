@@ -52,7 +52,8 @@ CORE = (
 WIDGETS = ("vtk_segdeform.widgets", "vtk_segdeform.widgets.recording.film")
 
 # Hooks that `Widget` calls with its own objects, and arithmetic of a view at every event.
-NOT_CALLED = {"on_press", "on_hover", "on_wheel", "on_key"}
+NOT_CALLED = {"on_press", "on_hover", "on_wheel", "on_key", "reset_pivot_at"}
+NOT_CALLED |= {"inner_balls"}  # of the local volume, on arrays of the solver
 NOT_CALLED |= {
     "contains",
     "guarded",
@@ -336,18 +337,22 @@ def _file(name: str) -> Path:
 
 ARGUMENTS: dict[str, Callable[[], Any]] = {
     "arrays": lambda: (),
+    "avoid_contact": lambda: True,
+    "avoid_folds": lambda: True,
     "blend": lambda: regions().weights,
     "cage_faces": lambda: cages()[0].faces,
     "cage_vertices": lambda: [cage.vertices for cage in cages()],
     "cages": cages,
     "cache": lambda: Path("cache"),
     "callback": lambda: lambda: None,
+    "density": lambda: np.ones(mesh().n_vertices),
     "divisions": lambda: (2, 2, 4),
     "event": lambda: "ModifiedEvent",
     "events": lambda: 1000,
     "exact_volume": lambda: True,
     "faces": lambda: mesh().faces,
     "fixed": _left,
+    "fixed_at": lambda: mesh().vertices[_left()],
     "follows": lambda: 0.5,
     "folder": Path,
     "fps": lambda: 20.0,
@@ -391,12 +396,12 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "position": lambda: 0,
     "preserve_region_volumes": lambda: False,
     "preserve_volume": lambda: True,
-    "refine": lambda: True,
     "progress": lambda: lambda _fraction, _message: None,
     "radius": lambda: 1.0,
     "region": lambda: 0,
     "report": lambda: sd.find_faults(mesh().vertices, mesh().faces),
     "reach": lambda: 0.5,
+    "refine": lambda: True,
     "regions": regions,
     "renderer": lambda: view().renderer,
     "rings": lambda: 1,

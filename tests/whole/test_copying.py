@@ -130,7 +130,8 @@ def test_a_copied_solution_has_the_same_values_and_no_deformer(way):
     for name in ("handle_error", "fixed_error", "volume_change", "steps", "status", "merits"):
         assert getattr(other, name) == getattr(solution, name)
     assert_array_equal(other.region_volume_change, solution.region_volume_change)
-    assert len(pickle.dumps(solution)) < 4 * solution.vertices.nbytes
+    # Its vertices, those at rest, and the faces, for `crossings`; no rows of W~.
+    assert len(pickle.dumps(solution)) < 5 * solution.vertices.nbytes
 
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
