@@ -35,21 +35,21 @@ from ..progress import Progress, part, tell
 from ..solver import Anderson, VolumeConstraint, moved_along, steps_to_volume
 from .cell_energy import CellEnergy
 from .folds import Folds
+from .unfolding import unfolded
 
 # t of the final cells.  Medians of 15 poses of limbs for t = 0, 0.12, 0.15: distortion 1.21, 1.27,
 # 1.28 times that of as-rigid-as-possible, whose volume is not preserved; change of the dihedral
 # angles 1.28, 1.18, 1.17 times that of the start.
 SHARE = 0.1
 _LARGE = 3  # rounds of t = 1 of the first cells
-_FIRST, _LAST, _UNFOLDING = 10, 12, 6  # steps, at most
+_FIRST, _LAST = 10, 12  # steps, at most
 _NEAR, _TOLERANCE = 1e-4, 1e-5  # root mean square of a step, in mesh sizes, after which they end
 _WINDOW, _ROWS = 6, 10_000  # steps that the acceleration remembers, and rows of their residuals
 _Z_STEPS = 4  # for which the directions of the volumes are used
 _ROUNDING = 1e-15  # mesh sizes by which places may differ from those of the start
 _RISE = 1e-13  # relative rise of the energy that counts as rounding
 _SHORTEST = 1.0 / 16.0  # least share of a step
-_RINGS, _UNFOLDED = 4, 3  # around folded triangles, in which cells grow; so many times, at most
-_BACK = (0.5, 0.25, 0.0)  # shares of the finish that are tried if it folds triangles
+_UNFOLDED = 3  # rounds of removing folds, and restoring the volume, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,24 +137,9 @@ class Finisher:
         steps = first.steps + here.steps
         if not steps:
             return Finish(begin, here.merits, 0)
-        folds, best, ahead = Folds.of(self._mesh), here.x, here.x
-        least = folded = folds.at(best)
-        grown = np.zeros_like(ones)
-        for turn in range(1, _UNFOLDED + 1):
-            if not folded.any():
-                break
-            grown = np.maximum(grown, self._around(folded))
-            share = part(progress, 0.7 + 0.1 * (turn - 1), 0.7 + 0.1 * turn)
-            rounds = [grown] * (_LARGE * turn)
-            found = self._descend(ahead, small + rounds, _UNFOLDING, _NEAR, share)
-            ahead, steps = found.x, steps + found.steps
-            folded = folds.at(ahead)
-            if np.count_nonzero(folded) < np.count_nonzero(least):
-                best, least = ahead, folded
+        x = self._without_folds(here.x, part(progress, 0.7, 1.0))
         tell(progress, 1.0, "finished")
-        if least.any():
-            best = self._with_few_folds(begin, best, folds)
-        return Finish(best, here.merits, steps)
+        return Finish(x, here.merits, steps)
 
     def _at_places(self, start: FloatArray, places: FloatArray) -> FloatArray:
         """Return *start* with the held vertices at *places*, and the others moved smoothly."""
@@ -259,26 +244,23 @@ class Finisher:
         paths = np.hstack([x, *directions])
         return moved_along(paths, steps_to_volume(self._constraints, paths))
 
-    def _around(self, folded: BoolArray) -> FloatArray:
-        """Return 1 for the vertices around *folded* triangles (m,), 0 elsewhere, (n, 1)."""
-        near = np.zeros((self._mesh.n_vertices, 1))
-        near[self._mesh.faces[folded]] = 1.0
-        for _ in range(_RINGS):
-            near = np.maximum(near, self._energy.neighbours @ near > 0.0)
-        return near
-
-    def _with_few_folds(self, begin: FloatArray, end: FloatArray, folds: Folds) -> FloatArray:
-        """Return *end*, or a pose nearer to *begin* if fewer triangles fold there."""
-        few = np.count_nonzero(folds.at(begin))
-        if np.count_nonzero(folds.at(end)) <= few:
-            return end
-        for share in _BACK:
-            x = begin + share * (end - begin)
-            x[self._held] = end[self._held]
+    def _without_folds(self, x: FloatArray, progress: Progress | None) -> FloatArray:
+        """Return *x* with as few folds as its places and volumes allow."""
+        folds = Folds.of(self._mesh)
+        free = np.zeros(len(x), dtype=bool)
+        free[self._free] = True
+        best, least = x, np.count_nonzero(folds.at(x))
+        for turn in range(_UNFOLDED):
+            if not least:
+                break
+            tell(progress, turn / _UNFOLDED, "removing folds")
+            x = unfolded(self._mesh, folds, x, free)
             x = self._landed(x, self._directions(x))
-            if np.isfinite(x).all() and np.count_nonzero(folds.at(x)) <= few:
-                return x
-        return begin
+            folded = np.count_nonzero(folds.at(x))
+            if not np.isfinite(x).all() or folded >= least:
+                break
+            best, least = x, folded
+        return best
 
 
 def _factored(matrix: sparse.csr_array) -> Callable[[FloatArray], FloatArray]:
