@@ -12,8 +12,12 @@ the merit: Anderson acceleration proposes a step, and where the energy rises the
 it, and is halved.
 
 Cells are first large, which removes folds and kinks of the start and moves whole limbs, then small.
-Where triangles are folded after that, the cells around them grow again, and a few more steps
-follow.  A result with more folds than its start is drawn back towards it.
+Triangles that are folded after that are opened where they are (`unfolding`).
+
+Parts that cross only after the finish are put back where they were before it, and the finish is
+repeated with these vertices held, if crossings are to be avoided: the rest of the surface relaxes
+around them.  In a body twisted by 135 degrees this leaves distortion 0.102 without crossings; the
+start has 0.160, and the finish with crossings 0.091.
 
 Components without a fixed or handle vertex stay where they are, since nothing determines their
 place; so do vertices in no triangle.
@@ -23,24 +27,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from ..arrays import BoolArray, FloatArray
-from ..mesh import Mesh
+from ..arrays import BoolArray, FloatArray, IntArray
+from ..mesh import Mesh, new_crossings
 from ..progress import Progress, part, tell
 from ..solver import Anderson, VolumeConstraint, moved_along, steps_to_volume
 from .cell_energy import CellEnergy
 from .folds import Folds
 from .unfolding import unfolded
 
-# t of the final cells.  Medians of 15 poses of limbs for t = 0, 0.12, 0.15: distortion 1.21, 1.27,
-# 1.28 times that of as-rigid-as-possible, whose volume is not preserved; change of the dihedral
-# angles 1.28, 1.18, 1.17 times that of the start.
-SHARE = 0.1
+# t of the final cells.
+SHARE = 0.03
 _LARGE = 3  # rounds of t = 1 of the first cells
 _FIRST, _LAST = 10, 12  # steps, at most
 _NEAR, _TOLERANCE = 1e-4, 1e-5  # root mean square of a step, in mesh sizes, after which they end
@@ -50,6 +52,8 @@ _ROUNDING = 1e-15  # mesh sizes by which places may differ from those of the sta
 _RISE = 1e-13  # relative rise of the energy that counts as rounding
 _SHORTEST = 1.0 / 16.0  # least share of a step
 _UNFOLDED = 3  # rounds of removing folds, and restoring the volume, at most
+_MANY = 0.5  # of the crossings
+_PARTLY = 0.5, 0.0, 0.0  # shares of the finish at which crossing parts are held, one after another
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,10 +131,54 @@ class Finisher:
 
         *places* are in the order of the vertices.
         """
+        return self._run(self._at_places(start, places), progress)
+
+    def run_apart(
+        self, start: FloatArray, places: FloatArray, progress: Progress | None = None
+    ) -> Finish:
+        """Return the same without crossings that *start* does not have.
+
+        This is *start* itself if it has none and all else fails.  If it has at least half of the
+        crossings already, nothing is done about them.
+        """
         begin = self._at_places(start, places)
+        best = self._run(begin, part(progress, 0.0, 0.4))
+        crossing = least = self._crossing(best.vertices)
+        few = len(self._crossing(begin)) if len(least) else 0
+        end, steps = best.vertices, best.steps
+        stays = np.zeros(len(begin), dtype=bool)
+        for turn, share in enumerate(_PARTLY):
+            if len(least) <= few or few > _MANY * len(least):
+                break
+            stays[self._mesh.faces[crossing]] = True
+            stays |= self._energy.neighbours @ stays.astype(float) > 0.0
+            x = self.between(begin, end, share)
+            problem = Finisher(self._mesh, self._energy, self._held | stays, self._constraints)
+            found = problem._run(x, part(progress, 0.4 + 0.2 * turn, 0.6 + 0.2 * turn))
+            steps += found.steps
+            crossing = self._crossing(found.vertices)
+            if len(crossing) < len(least):
+                best, least = found, crossing
+        if len(least) and not few:
+            return Finish(begin, (), steps)
+        return replace(best, steps=steps)
+
+    def between(self, begin: FloatArray, end: FloatArray, shares: float | FloatArray) -> FloatArray:
+        """Return *begin* moved by *shares*, (n, 1) or one, of its finish *end*, on the volumes."""
+        x = begin + shares * (end - begin)
+        x[self._held] = end[self._held]
+        x = self._landed(x, self._directions(x))
+        return x if np.isfinite(x).all() else end
+
+    def _crossing(self, x: FloatArray) -> IntArray:
+        """Return the faces that cross others in the pose *x*, but not at rest."""
+        return new_crossings(x, self._mesh.vertices, self._mesh.faces)
+
+    def _run(self, begin: FloatArray, progress: Progress | None) -> Finish:
+        """Return the finish of a pose whose held vertices are in their places."""
         if not len(self._free):
             return Finish(begin, (), 0)
-        ones = np.ones((len(start), 1))
+        ones = np.ones((len(begin), 1))
         small = [SHARE * ones]
         first = self._descend(begin, [ones] * _LARGE, _FIRST, _NEAR, part(progress, 0.0, 0.3))
         here = self._descend(first.x, small, _LAST, _TOLERANCE, part(progress, 0.3, 0.7))
