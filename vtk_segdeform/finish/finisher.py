@@ -31,6 +31,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
 from ..arrays import BoolArray, FloatArray, IntArray
@@ -41,8 +42,11 @@ from .cell_energy import CellEnergy
 from .folds import Folds
 from .unfolding import unfolded
 
-# t of the final cells.
-SHARE = 0.03
+# t of the final cells.  Medians of 15 poses of limbs for t = 0.03, 0.05, 0.1: distortion 1.22,
+# 1.23, 1.25 times that of as-rigid-as-possible, whose volume is not preserved; change of the
+# dihedral angles 0.99 times that of the start.  Of 12 poses of other bodies: 1.04, 1.05, 1.08
+# times, and 1.31, 1.27, 1.22 times.
+SHARE = 0.05
 _LARGE = 3  # rounds of t = 1 of the first cells
 _FIRST, _LAST = 10, 12  # steps, at most
 _NEAR, _TOLERANCE = 1e-4, 1e-5  # root mean square of a step, in mesh sizes, after which they end
@@ -312,8 +316,21 @@ class Finisher:
 
 
 def _factored(matrix: sparse.csr_array) -> Callable[[FloatArray], FloatArray]:
-    """Return the solution of the symmetric positive definite *matrix* as a function."""
+    """Return the solution of the symmetric positive definite *matrix* as a function.
+
+    Minimum degree takes minutes for the vertex order of a subdivided mesh: 45 s and more for
+    120,000 vertices, and 2 s from the order of Cuthill and McKee.
+    """
     if not matrix.shape[0]:
         return np.zeros_like
-    factor = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-    return lambda right: factor.solve(np.ascontiguousarray(right))
+    order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
+    sorted_matrix = matrix[order][:, order].tocsc()
+    options = {"SymmetricMode": True}
+    factor = splu(sorted_matrix, permc_spec="MMD_AT_PLUS_A", options=options)
+
+    def solve(right: FloatArray) -> FloatArray:
+        result = np.empty_like(right)
+        result[order] = factor.solve(right[order])
+        return result
+
+    return solve

@@ -23,8 +23,8 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from ..mesh import Mesh
 from .folds import Folds
 
-_RINGS = 3, 5, 8, 12, 16  # around folded triangles, that move; one after the other
-_STEPS = 60  # with one of them, at most
+_RINGS = 3, 6, 12  # around folded triangles, that move; one after the other
+_STEPS = 30  # with one of them, at most
 _LEAST, _MOST = 0.3, 4.0  # singular values of gradients
 _TURNED, _CHANGED = np.radians(115.0), np.radians(60.0)  # as in `folds`, of triangles far from it
 _HEAVY = 10.0  # w_T of changed triangles
@@ -78,9 +78,7 @@ class _Patch:
         values = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2)
         columns = np.repeat(self._faces, 2, axis=0)
         places = np.repeat(rows, 3), columns.ravel()
-        self._gradient = sparse.csr_array(
-            (values.ravel(), places), (len(rows), mesh.n_vertices)
-        )
+        self._gradient = sparse.csr_array((values.ravel(), places), (len(rows), mesh.n_vertices))
         self._heavy = np.zeros(len(triangles), dtype=bool)
 
     def opened(self, x: FloatArray) -> FloatArray:
