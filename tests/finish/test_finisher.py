@@ -15,8 +15,9 @@ from solids import exact_volume_change, icosphere, rotation
 from vtk_segdeform.errors import ArgumentError, Cancelled
 from vtk_segdeform.finish import CellEnergy, Finish, Finisher, Folds
 from vtk_segdeform.finish import finisher as finishing
+from vtk_segdeform.finish.unfolding import unfolded
 from vtk_segdeform.geometry import closest_rotations, lids_of, triangle_distortion
-from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.mesh import Mesh, new_crossings
 from vtk_segdeform.solver import Bodies, total_volume
 
 SCENE = sausage(2, is_coarse=True)
@@ -202,7 +203,60 @@ def test_a_start_with_folds_has_none_after_it_and_a_good_one_gets_none():
     start = SAUSAGE.start + np.where(SAUSAGE.held[:, None], 0.0, 0.15 * noise)
     crumpled = Problem(SCENE.mesh, SAUSAGE.held, SAUSAGE.places, start)
     assert np.count_nonzero(folds.at(start)) > 9
-    assert not folds.at(crumpled.finish().vertices).any()
+    found = crumpled.finish().vertices
+    assert not folds.at(found).any()
+    assert_array_equal(found[SAUSAGE.held], SAUSAGE.places)
+
+
+def test_folds_are_opened_and_nothing_else_moves():
+    """Folded are: a triangle turned over its edge, and one pressed flat."""
+    mesh = sheet()
+    folds, free = Folds.of(mesh), np.ones(mesh.n_vertices, dtype=bool)
+    free[:6] = False
+    for vertex, to in ((62, mesh.vertices[62] + [0.6, 0.0, 0.0]), (62, mesh.vertices[68])):
+        x = mesh.vertices.copy()
+        x[vertex] = to
+        assert np.count_nonzero(folds.at(x)) > 0
+        opened = unfolded(mesh, folds, x, free)
+        assert not folds.at(opened).any()
+        far = np.abs(mesh.vertices[:, 0] - mesh.vertices[vertex, 0]) > 1.5
+        assert_array_equal(opened[far], x[far])
+    free[:] = False
+    assert_array_equal(unfolded(mesh, folds, x, free), x)
+
+
+def test_an_arch_over_a_sheet_stays_over_it():
+    """Held at its lower ends, it would end in a plane that crosses the sheet."""
+    one = sheet()
+    x, n = one.vertices, one.n_vertices
+    flat = np.stack([2.5 - x[:, 1], x[:, 0] - 1.5, np.full(n, 0.5)], 1)
+    mesh = Mesh(np.concatenate([x, flat]), np.concatenate([one.faces, one.faces + n]))
+    ends = (x[:, 0] < 0.1) | (x[:, 0] > 3.9)
+    arch = flat + np.stack([0.0 * x[:, 0]] * 2 + [1.5 * np.sin(0.25 * np.pi * x[:, 0]) - 0.5], 1)
+    start = np.concatenate([x, arch])
+    held = np.concatenate([ends, ends])
+    problem = Problem(mesh, held, start[held], start)
+    assert not len(new_crossings(start, mesh.vertices, mesh.faces))
+    assert len(new_crossings(problem.finish().vertices, mesh.vertices, mesh.faces))
+    found = Finisher(mesh, CellEnergy.of(mesh), held, []).run_apart(start, start[held])
+    assert not len(new_crossings(found.vertices, mesh.vertices, mesh.faces))
+    assert_array_equal(found.vertices[held], start[held])
+    assert distortion(problem, found.vertices) < 0.9 * distortion(problem, start)
+
+
+def test_the_finish_of_a_pull_moves_its_reach_only():
+    mesh, tip = SCENE.mesh, int(np.argmax(SCENE.mesh.vertices[:, 0]))
+    deformer = SCENE.held().hold(handle=[tip])
+    x, size = mesh.vertices, mesh.diagonal
+    pulled = deformer.local(tip, 0.2 * size, 0.05 * size)
+    solution = pulled.solve(x[[tip]] + [0.0, 0.05 * size, 0.0])
+    found = pulled.finish(solution)
+    away = np.linalg.norm(x - x[tip], axis=1)
+    moved = np.linalg.norm(found.vertices - solution.vertices, axis=1)
+    assert moved[away > 0.3 * size].max() == 0.0
+    assert moved[away < 0.04 * size].max() < 1e-5 * size
+    assert moved.max() > 1e-4 * size
+    assert abs(found.volume_change) < 1e-13
 
 
 def test_cancelling_at_any_step_changes_nothing_of_the_solution():

@@ -114,6 +114,7 @@ _CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
 _CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 300  # of a solve with active contacts
 _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
+_STAYS = 1.0  # weight of `locality` from which a finish moves nothing: at 1.4 times the reach
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
 
 
@@ -199,6 +200,7 @@ class _Constraints:
     solver: GaussNewton  # with the initial weights
     contact: Contact | None  # one of its terms
     pulled: _PulledPoints
+    keeps: FloatArray | None = None  # (s,): how firmly the finish of a pull keeps samples in place
 
     def places(self, targets: FloatArray) -> FloatArray:
         """Return the places (s, 3) of all sets, for *targets* (k, 3) of the handles."""
@@ -411,7 +413,8 @@ class Deformer:
             raise ConstraintError(f"spread must be a positive number; got {shown(spread)}")
         if not (is_number(follows, 0.0) and follows <= 1.0):
             raise ConstraintError(f"follows must be a number from 0 to 1; got {shown(follows)}")
-        quadratic = self._samples.quadratic(vertex, float(reach) / self._frame.size, follows)
+        near = vertex, float(reach) / self._frame.size, follows
+        quadratic = self._samples.quadratic(*near)
         weight = _ANCHOR_WEIGHT * _POSITION_WEIGHT * self._binding.energy.scale
         before, p = self._constraints.solver, self._p
         rows, soft, of_target = before.positions.rows.copy(), [], []
@@ -434,7 +437,10 @@ class Deformer:
         anchors = Anchors(weight * quadratic + steady, p, load)
         solver = replace(solver, positions=positions.local(rows, anchors))
         other = self._shared()
-        other._constraints = replace(self._constraints, solver=solver, pulled=pulled)
+        keeps = self._samples.weights(*near)
+        for each in pulled.vertices:
+            keeps[self._samples.distances(int(each)) < spread / self._frame.size] = np.inf
+        other._constraints = replace(self._constraints, solver=solver, pulled=pulled, keeps=keeps)
         other._begin(p, self._targets)
         return other
 
@@ -574,8 +580,10 @@ class Deformer:
         A few steps over all vertices, which takes about as long as 20 iterations of
         as-rigid-as-possible: triangles are less distorted, joints bend in less space, and the
         handles and fixed vertices are exact.  The volume is preserved as before.  The next solve
-        starts from the cages, as if the pose had not been finished.  Deformers made by `local`
-        finish the whole surface.
+        starts from the cages, as if the pose had not been finished.  Of a deformer made by `local`
+        only the surface within the reach is finished: it stays from 1.4 times the reach on, and
+        next to a handle of one vertex, which would become a spike.
+        With *avoid_contact*, crossings that *solution* does not have are avoided.
 
         Parameters
         ----------
@@ -606,9 +614,19 @@ class Deformer:
         held[self.fixed] = held[self.handle] = True
         places = np.array(self._rest_pose.vertices)
         places[self.handle] = frame.about_origin(frame.outward(self._targets))
-        finisher = Finisher(self._rest_pose, self._cell_energy, held, self.preserved_volumes)
         start = frame.about_origin(solution.vertices)
-        found = finisher.run(start, places[held], progress)
+        keeps, shares = self._constraints.keeps, None
+        if keeps is not None:
+            away = self._samples.smooth_at_vertices(np.minimum(np.sqrt(keeps / _STAYS), 1.0))
+            stays = (away == 1.0) & ~held
+            places[stays] = start[stays]
+            held |= stays
+            shares = (1.0 - away * away * (3.0 - 2.0 * away))[:, None]
+        finisher = Finisher(self._rest_pose, self._cell_energy, held, self.preserved_volumes)
+        run = finisher.run_apart if self._avoid_contact else finisher.run
+        found = run(start, places[held], progress)
+        if shares is not None and found.vertices is not start:
+            found = replace(found, vertices=finisher.between(start, found.vertices, shares))
         if found.vertices is start:
             return solution
         x = frame.in_scene(found.vertices)

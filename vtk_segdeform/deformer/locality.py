@@ -34,6 +34,7 @@ the worst offset falls from 0.47 to 0.43 edges, while on others the vertex misse
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -50,6 +51,7 @@ _LARGEST = 1e4  # (d^2 - 1)^2, reached at ten times the reach; also the weight o
 _STEADY = 10.0  # times the least weight of anchors under a load; still far below those of handles
 _FEWEST = 4  # samples that determine an affine motion
 _SHORTEST = 1e-12  # reach and spread; the mesh has size 1
+_SMOOTHING = 2.0  # rounds, in edges across a cell
 _FLAT = 1e-3  # of the moments: thinner patches count as flat
 
 
@@ -121,24 +123,41 @@ class SurfaceSamples:
         found = csgraph.dijkstra(self.edges, directed=False, indices=self.cells[vertex])
         return np.asarray(found, dtype=np.float64)
 
-    def quadratic(self, vertex: int, reach: float, follows: float) -> FloatArray:
-        """Return sum_s w_s W~_s^T W~_s, (m, m), for kappa = 1.
+    def weights(self, vertex: int, reach: float, follows: float) -> FloatArray:
+        """Return w_s / a_s for kappa = 1, (s,).
 
         Parts beyond the *reach* that are smaller than the largest by the factor *follows* are free.
         """
         if np.isinf(reach):
-            return np.zeros((self.rows.shape[1],) * 2)
+            return np.zeros(len(self.points))
         away = self.distances(vertex) / max(reach, _SHORTEST)
         nearer = np.clip(away, 1.0, 1e2)
-        weights = self.areas * np.minimum((nearer**2 - 1.0) ** 2, _LARGEST)
+        weights = np.minimum((nearer**2 - 1.0) ** 2, _LARGEST)
         far = np.flatnonzero((away > 1.0) & np.isfinite(away))
         if len(far):
             _, part = csgraph.connected_components(self.edges[far][:, far], directed=False)
             size = np.bincount(part, self.areas[far])
             weights[far[(size < follows * size.max())[part]]] = 0.0
+        return weights
+
+    def quadratic(self, vertex: int, reach: float, follows: float) -> FloatArray:
+        """Return sum_s w_s W~_s^T W~_s, (m, m), for kappa = 1; see `weights`."""
+        weights = self.areas * self.weights(vertex, reach, follows)
         kept = weights > 0.0
         rows = self.rows[kept]
         return np.asarray((rows.T * weights[kept]) @ rows)
+
+    def smooth_at_vertices(self, values: FloatArray) -> FloatArray:
+        """Return *values* (s,) of the samples at all vertices, without steps between cells."""
+        at_vertices = values[self.cells]
+        if self.rest is None or len(values) == len(at_vertices):
+            return at_vertices
+        graph = self.rest.adjacency
+        near = sparse.csr_array((np.ones(graph.nnz), graph.indices, graph.indptr), graph.shape)
+        count = 1.0 + np.diff(near.indptr)
+        for _ in range(math.ceil(_SMOOTHING * math.sqrt(len(at_vertices) / len(values)))):
+            at_vertices = (at_vertices + near @ at_vertices) / count
+        return at_vertices
 
     def steadying(self, p: FloatArray, load: FloatArray) -> FloatArray:
         """Return anchors (m, m) that keep a *load* (m, 3) at cages *p* (m, 3) from turning them.

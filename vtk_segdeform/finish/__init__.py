@@ -4,6 +4,7 @@ The files, in reading order:
 
     cell_energy    the stretch energy over all vertices, and the rotations that it is fitted to
     folds          triangles that a pose turned over
+    unfolding      opens them where they are
     finisher       the iteration: fixed vertices, handles and volumes exact
 """
 

@@ -12,8 +12,12 @@ the merit: Anderson acceleration proposes a step, and where the energy rises the
 it, and is halved.
 
 Cells are first large, which removes folds and kinks of the start and moves whole limbs, then small.
-Where triangles are folded after that, the cells around them grow again, and a few more steps
-follow.  A result with more folds than its start is drawn back towards it.
+Triangles that are folded after that are opened where they are (`unfolding`).
+
+Parts that cross only after the finish are put back where they were before it, and the finish is
+repeated with these vertices held, if crossings are to be avoided: the rest of the surface relaxes
+around them.  In a body twisted by 135 degrees this leaves distortion 0.102 without crossings; the
+start has 0.160, and the finish with crossings 0.091.
 
 Components without a fixed or handle vertex stay where they are, since nothing determines their
 place; so do vertices in no triangle.
@@ -23,33 +27,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
-from ..arrays import BoolArray, FloatArray
-from ..mesh import Mesh
+from ..arrays import BoolArray, FloatArray, IntArray
+from ..mesh import Mesh, new_crossings
 from ..progress import Progress, part, tell
 from ..solver import Anderson, VolumeConstraint, moved_along, steps_to_volume
 from .cell_energy import CellEnergy
 from .folds import Folds
+from .unfolding import unfolded
 
-# t of the final cells.  Medians of 15 poses of limbs for t = 0, 0.12, 0.15: distortion 1.21, 1.27,
-# 1.28 times that of as-rigid-as-possible, whose volume is not preserved; change of the dihedral
-# angles 1.28, 1.18, 1.17 times that of the start.
-SHARE = 0.1
+# t of the final cells.  Medians of 15 poses of limbs for t = 0.03, 0.05, 0.1: distortion 1.22,
+# 1.23, 1.25 times that of as-rigid-as-possible, whose volume is not preserved; change of the
+# dihedral angles 0.99 times that of the start.  Of 12 poses of other bodies: 1.04, 1.05, 1.08
+# times, and 1.31, 1.27, 1.22 times.
+SHARE = 0.05
 _LARGE = 3  # rounds of t = 1 of the first cells
-_FIRST, _LAST, _UNFOLDING = 10, 12, 6  # steps, at most
+_FIRST, _LAST = 10, 12  # steps, at most
 _NEAR, _TOLERANCE = 1e-4, 1e-5  # root mean square of a step, in mesh sizes, after which they end
 _WINDOW, _ROWS = 6, 10_000  # steps that the acceleration remembers, and rows of their residuals
 _Z_STEPS = 4  # for which the directions of the volumes are used
 _ROUNDING = 1e-15  # mesh sizes by which places may differ from those of the start
 _RISE = 1e-13  # relative rise of the energy that counts as rounding
 _SHORTEST = 1.0 / 16.0  # least share of a step
-_RINGS, _UNFOLDED = 4, 3  # around folded triangles, in which cells grow; so many times, at most
-_BACK = (0.5, 0.25, 0.0)  # shares of the finish that are tried if it folds triangles
+_UNFOLDED = 3  # rounds of removing folds, and restoring the volume, at most
+_MANY = 0.5  # of the crossings
+_PARTLY = 0.5, 0.0, 0.0  # shares of the finish at which crossing parts are held, one after another
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,34 +135,63 @@ class Finisher:
 
         *places* are in the order of the vertices.
         """
+        return self._run(self._at_places(start, places), progress)
+
+    def run_apart(
+        self, start: FloatArray, places: FloatArray, progress: Progress | None = None
+    ) -> Finish:
+        """Return the same without crossings that *start* does not have.
+
+        This is *start* itself if it has none and all else fails.  If it has at least half of the
+        crossings already, nothing is done about them.
+        """
         begin = self._at_places(start, places)
+        best = self._run(begin, part(progress, 0.0, 0.4))
+        crossing = least = self._crossing(best.vertices)
+        few = len(self._crossing(begin)) if len(least) else 0
+        end, steps = best.vertices, best.steps
+        stays = np.zeros(len(begin), dtype=bool)
+        for turn, share in enumerate(_PARTLY):
+            if len(least) <= few or few > _MANY * len(least):
+                break
+            stays[self._mesh.faces[crossing]] = True
+            stays |= self._energy.neighbours @ stays.astype(float) > 0.0
+            x = self.between(begin, end, share)
+            problem = Finisher(self._mesh, self._energy, self._held | stays, self._constraints)
+            found = problem._run(x, part(progress, 0.4 + 0.2 * turn, 0.6 + 0.2 * turn))
+            steps += found.steps
+            crossing = self._crossing(found.vertices)
+            if len(crossing) < len(least):
+                best, least = found, crossing
+        if len(least) and not few:
+            return Finish(begin, (), steps)
+        return replace(best, steps=steps)
+
+    def between(self, begin: FloatArray, end: FloatArray, shares: float | FloatArray) -> FloatArray:
+        """Return *begin* moved by *shares*, (n, 1) or one, of its finish *end*, on the volumes."""
+        x = begin + shares * (end - begin)
+        x[self._held] = end[self._held]
+        x = self._landed(x, self._directions(x))
+        return x if np.isfinite(x).all() else end
+
+    def _crossing(self, x: FloatArray) -> IntArray:
+        """Return the faces that cross others in the pose *x*, but not at rest."""
+        return new_crossings(x, self._mesh.vertices, self._mesh.faces)
+
+    def _run(self, begin: FloatArray, progress: Progress | None) -> Finish:
+        """Return the finish of a pose whose held vertices are in their places."""
         if not len(self._free):
             return Finish(begin, (), 0)
-        ones = np.ones((len(start), 1))
+        ones = np.ones((len(begin), 1))
         small = [SHARE * ones]
         first = self._descend(begin, [ones] * _LARGE, _FIRST, _NEAR, part(progress, 0.0, 0.3))
         here = self._descend(first.x, small, _LAST, _TOLERANCE, part(progress, 0.3, 0.7))
         steps = first.steps + here.steps
         if not steps:
             return Finish(begin, here.merits, 0)
-        folds, best, ahead = Folds.of(self._mesh), here.x, here.x
-        least = folded = folds.at(best)
-        grown = np.zeros_like(ones)
-        for turn in range(1, _UNFOLDED + 1):
-            if not folded.any():
-                break
-            grown = np.maximum(grown, self._around(folded))
-            share = part(progress, 0.7 + 0.1 * (turn - 1), 0.7 + 0.1 * turn)
-            rounds = [grown] * (_LARGE * turn)
-            found = self._descend(ahead, small + rounds, _UNFOLDING, _NEAR, share)
-            ahead, steps = found.x, steps + found.steps
-            folded = folds.at(ahead)
-            if np.count_nonzero(folded) < np.count_nonzero(least):
-                best, least = ahead, folded
+        x = self._without_folds(here.x, part(progress, 0.7, 1.0))
         tell(progress, 1.0, "finished")
-        if least.any():
-            best = self._with_few_folds(begin, best, folds)
-        return Finish(best, here.merits, steps)
+        return Finish(x, here.merits, steps)
 
     def _at_places(self, start: FloatArray, places: FloatArray) -> FloatArray:
         """Return *start* with the held vertices at *places*, and the others moved smoothly."""
@@ -259,31 +296,41 @@ class Finisher:
         paths = np.hstack([x, *directions])
         return moved_along(paths, steps_to_volume(self._constraints, paths))
 
-    def _around(self, folded: BoolArray) -> FloatArray:
-        """Return 1 for the vertices around *folded* triangles (m,), 0 elsewhere, (n, 1)."""
-        near = np.zeros((self._mesh.n_vertices, 1))
-        near[self._mesh.faces[folded]] = 1.0
-        for _ in range(_RINGS):
-            near = np.maximum(near, self._energy.neighbours @ near > 0.0)
-        return near
-
-    def _with_few_folds(self, begin: FloatArray, end: FloatArray, folds: Folds) -> FloatArray:
-        """Return *end*, or a pose nearer to *begin* if fewer triangles fold there."""
-        few = np.count_nonzero(folds.at(begin))
-        if np.count_nonzero(folds.at(end)) <= few:
-            return end
-        for share in _BACK:
-            x = begin + share * (end - begin)
-            x[self._held] = end[self._held]
+    def _without_folds(self, x: FloatArray, progress: Progress | None) -> FloatArray:
+        """Return *x* with as few folds as its places and volumes allow."""
+        folds = Folds.of(self._mesh)
+        free = np.zeros(len(x), dtype=bool)
+        free[self._free] = True
+        best, least = x, np.count_nonzero(folds.at(x))
+        for turn in range(_UNFOLDED):
+            if not least:
+                break
+            tell(progress, turn / _UNFOLDED, "removing folds")
+            x = unfolded(self._mesh, folds, x, free)
             x = self._landed(x, self._directions(x))
-            if np.isfinite(x).all() and np.count_nonzero(folds.at(x)) <= few:
-                return x
-        return begin
+            folded = np.count_nonzero(folds.at(x))
+            if not np.isfinite(x).all() or folded >= least:
+                break
+            best, least = x, folded
+        return best
 
 
 def _factored(matrix: sparse.csr_array) -> Callable[[FloatArray], FloatArray]:
-    """Return the solution of the symmetric positive definite *matrix* as a function."""
+    """Return the solution of the symmetric positive definite *matrix* as a function.
+
+    Minimum degree takes minutes for the vertex order of a subdivided mesh: 45 s and more for
+    120,000 vertices, and 2 s from the order of Cuthill and McKee.
+    """
     if not matrix.shape[0]:
         return np.zeros_like
-    factor = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-    return lambda right: factor.solve(np.ascontiguousarray(right))
+    order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
+    sorted_matrix = matrix[order][:, order].tocsc()
+    options = {"SymmetricMode": True}
+    factor = splu(sorted_matrix, permc_spec="MMD_AT_PLUS_A", options=options)
+
+    def solve(right: FloatArray) -> FloatArray:
+        result = np.empty_like(right)
+        result[order] = factor.solve(right[order])
+        return result
+
+    return solve
