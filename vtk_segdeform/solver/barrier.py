@@ -33,6 +33,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
+from scipy.linalg import blas
 from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
@@ -40,9 +41,10 @@ from ..geometry import inner_balls
 from ..kernels import compiled_kernels, inputs
 from ..subspace import Subspace
 
-_THRESHOLD = 0.5  # J_0
+_THRESHOLD = 0.25  # J_0
 _STEEPEST = 0.02  # J below which b is a parabola
 _STRENGTH = 0.03  # of all tetrahedra together, in scales of the shape energy
+_JUMP = 1e6  # of the objective where a tetrahedron is inverted, in scales of the shape energy
 _AROUND, _REACH = 16, 1.3  # points around a ball, within so many of its radii from its middle
 _LEAST_HEIGHT = 0.1  # of a tetrahedron, relative to the root of its triangle's area
 _MOST = 8_000  # tetrahedra
@@ -61,8 +63,10 @@ class Barrier:
         The tetrahedra: the three corners of a triangle, seen from inside, and the inner point.
     volumes : (t,) float
         Six times their volumes at rest, which are positive.
-    weight : float
-        Of each tetrahedron.
+    weights : (t,) float
+        Of the tetrahedra.
+    jump : float
+        Of the objective, for each inverted tetrahedron.
     rest : (m, 3) float
         The cages at rest.
     """
@@ -70,7 +74,8 @@ class Barrier:
     points: Subspace
     corners: IntArray
     volumes: FloatArray
-    weight: float
+    weights: FloatArray
+    jump: float
     rest: FloatArray
 
     @classmethod
@@ -109,8 +114,8 @@ class Barrier:
             points = surface.averaged(sparse.csr_array(both))
             corners = _tetrahedra(points.map(rest), faces)
         volumes = _determinants(points.map(rest), corners)
-        weight = _STRENGTH * strength / max(len(corners), 1)
-        return cls(points, corners, volumes, weight, rest)
+        weights = _STRENGTH * strength * volumes / max(volumes.sum(), 1e-300)
+        return cls(points, corners, volumes, weights, _JUMP * strength, rest)
 
     def ratios(self, p: FloatArray) -> FloatArray:
         """Return J of each tetrahedron for cages at *p* (m, 3), (t,)."""
@@ -125,13 +130,13 @@ class Barrier:
         active = np.flatnonzero(j < _THRESHOLD)
         corners, (value, first, _) = self.corners[active], _barrier(j[active])
         edges = x[corners[:, 1:]] - x[corners[:, :1]]
-        force = (
-            _cofactors(edges) * (0.5 * self.weight * first / self.volumes[active])[:, None, None]
-        )
+        weights = self.weights[active]
+        force = _cofactors(edges) * (0.5 * weights * first / self.volumes[active])[:, None, None]
         slope = np.zeros_like(x)
         np.add.at(slope, corners[:, 1:], force)
         np.add.at(slope, corners[:, 0], -force.sum(axis=1))
-        return self.weight * float(value.sum()), self.points.adjoint(slope)
+        inverted = np.count_nonzero(j[active] <= 0.0)
+        return float(weights @ value) + inverted * self.jump, self.points.adjoint(slope)
 
     def hessian(self, p: FloatArray) -> FloatArray | None:
         """Return half its Hessian at *p* without negative curvature, (3m, 3m); None at 0."""
@@ -143,13 +148,15 @@ class Barrier:
         corners, (_, first, second) = self.corners[active], _barrier(j[active])
         x0 = self.points.map(self.rest)
         inverse = np.linalg.inv(x0[corners[:, 1:]] - x0[corners[:, :1]])
+        weights = 0.5 * self.weights[active]
         of, vectors = _curvatures(inverse @ (x[corners[:, 1:]] - x[corners[:, :1]]), first, second)
         ids, place = np.unique(corners, return_inverse=True)
         w, place = self.points.at(ids), place.reshape(corners.shape)
         gradients = inverse @ (w[place[:, 1:]] - w[place[:, :1]])  # of each coordinate, (k, 3, m)
         m = len(p)
         rows = (np.swapaxes(vectors, 1, 2) @ gradients[of]).reshape(-1, 3 * m)
-        return np.asarray(0.5 * self.weight * (rows.T @ rows))
+        rows *= np.sqrt(weights[of])[:, None]
+        return np.asarray(blas.dsyrk(1.0, rows.T, lower=0).T)
 
     def _ratios(self, x: FloatArray) -> FloatArray:
         if kernels := compiled_kernels(len(self.corners)):
