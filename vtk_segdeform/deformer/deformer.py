@@ -276,7 +276,6 @@ class Deformer:
     _total_volume: VolumeConstraint
     _bodies: Bodies
     _known_volumes: dict[bytes | bool, _Preserved]
-    _terms: tuple[Term, ...]
     _constraints: _Constraints
     _continuation: WeightContinuation
     _aim: _Approach
@@ -320,9 +319,9 @@ class Deformer:
         self._hold_tolerance = hold_tolerance
         self._preserve_volume = as_flag(preserve_volume, "preserve_volume")
         self._preserve_region_volumes = as_flag(preserve_region_volumes, "preserve_region_volumes")
+        self._avoid_folds = as_flag(avoid_folds, "avoid_folds")
         self._avoid_contact = as_flag(avoid_contact, "avoid_contact")
         self._lids_option = as_lids(lids)
-        avoid_folds = as_flag(avoid_folds, "avoid_folds")
         self._own_blend = None if blend is None else as_numbers(blend, "blend")
         folder = None if cache is None else as_path(cache, "cache")
 
@@ -340,7 +339,6 @@ class Deformer:
         self._rest_pose = mesh.with_vertices(at_origin) if self._frame.is_far else mesh
         self._enclose()
         self._samples = SurfaceSamples.of(self._rest, self._binding.coarse_volume)
-        self._terms = self._barrier() if avoid_folds else ()
         self._constrain(fixed, handle)
         if compiled_kernels(mesh.n_vertices):
             tell(progress, 0.99, "taking a trial step")
@@ -357,12 +355,13 @@ class Deformer:
         preserve_volume: bool | None = None,
         preserve_region_volumes: bool | None = None,
         lids: bool | EllipsisType | None = ...,
+        avoid_folds: bool | None = None,
         avoid_contact: bool | None = None,
     ) -> Deformer:
         """Return a deformer at rest with other constraints, which shares the binding of this one.
 
-        ``preserve_volume=None``, ``preserve_region_volumes=None``, ``lids=...`` and
-        ``avoid_contact=None`` are the values of this deformer.  The fixed vertices stay at
+        ``preserve_volume=None``, ``preserve_region_volumes=None``, ``lids=...``,
+        ``avoid_folds=None`` and ``avoid_contact=None`` are the values of this deformer.  The fixed vertices stay at
         *fixed_at* (f, 3), in the order of the attribute `fixed`, by default at rest.
         """
         other = self._shared()
@@ -372,6 +371,8 @@ class Deformer:
             other._preserve_region_volumes = as_flag(
                 preserve_region_volumes, "preserve_region_volumes"
             )
+        if avoid_folds is not None:
+            other._avoid_folds = as_flag(avoid_folds, "avoid_folds")
         if avoid_contact is not None:
             other._avoid_contact = as_flag(avoid_contact, "avoid_contact")
         if lids is not ... and as_lids(lids) is not self._lids_option:
@@ -895,16 +896,13 @@ class Deformer:
         self._total_volume = total_volume(self._rest_pose, self._lids)
         self._bodies = Bodies(self._rest_pose, self._total_volume, self._lids)
 
-    def _barrier(self) -> tuple[Term, ...]:
-        """Return the barrier against folds; none if no part of the mesh has an inside."""
+    @cached_property
+    def _barrier(self) -> Barrier:
         samples, surface = self._samples, self._binding.coarse_volume.surface
         encloses = np.zeros(surface.n_vertices, dtype=bool)
         encloses[samples.cells] = lids_of(self._rest_pose).encloses[self.mesh.components]
-        if not encloses.any():
-            return ()
-        scale = self._binding.energy.scale
-        rest = self._rest_cages
-        return (Barrier.of(surface, samples.faces, rest, encloses=encloses, strength=scale),)
+        scale, rest = self._binding.energy.scale, self._rest_cages
+        return Barrier.of(surface, samples.faces, rest, encloses=encloses, strength=scale)
 
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:
         return np.array([each.relative(x) for each in self._region_volumes])
@@ -931,7 +929,8 @@ class Deformer:
         gathered = in_order if positions.mean is None else positions.mean @ in_order
         preserved, volumes, scaled = self._preserved_volumes()
         contact = self._contact_of()
-        terms = self._terms if contact is None else (*self._terms, contact)
+        terms: list[Term] = [self._barrier] if self._avoid_folds else []
+        terms += [] if contact is None else [contact]
         fixed_in_scene, inside = mesh.vertices[self.fixed], rest[self.fixed]
         if places is not None:
             fixed_in_scene = checked_targets(places, len(self.fixed), "fixed_at", "fixed")
@@ -949,7 +948,7 @@ class Deformer:
             preserved=preserved,
             volumes=volumes,
             scaled=scaled,
-            solver=GaussNewton(binding.energy, positions, volumes, terms=terms),
+            solver=GaussNewton(binding.energy, positions, volumes, terms=tuple(terms)),
             contact=contact,
             pulled=_PulledPoints(),
         )
