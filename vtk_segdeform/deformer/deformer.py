@@ -249,7 +249,7 @@ class Deformer:
         place before its weight is raised.
     avoid_folds : bool
         Keep the body below the surface from turning inside out, by a barrier (`solver.barrier`).
-        Far bends then fold less, but distort the surface more and take about three times as long.
+        Far bends and twists then fold less, but distort the surface more and take longer.
     avoid_contact : bool
         Keep parts of the surface that are not near each other at rest from crossing; see
         `solver.contact`.  Handles take precedence: if their targets, or fixed vertices, force a
@@ -361,8 +361,9 @@ class Deformer:
         """Return a deformer at rest with other constraints, which shares the binding of this one.
 
         ``preserve_volume=None``, ``preserve_region_volumes=None``, ``lids=...``,
-        ``avoid_folds=None`` and ``avoid_contact=None`` are the values of this deformer.  The fixed vertices stay at
-        *fixed_at* (f, 3), in the order of the attribute `fixed`, by default at rest.
+        ``avoid_folds=None`` and ``avoid_contact=None`` are the values of this deformer.  The fixed
+        vertices stay at *fixed_at* (f, 3), in the order of the attribute `fixed`, by default at
+        rest.
         """
         other = self._shared()
         if preserve_volume is not None:

@@ -200,7 +200,7 @@ class Contact:
         flat = jacobian.reshape(len(along), -1)
         return np.asarray(blas.dsyrk(1.0, flat.T, lower=0).T)
 
-    def begun_at(self, p: FloatArray) -> Contact:
+    def begun_at(self, _p: FloatArray) -> Contact:
         """Return itself: the term is finite everywhere."""
         return self
 

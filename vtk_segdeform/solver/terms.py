@@ -24,7 +24,7 @@ class Term(Protocol):
         """
         ...
 
-    def begun_at(self, p: FloatArray) -> Term:
+    def begun_at(self, p: FloatArray, /) -> Term:
         """Return the term of a solve that begins at *p*: itself, or one that is finite there."""
         ...
 
