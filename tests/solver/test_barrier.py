@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -12,6 +14,8 @@ from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
+from vtk_segdeform.session.pose_solver import PoseSolver
+from vtk_segdeform.session.state import Options, State
 from vtk_segdeform.solver.solution import Status
 
 SCENE = sausage(2)
@@ -106,6 +110,15 @@ def test_while_inactive_it_changes_no_bit():
     targets = SCENE.turned(20)
     without = FREE.hold(**HELD).solve(targets)
     assert_array_equal(BOUND.hold(**HELD).solve(targets).vertices, without.vertices)
+
+
+def test_a_session_turns_it_on_and_off():
+    state = State(SCENE.regions, SCENE.cages, SCENE.fixed, {"tip": SCENE.handle})
+    solver = PoseSolver(SCENE.mesh)
+    for on in (True, False, True):
+        options = Options(avoid_folds=on)
+        terms = solver._constrain(replace(state, options=options))._constraints.solver.terms
+        assert len(terms) == on
 
 
 def test_an_open_sheet_has_no_inside():
