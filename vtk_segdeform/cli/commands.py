@@ -179,6 +179,7 @@ def _settings(options: Namespace) -> dict[str, Any]:
     settings: dict[str, Any] = {
         "preserve_volume": not options.no_volume,
         "lids": LIDS[options.lids],
+        "avoid_folds": options.avoid_folds,
         "avoid_contact": options.avoid_contact,
     }
     if options.stretch is not None:

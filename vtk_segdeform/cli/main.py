@@ -356,6 +356,7 @@ def _handles(parser: argparse.ArgumentParser) -> None:
             f"--{name}", action=_HandleOption, metavar=metavar, help=text, required=required
         )
     add("--no-volume", action="store_true", help="do not preserve the volume")
+    add("--avoid-folds", action="store_true", help="keep the body from turning inside out")
     add("--avoid-contact", action="store_true", help="keep parts of the surface from crossing")
     text = "whether open parts enclose a volume under lids over their holes (default: auto)"
     add("--lids", choices=("auto", "on", "off"), default="auto", help=text)

@@ -26,6 +26,7 @@ def deform(
     n_cage_vertices: int | None = None,
     preserve_volume: bool = True,
     lids: bool | None = None,
+    avoid_folds: bool = False,
     avoid_contact: bool = False,
     refine: bool = False,
     progress: Progress | None = None,
@@ -53,6 +54,8 @@ def deform(
     lids : bool or None
         Whether an open surface encloses a volume under lids over its borders; None decides it for
         each connected part, as `Deformer` does.
+    avoid_folds : bool
+        Keep the body below the surface from turning inside out; see `Deformer`.
     avoid_contact : bool
         Keep parts of the surface from crossing each other; see `Deformer`.
     refine : bool
@@ -72,6 +75,7 @@ def deform(
     require_mesh(mesh)
     as_flag(preserve_volume, "preserve_volume")
     as_lids(lids)
+    as_flag(avoid_folds, "avoid_folds")
     as_flag(avoid_contact, "avoid_contact")
     as_flag(refine, "refine")
     stays, moves = checked_constraints(mesh, fixed, handle)
@@ -93,6 +97,7 @@ def deform(
         handle=handle,
         preserve_volume=preserve_volume,
         lids=lids,
+        avoid_folds=avoid_folds,
         avoid_contact=avoid_contact,
         progress=part(progress, 0.7, 0.9),
     )

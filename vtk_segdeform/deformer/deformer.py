@@ -251,7 +251,7 @@ class Deformer:
         place before its weight is raised.
     avoid_folds : bool
         Keep the body below the surface from turning inside out, by a barrier (`solver.barrier`).
-        Far bends then fold less, but distort the surface more and take about three times as long.
+        Far bends and twists then fold less, but distort the surface more and take longer.
     avoid_contact : bool
         Keep parts of the surface that are not near each other at rest from crossing; see
         `solver.contact`.  Handles take precedence: if their targets, or fixed vertices, force a
@@ -278,7 +278,6 @@ class Deformer:
     _total_volume: VolumeConstraint
     _bodies: Bodies
     _known_volumes: dict[bytes | bool, _Preserved]
-    _terms: tuple[Term, ...]
     _constraints: _Constraints
     _continuation: WeightContinuation
     _aim: _Approach
@@ -322,9 +321,9 @@ class Deformer:
         self._hold_tolerance = hold_tolerance
         self._preserve_volume = as_flag(preserve_volume, "preserve_volume")
         self._preserve_region_volumes = as_flag(preserve_region_volumes, "preserve_region_volumes")
+        self._avoid_folds = as_flag(avoid_folds, "avoid_folds")
         self._avoid_contact = as_flag(avoid_contact, "avoid_contact")
         self._lids_option = as_lids(lids)
-        avoid_folds = as_flag(avoid_folds, "avoid_folds")
         self._own_blend = None if blend is None else as_numbers(blend, "blend")
         folder = None if cache is None else as_path(cache, "cache")
 
@@ -342,7 +341,6 @@ class Deformer:
         self._rest_pose = mesh.with_vertices(at_origin) if self._frame.is_far else mesh
         self._enclose()
         self._samples = SurfaceSamples.of(self._rest, self._binding.coarse_volume)
-        self._terms = self._barrier() if avoid_folds else ()
         self._constrain(fixed, handle)
         if compiled_kernels(mesh.n_vertices):
             tell(progress, 0.99, "taking a trial step")
@@ -359,13 +357,15 @@ class Deformer:
         preserve_volume: bool | None = None,
         preserve_region_volumes: bool | None = None,
         lids: bool | EllipsisType | None = ...,
+        avoid_folds: bool | None = None,
         avoid_contact: bool | None = None,
     ) -> Deformer:
         """Return a deformer at rest with other constraints, which shares the binding of this one.
 
-        ``preserve_volume=None``, ``preserve_region_volumes=None``, ``lids=...`` and
-        ``avoid_contact=None`` are the values of this deformer.  The fixed vertices stay at
-        *fixed_at* (f, 3), in the order of the attribute `fixed`, by default at rest.
+        ``preserve_volume=None``, ``preserve_region_volumes=None``, ``lids=...``,
+        ``avoid_folds=None`` and ``avoid_contact=None`` are the values of this deformer.  The fixed
+        vertices stay at *fixed_at* (f, 3), in the order of the attribute `fixed`, by default at
+        rest.
         """
         other = self._shared()
         if preserve_volume is not None:
@@ -374,6 +374,8 @@ class Deformer:
             other._preserve_region_volumes = as_flag(
                 preserve_region_volumes, "preserve_region_volumes"
             )
+        if avoid_folds is not None:
+            other._avoid_folds = as_flag(avoid_folds, "avoid_folds")
         if avoid_contact is not None:
             other._avoid_contact = as_flag(avoid_contact, "avoid_contact")
         if lids is not ... and as_lids(lids) is not self._lids_option:
@@ -913,16 +915,13 @@ class Deformer:
         self._total_volume = total_volume(self._rest_pose, self._lids)
         self._bodies = Bodies(self._rest_pose, self._total_volume, self._lids)
 
-    def _barrier(self) -> tuple[Term, ...]:
-        """Return the barrier against folds; none if no part of the mesh has an inside."""
+    @cached_property
+    def _barrier(self) -> Barrier:
         samples, surface = self._samples, self._binding.coarse_volume.surface
         encloses = np.zeros(surface.n_vertices, dtype=bool)
         encloses[samples.cells] = lids_of(self._rest_pose).encloses[self.mesh.components]
-        if not encloses.any():
-            return ()
-        scale = self._binding.energy.scale
-        rest = self._rest_cages
-        return (Barrier.of(surface, samples.faces, rest, encloses=encloses, strength=scale),)
+        scale, rest = self._binding.energy.scale, self._rest_cages
+        return Barrier.of(surface, samples.faces, rest, encloses=encloses, strength=scale)
 
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:
         return np.array([each.relative(x) for each in self._region_volumes])
@@ -949,7 +948,8 @@ class Deformer:
         gathered = in_order if positions.mean is None else positions.mean @ in_order
         preserved, volumes, scaled = self._preserved_volumes()
         contact = self._contact_of()
-        terms = self._terms if contact is None else (*self._terms, contact)
+        terms: list[Term] = [self._barrier] if self._avoid_folds else []
+        terms += [] if contact is None else [contact]
         fixed_in_scene, inside = mesh.vertices[self.fixed], rest[self.fixed]
         if places is not None:
             fixed_in_scene = checked_targets(places, len(self.fixed), "fixed_at", "fixed")
@@ -967,7 +967,7 @@ class Deformer:
             preserved=preserved,
             volumes=volumes,
             scaled=scaled,
-            solver=GaussNewton(binding.energy, positions, volumes, terms=terms),
+            solver=GaussNewton(binding.energy, positions, volumes, terms=tuple(terms)),
             contact=contact,
             pulled=_PulledPoints(),
         )

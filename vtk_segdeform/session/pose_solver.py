@@ -39,6 +39,7 @@ _CONSTRAINT_OPTIONS = (
     "preserve_volume",
     "preserve_region_volumes",
     "lids",
+    "avoid_folds",
     "avoid_contact",
 )  # changed by `Deformer.hold`
 _NO_TARGETS = np.empty((0, 3))
@@ -219,6 +220,7 @@ class PoseSolver:
             preserve_volume=state.options.preserve_volume,
             preserve_region_volumes=state.options.preserve_region_volumes,
             lids=state.options.lids,
+            avoid_folds=state.options.avoid_folds,
             avoid_contact=state.options.avoid_contact,
         )
         constraints = State(

@@ -39,6 +39,7 @@ _WORDS = {
     "lids": "volume of open parts",
     "stretch": "stretch resistance",
     "rotation_groups": "rotation clusters",
+    "avoid_folds": "fold avoidance",
     "avoid_contact": "contact avoidance",
 }
 
@@ -64,6 +65,8 @@ class Options:
         Stretch resistance relative to detail preservation; 0 is the paper's energy.
     rotation_groups : int, optional
         Number of rotation clusters; None for one rotation per vertex.
+    avoid_folds : bool
+        Keep the body below the surface from turning inside out, as `Deformer` does.
     avoid_contact : bool
         Keep parts of the surface from crossing each other, as `Deformer` does.
 
@@ -80,10 +83,12 @@ class Options:
     lids: bool | None = None
     stretch: float = 10.0
     rotation_groups: int | None = 300
+    avoid_folds: bool = False
     avoid_contact: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("preserve_volume", "preserve_region_volumes", "avoid_contact"):
+        flags = "preserve_volume", "preserve_region_volumes", "avoid_folds", "avoid_contact"
+        for name in flags:
             value = getattr(self, name)
             if not isinstance(value, bool):
                 raise SessionError(f"{name} must be True or False; got {shown(value)}")

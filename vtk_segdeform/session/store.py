@@ -54,6 +54,7 @@ VERSION = 2
 
 _LATER = {
     "lids": None,
+    "avoid_folds": False,
     "avoid_contact": False,
 }  # options that version 1 does not have, and their defaults
 

@@ -1,25 +1,23 @@
 """Barrier against folds: the body below the surface does not turn inside out.
 
-A triangle (a, b, c) of a coarse surface and a point d inside the body make a tetrahedron.  From
-rest to pose it is mapped by F, and J = det F is the local volume change, negative where the body
-is turned inside out.  While J is below a threshold J_0, the objective has the term
+A triangle (a, b, c) of a coarse surface and a point d inside the body make a tetrahedron.  J is its
+volume relative to that at rest, negative where the body is turned inside out.  While J is below a
+threshold J_0, the objective has the term
 
     b(J) = (J_0 - J)^3 / (J_0^2 J)
 
-which is convex, twice differentiable, and grows without limit towards J = 0.  Poses that are folded
-already, such as those of cages moved by hand, must have a way back.  So below a small J b
-continues as a parabola, so steep that no handle pushes through it.
+times the tetrahedron's share of the volume.  It is convex, twice differentiable, and infinite from
+J = 0 on.  It is weak: it costs hardly anything unless a tetrahedron is almost flat.
+
+Poses that are folded already, such as those of cages moved by hand, must have a way back.  So
+tetrahedra that are inverted where a solve begins are left out of this solve.
 
 The inner point d is in the middle of the largest balls inside the body that touch the surface at
 the three corners, as the mean of the surface points around these balls.  So all corners are linear
 in the surface, the coarse one that the solver's steps have anyway; binding computes nothing more.
 
-The Hessian of b(det F) in the nine entries of F is
-
-    b'' C C^T + b' dC/dF,      C = dJ/dF, the cofactors
-
-and its eigenvalues below 0 are left out.  F is linear in the cages, so that each tetrahedron with
-J < J_0 adds a matrix of rank at most 9.
+Of the Hessian only b'' dJ dJ^T is used, one row for each tetrahedron with J < J_0.  The rest,
+b' d^2 J, is not convex; steps without it are as few.
 
 Source
 ------
@@ -33,6 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
+from scipy.linalg import blas
 from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
@@ -40,13 +39,13 @@ from ..geometry import inner_balls
 from ..kernels import compiled_kernels, inputs
 from ..subspace import Subspace
 
-_THRESHOLD = 0.5  # J_0
-_STEEPEST = 0.02  # J below which b is a parabola
-_STRENGTH = 0.03  # of all tetrahedra together, in scales of the shape energy
+_THRESHOLD = 0.25  # J_0
+_LEAST_RATIO = 1e-4  # J up to which a tetrahedron counts as inverted
+_STRENGTH = 3e-3  # of all tetrahedra together, in scales of the shape energy
 _AROUND, _REACH = 16, 1.3  # points around a ball, within so many of its radii from its middle
 _LEAST_HEIGHT = 0.1  # of a tetrahedron, relative to the root of its triangle's area
 _MOST = 8_000  # tetrahedra
-_LEAST_EIGENVALUE = 1e-4  # relative to the largest; smaller ones are left out
+_TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,17 +60,14 @@ class Barrier:
         The tetrahedra: the three corners of a triangle, seen from inside, and the inner point.
     volumes : (t,) float
         Six times their volumes at rest, which are positive.
-    weight : float
-        Of each tetrahedron.
-    rest : (m, 3) float
-        The cages at rest.
+    weights : (t,) float
+        Of the tetrahedra.
     """
 
     points: Subspace
     corners: IntArray
     volumes: FloatArray
-    weight: float
-    rest: FloatArray
+    weights: FloatArray
 
     @classmethod
     def of(
@@ -109,8 +105,8 @@ class Barrier:
             points = surface.averaged(sparse.csr_array(both))
             corners = _tetrahedra(points.map(rest), faces)
         volumes = _determinants(points.map(rest), corners)
-        weight = _STRENGTH * strength / max(len(corners), 1)
-        return cls(points, corners, volumes, weight, rest)
+        weights = _STRENGTH * strength * volumes / max(volumes.sum(), _TINY)
+        return cls(points, corners, volumes, weights)
 
     def ratios(self, p: FloatArray) -> FloatArray:
         """Return J of each tetrahedron for cages at *p* (m, 3), (t,)."""
@@ -120,36 +116,43 @@ class Barrier:
         """Return the barrier at *p* (m, 3) and half its gradient (m, 3)."""
         x = self.points.map(p)
         j = self._ratios(x)
-        if j.min(initial=1.0) >= _THRESHOLD:
-            return 0.0, np.zeros_like(p)
         active = np.flatnonzero(j < _THRESHOLD)
-        corners, (value, first, _) = self.corners[active], _barrier(j[active])
-        edges = x[corners[:, 1:]] - x[corners[:, :1]]
-        force = (
-            _cofactors(edges) * (0.5 * self.weight * first / self.volumes[active])[:, None, None]
-        )
+        if not len(active):
+            return 0.0, np.zeros_like(p)
+        value, first, _ = _barrier(j[active])
+        if not np.isfinite(value).all():
+            return np.inf, np.zeros_like(p)
+        moves = self._slopes(x, active) * (0.5 * self.weights[active] * first)[:, None, None]
         slope = np.zeros_like(x)
-        np.add.at(slope, corners[:, 1:], force)
-        np.add.at(slope, corners[:, 0], -force.sum(axis=1))
-        return self.weight * float(value.sum()), self.points.adjoint(slope)
+        np.add.at(slope, self.corners[active], moves)
+        return float(self.weights[active] @ value), self.points.adjoint(slope)
 
     def hessian(self, p: FloatArray) -> FloatArray | None:
-        """Return half its Hessian at *p* without negative curvature, (3m, 3m); None at 0."""
+        """Return half its Hessian at *p* without b' d^2 J, (3m, 3m); None at 0."""
         x = self.points.map(p)
         j = self._ratios(x)
         active = np.flatnonzero(j < _THRESHOLD)
         if not len(active):
             return None
-        corners, (_, first, second) = self.corners[active], _barrier(j[active])
-        x0 = self.points.map(self.rest)
-        inverse = np.linalg.inv(x0[corners[:, 1:]] - x0[corners[:, :1]])
-        of, vectors = _curvatures(inverse @ (x[corners[:, 1:]] - x[corners[:, :1]]), first, second)
-        ids, place = np.unique(corners, return_inverse=True)
-        w, place = self.points.at(ids), place.reshape(corners.shape)
-        gradients = inverse @ (w[place[:, 1:]] - w[place[:, :1]])  # of each coordinate, (k, 3, m)
-        m = len(p)
-        rows = (np.swapaxes(vectors, 1, 2) @ gradients[of]).reshape(-1, 3 * m)
-        return np.asarray(0.5 * self.weight * (rows.T @ rows))
+        scale = np.sqrt(0.5 * self.weights[active] * _barrier(j[active])[2])
+        moves = self._slopes(x, active) * scale[:, None, None]
+        ids, place = np.unique(self.corners[active], return_inverse=True)
+        w = self.points.at(ids)[place.reshape(-1, 4)]
+        rows = (np.swapaxes(moves, 1, 2) @ w).reshape(len(active), -1)
+        return np.asarray(blas.dsyrk(1.0, rows.T, lower=0).T)
+
+    def begun_at(self, p: FloatArray) -> Barrier:
+        """Return the barrier of a solve that begins at *p* (m, 3), where it is finite."""
+        kept = self.ratios(p) > _LEAST_RATIO
+        corners, volumes, weights = self.corners[kept], self.volumes[kept], self.weights[kept]
+        return Barrier(self.points, corners, volumes, weights)
+
+    def _slopes(self, x: FloatArray, active: IntArray) -> FloatArray:
+        """Return the derivatives of J of some tetrahedra by their corners, (k, 4, 3)."""
+        corners = self.corners[active]
+        of_edges = _cofactors(x[corners[:, 1:]] - x[corners[:, :1]])
+        of_edges /= self.volumes[active, None, None]
+        return np.concatenate([-of_edges.sum(axis=1, keepdims=True), of_edges], axis=1)
 
     def _ratios(self, x: FloatArray) -> FloatArray:
         if kernels := compiled_kernels(len(self.corners)):
@@ -161,14 +164,11 @@ class Barrier:
 
 def _barrier(j: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return b and its first two derivatives at *j* (k,), all below the threshold."""
-    at = np.maximum(j, _STEEPEST)
+    at = np.maximum(j, _LEAST_RATIO)
     short = _THRESHOLD - at
-    value = short**3 / at / _THRESHOLD**2
+    value = np.where(j > _LEAST_RATIO, short**3 / at / _THRESHOLD**2, np.inf)
     first = -(short**2) * (2.0 * at + _THRESHOLD) / (at * _THRESHOLD) ** 2
-    second = 2.0 * _THRESHOLD / at**3 - 2.0 / _THRESHOLD**2
-    beyond = np.minimum(j - _STEEPEST, 0.0)
-    value += first * beyond + 0.5 * second * beyond**2
-    return value, first + second * beyond, second
+    return value, first, 2.0 * _THRESHOLD / at**3 - 2.0 / _THRESHOLD**2
 
 
 def _determinants(x: FloatArray, corners: IntArray) -> FloatArray:
@@ -181,26 +181,6 @@ def _cofactors(rows: FloatArray) -> FloatArray:
     """Return the derivatives of the determinants of 3 x 3 matrices, (k, 3, 3)."""
     a, b, c = np.moveaxis(rows, 1, 0)
     return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
-
-
-def _curvatures(
-    f: FloatArray, first: FloatArray, second: FloatArray
-) -> tuple[IntArray, FloatArray]:
-    """Return the positive part of the Hessians of b(det F^T) as sums of v v^T.
-
-    *f* (k, 3, 3) are the F^T.  Of each v (r, 3, 3), the number (r,) of its Hessian is returned.
-    """
-    c = _cofactors(f).reshape(-1, 9)
-    full = second[:, None, None] * c[:, :, None] * c[:, None, :]
-    blocks = full.reshape(-1, 3, 3, 3, 3)
-    for i in range(3):
-        cross = np.cross(f[:, i, None, :], np.eye(3)) * first[:, None, None]
-        blocks[:, i - 2, :, i - 1, :] += cross
-        blocks[:, i - 1, :, i - 2, :] += np.swapaxes(cross, 1, 2)
-    values, vectors = np.linalg.eigh(full)
-    of, which = np.nonzero(values > _LEAST_EIGENVALUE * values[:, -1:])
-    scaled = vectors[of, :, which] * np.sqrt(values[of, which])[:, None]
-    return of, scaled.reshape(-1, 3, 3)
 
 
 def _inner_points(x: FloatArray, faces: IntArray) -> sparse.csr_array:

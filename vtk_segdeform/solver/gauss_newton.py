@@ -208,6 +208,7 @@ class GaussNewton:
     _state: _State | None = field(init=False, repr=False, default=None)
     _last: _Iterate | None = field(init=False, repr=False, default=None)
     _way: Way = field(init=False, repr=False, default=Way())
+    _begun: tuple[Term, ...] = field(init=False, repr=False, default=())  # the terms of this call
 
     def __post_init__(self) -> None:
         hessian = self.energy.quadratic + self.positions.quadratic()
@@ -357,7 +358,7 @@ class GaussNewton:
 
         Unless *newton*, it is that of (21) with the further terms; None without them.
         """
-        of_terms = hessian_of(self.terms, here.p) if here.is_active else None
+        of_terms = hessian_of(self._begun, here.p) if here.is_active else None
         if not newton:
             return (
                 full_factor(self._hessian, None, here.p, added=of_terms) if here.is_active else None
@@ -390,16 +391,21 @@ class GaussNewton:
         else:
             rows = self.volumes.surface.adjoints(gradients)
         energy, slope = self.energy.value_and_slope(p, load)
-        value, slope = with_terms(self.terms, p, energy, slope)
+        value, slope = with_terms(self._begun, p, energy, slope)
         here = _Iterate(p, x, value, slope, tuple(rows), value, slope, value != energy)
         return here.toward(term)
 
     def _iterate_at(self, p: FloatArray, term: TargetTerm) -> _Iterate:
         """Return the iterate at *p*; where the last call ended only the targets have changed."""
         last = self._last
-        if last is None or last.p is not p:
-            return self._evaluate(p, self._surface(p), term)
-        return last.toward(term)
+        if last is not None and last.p is p and self._begun is self.terms:
+            return last.toward(term)
+        self._begun = self.terms
+        here = self._evaluate(p, self._surface(p), term)
+        if here.shape < math.inf:
+            return here
+        self._begun = tuple(each.begun_at(p) for each in self.terms)
+        return self._evaluate(p, self._surface(p), term)
 
     def _ahead(
         self, here: _Iterate, targets: FloatArray, term: TargetTerm, options: SolverOptions

@@ -24,6 +24,10 @@ class Term(Protocol):
         """
         ...
 
+    def begun_at(self, p: FloatArray, /) -> Term:
+        """Return the term of a solve that begins at *p*: itself, or one that is finite there."""
+        ...
+
     def hessian(self, p: FloatArray) -> FloatArray | None:
         """Return half the Hessian at *p*, made positive semi-definite; None while inactive.
 
