@@ -605,6 +605,7 @@ class Deformer:
         held = np.zeros(self.mesh.n_vertices, dtype=bool)
         held[self.fixed] = held[self.handle] = True
         places = np.array(self._rest_pose.vertices)
+        places[self.fixed] = frame.about_origin(self._constraints.fixed_at)
         places[self.handle] = frame.about_origin(frame.outward(self._targets))
         finisher = Finisher(self._rest_pose, self._cell_energy, held, self.preserved_volumes)
         start = frame.about_origin(solution.vertices)
