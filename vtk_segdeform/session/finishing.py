@@ -10,6 +10,7 @@ vertices, by far less than the offset x - W~ p.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
@@ -32,7 +33,8 @@ class FinishedPose(NamedTuple):
     solution: Solution
 
 
-class Finish(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Finish:
     """A pose to finish, and its own deformer; another thread may call ``finish(progress)``."""
 
     mesh: Mesh

@@ -11,6 +11,7 @@ The files, in reading order:
     keys bindings    tables of keys, and the editor's own one
     job              background work, with progress and cancellation
     preparing        the preparation for pulls, while the editor remains usable
+    finishing        the finish of a pose on the mesh, after a drag
     session_file     the file that the session is saved to
     recordings       recordings of input and video
     messages hints status_line help_card
@@ -50,6 +51,7 @@ from .panel_actions import (
     choosing_handle,
     choosing_region,
     exporting,
+    finishing_after_drags,
     fitting_with,
     frame_all,
     frame_selection,
@@ -96,6 +98,7 @@ __all__ = [
     "converting",
     "error_text",
     "exporting",
+    "finishing_after_drags",
     "fitting_with",
     "frame_all",
     "frame_selection",

@@ -16,6 +16,7 @@ The files, in reading order:
 from .confinement import confined_path, recorded_keys
 from .film import Film, film
 from .film_files import require_film
+from .finishes import announce_finish, on_finish_request
 from .limits import Clock, ReplayLimits
 from .off_screen import OffScreen
 from .reading import read_recording
@@ -29,8 +30,10 @@ __all__ = [
     "OffScreen",
     "Recorder",
     "ReplayLimits",
+    "announce_finish",
     "confined_path",
     "film",
+    "on_finish_request",
     "read_recording",
     "recorded_keys",
     "replay",
