@@ -30,7 +30,9 @@ _KEPT = Change.NAMES | Change.PIVOTS  # changes that a finish does not depend on
 
 
 class Finishing:
-    """Finishes the pose of a session after a drag.
+    """Finishes the pose of a session after a drag, if that is wanted.
+
+    By default it is not: where the finish moves whole limbs, the surface jumps after the release.
 
     Parameters
     ----------
@@ -53,7 +55,7 @@ class Finishing:
     ) -> None:
         self._view, self._session = view, session
         self._is_free, self._changed = is_free, changed
-        self._is_wanted = True
+        self._is_wanted = False
         self._stop_waiting: Stop | None = None
         self._since = 0.0
         self._job: Job[FinishedPose] | None = None

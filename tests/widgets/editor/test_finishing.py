@@ -10,7 +10,7 @@ from hands import plain_view
 from test_editor import Bench, bench, pull_handle, ready  # noqa: F401 - two of them are fixtures
 
 from vtk_segdeform import load_session
-from vtk_segdeform.widgets.editor import finishing
+from vtk_segdeform.widgets.editor import finishing, finishing_after_drags
 from vtk_segdeform.widgets.recording.recording import replay
 
 pytestmark = pytest.mark.usefixtures("unprepared")
@@ -35,6 +35,7 @@ def is_finished(bench):  # noqa: F811
 
 def test_a_pose_is_finished_after_a_drag_and_a_replay_ends_in_the_same(bench, tmp_path):  # noqa: F811
     bench.editor.path = tmp_path / "work.segdeform"
+    bench.editor.do(finishing_after_drags(True))
     bench.type("4", "ctrl+r")
     pull_handle(bench, (15, 25))
     until(bench, lambda: is_finished(bench))
@@ -59,6 +60,7 @@ def test_a_pose_is_finished_after_a_drag_and_a_replay_ends_in_the_same(bench, tm
 def test_the_next_press_and_escape_and_undo_cancel_it(bench, monkeypatch):  # noqa: F811
     bench.type("4")
     running = bench.editor.controller.finishing
+    running.is_wanted = True
 
     def begin():
         pull_handle(bench, (5, 8))
@@ -86,12 +88,12 @@ def test_the_next_press_and_escape_and_undo_cancel_it(bench, monkeypatch):  # no
 
 
 def test_a_key_finishes_the_pose_on_request(bench):  # noqa: F811
-    bench.editor.controller.finishing.is_wanted = False
     bench.type("4", "shift+f")
     assert "no pose to finish" in bench.editor.status.lower()
     bench.hand.failures.clear()
     pull_handle(bench)
     bench.hand.tick(5)
+    assert bench.editor.controller.finishing.fraction is None
     assert bench.session.can_finish
     bench.type("shift+f")
     assert is_finished(bench)
