@@ -19,7 +19,6 @@ The files, in reading order:
     history          the states of the session by name, jumps and previews
     notices notice_line
                      how the mesh differs from what was given, and where
-    wrapping         text that fits into a window
 """
 
 from . import actions

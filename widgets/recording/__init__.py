@@ -8,6 +8,7 @@ The files, in reading order:
     parsing         parsing the numbers in a line
     limits          limits of a replay
     confinement     the folder a replay may access, and its keys
+    finishes        finishes of a pose in the background
     film            `film` and `Film`
     film_files      GIF, MP4 and PNG files
     off_screen      a session in an off-screen window
