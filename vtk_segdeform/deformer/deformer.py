@@ -615,6 +615,7 @@ class Deformer:
         held = np.zeros(self.mesh.n_vertices, dtype=bool)
         held[self.fixed] = held[self.handle] = True
         places = np.array(self._rest_pose.vertices)
+        places[self.fixed] = frame.about_origin(self._constraints.fixed_at)
         places[self.handle] = frame.about_origin(frame.outward(self._targets))
         start = frame.about_origin(solution.vertices)
         keeps, shares = self._constraints.keeps, None

@@ -8,6 +8,7 @@ The files, in reading order:
     handles        named handles and their targets
     pulling        pulls and pins
     painting       painting, merging and splitting regions
+    finishing      poses finished on the mesh itself
     pose_solver    poses of states, with cached solvers
     listeners      notification of changes
     naming         names of regions and handles
@@ -16,6 +17,7 @@ The files, in reading order:
     archive        the file format
 """
 
+from .finishing import FinishedPose
 from .handles import require_handle
 from .listeners import Change
 from .naming import region_name
@@ -27,6 +29,7 @@ from .store import load_session, save_session, saved_view
 __all__ = [
     "Change",
     "Effort",
+    "FinishedPose",
     "Options",
     "Preparation",
     "Session",

@@ -76,7 +76,7 @@ def renamed(state: State, name: str, new_name: str) -> State:
     if state.pose is None:
         return replace(state, handles=handles)
     targets = {name_after(other): points for other, points in state.pose.targets.items()}
-    pose = Pose(state.pose.cage_vertices, MappingProxyType(targets))
+    pose = replace(state.pose, targets=MappingProxyType(targets))
     return replace(state, handles=handles, pose=pose)
 
 
@@ -113,7 +113,7 @@ def with_handles(pose: Pose, before: Handles, after: Handles, vertices: FloatArr
         name: pose.targets[name] if before.get(name) is ids else here[name]
         for name, ids in after.items()
     }
-    return Pose(pose.cage_vertices, MappingProxyType(kept))
+    return replace(pose, targets=MappingProxyType(kept))
 
 
 def checked_targets(

@@ -6,7 +6,8 @@
     cages, Pose               ->  vertices, x = W~ p       always the same product
 
 The vertices of a pose do not depend on how it was reached: after undo, redo or loading they are
-bitwise identical.
+bitwise identical.  A finished pose has its own vertices, as in `finishing`; its cages are solved
+for the places of handles and fixed vertices less the shifts in it.
 """
 
 from __future__ import annotations
@@ -19,17 +20,18 @@ from types import MappingProxyType
 import numpy as np
 
 from .. import sizes
-from ..arrays import FloatArray, frozen
+from ..arrays import FloatArray, IntArray, frozen
 from ..deformer import Deformer
 from ..errors import CageError, ConstraintError
 from ..files import cache_folder
 from ..geometry import Lids, lids_of, volume_gradient
 from ..mesh import Mesh
 from ..progress import Progress, part, tell
-from ..solver import Solution, VolumeConstraint, total_volume
+from ..solver import Solution, VolumeConstraint, errors_at, total_volume
+from .finishing import Finish, moved_on
 from .handles import require_near, targets_at
 from .listeners import Change
-from .state import Locality, Pose, State
+from .state import Finished, Locality, Pose, State
 
 _MAX_BOUND = 3  # bound deformers in memory: undo of new cages or options needs no new binding
 _BIND_SHARE = 0.95  # share of binding in the progress of `prepare`; the rest adds constraints
@@ -57,11 +59,12 @@ class PoseSolver:
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh
         self._bound: tuple[tuple[State, Deformer], ...] = ()  # newest first
-        self._constrained: tuple[Deformer, State, Deformer] | None = None
+        self._constrained: tuple[Deformer, State, FloatArray | None, Deformer] | None = None
         self._local: tuple[Deformer, Locality, Deformer] | None = None
         self._current: Pose | None = None  # pose of the deformer in use; None if unknown
         self._used: Deformer | None = None
         self._evaluated: tuple[Pose, bool | None, FloatArray, Callable[[], float]] | None = None
+        self._mapped: tuple[tuple[FloatArray, ...], FloatArray] = (), _NO_TARGETS
         self._volumes: dict[bool | None, tuple[Lids, VolumeConstraint]] = {}
 
     def lids(self, state: State) -> Lids:
@@ -122,10 +125,12 @@ class PoseSolver:
 
     def peek(self, state: State, pose: Pose) -> FloatArray | None:
         """Return `vertices` of a pose that may not be the current one; None if that would bind."""
+        if pose.finished is not None:
+            return pose.finished.vertices
         if not self.is_bound(state):
             return None
         known = self._evaluated
-        if known is not None and known[0].cage_vertices is pose.cage_vertices:
+        if known is not None and known[0].is_same_surface(pose):
             return known[2]
         x = self.bind(state).surface(pose.cage_vertices)
         frozen(x)
@@ -153,21 +158,55 @@ class PoseSolver:
         ConstraintError
             If no finite pose is found.
         """
+        before, shift = state.pose, self._shift(state)
         deformer = self._localise(state, self._constrain(state))
         self._start_from(state, deformer)
         self._current = None  # in case the solve fails
-        solution = deformer.solve(_stacked(targets), max_steps=max_steps, within=within)
+        places = _less(_stacked(targets), shift, deformer.handle)
+        solution = deformer.solve(places, max_steps=max_steps, within=within)
         if not np.isfinite(solution.vertices).all():
             raise ConstraintError("no finite pose for these targets; move the handles less")
         for vertices in solution.cage_vertices:
             frozen(vertices)
-        cages, before = solution.cage_vertices, state.pose
+        cages, finished = solution.cage_vertices, None if before is None else before.finished
         if before is not None and all(map(np.array_equal, cages, before.cage_vertices)):
             cages = before.cage_vertices  # so that their vertices are known
-        pose = Pose(cages, targets)
+        elif before is not None and finished is not None:
+            finished = self._moved_on(state, before, finished, solution.vertices)
+            self._mapped = cages, solution.vertices
+        pose = Pose(cages, targets, finished)
         self._current = pose
         x, change = self._evaluate(state, pose)
-        return pose, replace(solution, vertices=x, volume=change)
+        solution = replace(solution, vertices=x, volume=change)
+        if shift is None:
+            return pose, solution
+        reached = None if solution.targets is None else solution.targets + shift[deformer.handle]
+        ids, wanted = (
+            (deformer.handle, deformer.fixed),
+            (_stacked(targets), _fixed_at(self._mesh, state)),
+        )
+        errors = partial(errors_at, ids, wanted, self._mesh.diagonal)
+        return pose, replace(solution, errors=errors, targets=reached)
+
+    def finish(self, state: State, pose: Pose) -> Finish:
+        """Return the finish of *pose* of *state*, for another thread or for this one.
+
+        Raises
+        ------
+        ConstraintError
+            If there are neither handles nor fixed vertices.
+        """
+        if not (state.handles or len(state.fixed)):
+            raise ConstraintError("there are no handles to finish the pose for; add a handle")
+        shift = self._shift(state)
+        is_shifted = shift is not None and bool(shift[state.fixed].any())
+        deformer = self._held(state, state.fixed_at) if is_shifted else self._constrain(state)
+        return Finish(self._mesh, deformer.copy(), pose, _stacked(pose.targets), shift)
+
+    def accept(self, before: Pose, after: Pose) -> None:
+        """Continue from *after*, which has the same cages as *before* and is finished."""
+        if self._current is before:
+            self._current = after
 
     def free_form(self, state: State, cage_vertices: Sequence[FloatArray]) -> Pose:
         """Return the pose with the given *cage_vertices* (m_r, 3), corrected to preserve volume.
@@ -185,7 +224,12 @@ class PoseSolver:
             p = self._restore_volume(state, p)
         for vertices in p:
             frozen(vertices)
-        pose = Pose(p, MappingProxyType({}))
+        before = state.pose
+        finished = None if before is None else before.finished
+        if before is not None and finished is not None:
+            x = self._surface(state, p)
+            finished = self._moved_on(state, before, finished, x)
+        pose = Pose(p, MappingProxyType({}), finished)
         x, change = self._evaluate(state, pose)
         pose = replace(pose, targets=targets_at(state.handles, x))
         self._evaluated = pose, state.options.lids, x, change  # targets do not change the vertices
@@ -208,30 +252,60 @@ class PoseSolver:
 
     def _constrain(self, state: State) -> Deformer:
         """Return a deformer with the fixed vertices, handles and volume options of *state*."""
-        bound = self.bind(state)
+        bound, shift = self.bind(state), self._shift(state)
+        fixed_at = state.fixed_at
+        if shift is not None and shift[state.fixed].any():
+            fixed_at = _less(_fixed_at(self._mesh, state), shift, state.fixed)
         if self._constrained is not None:
-            other, constraints, deformer = self._constrained
-            if other is bound and _same_constraints(state, constraints):
+            other, constraints, places, deformer = self._constrained
+            is_same = places is fixed_at or (
+                places is not None and fixed_at is not None and np.array_equal(places, fixed_at)
+            )
+            if other is bound and is_same and _same_constraints(state, constraints):
                 return deformer
-        deformer = bound.hold(
-            fixed=state.fixed,
-            handle=state.handle,
-            fixed_at=state.fixed_at,
-            preserve_volume=state.options.preserve_volume,
-            preserve_region_volumes=state.options.preserve_region_volumes,
-            lids=state.options.lids,
-            avoid_folds=state.options.avoid_folds,
-            avoid_contact=state.options.avoid_contact,
-        )
+        deformer = self._held(state, fixed_at)
         constraints = State(
             fixed=state.fixed,
             handles=state.handles,
             options=state.options,
             fixed_at=state.fixed_at,
         )
-        self._constrained = bound, constraints, deformer
+        self._constrained = bound, constraints, fixed_at, deformer
         self._current = None
         return deformer
+
+    def _held(self, state: State, fixed_at: FloatArray | None) -> Deformer:
+        """Return a deformer with the constraints of *state*, its fixed vertices at *fixed_at*."""
+        return self.bind(state).hold(
+            fixed=state.fixed,
+            handle=state.handle,
+            fixed_at=fixed_at,
+            preserve_volume=state.options.preserve_volume,
+            preserve_region_volumes=state.options.preserve_region_volumes,
+            lids=state.options.lids,
+            avoid_folds=state.options.avoid_folds,
+            avoid_contact=state.options.avoid_contact,
+        )
+
+    def _shift(self, state: State) -> FloatArray | None:
+        """Return `Finished.shifted` (n, 3) of the pose; None if it is not finished."""
+        pose = state.pose
+        if pose is None or pose.finished is None:
+            return None
+        return pose.finished.shifted(self._surface(state, pose.cage_vertices))
+
+    def _moved_on(self, state: State, before: Pose, finished: Finished, x: FloatArray) -> Finished:
+        """Return *finished*, of the pose *before*, for other cages, whose mesh is *x* (n, 3)."""
+        offset = finished.vertices - self._surface(state, before.cage_vertices)
+        held = np.concatenate([state.fixed, state.handle])
+        preserved = self._constrain(state).preserved_volumes
+        return moved_on(finished, offset, x, held=held, constraints=preserved)
+
+    def _surface(self, state: State, cage_vertices: tuple[FloatArray, ...]) -> FloatArray:
+        """Return W~ p, (n, 3); the last one is kept."""
+        if self._mapped[0] is not cage_vertices:
+            self._mapped = cage_vertices, self.bind(state).surface(cage_vertices)
+        return self._mapped[1]
 
     def _localise(self, state: State, constrained: Deformer) -> Deformer:
         """Return a deformer that keeps what the last pull of *state* does not reach, if any."""
@@ -259,18 +333,27 @@ class PoseSolver:
         deformer.reset()
         # Every step of the solver meets the constraints, so its starting pose must do so too.
         if pose is not None and self._meets_constraints(state, pose, deformer):
-            deformer.resume(pose.cage_vertices, _stacked(pose.targets))
+            places = _less(_stacked(pose.targets), self._shift(state), deformer.handle)
+            deformer.resume(pose.cage_vertices, places)
 
     def _meets_constraints(self, state: State, pose: Pose, deformer: Deformer) -> bool:
-        x, _ = self._evaluate(state, pose)
+        if pose.finished is None:
+            x, _ = self._evaluate(state, pose)
+        else:
+            x = self._surface(state, pose.cage_vertices)
         return all(abs(v.relative(x)) <= _VOLUME_TOLERANCE for v in deformer.preserved_volumes)
 
     def _evaluate(self, state: State, pose: Pose) -> tuple[FloatArray, Callable[[], float]]:
-        """Return x = W~ p, and a function that returns its volume change."""
+        """Return x = W~ p, or the finished mesh, and a function that returns its volume change."""
         lids, before = state.options.lids, self._evaluated
-        same = before is not None and before[0].cage_vertices is pose.cage_vertices
+        same = before is not None and before[0].is_same_surface(pose)
         if before is None or not same or before[1] is not lids:
-            x = before[2] if before and same else self.bind(state).surface(pose.cage_vertices)
+            if before and same:
+                x = before[2]
+            elif pose.finished is not None:
+                x = pose.finished.vertices
+            else:
+                x = self.bind(state).surface(pose.cage_vertices)
             frozen(x)
             _, volume = self._enclosed(state)
             before = self._evaluated = pose, lids, x, cache(partial(volume.relative, x))
@@ -279,6 +362,15 @@ class PoseSolver:
 
 def _stacked(targets: Mapping[str, FloatArray]) -> FloatArray:
     return np.concatenate([_NO_TARGETS, *targets.values()])
+
+
+def _less(points: FloatArray, shift: FloatArray | None, ids: IntArray) -> FloatArray:
+    """Return *points* (k, 3) of the vertices *ids* (k,), less their *shift* if there is any."""
+    return points if shift is None else points - shift[ids]
+
+
+def _fixed_at(mesh: Mesh, state: State) -> FloatArray:
+    return mesh.vertices[state.fixed] if state.fixed_at is None else state.fixed_at
 
 
 def _same_binding(a: State, b: State) -> bool:

@@ -134,7 +134,11 @@ def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
         handles = with_handle(mesh, state, name, patch)
     places = tuple(cage.vertices for cage in state.cages)
     places = places if state.pose is None else state.pose.cage_vertices
-    pose = Pose(places, targets_at(handles, vertices))
+    finished = None if state.pose is None else state.pose.finished
+    if finished is not None:  # handles stay where they are, also for the cages
+        kept = np.isin(finished.held, state.fixed)
+        finished = replace(finished, held=finished.held[kept], shifts=finished.shifts[kept])
+    pose = Pose(places, targets_at(handles, vertices), finished)
     reach, follows = reach_and_follows(radius, locality)
     local = Locality(vertex, reach, SPREAD * radius, follows, pose.cage_vertices)
     after = replace(state, handles=handles, pulls=pulls, pose=pose, locality=local)

@@ -49,6 +49,7 @@ from ..progress import Progress, part
 from ..regions import Regions, segment
 from ..solver import Solution, Status
 from . import handles, naming, painting, pulling
+from .finishing import Finish, FinishedPose
 from .history import Timeline
 from .listeners import Change
 from .pose_solver import PoseSolver
@@ -135,6 +136,7 @@ class Session(Timeline):
         self._pose_solver = PoseSolver(mesh)
         self._solution: tuple[Pose, Solution] | None = None
         self._effort = Effort(0, 0.0)
+        self._finished: Pose | None = None  # the last one accepted
         # The result of `fitted_cages`, which `set_cages` need not check.
         self._fitted: tuple[Regions | None, Sequence[Cage] | None] = None, None
         # The state before the ongoing pull, and what it has grabbed.
@@ -790,6 +792,73 @@ class Session(Timeline):
         self._solution = pose, solution
         self._set_state(replace(self._state, pose=pose), Change(0))
         return solution
+
+    def finish(self, *, progress: Progress | None = None) -> Solution:
+        """Finish the pose on the mesh itself, as `Deformer.finish` does.
+
+        Triangles are less distorted, joints bend in less space, and handles and fixed vertices are
+        exact.  The next drag continues from the finished pose.
+
+        Adds no undo step: the result becomes part of the ongoing drag, or else of the last step.
+
+        Parameters
+        ----------
+        progress : Progress, optional
+            May cancel; then nothing changes.
+
+        Raises
+        ------
+        SessionError
+            If there is no pose, or it is that of a local pull.
+        """
+        if self.solution is not None and self.solution.status is Status.STEP_LIMIT:
+            self.refine()
+        result = self.finishing()(progress)
+        self.accept_finish(result)
+        return result.solution
+
+    @property
+    def can_finish(self) -> bool:
+        """Whether there is a pose that `finish` can finish, and it is not finished yet."""
+        return not self._reason_not_to_finish() and not self._is_finished
+
+    def finishing(self) -> Finish:
+        """Return a function that finishes the current pose, ``finishing(progress)``.
+
+        It does not use the session, so another thread may call it while the session is edited; pass
+        its result to `accept_finish` in the session's thread.  Raises like `finish`.
+        """
+        reason = self._reason_not_to_finish()
+        if reason:
+            raise SessionError(reason)
+        assert self._state.pose is not None
+        return self._pose_solver.finish(self._state, self._state.pose)
+
+    def accept_finish(self, result: FinishedPose) -> bool:
+        """Use the result of `finishing`; False if the pose has changed since."""
+        before, pose, solution = require(result, FinishedPose, "result")
+        if self._state.pose is not before:
+            return False
+        self._pose_solver.accept(before, pose)
+        self._solution = pose, solution
+        self._finished = pose
+        self._set_state(replace(self._state, pose=pose), Change(0))
+        return True
+
+    @property
+    def _is_finished(self) -> bool:
+        return self._finished is not None and self._finished is self._state.pose
+
+    def _reason_not_to_finish(self) -> str:
+        """Return why the pose cannot be finished, or ""."""
+        state = self._state
+        if state.pose is None:
+            return "there is no pose to finish; move a handle first"
+        if not (state.handles or len(state.fixed)):
+            return "there are no handles or fixed vertices to finish the pose for; add a handle"
+        if state.locality is not None:
+            return "the pose of a pull cannot be finished; drag a handle first"
+        return ""
 
     def start_afresh(self) -> None:
         """Make the next solve bitwise reproducible, as in a session that was just loaded.

@@ -112,6 +112,25 @@ def label_of_change(before: Options, after: Options) -> str:
 
 
 @dataclass(frozen=True, eq=False)
+class Finished(Frozen):
+    """The mesh in a pose that was finished, or dragged on from one that was; see `finishing`."""
+
+    vertices: FloatArray
+    """(n, 3) float."""
+    held: IntArray
+    """(h,) int: the vertices that were fixed or in handles at the finish."""
+    shifts: FloatArray
+    """(h, 3) float: their places, less those that the cages are solved for; 0 but for vertices that
+    became fixed or handles in a finished pose."""
+
+    def shifted(self, x: FloatArray) -> FloatArray:
+        """Return for every vertex its place, less that of the cages, whose mesh is *x* (n, 3)."""
+        shift = self.vertices - x
+        shift[self.held] = self.shifts
+        return shift
+
+
+@dataclass(frozen=True, eq=False)
 class Pose(Frozen):
     """A deformation of the cages, and the targets it was solved for; read-only arrays."""
 
@@ -119,6 +138,12 @@ class Pose(Frozen):
     """One (m_r, 3) float per region."""
     targets: Mapping[str, FloatArray]
     """For each handle by name, (k, 3) float: the targets of its vertices."""
+    finished: Finished | None = None
+    """The mesh, unless it is that of the cages, W~ p."""
+
+    def is_same_surface(self, other: Pose) -> bool:
+        """Return whether the mesh is that of *other*, whatever the targets."""
+        return self.cage_vertices is other.cage_vertices and self.finished is other.finished
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,6 +252,7 @@ def checked_state(mesh: Mesh, state: State) -> State:
     pose = None
     if state.pose is not None:
         pose = _checked_pose(cages, lengths, list(handles), require(state.pose, Pose, "state.pose"))
+        pose = replace(pose, finished=_checked_finished(mesh, state.pose.finished))
         _require_plausible(mesh, pose)
     pulls, locality = all_of(state.pulls, str, "state.pulls"), state.locality
     if locality is not None:
@@ -301,6 +327,22 @@ def _checked_pose(
     return Pose(tuple(_frozen_copy(points) for points in places), owned)
 
 
+def _checked_finished(mesh: Mesh, finished: Finished | None) -> Finished | None:
+    if finished is None:
+        return None
+    require(finished, Finished, "state.pose.finished")
+    vertices = as_points(finished.vertices, "state.pose.finished.vertices")
+    if len(vertices) != mesh.n_vertices:
+        raise CageError(
+            f"the finished pose must have {mesh.n_vertices} vertices; got {len(vertices)}"
+        )
+    held, _ = checked_constraints(mesh, finished.held, ())
+    shifts = as_points(finished.shifts, "state.pose.finished.shifts")
+    if len(shifts) != len(held) or not np.array_equal(held, finished.held):
+        raise ConstraintError("the finished pose must have a shift for each held vertex")
+    return Finished(*map(_frozen_copy, (vertices, held, shifts)))
+
+
 def _checked_locality(mesh: Mesh, cages: Sequence[Cage], locality: Locality) -> Locality:
     start = _checked_pose(cages, [], [], Pose(locality.cage_vertices, {}))
     _require_plausible(mesh, start)
@@ -349,7 +391,8 @@ def _checked_pivots(
 
 def _require_plausible(mesh: Mesh, pose: Pose) -> None:
     """Raise a CageError if *pose* is so far away that vertices could overflow."""
-    every = np.concatenate([*pose.cage_vertices, *pose.targets.values()])
+    own = [] if pose.finished is None else [pose.finished.vertices]
+    every = np.concatenate([*pose.cage_vertices, *pose.targets.values(), *own])
     away = np.abs(every - mesh.vertices.mean(axis=0)).max(initial=0.0) / mesh.diagonal
     if not away <= _FARTHEST:
         raise CageError(f"the pose is damaged: it is {away:.0e} mesh diagonals away from the mesh")

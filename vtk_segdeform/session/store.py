@@ -9,6 +9,8 @@ The file is an `archive`, which ``numpy.load`` reads as an .npz file:
     fixed.npy             (f,) int         handle.npy       (h,) int
     pose.npy              (c, 3) float     targets.npy      (h, 3) float           if not at rest
     locality.npy          (c, 3) float     the cages where a pull began            if any
+    finished.npy          (n, 3) float     the mesh in a finished pose             if any
+    finished_held.npy, finished_shifts.npy       as in `state.Finished`
     surface_...npy        the given surface, as in `surface_store`                 if any
 
 The header may also have the ``view`` of the editor: camera, mode and up axis.  Nothing else depends
@@ -44,7 +46,7 @@ from ..mesh import Mesh
 from ..regions import Regions
 from .archive import Archive, write_archive
 from .session import Session
-from .state import Locality, Options, Pose, State, split_rows
+from .state import Finished, Locality, Options, Pose, State, split_rows
 
 if TYPE_CHECKING:
     from ..io import Surface
@@ -184,6 +186,11 @@ def _write(
         vertex, reach, *lengths, _ = vars(state.locality).values()
         header["locality"] = [vertex, None if reach == math.inf else reach, *lengths]
         arrays["locality"] = np.concatenate(state.locality.cage_vertices)
+    if pose is not None and pose.finished is not None:
+        header["n_finished_held"] = len(pose.finished.held)
+        arrays["finished"] = pose.finished.vertices
+        arrays["finished_held"] = pose.finished.held
+        arrays["finished_shifts"] = pose.finished.shifts
     if state.fixed_at is not None:
         header["fixed_in_pose"] = True
         arrays["fixed_at"] = state.fixed_at
@@ -228,7 +235,15 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
     if header["posed"]:
         places = split_rows(archive.array("pose", "f", (total, 3)), n_vertices)
         targets = split_rows(archive.array("targets", "f", (n_handle, 3)), lengths)
-        pose = Pose(tuple(places), dict(zip(sizes, targets, strict=True)))
+        finished = None
+        if "n_finished_held" in header:
+            held = _count(header, "n_finished_held")
+            finished = Finished(
+                archive.array("finished", "f", (n, 3)),
+                archive.array("finished_held", "i", (held,)),
+                archive.array("finished_shifts", "f", (held, 3)),
+            )
+        pose = Pose(tuple(places), dict(zip(sizes, targets, strict=True)), finished)
     fixed = archive.array("fixed", "i", (_count(header, "n_fixed"),))
     options = Options(**header["options"])
     names = tuple(_list(header, "region_names")) if "region_names" in header else ()

@@ -11,6 +11,7 @@ The files, in reading order:
     keys bindings    tables of keys, and the editor's own one
     job              background work, with progress and cancellation
     preparing        the preparation for pulls, while the editor remains usable
+    finishing        the finish of a pose on the mesh, after a drag
     session_file     the file that the session is saved to
     recordings       recordings of input and video
     messages hints status_line help_card
@@ -18,7 +19,6 @@ The files, in reading order:
     history          the states of the session by name, jumps and previews
     notices notice_line
                      how the mesh differs from what was given, and where
-    wrapping         text that fits into a window
 """
 
 from . import actions
@@ -50,6 +50,7 @@ from .panel_actions import (
     choosing_handle,
     choosing_region,
     exporting,
+    finishing_after_drags,
     fitting_with,
     frame_all,
     frame_selection,
@@ -96,6 +97,7 @@ __all__ = [
     "converting",
     "error_text",
     "exporting",
+    "finishing_after_drags",
     "fitting_with",
     "frame_all",
     "frame_selection",

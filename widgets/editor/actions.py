@@ -18,6 +18,7 @@ from vtk_segdeform.errors import CageError, ConstraintError, RegionError, Sessio
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.regions import segment as segment_mesh
+from vtk_segdeform.session import FinishedPose
 
 from ..region_selector import Paint, Tool
 from ..scene import Phase, SurfaceStyle
@@ -75,6 +76,17 @@ def reset(controller: Controller) -> None:
     """Reset the pose."""
     controller.session.reset_pose()
     controller.say("Pose reset")
+
+
+def finish(controller: Controller) -> None:
+    """Finish the pose on the mesh."""
+    session = controller.session
+
+    def accept(result: FinishedPose) -> str:
+        is_same = session.accept_finish(result)
+        return "Pose finished on the mesh" if is_same else "The pose changed; it was not finished"
+
+    controller.start("Finishing on the mesh", session.finishing(), accept)
 
 
 def save(controller: Controller) -> None:

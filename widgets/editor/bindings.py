@@ -41,6 +41,7 @@ BINDINGS = (
     Binding("undo", ("z", "ctrl+z"), ALL, "Undo", actions.undo),
     Binding("redo", ("y", "ctrl+y", "ctrl+shift+z"), ALL, "Redo", actions.redo),
     Binding("reset_pose", ("home",), ALL, "Reset pose", actions.reset),
+    Binding("finish", ("shift+f",), ALL, "Finish pose on the mesh", actions.finish),
     Binding("show_cages", ("c",), ALL, "Show cages in all modes", actions.toggle_cages),
     Binding("preserve_volume", ("p",), ALL, "Preserve volume", actions.toggle_volume),
     Binding(

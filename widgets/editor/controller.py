@@ -23,6 +23,7 @@ from vtk_segdeform.session import Change, Preparation, Session, saved_view
 from ..recording import confined_path
 from ..scene import Draft, View, Widget
 from .camera import Camera, has_y_up
+from .finishing import Finishing
 from .help_card import HelpCard
 from .hints import hint
 from .job import Worker, view_timer
@@ -68,6 +69,8 @@ class Controller:
         The current recording of input and of video.
     camera : Camera
         Navigation, views and the orientation cube.
+    finishing : Finishing
+        Finishes the pose on the mesh after each drag.
     """
 
     def __init__(self, view: View, session: Session, keys: Keys) -> None:
@@ -90,6 +93,7 @@ class Controller:
             self._prepare_pulls,
             self.refresh,
         )
+        self.finishing = Finishing(view, lambda: self.session, self._is_free, self.refresh)
         self.widgets = WidgetSet(view, session)
         self.camera = Camera(view, self.widgets, self.help)
         self._listen()
@@ -143,6 +147,7 @@ class Controller:
                 if not on:
                     self.help.hide()
                     self._preparing.stop()
+                    self.finishing.interrupt()
                     self._worker.cancel()
                     self.wait()
             finally:
@@ -154,6 +159,7 @@ class Controller:
         self._stop_listening()
         self._stop_failures()
         self.recordings.remove()
+        self.finishing.remove()
         self.camera.remove()
         self.widgets.remove()
         self.help.remove()
@@ -191,7 +197,10 @@ class Controller:
         elif self._is_on:
             fraction = self._preparing.fraction
             preparing = None if fraction == 1.0 else fraction  # finished, but not accepted yet
-            self.messages.show(mode, self.hint, preparing)
+            work, fraction = "Preparing", preparing
+            if preparing is None and self.finishing.fraction is not None:
+                work, fraction = "Finishing", self.finishing.fraction
+            self.messages.show(mode, self.hint, fraction, work=work)
         else:
             self.messages.hide()
         self.notices.enable(self._is_on)
@@ -245,9 +254,12 @@ class Controller:
     def _gesture_ended(self, widget: Widget, _: str) -> None:
         if widget.remark:
             self.messages.note(widget.remark)
+        if widget is self.widgets.dragger:
+            self.finishing.rest()
         self.refresh()
 
     def _gesture_began(self, *_: object) -> None:
+        self.finishing.interrupt()
         self.messages.clear()  # an error would hide the amount and the keys of the drag
         if self._mode is Mode.PULL:
             self._prepare_pulls(again=True)
@@ -257,6 +269,7 @@ class Controller:
         if change & Change.HISTORY:
             self.messages.clear()
             self.show_instead(None)
+        self.finishing.follow(change)
         self.notices.changed(change)
         replaced = change & Change.POSE and change & (Change.REGIONS | Change.CAGES)
         if replaced and self.session.state.pose is None:
@@ -295,6 +308,7 @@ class Controller:
         with self.view.drawing_once():
             self.widgets.finish()  # before the job starts, because it may fail
             self._preparing.interrupt()
+            self.finishing.interrupt()
             self._worker.start(name, work, deliver)
             self.widgets.switch_off()
             self.refresh()
@@ -312,6 +326,8 @@ class Controller:
             pass
         elif self.help.is_shown:
             self.help.hide()
+        elif self.finishing.interrupt():
+            self.say("The pose is not finished on the mesh")
         elif self._preparing.cancel():
             self.say("Preparation cancelled. Drag the surface to start it again")
 
@@ -351,6 +367,13 @@ class Controller:
         session = self.session
         is_pulling = session.is_bound and any(w.is_grabbing for w in self.widgets.interactive)
         return self._mode is Mode.PULL and not (self.is_busy or session.is_dragging or is_pulling)
+
+    def _is_free(self) -> bool:
+        """Return whether nothing is being dragged, refined or computed."""
+        widgets = self.widgets
+        is_used = self.session.is_dragging or any(w.is_grabbing for w in widgets.interactive)
+        is_refined = widgets.dragger.is_refining or widgets.puller.is_refining
+        return self._is_on and not (self.is_busy or is_used or is_refined)
 
     def _accept(self, session: Session, preparation: Preparation) -> None:
         was_modified = self.file.is_modified(session)

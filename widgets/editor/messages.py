@@ -101,15 +101,17 @@ class Messages:
         self.note(question)
         return False
 
-    def show(self, mode: str, hint: str, preparing: float | None = None) -> None:
+    def show(
+        self, mode: str, hint: str, preparing: float | None = None, *, work: str = "Preparing"
+    ) -> None:
         """Show the error, or else the result and *hint*, the next step in *mode*.
 
-        At the right, show which fraction of the preparation is complete, if any is *preparing*.
+        At the right, show which fraction of the background *work* is complete, if any is running.
         """
         self._preparing = preparing
         if time.monotonic() > self._noted + _SECONDS and not self._question:
             self._note = ""
-        aside = "" if preparing is None else f"Preparing ... {100.0 * preparing:.0f} % (Esc)"
+        aside = "" if preparing is None else f"{work} ... {100.0 * preparing:.0f} % (Esc)"
         if self._error:
             self._line.warn(self._error, mode, aside)
         else:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from ..scene import Panel, Text, View
-from .wrapping import letter_size, wrapped
+from .status_line import letter_size, wrapped
 
 _PAPER, _LETTERS = "#2B2F36", "#FFFFFF"  # contrast 13 to 1
 _BUTTON, _POINTED, _INK = "#8CC4EA", "#FFFFFF", "#14181D"  # contrasts above 9 to 1

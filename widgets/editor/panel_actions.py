@@ -156,6 +156,17 @@ def setting(**changes: float | bool | None) -> Action:
     return lambda controller: controller.session.change_options(**changes)
 
 
+def finishing_after_drags(wanted: bool) -> Action:
+    """Return the action that finishes poses on the mesh after each drag, or no longer."""
+
+    def change(controller: Controller) -> None:
+        controller.finishing.is_wanted = wanted
+        if wanted:
+            controller.finishing.rest()
+
+    return change
+
+
 def opening(path: Path) -> Action:
     """Return the action that opens a session or a mesh."""
     return lambda controller: controller.open(path)

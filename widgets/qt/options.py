@@ -8,6 +8,7 @@ from qtpy import QtCore, QtWidgets
 
 from ..editor import (
     DeformEditor,
+    finishing_after_drags,
     fitting_with,
     setting,
     setting_colour_range,
@@ -137,6 +138,15 @@ class DeformPart(QtWidgets.QGroupBox):
         self.clusters.setSingleStep(50)
         self.clusters.setSpecialValueText("One per vertex")
         self.clusters.valueChanged.connect(lambda n: editor.do(setting(rotation_groups=n or None)))
+        self.contact = check_box(
+            "Avoid contact", "Keep parts of the surface from crossing each other"
+        )
+        self.contact.clicked.connect(lambda on: editor.do(setting(avoid_contact=on)))
+        self.finishes = check_box(
+            "Finish on the mesh", "After each drag, reduce the distortion of the mesh itself"
+        )
+        self.finishes.clicked.connect(lambda on: editor.do(finishing_after_drags(on)))
+        self.finish = key_button(editor, "finish", "Finish pose")
         self.reset = key_button(editor, "reset_pose")
         column(
             self,
@@ -149,7 +159,8 @@ class DeformPart(QtWidgets.QGroupBox):
                 ("Stretch resistance", self.stretch),
                 ("Rotation clusters", self.clusters),
             ),
-            self.reset,
+            row(self.contact, self.finishes),
+            row(self.finish, self.reset),
         )
 
     def refresh(self) -> None:
@@ -171,6 +182,9 @@ class DeformPart(QtWidgets.QGroupBox):
         self.range.setEnabled(widgets.overlay_wanted)
         put(self.stretch, options.stretch)
         put(self.clusters, options.rotation_groups or 0)
+        put(self.contact, options.avoid_contact)
+        put(self.finishes, self._editor.controller.finishing.is_wanted)
+        self.finish.setEnabled(session.can_finish)
         self.reset.setEnabled(session.state.pose is not None)
 
 

@@ -8,6 +8,7 @@ The files, in reading order:
     parsing         parsing the numbers in a line
     limits          limits of a replay
     confinement     the folder a replay may access, and its keys
+    finishes        finishes of a pose in the background
     film            `film` and `Film`
     film_files      GIF, MP4 and PNG files
     off_screen      a session in an off-screen window
@@ -16,6 +17,7 @@ The files, in reading order:
 from .confinement import confined_path, recorded_keys
 from .film import Film, film
 from .film_files import require_film
+from .finishes import announce_finish, on_finish_request
 from .limits import Clock, ReplayLimits
 from .off_screen import OffScreen
 from .reading import read_recording
@@ -29,8 +31,10 @@ __all__ = [
     "OffScreen",
     "Recorder",
     "ReplayLimits",
+    "announce_finish",
     "confined_path",
     "film",
+    "on_finish_request",
     "read_recording",
     "recorded_keys",
     "replay",

@@ -18,9 +18,9 @@ changed, so a replay is exact even if a program moved the camera.
 `Keys` are those keys of the editor that differ from the default ones; they hold for the replay.
 
 Empty lines and lines that begin with # are ignored.  `Steps` is the number of solver steps of one
-solve.  A replay uses the same number and ends in the same pose on any machine, bit by bit if numpy
-sums in the same order.  A recording holds input only: replay it with the session and the view it
-began with.
+solve.  `Finish` finishes the pose on the mesh, which happened in the background.  A replay uses the
+same number and ends in the same pose on any machine, bit by bit if numpy sums in the same order.  A
+recording holds input only: replay it with the session and the view it began with.
 
 During a camera drag VTK's interactor style withholds all events from other observers, and a widget
 does so by its abort flag.  Neither affects VTK's passive observers, which are called first.  The
@@ -46,9 +46,10 @@ from vtk_segdeform.version import __version__
 
 from ..scene import View, observe_steps, prescribe_steps
 from .confinement import confined
+from .finishes import on_finish
 from .limits import Clock, ReplayLimits
 from .reading import Moment, read_recording
-from .transcript import EVENTS, TITLE, Camera, Entry, Input, Keys, Steps, Ticks, Window
+from .transcript import EVENTS, TITLE, Camera, Entry, Finish, Input, Keys, Steps, Ticks, Window
 
 _LONGEST_PAUSE = 2.0  # seconds
 _MOST_KEYS = 1000
@@ -102,6 +103,7 @@ class Recorder:
             self._record(Input(name, x, y, key=key, code=ord(key)))
         self._tags = [self._observe(name) for name in (*EVENTS, "Timer")]
         self._stop_steps = observe_steps(self.view.interactor, self._on_steps)
+        self._stop_finishes = on_finish(self.view, self._on_finish)
 
     def stop(self) -> None:
         """Stop recording and close the file."""
@@ -111,6 +113,7 @@ class Recorder:
             self.view.interactor.RemoveObserver(tag)
         self._tags = []
         self._stop_steps()
+        self._stop_finishes()
         self._record_ticks()
         self._record_scene()
         if self._file is not None:
@@ -157,6 +160,10 @@ class Recorder:
         with self.view.guarded():
             self._record_ticks()  # the last tick caused the solve
             self._record(Steps(steps))
+
+    def _on_finish(self) -> None:
+        self._record_ticks()  # the finish takes effect after the last tick
+        self._record(Finish())
 
     def _record_ticks(self) -> None:
         if self._ticks:

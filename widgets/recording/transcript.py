@@ -5,6 +5,7 @@
     MouseMove X Y [shift] [control] [alt] [key=NAME] [code=NUMBER]      and all other `EVENTS`
     Timer TIMES
     Steps NUMBER                    solver steps of a solve caused by the last event or tick
+    Finish                          the pose was finished on the mesh, in the background
     Keys ACTION=KEY[,KEY ...] ...   the keys of actions from here on, others than the default ones
 
 Lines are not trusted: only the names above are accepted, and numbers must be finite and within
@@ -21,6 +22,7 @@ from vtk_segdeform.errors import SessionError
 
 from ..scene import View
 from .confinement import set_recorded_keys
+from .finishes import request_finish
 from .parsing import parse_float, parse_int, require_count
 
 TITLE = "vtk_segdeform recording 1"
@@ -234,6 +236,18 @@ class Steps:
 
 
 @dataclass(frozen=True)
+class Finish:
+    """The pose was finished on the mesh in the background."""
+
+    def __str__(self) -> str:
+        return "Finish"
+
+    def send(self, view: View) -> None:
+        """Finish the pose."""
+        request_finish(view.interactor)
+
+
+@dataclass(frozen=True)
 class Keys:
     """The keys of actions of the editor; the other actions have their default keys."""
 
@@ -272,6 +286,9 @@ def read_entry(text: str) -> tuple[float, Entry]:
         return time, Ticks(parse_int(require_count(rest, 1)[0], 1, _MOST_TICKS))
     if name == "Steps":
         return time, Steps(parse_int(require_count(rest, 1)[0], 1, _MOST_STEPS))
+    if name == "Finish":
+        require_count(rest, 0)
+        return time, Finish()
     if name == "Keys":
         return time, Keys.read(rest)
     raise ValueError(f"{name[:40]!r} is not an event of a recording")

@@ -1,0 +1,198 @@
+"""Poses finished on the mesh: the next drag continues from them, and every copy is the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from scenes import sausage
+from sheets import plate
+from solids import rotation
+
+from vtk_segdeform.cages.cage import Cage
+from vtk_segdeform.cages.fit import fit_cages
+from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, SessionError
+from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.regions.regions import Regions
+from vtk_segdeform.session.session import Session
+from vtk_segdeform.session.state import checked_state
+from vtk_segdeform.session.store import load_session, save_session
+
+pytestmark = pytest.mark.usefixtures("bound_once")
+SCENE = sausage(2)
+
+
+def turned(angle: float) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation([0.0, 1.0, 0.0], angle)
+    return matrix
+
+
+def volume_of(mesh: Mesh, vertices: np.ndarray | None = None) -> float:
+    """Return the volume of the first part, which is the one that moves."""
+    faces = mesh.faces[mesh.faces.max(axis=1) < SCENE.mesh.n_vertices]
+    return signed_volume(mesh.vertices if vertices is None else vertices, faces)
+
+
+def ready() -> Session:
+    """Return a session with fixed vertices and a handle called "tip"."""
+    session = Session(SCENE.mesh)
+    session.set_regions(SCENE.regions)
+    session.set_cages(SCENE.cages)
+    session.set_fixed(SCENE.fixed)
+    session.add_handle(SCENE.handle, "tip")
+    return session
+
+
+def dragged(session: Session, angle: float = -0.9) -> Session:
+    session.move_handle("tip", turned(angle))
+    session.commit()
+    return session
+
+
+def two_parts() -> Session:
+    """Return a session of two bodies in one cage each, of which one is bent."""
+    one = SCENE.mesh
+    far = np.array([0.0, 3.0 * one.diagonal, 0.0])
+    mesh = Mesh(
+        np.concatenate([one.vertices, one.vertices + far]),
+        np.concatenate([one.faces, one.faces + one.n_vertices]),
+    )
+    session = Session(mesh)
+    membership = np.zeros((2, mesh.n_vertices), dtype=bool)
+    membership[0, : one.n_vertices] = membership[1, one.n_vertices :] = True
+    session.set_regions(Regions(mesh, membership))
+    (cage,) = fit_cages(one, Regions.single(one), 60)
+    session.set_cages([cage, Cage(cage.vertices + far, cage.faces)])
+    session.set_fixed(SCENE.fixed)
+    session.add_handle(SCENE.handle, "tip")
+    return session
+
+
+def open_sheet() -> Session:
+    mesh = Mesh(*plate(14, 10))
+    session = Session(mesh)
+    session.set_regions(Regions.single(mesh))
+    session.change_options(n_cage_vertices=40)
+    session.fit_cages()
+    x = mesh.vertices[:, 0]
+    session.set_fixed(x <= np.quantile(x, 0.1))
+    session.add_handle(x >= np.quantile(x, 0.9), "tip")
+    return session
+
+
+@pytest.mark.parametrize("make", [ready, two_parts, open_sheet])
+def test_a_drag_goes_on_from_a_finished_pose_without_a_jump(make):
+    session = dragged(make(), -0.6)
+    other = dragged(make(), -0.6)
+    before, steps = session.vertices, len(session.history)
+    solution = session.finish()
+    finished = session.vertices
+    assert np.abs(finished - before).max() > 1e-4 * session.mesh.diagonal
+    assert len(session.history) == steps
+    assert solution.handle_error < 1e-12
+    assert solution.fixed_error < 1e-12
+    session.drag(session.targets)
+    assert_array_equal(session.vertices, finished)
+    for angle in (1e-5, 0.2):
+        session.move_handle("tip", turned(-angle))
+        other.move_handle("tip", turned(-angle))
+        assert np.abs(session.vertices - finished).max() < 3.0 * angle * session.mesh.diagonal
+        if session.has_volume:
+            change = volume_of(session.mesh, session.vertices) / volume_of(session.mesh) - 1.0
+            assert abs(change) < 1e-12
+        assert_array_equal(session.cage_vertices[0], other.cage_vertices[0])
+
+
+def test_every_copy_and_step_has_the_same_finished_pose(tmp_path):
+    session = ready()
+    dragged(session).finish()
+    first = session.vertices
+    dragged(session, -0.2)
+    second = session.vertices  # not finished itself
+    session.undo()
+    assert_array_equal(session.vertices, first)
+    session.undo()
+    assert session.state.pose is None
+    session.jump(len(session.history) - 1)
+    assert_array_equal(session.vertices, second)
+    assert_array_equal(session.vertices_at(session.position - 1), first)
+    save_session(tmp_path / "posed", session)
+    loaded = load_session(tmp_path / "posed")
+    assert_array_equal(loaded.vertices, second)
+    for each in (session, loaded):
+        each.start_afresh()
+        each.drag(each.targets)
+        each.commit()
+        each.finish()
+    assert_array_equal(loaded.vertices, session.vertices)
+
+
+def test_what_is_fixed_or_grabbed_after_a_finish_stays_where_it_is():
+    session = ready()
+    dragged(session).finish()
+    finished, unit = session.vertices, session.mesh.diagonal
+    free = np.setdiff1d(np.arange(len(finished)), [*session.fixed, *session.state.handle])
+    away = np.abs(finished - SCENE.mesh.vertices).sum(axis=1)
+    middle = free[np.argsort(away[free])][len(free) // 2 :][:20]
+    session.set_fixed(np.concatenate([session.fixed, middle[:10]]))
+    session.add_handle(middle[10:], "belly")
+    solution = session.drag(session.targets)
+    assert np.abs(session.vertices - finished).max() < 1e-3 * unit
+    assert max(solution.handle_error, solution.fixed_error) < 5e-4
+    session.commit()
+    session.finish()
+    places = session.state.fixed_at
+    assert places is not None
+    assert np.abs(session.vertices[session.fixed] - places).max() < 1e-12
+    finished = session.vertices
+    session.drag(session.targets)
+    assert np.abs(session.vertices - finished).max() < 1e-3 * unit
+    session.commit()
+    vertex = int(free[3])
+    before = session.vertices
+    session.pull(vertex, before[vertex])
+    assert np.abs(session.vertices - before).max() < 1e-9 * unit
+
+
+def test_a_finish_that_is_cancelled_or_late_changes_nothing():
+    session = dragged(ready())
+    before = session.state
+
+    def cancel(*_: object) -> None:
+        raise Cancelled("Cancelled")
+
+    with pytest.raises(Cancelled):
+        session.finish(progress=cancel)
+    assert session.state is before
+    late = session.finishing()()
+    dragged(session, -0.1)
+    now = session.state
+    assert not session.accept_finish(late)
+    assert session.state is now
+
+
+def test_what_cannot_be_finished_is_told():
+    session = ready()
+    with pytest.raises(SessionError, match="no pose"):
+        session.finish()
+    session.pull(int(SCENE.handle[0]), SCENE.mesh.vertices[SCENE.handle[0]] + 0.1, locality=0.5)
+    session.commit()
+    with pytest.raises(SessionError, match="pull"):
+        session.finish()
+    assert not session.can_finish
+
+
+def test_a_finished_pose_that_does_not_fit_is_refused():
+    session = dragged(ready())
+    session.finish()
+    state = session.state
+    assert state.pose is not None
+    assert state.pose.finished is not None
+    for part in ("vertices", "held", "shifts"):
+        short = replace(state.pose.finished, **{part: getattr(state.pose.finished, part)[1:]})
+        with pytest.raises((CageError, ConstraintError)):
+            checked_state(session.mesh, replace(state, pose=replace(state.pose, finished=short)))

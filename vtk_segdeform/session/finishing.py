@@ -1,0 +1,100 @@
+"""Poses finished on the mesh itself: the finish, and poses dragged on from a finished one.
+
+    finish                        x = the finish of W~ p         `Deformer.finish`
+    drag on, with cages p'        x' = W~ p' + (x - W~ p)        then the exact volume again
+
+The cages are solved for as if nothing had been finished, so the next move of a handle continues
+from where the cages are, and nothing jumps.  The volume is restored along the normals of the free
+vertices, by far less than the offset x - W~ p.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import FloatArray, IntArray, frozen
+from ..deformer import Deformer
+from ..mesh import Mesh, new_crossings
+from ..progress import Progress
+from ..solver import Solution, Status, VolumeConstraint, moved_along, steps_to_volume
+from .state import Finished, Pose
+
+
+class FinishedPose(NamedTuple):
+    """The result of `Session.finishing`."""
+
+    before: Pose
+    """The pose that was finished."""
+    pose: Pose
+    solution: Solution
+
+
+@dataclass(frozen=True, eq=False)
+class Finish:
+    """A pose to finish, and its own deformer; another thread may call ``finish(progress)``."""
+
+    mesh: Mesh
+    deformer: Deformer
+    pose: Pose
+    targets: FloatArray
+    """(k, 3) float, of all handles."""
+    shifts: FloatArray | None
+    """(n, 3) float, as `Finished.shifted`, if the pose was finished before."""
+
+    def __call__(self, progress: Progress | None = None, /) -> FinishedPose:
+        """Finish the pose; start from its cages, so that the way to it makes no difference."""
+        mesh, deformer, pose = self.mesh, self.deformer, self.pose
+        deformer.resume(pose.cage_vertices, self.targets)
+        x = deformer.surface(pose.cage_vertices)
+        start = Solution(
+            vertices=x,
+            cage_vertices=pose.cage_vertices,
+            steps=0,
+            status=Status.CONVERGED,
+            merits=(),
+            errors=lambda _: (0.0, 0.0),
+            volume=lambda: 0.0,
+            region_volumes=lambda _: np.empty(0),
+            crossed=partial(new_crossings, rest=mesh.vertices, faces=mesh.faces),
+        )
+        solution = deformer.finish(start, progress=progress)
+        held = np.union1d(deformer.fixed, deformer.handle)
+        shifts = np.zeros((len(held), 3)) if self.shifts is None else self.shifts[held]
+        vertices = np.array(solution.vertices)
+        for array in (vertices, held, shifts):
+            frozen(array)
+        finished = Finished(vertices, held, shifts)
+        return FinishedPose(pose, Pose(pose.cage_vertices, pose.targets, finished), solution)
+
+
+def moved_on(
+    finished: Finished,
+    offset: FloatArray,
+    x: FloatArray,
+    *,
+    held: IntArray,
+    constraints: tuple[VolumeConstraint, ...],
+) -> Finished:
+    """Return *x* (n, 3), the mesh of other cages, with the *offset* (n, 3) of a finished pose.
+
+    The *held* vertices do not follow when the volumes are restored.
+    """
+    moved = x + offset
+    if constraints:
+        centre = moved.mean(axis=0)
+        moved -= centre
+        directions = []
+        for constraint in constraints:
+            normals = constraint.gradient(moved)
+            lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+            normals /= np.where(lengths > 0.0, lengths, 1.0)
+            normals[held] = 0.0
+            directions.append(normals)
+        paths = np.hstack([moved, *directions])
+        moved = moved_along(paths, steps_to_volume(constraints, paths)) + centre
+    frozen(moved)
+    return Finished(moved, finished.held, finished.shifts)

@@ -1,0 +1,156 @@
+"""Finishing poses on the mesh in the background, once the hand has rested after a drag.
+
+    end of a drag  ->  rest for a moment, until the pose has converged
+    another thread ->  `Session.finishing`, from its own deformer
+    the result     ->  `Session.accept_finish`, part of the same undo step
+
+The next press, and every change of the session, cancels it.  Large meshes are finished on request
+only.  A replay finishes where the recording did.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from vtk_segdeform.checks import as_flag
+from vtk_segdeform.session import Change, FinishedPose, Session
+from vtk_segdeform.solver import Status
+
+from ..recording import announce_finish, on_finish_request, recorded_keys
+from ..scene import Stop, View
+from .job import Job, view_timer
+
+MOST_VERTICES = 30_000  # of a mesh that is finished without a request: it takes about 2 seconds
+
+_REST = 0.4  # seconds without a change before it begins
+_PERIOD = 100  # milliseconds between two checks
+_STEP = 0.2  # the fraction that is shown is a multiple of this: each change draws the view
+_KEPT = Change.NAMES | Change.PIVOTS  # changes that a finish does not depend on
+
+
+class Finishing:
+    """Finishes the pose of a session after a drag, if that is wanted.
+
+    By default it is not: where the finish moves whole limbs, the surface jumps after the release.
+
+    Parameters
+    ----------
+    view : View
+        Provides the timer.
+    session : callable
+        Returns the session that is edited.
+    is_free : callable
+        Returns whether nothing is being dragged, refined or computed.
+    changed : callable
+        Called when `fraction` has changed.
+    """
+
+    def __init__(
+        self,
+        view: View,
+        session: Callable[[], Session],
+        is_free: Callable[[], bool],
+        changed: Callable[[], object],
+    ) -> None:
+        self._view, self._session = view, session
+        self._is_free, self._changed = is_free, changed
+        self._is_wanted = False
+        self._stop_waiting: Stop | None = None
+        self._since = 0.0
+        self._job: Job[FinishedPose] | None = None
+        self._is_accepting = False
+        self._fraction: float | None = None
+        self._stop_requests = on_finish_request(view, self._finish_now)
+
+    @property
+    def is_wanted(self) -> bool:
+        """Whether poses are finished after each drag."""
+        return self._is_wanted
+
+    @is_wanted.setter
+    def is_wanted(self, wanted: bool) -> None:
+        self._is_wanted = as_flag(wanted, "wanted")
+        self.interrupt()
+
+    @property
+    def fraction(self) -> float | None:
+        """Completed fraction, 0..1, coarsely; None if no pose is being finished."""
+        return self._fraction
+
+    def rest(self) -> None:
+        """Finish the pose in a moment: a drag has just ended."""
+        self.interrupt()
+        is_replayed = recorded_keys(self._view.interactor) is not None
+        is_small = self._session().mesh.n_vertices <= MOST_VERTICES
+        if self._is_wanted and is_small and not is_replayed:
+            self._since = time.monotonic()
+            self._stop_waiting = self._view.every(_PERIOD, self._check)
+
+    def follow(self, change: Change) -> None:
+        """Cancel the finish if it does not suit the session after *change*."""
+        if self._is_accepting or not change & ~_KEPT:
+            return
+        if change is Change.POSE and self._stop_waiting is not None:
+            self._since = time.monotonic()  # still converging
+        else:
+            self.interrupt()
+
+    def interrupt(self) -> bool:
+        """Cancel; False if there was nothing to cancel."""
+        is_running = self._job is not None
+        if self._stop_waiting is not None:
+            self._stop_waiting()
+            self._stop_waiting = None
+        if self._job is not None:
+            self._job.abandon()
+            self._job = None
+        self._show(None)
+        return is_running
+
+    def remove(self) -> None:
+        """Stop permanently."""
+        self.interrupt()
+        self._stop_requests()
+
+    def _check(self) -> None:
+        if not self._is_free():
+            self._since = time.monotonic()
+        if time.monotonic() - self._since < _REST:
+            return
+        self.interrupt()
+        session = self._session()
+        solution = session.solution  # None after undo
+        if solution is None or solution.status is Status.STEP_LIMIT or not session.can_finish:
+            return
+        self._job = Job(
+            view_timer(self._view),
+            session.finishing(),
+            done=self._accept,
+            watch=self._watch,
+            is_due=self._is_free,
+        )
+        self._show(0.0)
+
+    def _accept(self, result: FinishedPose) -> None:
+        self._is_accepting = True
+        try:
+            is_accepted = self._session().accept_finish(result)
+        finally:
+            self._is_accepting = False
+        if is_accepted:
+            announce_finish(self._view.interactor)
+
+    def _watch(self, job: Job[FinishedPose]) -> None:
+        if job is self._job and not job.is_running:
+            self._job = None
+        self._show(_STEP * int(job.fraction / _STEP) if job.is_running else None)
+
+    def _finish_now(self) -> None:
+        if self._session().can_finish:
+            self._session().finish()
+
+    def _show(self, fraction: float | None) -> None:
+        if fraction != self._fraction:
+            self._fraction = fraction
+            self._changed()
