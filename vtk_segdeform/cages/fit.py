@@ -285,7 +285,7 @@ def _fit(
         message = f"fitting a cage of {n} vertices, attempt {attempt + 1}"
         tell(progress, attempt / _ATTEMPTS, message)
         larger = _LARGER ** (attempt * (attempt + 1) / 2)
-        nodes = max(_NODES, _NODES_PER_VERTEX * n)
+        nodes = max(_NODES, _NODES_PER_VERTEX * n) / (1.0 if stretch is None else 3.0)
         field = solid_field(
             patch, offset * larger, _STEP * length * larger, most_nodes=nodes, stretch=stretch
         )
@@ -295,7 +295,10 @@ def _fit(
             continue
         share = part(progress, (attempt + 0.5) / _ATTEMPTS, (attempt + 0.8) / _ATTEMPTS)
         contour = contour_surface(field.smooth, field.offset)
-        density = None if field.stretch is None else field.stretch_at(contour[0]) ** -2.0
+        density = None
+        if spacing is not None:
+            _, nearest = patch.surface.tree.query(field.grid.to_points(contour[0]))
+            density = (spacing[nearest] / length) ** -2.0
         vertices, faces = simplify(*contour, n, density=density, progress=share, message=message)
         tell(progress, (attempt + 0.8) / _ATTEMPTS, message)
         vertices = _cleared(vertices, faces, field)
