@@ -50,6 +50,7 @@ _LARGER = 1.25  # attempt k = 0, 1, ... has 1.25^(k (k + 1) / 2) times the offse
 _ATTEMPTS = 8  # 1, 1.25, 2, 4, 9, 28, 108, 517
 _ROUND, _NEAR = 0.2, 0.2  # least roundness, and distance in offsets, of a good cage
 _NODES, _NODES_PER_VERTEX = 3e5, 1e3  # limit of the nodes of a grid: the larger of both
+_FEWER = 3.0  # by which nodes are fewer if spacing varies: half the time, and as good poses
 _FEWEST = 8  # vertices of a cage
 _SUGGESTED, _SUGGESTED_EACH = 155, 30  # cage vertices in total, and for each region
 _SHELL = 6  # fewest vertices of each component of a cage with several
@@ -285,7 +286,7 @@ def _fit(
         message = f"fitting a cage of {n} vertices, attempt {attempt + 1}"
         tell(progress, attempt / _ATTEMPTS, message)
         larger = _LARGER ** (attempt * (attempt + 1) / 2)
-        nodes = max(_NODES, _NODES_PER_VERTEX * n) / (1.0 if stretch is None else 3.0)
+        nodes = max(_NODES, _NODES_PER_VERTEX * n) / (1.0 if stretch is None else _FEWER)
         field = solid_field(
             patch, offset * larger, _STEP * length * larger, most_nodes=nodes, stretch=stretch
         )
@@ -295,10 +296,7 @@ def _fit(
             continue
         share = part(progress, (attempt + 0.5) / _ATTEMPTS, (attempt + 0.8) / _ATTEMPTS)
         contour = contour_surface(field.smooth, field.offset)
-        density = None
-        if spacing is not None:
-            _, nearest = patch.surface.tree.query(field.grid.to_points(contour[0]))
-            density = (spacing[nearest] / length) ** -2.0
+        density = None if field.stretch is None else field.stretch_at(contour[0]) ** -2.0
         vertices, faces = simplify(*contour, n, density=density, progress=share, message=message)
         tell(progress, (attempt + 0.8) / _ATTEMPTS, message)
         vertices = _cleared(vertices, faces, field)
