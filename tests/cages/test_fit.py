@@ -151,7 +151,20 @@ def test_the_thickness_of_a_ball_is_about_its_diameter():
     assert_allclose(thickness(mesh), 2.0, rtol=0.12)
 
 
-@pytest.mark.parametrize("density", [[1.0], -np.ones(642), np.full(642, np.nan)])
+def test_a_thin_end_has_more_cage_vertices_by_thickness():
+    x, faces = squeezed(3.0, 1.0, 1.0)
+    thin = x[:, 0] > 0.5
+    x[thin, 1:] *= 0.3
+    mesh = Mesh(x, faces)
+    numbers = []
+    for density in (None, "thickness"):
+        (cage,) = fit_cages(mesh, Regions.single(mesh), 60, density=density)
+        assert cage.contains(mesh.vertices).all()
+        numbers.append(np.count_nonzero(cage.vertices[:, 0] > 0.5))
+    assert numbers[1] > 1.3 * numbers[0]
+
+
+@pytest.mark.parametrize("density", ["thin", [1.0], -np.ones(642), np.full(642, np.nan)])
 def test_an_invalid_density_is_refused(density):
     mesh = Mesh(*icosphere(3))
     with pytest.raises(ArgumentError, match="density"):

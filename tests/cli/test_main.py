@@ -72,6 +72,8 @@ def test_deform_moves_the_handle_keeps_the_volume_and_all_that_came_along(
     assert_allclose(mesh.vertices[top], expected, atol=1e-3 * bar.diagonal)
     bottom = bar.vertices[:, 2] < 0.1
     assert_allclose(mesh.vertices[bottom], bar.vertices[bottom], atol=1e-3 * bar.diagonal)
+    same = vtk_segdeform.deform(bar, bottom, top, expected, n_regions=2, n_cage_vertices=60)
+    assert_allclose(mesh.vertices, same.vertices, atol=1e-6 * bar.diagonal)
 
 
 def test_each_handle_has_its_own_motion_and_a_shift_may_begin_with_a_minus(bar, bar_file, tmp_path):

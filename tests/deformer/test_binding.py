@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 from scenes import sausage
+from solids import icosphere, together
 
 from vtk_segdeform import Deformer, Mesh, Regions, Session, sizes
+from vtk_segdeform.cages.fit import fit_cage
 from vtk_segdeform.deformer import binding, binding_cache
 from vtk_segdeform.errors import Cancelled
 
@@ -258,3 +260,16 @@ def test_a_binding_that_cannot_be_written_is_logged_and_not_required(tmp_path, c
         SCENE.deformer(cache=tmp_path / "file" / "folder")
     (said,) = [record.getMessage() for record in caplog.records if "written" in record.getMessage()]
     assert "not written, " in said
+
+
+def test_shares_of_clusters_follow_the_cage_vertices_of_regions_in_each_component():
+    mesh = Mesh(*together(icosphere(2), (icosphere(2)[0] + 5.0, icosphere(2)[1])))
+    regions = Regions.from_labels(mesh, (mesh.vertices[:, 0] > 0.5).astype(int))
+    numbers = zip(regions.membership, (20, 60), strict=True)
+    cages = [fit_cage(mesh, members, n) for members, n in numbers]
+    inputs = binding.BindingInputs(mesh, regions, cages, np.empty((80, 3)), None, 1.0, 300)
+    part, label = inputs.parts, regions.labels
+    for k in np.unique(part):
+        region = label[part == k][0]
+        within = (part == k).sum() / (label == region).sum()
+        assert inputs.shares[k] == pytest.approx((20, 60)[region] * within)

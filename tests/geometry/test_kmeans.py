@@ -29,6 +29,11 @@ def test_no_cluster_spans_two_parts():
     clusters = cluster_within_parts(positions, parts, 30)
     for cluster in range(clusters.max() + 1):
         assert len(np.unique(parts[clusters == cluster])) == 1
+    shares = np.array([7.0, 5.0, 7.0, 1.0, 0.0, 9.0])
+    some = np.array([1, 3, 4, 5])  # not every number is a part
+    clusters = cluster_within_parts(positions, some[parts], 30, shares=shares)
+    numbers = [len(np.unique(clusters[parts == part])) for part in range(4)]
+    assert numbers == [10, 2, 1, 18]
 
 
 def test_with_as_many_clusters_as_points_each_point_has_its_own():

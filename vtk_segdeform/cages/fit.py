@@ -50,6 +50,7 @@ _LARGER = 1.25  # attempt k = 0, 1, ... has 1.25^(k (k + 1) / 2) times the offse
 _ATTEMPTS = 8  # 1, 1.25, 2, 4, 9, 28, 108, 517
 _ROUND, _NEAR = 0.2, 0.2  # least roundness, and distance in offsets, of a good cage
 _NODES, _NODES_PER_VERTEX = 3e5, 1e3  # limit of the nodes of a grid: the larger of both
+_FEWER = 3.0  # by which nodes are fewer if spacing varies: half the time, and as good poses
 _FEWEST = 8  # vertices of a cage
 _SUGGESTED, _SUGGESTED_EACH = 155, 30  # cage vertices in total, and for each region
 _SHELL = 6  # fewest vertices of each component of a cage with several
@@ -79,7 +80,7 @@ def fit_cages(
     n_vertices: int = 155,
     *,
     fixed: ArrayLike = (),
-    density: ArrayLike | None = None,
+    density: ArrayLike | str | None = None,
     offset: float | None = None,
     progress: Progress | None = None,
 ) -> tuple[Cage, ...]:
@@ -97,9 +98,10 @@ def fit_cages(
     fixed : (k,) int or (n,) bool
         Vertices of the mesh that keep their shape, fixed or moved rigidly.  Cages have few vertices
         there, and more where the mesh is free, the more the thinner it is.
-    density : (n,) float, optional
-        Cage vertices per area at each vertex of the mesh, not negative; only ratios matter.  By
-        default, if there are fixed vertices, the inverse of the local thickness.
+    density : (n,) float or "thickness", optional
+        Cage vertices per area at each vertex of the mesh, not negative; only ratios matter.
+        "thickness" is the inverse of the local thickness, the default if there are fixed vertices;
+        poses are better, and fitting takes two to three times as long.
     offset : float, optional
         Approximate distance of the cages from the surface, in the unit of the mesh.  By default,
         0.4 sqrt(area / vertices of its cage) for each region.  It is increased where no valid
@@ -128,6 +130,7 @@ def fit_cages(
     shape, membership = mesh, regions.membership
     held = np.zeros(mesh.n_vertices, dtype=bool)
     held[as_ids(fixed, mesh.n_vertices, "fixed")] = True
+    by_thickness = held.any() if density is None else isinstance(density, str)
     wanted = None if density is None else _as_density(density, mesh.n_vertices)
     cluster = None
     if mesh.n_vertices > sizes.DECIMATED:
@@ -139,7 +142,9 @@ def fit_cages(
         free[cluster[~held]] = True
         held = ~free
         wanted = None if wanted is None else wanted[kept]
-    spacing = _spacing(shape, held, wanted, n_vertices)
+    if by_thickness and not held.all():
+        wanted = bending_density(shape)
+    spacing = None if wanted is None else _spacing(shape, held, wanted, n_vertices)
     patches = _patches(shape, membership, progress)
     numbers = _distributed(patches, n_vertices, spacing)
     cages = []
@@ -157,8 +162,12 @@ def fit_cages(
     return tuple(cages)
 
 
-def _as_density(density: ArrayLike, n: int) -> FloatArray:
-    """Return *density* as an array (n,), or raise an ArgumentError."""
+def _as_density(density: ArrayLike | str, n: int) -> FloatArray | None:
+    """Return *density* as an array (n,), None if it is "thickness", or raise an ArgumentError."""
+    if isinstance(density, str):
+        if density != "thickness":
+            raise ArgumentError(f"density must be numbers or 'thickness'; got {shown(density)}")
+        return None
     array = as_numbers(density, "density")
     if array.shape != (n,) or not (array >= 0.0).all() or not np.isfinite(array).all():
         raise ArgumentError(f"density must be {n} finite numbers, one per vertex, 0 or more")
@@ -166,16 +175,12 @@ def _as_density(density: ArrayLike, n: int) -> FloatArray:
 
 
 def _spacing(
-    mesh: Mesh, held: BoolArray, density: FloatArray | None, n_vertices: int
+    mesh: Mesh, held: BoolArray, density: FloatArray, n_vertices: int
 ) -> FloatArray | None:
     """Return the spacing of cage vertices at each vertex (n,); None if it is the same everywhere.
 
     *held* (n,) are vertices that keep their shape.
     """
-    if density is None:
-        if held.all() or not held.any():
-            return None
-        density = bending_density(mesh)
     density = np.where(held, 0.0, density)
     return cage_spacing(mesh, density, n_vertices) if density.any() else None
 
@@ -285,7 +290,7 @@ def _fit(
         message = f"fitting a cage of {n} vertices, attempt {attempt + 1}"
         tell(progress, attempt / _ATTEMPTS, message)
         larger = _LARGER ** (attempt * (attempt + 1) / 2)
-        nodes = max(_NODES, _NODES_PER_VERTEX * n)
+        nodes = max(_NODES, _NODES_PER_VERTEX * n) / (1.0 if stretch is None else _FEWER)
         field = solid_field(
             patch, offset * larger, _STEP * length * larger, most_nodes=nodes, stretch=stretch
         )

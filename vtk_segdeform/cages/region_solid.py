@@ -219,16 +219,20 @@ def solid_field(
     offset would have too few steps; if both, the offset is increased.
 
     With *stretch* (n,), at least 1, the offset at a vertex is that many times *offset*: distances
-    are divided by the stretch at the nearest vertex, smoothed.
+    are divided by the stretch at the nearest vertex, smoothed.  Where *offset* is increased, only
+    smaller offsets are: otherwise the grid would grow with the largest one.
     """
     surface, members = patch.surface, patch.members
     low, high = patch.box
-    largest = 1.0 if stretch is None else float(stretch[members].max())
+    asked, largest = offset, offset if stretch is None else offset * float(stretch[members].max())
     step = min(step, offset / _STEPS_PER_OFFSET)
-    while np.prod((high - low + 2 * largest * offset) / step + 2 * _MARGIN + 2) > most_nodes:
+    while np.prod((high - low + 2 * largest) / step + 2 * _MARGIN + 2) > most_nodes:
         step *= 1.1
         offset = max(offset, step * _STEPS_PER_OFFSET)
-    pad = largest * offset + _MARGIN * step
+        largest = max(largest, offset)
+    if stretch is not None:
+        stretch = np.maximum(stretch * (asked / offset), 1.0)
+    pad = largest + _MARGIN * step
     nx, ny, nz = (int(k) for k in np.ceil((high - low + 2 * pad) / step) + 1)
     grid = Grid((low - pad) @ patch.axes, patch.axes, step, (nx, ny, nz))
 

@@ -13,12 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .. import io
 from ..arrays import FloatArray, IntArray
-from ..cages import Cage, fit_cages, suggested_size
-from ..deformer import Deformer
+from ..cages import fit_cages, suggested_size
+from ..deformer import Deformer, clamped
 from ..errors import ConstraintError, MeshError
 from ..geometry import lids_of
 from ..io import Surface
@@ -58,7 +57,14 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
         say(f"volume          {enclosed.summary(preserved=not options.no_volume)}")
     fixed = _selected(options.fixed, surface, "fixed")
     handle, targets = _handles(options.handles, surface, fixed)
-    regions, cages = _subspace(options, surface, part(progress, 0.0, 0.6), fixed)
+    found = _regions(options, surface, part(progress, 0.0, 0.18))
+    size = _size(options, found)
+    is_fixed = np.zeros(mesh.n_vertices, dtype=bool)
+    is_fixed[fixed] = True
+    regions, rigid = clamped(
+        found, fixed=is_fixed, handle=handle, targets=targets, n_cage_vertices=size
+    )
+    cages = fit_cages(mesh, regions, size, fixed=rigid, progress=part(progress, 0.18, 0.6))
     report_regions(regions, say)
     report_cages(cages, say)
     deformer = Deformer(
@@ -121,7 +127,8 @@ def cages(options: Namespace, say: Say, progress: Progress) -> bool:
         io.require_writable(options.output, arrays=True)
     surface = Surface.read(options.input)
     report_surface(surface, say)
-    found, made = _subspace(options, surface, progress)
+    found = _regions(options, surface, part(progress, 0.0, 0.3))
+    made = fit_cages(surface.mesh, found, _size(options, found), progress=part(progress, 0.3, 1.0))
     report_regions(found, say)
     report_cages(made, say)
     if options.output is not None:
@@ -151,15 +158,10 @@ def _regions(options: Namespace, surface: Surface, progress: Progress | None) ->
     return segment(surface.mesh, n_regions=number, progress=progress)
 
 
-def _subspace(
-    options: Namespace, surface: Surface, progress: Progress | None, fixed: ArrayLike = ()
-) -> tuple[Regions, tuple[Cage, ...]]:
-    found = _regions(options, surface, part(progress, 0.0, 0.3))
-    number = options.cage_vertices
-    size = suggested_size(found) if number is None else number
-    fitting = part(progress, 0.3, 1.0)
-    made = fit_cages(surface.mesh, found, n_vertices=size, fixed=fixed, progress=fitting)
-    return found, made
+def _size(options: Namespace, found: Regions) -> int:
+    """Return the total number of cage vertices."""
+    number: int | None = options.cage_vertices
+    return suggested_size(found) if number is None else number
 
 
 def _selected(text: str, surface: Surface, role: Role) -> IntArray:

@@ -26,6 +26,7 @@ from .arguments import (
     checked_vertex,
     reach_and_follows,
 )
+from .clamping import clamped
 from .deform import deform
 from .deformer import Deformer
 from .pull import pull
@@ -42,6 +43,7 @@ __all__ = [
     "checked_radius",
     "checked_targets",
     "checked_vertex",
+    "clamped",
     "deform",
     "pull",
     "reach_and_follows",

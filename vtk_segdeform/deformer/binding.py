@@ -26,7 +26,7 @@ from ..regions import Regions
 from ..solver import CoarseVolume
 from ..subspace import cage_subspace
 
-_FORMAT = 10  # increment whenever the content of a binding changes
+_FORMAT = 11  # increment whenever the content of a binding changes
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +69,17 @@ class BindingInputs:
         """Numbers (n,) of the parts that no rotation cluster spans: regions, shell by shell."""
         component = self.regions.mesh.components
         return np.asarray(self.regions.labels * (int(component.max()) + 1) + component)
+
+    @property
+    def shares(self) -> FloatArray:
+        """Relative number of rotation clusters of each part: that of its cage vertices.
+
+        A fixed part of many vertices but with a small cage hardly needs any.
+        """
+        numbers, labels = self.parts, self.regions.labels
+        each = np.bincount(labels, minlength=len(self.cages))
+        weight = np.array([cage.n_vertices for cage in self.cages]) / np.maximum(each, 1)
+        return np.asarray(np.bincount(numbers, weight[labels]))
 
     def digest(self) -> str:
         """Return 40 hexadecimal digits that are equal exactly for equal inputs."""
@@ -119,11 +130,13 @@ def _first_clusters(inputs: BindingInputs) -> IntArray | None:
         count = max(sizes.FIRST_CLUSTERS, sizes.FIRST_CLUSTERS_EACH * count)
     if count >= n:
         return np.arange(n)
+    shares = inputs.shares
     if inputs.is_reduced and n > sizes.DECIMATED:
         _, kept, of_vertex = decimated(inputs.regions.mesh, sizes.DECIMATED_POINTS)
         parts, x = inputs.parts[kept], inputs.rest.vertices[kept]
-        return cluster_within_parts(x, parts, count, quick=True)[of_vertex]
-    return cluster_within_parts(inputs.rest.vertices, inputs.parts, count, quick=inputs.is_reduced)
+        return cluster_within_parts(x, parts, count, shares=shares, quick=True)[of_vertex]
+    x, quick = inputs.rest.vertices, inputs.is_reduced
+    return cluster_within_parts(x, inputs.parts, count, shares=shares, quick=quick)
 
 
 def _joined(
@@ -140,4 +153,11 @@ def _joined(
     parts[clusters] = inputs.parts
     patches = means, parts, counts
     n_clusters = inputs.n_clusters
-    return join_rotations(energy, inputs.rest_cages, patches, n_clusters, progress=progress)[0]
+    return join_rotations(
+        energy,
+        inputs.rest_cages,
+        patches,
+        n_clusters,
+        shares=inputs.shares,
+        progress=progress,
+    )[0]

@@ -93,7 +93,8 @@ def pull(
         locality = automatic_locality(len(fixed))
     regions = segment(mesh, n_regions, progress=part(progress, 0.0, 0.2))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
-    cages = fit_cages(mesh, regions, size, progress=part(progress, 0.2, 0.7))
+    fitting = part(progress, 0.2, 0.7)
+    cages = fit_cages(mesh, regions, size, density="thickness", progress=fitting)
     binding = part(progress, 0.7, 0.9)
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, lids=lids, progress=binding

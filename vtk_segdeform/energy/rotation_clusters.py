@@ -76,6 +76,7 @@ def join_rotations(
     patches: tuple[FloatArray, IntArray, IntArray],
     n_clusters: int,
     *,
+    shares: FloatArray | None = None,
     progress: Progress | None = None,
 ) -> tuple[Energy, IntArray]:
     """Return *energy* with fewer rotations, and the new cluster of each of the present ones.
@@ -91,12 +92,14 @@ def join_rotations(
         vertices.  No cluster spans two parts.
     n_clusters : int
         About how many; at least one for each part.
+    shares : (number of parts,) float, optional
+        Relative number of clusters of each part; by default the number of its rotations.
     progress : Progress, optional
         Called between the steps; may cancel.
     """
     positions, parts, counts = patches
     rows = np.asarray(energy.covariance_operator).reshape(len(parts), 3, -1)
-    clusters = cluster_within_parts(positions, parts, n_clusters)
+    clusters = cluster_within_parts(positions, parts, n_clusters, shares=shares)
     tell(progress, 0.0, _MESSAGE)
     pulls = _pulls(energy, rest, progress)
     tell(progress, 0.4, _MESSAGE)

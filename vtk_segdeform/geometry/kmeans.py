@@ -56,22 +56,32 @@ def cluster_positions(
 
 
 def cluster_within_parts(
-    positions: FloatArray, parts: IntArray, n_clusters: int, *, quick: bool = False
+    positions: FloatArray,
+    parts: IntArray,
+    n_clusters: int,
+    *,
+    shares: FloatArray | None = None,
+    quick: bool = False,
 ) -> IntArray:
     """Return (n,) int: about *n_clusters* clusters of position, each within one of the *parts*.
 
-    *parts* (n,) are numbers from 0; some may be unused.  *quick* clusters are less even in size.
+    *parts* (n,) are numbers from 0; some may be unused.  Numbers of clusters are proportional to
+    the *shares* of the parts, by default the numbers of their positions.  *quick* clusters are less
+    even in size.
     """
     rounds, seeded = (3, False) if quick else (5, True)
     if not is_whole(n_clusters, 1):
         raise ArgumentError(
             f"the number of clusters must be a whole number, 1 or more; got {n_clusters!r}"
         )
+    shares = None if shares is None else shares[np.unique(parts)]
     parts, clusters = _numbered(parts), np.empty(len(positions), dtype=np.int64)
     used = 0
     by_part = np.argsort(parts, kind="stable")
-    for here in np.split(by_part, np.cumsum(np.bincount(parts))[:-1]):
-        share = max(1, round(n_clusters * len(here) / len(positions)))
+    counts = np.bincount(parts)
+    wanted = n_clusters * (counts / len(positions) if shares is None else shares / shares.sum())
+    for here, number in zip(np.split(by_part, np.cumsum(counts)[:-1]), wanted, strict=True):
+        share = min(max(1, round(number)), len(here))
         local = cluster_positions(positions[here], share, rounds=rounds, seeded=seeded)
         clusters[here] = used + local
         used += int(local.max()) + 1
