@@ -193,11 +193,15 @@ class Contact:
         found = self._active(p)
         if found is None:
             return None
-        rows = self.surface.rows
-        along = rows[found.a] - rows[found.b]
-        weight = np.sqrt(self.stiffness * found.weight * found.fading)
-        jacobian = np.einsum("ki,kj->kij", weight[:, None] * found.direction, along)
-        flat = jacobian.reshape(len(along), -1)
+        jacobian = found.jacobian()
+        rows, used = self.surface.rows, np.unique(jacobian.indices // 3)
+        count, m = jacobian.shape[0], rows.shape[1]
+        flat = np.empty((count, 3 * m))
+        for axis in range(3):
+            np.matmul(
+                jacobian[:, 3 * used + axis].toarray(), rows[used], out=flat[:, axis * m : axis * m + m]
+            )
+        flat *= np.sqrt(self.stiffness)
         return np.asarray(blas.dsyrk(1.0, flat.T, lower=0).T)
 
     def is_active(self, p: FloatArray) -> bool:
@@ -327,29 +331,42 @@ class _Pairs:
 
     def gradient(self) -> FloatArray:
         """Return the derivative of `value` by the samples, (s, 3)."""
+        residual = 2.0 * np.sqrt(self.weight * self.fading) * self.into
+        return np.reshape(residual @ self.jacobian(), self.y.shape)
+
+    def jacobian(self) -> sparse.csr_array:
+        """Return the derivatives of r, of which `value` is the sum of squares, (k, 3s)."""
         surface, a, b, n = self.surface, self.a, self.b, self.normals
         area = np.minimum(surface.areas[a], surface.areas[b])
+        r = np.sqrt(self.weight * self.fading) * self.into
+        half = 0.5 / np.maximum(r, _TINY)
         depth = self.into**2 * self.fading
-        by_s = area * self.facing * self.lateral_slope * depth
+        by_s = area * self.facing * self.lateral_slope * depth * half
         by_g = self.weight * (self.into**2 * self.fading_slope - 2.0 * self.into * self.fading)
-        by_g -= 2.0 * by_s * self.gap
-        by_c = area * self.lateral * self.facing_slope * depth
+        by_g = by_g * half - 2.0 * by_s * self.gap
+        by_c = (area * self.lateral * self.facing_slope * depth * half)[:, None]
         by_e = by_g[:, None] * self.direction + 2.0 * by_s[:, None] * self.e
         by_n = 0.5 * by_g[:, None] * self.e
-        count = len(n)
-        at_y = _scattered(count, (a, by_e), (b, -by_e))
-        at_n = _scattered(count, (b, by_n + by_c[:, None] * n[a]), (a, by_c[:, None] * n[b] - by_n))
-        at_n -= np.einsum("ij,ij->i", at_n, n)[:, None] * n
-        at_n /= self.lengths[:, None]
-        is_used = np.asarray(at_n.any(axis=1))
-        used = np.flatnonzero(is_used[surface.faces].any(axis=1))
-        faces = surface.faces[used]
-        torque = at_n[faces].sum(axis=1)
-        y = self.y[faces]
-        for k in range(3):
-            side = y[:, (k + 1) % 3] - y[:, (k + 2) % 3]
-            at_y += _scattered(count, (faces[:, k], np.cross(side, torque)))
-        return at_y
+        k, count = len(a), len(n)
+        pairs = np.arange(k)
+        rows, places, values = [pairs, pairs], [a, b], [by_e, -by_e]
+        for sample, at_n in (a, by_c * n[b] - by_n), (b, by_n + by_c * n[a]):
+            at_n = at_n - np.einsum("ij,ij->i", at_n, n[sample])[:, None] * n[sample]
+            at_n = at_n / self.lengths[sample][:, None]
+            ring = surface.corners[sample]
+            owner = np.repeat(pairs, np.diff(ring.indptr))
+            corners, torque = surface.faces[ring.indices], at_n[owner]
+            y = self.y[corners]
+            for c in range(3):
+                side = y[:, (c + 1) % 3] - y[:, (c + 2) % 3]
+                rows.append(owner)
+                places.append(corners[:, c])
+                values.append(np.cross(side, torque))
+        row, place = np.concatenate(rows), np.concatenate(places)
+        columns = 3 * place[:, None] + np.arange(3)
+        ends = np.repeat(row, 3), columns.ravel()
+        entries = np.concatenate(values).ravel()
+        return sparse.coo_array((entries, ends), (k, 3 * count)).tocsr()
 
 
 def _largest(vectors: FloatArray) -> float:
