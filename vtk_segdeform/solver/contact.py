@@ -50,7 +50,7 @@ _AWAY = 0.8  # <n_a, n_b> of samples that face away from each other until the ne
 _OF_MOTION = 0.5  # of a gap, which closes by motion; the rest by rotation of the normals
 _LARGEST = 2.0  # times the median: radii of samples, at most
 _SLACK = 1.0  # median (h_a + h_b): additional distance of a search
-_STIFFNESS = 2e3  # k, times the scale of the shape energy
+_STIFFNESS = 5e3  # k, times the scale of the shape energy
 _TINY = 1e-30
 
 
