@@ -202,7 +202,10 @@ class Contact:
         return 2.0 * weight * found.value, weight * (self.surface.rows.T @ found.gradient())
 
     def hessian(self, p: FloatArray) -> FloatArray | None:
-        """Return half the Hessian at *p* with normals and weights held, (3m, 3m); or None."""
+        """Return half the Gauss-Newton Hessian at *p*, (3m, 3m); or None.
+
+        The derivatives of normals and weights are in it: without them poses converge slowly.
+        """
         found = self._active(p)
         if found is None:
             return None
@@ -211,9 +214,8 @@ class Contact:
         count, m = jacobian.shape[0], rows.shape[1]
         flat = np.empty((count, 3 * m))
         for axis in range(3):
-            np.matmul(
-                jacobian[:, 3 * used + axis].toarray(), rows[used], out=flat[:, axis * m : axis * m + m]
-            )
+            part = jacobian[:, 3 * used + axis].toarray()
+            flat[:, axis * m : (axis + 1) * m] = part @ rows[used]
         flat *= np.sqrt(self.stiffness)
         return np.asarray(blas.dsyrk(1.0, flat.T, lower=0).T)
 
