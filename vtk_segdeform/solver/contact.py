@@ -25,6 +25,8 @@ surface over its sample, and a tenth of the distance between samples.
 
 Only pairs within reach are evaluated.  Their list is valid until a sample has moved by half the
 additional distance to which it was searched.
+
+Long because the derivatives of a pair, its search and what is no contact at rest share one formula.
 """
 
 from __future__ import annotations
