@@ -48,6 +48,7 @@ def test_what_crosses_without_it_does_not_with_it(fork, through):
     assert len(through[0].crossings()) > 50
     assert len(solution.crossings()) <= 2
     assert solution.handle_error < 1.5 * through[0].handle_error
+    assert solution.steps < 60  # with the normals fixed in the Hessian, far more
 
 
 def test_crossings_at_rest_do_not_count(through, fork):
@@ -60,7 +61,7 @@ def test_crossings_at_rest_do_not_count(through, fork):
     assert not len(deformer.hold(handle=[0]).solve(crossed.vertices[[0]]).crossings())
 
 
-def test_its_gradient_is_that_of_its_value_and_it_moves_along(fork, through):
+def test_its_gradient_is_that_of_its_value_and_it_moves_along(fork, through, monkeypatch):
     contact, p = fork[0]._constraints.contact, through[1]
     value, slope = contact.value_and_slope(p)
     assert value > 0.0
@@ -73,6 +74,9 @@ def test_its_gradient_is_that_of_its_value_and_it_moves_along(fork, through):
     lower = contact.hessian(p)
     half = np.tril(lower) + np.tril(lower, -1).T
     assert np.linalg.eigvalsh(half)[0] > -1e-9 * np.abs(half).max()
+    fewer = Contact(contact.surface, contact.held, contact.stiffness)
+    monkeypatch.setattr("vtk_segdeform.solver.contact.compiled_kernels", lambda: None)
+    assert fewer.value_and_slope(p)[0] == pytest.approx(value, rel=1e-12)
     turn = Rotation.from_rotvec([0.3, -1.0, 0.5])
     there, turned = contact.value_and_slope(turn.apply(p) + [3.0, -2.0, 1.0])
     assert there == pytest.approx(value, rel=1e-9)
@@ -91,11 +95,11 @@ def test_far_from_contact_no_bit_changes():
 
 def test_crossings_of_a_large_mesh_are_searched_where_parts_meet(monkeypatch):
     monkeypatch.setattr("vtk_segdeform.mesh.intersections._ALL_FACES", 0)
-    ball = sd.models.sphere(6000)
+    ball = sd.models.sphere(2000)
     two = np.concatenate([ball.faces, ball.faces + ball.n_vertices])
     rest = np.concatenate([ball.vertices, ball.vertices + [6.0, 0.0, 0.0]])
     near = np.concatenate([ball.vertices, ball.vertices + [1.9, 0.01, 0.02]])
     assert len(new_crossings(rest, rest, two)) == 0
     found = np.unique(self_intersections(near, two))
     assert np.array_equal(new_crossings(near, rest, two), found)
-    assert len(found) > 50
+    assert len(found) > 20

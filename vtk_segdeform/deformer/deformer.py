@@ -826,6 +826,8 @@ class Deformer:
         """Yield the waypoints (k, 3) before *goal*; near a contact they are close together."""
         handles, start = self._constraints.handles, self._targets
         shortest = self._longest_leg(0.0)
+        if _largest(goal - start) <= shortest * LONGEST_MOVE:
+            shortest = 1.0
         way = [start, *waypoints(start, goal, handles, shortest)]
         done, last, most = 0, len(way) - 1, round(1.0 / shortest)
         while done + 1 < last:
@@ -841,14 +843,17 @@ class Deformer:
     def _longest_leg(self, most: float) -> float:
         """Return how far apart waypoints may be at this pose, as a share of the usual distance.
 
-        With contacts it is half the clearance between parts, which is looked for up to *most*; but
-        at least the distance between samples.
+        With contacts it is little more than the clearance between parts, which is looked for up to
+        *most*: a part that has crossed another by less is pushed back.
         """
         contact = self._constraints.contact
-        if contact is None:
+        if contact is None or 0.0 < most <= contact.surface.spacing:
             return 1.0
         clearance = contact.clearance(self._continuation.p, most) if most else 0.0
-        return min(1.0, max(0.5 * clearance, contact.surface.spacing) / LONGEST_MOVE)
+        if 0.0 < most <= clearance < _CLEARANCE:  # a motion by *most* meets nothing
+            return 1.0
+        spacing = contact.surface.spacing
+        return min(1.0, max(clearance + 0.5 * spacing, spacing) / LONGEST_MOVE)
 
     def _with_exact_volume(self, result: SolverResult) -> tuple[FloatArray, float]:
         """Restore the exact volumes; return the mesh and by how much it was scaled.

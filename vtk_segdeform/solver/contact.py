@@ -17,7 +17,7 @@ All of it is a smooth function of p that does not depend on how the mesh is move
 Three kinds of pairs are no contact, since they are near each other at rest already:
 
     neighbours      within 4 (h_a + h_b) along the surface
-    two sides       of a thin part: one is behind the other, by at most 2 D_ab
+    two sides       of a thin part: one is behind the other, within 4.5 (h_a + h_b)
     crossings       the same, of a mesh that crosses itself at rest
 
 and the margin d_ab = d_a + d_b is at most the gap at rest.  Otherwise d_a is the height of the true
@@ -25,6 +25,8 @@ surface over its sample, and a tenth of the distance between samples.
 
 Only pairs within reach are evaluated.  Their list is valid until a sample has moved by half the
 additional distance to which it was searched.
+
+Long because the derivatives of a pair, its search and what is no contact at rest share one formula.
 """
 
 from __future__ import annotations
@@ -39,9 +41,11 @@ from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from ..kernels import compiled_kernels, inputs
 
 _LATERAL = 1.1  # r_ab / (h_a + h_b): discs of this radius about the samples cover the surface
 _DEPTH = 1.5  # D_ab / (h_a + h_b)
+_BEHIND = 4.5  # (h_a + h_b): distance of two sides of a thin part, at most
 _NEIGHBOURS = 4.0  # (h_a + h_b): distance along the surface
 _MARGIN = 0.2  # of h_a
 _OF_GAP = 0.45  # of the least gap at rest: the most of it that a margin takes
@@ -49,8 +53,9 @@ _FACING = 0.1, 0.6  # -<n_a, n_b> where f begins and ends to rise
 _AWAY = 0.8  # <n_a, n_b> of samples that face away from each other until the next search
 _OF_MOTION = 0.5  # of a gap, which closes by motion; the rest by rotation of the normals
 _LARGEST = 2.0  # times the median: radii of samples, at most
-_SLACK = 1.0  # median (h_a + h_b): additional distance of a search
-_STIFFNESS = 2e3  # k, times the scale of the shape energy
+_SLACK = 2.0  # median (h_a + h_b): additional distance of a search
+_ROOM = 50  # pairs per sample for which a search makes room
+_STIFFNESS = 5e3  # k, times the scale of the shape energy
 _TINY = 1e-30
 
 
@@ -70,8 +75,8 @@ class ContactSurface:
         h_a.
     margins, gaps : (s,) float
         d_a, and its limit: the share of the least gap at rest.
-    excluded : (k,) int
-        Pairs that are no contact: a s + b for a < b, in increasing order.
+    excluded : (s, s) bool
+        Pairs that are no contact.
     """
 
     rows: FloatArray
@@ -80,7 +85,7 @@ class ContactSurface:
     radii: FloatArray
     margins: FloatArray
     gaps: FloatArray
-    excluded: IntArray
+    excluded: BoolArray
     spacing: float  # median of h_a + h_b
     corners: sparse.csr_array  # (s, t), 1 where a face is at a sample
     norm: float  # of W~: largest motion of a sample by motions of cage vertices of length 1
@@ -117,7 +122,7 @@ class ContactSurface:
         radii = np.minimum(radii, _LARGEST * float(np.median(radii)))
         places = faces.ravel(), np.repeat(np.arange(len(faces)), 3)
         corners = sparse.coo_array((np.ones(faces.size), places), (n, len(faces))).tocsr()
-        no_pairs, spacing = np.zeros(0, dtype=np.int64), 2.0 * float(np.median(radii))
+        no_pairs, spacing = np.eye(n, dtype=bool), 2.0 * float(np.median(radii))
         norm, free = float(np.abs(rows).sum(axis=1).max(initial=1.0)), np.full(n, np.inf)
         margins = _MARGIN * radii
         own = cls(rows, faces, areas, radii, margins, free, no_pairs, spacing, corners, norm)
@@ -132,17 +137,17 @@ class ContactSurface:
         n, radii, normals = len(points), self.radii, self.normals(points)
         largest = 2.0 * float(radii.max(initial=0.0))
         near = csgraph.dijkstra(edges, directed=False, limit=_NEIGHBOURS * largest)
-        i, j = np.nonzero(np.triu(near <= _NEIGHBOURS * np.add.outer(radii, radii), 1))
-        pairs = cKDTree(points).query_pairs(2.0 * _DEPTH * largest, output_type="ndarray")
+        excluded = np.asarray(near <= _NEIGHBOURS * np.add.outer(radii, radii))
+        pairs = cKDTree(points).query_pairs(_BEHIND * largest, output_type="ndarray")
         a, b = np.sort(pairs, axis=1).T
         e, sums = points[a] - points[b], radii[a] + radii[b]
         squared = np.einsum("ij,ij->i", e, e)
         gap = 0.5 * np.einsum("ij,ij->i", normals[b] - normals[a], e)
-        behind = (gap <= 0.0) & (squared < (2.0 * _DEPTH * sums) ** 2)
-        excluded = np.unique(np.concatenate([i * n + j, (a * n + b)[behind]]).astype(np.int64))
+        behind = (gap <= 0.0) & (squared < (_BEHIND * sums) ** 2)
+        excluded[a[behind], b[behind]] = excluded[b[behind], a[behind]] = True
         in_front = (gap > 0.0) & (squared - gap**2 < (_LATERAL * sums) ** 2)
         in_front &= np.einsum("ij,ij->i", normals[a], normals[b]) < -_FACING[0]
-        in_front &= ~_among(a * n + b, excluded)
+        in_front &= ~excluded[a, b]
         least = np.full(n, np.inf)
         for each in (a, b):
             np.minimum.at(least, each[in_front], gap[in_front])
@@ -151,19 +156,29 @@ class ContactSurface:
 
     def normals(self, y: FloatArray) -> FloatArray:
         """Return unit normals (s, 3) of samples at *y* (s, 3)."""
-        return self.sums(y)[1]
+        return self.sums(y, np.arange(len(y)))[1]
 
-    def sums(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the lengths (s,) of the sums of face normals, and the unit normals (s, 3)."""
-        a, b, c = y[self.faces.T]
-        total = self.corners @ np.cross(b - a, c - a)
-        length = np.sqrt(np.einsum("ij,ij->i", total, total)) + _TINY
+    def sums(self, y: FloatArray, some: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return the lengths (k,) of the sums of face normals, and the unit normals (k, 3).
+
+        *y* (s, 3) are all samples, *some* (k,) those asked for, in increasing order.
+        """
+        corners, faces = self.corners, self.faces
+        if len(some) < len(y):
+            corners = corners[some]
+            used, places = np.unique(corners.indices, return_inverse=True)
+            faces = faces[used]
+            shape = len(some), len(used)
+            corners = sparse.csr_array((corners.data, places, corners.indptr), shape)
+        a, b, c = y[faces.T]
+        total = corners @ np.cross(b - a, c - a)
+        length = _lengths(total) + _TINY
         return length, total / length[:, None]
 
     def pairs_near(self, y: FloatArray, reach: float) -> IntArray:
         """Return the pairs (k, 2) within *reach* at *y* that may be in contact."""
         pairs = np.sort(cKDTree(y).query_pairs(reach, output_type="ndarray"), axis=1)
-        return pairs[~_among(pairs[:, 0] * len(y) + pairs[:, 1], self.excluded)]
+        return pairs[~self.excluded[pairs[:, 0], pairs[:, 1]]]
 
 
 @dataclass(eq=False)
@@ -189,15 +204,21 @@ class Contact:
         return 2.0 * weight * found.value, weight * (self.surface.rows.T @ found.gradient())
 
     def hessian(self, p: FloatArray) -> FloatArray | None:
-        """Return half the Hessian at *p* with normals and weights held, (3m, 3m); or None."""
+        """Return half the Gauss-Newton Hessian at *p*, (3m, 3m); or None.
+
+        The derivatives of normals and weights are in it: without them poses converge slowly.
+        """
         found = self._active(p)
         if found is None:
             return None
-        rows = self.surface.rows
-        along = rows[found.a] - rows[found.b]
-        weight = np.sqrt(self.stiffness * found.weight * found.fading)
-        jacobian = np.einsum("ki,kj->kij", weight[:, None] * found.direction, along)
-        flat = jacobian.reshape(len(along), -1)
+        jacobian = found.jacobian()
+        rows, used = self.surface.rows, np.unique(jacobian.indices // 3)
+        count, m = jacobian.shape[0], rows.shape[1]
+        flat = np.empty((count, 3 * m))
+        for axis in range(3):
+            part = jacobian[:, 3 * used + axis].toarray()
+            flat[:, axis * m : (axis + 1) * m] = part @ rows[used]
+        flat *= np.sqrt(self.stiffness)
         return np.asarray(blas.dsyrk(1.0, flat.T, lower=0).T)
 
     def begun_at(self, _p: FloatArray) -> Contact:
@@ -225,50 +246,85 @@ class Contact:
 
     def _active(self, p: FloatArray) -> _Pairs | None:
         """Return the active pairs at *p*, if there are any."""
-        y, pairs = self._near(p)
-        return None if y is None else _Pairs.of(self.surface, y, pairs)
+        known, norm = self._listed, self.surface.norm
+        if known is not None and norm * _largest(p - known.tested) <= known.quiet:
+            return None
+        slack = _SLACK * self.surface.spacing
+        moved = np.inf if known is None else known.moved + norm * _largest(p - known.p)
+        if known is not None and moved > 0.5 * slack:  # at most; by how much exactly?
+            moved = _largest(self.surface.rows @ p - known.all)
+            known = replace(known, p=p.copy(), moved=moved)
+        if known is None or moved > 0.4 * slack:
+            known, moved = self._list(p, slack), 0.0
+        y = known.rows @ p
+        a, b = known.places.T
+        move = _lengths(y - known.y)
+        apart = np.maximum(_lengths(y[a] - y[b]) - known.reach, known.gap - move[a] - move[b])
+        quiet = min(0.5 * float(apart.min(initial=slack)), 0.5 * slack - moved)
+        self._listed = replace(known, tested=p.copy(), quiet=quiet)
+        near = apart < 0.0
+        if not near.any():
+            return None
+        return _Pairs.of(self.surface, self.surface.rows @ p, known.samples[known.places[near]])
 
-    def _near(self, p: FloatArray) -> tuple[FloatArray | None, IntArray]:
-        """Return the samples (s, 3) at *p*, and the pairs within reach; None if there are none."""
-        known = self._listed
-        if known is not None and self.surface.norm * _largest(p - known.p) <= known.quiet:
-            return None, known.pairs
-        y = self.surface.rows @ p
-        moved = np.inf if known is None else _largest(y - known.y)
-        if known is None or moved > 0.5 * _SLACK * self.surface.spacing:
-            known, moved = self._list(p, y), 0.0
-            self._listed = known
-        return (None if moved <= known.quiet else y), known.pairs
-
-    def _list(self, p: FloatArray, y: FloatArray) -> _Listed:
-        """Return the pairs that may be in contact before a sample has moved by half the slack."""
-        surface, radii = self.surface, self.surface.radii
-        slack = _SLACK * surface.spacing
-        reach = 2.0 * np.hypot(_DEPTH, _LATERAL) * float(radii.max()) + slack
-        a, b = np.sort(cKDTree(y).query_pairs(reach, output_type="ndarray"), axis=1).T
-        normals = surface.normals(y)
-        facing = np.einsum("ij,ij->i", normals[a], normals[b]) < _AWAY
-        a, b = a[facing], b[facing]
+    def _list(self, p: FloatArray, slack: float) -> _Listed:
+        """Return the pairs that may be in contact before a sample has moved by half the *slack*."""
+        surface, reaches = self.surface, np.hypot(_DEPTH, _LATERAL) * self.surface.radii
+        y = surface.rows @ p
+        normals, reach = surface.normals(y), 2.0 * float(reaches.max()) + slack
+        kernels = compiled_kernels()
+        if kernels is not None:
+            axis = int(np.argmax(np.ptp(y, axis=0)))
+            order = np.argsort(y[:, axis])
+            limits = np.array([reach, _AWAY, _OF_MOTION, slack])
+            turned = [np.roll(each, -axis, axis=1) for each in (y, normals)]
+            sorted_by_x = [each[order] for each in (*turned, reaches, surface.margins)]
+            given = inputs(*sorted_by_x, order, surface.excluded, limits)
+            count = room = _ROOM * len(y)
+            while count >= room:
+                room = max(room, count + 1)
+                found = np.empty((room, 2), dtype=np.int64)
+                count = kernels.facing_pairs(*given, found)
+            a, b = np.sort(order[found[:count]], axis=1).T
+        else:
+            a, b = np.sort(cKDTree(y).query_pairs(reach, output_type="ndarray"), axis=1).T
+            facing = np.einsum("ij,ij->i", normals[a], normals[b]) < _AWAY
+            a, b = a[facing], b[facing]
         e = y[a] - y[b]
-        beyond = np.linalg.norm(e, axis=1) - np.hypot(_DEPTH, _LATERAL) * (radii[a] + radii[b])
         gap = 0.5 * np.einsum("ij,ij->i", normals[b] - normals[a], e)
-        gap -= surface.margins[a] + surface.margins[b]
-        beyond = np.maximum(beyond, _OF_MOTION * gap)
-        kept = np.flatnonzero(beyond < slack)
-        kept = kept[~_among(a[kept] * len(y) + b[kept], surface.excluded)]
-        kept = kept[~(self.held[a[kept]] & self.held[b[kept]])]
-        quiet = 0.5 * float(beyond[kept].min(initial=slack))
-        return _Listed(p.copy(), y, np.stack([a[kept], b[kept]], axis=1), quiet)
+        gap = _OF_MOTION * (gap - surface.margins[a] - surface.margins[b])
+        beyond = np.maximum(_lengths(e) - reaches[a] - reaches[b], gap)
+        kept = (beyond < slack) & ~(self.held[a] & self.held[b]) & ~surface.excluded[a, b]
+        a, b, gap = a[kept], b[kept], gap[kept]
+        samples, places = np.unique(np.stack([a, b], axis=1), return_inverse=True)
+        return _Listed(
+            p=p.copy(),
+            samples=samples,
+            rows=surface.rows[samples],
+            y=y[samples],
+            all=y,
+            places=places.reshape(-1, 2),
+            reach=reaches[a] + reaches[b],
+            gap=gap,
+            tested=p,
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class _Listed:
-    """Pairs of samples near each other at a pose."""
+    """Pairs of samples that may soon be in contact."""
 
-    p: FloatArray  # (m, 3)
-    y: FloatArray  # (s, 3)
-    pairs: IntArray  # (k, 2)
-    quiet: float  # by which samples may move before a pair is active
+    p: FloatArray  # (m, 3), cages where `moved` was computed
+    samples: IntArray  # (s,), in the pairs
+    rows: FloatArray  # (s, m), W~ of them
+    y: FloatArray  # (s, 3), their positions when they were searched
+    all: FloatArray  # (n, 3), those of all samples
+    places: IntArray  # (k, 2), of the pairs among the samples
+    reach: FloatArray  # (k,), the distance from which they may be active
+    gap: FloatArray  # (k,), the least motion of both together that closes their gap
+    tested: FloatArray  # (m, 3), where they were last tested
+    moved: float = 0.0  # largest motion of a sample since the search
+    quiet: float = 0.0  # the least motion from there that makes a pair active
 
 
 @dataclass(frozen=True, eq=False)
@@ -304,7 +360,9 @@ class _Pairs:
         if not near.any():
             return None
         a, b, e, sums = a[near], b[near], e[near], sums[near]
-        lengths, normals = surface.sums(y)
+        some = np.unique(np.concatenate([a, b]))
+        lengths, normals = np.ones(len(y)), np.zeros_like(y)
+        lengths[some], normals[some] = surface.sums(y, some)
         direction = 0.5 * (normals[b] - normals[a])
         gap = np.einsum("ij,ij->i", direction, e)
         facing, facing_slope = _step(-np.einsum("ij,ij->i", normals[a], normals[b]), *_FACING)
@@ -331,41 +389,51 @@ class _Pairs:
 
     def gradient(self) -> FloatArray:
         """Return the derivative of `value` by the samples, (s, 3)."""
+        residual = 2.0 * np.sqrt(self.weight * self.fading) * self.into
+        return np.reshape(residual @ self.jacobian(), self.y.shape)
+
+    def jacobian(self) -> sparse.csr_array:
+        """Return the derivatives of r, of which `value` is the sum of squares, (k, 3s)."""
         surface, a, b, n = self.surface, self.a, self.b, self.normals
         area = np.minimum(surface.areas[a], surface.areas[b])
+        r = np.sqrt(self.weight * self.fading) * self.into
+        half = 0.5 / np.maximum(r, _TINY)
         depth = self.into**2 * self.fading
-        by_s = area * self.facing * self.lateral_slope * depth
+        by_s = area * self.facing * self.lateral_slope * depth * half
         by_g = self.weight * (self.into**2 * self.fading_slope - 2.0 * self.into * self.fading)
-        by_g -= 2.0 * by_s * self.gap
-        by_c = area * self.lateral * self.facing_slope * depth
+        by_g = by_g * half - 2.0 * by_s * self.gap
+        by_c = (area * self.lateral * self.facing_slope * depth * half)[:, None]
         by_e = by_g[:, None] * self.direction + 2.0 * by_s[:, None] * self.e
         by_n = 0.5 * by_g[:, None] * self.e
-        count = len(n)
-        at_y = _scattered(count, (a, by_e), (b, -by_e))
-        at_n = _scattered(count, (b, by_n + by_c[:, None] * n[a]), (a, by_c[:, None] * n[b] - by_n))
-        at_n -= np.einsum("ij,ij->i", at_n, n)[:, None] * n
-        at_n /= self.lengths[:, None]
-        is_used = np.asarray(at_n.any(axis=1))
-        used = np.flatnonzero(is_used[surface.faces].any(axis=1))
-        faces = surface.faces[used]
-        torque = at_n[faces].sum(axis=1)
-        y = self.y[faces]
-        for k in range(3):
-            side = y[:, (k + 1) % 3] - y[:, (k + 2) % 3]
-            at_y += _scattered(count, (faces[:, k], np.cross(side, torque)))
-        return at_y
+        k, count = len(a), len(n)
+        pairs = np.arange(k)
+        rows, places, values = [pairs, pairs], [a, b], [by_e, -by_e]
+        for sample, at_n in (a, by_c * n[b] - by_n), (b, by_n + by_c * n[a]):
+            at_n = at_n - np.einsum("ij,ij->i", at_n, n[sample])[:, None] * n[sample]
+            at_n = at_n / self.lengths[sample][:, None]
+            ring = surface.corners[sample]
+            owner = np.repeat(pairs, np.diff(ring.indptr))
+            corners, torque = surface.faces[ring.indices], at_n[owner]
+            y = self.y[corners]
+            for c in range(3):
+                side = y[:, (c + 1) % 3] - y[:, (c + 2) % 3]
+                rows.append(owner)
+                places.append(corners[:, c])
+                values.append(np.cross(side, torque))
+        row, place = np.concatenate(rows), np.concatenate(places)
+        columns = 3 * place[:, None] + np.arange(3)
+        ends = np.repeat(row, 3), columns.ravel()
+        entries = np.concatenate(values).ravel()
+        return sparse.coo_array((entries, ends), (k, 3 * count)).tocsr()
 
 
 def _largest(vectors: FloatArray) -> float:
     """Return the largest length of *vectors* (k, 3)."""
-    return float(np.sqrt(np.einsum("ij,ij->i", vectors, vectors).max()))
+    return float(_lengths(vectors).max())
 
 
-def _scattered(n: int, *parts: tuple[IntArray, FloatArray]) -> FloatArray:
-    """Return the sums (n, 3) of vectors (k, 3) by the indices (k,) beside them."""
-    ids = np.concatenate([i for i, _ in parts])
-    vectors = np.concatenate([v for _, v in parts])
-    return np.stack([np.bincount(ids, axis, n) for axis in vectors.T], axis=1)
+def _lengths(vectors: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)))
 
 
 def _step(
@@ -374,11 +442,3 @@ def _step(
     """Return a smooth step from 0 at *start* to 1 at *end*, and its derivative."""
     t = np.clip((x - start) / (end - start), 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t) / (end - start)
-
-
-def _among(keys: IntArray, known: IntArray) -> BoolArray:
-    """Return which *keys* are among the increasing *known* ones."""
-    if not len(known):
-        return np.zeros(len(keys), dtype=bool)
-    places = np.minimum(np.searchsorted(known, keys), len(known) - 1)
-    return np.asarray(known[places] == keys)

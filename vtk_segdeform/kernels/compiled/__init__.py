@@ -9,6 +9,7 @@
     rotations       `rotations.closest_rotations`
     factor          `hessian.Factor`
     half_edges      `topology.HalfEdges`, `grouping.connected`
+    pairs           `contact.Contact`
     paths           `blending.border_distance`
     beams           `line_of_sight.faces_in_beam`
     triangles       `faults.Search`, `shells.shell_volumes`, `grouping.first_equal_row`
@@ -32,6 +33,7 @@ from .half_edges import (
 from .interpolated import add_interpolated, add_interpolated_adjoint, interpolated_rows
 from .mean_value import weights
 from .normals import ring_normals, rings
+from .pairs import facing_pairs
 from .paths import distances_inside
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
 from .rotations import rotations
@@ -51,6 +53,7 @@ __all__ = [
     "determinants",
     "distances_inside",
     "facet_corners",
+    "facing_pairs",
     "first_equal_points",
     "flat_faces",
     "interpolated_rows",
