@@ -13,6 +13,8 @@ from vtk_segdeform.kernels import load_early
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session, load_session, save_session
 
+from ..scene import drawn_triangles
+
 _SUFFIX = ".segdeform"
 _LARGE = 1 << 20  # bytes of a file for whose mesh compiled kernels pay before the first picture
 _READ = 0.3  # share of reading in the progress of opening a mesh; the rest is checking it
@@ -107,6 +109,7 @@ def read_session(path: Path, progress: Progress) -> Session:
         session = Session(surface)
         # They are kept with the mesh or the session.  The window does not wait for them here.
         VertexNormals(session.mesh).of(session.vertices)
+        drawn_triangles(session.mesh)
         _ = session.mesh.bounds, session.has_volume
         progress(1.0, "Drawing mesh")
         return session
