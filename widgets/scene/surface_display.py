@@ -38,7 +38,6 @@ from .decimated_surface import DecimatedSurface, Decimating
 from .draft import SLOW, observe_drafts
 from .view import View
 
-
 _NOTHING = np.arange(0)
 _all_triangles: WeakKeyDictionary[Mesh, tuple[Any, IntArray]] = WeakKeyDictionary()
 

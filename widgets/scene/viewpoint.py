@@ -380,5 +380,5 @@ def _outermost(points: FloatArray) -> FloatArray:
     step = len(points) // _ENOUGH
     if step < 2:
         return points
-    ends = np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])
+    ends = [end for axis in points.T for end in (axis.argmin(), axis.argmax())]
     return np.concatenate([points[::step], points[ends]])
