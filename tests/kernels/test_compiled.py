@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from open_surfaces import bottle, moebius, sheet
 from solids import OCTAHEDRON, icosphere, together, torus
 
-from vtk_segdeform import Mesh, Surface, models
+from vtk_segdeform import Mesh, Surface, models, sizes
 from vtk_segdeform.cages.fit import fit_cages
 from vtk_segdeform.cages.mean_value import mean_value_coordinates
 from vtk_segdeform.deformer.deformer import Deformer
@@ -80,6 +80,34 @@ def test_kernels_are_loaded_early_in_another_thread_and_only_once(monkeypatch):
     dispatch.compiled_kernels()
     dispatch.load_early()
     assert len(started) == 1
+
+
+def test_small_arrays_do_not_wait_for_late_kernels(monkeypatch):
+    loaded = object()
+    kernels = functools.cache(lambda: loaded)
+    monkeypatch.setattr(dispatch, "_kernels", kernels)
+    monkeypatch.setattr(dispatch, "_is_late", [False])
+    dispatch.load_late()
+    assert dispatch.compiled_kernels(sizes.COMPILED_LATE - 1) is None
+    assert not kernels.cache_info().currsize
+    assert dispatch.compiled_kernels(sizes.COMPILED_LATE) is loaded
+    assert dispatch.compiled_kernels(sizes.COMPILED) is loaded
+    dispatch.load_late()  # too late
+    assert dispatch.compiled_kernels(sizes.COMPILED) is loaded
+    assert dispatch.compiled_kernels(sizes.COMPILED - 1) is None
+
+
+def test_a_product_stays_the_same_when_late_kernels_are_loaded(monkeypatch):
+    pytest.importorskip("numba")
+    block = RNG.random((900, 60))
+    subspace = Subspace(900, (np.arange(900),), (block,))
+    p = RNG.normal(size=(60, 3))
+    monkeypatch.setattr(dispatch, "_is_late", [True])
+    before = subspace.map(p)
+    monkeypatch.setattr(dispatch, "_is_late", [False])
+    assert_array_equal(subspace.map(p), before)
+    assert not subspace._is_compiled
+    assert Subspace(900, (np.arange(900),), (block,))._is_compiled
 
 
 def test_any_triangles_become_the_same_mesh(twin, monkeypatch):

@@ -13,6 +13,7 @@ from scipy.spatial import ConvexHull, QhullError
 from ..arrays import FloatArray, bounds_of
 
 _LAYER = 0.03  # of the height: the vertices that belong to a footprint
+_ENOUGH = 100_000  # vertices; of more, every second, third ... determines the footprints
 _CLEAR = 0.01  # difference of footprints, in squares of the middle extent; smaller ones are chance
 
 
@@ -29,7 +30,7 @@ def guess_up_axis(vertices: FloatArray) -> int:
     unit = float(np.sort(extent)[1])
     if not unit > 0.0:  # points on a line
         return 1 if extent[1] > extent[2] else 2
-    points = (vertices - low) / unit
+    points = (vertices[:: max(1, len(vertices) // _ENOUGH)] - low) / unit
     y, z = (_footprint(points, axis, extent[axis] / unit) for axis in (1, 2))
     if abs(y - z) > _CLEAR:
         return 1 if y > z else 2

@@ -34,7 +34,8 @@ def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.P
     surface = pv.PolyData()
     surface.points = points
     # With offsets even for triangles alone: VTK's coordinates are wrong on cells of a fixed size.
-    offsets = np.append(0, np.cumsum(counts)).astype(np.int64)
+    offsets = np.zeros(len(counts) + 1, dtype=np.int64)
+    np.cumsum(counts, out=offsets[1:])
     surface.SetPolys(pv.CellArray.from_arrays(offsets, np.array(corners, dtype=np.int64)))
     return surface
 

@@ -13,6 +13,7 @@ from .dispatch import (
     compiled_kernels,
     inputs,
     load_early,
+    load_late,
     scratch,
     writable,
 )
@@ -25,6 +26,7 @@ __all__ = [
     "in_parallel",
     "inputs",
     "load_early",
+    "load_late",
     "n_threads",
     "one_blas_thread",
     "scratch",

@@ -3,6 +3,7 @@
     kernels = compiled_kernels()        the module `compiled`, or None
     kernels = compiled_checks(size)     the same for short checks, which are not worth an import
     load_early()                        import them before they are needed
+    load_late()                         do without them for small arrays until then
 
 numba is installed with the package on platforms that have wheels of it.  Importing it takes half a
 second, so it is imported for the first array that is large enough.  Without it everything works,
@@ -27,11 +28,16 @@ from .. import sizes
 _LIBRARIES = "numba", "threadpoolctl"  # required for speed only
 _HUGE = 1 << 23  # bytes; only the pages that are used take memory
 _checked = [0]  # faces processed so far by equivalents in numpy
+_is_late = [False]  # whether small arrays are processed in numpy until the kernels are loaded
 
 
 def compiled_kernels(size: int | None = None) -> Any:
     """Return the compiled kernels; None without numba, or if *size* is not worth a call."""
-    return _kernels() if size is None or size >= sizes.COMPILED else None
+    if size is not None and size < (sizes.COMPILED_LATE if _is_late[0] else sizes.COMPILED):
+        return None
+    kernels = _kernels()
+    _is_late[0] = False
+    return kernels
 
 
 def compiled_checks(size: int) -> Any:
@@ -51,11 +57,19 @@ def compiled_checks(size: int) -> Any:
 def load_early() -> None:
     """Begin to load the compiled kernels in another thread, if they are not loaded yet.
 
-    An editor needs them for the first mesh that is opened.  Until the thread has ended,
-    `compiled_kernels` waits for it.
+    Until the thread has ended, `compiled_kernels` waits for it, except after `load_late`.
     """
     if not _kernels.cache_info().currsize:
         Thread(target=_load, name="segdeform kernels").start()
+
+
+def load_late() -> None:
+    """Process arrays of less than `sizes.COMPILED_LATE` in numpy until the kernels are loaded.
+
+    An editor calls this if its first mesh is small, and `load_early` once that has been dragged:
+    the import would take a third of the time until then.
+    """
+    _is_late[0] = not _kernels.cache_info().currsize
 
 
 def advice() -> str:
@@ -99,9 +113,12 @@ def scratch(kind: type[np.signedinteger[Any]], *sizes: int) -> list[NDArray[Any]
 
 
 def _load() -> None:
-    kernels = _kernels()
-    if kernels is not None:
-        kernels.number_trees(np.arange(1))  # the first call of a kernel sets up the compiler
+    try:
+        kernels = _kernels()
+        if kernels is not None:
+            kernels.number_trees(np.arange(1))  # the first call of a kernel sets up the compiler
+    finally:
+        _is_late[0] = False
 
 
 @functools.cache

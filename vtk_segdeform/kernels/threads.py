@@ -21,6 +21,8 @@ from typing import Any
 
 from ..progress import Progress
 
+_finding = threading.Lock()
+
 
 def in_parallel(
     work: Callable[[int, int], None],
@@ -120,8 +122,15 @@ class _BlasLimit:
                 self._before.restore_original_limits()
 
 
-@functools.cache
 def _blas_limit() -> _BlasLimit | None:
+    if not _found_blas_limit.cache_info().currsize:
+        with _finding:  # otherwise two threads would both search for the libraries
+            return _found_blas_limit()
+    return _found_blas_limit()
+
+
+@functools.cache
+def _found_blas_limit() -> _BlasLimit | None:
     try:
         from threadpoolctl import ThreadpoolController
     except ImportError:

@@ -70,8 +70,12 @@ class Subspace:
 
     @cached_property
     def _is_compiled(self) -> bool:
-        """Whether W~ has enough numbers for compiled kernels."""
-        return sum(block.size for block in self.blocks) // _PER_FACE >= sizes.COMPILED
+        """Whether W~ has enough numbers for compiled kernels.
+
+        The answer stays, so that the same cage vertices always give the same mesh, bit for bit.
+        """
+        size = sum(block.size for block in self.blocks) // _PER_FACE
+        return compiled_kernels(size) is not None
 
     @cached_property
     def _is_packed(self) -> bool:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from vtk_segdeform.arrays import FloatArray
-from vtk_segdeform.kernels import advice, load_early
+from vtk_segdeform.kernels import advice, load_early, load_late
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Change, Preparation, Session, saved_view
 
@@ -74,7 +74,7 @@ class Controller:
     """
 
     def __init__(self, view: View, session: Session, keys: Keys) -> None:
-        load_early()
+        load_late()
         self.view, self.keys = view, keys
         self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL))
         self.messages = Messages(view)
@@ -254,6 +254,7 @@ class Controller:
     def _gesture_ended(self, widget: Widget, _: str) -> None:
         if widget.remark:
             self.messages.note(widget.remark)
+        load_early()
         if widget is self.widgets.dragger:
             self.finishing.rest()
         self.refresh()
@@ -378,6 +379,8 @@ class Controller:
     def _accept(self, session: Session, preparation: Preparation) -> None:
         was_modified = self.file.is_modified(session)
         session.accept(preparation)
+        if not any(widget.is_grabbing for widget in self.widgets.interactive):
+            load_early()
         self.file.prepared(session, was_modified=was_modified)
         self.refresh()
 

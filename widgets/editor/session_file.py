@@ -9,10 +9,14 @@ from typing import Any
 
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.geometry import VertexNormals
+from vtk_segdeform.kernels import load_early
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session, load_session, save_session
 
+from ..scene import drawn_triangles
+
 _SUFFIX = ".segdeform"
+_LARGE = 1 << 20  # bytes of a file for whose mesh compiled kernels pay before the first picture
 _READ = 0.3  # share of reading in the progress of opening a mesh; the rest is checking it
 _MESHES = "*.ply *.obj *.off *.stl *.glb *.gltf *.vtk *.vtp *.vtu *.vtkhdf"
 # Types of files in dialogs.
@@ -90,6 +94,8 @@ def read_session(path: Path, progress: Progress) -> Session:
 
     A session with a pose is bound, because the pose cannot be drawn otherwise.
     """
+    if os.path.isfile(path) and os.path.getsize(path) > _LARGE:
+        load_early()
     if is_mesh(path):
         from vtk_segdeform.io import Surface, read_polydata  # which import pyvista
 
@@ -103,6 +109,7 @@ def read_session(path: Path, progress: Progress) -> Session:
         session = Session(surface)
         # They are kept with the mesh or the session.  The window does not wait for them here.
         VertexNormals(session.mesh).of(session.vertices)
+        drawn_triangles(session.mesh)
         _ = session.mesh.bounds, session.has_volume
         progress(1.0, "Drawing mesh")
         return session

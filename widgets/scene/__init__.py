@@ -33,7 +33,7 @@ from .navigation import Navigation
 from .orientation_cube import OrientationCube
 from .projection import Projection
 from .step_budget import StepBudget, observe_steps, prescribe_steps
-from .surface_display import SurfaceDisplay, SurfaceStyle
+from .surface_display import SurfaceDisplay, SurfaceStyle, drawn_triangles
 from .view import Stop, View
 from .viewpoint import VIEWS, Viewpoint
 from .widget import Widget
@@ -59,6 +59,7 @@ __all__ = [
     "Viewpoint",
     "Widget",
     "Wireframe",
+    "drawn_triangles",
     "handle_colour",
     "observe_steps",
     "prescribe_steps",

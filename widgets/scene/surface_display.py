@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import enum
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,18 +24,40 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from vtk_segdeform import sizes
-from vtk_segdeform.arrays import FloatArray, as_points, plain
+from vtk_segdeform.arrays import FloatArray, IntArray, as_points, plain
 from vtk_segdeform.checks import require
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.freezing import read_only
 from vtk_segdeform.geometry import VertexNormals
 from vtk_segdeform.io import polydata_of
+from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.pictures import BODY, INK, rgb
 from vtk_segdeform.session import Change, Session
 
 from .decimated_surface import DecimatedSurface, Decimating
 from .draft import SLOW, observe_drafts
 from .view import View
+
+_NOTHING = np.arange(0)
+_all_triangles: WeakKeyDictionary[Mesh, tuple[Any, IntArray]] = WeakKeyDictionary()
+
+
+def drawn_triangles(mesh: Mesh) -> tuple[Any, IntArray]:
+    """Return the triangles as a vtkCellArray, and the vertices (k,) that are drawn twice.
+
+    They are kept as long as the mesh, so another thread can make them before it is drawn.
+    """
+    known = _all_triangles.get(mesh)
+    if known is None:
+        faces, turned = mesh.faces.ravel(), VertexNormals(mesh).turned
+        twice, second = np.unique(faces[turned], return_inverse=True)
+        if len(turned):
+            faces = faces.copy()
+            faces[turned] = mesh.n_vertices + second
+        points = np.empty((mesh.n_vertices + len(twice), 3))
+        surface = polydata_of(points, np.full(mesh.n_faces, 3), faces)
+        known = _all_triangles[mesh] = surface.GetPolys(), twice
+    return known
 
 
 class SurfaceStyle(enum.Enum):
@@ -64,13 +87,10 @@ class SurfaceDisplay:
         self._instead: FloatArray | None = None
         mesh = session.mesh
         self._vertex_normals = VertexNormals(mesh)
-        faces, turned = mesh.faces.ravel(), self._vertex_normals.turned
-        self._twice, second = np.unique(faces[turned], return_inverse=True)
-        if len(turned):
-            faces = faces.copy()
-            faces[turned] = mesh.n_vertices + second
+        triangles, self._twice = drawn_triangles(mesh)
         x = self._shown = session.vertices
-        self.polydata = polydata_of(np.vstack([x, x[self._twice]]), np.full(mesh.n_faces, 3), faces)
+        self.polydata = polydata_of(np.vstack([x, x[self._twice]]), _NOTHING, _NOTHING)
+        self.polydata.SetPolys(triangles)
         self._drawn: NDArray[np.float64] = vtk_to_numpy(self.polydata.GetPoints().GetData())
         self._points = self._drawn[: mesh.n_vertices]
         self._read_only_points: NDArray[np.float64] = read_only(self._points)

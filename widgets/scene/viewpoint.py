@@ -25,6 +25,7 @@ from .camera_checks import axis_angle, is_sound, numbers, rotation
 from .gestures import Pointer
 from .view import Stop, View
 
+_ENOUGH = 50_000  # points that are framed, about, with those farthest out along the axes
 _NEAREST, _FARTHEST = 3e-3, 100.0  # distances of the camera, in diagonals of the model
 _MARGIN = 0.86  # share of the view that a framed model fills
 _SMALLEST = 1e-6  # the smallest framed radius, in diagonals
@@ -302,6 +303,7 @@ class Viewpoint:
         camera, (width, height) = self.view.camera, self.view.renderer.GetSize()
         slope = _MARGIN * math.tan(0.5 * math.radians(camera.GetViewAngle()))
         slopes = slope * np.array([max(width, 1) / max(height, 1), 1.0])
+        points = _outermost(points)
         low, high = bounds_of(points)
         origin = 0.5 * (low + high)
         local = (points - origin) @ axes.T
@@ -371,3 +373,12 @@ class Viewpoint:
     def _drawn(self) -> None:
         self.view.renderer.ResetCameraClippingRange()
         self.view.request_render()
+
+
+def _outermost(points: FloatArray) -> FloatArray:
+    """Return some of many *points* (n, 3), with those that are farthest out along each axis."""
+    step = len(points) // _ENOUGH
+    if step < 2:
+        return points
+    ends = [end for axis in points.T for end in (axis.argmin(), axis.argmax())]
+    return np.concatenate([points[::step], points[ends]])

@@ -15,7 +15,9 @@ from vtkmodules.vtkInteractionStyle import (
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from vtk_segdeform import Mesh, Session, models
+from vtk_segdeform.arrays import bounds_of
 from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.widgets.scene import viewpoint
 from vtk_segdeform.widgets.scene.gestures import Gesture, Phase, Pointer
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 from vtk_segdeform.widgets.scene.view import View
@@ -430,3 +432,12 @@ def test_the_foreground_follows_viewport_and_camera():
     assert front.GetViewport() == (0.5, 0.0, 1.0, 1.0)
     assert front.GetActiveCamera().GetPosition() == (1.0, 2.0, 3.0)
     assert front.GetActiveCamera().GetParallelProjection()
+
+
+def test_of_many_points_some_are_framed_with_the_outermost(monkeypatch):
+    monkeypatch.setattr(viewpoint, "_ENOUGH", 50)
+    points = np.random.default_rng(5).normal(size=(1000, 3))
+    some = viewpoint._outermost(points)
+    assert len(some) < 100
+    assert np.array_equal(bounds_of(some), bounds_of(points))
+    assert len(viewpoint._outermost(points[:90])) == 90
