@@ -16,7 +16,8 @@ of 8,000 faces takes 0.03 ms instead of 0.13."""
 COMPILED_LATE = 100_000
 """The same for the first mesh of an editor, until that has been dragged.
 
-A mesh of 5,400 vertices, dragged at once, follows after 1.0 s of processor time instead of 1.5."""
+A mesh of 5,400 vertices, dragged at once, follows after 1.1 to 1.2 s of processor time instead of
+1.8 to 2.1."""
 
 COMPILED_CHECKS = 1_500_000
 """Faces that checks of meshes process without compiled kernels before they import numba.

@@ -49,7 +49,7 @@ def test_a_picture_that_cannot_be_written_is_an_error_before_the_solve(
         os.mkfifo(folder / "pipe.png")
     before = set(os.listdir(folder))
     monkeypatch.setattr(commands, "Deformer", no_solver)
-    monkeypatch.setattr(commands, "_subspace", no_solver)
+    monkeypatch.setattr(commands, "_regions", no_solver)
     assert main(["deform", "bar.ply", "-o", "out.ply", *POSE, "--picture", picture]) == 1
     error = capsys.readouterr().err
     assert says in error

@@ -222,6 +222,10 @@ def _preparation() -> Any:
     return session().preparation()
 
 
+def _finished() -> Any:
+    return _worked_on().finishing()()
+
+
 def surface() -> pv.PolyData:
     return sd.io.to_polydata(mesh())
 
@@ -404,6 +408,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "refine": lambda: True,
     "regions": regions,
     "renderer": lambda: view().renderer,
+    "result": _finished,
     "rings": lambda: 1,
     "rotation_groups": lambda: 20,
     "seconds": lambda: 5.0,

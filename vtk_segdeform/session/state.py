@@ -3,7 +3,9 @@
 A `State` is frozen and its arrays are read-only, so that successive states share unchanged parts.
 An undo step therefore stores only its changes: one mask per region for painting, the cage vertices
 (m, 3) and handle targets (k, 3) for a drag.  States contain neither the mesh nor the vertices of a
-pose.
+pose, unless it is finished.
+
+Long because each part of a state is checked here, where it enters.
 """
 
 from __future__ import annotations
