@@ -19,7 +19,8 @@ from vtk_segdeform.mesh.topology import HalfEdges
 from vtk_segdeform.solver.solution import Status
 
 
-def posed(name, n_regions):
+def posed(name, n_regions, every=1):
+    """Return a mesh, with *every* second (2) vertex along each side of its grid, and its pose."""
     vertices, _, selection, matrix = botsch_sorkine(name)
     mesh = Surface.read(path_of(f"botsch-sorkine/{name}.off")).mesh
     assert_array_equal(mesh.vertices, vertices)
