@@ -306,9 +306,7 @@ def test_columns_through_vertices_and_edges_are_counted_once():
     assert not inside[well_out].any()
 
 
-@pytest.mark.parametrize(
-    "name", ["cactus", pytest.param("cylinder", marks=pytest.mark.campaign)]
-)
+@pytest.mark.parametrize("name", ["cactus", pytest.param("cylinder", marks=pytest.mark.campaign)])
 def test_cages_of_a_real_mesh_are_valid_and_tight(name):
     vertices, faces = read_off(f"botsch-sorkine/{name}.off")
     mesh = Mesh(vertices, faces)
