@@ -75,7 +75,9 @@ def test_the_volume_change_is_that_of_the_returned_vertices_at_any_distance(diag
     assert abs(true) <= shell / signed_volume(scene.mesh.vertices, faces) + 1e-14
 
 
-@pytest.mark.parametrize("degrees", [30, 70, 120, 180])
+@pytest.mark.parametrize(
+    "degrees", [*(pytest.param(d, marks=pytest.mark.campaign) for d in (30, 70)), 120, 180]
+)
 def test_far_motions_end_with_exact_volume_and_without_folds(degrees):
     scene = sausage(3)
     solution = scene.deformer().solve(scene.turned(degrees, about=(0.0, 0.0, 1.2)))

@@ -68,6 +68,12 @@ def around(editor, mask):
     return seen.min(axis=0) - 4.0, seen.max(axis=0) + 4.0
 
 
+@pytest.mark.parametrize(
+    "qt",
+    [pytest.param(in_a_window, id="QtInteractor"),
+     pytest.param(in_the_background, id="BackgroundPlotter", marks=pytest.mark.campaign)],
+    indirect=True,
+)  # fmt: skip
 def test_the_whole_story_in_qt(qt):
     _, editor, hand, _ = qt
     session, height = editor.session, MESH.vertices[:, 2]
