@@ -67,7 +67,12 @@ nitpicky = True
 default_role = "py:obj"
 
 # The API pages. They are built without Qt.
-autodoc_mock_imports = ["pyvistaqt", "qtpy", "vtk_segdeform.widgets.qt.panel"]
+autodoc_mock_imports = [
+    "pyvistaqt",
+    "qtpy",
+    "vtk_segdeform.widgets.qt.controls",
+    "vtk_segdeform.widgets.qt.panel",
+]
 autodoc_typehints = "none"  # the docstrings give types, with shapes
 autodoc_member_order = "bysource"
 autosummary_generate = False
