@@ -259,6 +259,14 @@ def test_the_finish_of_a_pull_moves_its_reach_only():
     assert abs(found.volume_change) < 1e-13
 
 
+def test_a_pose_whose_volume_a_finish_would_lose_is_returned_as_it_is():
+    held = np.setdiff1d(np.arange(SCENE.mesh.n_vertices), SCENE.handle)
+    deformer = SCENE.held().hold(fixed=held, handle=SCENE.handle)
+    solution = deformer.solve(SCENE.mesh.vertices[SCENE.handle] + [0.02, 0.0, 0.0])
+    assert abs(solution.volume_change) < 1e-13
+    assert deformer.finish(solution) is solution
+
+
 def test_cancelling_at_any_step_changes_nothing_of_the_solution():
     deformer = SCENE.held()
     targets = SCENE.turned(40)

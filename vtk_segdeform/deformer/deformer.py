@@ -108,6 +108,7 @@ _SEEN = 10_000  # vertices, of which this is checked
 _LEAST_SHARE = 1.0 / 32.0  # of the usual distance between waypoints
 _SCALED = 3e-5  # relative scale from which another solve follows
 _ROUNDING = 1e-7  # relative scale that counts as rounding
+_VOLUME_KEPT = 1e-9  # relative; a finish with a larger error is not used
 _MET = 1e-3  # position error, in diagonals, below which a target is met
 _SAME = 1e-9  # mesh sizes, within which cages are those of a solution
 _CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
@@ -584,8 +585,8 @@ class Deformer:
         handles and fixed vertices are exact.  The volume is preserved as before.  The next solve
         starts from the cages, as if the pose had not been finished.  Of a deformer made by `local`
         only the surface within the reach is finished: it stays from 1.4 times the reach on, and
-        next to a handle of one vertex, which would become a spike.
-        With *avoid_contact*, crossings that *solution* does not have are avoided.
+        next to a handle of one vertex, which would become a spike.  A pose that would lose its
+        volume, because hardly a vertex is free, is returned unchanged.  With *avoid_contact*, crossings that *solution* does not have are avoided.
 
         Parameters
         ----------
@@ -630,7 +631,9 @@ class Deformer:
         found = run(start, places[held], progress)
         if shares is not None and found.vertices is not start:
             found = replace(found, vertices=finisher.between(start, found.vertices, shares))
-        if found.vertices is start:
+        # Without enough free vertices exact handles and exact volumes exclude each other.
+        off = [abs(each.relative(found.vertices)) for each in self.preserved_volumes]
+        if found.vertices is start or max(off, default=0.0) > _VOLUME_KEPT:
             return solution
         x = frame.in_scene(found.vertices)
         is_there = solution.targets is None

@@ -93,7 +93,7 @@ class _Element:
 
 @dataclass
 class _Coding:
-    """How arrays are coded, and the bytes of those that are appended."""
+    """The encoding of arrays, and the appended data."""
 
     header: int
     compressed: bool
