@@ -586,7 +586,9 @@ class Deformer:
         starts from the cages, as if the pose had not been finished.  Of a deformer made by `local`
         only the surface within the reach is finished: it stays from 1.4 times the reach on, and
         next to a handle of one vertex, which would become a spike.  A pose that would lose its
-        volume, because hardly a vertex is free, is returned unchanged.  With *avoid_contact*, crossings that *solution* does not have are avoided.
+        volume, because hardly a vertex is free, is returned unchanged.
+
+        With *avoid_contact*, crossings that *solution* does not have are avoided.
 
         Parameters
         ----------
