@@ -486,7 +486,7 @@ class Session(Timeline):
     # Fixed vertices and handles.
 
     def set_fixed(self, vertices: ArrayLike) -> None:
-        """Fix *vertices*, ids or a mask, where they are; those that were fixed stay as before.
+        """Fix *vertices* (ids or a mask) at their current positions; those already fixed keep theirs.
 
         Without a pose, after `reset_pose` or with new regions or cages, they are fixed at rest.
         """

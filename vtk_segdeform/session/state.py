@@ -122,8 +122,8 @@ class Finished(Frozen):
     held: IntArray
     """(h,) int: the vertices that were fixed or in handles at the finish."""
     shifts: FloatArray
-    """(h, 3) float: their places, less those that the cages are solved for; 0 but for vertices that
-    became fixed or handles in a finished pose."""
+    """(h, 3) float: their positions minus the targets of the cages; nonzero only for vertices that
+    were fixed, or made handles, in a finished pose."""
 
     def shifted(self, x: FloatArray) -> FloatArray:
         """Return for every vertex its place, less that of the cages, whose mesh is *x* (n, 3)."""

@@ -376,7 +376,7 @@ class Viewpoint:
 
 
 def _outermost(points: FloatArray) -> FloatArray:
-    """Return some of many *points* (n, 3), with those that are farthest out along each axis."""
+    """Return a subset of *points* (n, 3) that includes the extremes along each axis."""
     step = len(points) // _ENOUGH
     if step < 2:
         return points
