@@ -486,8 +486,9 @@ class Session(Timeline):
     # Fixed vertices and handles.
 
     def set_fixed(self, vertices: ArrayLike) -> None:
-        """Fix *vertices* (ids or a mask) at their current positions; those already fixed keep theirs.
+        """Fix *vertices* (ids or a mask) at their current positions.
 
+        Vertices that are already fixed keep theirs.
         Without a pose, after `reset_pose` or with new regions or cages, they are fixed at rest.
         """
         fixed, _ = checked_constraints(self.mesh, vertices, self._state.handle)
