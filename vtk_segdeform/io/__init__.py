@@ -32,6 +32,7 @@ from .convert import (
     require_writable,
     to_polydata,
     with_vertices,
+    writable_suffixes,
     write_mesh,
 )
 from .meshlab import from_meshset, simplify, to_meshset
@@ -56,6 +57,7 @@ __all__ = [
     "to_polydata",
     "triangles_of",
     "with_vertices",
+    "writable_suffixes",
     "write_mesh",
     "write_project",
 ]

@@ -62,6 +62,12 @@ def is_mesh_file(path: str | Path) -> bool:
     return as_path(path).suffix.lower() in {*_READERS, *_VTK_READS, *meshlab.READS}
 
 
+def writable_suffixes() -> tuple[str, ...]:
+    """Return the suffixes of the formats that `write_mesh` can write here, in order."""
+    more = meshlab.WRITES if meshlab.available() else frozenset()
+    return tuple(sorted({*_WRITERS, *_VTK_WRITES, *more}))
+
+
 def read_polydata(path: str | Path) -> pv.PolyData:
     """Read a surface with its polygons and arrays from a file; it may be open or faulty.
 

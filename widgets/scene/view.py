@@ -70,6 +70,8 @@ class View(Projection):
         self._depth = 0  # number of nested callbacks
         self._render_requested = False
         self.draft: Any = None  # of `Draft.of`
+        self.host: Callable[[], None] | None = None
+        """Called by `render` instead of `draw`, by a host that calls `draw` later, as in a page."""
         self._n_spared = 0  # threads that drawing must not hold up
         self._drawn, self._drawing_time = -math.inf, 0.0  # end and duration of the last picture
 
@@ -115,7 +117,14 @@ class View(Projection):
             self._foreground = None
 
     def render(self) -> None:
-        """Draw the window; do nothing once it is closed."""
+        """Draw the window, or let the `host` do so; do nothing once it is closed."""
+        if self.host is not None:
+            self.host()
+        else:
+            self.draw()
+
+    def draw(self) -> None:
+        """Draw the window now; do nothing once it is closed."""
         if self.window is not None:
             began = time.perf_counter()
             self.window.Render()

@@ -1,0 +1,42 @@
+"""The editor in a browser.
+
+The files, in reading order:
+
+    web_editor  `WebEditor`: an off-screen view, a trame server and a page
+    stream      input in, pictures out, in one order
+    inputs key_names timers pictures
+                the parts of that: events, keys, timers, JPEG
+    protocol    the messages between page and stream
+    page_model  what the page shows, and the one way in which it uses the editor
+    transfer    uploads and downloads
+    client      a process for one person, for servers
+    page/       the page: view.js, panel.js, page.js, page.html, page.css
+
+It needs ``pip install 'vtk-segdeform[web]'``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from vtk_segdeform.errors import MissingDependencyError
+
+if TYPE_CHECKING:
+    from .web_editor import WebEditor
+
+__all__ = ["WebEditor"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import `WebEditor` when it is first used, because trame is optional."""
+    if name != "WebEditor":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    try:
+        from .web_editor import WebEditor
+    except ModuleNotFoundError as fault:
+        if (fault.name or "").startswith("vtk_segdeform"):
+            raise
+        raise MissingDependencyError(
+            f"The editor in a browser needs {fault.name}: pip install 'vtk-segdeform[web]'"
+        ) from None
+    return WebEditor

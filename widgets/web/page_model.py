@@ -1,0 +1,131 @@
+"""What the page shows, as JSON, and the one way in which it uses the editor.
+
+The models are those of `widgets.panel`, which Qt draws as well.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from vtk_segdeform.errors import ArgumentError
+
+from .. import panel
+from ..editor import DeformEditor
+from ..panel import Field
+
+_PERIOD = 0.1  # seconds between two refreshes, at least
+_UNSHARED = frozenset({"act", "acts", "action", "while_busy"})
+
+_log = logging.getLogger(__name__)
+
+
+class PageModel:
+    """Keeps the state of a page as the editor is.
+
+    Parameters
+    ----------
+    editor : DeformEditor
+        The editor.
+    state : trame_server.state.State
+        The state of the page; only what differs is sent.
+    names : mapping of str to str
+        Files of the server, by the names that the page shows instead.
+    """
+
+    def __init__(self, editor: DeformEditor, state: Any, names: dict[str, str]) -> None:
+        self._editor, self._state, self._names = editor, state, names
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._is_due = False
+        self._shown: dict[str, Any] = {}
+        state.cards = _plain(panel.first_steps())
+        self.refresh()
+        self.stop: Callable[[], None] = editor.controller.messages.on_change(self.changed)
+
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Follow the editor in *loop*."""
+        self._loop = loop
+
+    def changed(self) -> None:
+        """Refresh the page soon."""
+        if self._loop is not None and not self._is_due:
+            self._is_due = True
+            self._loop.call_later(_PERIOD, self._flush)
+
+    def _flush(self) -> None:
+        self._is_due = False
+        self.refresh()
+        self._state.flush()
+
+    def refresh(self) -> None:
+        """Show the editor as it is."""
+        editor, keys = self._editor, self._editor.keys
+        name = self._name
+        now = {
+            "toolbar": panel.toolbar(editor),
+            "sections": panel.sections(editor),
+            "history": panel.history(editor),
+            "status": panel.status(editor),
+        }
+        for key, model in now.items():
+            self._set(key, self._public(_plain(model, lambda f: panel.tooltip(f, keys))))
+        is_modified = editor.controller.file.is_modified(editor.session)
+        stem = name.rpartition(".")[0] or name
+        self._set("document", {"name": name, "stem": stem, "modified": is_modified})
+
+    def press(self, name: object, value: object = None) -> None:
+        """Use a control; see `panel.press`.  "hint" runs the action of a word of the hint."""
+        editor = self._editor
+        with editor.view.guarded(), editor.view.drawing_once():
+            try:
+                if name == "hint":
+                    words = panel.status(editor).words
+                    if value in {word.action for word in words if word.action}:
+                        editor.run(str(value))
+                else:
+                    panel.press(editor, name, value)  # type: ignore[arg-type]
+            except ArgumentError as fault:
+                _log.info("a page pressed %r: %s", name, fault)
+                editor.controller.messages.report_error(fault)
+                editor.controller.refresh()
+        self.changed()
+
+    @property
+    def _name(self) -> str:
+        """The name of the document."""
+        return self._names.get(str(self._editor.path), self._editor.path.name)
+
+    def _set(self, key: str, value: Any) -> None:
+        if self._shown.get(key) != value:
+            self._shown[key] = value
+            self._state[key] = value
+
+    def _public(self, value: Any) -> Any:
+        """Return *value* with the names that the page shows for files of the server."""
+        if isinstance(value, str):
+            for path, name in self._names.items():
+                value = value.replace(path, name)
+            return value
+        if isinstance(value, list):
+            return [self._public(each) for each in value]
+        if isinstance(value, dict):
+            return {key: self._public(each) for key, each in value.items()}
+        return value
+
+
+def _plain(model: Any, tip: Callable[[Field], str] | None = None) -> Any:
+    """Return a model as lists, dicts, texts and numbers, without anything that is not visible."""
+    if isinstance(model, tuple | list):
+        return [_plain(each, tip) for each in model if getattr(each, "visible", True)]
+    if not is_dataclass(model):
+        return model
+    names = [each.name for each in fields(model) if each.name not in _UNSHARED]
+    if not isinstance(model, Field):
+        names = [each.name for each in fields(model) if each.name != "acts"]
+    made = {name: _plain(getattr(model, name), tip) for name in names}
+    if isinstance(model, Field) and tip is not None:
+        made["tip"] = tip(model)
+    return made

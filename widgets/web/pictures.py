@@ -1,0 +1,80 @@
+"""Pictures of a view as JPEG: small while it moves, complete once it rests."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+
+from ..scene import View
+
+_MOVING, _STILL = 65, 92  # quality, of 100
+_MOST_MOVING = 1_200_000  # pixels of a picture that moves
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An encoded picture."""
+
+    data: bytes
+    width: int
+    """Pixels of the encoded picture, which may be fewer than those of the view."""
+    height: int
+    is_still: bool
+
+
+Encode = Callable[[], Picture]
+"""Encodes a picture that was drawn; called in another thread."""
+
+
+class Pictures:
+    """Draws a view, and encodes the result.
+
+    Parameters
+    ----------
+    view : View
+        The view.
+    """
+
+    def __init__(self, view: View) -> None:
+        self._view = view
+        self._pixels: NDArray[np.uint8] | None = None
+
+    def draw(self) -> Encode:
+        """Draw the view now; return what encodes the picture for a view that moves."""
+        self._view.draw()
+        self._pixels = pixels = _pixels_of(self._view.window)
+        return lambda: _encoded(pixels, is_still=False)
+
+    def still(self) -> Encode | None:
+        """Return what encodes the last picture completely, if there is one."""
+        pixels = self._pixels
+        return None if pixels is None else (lambda: _encoded(pixels, is_still=True))
+
+
+def _pixels_of(window: Any) -> NDArray[np.uint8]:
+    """Return the (height, width, 3) colours of the last picture, the lowest row first."""
+    width, height = window.GetSize()
+    values = vtkUnsignedCharArray()
+    window.GetPixelData(0, 0, width - 1, height - 1, 0, values, 0)
+    pixels: NDArray[np.uint8] = vtk_to_numpy(values).reshape(height, width, 3)
+    return pixels
+
+
+def _encoded(pixels: NDArray[np.uint8], *, is_still: bool) -> Picture:
+    height, width, _ = pixels.shape
+    image = Image.frombuffer("RGB", (width, height), pixels, "raw", "RGB", 0, -1)
+    if not is_still and width * height > _MOST_MOVING:
+        image = image.reduce(math.ceil(math.sqrt(width * height / _MOST_MOVING)))
+    file = io.BytesIO()
+    # 4:4:4 keeps thin coloured lines; 4:2:0 takes half the bytes.
+    image.save(file, "JPEG", quality=_STILL if is_still else _MOVING, subsampling=2 - 2 * is_still)
+    return Picture(file.getvalue(), *image.size, is_still)

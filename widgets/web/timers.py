@@ -1,0 +1,84 @@
+"""The timers of an interactor without an event loop, fired by asyncio.
+
+A vtkGenericRenderWindowInteractor announces each timer by ``CreateTimerEvent`` and
+``DestroyTimerEvent``, and expects its host to fire it.  Nothing is scheduled while no timer runs.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from functools import partial
+from typing import Any
+
+_ONE_SHOT = 1  # type of a timer, as vtkRenderWindowInteractor numbers them
+
+
+class Timers:
+    """Fires all timers that *interactor* creates from now on, between `start` and `stop`.
+
+    Parameters
+    ----------
+    interactor : vtkGenericRenderWindowInteractor
+        Their owner.
+    """
+
+    def __init__(self, interactor: Any) -> None:
+        self._interactor = interactor
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._periods: dict[int, tuple[float, bool]] = {}  # seconds, and whether it repeats
+        self._handles: dict[int, asyncio.TimerHandle] = {}
+        self._tags = [
+            interactor.AddObserver("CreateTimerEvent", self._created),
+            interactor.AddObserver("DestroyTimerEvent", self._destroyed),
+        ]
+
+    @property
+    def running(self) -> tuple[float, ...]:
+        """The periods of the timers that run, in seconds."""
+        return tuple(seconds for seconds, _ in self._periods.values())
+
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Fire timers in *loop* from now on."""
+        self._loop = loop
+        for timer in self._periods:
+            self._schedule(timer)
+
+    def stop(self) -> None:
+        """Fire no timer any more."""
+        for tag in self._tags:
+            self._interactor.RemoveObserver(tag)
+        for handle in self._handles.values():
+            handle.cancel()
+        self._tags, self._handles, self._periods = [], {}, {}
+
+    def _created(self, *_: object) -> None:
+        interactor = self._interactor
+        seconds = interactor.GetTimerEventDuration() / 1000.0
+        is_repeating = interactor.GetTimerEventType() != _ONE_SHOT
+        timer = interactor.GetTimerEventPlatformId()
+        self._periods[timer] = seconds, is_repeating
+        self._schedule(timer)
+
+    def _destroyed(self, *_: object) -> None:
+        self._forget(self._interactor.GetTimerEventPlatformId())
+
+    def _forget(self, timer: int) -> None:
+        self._periods.pop(timer, None)
+        handle = self._handles.pop(timer, None)
+        if handle is not None:
+            handle.cancel()
+
+    def _schedule(self, timer: int) -> None:
+        if self._loop is not None:
+            if timer in self._handles:
+                self._handles[timer].cancel()
+            seconds, _ = self._periods[timer]
+            self._handles[timer] = self._loop.call_later(seconds, partial(self._fire, timer))
+
+    def _fire(self, timer: int) -> None:
+        _, is_repeating = self._periods[timer]
+        if is_repeating:
+            self._schedule(timer)  # first: the observers may destroy it
+        else:
+            self._forget(timer)
+        self._interactor.InvokeEvent("TimerEvent")

@@ -1,0 +1,147 @@
+"""Files of a page: uploads that the editor opens, and downloads of what it edits.
+
+    POST upload?name=NAME      the body is a mesh or a session
+    GET  download/SUFFIX       the session, or the surface in its pose
+
+Both need the header ``X-Segdeform``, which a page of another origin cannot send.  A page never names
+a file of the server: of NAME only the suffix is used, and the text is shown.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from aiohttp import web
+
+from vtk_segdeform.errors import SegDeformError, SessionError
+from vtk_segdeform.io import is_mesh_file, writable_suffixes
+from vtk_segdeform.session import save_session
+
+from ..editor import DeformEditor, opening
+
+_SESSION = ".segdeform"
+_HEADER = "X-Segdeform"
+_LONGEST = 80  # letters of a name
+UPLOAD_LIMIT = 1 << 30  # bytes
+_LABELS = {".glb": "glTF binary", ".gltf": "glTF"}
+
+
+def formats() -> list[dict[str, str]]:
+    """Return suffix and label of each format of a download, the session first."""
+    known = [{"suffix": _SESSION[1:], "label": f"Session ({_SESSION})"}]
+    for suffix in writable_suffixes():
+        label = f"{_LABELS.get(suffix, suffix[1:].upper())} ({suffix})"
+        known.append({"suffix": suffix[1:], "label": label})
+    return known
+
+
+class Transfer:
+    """The routes of one editor.
+
+    Parameters
+    ----------
+    editor : DeformEditor
+        The editor.
+    folder : Path
+        Where uploads are stored; nobody else writes there.
+    limit : int
+        Largest upload, in bytes.
+    names : dict of str to str
+        Filled with the names that the page shows for paths.
+    changed : callable
+        Called after a download, which saves.
+    """
+
+    def __init__(
+        self,
+        editor: DeformEditor,
+        folder: Path,
+        limit: int,
+        names: dict[str, str],
+        changed: Callable[[], None],
+    ) -> None:
+        self._editor, self._folder, self.limit = editor, folder, limit
+        self._names, self._changed = names, changed
+
+    def add_routes(self, app: Any) -> None:
+        """Add the routes to an aiohttp application."""
+        app.router.add_post("/upload", self.upload)
+        app.router.add_get("/download/{suffix}", self.download)
+
+    async def upload(self, request: web.Request) -> web.Response:
+        """Store the body, and open it in the background."""
+        name = re.sub(r"[^\w .()+-]", "_", request.query.get("name", ""))[-_LONGEST:].strip()
+        suffix = Path(name).suffix.lower()
+        if _HEADER not in request.headers:
+            return _refusal(403, "Only the page of the editor may upload files.")
+        if suffix != _SESSION and not is_mesh_file(f"mesh{suffix}"):
+            return _refusal(415, f"{name or 'This file'} is no mesh or session that can be opened.")
+        if (request.content_length or 0) > self.limit:
+            return self._too_large(name)
+        if self._editor.is_busy:
+            return _refusal(409, "The editor is busy. Wait, or cancel the work, and try again.")
+        place = Path(tempfile.mkdtemp(dir=self._folder)) / f"upload{suffix}"
+        size = 0
+        with place.open("wb") as file:
+            async for data in request.content.iter_chunked(1 << 18):
+                size += len(data)
+                if size > self.limit:
+                    break
+                file.write(data)
+        if size > self.limit:
+            shutil.rmtree(place.parent)
+            return self._too_large(name)
+        self._remove_older(place)
+        self._names[str(place)] = name
+        self._names[str(place.with_suffix(_SESSION))] = name
+        error = self._editor.do(opening(place))
+        return _refusal(409, str(error)) if error is not None else web.Response()
+
+    async def download(self, request: web.Request) -> web.Response:
+        """Send the session, or the surface in its pose."""
+        suffix = f".{request.match_info['suffix']}"
+        if _HEADER not in request.headers:
+            return _refusal(403, "Only the page of the editor may download files.")
+        if suffix != _SESSION and suffix not in writable_suffixes():
+            return _refusal(404, f"There is no format {suffix}.")
+        place = Path(tempfile.mkdtemp(dir=self._folder)) / f"download{suffix}"
+        try:
+            self._write(place)
+            data = place.read_bytes()
+        except SegDeformError as error:
+            return _refusal(409, str(error).removeprefix(f"{place}: "))
+        finally:
+            shutil.rmtree(place.parent)
+        self._changed()
+        disposition = f'attachment; filename="{place.name}"'
+        return web.Response(body=data, headers={"Content-Disposition": disposition})
+
+    def _write(self, place: Path) -> None:
+        """Write the session, or the surface in its pose."""
+        editor, session = self._editor, self._editor.session
+        if editor.is_busy or session.is_dragging:
+            raise SessionError("Finish the drag or the work before downloading.")
+        if place.suffix != _SESSION:
+            session.write_deformed(place)
+            return
+        save_session(place, session, view=editor.controller.camera.settings(editor.mode))
+        editor.controller.file.mark_saved(session)
+
+    def _too_large(self, name: str) -> web.Response:
+        most = f"{self.limit / 1e6:,.0f} MB"
+        return _refusal(413, f"{name} is larger than {most}, the limit of this server.")
+
+    def _remove_older(self, place: Path) -> None:
+        """Remove earlier uploads, except the one that is edited, which may be saved to again."""
+        for path in self._folder.iterdir():
+            if path.is_dir() and path not in (place.parent, self._editor.path.parent):
+                shutil.rmtree(path, ignore_errors=True)
+
+
+def _refusal(status: int, text: str) -> web.Response:
+    return web.Response(status=status, text=text)

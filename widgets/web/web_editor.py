@@ -1,0 +1,212 @@
+"""The editor in a browser: an off-screen view, a trame server, and a page around the view.
+
+    web = WebEditor(mesh)
+    web.start(port=8080)             # blocks; or await web.serve(port=8080)
+
+One `WebEditor` is for one person: all pages of its server show the same view.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pyvista as pv
+from trame.app import get_server
+from trame.ui.vuetify3 import VAppLayout
+
+from vtk_segdeform.checks import as_text, require
+from vtk_segdeform.pictures import require_offscreen
+from vtk_segdeform.session import Session
+
+from .. import plugin  # registers `segdeform` on plotters even without entry points
+from ..editor import DeformEditor, KeyChoice, keys_of
+from ..scene import set_background, set_lights
+from .page_model import PageModel
+from .protocol import ViewProtocol
+from .stream import Stream
+from .timers import Timers
+from .transfer import UPLOAD_LIMIT, Transfer, formats
+
+_PAGE = Path(__file__).with_name("page")
+_SCRIPTS = ("view.js", "panel.js", "page.js")  # the last one defines what Vue installs
+# These write to files of the server, or read them: the page uploads and downloads instead.
+_NO_KEYS = dict.fromkeys(("save", "open", "record_input", "record_video"), ())
+_SIZE = 1000, 700  # pixels, until the page tells its own
+_SAMPLES = 8  # per pixel, for smooth edges
+_COLOURS = {
+    "light": {"primary": "#2f7fc1", "surface": "#fbfbfa", "background": "#f0f0ee"},
+    "dark": {"primary": "#5aa2dd", "surface": "#26282c", "background": "#1d1e21"},
+}
+_numbers = itertools.count(1)
+
+
+class WebEditor:
+    """The editor behind a trame server.
+
+    Parameters
+    ----------
+    mesh : pyvista.PolyData, pyvista.MultiBlock, Surface, Mesh or Session
+        What to edit first; the page can open other files.
+    name : str
+        The name that the page shows for it.
+    keys : str or mapping of str to str or sequence of str
+        As in `edit`.  Keys of files and recordings do nothing: the page uploads and downloads.
+    folder : Path, optional
+        A private folder for uploads; by default a temporary one, which `close` deletes.
+    upload_limit : int
+        Largest upload, in bytes.
+
+    Raises
+    ------
+    MissingDependencyError
+        If off-screen rendering is unavailable.
+
+    Attributes
+    ----------
+    plotter : pyvista.Plotter
+        The off-screen view; anything that pyvista draws can be added to it.
+    editor : DeformEditor
+        The editor in the view.
+    server : trame_server.core.Server
+        The server of the page.
+    stream : Stream
+        The view's input and pictures; ``stream.want()`` is the one place that asks for a picture.
+    """
+
+    def __init__(
+        self,
+        mesh: Any,
+        *,
+        name: str = "Untitled",
+        keys: KeyChoice = "pyvista",
+        folder: Path | None = None,
+        upload_limit: int = UPLOAD_LIMIT,
+    ) -> None:
+        session = plugin.session_of(mesh)
+        as_text(name, "name")
+        require_offscreen()
+        self._own = Path(tempfile.mkdtemp(prefix="segdeform-")) if folder is None else None
+        self._folder = folder or self._own or Path()
+        self.plotter = pv.Plotter(off_screen=True, notebook=False, window_size=[*_SIZE])
+        self.plotter.render_window.SetMultiSamples(_SAMPLES)
+        self.plotter.iren.clear_key_event_callbacks()
+        set_lights(self.plotter.renderer)
+        set_background(self.plotter.renderer)
+        timers = Timers(self.plotter.iren.interactor)  # before the editor creates the first one
+        table = {**keys_of(keys).changes, **_NO_KEYS}
+        self.editor: DeformEditor = self.plotter.segdeform.edit(session, keys=table)
+        self.editor.controller.messages.show_line(False)  # which the page shows
+        self.plotter.show(interactive=False, auto_close=False)
+        names = {str(self.editor.path): name}
+        self.server = get_server(f"segdeform {next(_numbers)}", client_type="vue3")
+        self.model = PageModel(self.editor, self.server.state, names)
+        self.stream = Stream(self.editor.view, timers, self._send, self.model.changed)
+        self._protocol = ViewProtocol(self.stream)
+        self._transfer = Transfer(
+            self.editor, self._folder, upload_limit, names, self.model.changed
+        )
+        self._make_page()
+
+    @property
+    def session(self) -> Session:
+        """The session being edited; another one after the page has opened a file."""
+        return self.editor.session
+
+    def start(self, *, port: int = 0, ready: Callable[[int], object] | None = None) -> None:
+        """Serve the page at 127.0.0.1 until interrupted, then `close`.
+
+        Parameters
+        ----------
+        port : int
+            The port; 0 for any that is free.
+        ready : callable, optional
+            ``ready(port)`` is called once the page can be opened.
+        """
+        asyncio.run(self.serve(port=port, ready=ready))
+
+    async def serve(self, *, port: int = 0, ready: Callable[[int], object] | None = None) -> None:
+        """Serve the page, as `start` does, in the running event loop."""
+
+        def begin(**_: object) -> None:
+            loop = asyncio.get_running_loop()
+            self.stream.start(loop)
+            self.model.start(loop)
+            if ready is not None:
+                ready(self.server.port)
+
+        self.server.controller.on_server_ready.add(begin)
+        with _without_arguments():
+            running = self.server.start(
+                port=port,
+                host="127.0.0.1",
+                exec_mode="coroutine",
+                backend="aiohttp",
+                open_browser=False,
+                show_connection_info=False,
+                disable_logging=True,
+                thread=True,  # leaves signals to the caller
+                timeout=0,
+            )
+        try:
+            await running
+        finally:
+            await self.stream.stop()
+            self.close()
+
+    def close(self) -> None:
+        """Release the view and the folder of uploads; the session is unchanged."""
+        self.model.stop()
+        self.plotter.close()  # which removes the editor first
+        if self._own is not None:
+            shutil.rmtree(self._own, ignore_errors=True)
+
+    def _send(self, picture: Any, number: int) -> None:
+        self._protocol.send(picture, number)
+
+    def _make_page(self) -> None:
+        server, address = self.server, "__segdeform"
+        server.enable_module(
+            {
+                "serve": {address: str(_PAGE)},
+                "scripts": [f"{address}/{script}" for script in _SCRIPTS],
+                "styles": [f"{address}/page.css"],
+                "vue_use": ["segdeform"],
+            }
+        )
+        server.add_protocol_to_configure(lambda root: root.registerLinkProtocol(self._protocol))
+        server.controller.on_server_bind.add(lambda app: self._transfer.add_routes(app.app))
+        server.controller.trigger("press")(self.model.press)
+        state = server.state
+        state.trame__title = "segdeform"
+        state.formats = formats()
+        state.upload_limit = self._transfer.limit
+        state.dark = False
+        state.change("dark")(self._set_dark)
+        themes = {name: {"dark": name == "dark", "colors": c} for name, c in _COLOURS.items()}
+        config = {"theme": {"defaultTheme": "light", "themes": themes}}
+        theme = ("dark ? 'dark' : 'light'",)
+        with VAppLayout(server, vuetify_config=config, theme=theme) as layout:
+            layout.root.add_child((_PAGE / "page.html").read_text(encoding="utf-8"))
+
+    def _set_dark(self, dark: object, **_: object) -> None:
+        set_background(self.plotter.renderer, dark=dark is True)
+        self.stream.want()
+
+
+@contextmanager
+def _without_arguments() -> Iterator[None]:
+    """Hide the arguments of this program from trame, which would parse them."""
+    arguments = sys.argv
+    sys.argv = arguments[:1]
+    try:
+        yield
+    finally:
+        sys.argv = arguments
