@@ -1,0 +1,43 @@
+"""The panel of the editor without a toolkit: what it shows, and what its controls do.
+
+    sections(editor)                  the boxes of the present mode, with fields and tables
+    toolbar(editor)                   the buttons that are the same in every mode
+    status(editor)                    the message, the next step, progress
+    history(editor)                   the states by name
+    first_steps()                     the cards for the first run
+    press(editor, name, value)        use a control: one entry for every skin
+
+Qt and the web page draw these models and call `press`; nothing of a control is written twice.
+"""
+
+from .fields import (
+    Card,
+    Cell,
+    Column,
+    Entry,
+    Field,
+    Item,
+    Row,
+    Section,
+    Status,
+    Table,
+    Value,
+    Word,
+    tooltip,
+)
+
+__all__ = [
+    "Card",
+    "Cell",
+    "Column",
+    "Entry",
+    "Field",
+    "Item",
+    "Row",
+    "Section",
+    "Status",
+    "Table",
+    "Value",
+    "Word",
+    "tooltip",
+]
