@@ -8,6 +8,15 @@
     press(editor, name, value)        use a control: one entry for every skin
 
 Qt and the web page draw these models and call `press`; nothing of a control is written twice.
+
+The files, in reading order:
+
+    fields      what fields, tables and sections are
+    panel       `sections` and `press`
+    pulling handles options regions painting
+                the sections
+    toolbar     the toolbar and the menu about the view
+    status      the status, the history and the first steps
 """
 
 from .fields import (
@@ -25,6 +34,9 @@ from .fields import (
     Word,
     tooltip,
 )
+from .panel import all_sections, press, sections
+from .status import first_steps, history, status
+from .toolbar import toolbar, view_entries
 
 __all__ = [
     "Card",
@@ -39,5 +51,13 @@ __all__ = [
     "Table",
     "Value",
     "Word",
+    "all_sections",
+    "first_steps",
+    "history",
+    "press",
+    "sections",
+    "status",
+    "toolbar",
     "tooltip",
+    "view_entries",
 ]

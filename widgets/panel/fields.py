@@ -11,6 +11,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..editor import Action, Keys, key_cap
 
 Value = bool | int | float | str | None
@@ -55,13 +58,13 @@ class Field:
     """The text for None, as in "Auto"; without it, None is no value of a number."""
     on_release: bool = False
     """Whether a slider reports only where it is released: what follows takes its time."""
-    choices: tuple[tuple[str, Value], ...] = ()
+    choices: tuple[tuple[str, str], ...] = ()
     """The label and the value of each choice."""
     icon: str = ""
     group: str = ""
     """The group of a button: one of those with a value in a group is down."""
-    items: tuple[Field, ...] = ()
-    """The entries of a menu, a separator being None."""
+    items: tuple[Field | None, ...] = ()
+    """The entries of a menu; None separates two groups."""
     while_busy: bool = False
     """Whether it works during a job and leaves a drag alone."""
     act: Act | None = field(default=None, compare=False, repr=False)
@@ -175,13 +178,17 @@ class Status:
     words: tuple[Word, ...]
     """The next step, with keys to click on."""
     is_busy: bool
-    """Whether a job runs: everything but the camera, menus and cancel waits for it."""
+    """Whether a job runs; everything but the camera, help and cancel waits for it."""
+    work: str
+    """Name of the job, or of the work in the background, whose progress is known; or ""."""
     progress: float | None
     """Completed fraction of the job or the work in the background, 0..1; None if there is none."""
     volume: str
     """The volume change of the mesh; "" if it is not known now."""
     state: str
-    """What is at the right end: the size of the mesh."""
+    """The size of the mesh."""
+    cancel: Field
+    """The button that cancels the job or work; visible while there is any."""
 
     @property
     def hint(self) -> str:
@@ -205,6 +212,21 @@ class Card:
     name: str
     title: str
     sentence: str
+
+
+def key_button(keys: Keys, name: str, action: str, label: str = "", **state: Any) -> Field:
+    """Return a button for an *action* of the table of *keys*, with its label or *label*.
+
+    *state* are other attributes of the `Field`.
+    """
+    tip = keys[action].label
+    return Field(name, "button", label or tip, tip, action, **state)
+
+
+def as_rgb(colour: NDArray[np.uint8]) -> tuple[int, int, int]:
+    """Return a colour (3,), 0 to 255, as a tuple."""
+    red, green, blue = colour.tolist()
+    return red, green, blue
 
 
 def tooltip(item: Field, keys: Keys) -> str:
