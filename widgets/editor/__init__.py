@@ -48,7 +48,7 @@ from .mode import Mode
 from .notices import Notice, Notices, notices_of
 from .panel_actions import (
     choosing_handle,
-    choosing_region,
+    choosing_regions,
     exporting,
     finishing_after_drags,
     fitting_with,
@@ -93,7 +93,7 @@ __all__ = [
     "Timer",
     "actions",
     "choosing_handle",
-    "choosing_region",
+    "choosing_regions",
     "converting",
     "error_text",
     "exporting",

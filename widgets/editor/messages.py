@@ -43,6 +43,7 @@ class Messages:
         self._noted = 0.0
         self._note = self._error = self._question = self._last_question = ""
         self._preparing: float | None = None
+        self._work = ""
         self._listeners: dict[int, Callable[[], object]] = {}
 
     @property
@@ -69,6 +70,11 @@ class Messages:
     def fraction(self) -> float | None:
         """Completed fraction of the job or preparation that is shown, 0..1; None if none is."""
         return self._line.fraction if self._preparing is None else self._preparing
+
+    @property
+    def work(self) -> str:
+        """What `fraction` is about: the job with its current step, or the preparation; or ""."""
+        return self._work
 
     def on_change(self, listener: Callable[[], object]) -> Stop:
         """Call *listener* whenever messages are shown, even if unchanged, until stopped."""
@@ -108,7 +114,7 @@ class Messages:
 
         At the right, show which fraction of the background *work* is complete, if any is running.
         """
-        self._preparing = preparing
+        self._preparing, self._work = preparing, "" if preparing is None else work
         if time.monotonic() > self._noted + _SECONDS and not self._question:
             self._note = ""
         aside = "" if preparing is None else f"{work} ... {100.0 * preparing:.0f} % (Esc)"
@@ -121,7 +127,7 @@ class Messages:
 
     def show_progress(self, mode: str, text: str, fraction: float, *, is_cancelled: bool) -> None:
         """Show the progress of a job and how to cancel it."""
-        self._preparing = None
+        self._preparing, self._work = None, text
         if is_cancelled:
             self.note("Cancelled. Nothing was changed")  # shown once the job has ended
         key = "Stopping ..." if is_cancelled else "Esc to cancel"

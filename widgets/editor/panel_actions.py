@@ -19,9 +19,9 @@ from .controller import Controller
 from .mode import Mode
 
 
-def choosing_region(region: int) -> Action:
-    """Return the action that selects *region*."""
-    return lambda controller: controller.widgets.choose_region(region)
+def choosing_regions(regions: Sequence[int]) -> Action:
+    """Return the action that selects *regions*, one of them for painting."""
+    return lambda controller: controller.widgets.choose_regions(regions)
 
 
 def merging(regions: Sequence[int]) -> Action:

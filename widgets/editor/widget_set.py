@@ -7,6 +7,7 @@ decides whether cages, volume changes and the outlines of regions are shown as w
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import ExitStack
 
 from vtk_segdeform.arrays import FloatArray
@@ -54,6 +55,7 @@ class WidgetSet:
         self.overlay = VolumeOverlay(view, session, self.surface)
         self.cages_wanted = self.overlay_wanted = self.regions_wanted = False
         self.cages.hide()
+        self._chosen: tuple[int, ...] = ()
         self.choose_region(0)
 
     @property
@@ -73,6 +75,18 @@ class WidgetSet:
         Without regions, 1 is selected: region 0 will be the rest of the mesh.
         """
         self.selector.region = min(region, self.n_regions) if self.n_regions else 1
+
+    def choose_regions(self, regions: Sequence[int]) -> None:
+        """Select several regions, of which one is painted: the current one if it is there."""
+        self._chosen = tuple(sorted(regions))
+        if regions and self.selector.region not in regions:
+            self.choose_region(regions[0])
+
+    @property
+    def chosen_regions(self) -> tuple[int, ...]:
+        """The selected regions, with the one that is painted."""
+        region = self.selector.region
+        return self._chosen if region in self._chosen else (region,)
 
     def enter(self, mode: Mode) -> None:
         """Activate the widget of *mode* and show its actors."""

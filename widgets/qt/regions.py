@@ -11,7 +11,7 @@ from vtk_segdeform.pictures import of_region
 from ..editor import (
     DeformEditor,
     Mode,
-    choosing_region,
+    choosing_regions,
     merging,
     naming_region,
     segmenting,
@@ -148,7 +148,7 @@ class RegionsPart(QtWidgets.QGroupBox):
     def _selection_changed(self) -> None:
         regions = [self._rows[k].region for k in self.selected]
         if regions and self._editor.widgets.selector.region not in regions:
-            self._editor.do(choosing_region(regions[0]))
+            self._editor.do(choosing_regions(regions))
         self.refresh()
 
     def _item_edited(self, item: Any, which: int) -> None:

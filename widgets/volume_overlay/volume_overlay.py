@@ -62,6 +62,11 @@ class VolumeOverlay:
         The session whose pose is shown.
     surface : SurfaceDisplay, optional
         The displayed mesh of the session; by default the overlay adds its own.
+
+    Attributes
+    ----------
+    region_volumes : RegionVolumes
+        The volume change of each region.
     """
 
     def __init__(self, view: Any, session: Session, surface: SurfaceDisplay | None = None) -> None:
@@ -74,7 +79,7 @@ class VolumeOverlay:
         self._legend = Legend(self.view, "Local volume\nchange")
         self._clock = _FrameClock(self.view)
         self._local: LocalVolume | None = None
-        self._regions = RegionVolumes(session)
+        self.region_volumes = RegionVolumes(session)
         self._change: FloatArray | None = None
         self._half_range: float | None = None
         self._wanted_range: float | None = _RANGE
@@ -128,7 +133,7 @@ class VolumeOverlay:
         called in another thread.
         """
         self._prepared()
-        self._regions.prepare()
+        self.region_volumes.prepare()
 
     def show(self) -> None:
         """Show the overlay and update it whenever the pose changes."""
@@ -196,7 +201,7 @@ class VolumeOverlay:
             lines.append((f"Volume: {percent(self.session.volume_change)}", None))
         if self._prepared().is_defined:
             lines.append((f"Local: {low} to {high} %", None))
-        regions = self._regions.changes()
+        regions = self.region_volumes.changes()
         lines += [
             (f"{self._name(region)}: {in_tenths(share)}", region)
             for region, share in regions[:_MOST_REGIONS]

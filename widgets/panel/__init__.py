@@ -1,0 +1,63 @@
+"""The panel of the editor without a toolkit: what it shows, and what its controls do.
+
+    sections(editor)                  the boxes of the present mode, with fields and tables
+    toolbar(editor)                   the buttons that are the same in every mode
+    status(editor)                    the message, the next step, progress
+    history(editor)                   the states by name
+    first_steps()                     the cards for the first run
+    press(editor, name, value)        use a control: one entry for every skin
+
+Qt and the web page draw these models and call `press`; nothing of a control is written twice.
+
+The files, in reading order:
+
+    fields      what fields, tables and sections are
+    panel       `sections` and `press`
+    pulling handles options regions painting
+                the sections
+    toolbar     the toolbar and the menu about the view
+    status      the status, the history and the first steps
+"""
+
+from .fields import (
+    Card,
+    Cell,
+    Column,
+    Entry,
+    Field,
+    Item,
+    Row,
+    Section,
+    Status,
+    Table,
+    Value,
+    Word,
+    tooltip,
+)
+from .panel import all_sections, press, sections
+from .status import first_steps, history, status
+from .toolbar import toolbar, view_entries
+
+__all__ = [
+    "Card",
+    "Cell",
+    "Column",
+    "Entry",
+    "Field",
+    "Item",
+    "Row",
+    "Section",
+    "Status",
+    "Table",
+    "Value",
+    "Word",
+    "all_sections",
+    "first_steps",
+    "history",
+    "press",
+    "sections",
+    "status",
+    "toolbar",
+    "tooltip",
+    "view_entries",
+]

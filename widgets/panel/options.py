@@ -1,0 +1,209 @@
+"""The sections with the options for fitting cages and for deforming."""
+
+from __future__ import annotations
+
+from ..editor import (
+    DeformEditor,
+    finishing_after_drags,
+    fitting_with,
+    setting,
+    setting_colour_range,
+    toggle_cages,
+    toggle_overlay,
+)
+from .fields import Field, Section, key_button
+from .pulling import preserve_toggle, reset_button, volume_label
+
+_MOST = 100_000
+_EACH, _MOST_DETAIL = 12, 800  # cage vertices: fewest for each region, and most of the slider
+_LIDS = {"auto": None, "lids": True, "off": False}
+_LIDS_LABELS = (("Auto", "auto"), ("Under lids", "lids"), ("Off", "off"))
+
+
+def cages_section(editor: DeformEditor) -> Section:
+    """Return the options for fitting cages."""
+    session, widgets = editor.session, editor.widgets
+    options, has_regions = session.options, session.regions is not None
+    fitted = sum(cage.n_vertices for cage in session.cages)
+    # The default follows the number of regions, and other numbers are met only nearly.
+    is_other = fitted not in (0, options.n_cage_vertices)
+    least = _EACH * max(1, widgets.n_regions)
+    largest, decimals = _readable(0.2 * session.mesh.diagonal)
+    return Section(
+        "cages",
+        "Cages",
+        (
+            Field(
+                "cages.detail",
+                "slider",
+                "Detail",
+                "Detail of cages: release to refit them",
+                value=fitted or options.n_cage_vertices,
+                enabled=has_regions,
+                minimum=least,
+                maximum=max(least, _MOST_DETAIL),
+                page=50.0,
+                on_release=True,
+                act=fitting_with,
+            ),
+            Field(
+                "cages.total",
+                "integer",
+                "Total cage vertices",
+                "Total vertices of all cages (used at next fit)",
+                value=options.n_cage_vertices,
+                minimum=8,
+                maximum=_MOST,
+                step=10,
+                unit=f"({fitted} fitted)" if is_other else "",
+                act=lambda n: setting(n_cage_vertices=n),
+            ),
+            Field(
+                "cages.offset",
+                "number",
+                "Offset",
+                "Cage offset from the surface (used at next fit)",
+                value=options.offset,
+                maximum=largest,
+                step=10.0**-decimals,
+                decimals=decimals,
+                special="Auto",
+                act=lambda x: setting(offset=x),
+            ),
+            key_button(
+                editor.keys,
+                "cages.fit",
+                "fit_cages",
+                "Refit cages" if session.cages else "Fit cages",
+                enabled=has_regions,
+            ),
+            Field(
+                "cages.shown",
+                "toggle",
+                "Show cages in all modes",
+                "Show cages outside mode 2 as well",
+                "show_cages",
+                value=widgets.cages_wanted,
+                enabled=bool(session.cages),
+                act=lambda _: toggle_cages,
+            ),
+        ),
+    )
+
+
+def deform_section(editor: DeformEditor) -> Section:
+    """Return the options for deforming, and the volume change."""
+    session, widgets = editor.session, editor.widgets
+    options, has_volume = session.options, session.has_volume
+    share = widgets.overlay.wanted_range
+    return Section(
+        "deform",
+        "Deform",
+        (
+            volume_label(editor, "deform.volume"),
+            (
+                preserve_toggle(editor, "deform.preserve"),
+                Field(
+                    "deform.per_region",
+                    "toggle",
+                    "Per region",
+                    "Preserve the volume of each region as well",
+                    value=options.preserve_region_volumes and has_volume,
+                    enabled=has_volume,
+                    act=lambda on: setting(preserve_region_volumes=on),
+                ),
+            ),
+            Field(
+                "deform.overlay",
+                "toggle",
+                "Show local volume change",
+                "Colour the mesh by its local volume change",
+                "show_volume_change",
+                value=widgets.overlay_wanted,
+                act=lambda _: toggle_overlay,
+            ),
+            Field(
+                "deform.lids",
+                "choice",
+                "Open parts",
+                "How the volume of open parts is preserved: Auto is under lids unless flat",
+                value=next(name for name, lids in _LIDS.items() if lids is options.lids),
+                enabled=not session.mesh.is_closed,
+                choices=_LIDS_LABELS,
+                act=lambda name: setting(lids=_LIDS[name]),
+            ),
+            Field(
+                "deform.range",
+                "number",
+                "Colour range",
+                "Local volume change at the ends of the colour scale",
+                value=None if share is None else 100.0 * share,
+                enabled=widgets.overlay_wanted,
+                maximum=1000.0,
+                step=5.0,
+                decimals=1,
+                prefix="±",
+                unit="%",
+                special="Auto",
+                act=lambda x: setting_colour_range(None if x is None else 0.01 * x),
+            ),
+            Field(
+                "deform.stretch",
+                "number",
+                "Stretch resistance",
+                "Weight of the stretch energy relative to the detail energy; "
+                "0 is the paper's energy",
+                value=options.stretch,
+                maximum=1e6,
+                decimals=2,
+                act=lambda x: setting(stretch=x),
+            ),
+            Field(
+                "deform.clusters",
+                "integer",
+                "Rotation clusters",
+                "Rotation clusters: fewer is faster, less accurate",
+                value=options.rotation_groups,
+                maximum=_MOST,
+                step=50,
+                special="One per vertex",
+                act=lambda n: setting(rotation_groups=n),
+            ),
+            (
+                Field(
+                    "deform.contact",
+                    "toggle",
+                    "Avoid contact",
+                    "Keep parts of the surface from crossing each other",
+                    value=options.avoid_contact,
+                    act=lambda on: setting(avoid_contact=on),
+                ),
+                Field(
+                    "deform.finishes",
+                    "toggle",
+                    "Finish on the mesh",
+                    "After each drag, reduce the distortion of the mesh itself",
+                    value=editor.controller.finishing.is_wanted,
+                    act=finishing_after_drags,
+                ),
+            ),
+            (
+                key_button(
+                    editor.keys,
+                    "deform.finish",
+                    "finish",
+                    "Finish pose",
+                    enabled=session.can_finish,
+                ),
+                reset_button(editor, "deform.reset"),
+            ),
+        ),
+    )
+
+
+def _readable(largest: float) -> tuple[float, int]:
+    """Return *largest* with three digits or more, and the decimals for that."""
+    decimals = 0
+    while largest * 10.0**decimals < 200.0 and decimals < 12:
+        decimals += 1
+    return round(largest, decimals), decimals

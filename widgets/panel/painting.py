@@ -1,0 +1,66 @@
+"""The section with the painting tools and their settings."""
+
+from __future__ import annotations
+
+import math
+
+from ..editor import DeformEditor, Mode, selecting_through, with_radius
+from ..region_selector import Tool
+from .fields import Field, Section, key_button
+
+_TOOLS = {
+    Tool.BRUSH: "brush",
+    Tool.LASSO: "lasso",
+    Tool.RECTANGLE: "rectangle",
+    Tool.COMPONENT: "connected_part",
+    Tool.REGION: "whole_region",
+}
+
+
+def painting_section(editor: DeformEditor) -> Section:
+    """Return the painting tools and their settings."""
+    selector, keys = editor.widgets.selector, editor.keys
+    diagonal = editor.session.mesh.diagonal
+    decimals = max(0, 4 - math.floor(math.log10(diagonal)))
+    tools = tuple(
+        key_button(keys, f"paint.{action}", action, value=selector.tool is tool, group="tools")
+        for tool, action in _TOOLS.items()
+    )
+    return Section(
+        "paint",
+        "Paint with",
+        (
+            tools[:3],
+            tools[3:],
+            Field(
+                "paint.radius",
+                "number",
+                "Brush radius",
+                "Brush radius along the surface, in mesh units ([ ] or Shift+wheel)",
+                value=selector.radius,
+                enabled=selector.tool is Tool.BRUSH,
+                minimum=round(1e-4 * diagonal, decimals),
+                maximum=round(2.0 * diagonal, decimals),
+                step=0.01 * diagonal,
+                decimals=decimals,
+                act=with_radius,
+            ),
+            Field(
+                "paint.through",
+                "toggle",
+                "Select through (X-ray)",
+                "Paint hidden vertices as well",
+                "select_through",
+                value=selector.through,
+                act=selecting_through,
+            ),
+            (
+                key_button(keys, "paint.grow", "grow", "Grow"),
+                key_button(keys, "paint.shrink", "shrink", "Shrink"),
+                key_button(keys, "paint.all", "select_all", "All"),
+                key_button(
+                    keys, "paint.invert", "invert", "Invert", visible=editor.mode is Mode.HANDLES
+                ),
+            ),
+        ),
+    )

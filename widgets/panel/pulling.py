@@ -1,0 +1,104 @@
+"""The section with the settings of a pull, and the volume change."""
+
+from __future__ import annotations
+
+from ..editor import Action, Controller, DeformEditor, pulling_with, setting
+from ..volume_overlay import percent
+from .fields import Field, Section, key_button
+
+
+def pull_section(editor: DeformEditor) -> Section:
+    """Return the settings of a pull, and the volume change."""
+    session, puller, keys = editor.session, editor.widgets.puller, editor.keys
+    return Section(
+        "pull",
+        "Pull",
+        (
+            Field(
+                "pull.radius",
+                "number",
+                "Radius",
+                "Radius of the pulled surface, in % of the model's size ([ ] or Shift+wheel)",
+                value=100.0 * puller.radius / session.mesh.diagonal,
+                minimum=0.5,
+                maximum=100.0,
+                decimals=1,
+                unit="%",
+                act=_with_radius,
+            ),
+            Field(
+                "pull.local",
+                "slider",
+                "Local",
+                "How much of the surface stays in place: all of it follows at the left, "
+                "only the surface near the pointer at the right",
+                "more_local",
+                value=round(100.0 * puller.effective_locality),
+                maximum=100.0,
+                unit="%",
+                act=lambda share: pulling_with(locality=0.01 * share),
+            ),
+            volume_label(editor, "pull.volume"),
+            (
+                Field(
+                    "pull.auto",
+                    "toggle",
+                    "Auto local",
+                    "0 between three pins or fixed vertices, otherwise mostly free",
+                    "auto_locality",
+                    value=puller.locality is None,
+                    act=lambda on: _auto if on else _not_auto,
+                ),
+                preserve_toggle(editor, "pull.preserve"),
+            ),
+            (
+                key_button(keys, "pull.unpin", "remove_pins", enabled=bool(puller.marked)),
+                reset_button(editor, "pull.reset"),
+            ),
+        ),
+    )
+
+
+def volume_label(editor: DeformEditor, name: str) -> Field:
+    """Return the field that shows the volume change of the mesh."""
+    session = editor.session
+    text = percent(session.volume_change) if session.has_volume else "No volume to preserve"
+    tip = "Relative volume change of the whole mesh"
+    return Field(name, "label", "Volume change", tip, value=text)
+
+
+def preserve_toggle(editor: DeformEditor, name: str) -> Field:
+    """Return the field that turns volume preservation on and off."""
+    has_volume = editor.session.has_volume
+    return Field(
+        name,
+        "toggle",
+        "Preserve volume",
+        "Preserve the enclosed volume exactly",
+        "preserve_volume",
+        value=editor.session.options.preserve_volume and has_volume,
+        enabled=has_volume,
+        act=lambda on: setting(preserve_volume=on),
+    )
+
+
+def reset_button(editor: DeformEditor, name: str) -> Field:
+    """Return the button that resets the pose."""
+    is_posed = editor.session.state.pose is not None
+    return key_button(editor.keys, name, "reset_pose", enabled=is_posed)
+
+
+def _with_radius(percentage: float) -> Action:
+    def resize(controller: Controller) -> None:
+        radius = 0.01 * percentage * controller.session.mesh.diagonal
+        pulling_with(radius=radius)(controller)
+
+    return resize
+
+
+def _auto(controller: Controller) -> None:
+    pulling_with(locality=None)(controller)
+
+
+def _not_auto(controller: Controller) -> None:
+    pulling_with(locality=controller.widgets.puller.effective_locality)(controller)

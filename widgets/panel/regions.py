@@ -1,0 +1,121 @@
+"""The section with the regions: colour, name, cage and volume change."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from vtk_segdeform.pictures import of_region
+
+from ..editor import (
+    Action,
+    DeformEditor,
+    Mode,
+    choosing_regions,
+    merging,
+    naming_region,
+    segmenting,
+    showing_cage,
+    split_region,
+)
+from ..volume_overlay import in_tenths
+from .fields import Cell, Column, Field, Row, Section, Table, as_rgb, key_button
+
+_MOST = 20  # regions of a segmentation
+_COLUMNS = (
+    Column("cage", "Cage", "Number of cage vertices. Tick: show the cage"),
+    Column("volume", "Volume"),
+)
+
+
+def regions_section(editor: DeformEditor) -> Section:
+    """Return the list of regions, and what can be done with them."""
+    widgets, keys = editor.widgets, editor.keys
+    painting = editor.mode is Mode.REGIONS
+    existing = [region for region in widgets.chosen_regions if region < widgets.n_regions]
+    return Section(
+        "regions",
+        "Regions",
+        (
+            key_button(keys, "regions.segment", "segment", visible=painting),
+            Field(
+                "regions.count",
+                "slider",
+                "Number",
+                "Number of regions: release to segment again",
+                value=min(max(1, widgets.n_regions), _MOST),
+                visible=painting,
+                minimum=1,
+                maximum=_MOST,
+                on_release=True,
+                act=segmenting,
+            ),
+            Table(
+                "regions.list",
+                "Region",
+                _COLUMNS,
+                _rows(editor),
+                "The selected region is painted in mode 1. Tick: show its cage. F2: rename",
+                n_rows=7,
+                multiple=True,
+                acts={
+                    "select": _choosing,
+                    "rename": lambda key, name: naming_region(int(key), name),
+                    "cage": lambda key, on: showing_cage(int(key), on),
+                },
+            ),
+            (
+                key_button(keys, "regions.new", "new_region", "New", visible=painting),
+                Field(
+                    "regions.merge",
+                    "button",
+                    "Merge",
+                    "Merge the selected regions",
+                    enabled=len(existing) > 1,
+                    visible=painting,
+                    act=lambda _: merging(existing),
+                ),
+                Field(
+                    "regions.split",
+                    "button",
+                    "Split",
+                    "Split the selected region",
+                    "split_region",
+                    enabled=len(existing) == 1,
+                    visible=painting,
+                    act=lambda _: split_region,
+                ),
+            ),
+        ),
+    )
+
+
+def _choosing(keys: Sequence[str]) -> Action:
+    return choosing_regions([int(key) for key in keys])
+
+
+def _rows(editor: DeformEditor) -> tuple[Row, ...]:
+    session, widgets = editor.session, editor.widgets
+    volumes = dict(widgets.overlay.region_volumes.changes())
+    if widgets.n_regions == 1 and session.has_volume:
+        volumes = {0: session.volume_change}
+    shown = [*range(widgets.n_regions)]
+    new = widgets.selector.region
+    if editor.mode is Mode.REGIONS and new >= widgets.n_regions:
+        shown.append(new)
+    return tuple(_row(editor, region, volumes.get(region)) for region in shown)
+
+
+def _row(editor: DeformEditor, region: int, volume: float | None) -> Row:
+    widgets, cages = editor.widgets, editor.session.cages
+    name, exists = editor.session.region_name(region), region < widgets.n_regions
+    cage = Cell("None" if exists else "")
+    if exists and cages:
+        cage = Cell(str(cages[region].n_vertices), widgets.cages.is_visible(region))
+    return Row(
+        str(region),
+        name if exists else f"{name} (new)",
+        as_rgb(of_region(region)),
+        (cage, Cell("" if volume is None else in_tenths(volume))),
+        selected=region in widgets.chosen_regions,
+        renamable=exists,
+    )

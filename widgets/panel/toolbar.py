@@ -1,0 +1,171 @@
+"""The toolbar: files, undo and redo, the modes, the rest pose, what is shown, and help."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from ..editor import (
+    DeformEditor,
+    Mode,
+    keys_of,
+    looking_from,
+    show_pose,
+    show_rest,
+    toggle_cube,
+    with_up,
+)
+from .fields import Act, Field, key_button
+
+_Test = Callable[[DeformEditor], bool]
+_DEFAULT = keys_of("pyvista")
+# The action of an entry, whether there is something to show, and whether it is shown.
+_SHOWN: tuple[tuple[str, _Test, _Test | None], ...] = (
+    ("style", lambda _: True, None),
+    ("show_regions", lambda e: e.session.regions is not None, lambda e: e.widgets.regions_wanted),
+    ("show_cages", lambda e: bool(e.session.cages), lambda e: e.widgets.cages.is_shown),
+    ("show_volume_change", lambda _: True, lambda e: e.widgets.overlay_wanted),
+    ("show_holes", lambda e: bool(e.controller.notices.text), None),
+)
+_VIEWS = ("front", "back", "right", "left", "top", "bottom")
+
+
+def toolbar(editor: DeformEditor) -> tuple[Field, ...]:
+    """Return the buttons of the toolbar of *editor*, group by group."""
+    keys, controller, is_free = editor.keys, editor.controller, not editor.is_busy
+    files = [
+        Field("open", "file", "Open", "Open a mesh or a session", "open", enabled=is_free),
+        Field(
+            "save",
+            "menu",
+            "Save",
+            "Save the session or the deformed mesh",
+            "save",
+            enabled=is_free,
+            items=(
+                Field("save.session", "file", "Save session"),
+                Field("save.session_as", "file", "Save session as ..."),
+                Field("save.mesh_as", "file", "Save mesh as ..."),
+            ),
+        ),
+        _step("undo", controller.undo_label, is_free=is_free),
+        _step("redo", editor.session.redo_label, is_free=is_free),
+    ]
+    modes = [
+        key_button(
+            keys,
+            f"mode.{mode.name.lower()}",
+            mode.name.lower(),
+            mode.name.title(),
+            value=editor.mode is mode,
+            enabled=is_free,
+            icon=mode.name.lower(),
+            group="modes",
+        )
+        for mode in Mode
+    ]
+    others = [
+        Field(
+            "compare",
+            "hold",
+            "Before/After",
+            "Show the mesh at rest while the button is held",
+            "before_after",
+            value=controller.shows_rest,
+            enabled=is_free and editor.session.state.pose is not None,
+            act=lambda on: show_rest if on else show_pose,
+        ),
+        Field("view", "menu", "View", "What is shown", enabled=is_free, items=view_entries(editor)),
+        Field("help", "button", "Keys", "Show keys", "help", while_busy=True),
+    ]
+    return tuple(
+        replace(each, icon=each.icon or each.name, group=group)
+        for group, fields in (("files", files), ("modes", modes), ("others", others))
+        for each in fields
+    )
+
+
+def view_entries(editor: DeformEditor | None) -> tuple[Field | None, ...]:
+    """Return the entries of the menu about the view; without an editor, all are disabled."""
+    views = [_camera(editor, each, each.capitalize(), f"view_{each}") for each in _VIEWS]
+    views.append(_camera(editor, "home", "Three-quarter", "view_home"))
+    views.append(_camera(editor, "iso", "Isometric", act=lambda _: looking_from("iso")))
+    ups = [
+        _camera(editor, f"up_{name.lower()}", name, act=_upright(axis), shows=_is_up(axis))
+        for axis, name in enumerate("XYZ")
+    ]
+    return (
+        *(_shown(editor, *each) for each in _SHOWN),
+        None,
+        _camera(editor, "frame_all", "Fit to view", "frame_all"),
+        _camera(editor, "frame_selection", "Fit selection", "frame_selection"),
+        replace(_camera(editor, "viewpoint", "Viewpoint"), kind="menu", items=tuple(views)),
+        replace(_camera(editor, "up", "Up axis"), kind="menu", items=tuple(ups)),
+        _camera(
+            editor,
+            "orthographic",
+            "Orthographic",
+            "projection",
+            shows=lambda e: bool(e.view.camera.GetParallelProjection()),
+        ),
+        _camera(
+            editor,
+            "cube",
+            "Orientation cube",
+            act=lambda _: toggle_cube,
+            shows=lambda e: e.show_cube,
+        ),
+    )
+
+
+def _shown(
+    editor: DeformEditor | None, action: str, exists: _Test, is_shown: _Test | None
+) -> Field:
+    """Return the entry of an *action* that shows or hides something."""
+    binding = (_DEFAULT if editor is None else editor.keys)[action]
+    return Field(
+        f"view.{action}",
+        "button" if is_shown is None else "toggle",
+        binding.label,
+        action=action,
+        value=None if is_shown is None else editor is not None and is_shown(editor),
+        enabled=editor is not None and editor.mode in binding.modes and exists(editor),
+    )
+
+
+def _camera(
+    editor: DeformEditor | None,
+    name: str,
+    label: str,
+    action: str = "",
+    *,
+    act: Act | None = None,
+    shows: _Test | None = None,
+) -> Field:
+    """Return an entry that moves the camera, during a job and a drag, too."""
+    return Field(
+        f"view.{name}",
+        "button" if shows is None else "toggle",
+        label,
+        action=action,
+        value=None if shows is None else editor is not None and shows(editor),
+        enabled=editor is not None,
+        while_busy=True,
+        act=act,
+    )
+
+
+def _upright(axis: int) -> Act:
+    return lambda _: with_up(axis)
+
+
+def _is_up(axis: int) -> _Test:
+    return lambda editor: bool(editor.controller.camera.viewpoint.up[axis] > 0.5)
+
+
+def _step(verb: str, label: str | None, *, is_free: bool) -> Field:
+    """Return the button that undoes or redoes the step with a *label*, if there is one."""
+    name = verb.capitalize()
+    if not label:
+        return Field(verb, "button", name, f"Nothing to {verb}", enabled=False)
+    return Field(verb, "button", name, f"{name}: {label}", verb, enabled=is_free)
