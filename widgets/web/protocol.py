@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from typing import Any
 
 from wslink import register
 from wslink.websocket import LinkProtocol
 
-from vtk_segdeform.arrays import is_integer, is_number
+from vtk_segdeform.arrays import is_whole, is_number
 from vtk_segdeform.checks import shown
 from vtk_segdeform.errors import ArgumentError
 
@@ -29,11 +30,13 @@ class ViewProtocol(LinkProtocol):
     ----------
     stream : Stream
         The view.
+    sized : callable
+        Called after each change of its size.
     """
 
-    def __init__(self, stream: Stream) -> None:
+    def __init__(self, stream: Stream, sized: Callable[[], object]) -> None:
         super().__init__()
-        self._stream = stream
+        self._stream, self._sized = stream, sized
         self._pages: set[str] = set()
 
     def onConnect(self, request: Any, client_id: str) -> None:  # noqa: N802 - wslink's name
@@ -64,11 +67,12 @@ class ViewProtocol(LinkProtocol):
         scale = min(1.0, (_MOST_PIXELS / (columns * rows)) ** 0.5)
         size = [min(_LARGEST, max(_SMALLEST, round(scale * each))) for each in (columns, rows)]
         self._stream.open(size[0], size[1])
+        self._sized()
 
     @register("segdeform.shown")
     def shown(self, number: object) -> None:
         """Continue: the page has shown picture *number*."""
-        if not is_integer(number):
+        if not is_whole(number, 0):
             raise ArgumentError(f"number must be an integer; got {shown(number)}")
         self._stream.shown(int(number))  # type: ignore[call-overload]
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import os
 import shutil
 import sys
 import tempfile
@@ -36,9 +37,9 @@ from .timers import Timers
 from .transfer import UPLOAD_LIMIT, Transfer, formats
 
 _PAGE = Path(__file__).with_name("page")
-_SCRIPTS = ("view.js", "panel.js", "page.js")  # the last one defines what Vue installs
 # These write to files of the server, or read them: the page uploads and downloads instead.
 _NO_KEYS = dict.fromkeys(("save", "open", "record_input", "record_video"), ())
+_COMPRESS = "WSLINK_WS_COMPRESS"
 _SIZE = 1000, 700  # pixels, until the page tells its own
 _SAMPLES = 8  # per pixel, for smooth edges
 _COLOURS = {
@@ -109,7 +110,8 @@ class WebEditor:
         self.server = get_server(f"segdeform {next(_numbers)}", client_type="vue3")
         self.model = PageModel(self.editor, self.server.state, names)
         self.stream = Stream(self.editor.view, timers, self._send, self.model.changed)
-        self._protocol = ViewProtocol(self.stream)
+        self._aim: tuple[float, ...] | None = tuple(self.plotter.camera.position)
+        self._protocol = ViewProtocol(self.stream, self._sized)
         self._transfer = Transfer(
             self.editor, self._folder, upload_limit, names, self.model.changed
         )
@@ -143,7 +145,7 @@ class WebEditor:
                 ready(self.server.port)
 
         self.server.controller.on_server_ready.add(begin)
-        with _without_arguments():
+        with _own_settings():
             running = self.server.start(
                 port=port,
                 host="127.0.0.1",
@@ -168,6 +170,12 @@ class WebEditor:
         if self._own is not None:
             shutil.rmtree(self._own, ignore_errors=True)
 
+    def _sized(self) -> None:
+        """Frame the model once the size of the page is known, unless the camera was moved."""
+        if self._aim == tuple(self.plotter.camera.position):
+            self.editor.controller.camera.viewpoint.frame(animate=False)
+        self._aim = None
+
     def _send(self, picture: Any, number: int) -> None:
         self._protocol.send(picture, number)
 
@@ -176,7 +184,7 @@ class WebEditor:
         server.enable_module(
             {
                 "serve": {address: str(_PAGE)},
-                "scripts": [f"{address}/{script}" for script in _SCRIPTS],
+                "module_scripts": [f"{address}/page.js"],
                 "styles": [f"{address}/page.css"],
                 "vue_use": ["segdeform"],
             }
@@ -202,11 +210,18 @@ class WebEditor:
 
 
 @contextmanager
-def _without_arguments() -> Iterator[None]:
-    """Hide the arguments of this program from trame, which would parse them."""
-    arguments = sys.argv
-    sys.argv = arguments[:1]
+def _own_settings() -> Iterator[None]:
+    """Hide the arguments of this program from trame, which would parse them.
+
+    Pictures are compressed already; wslink would compress them once more.
+    """
+    arguments, compress = sys.argv, os.environ.get(_COMPRESS)
+    sys.argv, os.environ[_COMPRESS] = arguments[:1], "0"
     try:
         yield
     finally:
         sys.argv = arguments
+        if compress is None:
+            del os.environ[_COMPRESS]
+        else:
+            os.environ[_COMPRESS] = compress

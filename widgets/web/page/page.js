@@ -1,134 +1,135 @@
 // The page around the view: opening by upload, downloads, colours, drawer, first steps.
-(function () {
-  const STEPS_SEEN = 'segdeform steps seen', COLOURS = 'segdeform colours';
-  const CARDS = { pin: 'mdi-pin-outline', pull: 'mdi-gesture-swipe-up', done: 'mdi-check' };
-  const remembered = {
-    get(name) { try { return localStorage.getItem(name); } catch { return null; } },
-    set(name, value) { try { localStorage.setItem(name, value); } catch { /* private window */ } },
-  };
-  const address = (path) => new URL(path, window.location.href.replace(/[^/]*([?#].*)?$/, ''));
+import controls from './panel.js';
+import View from './view.js';
 
-  const Page = {
-    props: { dark: Boolean },
-    emits: ['dark'],
-    inject: ['trame'],
-    data: () => ({
-      pins: false, panel: false, fault: '', sent: null, isOver: false, asked: null,
-      hasSteps: !remembered.get(STEPS_SEEN),
-    }),
-    mounted() {
-      const scheme = window.matchMedia('(prefers-color-scheme: dark)');
-      const own = remembered.get(COLOURS);
-      this.$emit('dark', own ? own === 'dark' : scheme.matches);
-      this.follow = () => { if (!remembered.get(COLOURS)) this.$emit('dark', scheme.matches); };
-      scheme.addEventListener('change', this.follow);
-      this.scheme = scheme;
+const STEPS_SEEN = 'segdeform steps seen', COLOURS = 'segdeform colours';
+const CARDS = { pin: 'mdi-pin-outline', pull: 'mdi-gesture-swipe-up', done: 'mdi-check' };
+const remembered = {
+  get(name) { try { return localStorage.getItem(name); } catch { return null; } },
+  set(name, value) { try { localStorage.setItem(name, value); } catch { /* private window */ } },
+};
+const address = (path) => new URL(path, window.location.href.replace(/[^/]*([?#].*)?$/, ''));
+
+const Page = {
+  props: { dark: Boolean },
+  emits: ['dark'],
+  inject: ['trame'],
+  data: () => ({
+    pins: false, panel: false, fault: '', sent: null, isOver: false, asked: null,
+    hasSteps: !remembered.get(STEPS_SEEN),
+  }),
+  mounted() {
+    const scheme = window.matchMedia('(prefers-color-scheme: dark)');
+    const own = remembered.get(COLOURS);
+    this.$emit('dark', own ? own === 'dark' : scheme.matches);
+    this.follow = () => { if (!remembered.get(COLOURS)) this.$emit('dark', scheme.matches); };
+    scheme.addEventListener('change', this.follow);
+    this.scheme = scheme;
+  },
+  beforeUnmount() { this.scheme.removeEventListener('change', this.follow); },
+  methods: {
+    press(name, value) {
+      this.fault = '';
+      this.trame.trigger('press', [name, value]);
     },
-    beforeUnmount() { this.scheme.removeEventListener('change', this.follow); },
-    methods: {
-      press(name, value) {
-        this.fault = '';
-        this.trame.trigger('press', [name, value]);
-      },
-      toggleDark() {
-        remembered.set(COLOURS, this.dark ? 'light' : 'dark');
-        this.$emit('dark', !this.dark);
-      },
-      togglePins() { this.pins = !this.pins; },
-      togglePanel() { this.panel = !this.panel; },
-      forget() { this.fault = ''; },
-      closeSteps() {
-        this.hasSteps = false;
-        remembered.set(STEPS_SEEN, 'yes');
-      },
-      cardIcon: (name) => CARDS[name] || 'mdi-circle-small',
-      touchSentence(card) {
-        const isTouch = window.matchMedia('(pointer: coarse)').matches;
-        return isTouch ? card.sentence.replace('Shift-click', 'Choose Pin, then tap') : card.sentence;
-      },
+    toggleDark() {
+      remembered.set(COLOURS, this.dark ? 'light' : 'dark');
+      this.$emit('dark', !this.dark);
+    },
+    togglePins() { this.pins = !this.pins; },
+    togglePanel() { this.panel = !this.panel; },
+    forget() { this.fault = ''; },
+    closeSteps() {
+      this.hasSteps = false;
+      remembered.set(STEPS_SEEN, 'yes');
+    },
+    cardIcon: (name) => CARDS[name] || 'mdi-circle-small',
+    touchSentence(card) {
+      const isTouch = window.matchMedia('(pointer: coarse)').matches;
+      return isTouch ? card.sentence.replace('Shift-click', 'Choose Pin, then tap') : card.sentence;
+    },
 
-      // Files.
-      choose() { this.$refs.file.click(); },
-      chosen(event) {
-        const [file] = event.target.files;
-        event.target.value = '';
-        this.offer(file);
-      },
-      over(event) {
-        if (![...event.dataTransfer.types].includes('Files')) return;
-        event.preventDefault();
-        this.isOver = true;
-      },
-      drop(event) {
-        this.isOver = false;
-        const [file] = event.dataTransfer.files;
-        if (!file) return;
-        event.preventDefault();
-        this.offer(file);
-      },
-      offer(file) {
-        if (!file) return;
-        if (this.trame.state.get('document').modified) this.asked = file;
-        else this.upload(file);
-      },
-      answer(yes) {
-        const file = this.asked;
-        this.asked = null;
-        if (yes) this.upload(file);
-      },
-      upload(file) {
-        this.fault = '';
-        this.sent = 0;
-        const request = new XMLHttpRequest();
-        const target = address('upload');
-        target.searchParams.set('name', file.name);
-        request.open('POST', target);
-        request.setRequestHeader('X-Segdeform', 'upload');
-        request.upload.onprogress = (event) => { this.sent = event.loaded / event.total; };
-        request.onloadend = () => {
-          this.sent = null;
-          if (request.status !== 200) {
-            this.fault = request.responseText || `${file.name} could not be uploaded. Try it again.`;
-          }
-        };
-        request.send(file);
-      },
-      async download(suffix) {
-        this.fault = '';
-        try {
-          const answer = await fetch(address(`download/${suffix}`), { headers: { 'X-Segdeform': 'download' } });
-          if (!answer.ok) throw new Error(await answer.text());
-          const link = document.createElement('a');
-          link.href = URL.createObjectURL(await answer.blob());
-          link.download = `${this.trame.state.get('document').stem}.${suffix}`;
-          link.click();
-          setTimeout(() => URL.revokeObjectURL(link.href), 10000);
-        } catch (error) {
-          this.fault = error.message || 'The file could not be downloaded. Try it again.';
+    // Files.
+    choose() { this.$refs.file.click(); },
+    chosen(event) {
+      const [file] = event.target.files;
+      event.target.value = '';
+      this.offer(file);
+    },
+    over(event) {
+      if (![...event.dataTransfer.types].includes('Files')) return;
+      event.preventDefault();
+      this.isOver = true;
+    },
+    drop(event) {
+      this.isOver = false;
+      const [file] = event.dataTransfer.files;
+      if (!file) return;
+      event.preventDefault();
+      this.offer(file);
+    },
+    offer(file) {
+      if (!file) return;
+      if (this.trame.state.get('document').modified) this.asked = file;
+      else this.upload(file);
+    },
+    answer(yes) {
+      const file = this.asked;
+      this.asked = null;
+      if (yes) this.upload(file);
+    },
+    upload(file) {
+      this.fault = '';
+      this.sent = 0;
+      const request = new XMLHttpRequest();
+      const target = address('upload');
+      target.searchParams.set('name', file.name);
+      request.open('POST', target);
+      request.setRequestHeader('X-Segdeform', 'upload');
+      request.upload.onprogress = (event) => { this.sent = event.loaded / event.total; };
+      request.onloadend = () => {
+        this.sent = null;
+        if (request.status !== 200) {
+          this.fault = request.responseText || `${file.name} could not be uploaded. Try it again.`;
         }
-      },
+      };
+      request.send(file);
     },
-    template: `
-      <div class="sd" :class="{ dark }" @dragover="over" @dragleave.self="isOver = false" @drop="drop">
-        <slot v-bind="{ ...$data, press, choose, download, togglePins, togglePanel, toggleDark,
-          forget, closeSteps, cardIcon, touchSentence }"></slot>
-        <input ref="file" type="file" class="sd-file" aria-label="File to open" @change="chosen">
-        <div v-if="isOver" class="sd-over" @dragover="over" @dragleave="isOver = false" @drop="drop">
-          <span>Drop to open</span></div>
-        <div v-if="asked" class="sd-ask" role="dialog" aria-modal="true">
-          <div><h2>Unsaved changes will be lost.</h2>
-            <p>Download the session first to keep them.</p>
-            <button type="button" class="sd-button" @click="download('segdeform')">Download</button>
-            <button type="button" class="sd-button" data-name="discard" @click="answer(true)">
-              Open {{ asked.name }}</button>
-            <button type="button" class="sd-button" @click="answer(false)">Cancel</button></div></div>
-      </div>`,
-  };
+    async download(suffix) {
+      this.fault = '';
+      try {
+        const answer = await fetch(address(`download/${suffix}`), { headers: { 'X-Segdeform': 'download' } });
+        if (!answer.ok) throw new Error(await answer.text());
+        const link = document.createElement('a');
+        link.href = URL.createObjectURL(await answer.blob());
+        link.download = `${this.trame.state.get('document').stem}.${suffix}`;
+        link.click();
+        setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+      } catch (error) {
+        this.fault = error.message || 'The file could not be downloaded. Try it again.';
+      }
+    },
+  },
+  template: `
+    <div class="sd" :class="{ dark }" @dragover="over" @dragleave.self="isOver = false" @drop="drop">
+      <slot v-bind="{ ...$data, press, choose, download, togglePins, togglePanel, toggleDark,
+        forget, closeSteps, cardIcon, touchSentence }"></slot>
+      <input ref="file" type="file" class="sd-file" aria-label="File to open" @change="chosen">
+      <div v-if="isOver" class="sd-over" @dragover="over" @dragleave="isOver = false" @drop="drop">
+        <span>Drop to open</span></div>
+      <div v-if="asked" class="sd-ask" role="dialog" aria-modal="true">
+        <div><h2>Unsaved changes will be lost.</h2>
+          <p>Download the session first to keep them.</p>
+          <button type="button" class="sd-button" @click="download('segdeform')">Download</button>
+          <button type="button" class="sd-button" data-name="discard" @click="answer(true)">
+            Open {{ asked.name }}</button>
+          <button type="button" class="sd-button" @click="answer(false)">Cancel</button></div></div>
+    </div>`,
+};
 
-  Object.assign(window.segdeform.components, { 'sd-page': Page });
-  window.segdeform.install = (app) => {
-    for (const [name, component] of Object.entries(window.segdeform.components)) {
-      app.component(name, component);
-    }
-  };
-}());
+window.segdeform = {
+  install(app) {
+    const all = { 'sd-page': Page, 'sd-view': View, ...controls };
+    for (const [name, component] of Object.entries(all)) app.component(name, component);
+  },
+};
