@@ -63,9 +63,8 @@ def is_mesh_file(path: str | Path) -> bool:
 
 
 def writable_suffixes() -> tuple[str, ...]:
-    """Return the suffixes of the formats that `write_mesh` can write here, in order."""
-    more = meshlab.WRITES if meshlab.available() else frozenset()
-    return tuple(sorted({*_WRITERS, *_VTK_WRITES, *more}))
+    """Return the suffixes that `write_mesh` can write without PyMeshLab, in order."""
+    return tuple(sorted({*_WRITERS, *_VTK_WRITES}))
 
 
 def read_polydata(path: str | Path) -> pv.PolyData:

@@ -102,7 +102,7 @@ def _first_session(file: Path | None, place: Path) -> tuple[Session, str]:
     if file is not None:
         return read_session(file, lambda *_: None), file.name
     if place.is_file():
-        return read_session(place, lambda *_: None), place.name
+        return read_session(place, lambda *_: None), "Last session"
     return Session(cactus()), "Sample model"
 
 

@@ -28,13 +28,15 @@ _SESSION = ".segdeform"
 _HEADER = "X-Segdeform"
 _LONGEST = 80  # letters of a name
 UPLOAD_LIMIT = 1 << 30  # bytes
+_COMMON = (".ply", ".obj", ".stl", ".glb", ".off")  # first in the list
 _LABELS = {".glb": "glTF binary", ".gltf": "glTF"}
 
 
 def formats() -> list[dict[str, str]]:
     """Return suffix and label of each format of a download, the session first."""
     known = [{"suffix": _SESSION[1:], "label": f"Session ({_SESSION})"}]
-    for suffix in writable_suffixes():
+    others = [suffix for suffix in writable_suffixes() if suffix not in _COMMON]
+    for suffix in (*_COMMON, *others):
         label = f"{_LABELS.get(suffix, suffix[1:].upper())} ({suffix})"
         known.append({"suffix": suffix[1:], "label": label})
     return known

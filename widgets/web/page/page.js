@@ -38,6 +38,10 @@ const Page = {
     },
     togglePins() { this.pins = !this.pins; },
     togglePanel() { this.panel = !this.panel; },
+    settle(event) {
+      const button = event.detail && event.target.closest('button');
+      if (button) button.blur(); // the next key is for the editor
+    },
     forget() { this.fault = ''; },
     closeSteps() {
       this.hasSteps = false;
@@ -70,7 +74,10 @@ const Page = {
     },
     offer(file) {
       if (!file) return;
-      if (this.trame.state.get('document').modified) this.asked = file;
+      const limit = this.trame.state.get('upload_limit');
+      if (file.size > limit) {
+        this.fault = `${file.name} is larger than ${Math.floor(limit / 1e6)} MB, the limit here.`;
+      } else if (this.trame.state.get('document').modified) this.asked = file;
       else this.upload(file);
     },
     answer(yes) {
@@ -111,7 +118,7 @@ const Page = {
     },
   },
   template: `
-    <div class="sd" :class="{ dark }" @dragover="over" @dragleave.self="isOver = false" @drop="drop">
+    <div class="sd" :class="{ dark }" @click="settle" @dragover="over" @dragleave.self="isOver = false" @drop="drop">
       <slot v-bind="{ ...$data, press, choose, download, togglePins, togglePanel, toggleDark,
         forget, closeSteps, cardIcon, touchSentence }"></slot>
       <input ref="file" type="file" class="sd-file" aria-label="File to open" @change="chosen">

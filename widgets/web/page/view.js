@@ -8,6 +8,7 @@ const AHEAD = 3; // messages without an answer
 const WHEEL = 100, PINCHED_WHEEL = 12; // pixels of one click of the wheel
 const PINCH = Math.log(1.2); // one click of the wheel zooms by 1.2
 const TAP = { distance: 8, time: 150 }; // until when a second finger may still come
+const OUTSIDE = { clientX: -99, clientY: -99 };
 const BUTTONS = ['Left', 'Middle', 'Right'];
 const LEFT_TO_BROWSER = new Set(['F5', 'F11', 'F12']);
 const WITH_CONTROL = new Set(['z', 'y', 'a', 'i', '+', '-']);
@@ -103,6 +104,7 @@ class Fingers {
     if (this.kind !== 'over') this.press(place, 'Release');
     this.kind = this.all.size ? 'over' : '';
     this.start = null;
+    if (!this.kind) this.view.send('MouseMove', OUTSIDE, {}); // nothing hovers
   }
 
   centre() {
@@ -219,7 +221,7 @@ const View = {
     },
 
     leave(event) {
-      if (!event.buttons) this.send('MouseMove', { clientX: -99, clientY: -99 }, {});
+      if (!event.buttons) this.send('MouseMove', OUTSIDE, {});
     },
 
     turn(event) {
@@ -266,7 +268,7 @@ const View = {
     },
 
     sendKey(name, key, code, flags) {
-      this.send(name, this.place || { clientX: -99, clientY: -99 }, flags, { key, code });
+      this.send(name, this.place || OUTSIDE, flags, { key, code });
     },
   },
 };

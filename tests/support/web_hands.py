@@ -1,0 +1,118 @@
+"""A `WebEditor` served by a thread, and a page of it in a real browser."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any, TypeVar
+
+from chromium import Chromium, Page
+
+T = TypeVar("T")
+_SHOWN = "Number(document.querySelector('canvas')?.dataset.number) > 0"
+
+
+class Served:
+    """The editor of *mesh*, served until the end of the ``with`` block.
+
+    VTK's window belongs to the thread that serves it: use `call` for all but reading.
+    """
+
+    def __init__(self, mesh: Any, **keywords: Any) -> None:
+        self._make = lambda: self._web_editor(mesh, keywords)
+        self._started: Future[int] = Future()
+        self._thread = threading.Thread(target=self._run)
+
+    def __enter__(self) -> Served:
+        self._thread.start()
+        self.port = self._started.result(60)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        asyncio.run_coroutine_threadsafe(self.web.server.stop(), self.loop).result(20)
+        self._thread.join(20)
+        assert not self._thread.is_alive()
+
+    @property
+    def url(self) -> str:
+        """The address of the page."""
+        return f"http://127.0.0.1:{self.port}/index.html"
+
+    def call(self, function: Callable[[], T]) -> T:
+        """Call *function* in the thread of the editor, and return its result."""
+
+        async def called() -> T:
+            return function()
+
+        return asyncio.run_coroutine_threadsafe(called(), self.loop).result(20)
+
+    def wait(self, condition: Callable[[], object], seconds: float = 40.0) -> None:
+        """Wait until *condition* holds, which is called in the thread of the editor."""
+        deadline = time.monotonic() + seconds
+        while not self.call(condition):
+            assert time.monotonic() < deadline, self.web.editor.status
+            time.sleep(0.02)
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether nothing is dragged, refined or computed."""
+        editor = self.web.editor
+        live = editor.widgets.puller, editor.widgets.dragger
+        is_used = any(each.is_grabbing or each.is_refining for each in live)
+        return not (is_used or editor.is_busy or editor.is_preparing)
+
+    def page(self, browser: Chromium, **keywords: Any) -> Page:
+        """Open the page, and wait for its first picture."""
+        page = browser.page(self.url, **keywords)
+        page.wait(_SHOWN)
+        self.wait(lambda: self.is_at_rest)
+        return page
+
+    def seen(self, page: Page, point: Any) -> tuple[float, float]:
+        """Return where *page* shows a *point* (3,), in CSS pixels."""
+        view = self.web.editor.view
+        x, y = self.call(lambda: view.to_display(point[None])[0][:2])
+        width, height = view.window.GetSize()
+        left, top, wide, high = page.box(".sd-canvas")
+        return left + wide * x / width, top + high * (1.0 - y / height)
+
+    def _run(self) -> None:
+        try:
+            self.web = self._make()
+            asyncio.run(self._serve())
+            del self.web  # VTK's objects end in the thread that made them
+            gc.collect()
+        except BaseException as error:
+            if not self._started.done():
+                self._started.set_exception(error)
+            raise
+
+    async def _serve(self) -> None:
+        self.loop = asyncio.get_running_loop()
+        await self.web.serve(ready=self._started.set_result)
+
+    @staticmethod
+    def _web_editor(mesh: Any, keywords: dict[str, Any]) -> Any:
+        from vtk_segdeform.widgets.web import WebEditor
+
+        return WebEditor(mesh, **keywords)
+
+
+def line(start: tuple[float, float], end: tuple[float, float], n: int) -> list[tuple[float, float]]:
+    """Return *n* points from *start* to *end*."""
+    (x, y), (u, v) = start, end
+    return [(x + (u - x) * k / (n - 1), y + (v - y) * k / (n - 1)) for k in range(n)]
+
+
+def only_file(folder: Path, pattern: str, seconds: float = 20.0) -> Path:
+    """Wait for the one file that matches, and return it."""
+    deadline = time.monotonic() + seconds
+    while not (found := [*folder.glob(pattern)]):
+        assert time.monotonic() < deadline, [*folder.iterdir()]
+        time.sleep(0.05)
+    return found[0]

@@ -1,0 +1,250 @@
+"""The input of a page, its timers and its pictures, without a browser."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
+from vtkmodules.vtkRenderingUI import vtkGenericRenderWindowInteractor
+
+pytest.importorskip("trame")
+
+from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.widgets.editor import keys_of
+from vtk_segdeform.widgets.editor.keys import event_key
+from vtk_segdeform.widgets.scene import View
+from vtk_segdeform.widgets.web.inputs import Inputs
+from vtk_segdeform.widgets.web.key_names import vtk_key
+from vtk_segdeform.widgets.web.stream import Stream
+from vtk_segdeform.widgets.web.timers import Timers
+
+_MIDDLE = {"x": 0.5, "y": 0.25}
+# What a browser calls the keys whose names in a table are words.
+_BROWSER = {
+    "escape": "Escape", "return": "Enter", "tab": "Tab", "delete": "Delete", "home": "Home",
+    "backspace": "Backspace", "bracketleft": "[", "bracketright": "]", "plus": "+",
+    "minus": "-", "equal": "=", "period": ".", "comma": ",", "backslash": "\\", "grave": "`",
+    "question": "?", "f1": "F1",
+}  # fmt: skip
+
+
+class Loop:
+    """An event loop's clock, moved by hand."""
+
+    def __init__(self) -> None:
+        self.now, self.due = 0.0, []  # type: ignore[var-annotated]
+
+    def call_later(self, seconds: float, call: Callable[[], None]) -> Any:
+        entry = [self.now + seconds, call]
+        self.due.append(entry)
+
+        class Handle:
+            cancel = staticmethod(lambda: self.due.remove(entry) if entry in self.due else None)
+
+        return Handle
+
+    def run(self, seconds: float) -> None:
+        end = self.now + seconds
+        while self.due and min(at for at, _ in self.due) <= end + 1e-9:
+            entry = min(self.due, key=lambda each: each[0])
+            self.due.remove(entry)
+            self.now, call = entry
+            call()
+        self.now = end
+
+
+@pytest.fixture
+def view() -> Any:
+    window, renderer = vtkRenderWindow(), vtkRenderer()
+    window.SetOffScreenRendering(True)
+    window.SetSize(200, 100)
+    window.AddRenderer(renderer)
+    interactor = vtkGenericRenderWindowInteractor()
+    interactor.SetRenderWindow(window)
+    interactor.SetInteractorStyle(None)
+    window.Render()
+    yield View(renderer, interactor)
+    window.Finalize()
+
+
+def _received(view: View, *names: str) -> list[tuple[Any, ...]]:
+    """The events that the view receives from now on, with their places."""
+    found: list[tuple[Any, ...]] = []
+    for name in names:
+        view.interactor.AddObserver(
+            f"{name}Event",
+            lambda *_, name=name: found.append((name, *view.interactor.GetEventPosition())),
+        )
+    return found
+
+
+def test_timers_fire_while_they_run_and_not_otherwise(view: View) -> None:
+    loop, ticks, others = Loop(), [], []
+    timers = Timers(view.interactor)
+    stop = view.every(20, lambda: ticks.append(loop.now))
+    timers.start(loop)  # type: ignore[arg-type]
+    loop.run(0.1)
+    assert ticks == pytest.approx([0.02, 0.04, 0.06, 0.08, 0.1])
+    stop_other = view.every(5, lambda: others.append(loop.now))
+    loop.run(0.02)
+    assert len(others) == 4
+    assert len(loop.due) == 1  # both share one timer
+    stop()
+    stop_other()
+    assert loop.due == []
+    assert timers.running == ()
+    view.interactor.CreateOneShotTimer(30)
+    loop.run(1.0)
+    assert loop.due == []
+    view.every(20, lambda: None)
+    timers.stop()
+    assert loop.due == []
+
+
+def test_a_timer_of_vtk_that_ends_does_not_end_ours(view: View) -> None:
+    loop, ticks = Loop(), []
+    timers = Timers(view.interactor)
+    timers.start(loop)  # type: ignore[arg-type]
+    view.every(20, lambda: ticks.append(loop.now))
+    other = view.interactor.CreateRepeatingTimer(500)
+    view.interactor.DestroyTimer(other)
+    loop.run(0.1)
+    assert len(ticks) == 5
+    timers.stop()
+
+
+@pytest.mark.parametrize("preset", ["pyvista", "Blender"])
+def test_every_key_of_the_editor_can_be_typed_in_a_browser(preset: str) -> None:
+    for binding in keys_of(preset).bindings:
+        for name in binding.keys:
+            *held, word = name.split("+")
+            key, place = _BROWSER.get(word, word), ""
+            if word.startswith("kp_"):
+                key, place = word[-1], f"Numpad{word[-1]}"
+            elif "shift" in held:
+                key = key.upper()
+            named = vtk_key(key, place)
+            assert named is not None, name
+            typed = event_key(
+                named[0], control="ctrl" in held, alt="alt" in held, shift="shift" in held
+            )
+            assert typed == name
+
+
+def test_an_arrow_and_a_modifier_have_vtks_names_and_foreign_letters_none() -> None:
+    assert vtk_key("ArrowLeft") == ("Left", 0)
+    assert vtk_key("Shift") == ("Shift_L", 0)
+    assert vtk_key("Enter", "NumpadEnter") == ("Return", 13)
+    assert vtk_key("é") is None
+    assert vtk_key("Unidentified") is None
+
+
+def test_only_the_latest_of_moves_in_a_row_is_handled(view: View) -> None:
+    inputs = Inputs(view)
+    seen = _received(view, "MouseMove", "LeftButtonPress")
+    for x in (0.1, 0.2, 0.3):
+        inputs.put({"name": "MouseMove", "x": x, "y": 0.0})
+    inputs.put({"name": "LeftButtonPress", "x": 0.3, "y": 0.0})
+    inputs.put({"name": "MouseMove", "x": 0.5, "y": 0.0})
+    inputs.put({"name": "MouseMove", "x": 0.5, "y": 1.0, "shift": True})
+    inputs.put({"name": "MouseMove", "x": 1.0, "y": 1.0, "shift": True})
+    while inputs:
+        inputs.send_next()
+    assert seen == [
+        ("MouseMove", 60, 99),
+        ("LeftButtonPress", 60, 99),
+        ("MouseMove", 100, 99),
+        ("MouseMove", 200, -1),
+    ]
+
+
+def test_one_key_is_one_key_press(view: View) -> None:
+    inputs = Inputs(view)
+    seen = _received(view, "KeyPress", "Char", "KeyRelease")
+    inputs.put({**_MIDDLE, "name": "KeyPress", "key": "z", "code": "KeyZ"})
+    inputs.put({**_MIDDLE, "name": "KeyRelease", "key": "z", "code": "KeyZ"})
+    while inputs:
+        inputs.send_next()
+    assert [name for name, *_ in seen] == ["KeyPress", "KeyRelease"]
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        None,
+        [],
+        {"name": "ExitEvent", **_MIDDLE},
+        {"name": "MouseMove"},
+        {"name": "MouseMove", "x": float("nan"), "y": 0.5},
+        {"name": "MouseMove", "x": 1e9, "y": 0.5},
+        {"name": "KeyPress", **_MIDDLE, "key": "z" * 100},
+        {"name": "KeyPress", **_MIDDLE, "key": ["z"]},
+    ],
+)
+def test_a_forged_message_is_refused(view: View, message: object) -> None:
+    inputs = Inputs(view)
+    with pytest.raises(ArgumentError):
+        inputs.put(message)
+    assert not len(inputs)
+
+
+def test_a_flood_of_events_is_refused_by_name(view: View) -> None:
+    inputs = Inputs(view)
+    with pytest.raises(ArgumentError, match="More than 500 events"):
+        for _ in range(600):
+            inputs.put({"name": "LeftButtonPress", **_MIDDLE})
+    assert len(inputs) == 500
+
+
+def test_many_requests_make_one_picture_and_none_is_drawn_ahead_of_the_page(view: View) -> None:
+    drawn: list[int] = []
+    sent: list[int] = []
+    view.window.AddObserver("EndEvent", lambda *_: drawn.append(1))
+
+    async def story() -> None:
+        stream = Stream(
+            view, Timers(view.interactor), lambda _, number: sent.append(number), lambda: None
+        )
+        stream.start(asyncio.get_running_loop())
+
+        async def settle() -> None:
+            for _ in range(4):
+                await asyncio.sleep(0.01)
+
+        view.render()
+        await settle()
+        assert drawn == []  # nobody looks
+        stream.open(200, 100)
+        for _ in range(10):
+            view.render()
+        await settle()
+        assert (len(drawn), sent) == (1, [1])
+        for _ in range(5):
+            view.render()
+            await settle()
+        assert (len(drawn), sent) == (2, [1, 2])  # the page has shown neither
+        stream.shown(2)
+        await settle()
+        assert (len(drawn), sent) == (3, [1, 2, 3])
+        stream.close()
+        view.render()
+        await settle()
+        assert len(drawn) == 3
+        await stream.stop()
+        view.render()
+        assert len(drawn) == 4  # by the view itself again
+
+    asyncio.run(story())
+
+
+def test_a_page_that_goes_releases_the_buttons(view: View) -> None:
+    inputs = Inputs(view)
+    seen = _received(view, "LeftButtonPress", "LeftButtonRelease")
+    inputs.put({"name": "LeftButtonPress", **_MIDDLE})
+    inputs.send_next()
+    inputs.put({"name": "LeftButtonPress", **_MIDDLE})
+    inputs.release_all()
+    assert [name for name, *_ in seen] == ["LeftButtonPress", "LeftButtonRelease"]
