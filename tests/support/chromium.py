@@ -81,7 +81,7 @@ class Chromium:
             for target, fd in zip((3, 4), high, strict=True):
                 os.dup2(fd, target)
 
-        self.process = subprocess.Popen(  # noqa: S603
+        self.process = subprocess.Popen(
             [path, *_FLAGS, f"--user-data-dir={self._profile}",
              f"--window-size={width},{height}", "about:blank"],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
@@ -329,9 +329,7 @@ class Page:
         """Close the page and its context."""
         self.browser.call("Target.disposeBrowserContext", browserContextId=self._context)
 
-    def _mouse(
-        self, kind: str, point: tuple[float, float], button: str, modifiers: int
-    ) -> None:
+    def _mouse(self, kind: str, point: tuple[float, float], button: str, modifiers: int) -> None:
         held = 0 if kind == "mouseReleased" else _BUTTONS[button]
         self.call("Input.dispatchMouseEvent", type=kind, x=point[0], y=point[1], button=button,
-                  buttons=held, modifiers=modifiers, clickCount=0 if kind == "mouseMoved" else 1)  # fmt: skip
+                  buttons=held, modifiers=modifiers, clickCount=int(kind != "mouseMoved"))  # fmt: skip

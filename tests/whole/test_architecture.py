@@ -27,7 +27,8 @@ ROOMS = [
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
     "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.recording",
     "widgets.editor", "widgets.panel",
-    "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "benchmarks", "cli", "__main__",
+    "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "widgets.web",
+    "benchmarks", "cli", "__main__",
 ]  # fmt: skip
 MOST_FLOORS = 24
 MOST_IMPORTS = 330  # pairs of rooms of which one imports from the other
@@ -61,6 +62,10 @@ GRANTED = {
     "widgets.qt.widget": {"pyvista", "pyvistaqt"},
     "widgets.app": VTK | {"qtpy"},
     "widgets.app.repair_preview": {"pyvista", "pyvistaqt"},
+    "widgets.web.pictures": VTK | {"PIL"},
+    "widgets.web.protocol": {"wslink"},
+    "widgets.web.transfer": {"aiohttp"},
+    "widgets.web.web_editor": {"pyvista", "trame"},
     "benchmarks.cage_making": VTK | {"igl", "gpytoolbox"},
     "benchmarks.charts": {"matplotlib"},
     "benchmarks.drawing": VTK,
@@ -71,7 +76,7 @@ GRANTED = {
     "cli.replaying": {"pyvista"},
 }
 
-MAY_PRINT_AND_EXIT = {"cli.main", "__main__", "filters.paraview_plugin"}
+MAY_PRINT_AND_EXIT = {"cli.main", "__main__", "filters.paraview_plugin", "widgets.web.client"}
 LONGEST = 400
 FILES = {
     ".".join(path.relative_to(PACKAGE).with_suffix("").parts): path

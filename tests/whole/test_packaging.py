@@ -17,7 +17,11 @@ import pytest
 import vtk_segdeform
 
 ROOT = Path(__file__).resolve().parents[2]
-LIBRARY_OF = {"vtkmodules": "vtk", "igl": "libigl"}  # imported name -> name to install
+LIBRARY_OF = {
+    "vtkmodules": "vtk",
+    "igl": "libigl",
+    "PIL": "pillow",
+}  # imported name -> name to install
 # ParaView loads our plugin itself; Blender's module has wheels for a single version of Python.
 UNDECLARED = {"paraview", "bpy"}
 
@@ -48,7 +52,7 @@ def imported_by(folder: str) -> set[str]:
 
 def test_every_library_imported_is_declared(setup_cfg):
     declared = names_in(setup_cfg["options"]["install_requires"])
-    for extra in ("meshlab", "qt", "bench"):
+    for extra in ("meshlab", "qt", "web", "bench"):
         declared |= names_in(setup_cfg["options.extras_require"][extra])
     used = imported_by("vtk_segdeform") | imported_by("widgets")
     assert {"numba", "qtpy"} <= used  # the sources of all folders are read

@@ -91,7 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             session, name=name, folder=options.folder, upload_limit=options.upload_limit
         )
     except SegDeformError as error:
-        print(f"segdeform: {error}", file=sys.stderr)
+        sys.stderr.write(f"segdeform: {error}\n")
         return 1
     asyncio.run(_serve(web, Autosave(web, place), options.port))
     return 0
@@ -115,7 +115,8 @@ async def _serve(web: WebEditor, autosave: Autosave, port: int) -> None:
 
     def ready(port: int) -> None:
         autosave.start()
-        print(json.dumps({"port": port}), flush=True)
+        sys.stdout.write(json.dumps({"port": port}) + "\n")
+        sys.stdout.flush()
 
     with suppress(NotImplementedError):  # on Windows
         loop.add_signal_handler(signal.SIGTERM, ended.set)

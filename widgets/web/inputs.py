@@ -106,7 +106,7 @@ class Inputs:
 
 
 def _fraction(message: Mapping[Any, Any], name: str) -> float:
-    value = message.get(name)
+    value: Any = message.get(name)
     if not is_number(value) or not abs(value) <= _FARTHEST:
         raise ArgumentError(f"{name} must be a fraction of the view; got {shown(value)}")
     return float(value)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from typing import Any
 
 from wslink import register
 from wslink.websocket import LinkProtocol
 
-from vtk_segdeform.arrays import is_whole, is_number
+from vtk_segdeform.arrays import is_number, is_whole
 from vtk_segdeform.checks import shown
 from vtk_segdeform.errors import ArgumentError
 
@@ -19,8 +18,6 @@ from .stream import Stream
 _SMALLEST, _LARGEST = 16, 8192  # pixels, width or height of a view
 _MOST_PIXELS = 8_000_000
 _MOST_EVENTS = 200  # of one message
-
-_log = logging.getLogger(__name__)
 
 
 class ViewProtocol(LinkProtocol):
@@ -58,23 +55,23 @@ class ViewProtocol(LinkProtocol):
         self._stream.put(events)
 
     @register("segdeform.size")
-    def size(self, width: object, height: object, ratio: object) -> None:
+    def size(self, width: Any, height: Any, ratio: Any) -> None:
         """Show the view at this size, in CSS pixels, with *ratio* device pixels each."""
         for value in (width, height, ratio):
             if not is_number(value) or not 0 < value <= _LARGEST:
                 raise ArgumentError(f"width, height and ratio must be numbers; got {shown(value)}")
-        columns, rows = float(width) * float(ratio), float(height) * float(ratio)  # type: ignore[arg-type]
+        columns, rows = width * ratio, height * ratio
         scale = min(1.0, (_MOST_PIXELS / (columns * rows)) ** 0.5)
         size = [min(_LARGEST, max(_SMALLEST, round(scale * each))) for each in (columns, rows)]
         self._stream.open(size[0], size[1])
         self._sized()
 
     @register("segdeform.shown")
-    def shown(self, number: object) -> None:
+    def shown(self, number: Any) -> None:
         """Continue: the page has shown picture *number*."""
         if not is_whole(number, 0):
             raise ArgumentError(f"number must be an integer; got {shown(number)}")
-        self._stream.shown(int(number))  # type: ignore[call-overload]
+        self._stream.shown(int(number))
 
     def send(self, picture: Picture, number: int) -> None:
         """Publish a picture."""

@@ -3,8 +3,8 @@
     POST upload?name=NAME      the body is a mesh or a session
     GET  download/SUFFIX       the session, or the surface in its pose
 
-Both need the header ``X-Segdeform``, which a page of another origin cannot send.  A page never names
-a file of the server: of NAME only the suffix is used, and the text is shown.
+Both need the header ``X-Segdeform``, which a page of another origin cannot send.  A page never
+names a file of the server: of NAME only the suffix is used, and the text is shown.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any
 from aiohttp import web
 
 from vtk_segdeform.errors import SegDeformError, SessionError
+from vtk_segdeform.files import replacing
 from vtk_segdeform.io import is_mesh_file, writable_suffixes
 from vtk_segdeform.session import save_session
 
@@ -89,7 +90,7 @@ class Transfer:
             return _refusal(409, "The editor is busy. Wait, or cancel the work, and try again.")
         place = Path(tempfile.mkdtemp(dir=self._folder)) / f"upload{suffix}"
         size = 0
-        with place.open("wb") as file:
+        with replacing(place) as draft, draft.open("wb") as file:
             async for data in request.content.iter_chunked(1 << 18):
                 size += len(data)
                 if size > self.limit:

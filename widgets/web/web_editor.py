@@ -23,7 +23,7 @@ import pyvista as pv
 from trame.app import get_server
 from trame.ui.vuetify3 import VAppLayout
 
-from vtk_segdeform.checks import as_text, require
+from vtk_segdeform.checks import as_text
 from vtk_segdeform.pictures import require_offscreen
 from vtk_segdeform.session import Session
 

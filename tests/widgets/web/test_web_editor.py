@@ -36,7 +36,7 @@ def served(tmp_path: Path) -> Iterator[Served]:
 
 
 def _top(served: Served) -> Any:
-    """A vertex on the upper side that the camera sees."""
+    """Return a vertex on the upper side that the camera sees."""
     vertices = served.web.session.vertices
     near = vertices[:, 2] > np.quantile(vertices[:, 2], 0.9)
     return vertices[near][np.argmin(vertices[near][:, 1])]
@@ -100,6 +100,7 @@ def test_regions_cages_and_a_handle_by_keys_and_mouse(served: Served, browser: C
     served.wait(lambda: web.session.regions is not None and not web.editor.is_busy)
     page.key("f")
     served.wait(lambda: web.session.cages and not web.editor.is_busy)
+    page.wait("document.querySelector('.sd-hint').textContent.includes('cages fitted')")
     heights = web.session.mesh.vertices[:, 2]
     served.call(lambda: web.session.set_fixed(np.flatnonzero(heights < np.quantile(heights, 0.1))))
     tip = np.flatnonzero(heights > 0.95 * heights.max())
@@ -164,9 +165,9 @@ def test_the_page_reads_and_writes_no_file_of_the_server(
 def _status(url: str, method: str, *, header: bool) -> int:
     body = bytes(10**6 + 1) if method == "POST" else None
     headers = {"X-Segdeform": "yes"} if header else {}
-    request = urllib.request.Request(url, body, headers, method=method)  # noqa: S310
+    request = urllib.request.Request(url, body, headers, method=method)
     try:
-        with urllib.request.urlopen(request, timeout=20) as answer:  # noqa: S310
+        with urllib.request.urlopen(request, timeout=20) as answer:
             return int(answer.status)
     except urllib.error.HTTPError as error:
         return error.code
