@@ -331,5 +331,6 @@ class Page:
 
     def _mouse(self, kind: str, point: tuple[float, float], button: str, modifiers: int) -> None:
         held = 0 if kind == "mouseReleased" else _BUTTONS[button]
+        clicks = int(kind != "mouseMoved")
         self.call("Input.dispatchMouseEvent", type=kind, x=point[0], y=point[1], button=button,
-                  buttons=held, modifiers=modifiers, clickCount=int(kind != "mouseMoved"))  # fmt: skip
+                  buttons=held, modifiers=modifiers, clickCount=clicks)  # fmt: skip

@@ -31,7 +31,7 @@ ROOMS = [
     "benchmarks", "cli", "__main__",
 ]  # fmt: skip
 MOST_FLOORS = 24
-MOST_IMPORTS = 330  # pairs of rooms of which one imports from the other
+MOST_IMPORTS = 335  # pairs of rooms of which one imports from the other
 MOST_FILES = 22  # in one folder
 
 NUMERIC = {"numpy", "scipy"}
