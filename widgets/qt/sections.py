@@ -55,7 +55,7 @@ class SectionBox(QtWidgets.QGroupBox):
         lines: list[Any] = []
         for is_form, group in groupby(section.items, key=_is_in_form):
             items = list(group)
-            lines += [self._form(items)] if is_form else map(self._line, items)
+            lines += [self._form(items)] if is_form else [self._line(item) for item in items]
         column(self, *lines)
 
     def draw(self, section: Section, keys: Keys) -> None:
@@ -74,7 +74,7 @@ class SectionBox(QtWidgets.QGroupBox):
                     each.setVisible(field.visible)
             _put(control, field)  # it may show a change that was refused
 
-    def _form(self, fields: Iterable[Field]) -> Any:
+    def _form(self, fields: Iterable[Any]) -> Any:
         layout = form(*((field.label, self._made(field)) for field in fields))
         for name, control in self.controls.items():
             if layout.indexOf(control) >= 0:

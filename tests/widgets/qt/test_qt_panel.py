@@ -159,7 +159,7 @@ def test_a_control_that_the_editor_refuses_shows_the_value_again(widget):
     panel, editor = widget.panel, widget.editor
     editor.mode = Mode.CAGES
     settle(widget)
-    editor.session.set_regions(editor.session.regions)  # which removes the cages
+    editor.session.merge_regions([0, 1])  # which removes the cages
     panel.controls["cages.shown"].click()  # before the panel is refreshed
     settle(widget)
     assert not panel.controls["cages.shown"].isChecked()

@@ -854,6 +854,10 @@ def test_enter_presses_the_focused_button_and_words_of_the_hint_run_keys(seen):
     panel.status.words.linkActivated.emit("deform")
     seen.settle()
     assert seen.editor.mode is Mode.DEFORM
+    (name,) = seen.session.handles
+    seen.session.move_handle(name, np.eye(4) + 0.1 * np.eye(4, k=3))
+    seen.session.commit()
+    seen.settle()
     bar.buttons["compare"].pressed.emit()
     assert seen.editor.controller.shows_rest
     bar.buttons["compare"].released.emit()
