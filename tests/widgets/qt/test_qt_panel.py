@@ -10,7 +10,7 @@ from vtk_segdeform import Session
 from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.editor import preparing
 from vtk_segdeform.widgets.panel.fields import Table, tooltip
-from vtk_segdeform.widgets.panel.panel import all_sections, sections
+from vtk_segdeform.widgets.panel.panel import all_sections, press, sections
 from vtk_segdeform.widgets.panel.toolbar import toolbar
 from vtk_segdeform.widgets.qt.widget import DeformWidget
 
@@ -133,8 +133,20 @@ def test_every_visible_control_presses_its_field(widget, monkeypatch):
                 use(panel.controls[field.name], field)
                 assert [name for name, _ in pressed] == [field.name]
                 kinds.add(field.kind)
-        settle(widget)
+                panel.refresh()  # nothing was done, which the control shows
+                assert said(panel.controls[field.name]) == expected(field)
     assert kinds >= {"button", "toggle", "number", "integer", "slider"}
+
+
+def test_rows_that_are_selected_elsewhere_are_selected_in_the_list(widget):
+    editor = widget.editor
+    editor.mode = Mode.REGIONS
+    for keys in (["0", "1"], ["1"], ["0"]):
+        press(editor, "regions.list.select", keys)
+        settle(widget)
+        (table,) = (table for section in sections(editor) for table in section.tables)
+        assert [row.key for row in table.rows if row.selected] == keys
+        compare(widget.panel.controls["regions.list"], table)
 
 
 def use(control, field):
