@@ -67,8 +67,8 @@ def full() -> Session:
 def editing(mode: Mode, session: Session | None = None) -> Iterator[DeformEditor]:
     """Yield an editor in *mode*, in which the handle with the gizmo is selected."""
     view = plain_view()
-    editor = DeformEditor(view, session or full())
     draw_seldom(view)
+    editor = DeformEditor(view, session or full())
     editor.On()
     editor.mode = mode
     editor.wait()
