@@ -48,11 +48,11 @@ class QtStand(Stand):
         super().settle()
         panel = self.widget.panel
         assert panel.isEnabled()
-        assert panel.toolbar.open.isEnabled()
+        assert panel.toolbar.buttons["open"].isEnabled()
         assert panel.history.isEnabled()
         assert not panel.status.cancel.isVisible()
-        assert panel.regions.isEnabledTo(panel)
-        assert panel.toolbar.undo.isEnabled() is self.session.can_undo
+        assert panel.boxes["regions"].isEnabledTo(panel)
+        assert panel.toolbar.buttons["undo"].isEnabled() is self.session.can_undo
 
     def close(self):
         self.widget.close()

@@ -141,13 +141,13 @@ class Menus:
 def connect_panel(window: Any) -> None:
     """Connect the file buttons of the panel to the functions of the menus; hide its View menu."""
     toolbar = window.editor_widget.panel.toolbar
-    toolbar.view.hide()  # the menu bar has the same entries
-    toolbar.open.clicked.disconnect()
-    toolbar.open.clicked.connect(window.ask_and_open)
-    saves = saving.save_session, saving.save_session_as, saving.save_mesh_as
-    for action, save in zip(toolbar.save.menu().actions(), saves, strict=True):
-        action.triggered.disconnect()
-        action.triggered.connect(_calling(save, window))
+    toolbar.buttons["view"].hide()  # the menu bar has the same entries
+    toolbar.asking = {
+        "open": window.ask_and_open,
+        "save.session": _calling(saving.save_session, window),
+        "save.session_as": _calling(saving.save_session_as, window),
+        "save.mesh_as": _calling(saving.save_mesh_as, window),
+    }
 
 
 def _calling(call: Callable[[Any], object], argument: Any) -> Callable[[], None]:

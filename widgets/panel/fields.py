@@ -96,7 +96,7 @@ class Row:
     key: str
     """What it is about, for `press`: it stays the same while other rows come and go."""
     label: str
-    colour: tuple[int, int, int] | None
+    colour: tuple[int, int, int]
     """Red, green and blue, 0 to 255."""
     cells: tuple[Cell, ...] = ()
     """One for each column of the table."""

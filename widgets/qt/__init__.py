@@ -3,8 +3,8 @@
 The files, in reading order:
 
     widget      `DeformWidget` and `deform_dock`
-    panel       the panel beside the view
-    toolbar pulling painting regions handles options status history
+    panel       the panel beside the view, which draws `widgets.panel`
+    toolbar sections tables status history
                 the parts of the panel
     first_steps three cards for the first run
     view_menu   menu entries for the camera

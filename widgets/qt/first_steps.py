@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from qtpy import QtCore, QtGui, QtWidgets
 
 from ..editor import DeformEditor
+from ..panel import first_steps
 
 Qt = QtCore.Qt
 _KEY = "first steps seen"
@@ -47,9 +48,7 @@ class FirstSteps(QtWidgets.QWidget):
         self.setToolTip("Click to close (Esc)")
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self._cards = [
-            _Card(self, _pin, "Pin", "Shift-click a point to keep it in place."),
-            _Card(self, _pull, "Pull", "Drag the surface: it follows."),
-            _Card(self, _done, "Done", "Release. The volume is preserved."),
+            _Card(self, _DRAWINGS[card.name], card.title, card.sentence) for card in first_steps()
         ]
         self._stop: Callable[[], None] = _nothing
         self.hide()
@@ -249,3 +248,6 @@ def _done(painter: Any) -> None:
     _surface(painter, 20.0)
     painter.setPen(_pen(QtGui.QColor(_ACCENT)))
     painter.drawPolyline([QtCore.QPointF(x, y) for x, y in ((28, 7), (32, 11), (40, 2))])
+
+
+_DRAWINGS = {"pin": _pin, "pull": _pull, "done": _done}

@@ -10,8 +10,9 @@ from typing import Any
 
 from qtpy import QtCore, QtGui, QtWidgets
 
-from ..editor import DeformEditor, jumping_to, position_of, preview, states_of
-from .controls import column, shortcut
+from ..editor import DeformEditor
+from ..panel import Entry, history
+from .controls import Press, column, shortcut
 
 Qt = QtCore.Qt
 _LEAST = 2  # rows
@@ -24,6 +25,8 @@ class HistoryPart(QtWidgets.QWidget):
     ----------
     editor : DeformEditor
         The editor whose history is shown.
+    press : callable
+        ``press(name, value)``, called to preview a state and to jump to it.
 
     Attributes
     ----------
@@ -33,10 +36,10 @@ class HistoryPart(QtWidgets.QWidget):
         One row for each state, the oldest first.
     """
 
-    def __init__(self, editor: DeformEditor) -> None:
+    def __init__(self, editor: DeformEditor, press: Press) -> None:
         super().__init__()
-        self._editor = editor
-        self._shown: tuple[tuple[str, ...], int] = (), -1
+        self._editor, self._press = editor, press
+        self._shown: tuple[Entry, ...] = ()
         self._is_previewing = False
         self.fold = QtWidgets.QToolButton()
         self.fold.setText("History")
@@ -68,10 +71,9 @@ class HistoryPart(QtWidgets.QWidget):
         """Show the current history, unless the list is folded."""
         if not self.fold.isChecked() or self._editor.is_busy:
             return
-        controller = self._editor.controller
-        now = states_of(controller), position_of(controller)
+        now = history(self._editor)
         if now != self._shown:
-            self._show(*now)
+            self._show(now)
         elif self._is_previewing and self._editor.widgets.surface.instead is None:
             self._return()  # an action in the view has ended the preview
 
@@ -86,33 +88,37 @@ class HistoryPart(QtWidgets.QWidget):
         """Redraw the rows after a change of palette or font."""
         super().changeEvent(event)
         if event.type() in (QtCore.QEvent.Type.PaletteChange, QtCore.QEvent.Type.FontChange):
-            self._shown = (), -1
+            self._shown = ()
             self.refresh()
 
     @property
     def _row_height(self) -> int:
         return int(1.4 * self.fontMetrics().height())
 
-    def _show(self, names: tuple[str, ...], position: int) -> None:
-        """Show the states with their *names*, the one at *position* as the current one."""
+    @property
+    def _position(self) -> int:
+        """The row of the current state."""
+        return next((row for row, entry in enumerate(self._shown) if entry.is_current), -1)
+
+    def _show(self, entries: tuple[Entry, ...]) -> None:
         quiet = QtCore.QSignalBlocker(self.list)
-        while self.list.count() > len(names):
+        while self.list.count() > len(entries):
             self.list.takeItem(self.list.count() - 1)
-        while self.list.count() < len(names):
+        while self.list.count() < len(entries):
             self.list.addItem("")
         groups, role = QtGui.QPalette.ColorGroup, QtGui.QPalette.ColorRole.Text
-        for row, name in enumerate(names):
+        for row, entry in enumerate(entries):
             item = self.list.item(row)
             font = QtGui.QFont(self.font())
-            font.setBold(row == position)
-            group = groups.Disabled if row > position else groups.Active
-            item.setText(name)
+            font.setBold(entry.is_current)
+            group = groups.Disabled if entry.is_undone else groups.Active
+            item.setText(entry.name)
             item.setSizeHint(QtCore.QSize(0, self._row_height))
             item.setFont(font)
             item.setForeground(self.palette().color(group, role))
-        self._shown, self._is_previewing = (names, position), False
-        self.list.setCurrentRow(position)
-        self.list.scrollToItem(self.list.item(position))
+        self._shown, self._is_previewing = entries, False
+        self.list.setCurrentRow(self._position)
+        self.list.scrollToItem(self.list.item(self._position))
         quiet.unblock()
 
     def _hover(self, item: Any) -> None:
@@ -123,21 +129,21 @@ class HistoryPart(QtWidgets.QWidget):
             self.list.setAutoScroll(True)
 
     def _preview(self, row: int) -> None:
-        preview(self._editor.controller, row if row >= 0 else None)
+        self._press("history.preview", row if row >= 0 else None)
         self._is_previewing = self._editor.widgets.surface.instead is not None
 
     def _return(self) -> None:
         """Show the current state again, and make its row the current one."""
         quiet = QtCore.QSignalBlocker(self.list)
-        self.list.setCurrentRow(self._shown[1])
+        self.list.setCurrentRow(self._position)
         quiet.unblock()
         if self._is_previewing:
             self._is_previewing = False
-            preview(self._editor.controller, None)
+            self._press("history.preview")
 
     def _jump(self, row: int) -> None:
         if row >= 0:
-            self._editor.do(jumping_to(row))
+            self._press("history", row)
             self.refresh()
 
     def _unfold(self, down: bool) -> None:

@@ -18,14 +18,11 @@ from qtpy import QtCore, QtWidgets
 
 from vtk_segdeform.session import Change
 
-from ..editor import DeformEditor, Keys, Mode, key_cap
-from .controls import name_keys, shortcut
-from .handles import HandlesPart
+from ..editor import DeformEditor, Keys, key_cap
+from ..panel import all_sections, sections
+from .controls import shortcut, using
 from .history import HistoryPart
-from .options import CagesPart, DeformPart
-from .painting import PaintingPart
-from .pulling import PullPart
-from .regions import RegionsPart
+from .sections import SectionBox
 from .status import StatusPart
 from .toolbar import Toolbar
 
@@ -44,6 +41,19 @@ class DeformPanel(QtWidgets.QWidget):
         The editor to show and control.
     parent : QWidget, optional
         The parent widget.
+
+    Attributes
+    ----------
+    boxes : dict of str to SectionBox
+        The box of each section, by its name.
+    controls : dict of str to QWidget
+        The controls in them, by the names of fields and tables.
+    toolbar : Toolbar
+        The toolbar.
+    status : StatusPart
+        The status.
+    history : HistoryPart
+        The history.
     """
 
     deformed = QtCore.Signal()
@@ -58,19 +68,12 @@ class DeformPanel(QtWidgets.QWidget):
     def __init__(self, editor: DeformEditor, parent: Any = None) -> None:
         super().__init__(parent)
         self.editor = editor
-        self.toolbar, self.status = Toolbar(editor), StatusPart(editor)
-        self.history = HistoryPart(editor)
-        self.painting, self.regions = PaintingPart(editor), RegionsPart(editor)
-        self.handles = HandlesPart(editor)
-        self.cages, self.deform = CagesPart(editor), DeformPart(editor)
-        self.pulling = PullPart(editor)
-        self._parts: dict[Any, set[Mode]] = {
-            self.pulling: {Mode.PULL},
-            self.handles: {Mode.PULL, Mode.HANDLES, Mode.DEFORM},
-            self.cages: {Mode.CAGES},
-            self.deform: {Mode.DEFORM},
-            self.regions: {Mode.REGIONS, Mode.CAGES, Mode.DEFORM},
-            self.painting: {Mode.REGIONS, Mode.HANDLES},
+        press = using(editor)
+        self.toolbar, self.status = Toolbar(editor, press), StatusPart(editor, press)
+        self.history = HistoryPart(editor, press)
+        self.boxes = {each.name: SectionBox(each, press) for each in all_sections(editor)}
+        self.controls = {
+            name: control for box in self.boxes.values() for name, control in box.controls.items()
         }
         self._keys: Keys | None = None  # as shown
         self._shortcuts: list[Any] = []
@@ -107,10 +110,11 @@ class DeformPanel(QtWidgets.QWidget):
         self.history.refresh()
         if busy:  # the job owns the session
             return
-        for part, modes in self._parts.items():
-            part.setVisible(editor.mode in modes)
-            if editor.mode in modes:
-                part.refresh()
+        shown = {section.name: section for section in sections(editor)}
+        for name, box in self.boxes.items():
+            box.setVisible(name in shown)
+            if name in shown:
+                box.draw(shown[name], editor.keys)
         if (
             editor.widgets.dragger.is_refining or editor.widgets.puller.is_refining
         ):  # refinement ends without a message
@@ -127,8 +131,8 @@ class DeformPanel(QtWidgets.QWidget):
         self._inside = QtWidgets.QWidget()
         inside = QtWidgets.QVBoxLayout(self._inside)
         inside.setContentsMargins(0, 0, 0, 0)
-        for part in self._parts:
-            inside.addWidget(part)
+        for box in self.boxes.values():
+            inside.addWidget(box)
         inside.addStretch(1)
         area = QtWidgets.QScrollArea()
         area.setWidget(self._inside)
@@ -142,17 +146,15 @@ class DeformPanel(QtWidgets.QWidget):
         layout.addWidget(self.status)
         layout.addWidget(self.history, 1)
         # The widest part fits beside a scroll bar.
-        widest = max(part.minimumSizeHint().width() for part in self._parts)
+        widest = max(box.minimumSizeHint().width() for box in self.boxes.values())
         widest += area.verticalScrollBar().sizeHint().width() + 2 * layout.contentsMargins().left()
         letters = _WIDTH * self.fontMetrics().averageCharWidth()
         self.setMinimumWidth(max(widest, letters))
         self._with_shortcuts = self.toolbar, area, self.status, self.history
 
     def _show_keys(self, keys: Keys) -> None:
-        """Name *keys* in tooltips, and use some of them in the panel, too."""
+        """Use some of the *keys* in the panel, too."""
         self._keys = keys
-        for each in (self, self.toolbar):  # which may be beside the panel
-            name_keys(each, keys)
         while self._shortcuts:
             self._shortcuts.pop().deleteLater()
         for name in _SHORTCUTS:

@@ -7,13 +7,13 @@ the view does not draw the same text as its status line.
 from __future__ import annotations
 
 import html
-import re
 from typing import Any
 
 from qtpy import QtCore, QtGui, QtWidgets
 
-from ..editor import DeformEditor, Keys, Mode, key_cap
-from .controls import doing, push_button, sentence
+from ..editor import DeformEditor
+from ..panel import Word, status, tooltip
+from .controls import Press, push_button
 
 _LINES = 2
 _BAR_LETTERS = 18  # width of the progress bar
@@ -26,9 +26,11 @@ class StatusPart(QtWidgets.QWidget):
     ----------
     editor : DeformEditor
         The editor whose status is shown.
+    press : callable
+        ``press(name)``, called by the Cancel button.
     """
 
-    def __init__(self, editor: DeformEditor) -> None:
+    def __init__(self, editor: DeformEditor, press: Press) -> None:
         super().__init__()
         self._editor = editor
         self.sign = QtWidgets.QLabel()
@@ -43,13 +45,13 @@ class StatusPart(QtWidgets.QWidget):
             flags.TextSelectableByMouse | flags.LinksAccessibleByMouse
         )
         self.words.setFocusPolicy(QtCore.Qt.FocusPolicy.NoFocus)
-        self.words.linkActivated.connect(self._press)
+        self.words.linkActivated.connect(editor.run)
         self.bar = QtWidgets.QProgressBar()
         self.bar.setRange(0, 1000)
         self.bar.setFixedWidth(_BAR_LETTERS * self.fontMetrics().averageCharWidth())
-        self.cancel = doing(
-            editor, push_button("Cancel", "Cancel; nothing is changed", "cancel"), "cancel"
-        )
+        cancel = status(editor).cancel
+        self.cancel = push_button(cancel.label)
+        self.cancel.clicked.connect(lambda: press(cancel.name))
         message, job = QtWidgets.QHBoxLayout(), QtWidgets.QHBoxLayout()
         message.addWidget(self.sign)
         message.addWidget(self.words, 1)
@@ -69,28 +71,19 @@ class StatusPart(QtWidgets.QWidget):
 
     def refresh(self) -> None:
         """Show the current message and progress."""
-        messages, busy = self._editor.controller.messages, self._editor.is_busy
-        if busy:
-            text = _escaped(sentence(messages.text))
-        elif messages.error:
-            text = _escaped(sentence(messages.error))
-        else:
-            mode = self._editor.mode
-            ink = self.palette().color(QtGui.QPalette.ColorRole.WindowText).name()
-            step = self._editor.controller.hint
-            note = "" if messages.last_note in step else _escaped(sentence(messages.last_note))
-            text = " · ".join(filter(None, (note, with_links(step, self._editor.keys, mode, ink))))
-        labels = [] if busy else self._editor.controller.recordings.labels
-        text = " · ".join([*(f"<b>{_escaped(label)}</b>" for label in labels), text])
+        now = status(self._editor)
+        ink = self.palette().color(QtGui.QPalette.ColorRole.WindowText).name()
+        hint = "".join(_linked(word, ink) for word in now.words)
+        labels = (f"<b>{_escaped(label)}</b>" for label in now.labels)
+        text = " · ".join(filter(None, (*labels, _escaped(now.text), hint)))
         if self.words.text() != text:
             self.words.setText(text)
             self.words.setToolTip(text)  # which may be too long for its place
-        self.sign.setVisible(bool(messages.error) and not busy)
-        is_running = messages.fraction is not None
-        self.bar.setVisible(is_running)
-        self.cancel.setVisible(is_running)
-        if is_running:
-            self.bar.setValue(round(1000.0 * (messages.fraction or 0.0)))
+        self.sign.setVisible(now.is_error)
+        for each in (self.bar, self.cancel):
+            each.setVisible(now.cancel.visible)
+        self.bar.setValue(round(1000.0 * (now.progress or 0.0)))
+        self.cancel.setToolTip(tooltip(now.cancel, self._editor.keys))
 
     def showEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
         """Take the text over from the view."""
@@ -103,26 +96,11 @@ class StatusPart(QtWidgets.QWidget):
         if self._editor.GetEnabled():
             self._editor.controller.messages.show_line(True)
 
-    def _press(self, key: str) -> None:
-        binding = self._editor.keys.binding_of(key, self._editor.mode)
-        if binding is not None:
-            self._editor.run(binding.name)
 
-
-def with_links(text: str, keys: Keys, mode: Mode, ink: str) -> str:
-    """Return the rich text of a hint, in which keys that work in *mode* are links, in *ink*."""
-    working = [b for b in keys.bindings if b.name and mode in b.modes and b.keys]
-    names = {key_cap(b.keys[0]): b.keys[0] for b in working}
-    names = {html.escape(cap, quote=False): key for cap, key in names.items()}
-    # A key after "Press", "or" or "Next:", or before ":" or "to", as hints name it.
-    caps = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
-    pattern = rf"((?:Press|or|Next:) |\(|· |, |\. )({caps})(?=[ :,.)]|$)"
-
-    def link(found: re.Match[str]) -> str:
-        before, cap = found.groups()
-        return f'{before}<a href="{names[cap]}" style="color: {ink}">{cap}</a>'
-
-    return re.sub(pattern, link, _escaped(text))
+def _linked(word: Word, ink: str) -> str:
+    """Return the rich text of a *word*, in *ink*: a link if it has an action."""
+    text = _escaped(word.text)
+    return f'<a href="{word.action}" style="color: {ink}">{text}</a>' if word.action else text
 
 
 def _escaped(text: str) -> str:

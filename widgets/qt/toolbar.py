@@ -6,6 +6,8 @@ in a narrow panel.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +17,13 @@ from ..editor import (
     MESH_FILES,
     READABLE_FILES,
     DeformEditor,
-    Mode,
     exporting,
     opening,
     save,
     saving,
-    show_pose,
-    show_rest,
 )
-from .controls import doing, highlighted, put, tool_button
+from ..panel import Field, toolbar, tooltip
+from .controls import Press, highlighted, tool_button
 from .icons import icon
 from .view_menu import add_view_entries
 
@@ -39,46 +39,35 @@ class Toolbar(QtWidgets.QWidget):
     ----------
     editor : DeformEditor
         The editor to control.
+    press : callable
+        ``press(name, value)``, called when a button is used.
+
+    Attributes
+    ----------
+    buttons : dict of str to QToolButton
+        The buttons, by the names of their fields.
+    asking : dict of str to callable
+        What is called instead for fields that ask for a file, by their names; may be replaced.
     """
 
-    def __init__(self, editor: DeformEditor) -> None:
+    def __init__(self, editor: DeformEditor, press: Press) -> None:
         super().__init__()
-        self._editor = editor
-        self.open = tool_button("Open", "Open a mesh or a session", "open")
-        self.save = tool_button("Save", "Save the session or the deformed mesh", "save")
-        self.open.clicked.connect(self.ask_and_open)
-        menu = self._menu(self.save)
-        for text, do in (
-            ("Save session", self.save_session),
-            ("Save session as ...", self.ask_and_save),
-            ("Save mesh as ...", self.ask_and_export),
-        ):
-            menu.addAction(text).triggered.connect(do)
-        self.undo = doing(editor, tool_button("Undo", "Undo"), "undo")
-        self.redo = doing(editor, tool_button("Redo", "Redo"), "redo")
-        self.modes = {mode: self._mode_button(mode) for mode in Mode}
-        self._group = QtWidgets.QButtonGroup(self)
-        for button in self.modes.values():
-            self._group.addButton(button)
-        tip = "Show the mesh at rest while the button is held"
-        self.compare = tool_button("Before/After", tip, "before_after")
-        self.compare.pressed.connect(lambda: editor.do(show_rest))
-        self.compare.released.connect(lambda: editor.do(show_pose, while_busy=True))
-        self.view = tool_button("View", "What is shown")
-        add_view_entries(self._menu(self.view), lambda: editor)
-        self.help = doing(editor, tool_button("Keys", "Show keys", "help"), "help")
-        self._icons = {
-            "open": self.open, "save": self.save, "undo": self.undo, "redo": self.redo,
-            "compare": self.compare, "view": self.view, "help": self.help,
-            **{mode.name.lower(): button for mode, button in self.modes.items()},
-        }  # fmt: skip
+        self._editor, self._press = editor, press
+        self.asking: dict[str, Callable[[], object]] = {
+            "open": self.ask_and_open,
+            "save.session": self.save_session,
+            "save.session_as": self.ask_and_save,
+            "save.mesh_as": self.ask_and_export,
+        }
+        self._modes = QtWidgets.QButtonGroup(self)
+        fields = toolbar(editor)
+        self.buttons = {field.name: self._made(field) for field in fields}
+        self._icons = {field.name: field.icon for field in fields}
         # Groups from left to right; in a narrow panel the modes have a row of their own.
-        groups = (
-            (self.open, self.save, self.undo, self.redo),
-            (*self.modes.values(),),
-            (self.compare, self.view, self.help),
-        )
-        self._groups = [_group(buttons) for buttons in groups]
+        self._groups = [
+            _group([self.buttons[field.name] for field in group])
+            for _, group in groupby(fields, key=lambda field: field.group)
+        ]
         self._grid = QtWidgets.QGridLayout(self)
         self._grid.setContentsMargins(4, 2, 4, 2)
         self._grid.setSpacing(2)
@@ -90,22 +79,12 @@ class Toolbar(QtWidgets.QWidget):
 
     def refresh(self) -> None:
         """Show the steps to undo and redo, and the mode."""
-        session, busy, keys = self._editor.session, self._editor.is_busy, self._editor.keys
-        for button, label, verb in (
-            (self.undo, self._editor.controller.undo_label, "Undo"),
-            (self.redo, session.redo_label, "Redo"),
-        ):
-            button.setEnabled(label is not None and not busy)
-            text = (
-                f"{verb}: {label} ({keys.cap(verb.lower())})"
-                if label
-                else f"Nothing to {verb.lower()}"
-            )
-            button.setToolTip(text)
-        for each in (self.open, self.save, self.view, *self.modes.values()):
-            each.setEnabled(not busy)
-        self.compare.setEnabled(not busy and session.state.pose is not None)
-        put(self.modes[self._editor.mode], True)
+        for field in toolbar(self._editor):
+            button = self.buttons[field.name]
+            button.setEnabled(field.enabled)
+            button.setToolTip(tooltip(field, self._editor.keys))
+            if button.isCheckable():
+                button.setChecked(field.value)
 
     def resizeEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
         """Show as many names as there is room for."""
@@ -122,20 +101,38 @@ class Toolbar(QtWidgets.QWidget):
 
     # Pieces.
 
-    def _mode_button(self, mode: Mode) -> Any:
-        action = mode.name.lower()
-        button = tool_button(mode.name.title(), self._editor.keys[action].label, action)
-        return highlighted(doing(self._editor, button, action))
+    def _made(self, field: Field) -> Any:
+        """Return a new button for *field*."""
+        button, name, press = tool_button(field.label), field.name, self._press
+        if field.kind == "menu":
+            menu = QtWidgets.QMenu(button)
+            button.setMenu(menu)
+            button.setPopupMode(QtWidgets.QToolButton.ToolButtonPopupMode.InstantPopup)
+            if name == "view":
+                add_view_entries(menu, lambda: self._editor)
+            else:
+                for entry in filter(None, field.items):
+                    menu.addAction(entry.label).triggered.connect(self._asker(entry.name))
+        elif field.kind == "file":
+            button.clicked.connect(self._asker(name))
+        elif field.kind == "hold":
+            button.pressed.connect(lambda: press(name, True))
+            button.released.connect(lambda: press(name, False))
+        else:
+            button.clicked.connect(lambda: press(name))
+        if field.value is not None and field.kind == "button":
+            self._modes.addButton(highlighted(button))
+        return button
 
-    def _menu(self, button: Any) -> Any:
-        menu = QtWidgets.QMenu(button)
-        button.setMenu(menu)
-        button.setPopupMode(QtWidgets.QToolButton.ToolButtonPopupMode.InstantPopup)
-        return menu
+    def _asker(self, name: str) -> Callable[[], None]:
+        def ask() -> None:
+            self.asking[name]()
+
+        return ask
 
     def _draw_icons(self) -> None:
-        for name, button in self._icons.items():
-            button.setIcon(icon(name, self.palette()))
+        for name, button in self.buttons.items():
+            button.setIcon(icon(self._icons[name], self.palette()))
 
     def _fit(self) -> None:
         """Use the arrangement with the most names that fits."""
@@ -149,8 +146,8 @@ class Toolbar(QtWidgets.QWidget):
         if level == self._level:
             return
         self._level = level
-        styles, modes = Qt.ToolButtonStyle, self.modes.values()
-        for button in self._icons.values():
+        styles, modes = Qt.ToolButtonStyle, self._modes.buttons()
+        for button in self.buttons.values():
             named = level == 3 or (level > 0 and button in modes)
             style = styles.ToolButtonTextBesideIcon if named else styles.ToolButtonIconOnly
             button.setToolButtonStyle(style)
@@ -214,7 +211,7 @@ class Toolbar(QtWidgets.QWidget):
         return str(self._editor.path.parent)
 
 
-def _group(buttons: tuple[Any, ...]) -> Any:
+def _group(buttons: list[Any]) -> Any:
     """Return a widget with *buttons* side by side."""
     group = QtWidgets.QWidget()
     layout = QtWidgets.QHBoxLayout(group)

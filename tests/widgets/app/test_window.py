@@ -295,15 +295,15 @@ def test_the_buttons_of_the_panel_call_the_functions_of_the_menus(
     head = hand.window.editor_widget.panel.toolbar
     change(hand)
     choose_file(monkeypatch, tmp_path / "knob.segdeform")
-    head.save.menu().actions()[1].trigger()
+    head.buttons["save"].menu().actions()[1].trigger()
     assert hand.title == "knob.segdeform - segdeform"
-    head.save.menu().actions()[0].trigger()
+    head.buttons["save"].menu().actions()[0].trigger()
     choose_file(monkeypatch, ball_file)
-    hand.click(head.open)
+    hand.click(head.buttons["open"])
     hand.settle()
     assert hand.title == "ball.vtp - segdeform"
     choose_file(monkeypatch, tmp_path / "again.vtp")
-    hand.window.editor_widget.panel.toolbar.save.menu().actions()[2].trigger()
+    hand.window.editor_widget.panel.toolbar.buttons["save"].menu().actions()[2].trigger()
     assert "height" in convert.read_polydata(tmp_path / "again.vtp").point_data
 
 
@@ -465,14 +465,14 @@ def test_keys_are_changed_in_a_dialog_by_keys_and_kept(start, arm_file):
     hand.settle()
     panel = window.editor_widget.panel
     until(lambda: panel.is_up_to_date, "the panel")
-    assert panel.painting.shrink.toolTip() == "Shrink by one ring (V)"
-    assert panel.painting.through.toolTip() == "Paint hidden vertices as well"
+    assert panel.controls["paint.shrink"].toolTip() == "Shrink by one ring (V)"
+    assert panel.controls["paint.through"].toolTip() == "Paint hidden vertices as well"
     window.session.set_fixed([1])
     hand.settle()
     before = len(window.session.fixed)
-    panel.painting.radius.setFocus()
-    until(panel.painting.radius.hasFocus, "the focus")
-    QtTest.QTest.keyClick(panel.painting.radius, Qt.Key_J, Qt.ControlModifier)
+    panel.controls["paint.radius"].setFocus()
+    until(panel.controls["paint.radius"].hasFocus, "the focus")
+    QtTest.QTest.keyClick(panel.controls["paint.radius"], Qt.Key_J, Qt.ControlModifier)
     assert len(window.session.fixed) != before
     QtTest.QTest.keyClick(window.editor_widget.plotter, Qt.Key_F5)
     assert len(window.session.fixed) == before

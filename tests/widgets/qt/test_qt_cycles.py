@@ -171,7 +171,7 @@ def one_cycle(kind, *, in_a_job):
         host.editor.mode = Mode.REGIONS
         application().processEvents()
         host.panel.refresh()
-        QtTest.QTest.mouseClick(host.panel.regions.segment, Qt.LeftButton)
+        QtTest.QTest.mouseClick(host.panel.controls["regions.segment"], Qt.LeftButton)
         assert host.editor.is_busy
     window = host.editor.view.window
     drawn = [vtkWeakReference() for _ in range(3)]

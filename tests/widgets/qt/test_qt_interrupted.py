@@ -70,7 +70,11 @@ def settings(panel) -> list:
     owners = panel, panel.toolbar  # which is not inside the panel of a `DeformWidget`
     inside = {each for kind in kinds for owner in owners for each in owner.findChildren(kind)}
     found = [each for each in inside if each.isVisible()]
-    asking = panel.toolbar.open, panel.toolbar.save, panel.toolbar.view  # a dialog or a menu
+    asking = (
+        panel.toolbar.buttons["open"],
+        panel.toolbar.buttons["save"],
+        panel.toolbar.buttons["view"],
+    )  # a dialog or a menu
     return [each for each in found if each.isEnabled() and each not in asking]
 
 
@@ -106,10 +110,10 @@ def test_undo_in_the_panel_reverts_the_drag_and_redo_restores_it(stand, during):
     panel, place = stand.widget.panel, dragged(stand, during=during)
     stand.editor.controller.refresh()
     panel.refresh()
-    QtTest.QTest.mouseClick(panel.toolbar.undo, Qt.LeftButton)
+    QtTest.QTest.mouseClick(panel.toolbar.buttons["undo"], Qt.LeftButton)
     assert is_kept(stand, place).done == 0
     assert stand.session.state is stand.start
-    QtTest.QTest.mouseClick(panel.toolbar.redo, Qt.LeftButton)
+    QtTest.QTest.mouseClick(panel.toolbar.buttons["redo"], Qt.LeftButton)
     stand.settle()
     assert stand.session.undo_label == DRAG
 
@@ -186,7 +190,7 @@ def test_two_editors_in_one_view_do_not_block_each_other(stand):
 def test_a_drag_that_loses_the_focus_or_its_release_is_finished(stand, what):
     place = dragged(stand, during=True)
     if what == "focus":
-        stand.widget.panel.deform.stretch.setFocus()
+        stand.widget.panel.controls["deform.stretch"].setFocus()
         event = QtCore.QEvent(QtCore.QEvent.WindowDeactivate)
         application().sendEvent(stand.widget, event)
         assert stand.session.is_dragging

@@ -22,7 +22,9 @@ class Seen:
         self.editor, self.panel = self.widget.editor, self.widget.panel
         self.editor.mode = Mode.DEFORM
         self.settle()
-        (self.part,) = (p for p in self.panel.findChildren(QtCore.QObject) if hasattr(p, "lids"))
+
+    def control(self, name):
+        return self.panel.controls[f"deform.{name}"]
 
     @property
     def session(self):
@@ -34,7 +36,7 @@ class Seen:
 
     def choose(self, name):
         """Choose an entry of the box by its keys."""
-        box = self.part.lids
+        box = self.control("lids")
         box.setFocus()
         row = box.findText(name)
         while box.currentIndex() != row:
@@ -64,36 +66,36 @@ def make():
 def test_lids_are_chosen_for_an_open_surface_and_undone(make):
     seen = make(Session(Surface(bottle(3, 3))))
     notices = seen.editor.controller.notices
-    assert seen.part.lids.isEnabled()
-    assert seen.part.lids.currentText() == "Auto"
+    assert seen.control("lids").isEnabled()
+    assert seen.control("lids").currentText() == "Auto"
     assert notices.text == "3 holes: volume kept under lids"
-    assert seen.part.volume.text() == "0 %"
+    assert seen.control("volume").text() == "0 %"
     seen.choose("Off")
     assert seen.session.options.lids is False
-    assert seen.part.volume.text() == "No volume to preserve"
-    assert not seen.part.preserve.isEnabled()
-    assert not seen.part.preserve.isChecked()
+    assert seen.control("volume").text() == "No volume to preserve"
+    assert not seen.control("preserve").isEnabled()
+    assert not seen.control("preserve").isChecked()
     assert "no volume" in notices.text
     seen.choose("Under lids")
     assert seen.session.options.lids is True
     while seen.session.undo():
         pass
     seen.settle()
-    assert seen.part.lids.currentText() == "Auto"
-    assert seen.part.preserve.isEnabled()
-    assert seen.part.preserve.isChecked()
+    assert seen.control("lids").currentText() == "Auto"
+    assert seen.control("preserve").isEnabled()
+    assert seen.control("preserve").isChecked()
 
 
 def test_a_sheet_has_no_volume_to_preserve_unless_lids_are_wanted(make):
     seen = make(sheet(6))
-    assert seen.part.volume.text() == "No volume to preserve"
-    assert not seen.part.preserve.isEnabled()
-    assert not seen.part.per_region.isEnabled()
+    assert seen.control("volume").text() == "No volume to preserve"
+    assert not seen.control("preserve").isEnabled()
+    assert not seen.control("per_region").isEnabled()
 
 
 def test_for_a_closed_mesh_there_is_nothing_to_choose(make):
     mesh, state = small()
     seen = make(Session(mesh, state=state))
-    assert not seen.part.lids.isEnabled()
-    assert seen.part.preserve.isEnabled()
+    assert not seen.control("lids").isEnabled()
+    assert seen.control("preserve").isEnabled()
     assert seen.editor.controller.notices.text == ""

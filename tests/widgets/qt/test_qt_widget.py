@@ -110,7 +110,7 @@ class Seen:
         self.settle()
 
     def mode(self, mode):
-        self.click(self.panel.toolbar.modes[mode])
+        self.click(self.panel.toolbar.buttons[f"mode.{mode.name.lower()}"])
 
 
 @pytest.fixture
@@ -163,26 +163,26 @@ def around(seen, mask):
 def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
     seen = make(MESH)
     panel, hand, height = seen.panel, seen.view_hand(), MESH.vertices[:, 2]
-    seen.click(panel.regions.segment)
-    assert seen.session.regions.n_regions == len(rows(panel.regions.list)) > 1
+    seen.click(panel.controls["regions.segment"])
+    assert seen.session.regions.n_regions == len(rows(panel.controls["regions.list"])) > 1
     seen.mode(Mode.CAGES)
-    seen.click(panel.cages.fit)
+    seen.click(panel.controls["cages.fit"])
     assert [str(cage.n_vertices) for cage in seen.session.cages] == [
-        cage for _, cage, _ in rows(panel.regions.list)
+        cage for _, cage, _ in rows(panel.controls["regions.list"])
     ]
 
     seen.mode(Mode.HANDLES)
-    seen.click(panel.painting.tools[Tool.RECTANGLE])
-    seen.click(panel.painting.through)
-    seen.click_row(panel.handles.list, 0)  # fixed vertices
+    seen.click(panel.controls["paint.rectangle"])
+    seen.click(panel.controls["paint.through"])
+    seen.click_row(panel.controls["handles.list"], 0)  # fixed vertices
     hand.drag(around(seen, height < 0.08))
-    seen.click(panel.handles.new)
+    seen.click(panel.controls["handles.new"])
     hand.drag(around(seen, height > 0.92))
     seen.settle()
     assert set(seen.session.fixed) <= set(np.flatnonzero(height < 0.12))
     (name,) = seen.session.handles
     counts = [len(seen.session.fixed), len(seen.session.handles[name])]
-    assert [int(count) for _, count, *_ in rows(panel.handles.list)] == counts
+    assert [int(count) for _, count, *_ in rows(panel.controls["handles.list"])] == counts
     assert min(counts) > 5
 
     seen.mode(Mode.DEFORM)
@@ -196,13 +196,13 @@ def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
     assert max(map(abs, seen.deformed)) < 1e-12
     bent = seen.session.vertices
     seen.settle()
-    volumes = [text for _, _, text in rows(panel.regions.list)]
+    volumes = [text for _, _, text in rows(panel.controls["regions.list"])]
     assert any(text not in ("", "0 %") for text in volumes)
-    seen.click(panel.toolbar.undo)
+    seen.click(panel.toolbar.buttons["undo"])
     assert_array_equal(seen.session.vertices, MESH.vertices)
-    seen.click(panel.toolbar.redo)
+    seen.click(panel.toolbar.buttons["redo"])
     assert_array_equal(seen.session.vertices, bent)
-    seen.click(panel.deform.reset)
+    seen.click(panel.controls["deform.reset"])
     assert seen.session.state.pose is None
     assert seen.errors == hand.failures == []
 
@@ -218,19 +218,19 @@ def test_the_whole_mesh_is_visible_at_first(seen):
 
 def test_regions_are_selected_merged_and_split_in_the_list(seen):
     panel, session = seen.panel, seen.session
-    seen.click_row(panel.regions.list, 1)
+    seen.click_row(panel.controls["regions.list"], 1)
     assert seen.editor.widgets.selector.region == 1
-    assert not panel.regions.merge.isEnabled()
-    seen.click_row(panel.regions.list, 0, held=Qt.ControlModifier)
-    seen.click(panel.regions.merge)
+    assert not panel.controls["regions.merge"].isEnabled()
+    seen.click_row(panel.controls["regions.list"], 0, held=Qt.ControlModifier)
+    seen.click(panel.controls["regions.merge"])
     assert session.regions.n_regions == 1
     assert "Merged" in panel.status.words.text()
-    seen.click(panel.regions.split)
+    seen.click(panel.controls["regions.split"])
     assert session.regions.n_regions == 2
-    seen.click(panel.regions.new)
-    assert rows(panel.regions.list)[2][0] == "region 3 (new)"
+    seen.click(panel.controls["regions.new"])
+    assert rows(panel.controls["regions.list"])[2][0] == "region 3 (new)"
     assert seen.editor.widgets.selector.region == 2
-    assert not panel.regions.split.isEnabled()
+    assert not panel.controls["regions.split"].isEnabled()
 
 
 def rename(tree, name):
@@ -243,7 +243,7 @@ def rename(tree, name):
 
 
 def test_regions_are_renamed_in_the_list_and_shown_by_name_everywhere(seen):
-    tree, session = seen.panel.regions.list, seen.session
+    tree, session = seen.panel.controls["regions.list"], seen.session
     assert [name for name, *_ in rows(tree)] == ["region 1", "region 2"]
     seen.click_row(tree, 1, column=2)  # beside the name
     rename(tree, " the left arm\N{WHITE SMILING FACE} ")
@@ -259,10 +259,10 @@ def test_regions_are_renamed_in_the_list_and_shown_by_name_everywhere(seen):
     rename(tree, "arm")
     seen.settle()
     assert "Brush: paint arm." in seen.editor.status
-    seen.click(seen.panel.regions.split)
+    seen.click(seen.panel.controls["regions.split"])
     assert [name for name, *_ in rows(tree)] == ["region 1", "arm", "arm 2"]
     seen.click_row(tree, 2, held=Qt.ControlModifier)
-    seen.click(seen.panel.regions.merge)
+    seen.click(seen.panel.controls["regions.merge"])
     assert "Merged arm and arm 2" in seen.panel.status.words.text()
     box = tree.visualItemRect(tree.topLevelItem(0))
     QtTest.QTest.mouseDClick(tree.viewport(), Qt.LeftButton, Qt.NoModifier, box.center())
@@ -276,9 +276,9 @@ def test_a_tick_shows_one_cage_and_hides_it(seen):
     seen.mode(Mode.CAGES)
     cages = seen.editor.widgets.cages
     assert cages.is_shown
-    seen.click_row(seen.panel.regions.list, 1, column=1)
+    seen.click_row(seen.panel.controls["regions.list"], 1, column=1)
     assert [cages.is_visible(region) for region in (0, 1)] == [True, False]
-    seen.click_row(seen.panel.regions.list, 1, column=1)
+    seen.click_row(seen.panel.controls["regions.list"], 1, column=1)
     assert cages.is_visible(1)
 
 
@@ -286,29 +286,29 @@ def test_a_pin_is_made_a_handle_in_the_list_of_mode_pull(seen):
     panel, session = seen.panel, seen.session
     session.remove_handle(*session.handles)
     seen.mode(Mode.PULL)
-    assert not panel.handles.isVisible()
+    assert not panel.boxes["handles"].isVisible()
     session.pin(int(np.setdiff1d(np.arange(session.mesh.n_vertices), session.fixed)[0]))
     seen.settle()
-    seen.click_row(panel.handles.list, 0)
-    assert panel.handles.convert.text() == "Make handle"
-    seen.click(panel.handles.convert)
-    assert rows(panel.handles.list)[0][0] == "handle 1"
+    seen.click_row(panel.controls["handles.list"], 0)
+    assert panel.controls["handles.convert"].text() == "Make handle"
+    seen.click(panel.controls["handles.convert"])
+    assert rows(panel.controls["handles.list"])[0][0] == "handle 1"
     seen.mode(Mode.DEFORM)
-    seen.click(panel.handles.local)
+    seen.click(panel.controls["handles.local_axes"])
     assert seen.editor.widgets.dragger.local
-    assert not panel.handles.pivot.isEnabled()
+    assert not panel.controls["handles.pivot"].isEnabled()
     session.set_pivot("handle 1", session.mesh.vertices[0])
     seen.settle()
-    seen.click(panel.handles.pivot)
+    seen.click(panel.controls["handles.pivot"])
     assert session.undo_label == "reset the pivot of handle 1"
-    assert panel.handles.convert.text() == "Make pin"
-    seen.click(panel.handles.convert)
+    assert panel.controls["handles.convert"].text() == "Make pin"
+    seen.click(panel.controls["handles.convert"])
     assert list(session.handles) == ["pin 1"]
 
 
 def test_handles_are_renamed_selected_and_removed_in_the_list(seen):
     seen.mode(Mode.HANDLES)
-    tree = seen.panel.handles.list
+    tree = seen.panel.controls["handles.list"]
     seen.click_row(tree, 1)
     rename(tree, "tail")
     seen.settle()
@@ -319,7 +319,7 @@ def test_handles_are_renamed_selected_and_removed_in_the_list(seen):
     assert seen.editor.widgets.selector.paints is Paint.FIXED
     seen.click_row(tree, 1)
     assert seen.editor.widgets.selector.paints is Paint.HANDLE
-    seen.click(seen.panel.handles.remove)
+    seen.click(seen.panel.controls["handles.remove"])
     assert not seen.session.handles
     assert [name for name, *_ in rows(tree)] == ["Fixed", "New handle (not painted yet)"]
 
@@ -327,51 +327,51 @@ def test_handles_are_renamed_selected_and_removed_in_the_list(seen):
 def test_a_handle_called_fixed_is_not_mistaken_for_the_fixed_vertices(seen):
     seen.session.rename_handle(next(iter(seen.session.handles)), "Fixed")
     seen.mode(Mode.HANDLES)
-    tree, selector = seen.panel.handles.list, seen.editor.widgets.selector
+    tree, selector = seen.panel.controls["handles.list"], seen.editor.widgets.selector
     assert [name for name, *_ in rows(tree)][:2] == ["Fixed", "Fixed"]
     seen.click_row(tree, 0)
     assert selector.paints is Paint.FIXED
-    assert not seen.panel.handles.remove.isEnabled()
+    assert not seen.panel.controls["handles.remove"].isEnabled()
     seen.click_row(tree, 1)
     assert (selector.paints, selector.handle) == (Paint.HANDLE, "Fixed")
-    seen.click(seen.panel.handles.remove)
+    seen.click(seen.panel.controls["handles.remove"])
     assert not seen.session.handles
 
 
 def test_options_are_steps_and_are_shown_when_they_are_undone(make):
     seen = make(models.sphere(300))
     seen.mode(Mode.CAGES)
-    seen.type_number(seen.panel.cages.total, 90)
-    seen.type_number(seen.panel.cages.offset, 0.5)
+    seen.type_number(seen.panel.controls["cages.total"], 90)
+    seen.type_number(seen.panel.controls["cages.offset"], 0.5)
     seen.mode(Mode.DEFORM)
-    part, options = seen.panel.deform, lambda: seen.session.options
-    seen.type_number(part.stretch, 3.0)
-    seen.type_number(part.clusters, 0)
-    seen.click(part.preserve)
-    seen.click(part.per_region)
+    part, options = seen.panel.controls, lambda: seen.session.options
+    seen.type_number(part["deform.stretch"], 3.0)
+    seen.type_number(part["deform.clusters"], 0)
+    seen.click(part["deform.preserve"])
+    seen.click(part["deform.per_region"])
     assert (options().n_cage_vertices, options().offset) == (90, 0.5)
     assert (options().stretch, options().rotation_groups) == (3.0, None)
     assert (options().preserve_volume, options().preserve_region_volumes) == (False, True)
     for _ in range(6):
-        seen.click(seen.panel.toolbar.undo)
-    assert seen.panel.deform.stretch.value() == 10.0
-    assert seen.panel.deform.clusters.value() == 300
-    assert seen.panel.deform.preserve.isChecked()
-    assert not seen.panel.deform.per_region.isChecked()
+        seen.click(seen.panel.toolbar.buttons["undo"])
+    assert seen.panel.controls["deform.stretch"].value() == 10.0
+    assert seen.panel.controls["deform.clusters"].value() == 300
+    assert seen.panel.controls["deform.preserve"].isChecked()
+    assert not seen.panel.controls["deform.per_region"].isChecked()
     seen.mode(Mode.CAGES)
-    assert seen.panel.cages.total.value() == 155
-    assert seen.panel.cages.offset.text() == "Auto"
-    assert seen.panel.toolbar.undo.toolTip() == "Nothing to undo"
+    assert seen.panel.controls["cages.total"].value() == 155
+    assert seen.panel.controls["cages.offset"].text() == "Auto"
+    assert seen.panel.toolbar.buttons["undo"].toolTip() == "Nothing to undo"
 
 
 def test_sliders_set_the_number_of_regions_and_the_detail_of_cages_at_once(seen):
     session, before = seen.session, seen.session.cages
     seen.mode(Mode.REGIONS)
-    seen.panel.regions.count.setValue(3)
+    seen.panel.controls["regions.count"].setValue(3)
     seen.settle()
-    assert session.regions.n_regions == seen.panel.regions.count.value() == 3
+    assert session.regions.n_regions == seen.panel.controls["regions.count"].value() == 3
     seen.mode(Mode.CAGES)
-    slider = seen.panel.cages.detail
+    slider = seen.panel.controls["cages.detail"]
     slider.setSliderDown(True)
     slider.setSliderPosition(40)
     seen.panel.refresh()
@@ -380,46 +380,50 @@ def test_sliders_set_the_number_of_regions_and_the_detail_of_cages_at_once(seen)
     slider.setSliderDown(False)
     seen.settle()
     assert sum(cage.n_vertices for cage in session.cages) == 40
-    assert seen.panel.cages.detail.value() == seen.panel.cages.total.value() == 40
-    assert seen.panel.cages.total.text() == "40"
-    assert seen.panel.cages.detail.minimum() == 3 * 12  # for each region
+    assert (
+        seen.panel.controls["cages.detail"].value()
+        == seen.panel.controls["cages.total"].value()
+        == 40
+    )
+    assert seen.panel.controls["cages.total"].text() == "40"
+    assert seen.panel.controls["cages.detail"].minimum() == 3 * 12  # for each region
     for _ in range(3):  # the cages, their number, the regions
-        seen.click(seen.panel.toolbar.undo)
+        seen.click(seen.panel.toolbar.buttons["undo"])
     assert session.cages == before
-    assert seen.panel.regions.count.value() == session.regions.n_regions == 2
+    assert seen.panel.controls["regions.count"].value() == session.regions.n_regions == 2
     count = sum(cage.n_vertices for cage in before)
-    assert seen.panel.cages.detail.value() == count
-    assert seen.panel.cages.total.text() == f"155 ({count} fitted)"
+    assert seen.panel.controls["cages.detail"].value() == count
+    assert seen.panel.controls["cages.total"].text() == f"155 ({count} fitted)"
 
 
 def test_the_panel_follows_keys_and_the_wheel(seen):
-    hand, part = seen.view_hand(), seen.panel.painting
+    hand, part = seen.view_hand(), seen.panel.controls
     hand.key("l")
     seen.settle()
-    assert part.tools[Tool.LASSO].isChecked()
-    assert not part.radius.isEnabled()
+    assert part["paint.lasso"].isChecked()
+    assert not part["paint.radius"].isEnabled()
     for key in "bv":
         hand.key(key)
     seen.settle()
-    assert part.through.isChecked()
-    before = part.radius.value()
+    assert part["paint.through"].isChecked()
+    before = part["paint.radius"].value()
     QtTest.QTest.keyClick(hand.widget, "]")
     seen.settle()
-    assert part.radius.value() == pytest.approx(1.2 * before, rel=1e-3)
-    seen.type_number(part.radius, 0.25)
+    assert part["paint.radius"].value() == pytest.approx(1.2 * before, rel=1e-3)
+    seen.type_number(part["paint.radius"], 0.25)
     assert seen.editor.widgets.selector.radius == pytest.approx(0.25)
     for key in "qe4":  # Q and E would close a window of pyvista or VTK
         hand.key(key)
     seen.settle()
-    assert seen.panel.toolbar.modes[Mode.DEFORM].isChecked()
-    assert part.isHidden()
-    seen.click(seen.panel.deform.overlay)
+    assert seen.panel.toolbar.buttons["mode.deform"].isChecked()
+    assert seen.panel.boxes["paint"].isHidden()
+    seen.click(seen.panel.controls["deform.overlay"])
     assert seen.editor.widgets.overlay.is_shown
 
 
 def test_a_click_on_a_button_leaves_the_keys_to_the_view(seen):
     hand = seen.view_hand()
-    seen.click(seen.panel.painting.tools[Tool.LASSO])
+    seen.click(seen.panel.controls["paint.lasso"])
     assert seen.widget.plotter.hasFocus()
     hand.key("b")
     assert seen.editor.widgets.selector.tool is Tool.BRUSH
@@ -437,8 +441,10 @@ def test_a_job_shows_its_progress_and_is_cancelled(seen):
     foot = seen.panel.status
     until(lambda: foot.bar.isVisible() and foot.bar.value() == 400, "the bar")
     assert foot.words.text() == "Counting: by hand · 40 % · Esc to cancel"
-    assert not seen.panel.regions.segment.isEnabled()  # nothing else is possible meanwhile
-    assert not seen.panel.toolbar.modes[Mode.DEFORM].isEnabled()
+    assert not seen.panel.controls[
+        "regions.segment"
+    ].isEnabled()  # nothing else is possible meanwhile
+    assert not seen.panel.toolbar.buttons["mode.deform"].isEnabled()
     QtTest.QTest.mouseClick(foot.cancel, Qt.LeftButton)
     until(lambda: "Stopping" in foot.words.text(), "the answer")
     go_on.set()
@@ -446,7 +452,7 @@ def test_a_job_shows_its_progress_and_is_cancelled(seen):
     assert delivered == []
     assert "cancelled" in foot.words.text().lower()
     assert not foot.bar.isVisible()
-    assert seen.panel.regions.segment.isEnabled()
+    assert seen.panel.controls["regions.segment"].isEnabled()
 
 
 def bend(seen, height=0.4):
@@ -554,33 +560,33 @@ def test_the_first_steps_are_shown_once_until_a_click_escape_or_a_pull(make, sta
 
 def test_the_colour_range_is_typed_and_kept_for_the_next_session(seen, tmp_path):
     seen.mode(Mode.DEFORM)
-    part, overlay = seen.panel.deform, lambda: seen.editor.widgets.overlay
-    assert not part.range.isEnabled()
-    seen.click(part.overlay)
+    part, overlay = seen.panel.controls, lambda: seen.editor.widgets.overlay
+    assert not part["deform.range"].isEnabled()
+    seen.click(part["deform.overlay"])
     bend(seen)
     assert overlay().half_range == 0.5
-    seen.type_number(part.range, 37.5)
+    seen.type_number(part["deform.range"], 37.5)
     assert overlay().half_range == 0.375
     assert seen.session.undo_label == "drag handle 1"  # the range is not an undo step
     seen.editor.save(tmp_path / "a.segdeform")
     seen.editor.load(tmp_path / "a.segdeform")
     seen.settle()
     assert overlay().half_range == 0.375
-    assert part.range.value() == 37.5
-    seen.type_number(part.range, 0)
-    assert part.range.text() == "Auto"
+    assert part["deform.range"].value() == 37.5
+    seen.type_number(part["deform.range"], 0)
+    assert part["deform.range"].text() == "Auto"
     assert overlay().half_range == 0.05  # automatic
 
 
 def test_an_error_is_shown_emitted_and_then_cleared(seen):
     seen.mode(Mode.HANDLES)
-    seen.panel.handles.list.topLevelItem(1).setText(0, "")  # not a valid name
+    seen.panel.controls["handles.list"].topLevelItem(1).setText(0, "")  # not a valid name
     seen.settle()
     (error,) = seen.errors
     assert "name" in error
     assert seen.panel.status.words.text().lower() == error.lower()
     assert seen.panel.status.sign.isVisible()
-    assert rows(seen.panel.handles.list)[1][0] == "handle 1"
+    assert rows(seen.panel.controls["handles.list"])[1][0] == "handle 1"
     seen.mode(Mode.DEFORM)
     assert not seen.panel.status.sign.isVisible()
 
@@ -600,17 +606,17 @@ def test_a_session_is_saved_and_opened_again(seen, tmp_path, monkeypatch):
     assert list(load_session(path).handles) == ["handle 1"]
     before = seen.session
     answer(monkeypatch, path)
-    seen.click(seen.panel.toolbar.open)  # saved, so no question
+    seen.click(seen.panel.toolbar.buttons["open"])  # saved, so no question
     assert seen.sessions == [seen.session]
     assert seen.session is not before
-    assert seen.session.regions.n_regions == len(rows(seen.panel.regions.list)) == 2
+    assert seen.session.regions.n_regions == len(rows(seen.panel.controls["regions.list"])) == 2
     before.merge_regions([0, 1])  # the previous session is no longer observed
     assert seen.regions == []
     seen.session.merge_regions([0, 1])
     assert seen.regions == [seen.session.regions]
     seen.session.remove_handle("handle 1")
     seen.mode(Mode.HANDLES)
-    assert len(seen.session.fixed) == int(rows(seen.panel.handles.list)[0][1]) > 0
+    assert len(seen.session.fixed) == int(rows(seen.panel.controls["handles.list"])[0][1]) > 0
 
 
 def test_unsaved_changes_are_discarded_only_if_confirmed(seen, tmp_path, monkeypatch):
@@ -623,7 +629,7 @@ def test_unsaved_changes_are_discarded_only_if_confirmed(seen, tmp_path, monkeyp
     before, buttons = seen.session, QtWidgets.QMessageBox.StandardButton
     for button, goes in ((buttons.Cancel, False), (buttons.Discard, True)):
         monkeypatch.setattr(QtWidgets.QMessageBox, "question", lambda *_, b=button: b)
-        seen.click(seen.panel.toolbar.open)
+        seen.click(seen.panel.toolbar.buttons["open"])
         assert (seen.session is not before) is goes
     assert seen.session.mesh.n_vertices == models.sphere(300).n_vertices
     assert seen.editor.path == tmp_path / "ball.segdeform"  # a mesh is never overwritten
@@ -683,7 +689,7 @@ def test_a_surface_is_written_back_with_all_its_arrays(make, tmp_path, monkeypat
     # The same from a file, and from a session file.
     answer(monkeypatch, tmp_path / "a.vtp")
     seen.editor.save(tmp_path / "a.segdeform")
-    seen.click(seen.panel.toolbar.open)
+    seen.click(seen.panel.toolbar.buttons["open"])
     assert_array_equal(seen.session.mesh.vertices, now.points)
     again = seen.widget.deformed_polydata()
     assert set(again.point_data.keys()) == everything
@@ -741,8 +747,8 @@ def test_two_widgets_and_a_dock_in_one_window_are_independent(state):
     assert [seen.editor.mode for seen in hands] == [Mode.DEFORM, Mode.REGIONS, Mode.CAGES]
     bend(hands[0])
     assert [len(seen.deformed) for seen in hands] == [1, 0, 0]
-    hands[1].click_row(second.panel.regions.list, 1)
-    hands[1].click(second.panel.regions.split)
+    hands[1].click_row(second.panel.controls["regions.list"], 1)
+    hands[1].click(second.panel.controls["regions.split"])
     assert [seen.session.regions.n_regions for seen in hands] == [2, 3, 2]
     first.close()  # the others stay
     hands[2].mode(Mode.DEFORM)
@@ -812,8 +818,8 @@ def test_every_control_is_reached_by_tab_and_has_a_tooltip(seen, mode):
     assert len(wanted) > 8
     assert [each for each in wanted if not each.toolTip()] == []
     reached, rows = set(), []
-    seen.panel.toolbar.open.setFocus()
-    until(seen.panel.toolbar.open.hasFocus, "the focus")
+    seen.panel.toolbar.buttons["open"].setFocus()
+    until(seen.panel.toolbar.buttons["open"].hasFocus, "the focus")
     for _ in range(60):
         here = application().focusWidget()
         if here in wanted and here not in reached:
@@ -826,7 +832,7 @@ def test_every_control_is_reached_by_tab_and_has_a_tooltip(seen, mode):
     assert {each for each in wanted if each.focusPolicy() != Qt.NoFocus} <= reached
     exclusive = {each for each in wanted - reached if each.group() is not None}
     assert wanted - reached == exclusive  # reached by the arrow keys
-    here = seen.panel.toolbar.modes[mode]
+    here = seen.panel.toolbar.buttons[f"mode.{mode.name.lower()}"]
     here.setFocus()
     QtTest.QTest.keyClick(here, Qt.Key_Left if mode is Mode.DEFORM else Qt.Key_Right)
     assert seen.editor.mode is not mode
@@ -834,26 +840,33 @@ def test_every_control_is_reached_by_tab_and_has_a_tooltip(seen, mode):
 
 def test_enter_presses_the_focused_button_and_words_of_the_hint_run_keys(seen):
     bar, panel = seen.panel.toolbar, seen.panel
-    for button, mode in ((bar.modes[Mode.HANDLES], Mode.HANDLES), (panel.handles.new, None)):
+    for button, mode in (
+        (bar.buttons["mode.handles"], Mode.HANDLES),
+        (panel.controls["handles.new"], None),
+    ):
         button.setFocusPolicy(Qt.StrongFocus)
         button.setFocus()
         QtTest.QTest.keyClick(button, Qt.Key_Return)
         seen.settle()
         assert mode is None or seen.editor.mode is mode
     assert seen.editor.widgets.selector.handle is None
-    assert 'href="4"' in panel.status.words.text()
-    panel.status.words.linkActivated.emit("4")
+    assert 'href="deform"' in panel.status.words.text()
+    panel.status.words.linkActivated.emit("deform")
     seen.settle()
     assert seen.editor.mode is Mode.DEFORM
-    bar.compare.pressed.emit()
+    (name,) = seen.session.handles
+    seen.session.move_handle(name, np.eye(4) + 0.1 * np.eye(4, k=3))
+    seen.session.commit()
+    seen.settle()
+    bar.buttons["compare"].pressed.emit()
     assert seen.editor.controller.shows_rest
-    bar.compare.released.emit()
+    bar.buttons["compare"].released.emit()
     assert not seen.editor.controller.shows_rest
 
 
 def test_handles_are_hidden_and_locked_in_the_list_which_has_their_colours(seen):
     seen.mode(Mode.DEFORM)
-    tree, dragger = seen.panel.handles.list, seen.editor.widgets.dragger
+    tree, dragger = seen.panel.controls["handles.list"], seen.editor.widgets.dragger
     (name,) = seen.session.handles
     row = [cells[0] for cells in rows(tree)].index(name)
     image = tree.topLevelItem(row).icon(0).pixmap(16, 16).toImage()
@@ -879,7 +892,7 @@ def test_in_a_dark_palette_the_panel_is_dark_and_its_text_is_light(seen, tmp_pat
         assert np.median(grey) < 60
         assert grey.max() > 200
         assert seen.panel.history.list.item(0).foreground().color().lightness() > 128
-        through, rows = seen.panel.painting.through, seen.panel.regions.list
+        through, rows = seen.panel.controls["paint.through"], seen.panel.controls["regions.list"]
         seen.click_row(rows, 1, column=1)  # no tick any more
         seen.click_row(rows, 0)  # highlights another row
         tick = rows.visualRect(rows.indexFromItem(rows.topLevelItem(1), 1))

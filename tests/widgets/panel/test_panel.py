@@ -1,0 +1,351 @@
+"""The models of the panel without any window: every control does what it says, and says so."""
+
+from __future__ import annotations
+
+import functools
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from bad_values import BAD
+from hands import draw_seldom, plain_view
+from scenes import sausage
+
+from vtk_segdeform import Session
+from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.session.state import State
+from vtk_segdeform.widgets.editor import Controller, preparing
+from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
+from vtk_segdeform.widgets.panel.fields import Field, Table, tooltip
+from vtk_segdeform.widgets.panel.panel import all_sections, checked, press, sections
+from vtk_segdeform.widgets.panel.status import first_steps, history, status, words_of
+from vtk_segdeform.widgets.panel.toolbar import toolbar, view_entries
+
+# What some of the controls can have, among `BAD`.
+SOMETIMES_GOOD = {"None", "True", "False", "numpy True", "0", "3", "2.5", "1e-320", "empty list"}
+VALUES = ("toggle", "number", "integer", "slider", "choice")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _unprepared():
+    """Do not prepare sessions for pulls in the background."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(preparing, "lacking", lambda _: None)
+        yield
+
+
+@functools.cache
+def start() -> tuple[Mesh, State]:
+    """Return the mesh and the state of a session that every control of the panel can change."""
+    scene = sausage(is_coarse=True)
+    session = Session(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.set_fixed(scene.fixed)
+    name = session.add_handle(scene.handle)
+    session.pin(int(np.argmin(np.abs(scene.mesh.vertices[:, 0]))))
+    session.set_pivot(name, scene.mesh.vertices[0])
+    session.drag({name: scene.mesh.vertices[scene.handle] + [0.0, 0.0, 0.3]})
+    session.commit()
+    return session.mesh, session.state
+
+
+def full() -> Session:
+    """Return a session with a step to undo and one to redo."""
+    mesh, state = start()
+    session = Session(mesh, state=state)
+    for share in (20.0, 30.0):
+        session.change_options(stretch=share)
+    session.undo()
+    return session
+
+
+@contextmanager
+def editing(mode: Mode, session: Session | None = None) -> Iterator[DeformEditor]:
+    """Yield an editor in *mode*, in which the handle with the gizmo is selected."""
+    view = plain_view()
+    draw_seldom(view)
+    editor = DeformEditor(view, session or full())
+    editor.On()
+    editor.mode = mode
+    editor.wait()
+    if "handle 1" in editor.session.handles and mode is Mode.HANDLES:
+        press(editor, "handles.list.select", ["handle:handle 1"])
+    yield editor
+    editor.remove()
+
+
+@pytest.fixture(params=[*Mode], ids=lambda mode: mode.name)
+def editor(request):
+    """Yield an editor over a session of `full`, in each mode."""
+    with editing(request.param) as editor:
+        yield editor
+
+
+def of(editor: DeformEditor, name: str) -> Field:
+    """Return the field *name* as it is now."""
+    return next(f for each in all_sections(editor) for f in each.fields if f.name == name)
+
+
+def table_of(editor: DeformEditor, name: str) -> Table:
+    return next(t for each in all_sections(editor) for t in each.tables if t.name == name)
+
+
+def another(field: Field) -> object:
+    """Return another value that *field* can have."""
+    if field.kind == "toggle":
+        return not field.value
+    if field.kind == "choice":
+        return next(value for _, value in field.choices if value != field.value)
+    low, high = field.minimum, min(field.maximum, 10.0 * field.minimum + 50.0 * field.step)
+    value = round(low + 0.5 * (high - low), field.decimals)
+    return value if field.kind == "number" else int(value)
+
+
+def everything(editor: DeformEditor) -> tuple:
+    """Return all that the panel shows."""
+    return all_sections(editor), toolbar(editor), status(editor), history(editor)
+
+
+def pressable(mode: Mode) -> list[str]:
+    """Return the names of all visible fields in *mode* that do something."""
+    with editing(mode) as editor:
+        found = [field for section in sections(editor) for field in section.fields]
+        return [field.name for field in found if field.visible and field.kind != "label"]
+
+
+@pytest.mark.parametrize("mode", [*Mode], ids=lambda mode: mode.name)
+def test_every_control_does_what_it_says_and_then_says_so(mode):
+    for name in pressable(mode):
+        with editing(mode) as editor:
+            if name == "regions.merge":
+                press(editor, "regions.list.select", ["0", "1"])
+            if name == "paint.brush":
+                press(editor, "paint.lasso")
+            if name == "deform.range":
+                press(editor, "deform.overlay")
+                editor.wait()
+            field, before = of(editor, name), everything(editor)
+            if name == "deform.lids":  # the mesh is closed
+                assert not field.enabled
+                continue
+            assert field.enabled, name
+            value = another(field) if field.kind in VALUES else None
+            assert press(editor, name, value) is None
+            editor.wait()
+            assert everything(editor) != before, name
+            now = of(editor, name).value
+            if value is None:
+                assert field.value is None or now is True
+                continue
+            near = 0.3 if name == "cages.detail" else 1e-12  # that is met only nearly
+            assert now == pytest.approx(value, rel=near)
+            assert now != field.value
+            if field.special:
+                press(editor, name, field.minimum)
+                assert of(editor, name).value is None
+
+
+def test_controls_that_are_disabled_or_not_shown_do_nothing():
+    scene = sausage(is_coarse=True)
+    with editing(Mode.PULL, Session(scene.mesh)) as editor:
+        for mode in Mode:
+            editor.mode = mode
+            editor.wait()
+            idle = [
+                field
+                for section in all_sections(editor)
+                for field in section.fields
+                if not (section.visible and field.visible and field.enabled)
+            ]
+            assert len(idle) > 20
+            before = everything(editor), editor.session.state
+            for field in idle:
+                if field.kind != "label":
+                    value = another(field) if field.kind in VALUES else None
+                    assert press(editor, field.name, value) is None
+                    assert not editor.is_busy
+            assert (everything(editor), editor.session.state) == before
+
+
+def test_the_toolbar_and_the_menu_do_what_they_say():
+    with editing(Mode.DEFORM) as editor:
+        buttons = {field.name: field for field in toolbar(editor)}
+        assert buttons["undo"].tip.startswith("Undo: ")
+        stretch = editor.session.options.stretch
+        assert press(editor, "undo") is None
+        assert editor.session.options.stretch != stretch
+        editor.wait()
+        press(editor, "redo")
+        editor.wait()
+        assert editor.session.options.stretch == stretch
+        press(editor, "compare", True)
+        assert editor.controller.shows_rest
+        press(editor, "compare", False)
+        assert not editor.controller.shows_rest
+        press(editor, "help")
+        assert editor.controller.help.is_shown
+        press(editor, "help")
+        for name in ("show_regions", "show_cages", "orthographic", "cube", "up_x"):
+            name, now = f"view.{name}", entries(editor)
+            assert now[name].kind == "toggle"
+            press(editor, name)
+            assert entries(editor)[name].value is not now[name].value
+        place = editor.view.camera.GetPosition()
+        press(editor, "view.front")
+        editor.view.render()
+        assert editor.view.camera.GetPosition() != place
+        for mode in Mode:
+            press(editor, f"mode.{mode.name.lower()}")
+            editor.wait()
+            assert editor.mode is mode
+            down = [f.name for f in toolbar(editor) if f.group == "modes" and f.value]
+            assert down == [f"mode.{mode.name.lower()}"]
+
+
+def entries(editor: DeformEditor | None) -> dict[str, Field]:
+    """Return the entries of the menu about the view, by their names."""
+    top = [field for field in view_entries(editor) if field is not None]
+    return {f.name: f for field in top for f in (field, *field.items) if f is not None}
+
+
+def test_without_an_editor_the_menu_has_the_same_entries_disabled(editor):
+    none, some = entries(None), entries(editor)
+    assert [*none] == [*some]
+    assert not any(field.enabled or field.value for field in none.values())
+    for name, field in some.items():
+        assert (field.kind, field.label) == (none[name].kind, none[name].label)
+
+
+def test_rows_are_selected_renamed_and_checked():
+    with editing(Mode.HANDLES) as editor:
+        handles = lambda: {row.key: row for row in table_of(editor, "handles.list").rows}  # noqa: E731
+        assert [*handles()] == ["fixed", "handle:handle 1", "handle:pin 1"]
+        press(editor, "handles.list.select", ["fixed"])
+        assert [row.key for row in handles().values() if row.selected] == ["fixed"]
+        press(editor, "handles.list.rename", ("handle:pin 1", " nose "))
+        assert handles()["handle:nose"].renamable
+        for place, (column, checked) in enumerate((("show", False), ("lock", True)), 1):
+            press(editor, f"handles.list.{column}", ("handle:nose", checked))
+            assert handles()["handle:nose"].cells[place].checked is checked
+        error = press(editor, "handles.list.rename", ("handle:nose", "handle 1"))
+        assert error is not None
+        assert status(editor).is_error
+        assert status(editor).text.lower() == str(error).lower()
+    with editing(Mode.REGIONS) as editor:
+        regions = lambda: table_of(editor, "regions.list").rows  # noqa: E731
+        press(editor, "regions.list.rename", ("1", "arm"))
+        press(editor, "regions.list.select", ["0", "1"])
+        assert [(row.label, row.selected) for row in regions()] == [
+            ("region 1", True),
+            ("arm", True),
+        ]
+        assert not of(editor, "regions.split").enabled
+        press(editor, "regions.list.cage", ("1", False))
+        assert [row.cells[0].checked for row in regions()] == [True, False]
+        press(editor, "regions.new")
+        assert [row.selected for row in regions()] == [False, False, True]
+        with pytest.raises(ArgumentError, match="cannot be renamed"):
+            press(editor, "regions.list.rename", ("2", "x"))
+
+
+def test_a_job_disables_all_sections_until_it_ends():
+    with editing(Mode.REGIONS) as editor:
+        before, go_on = sections(editor), threading.Event()
+        editor.controller.start("counting", lambda _: go_on.wait(20.0), lambda _: None)
+        during = sections(editor)
+        assert [section.name for section in during] == [section.name for section in before]
+        assert not any(field.enabled for section in during for field in section.fields)
+        assert not any(table.enabled for section in during for table in section.tables)
+        assert press(editor, "regions.new") is None
+        now = status(editor)
+        assert (now.is_busy, now.work, now.progress, now.cancel.visible) == (
+            True, "counting", 0.0, True,
+        )  # fmt: skip
+        free = [field.name for field in toolbar(editor) if field.enabled]
+        assert free == ["help"]
+        assert press(editor, "cancel") is None
+        go_on.set()
+        editor.wait()
+        assert sections(editor) == before
+        assert not status(editor).is_busy
+
+
+def test_the_history_is_named_previewed_and_jumped_to():
+    with editing(Mode.DEFORM) as editor:
+        entries = history(editor)
+        assert [entry.is_current for entry in entries] == [False, True, False]
+        assert [entry.is_undone for entry in entries] == [False, False, True]
+        editor.session.reset_pose()
+        editor.wait()
+        press(editor, "history.preview", 1)
+        assert editor.widgets.surface.instead is not None
+        press(editor, "history.preview")
+        assert editor.widgets.surface.instead is None
+        assert press(editor, "history", 0) is None
+        assert history(editor)[0].is_current
+
+
+def test_words_of_the_hint_with_actions_are_keys(editor):
+    hint = "No regions yet. Press G to detect them, or 1 to paint one"
+    words = words_of(hint, editor.keys, editor.mode)
+    assert "".join(word.text for word in words) == hint
+    assert [word.action for word in words if word.action] == ["segment", "regions"]
+    assert status(editor).hint == editor.controller.hint
+
+
+def test_names_and_tooltips_are_complete(editor):
+    fields = [field for section in all_sections(editor) for field in section.fields]
+    tables = [table for section in all_sections(editor) for table in section.tables]
+    known = [*fields, *tables, *toolbar(editor), *entries(editor).values()]
+    assert len({each.name for each in known}) == len(known)
+    for field in (*fields, *toolbar(editor)):
+        assert field.label[:1].isupper()
+        assert field.tip
+        idle = field.kind in ("label", "menu", "file") or not field.enabled
+        assert idle or field.act or editor.keys[field.action].action
+    assert tooltip(of(editor, "paint.grow"), editor.keys) == "Grow by one ring (+)"
+    assert [card.name for card in first_steps()] == ["pin", "pull", "done"]
+
+
+def test_actions_hold_no_editor(editor):
+    fields = [field for section in all_sections(editor) for field in section.fields]
+    acts = [f.act for f in (*fields, *toolbar(editor), *entries(editor).values()) if f.act]
+    acts += [act for each in all_sections(editor) for t in each.tables for act in t.acts.values()]
+    assert len(acts) > 20
+    for act in acts:
+        for cell in getattr(act, "__closure__", None) or ():
+            assert not isinstance(cell.cell_contents, DeformEditor | Controller | Session)
+
+
+def test_wrong_names_and_values_are_refused_by_name():
+    with editing(Mode.DEFORM) as editor:
+        state = editor.session.state
+        fields = [field for each in all_sections(editor) for field in each.fields]
+        tables = [table for each in sections(editor) for table in each.tables]
+        verbs = [f"{table.name}.{verb}" for table in tables for verb in table.acts]
+        for name in ("", "no such", "regions.list", "pull.radius.select"):
+            with pytest.raises(ArgumentError, match="name: there is no control"):
+                press(editor, name)
+        for name in ("open", "save", "save.session", "view", "deform.volume"):
+            with pytest.raises(ArgumentError, match=name):
+                press(editor, name)
+        with pytest.raises(
+            ArgumentError, match=r"deform\.stretch must be a number from 0 to 1e\+06"
+        ):
+            press(editor, "deform.stretch", -1.0)
+        for label, make in BAD.items():
+            with pytest.raises(ArgumentError):
+                press(editor, make())
+            if label in SOMETIMES_GOOD:
+                continue
+            for field in fields:
+                with pytest.raises(ArgumentError, match=field.name):
+                    checked(field, make())
+            for name in (*verbs, "history", "history.preview"):
+                with pytest.raises(ArgumentError, match=name):
+                    press(editor, name, make())
+        assert editor.session.state is state

@@ -1,0 +1,179 @@
+"""The Qt panel beside its models: what is visible, what it says, and that a click presses it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from qt_hands import Qt, QtTest, QtWidgets, application, small, until
+
+from vtk_segdeform import Session
+from vtk_segdeform.widgets import Mode
+from vtk_segdeform.widgets.editor import preparing
+from vtk_segdeform.widgets.panel.fields import Table, tooltip
+from vtk_segdeform.widgets.panel.panel import all_sections, press, sections
+from vtk_segdeform.widgets.panel.toolbar import toolbar
+from vtk_segdeform.widgets.qt.widget import DeformWidget
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _unprepared():
+    """Do not prepare sessions for pulls in the background."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(preparing, "lacking", lambda _: None)
+        yield
+
+
+@pytest.fixture(scope="module")
+def widget():
+    """Return a widget over a session with regions, cages, a handle and a pin."""
+    application()
+    mesh, state = small()
+    session = Session(mesh, state=state)
+    session.pin(int(np.argmin(np.abs(mesh.vertices[:, 0]))))
+    widget = DeformWidget(session)
+    widget.resize(900, 900)
+    widget.show()
+    until(lambda: widget.windowHandle().isExposed(), "the window")
+    yield widget
+    widget.close()
+    widget.deleteLater()
+
+
+def settle(widget):
+    application().processEvents()
+    until(lambda: widget.panel.is_up_to_date and not widget.editor.is_busy, "the panel")
+
+
+def said(control):
+    """Return what a control shows, as its user reads it."""
+    if isinstance(control, QtWidgets.QAbstractButton):
+        return control.text(), control.isChecked() if control.isCheckable() else None
+    if isinstance(control, QtWidgets.QComboBox):
+        return control.currentText()
+    if isinstance(control, QtWidgets.QSlider):
+        return control.minimum(), control.value(), control.maximum()
+    return control.text()
+
+
+def expected(field):
+    """Return what the control of *field* has to show."""
+    if field.kind in ("button", "toggle"):
+        return field.label, field.value
+    if field.kind == "choice":
+        return next(label for label, value in field.choices if value == field.value)
+    if field.kind == "slider":
+        return field.minimum, field.value, field.maximum
+    if field.kind == "label":
+        return field.value
+    if field.value is None:
+        return field.special
+    number = f"{field.value:.{field.decimals}f}"
+    return " ".join(filter(None, (field.prefix, number, field.unit)))
+
+
+@pytest.mark.parametrize("mode", [*Mode], ids=lambda mode: mode.name)
+def test_the_visible_controls_are_those_of_the_models_and_say_the_same(widget, mode):
+    panel, editor = widget.panel, widget.editor
+    editor.mode = mode
+    settle(widget)
+    shown = sections(editor)
+    assert [name for name, box in panel.boxes.items() if not box.isHidden()] == [
+        section.name for section in shown
+    ]
+    titles = {panel.boxes[section.name].title(): section.title for section in shown}
+    assert all(seen == said for seen, said in titles.items())
+    fields = [field for section in shown for field in section.fields]
+    known = {field.name for field in fields if field.visible}
+    known |= {table.name for section in shown for table in section.tables}
+    boxes = [panel.boxes[section.name] for section in shown]
+    visible = {
+        name for box in boxes for name, each in box.controls.items() if each.isVisibleTo(box)
+    }
+    assert visible == known
+    for field in fields:
+        control = panel.controls[field.name]
+        assert control.isEnabledTo(panel) is field.enabled
+        assert said(control) == expected(field)
+        assert control.toolTip() == tooltip(field, editor.keys)
+    for table in (table for section in shown for table in section.tables):
+        compare(panel.controls[table.name], table)
+    for field in toolbar(editor):
+        button = widget.panel.toolbar.buttons[field.name]
+        assert (button.text(), button.isEnabled()) == (field.label, field.enabled)
+        assert button.isChecked() is bool(field.kind == "button" and field.value)
+
+
+def compare(tree, table: Table):
+    """Check that a list shows the rows of *table*."""
+    assert tree.topLevelItemCount() == len(table.rows)
+    for k, row in enumerate(table.rows):
+        item = tree.topLevelItem(k)
+        assert (item.text(0), item.isSelected()) == (row.label, row.selected)
+        assert bool(item.flags() & Qt.ItemFlag.ItemIsEditable) is row.renamable
+        for place, cell in enumerate(row.cells, 1):
+            state = item.data(place, Qt.ItemDataRole.CheckStateRole)
+            checked = None if state is None else Qt.CheckState(state) == Qt.CheckState.Checked
+            assert (item.text(place), checked) == (cell.text, cell.checked)
+
+
+def test_every_visible_control_presses_its_field(widget, monkeypatch):
+    pressed = []
+    module = "vtk_segdeform.widgets.qt.controls.press"
+    monkeypatch.setattr(module, lambda _, name, value=None: pressed.append((name, value)))
+    panel, editor = widget.panel, widget.editor
+    kinds = set()
+    for mode in Mode:
+        editor.mode = mode
+        settle(widget)
+        for section in sections(editor):
+            for field in section.fields:
+                if not (field.visible and field.enabled) or field.kind == "label":
+                    continue
+                pressed.clear()
+                use(panel.controls[field.name], field)
+                assert [name for name, _ in pressed] == [field.name]
+                kinds.add(field.kind)
+                panel.refresh()  # nothing was done, which the control shows
+                assert said(panel.controls[field.name]) == expected(field)
+    assert kinds >= {"button", "toggle", "number", "integer", "slider"}
+
+
+def test_rows_that_are_selected_elsewhere_are_selected_in_the_list(widget):
+    editor = widget.editor
+    editor.mode = Mode.REGIONS
+    for keys in (["0", "1"], ["1"], ["0"]):
+        press(editor, "regions.list.select", keys)
+        settle(widget)
+        (table,) = (table for section in sections(editor) for table in section.tables)
+        assert [row.key for row in table.rows if row.selected] == keys
+        compare(widget.panel.controls["regions.list"], table)
+
+
+def use(control, field):
+    """Use a control by its keyboard, as a person would."""
+    control.setFocus()
+    if isinstance(control, QtWidgets.QAbstractButton):
+        control.click()
+    elif isinstance(control, QtWidgets.QAbstractSpinBox):
+        control.stepBy(-1 if control.value() == control.maximum() else 1)
+    else:
+        key = Qt.Key_Left if control.value() == control.maximum() else Qt.Key_Right
+        QtTest.QTest.keyClick(control, key)
+
+
+def test_the_panel_has_a_control_for_every_field_of_every_mode(widget):
+    every = all_sections(widget.editor)
+    names = [each.name for section in every for each in (*section.fields, *section.tables)]
+    assert sorted(names) == sorted(widget.panel.controls)
+
+
+def test_a_control_that_the_editor_refuses_shows_the_value_again(widget):
+    panel, editor = widget.panel, widget.editor
+    editor.mode = Mode.CAGES
+    settle(widget)
+    editor.session.merge_regions([0, 1])  # which removes the cages
+    panel.controls["cages.shown"].click()  # before the panel is refreshed
+    settle(widget)
+    assert not panel.controls["cages.shown"].isChecked()
+    assert not panel.controls["cages.shown"].isEnabled()
+    editor.session.undo()
