@@ -60,8 +60,12 @@ def guard(secret: str) -> Middleware:
     @web.middleware
     async def guarded(request: web.Request, handler: Handler) -> web.StreamResponse:
         given = request.headers.get(HEADER, "")
-        if not secret or not hmac.compare_digest(given.encode(), secret.encode()):
+        if not secret or not hmac.compare_digest(_bytes(given), _bytes(secret)):
             return web.Response(status=403, text="This port is internal to segdeform serve.\n")
         return await handler(request)
 
     return guarded
+
+
+def _bytes(text: str) -> bytes:
+    return text.encode("utf-8", "surrogateescape")  # headers may contain any bytes
