@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError, MissingDependencyError
 from ..files import open_regular
-from ..progress import Progress
 
 if TYPE_CHECKING:  # not imported at run time, so that the server loads neither numpy nor VTK
+    from ..progress import Progress
     from ..widgets.web.serving import Server
     from .outputs import Say
 

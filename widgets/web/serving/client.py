@@ -24,6 +24,7 @@ from pathlib import Path
 from .limits import Limits
 
 _log = logging.getLogger(__name__)
+_MOMENT = 1.0  # seconds
 _LAST_WORDS = 4000  # bytes of the error output that are kept
 _RUN = (
     "import runpy, sys; sys.path[:] = {path!r}; "
@@ -114,6 +115,12 @@ class Client:
         if self.is_running:
             await self._started.wait()
         return self.port
+
+    async def reason(self) -> str:
+        """Return why the process has ended, which is known a moment after its connections close."""
+        if self._task is not None:
+            await asyncio.wait([self._task], timeout=_MOMENT)
+        return self.failure or "The editor has ended; reload the page."
 
     async def end(self, reason: str = "") -> None:
         """Kill the process, and wait until it is gone; the page shows the *reason*."""

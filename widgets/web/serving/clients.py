@@ -30,13 +30,15 @@ class Clients:
         self._command, self._folder, self._limits = command, folder, limits
         self._clients: dict[str, Client] = {}
 
-    def __len__(self) -> int:
-        return len(self._clients)
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is no client."""
+        return not self._clients
 
     @property
     def is_full(self) -> bool:
         """Whether there can be no other client now."""
-        return len(self) >= self._limits.clients
+        return len(self._clients) >= self._limits.clients
 
     def new(self) -> Client:
         """Return a new client, whose process does not run yet."""

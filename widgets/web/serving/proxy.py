@@ -34,7 +34,8 @@ from .limits import Limits
 from .secret import HEADER
 
 _ENDED = 4000  # close codes from 4000 are free for applications
-_TOO_MANY, _GONE = 1008, "The editor has ended; reload the page."
+_TOO_MANY = 1008
+_LONGEST = 123  # bytes of a reason, by the protocol
 _HEARTBEAT = 30.0  # seconds; a page that does not answer within half of it is gone
 _TO_CLIENT = (
     hdrs.ACCEPT, hdrs.ACCEPT_ENCODING, hdrs.CONTENT_LENGTH, hdrs.CONTENT_TYPE,
@@ -100,7 +101,7 @@ async def pass_request(
         if body and body.is_too_large:
             raise web.HTTPRequestEntityTooLarge(limits.upload, text=f"{large}\n") from None
         if not response.prepared:
-            refuse(502, _GONE)
+            refuse(502, await client.reason())
         if request.transport is not None:
             request.transport.abort()  # an end in the normal way would look like a complete answer
         return response
@@ -113,7 +114,7 @@ async def pass_socket(
 ) -> web.WebSocketResponse:
     """Connect the WebSocket of a page with the client process, until either of them ends."""
     page = web.WebSocketResponse(
-        max_msg_size=limits.message, heartbeat=_HEARTBEAT, compress=False, timeout=2.0
+        max_msg_size=limits.message, heartbeat=_HEARTBEAT, compress=False, timeout=1.0
     )
     await page.prepare(request)
     try:
@@ -125,7 +126,8 @@ async def pass_socket(
                 await _connect(page, process, limits)
     except (ClientError, ConnectionError):
         pass  # either side has gone
-    await page.close(code=_ENDED, message=(client.failure or _GONE).encode()[:120])
+    if not page.closed:
+        await page.close(code=_ENDED, message=(await client.reason()).encode()[:_LONGEST])
     return page
 
 

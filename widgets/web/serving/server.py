@@ -137,7 +137,7 @@ class Server:
 
     async def _pass(self, client: Client, request: web.Request, tail: str) -> web.StreamResponse:
         if await client.started() is None:
-            refuse(502, "The editor has ended; reload the page.")
+            refuse(502, await client.reason())
         return await pass_request(self._session, client, request, tail, self.limits)
 
 
