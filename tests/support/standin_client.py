@@ -1,16 +1,16 @@
 """A client process for tests of the server: it starts in 0.2 s and does what a page tells it.
 
-    GET  index.html     its process id and its state
-    GET  headers        the headers of the request, as JSON
-    GET  fail           half an answer
-    POST upload         the number of bytes that arrived
-    ws                  set X       keep X in the autosave
-                        get         answer the state
-                        count       answer how many messages were handled
-                        sleep S     block for S seconds
-                        take N      take N megabytes of memory
-                        crash       end at once
-                        other       the same message back
+GET  index.html     its process id and its state
+GET  headers        the headers of the request, as JSON
+GET  fail           half an answer
+POST upload         the number of bytes that arrived
+ws                  set X       keep X in the autosave
+                    get         answer the state
+                    count       answer how many messages were handled
+                    sleep S     block for S seconds
+                    take N      take N megabytes of memory
+                    crash       end at once
+                    other       the same message back
 """
 
 from __future__ import annotations

@@ -27,7 +27,8 @@ ROOMS = [
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
     "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.recording",
     "widgets.editor",
-    "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "benchmarks", "cli", "__main__",
+    "widgets", "widgets.plugin", "widgets.qt", "widgets.app",
+    "widgets.web.serving", "widgets.web", "benchmarks", "cli", "__main__",
 ]  # fmt: skip
 MOST_FLOORS = 24
 MOST_IMPORTS = 330  # pairs of rooms of which one imports from the other
@@ -61,6 +62,7 @@ GRANTED = {
     "widgets.qt.widget": {"pyvista", "pyvistaqt"},
     "widgets.app": VTK | {"qtpy"},
     "widgets.app.repair_preview": {"pyvista", "pyvistaqt"},
+    "widgets.web.serving": {"aiohttp", "yarl"},
     "benchmarks.cage_making": VTK | {"igl", "gpytoolbox"},
     "benchmarks.charts": {"matplotlib"},
     "benchmarks.drawing": VTK,

@@ -48,7 +48,7 @@ def imported_by(folder: str) -> set[str]:
 
 def test_every_library_imported_is_declared(setup_cfg):
     declared = names_in(setup_cfg["options"]["install_requires"])
-    for extra in ("meshlab", "qt", "bench"):
+    for extra in ("meshlab", "qt", "web", "bench"):
         declared |= names_in(setup_cfg["options.extras_require"][extra])
     used = imported_by("vtk_segdeform") | imported_by("widgets")
     assert {"numba", "qtpy"} <= used  # the sources of all folders are read

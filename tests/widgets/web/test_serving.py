@@ -69,7 +69,9 @@ def test_the_page_has_a_cookie_of_its_own_and_no_token(server, do):
     assert "frame-ancestors 'none'" in headers["Content-Security-Policy"]
 
 
-@pytest.mark.parametrize("host", ["evil.example:{}", "127.0.0.1.evil.example:{}", "a b", "", "[::2]"])
+@pytest.mark.parametrize(
+    "host", ["evil.example:{}", "127.0.0.1.evil.example:{}", "a b", "", "[::2]"]
+)
 def test_another_host_name_is_refused_even_with_the_token(server, do, host):
     server, visitor = server
     host = host.format(server.port)

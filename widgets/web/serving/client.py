@@ -1,7 +1,7 @@
 """One client: its process, its folder, and when it was last seen.
 
-    folder/autosave.segdeform    written by the process; opened by the next one after a crash
-           tmp/                  temporary files of the process
+    folder/files/   uploads and autosave.segdeform, which the next process opens after a crash
+           tmp/     temporary files of the process
 
 The process is started by `Client.start` and gets its secret (`secret`) through its standard input,
 which stays open while the server lives.  It answers with one line, its port.  It leads its own
@@ -174,13 +174,14 @@ class Client:
             await process.wait()
 
     async def _new_process(self) -> asyncio.subprocess.Process:
-        temporary = self.folder / "tmp"
-        temporary.mkdir(mode=0o700, exist_ok=True)
+        files, temporary = self.folder / "files", self.folder / "tmp"
+        for each in (files, temporary):
+            each.mkdir(mode=0o700, exist_ok=True)
         pipe = asyncio.subprocess.PIPE
         return await asyncio.create_subprocess_exec(
-            *self._command, "--port", "0", "--folder", str(self.folder),
+            *self._command, "--port", "0", "--folder", str(files),
             "--upload-limit", str(self._limits.upload),
-            stdin=pipe, stdout=pipe, stderr=pipe, cwd=self.folder, start_new_session=True,
+            stdin=pipe, stdout=pipe, stderr=pipe, cwd=files, start_new_session=True,
             env={
                 **os.environ,
                 **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(temporary)),

@@ -38,6 +38,7 @@ _TOO_MANY = 1008
 _LONGEST = 123  # bytes of a reason, by the protocol
 _HEARTBEAT = 30.0  # seconds; a page that does not answer within half of it is gone
 _TO_CLIENT = (
+    "X-Segdeform",  # of uploads and downloads; a page of another site cannot send it
     hdrs.ACCEPT, hdrs.ACCEPT_ENCODING, hdrs.CONTENT_LENGTH, hdrs.CONTENT_TYPE,
     hdrs.IF_MODIFIED_SINCE, hdrs.IF_NONE_MATCH, hdrs.RANGE,
 )  # fmt: skip
@@ -84,7 +85,9 @@ async def pass_request(
         if (request.content_length or 0) > limits.upload:
             raise web.HTTPRequestEntityTooLarge(limits.upload, text=f"{large}\n")
         body = _Body(request.content, limits.upload)
-    headers = {name: request.headers[name] for name in _TO_CLIENT if name in request.headers}
+    headers: dict[str, str] = {
+        name: request.headers[name] for name in _TO_CLIENT if name in request.headers
+    }
     response = web.StreamResponse()
     try:
         async with session.request(
