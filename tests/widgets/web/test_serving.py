@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip("aiohttp")
 
-from visitors import LIMITS, serving  # noqa: E402
+from visitors import LIMITS, serving
 
 
 @pytest.fixture(scope="module")

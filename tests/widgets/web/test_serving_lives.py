@@ -18,9 +18,9 @@ import pytest
 
 pytest.importorskip("aiohttp")
 
-from visitors import LIMITS, STANDIN, serving  # noqa: E402
+from visitors import LIMITS, STANDIN, serving
 
-from vtk_segdeform.widgets.web.serving.run_folder import run_folder  # noqa: E402
+from vtk_segdeform.widgets.web.serving.run_folder import run_folder
 
 ON_LINUX = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads /proc")
 # The command line with a stand-in for the client process.
