@@ -37,6 +37,8 @@ def _secret_module():
 
 
 class Page:
+    """The state of the page, in the autosave, and what it answers."""
+
     def __init__(self, autosave: Path) -> None:
         self.autosave, self.handled = autosave, 0
 

@@ -83,6 +83,8 @@ class Visitor:
 @asynccontextmanager
 async def serving(folder, limits=LIMITS, command=STANDIN):
     """Yield a server and a function that returns new visitors."""
-    async with running(command, port=0, limits=limits, parent=folder) as server:
-        async with aiohttp.ClientSession(cookie_jar=aiohttp.DummyCookieJar()) as session:
-            yield server, lambda: Visitor(server, session)
+    async with (
+        running(command, port=0, limits=limits, parent=folder) as server,
+        aiohttp.ClientSession(cookie_jar=aiohttp.DummyCookieJar()) as session,
+    ):
+        yield server, lambda: Visitor(server, session)

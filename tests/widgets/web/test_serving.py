@@ -18,7 +18,7 @@ from visitors import LIMITS, serving
 
 @pytest.fixture(scope="module")
 def server(do, tmp_path_factory):
-    """A server with one client that all tests share; they leave it as it is."""
+    """Return a server that all tests share, and a function that returns new visitors."""
     context = serving(tmp_path_factory.mktemp("run"))
     server, visitor = do(context.__aenter__())
     yield server, visitor
@@ -148,9 +148,10 @@ async def chunks(size, part=10_000):
 
 
 def test_an_upload_above_the_limit_is_refused_by_its_announced_size(guest, do):
-    origin = f"http://127.0.0.1:{guest.server.port}"
-    head = (f"POST {guest.path}upload HTTP/1.1\nHost: 127.0.0.1:{guest.server.port}\n"
-            f"Origin: {origin}\nCookie: {guest.cookie}\nContent-Length: 2000000000\n\n")  # fmt: skip
+    head = (
+        f"POST {guest.path}upload HTTP/1.1\nHost: 127.0.0.1:{guest.server.port}\n"
+        f"Origin: {guest.base}\nCookie: {guest.cookie}\nContent-Length: 2000000000\n\n"
+    )
     answer = do(guest.raw(head))
     assert answer.startswith("HTTP/1.1 413")
     assert "larger than 0.1 MB" in answer

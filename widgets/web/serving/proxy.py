@@ -85,18 +85,16 @@ async def pass_request(
         if (request.content_length or 0) > limits.upload:
             raise web.HTTPRequestEntityTooLarge(limits.upload, text=f"{large}\n")
         body = _Body(request.content, limits.upload)
-    headers: dict[str, str] = {
-        name: request.headers[name] for name in _TO_CLIENT if name in request.headers
-    }
+    known = {str(name): request.headers[name] for name in _TO_CLIENT if name in request.headers}
     response = web.StreamResponse()
     try:
         async with session.request(
             request.method, _url(client, request, tail), data=body and body.parts(),
-            headers={**headers, HEADER: client.secret}, allow_redirects=False,
+            headers={**known, HEADER: client.secret}, allow_redirects=False,
         ) as answer:  # fmt: skip
             response.set_status(answer.status)
-            known = {name: answer.headers[name] for name in _TO_PAGE if name in answer.headers}
-            response.headers.update(known)
+            for name in filter(answer.headers.__contains__, _TO_PAGE):
+                response.headers[name] = answer.headers[name]
             await response.prepare(request)
             async for part in answer.content.iter_any():
                 await response.write(part)
