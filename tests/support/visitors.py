@@ -49,19 +49,19 @@ class Visitor:
 
     async def load(self):
         """Load the page as a browser does; return the id of the process and its state."""
-        for _ in range(600):
-            status, text, _ = await self.get(f"{self.path}index.html")
-            if status != 202:
-                break
+        status, text, _ = await self.get(f"{self.path}index.html")
+        if status == 202:
             assert "Starting the editor" in text
-            await asyncio.sleep(0.05)
+            status, text, _ = await self.get(f"{self.path}index.html")
         assert status == 200, text
         process, _, state = text.partition(" ")
         return int(process), state
 
     def socket(self):
         headers = {"Origin": self.base, "Cookie": self.cookie}
-        return self.session.ws_connect(f"{self.base}{self.path}ws", headers=headers)
+        patience = aiohttp.ClientWSTimeout(ws_close=1.0)
+        url = f"{self.base}{self.path}ws"
+        return self.session.ws_connect(url, headers=headers, timeout=patience)
 
     async def ask(self, *messages):
         """Send messages by a new WebSocket; return the last answer."""

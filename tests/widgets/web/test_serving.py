@@ -70,7 +70,7 @@ def test_the_page_has_a_cookie_of_its_own_and_no_token(server, do):
 
 
 @pytest.mark.parametrize(
-    "host", ["evil.example:{}", "127.0.0.1.evil.example:{}", "a b", "", "[::2]"]
+    "host", ["evil.example:{}", "127.0.0.1.evil.example:{}", "127.0.0.1 evil.example", "", "[::2]"]
 )
 def test_another_host_name_is_refused_even_with_the_token(server, do, host):
     server, visitor = server
@@ -208,7 +208,7 @@ def test_a_flood_is_closed_by_name(guest, do):
 
     async def flood(socket):
         while True:
-            await socket.send_bytes(b"event")
+            await socket.send_bytes(bytes(4000))
 
     before = int(do(guest.ask("count")))
     assert do(story()) == 1008

@@ -15,15 +15,19 @@ import json
 import logging
 import os
 import secrets
+import shutil
 import signal
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from vtk_segdeform.errors import SessionError
+
 from .limits import Limits
 
 _log = logging.getLogger(__name__)
+_NO_START = "The editor could not be started."
 _MOMENT = 1.0  # seconds
 _LAST_WORDS = 4000  # bytes of the error output that are kept
 _RUN = (
@@ -71,7 +75,7 @@ class Client:
         self.uploads = asyncio.Lock()
         self._command, self._limits = command, limits
         self._task: asyncio.Task[None] | None = None
-        self._started, self._is_ending = asyncio.Event(), False
+        self._started, self._is_ending, self._is_closed = asyncio.Event(), False, False
         self._pid: int | None = None
         self._visits, self._seen = 0, asyncio.get_running_loop().time()
 
@@ -104,8 +108,8 @@ class Client:
         return 0
 
     def start(self) -> None:
-        """Start the process, unless it runs."""
-        if not self.is_running:
+        """Start the process, unless it runs or this client is closed."""
+        if not (self.is_running or self._is_closed):
             self.failure, self.could_not_start, self._is_ending = "", False, False
             self._started.clear()
             self._task = asyncio.create_task(self._run())
@@ -122,7 +126,7 @@ class Client:
             await asyncio.wait([self._task], timeout=_MOMENT)
         return self.failure or "The editor has ended; reload the page."
 
-    async def end(self, reason: str = "") -> None:
+    async def end(self, reason: str) -> None:
         """Kill the process, and wait until it is gone; the page shows the *reason*."""
         if self._task is None or self._task.done():
             return
@@ -131,18 +135,31 @@ class Client:
             self._task.cancel()
         await asyncio.wait([self._task])
 
+    async def close(self) -> None:
+        """End for good, and delete the folder."""
+        self._is_closed = True
+        await self.end("The server has ended this client.")
+        shutil.rmtree(self.folder, ignore_errors=True)
+
     async def _run(self) -> None:
         errors = bytearray()
         try:
             await self._live(errors)
-        except (OSError, ValueError, KeyError, TypeError, asyncio.TimeoutError) as fault:
+        except SessionError as fault:
             words = errors.decode("utf-8", "backslashreplace").strip().splitlines()
-            self.failure = str(fault) or "The editor did not start in time."
-            self.could_not_start = self.port is None
-            _log.warning("%s %s", self.failure, ascii(words[-1]) if words else "")
+            self._fail(str(fault), *words[-1:])
+        except asyncio.TimeoutError:  # before OSError, of which it is one in later versions
+            self._fail("The editor did not start in time.")
+        except (OSError, ValueError) as fault:
+            self._fail(_NO_START, str(fault))
         finally:
             self.port = self._pid = None
             self._started.set()
+
+    def _fail(self, sentence: str, *details: str) -> None:
+        """Keep why the process has ended; the details are not for the page."""
+        self.failure, self.could_not_start = sentence, self.port is None
+        _log.warning(" ".join([sentence, *map(ascii, details)]))
 
     async def _live(self, errors: bytearray) -> None:
         """Run the process until it ends, which is an error, or this task is cancelled.
@@ -158,14 +175,11 @@ class Client:
             self._pid = process.pid
             process.stdin.write(self.secret.encode() + b"\n")
             line = await asyncio.wait_for(process.stdout.readline(), self._limits.start)
-            said = json.loads(line) if line else {"error": "The editor could not be started."}
-            if "error" in said:
-                raise ValueError(said["error"])
-            self.port = int(said["port"])
+            self.port = _port_in(line)
             self._started.set()
             await _read(process.stdout)
             await process.wait()
-            raise ValueError("The editor has ended unexpectedly.")
+            raise SessionError("The editor has ended unexpectedly.")
         finally:
             _kill(process)
             process.stdin.close()
@@ -191,6 +205,17 @@ class Client:
                 "WSLINK_MAX_MSG_SIZE": str(self._limits.message // 2),
             },
         )  # fmt: skip
+
+
+def _port_in(line: bytes) -> int:
+    """Return the port that a process has announced; SessionError if it has not."""
+    said: dict[str, object] = {}
+    with suppress(ValueError, TypeError):
+        said = dict(json.loads(line))
+    port = said.get("port")
+    if isinstance(port, int):
+        return port
+    raise SessionError(str(said.get("error", _NO_START)))
 
 
 async def _read(stream: asyncio.StreamReader, last: bytearray | None = None) -> None:

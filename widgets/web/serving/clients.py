@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -67,5 +66,4 @@ class Clients:
 
     async def _remove(self, client: Client) -> None:
         self._clients.pop(client.id, None)
-        await client.end("The server has ended this client.")
-        shutil.rmtree(client.folder, ignore_errors=True)
+        await client.close()

@@ -31,7 +31,6 @@ from .run_folder import run_folder
 DEFAULT_PORT = 8765
 _PAGES = ("", "index.html")
 _UPLOAD, _SOCKET = "upload", "ws"
-_WAIT = 0.2  # seconds in which a process may start before a page says that it starts
 _ENDINGS = ("SIGINT", "SIGTERM", "SIGHUP")
 
 _NOTE = """<!doctype html>
@@ -44,8 +43,8 @@ padding: 0 1em; text-align: center; }}</style></head><body><p>{text}</p></body><
 
 
 def _note(text: str, status: int, *, refresh: bool = False) -> web.Response:
-    """Return a page with one sentence, which loads itself again after a second if asked to."""
-    again = '<meta http-equiv="refresh" content="1">' if refresh else ""
+    """Return a page with one sentence, which loads itself again if asked to."""
+    again = '<meta http-equiv="refresh" content="0">' if refresh else ""
     body = _NOTE.format(text=html.escape(text), refresh=again)
     return web.Response(status=status, text=body, content_type="text/html")
 
@@ -117,15 +116,17 @@ class Server:
             return await self._pass(client, request, tail)
 
     async def _start(self, client: Client) -> web.Response | None:
-        """Start the process of a page; return what the page shows if that is not done yet."""
+        """Start the process of a page; return what the page shows meanwhile.
+
+        The note loads the page again at once, and browsers show the note until that is answered.
+        """
+        if await client.started() is not None:
+            return None
         if client.could_not_start:
             client.could_not_start = False
             return _note(f"{client.failure} Reload this page to try again.", 502)
         client.start()
-        with suppress(asyncio.TimeoutError):
-            await asyncio.wait_for(client.started(), _WAIT)
-        starting = client.port is None
-        return _note("Starting the editor ...", 202, refresh=True) if starting else None
+        return _note("Starting the editor ...", 202, refresh=True)
 
     async def _upload(self, client: Client, request: web.Request, tail: str) -> web.StreamResponse:
         if tail.split("/")[0] != _UPLOAD:
