@@ -11,7 +11,7 @@ import pytest
 def do():
     """Run a coroutine, and the server with it."""
     loop = asyncio.new_event_loop()
-    yield lambda coroutine: loop.run_until_complete(asyncio.wait_for(coroutine, 300))
+    yield lambda coroutine: loop.run_until_complete(asyncio.wait_for(coroutine, 200))
     if rest := asyncio.all_tasks(loop):  # connections that a visitor broke off
         for task in rest:
             task.cancel()
