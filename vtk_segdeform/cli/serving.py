@@ -17,7 +17,6 @@ if TYPE_CHECKING:  # not imported at run time, so that the server loads neither 
     from .outputs import Say
 
 _LIBRARIES = ("aiohttp", "trame", "trame_rca", "trame_vuetify")
-_LOCAL = ("127.0.0.1", "localhost", "::1")
 
 
 def serve(options: Namespace, say: Say, progress: Progress) -> bool:
@@ -50,7 +49,7 @@ def serve(options: Namespace, say: Say, progress: Progress) -> bool:
 
     def started(server: Server) -> None:
         say(f"Open this address in a browser: {server.address(server.access.token)}")
-        if options.host not in _LOCAL:
+        if not server.is_local:
             say(
                 f"Warning: {options.host} can be reached from other machines. Whoever knows the "
                 "token can use it, and nothing is encrypted."

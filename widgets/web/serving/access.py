@@ -18,8 +18,8 @@ from typing import NoReturn
 from aiohttp import hdrs, web
 from aiohttp.typedefs import Handler, Middleware
 
-_LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
-_ANY = frozenset({"0.0.0.0", "::", ""})  # the server is reached by all names of the machine
+LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
+ANY = frozenset({"0.0.0.0", "::", ""})  # reached by all names of the machine
 _HOST = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?::\d{1,5})?")
 
 _ERRORS = {
@@ -52,7 +52,7 @@ class Access:
         self.token = secrets.token_urlsafe(32)
         self._once: set[str] = set()
         self._cookie = f"segdeform-{port}"
-        self._names = None if host in _ANY else _LOOPBACK | {host.strip("[]").lower()}
+        self._names = None if host in ANY else LOOPBACK | {host.strip("[]").lower()}
 
     def token_for_once(self) -> str:
         """Return a token that can be used once, for command lines, which other users can see."""

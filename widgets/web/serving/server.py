@@ -21,7 +21,7 @@ from urllib.parse import unquote
 
 from aiohttp import hdrs, web
 
-from .access import Access, add_headers, refuse
+from .access import ANY, LOOPBACK, Access, add_headers, refuse
 from .client import Client, client_command
 from .clients import Clients
 from .limits import Limits
@@ -62,9 +62,15 @@ class Server:
     def __post_init__(self) -> None:
         self._session = new_session()
 
+    @property
+    def is_local(self) -> bool:
+        """Whether only this machine can reach the server."""
+        return self.host in LOOPBACK
+
     def address(self, token: str) -> str:
         """Return the address that starts a client."""
-        host = f"[{self.host}]" if ":" in self.host else self.host
+        host = socket.gethostname() if self.host in ANY else self.host
+        host = f"[{host}]" if ":" in host else host
         return f"http://{host}:{self.port}/?token={token}"
 
     def application(self) -> web.Application:
