@@ -34,7 +34,10 @@ from .limits import Limits
 from .secret import HEADER
 
 _ENDED = 4000  # close codes from 4000 are free for applications
-_TOO_MANY = 1008
+_TOO_MANY, _TOO_LARGE = 1008, 1009
+# A message is read up to this many times the limit: one that is left unread resets the connection,
+# and the page would not learn the reason.
+_READ = 16
 _LONGEST = 123  # bytes of a reason, by the protocol
 _HEARTBEAT = 30.0  # seconds; a page that does not answer within half of it is gone
 _TO_CLIENT = (
@@ -115,7 +118,7 @@ async def pass_socket(
 ) -> web.WebSocketResponse:
     """Connect the WebSocket of a page with the client process, until either of them ends."""
     page = web.WebSocketResponse(
-        max_msg_size=limits.message, heartbeat=_HEARTBEAT, compress=False, timeout=1.0
+        max_msg_size=_READ * limits.message, heartbeat=_HEARTBEAT, compress=False, timeout=1.0
     )
     await page.prepare(request)
     try:
@@ -166,6 +169,9 @@ async def _to_process(
         before = now
         if allowed < 0.0:
             await page.close(code=_TOO_MANY, message=b"too many messages")
+            return
+        if isinstance(message.data, bytes | str) and len(message.data) > limits.message:
+            await page.close(code=_TOO_LARGE, message=b"message too large")
             return
         if message.type == WSMsgType.BINARY:
             await process.send_bytes(message.data)
