@@ -11,15 +11,40 @@ change.  Each of them works alone; `DeformEditor` combines all four over one `Se
 and keys.  `Recorder` and `replay` record and repeat the input, `film` makes a video of a session.
 
 Widgets translate events into calls of a session; they compute nothing themselves.
+
+Every name is imported on first use, so that `web.serving` loads no VTK.
 """
 
-from .cage_display import CageDisplay
-from .editor import DeformEditor, Mode
-from .handle_dragger import HandleDragger
-from .recording import Recorder, ReplayLimits, film, replay
-from .region_selector import Paint, RegionSelector, Tool
-from .scene import SurfaceDisplay, View
-from .volume_overlay import VolumeOverlay
+from __future__ import annotations
+
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING as _TYPE_CHECKING
+
+if _TYPE_CHECKING:
+    from .cage_display import CageDisplay
+    from .editor import DeformEditor, Mode
+    from .handle_dragger import HandleDragger
+    from .recording import Recorder, ReplayLimits, film, replay
+    from .region_selector import Paint, RegionSelector, Tool
+    from .scene import SurfaceDisplay, View
+    from .volume_overlay import VolumeOverlay
+
+_MODULE_OF = {
+    "CageDisplay": "cage_display",
+    "DeformEditor": "editor",
+    "HandleDragger": "handle_dragger",
+    "Mode": "editor",
+    "Paint": "region_selector",
+    "Recorder": "recording",
+    "RegionSelector": "region_selector",
+    "ReplayLimits": "recording",
+    "SurfaceDisplay": "scene",
+    "Tool": "region_selector",
+    "View": "scene",
+    "VolumeOverlay": "volume_overlay",
+    "film": "recording",
+    "replay": "recording",
+}
 
 __all__ = [
     "CageDisplay",
@@ -37,3 +62,15 @@ __all__ = [
     "film",
     "replay",
 ]
+
+
+def __getattr__(name: str) -> object:
+    if name in _MODULE_OF:
+        value = getattr(_import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
+        globals()[name] = value  # found without this function from now on
+        return value
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -27,8 +27,8 @@ ROOMS = [
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
     "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.recording",
     "widgets.editor", "widgets.panel",
-    "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "widgets.web",
-    "benchmarks", "cli", "__main__",
+    "widgets", "widgets.plugin", "widgets.qt", "widgets.app",
+    "widgets.web.serving", "widgets.web", "benchmarks", "cli", "__main__",
 ]  # fmt: skip
 MOST_FLOORS = 24
 MOST_IMPORTS = 335  # pairs of rooms of which one imports from the other
@@ -66,6 +66,7 @@ GRANTED = {
     "widgets.web.protocol": {"wslink"},
     "widgets.web.transfer": {"aiohttp"},
     "widgets.web.web_editor": {"pyvista", "trame"},
+    "widgets.web.serving": {"aiohttp", "yarl"},
     "benchmarks.cage_making": VTK | {"igl", "gpytoolbox"},
     "benchmarks.charts": {"matplotlib"},
     "benchmarks.drawing": VTK,

@@ -12,6 +12,7 @@ The files, in reading order:
     demo            ``segdeform demo``
     bench           ``segdeform bench``
     application     ``segdeform app``
+    serving         ``segdeform serve``
     interactive     ``segdeform bench --interactive``
     live_pulls      bench --interactive: live pulls, and the errors of their poses
     opening         ``segdeform bench --interactive --open``

@@ -36,6 +36,7 @@ COMMANDS = {
     "deform": "commands",
     "edit": "commands",
     "app": "application",
+    "serve": "serving",
     "replay": "replaying",
     "check": "checking",
     "regions": "commands",
@@ -67,6 +68,7 @@ examples:
   segdeform check scan.ply --repair -o closed.ply
   segdeform edit horse.ply -o bent.ply
   segdeform app horse.ply
+  segdeform serve horse.ply --open
   segdeform deform horse.ply -o bent.ply --fixed 'z<10%' --handle 'z>90%' --rotate y,45
   segdeform deform a.off -o b.off --fixed a.sel --handle a.sel --matrix a.def --regions auto
   segdeform deform in.vtp -o out.vtp --fixed 'z<5%' \\
@@ -239,6 +241,8 @@ def _parser() -> argparse.ArgumentParser:
     sub = add_command("app", "open the desktop program")
     sub.add_argument("input", type=Path, nargs="?", metavar="FILE", help="mesh or session file")
 
+    _serve(add_command("serve", "deform a mesh in the browser"))
+
     sub = add_command("replay", "replay a recording made with Ctrl+R", _REPLAYS)
     sub.add_argument("recording", type=Path, metavar="RECORDING", help="NAME.recording.txt")
     _input_output(sub, "the deformed mesh at the end", session=True)
@@ -269,6 +273,24 @@ def _parser() -> argparse.ArgumentParser:
 
     _bench(add_command("bench", "run the benchmarks and write a report"))
     return parser
+
+
+def _serve(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("input", type=Path, nargs="?", metavar="FILE", help="mesh or session file")
+    text = "port (default: 8765, or any free port if it is in use)"
+    add("--port", type=_count, default=None, metavar="N", help=text)
+    text = "address to listen on (default: 127.0.0.1, this machine only)"
+    add("--host", default="127.0.0.1", metavar="HOST", help=text)
+    add("--open", action="store_true", help="open the page in the browser")
+    text = "clients at the same time, each with its own process (default: 4)"
+    add("--clients", type=_count, default=4, metavar="N", help=text)
+    text = "largest upload (default: 500)"
+    add("--upload-limit", type=_count, default=500, metavar="MB", help=text)
+    text = "largest memory of a client; Linux only (default: 4000)"
+    add("--memory", type=_count, default=4000, metavar="MB", help=text)
+    text = "keep a client this long after its page was closed (default: 600)"
+    add("--keep", type=_count, default=600, metavar="SECONDS", help=text)
 
 
 def _bench(parser: argparse.ArgumentParser) -> None:

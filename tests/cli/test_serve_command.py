@@ -1,0 +1,45 @@
+"""``segdeform serve``: what is refused before anything is served."""
+
+from __future__ import annotations
+
+import socket
+
+import pytest
+
+from vtk_segdeform.cli import main, serving
+
+
+@pytest.fixture(autouse=True)
+def with_all_libraries(monkeypatch):
+    monkeypatch.setattr(serving, "_LIBRARIES", ())
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["missing.ply"], "missing.ply: there is no such file"),
+        (["."], ".: is a folder, not a file"),
+        (["--port", "99999"], "--port must be at most 65535; got 99999"),
+        (["--clients", "0"], "--clients must be at least 1"),
+        (["--upload-limit", "0"], "--upload-limit must be at least 1"),
+    ],
+)
+def test_what_cannot_be_served_is_refused(capsys, words, message):
+    assert main(["serve", *words]) == 1
+    assert capsys.readouterr().err == f"segdeform serve: {message}\n"
+
+
+def test_a_port_in_use_is_refused(capsys):
+    pytest.importorskip("aiohttp")
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        assert main(["serve", "--port", str(port)]) == 1
+    assert "already in use" in capsys.readouterr().err
+
+
+def test_a_missing_library_is_named_with_its_cure(capsys, monkeypatch):
+    monkeypatch.setattr(serving, "_LIBRARIES", ("no_such_library",))
+    assert main(["serve"]) == 1
+    assert "no_such_library; install it with pip install 'vtk-segdeform[web]'" in (
+        capsys.readouterr().err
+    )

@@ -1,0 +1,281 @@
+"""Lives of clients: apart from each other, continued, restarted, and gone without a trace."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import operator
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("aiohttp")
+
+from visitors import LIMITS, STANDIN, serving
+
+from vtk_segdeform.widgets.web.serving.run_folder import run_folder
+
+ON_LINUX = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads /proc")
+# The command line with a stand-in for the client process.
+PROGRAM = f"""
+import sys, tempfile
+from vtk_segdeform.cli import main, serving
+from vtk_segdeform.widgets.web.serving import server
+serving._LIBRARIES = ()
+server.client_command = lambda file: {STANDIN!r}
+tempfile.tempdir = sys.argv[1]
+sys.exit(main(["serve", "--port", "0"]))
+"""
+
+
+def is_alive(process):
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+async def until(true, seconds=20.0):
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "did not happen"
+        await asyncio.sleep(0.02)
+
+
+@ON_LINUX
+def test_the_life_of_two_clients(do, tmp_path):
+    """They are apart, and survive a reload, a crash and a third visitor."""
+
+    async def story():
+        limits = replace(LIMITS, clients=2)
+        async with serving(tmp_path, limits) as (server, visitor):
+            one, other, third = visitor(), visitor(), visitor()
+            (first, _), (second, _) = await asyncio.gather(one.enter(), other.enter())
+            assert first != second
+            await one.ask("set pulled")
+            assert await one.ask("get") == "pulled"
+            assert await other.ask("get") == ""
+            for cookie in (other.cookie, "", one.cookie[:-1]):
+                status, text, _ = await one.get(f"{one.path}index.html", Cookie=cookie)
+                assert status == 403
+                assert "pulled" not in text
+            assert await one.load() == (first, "pulled")
+
+            status, text, _ = await third.get(f"/?token={server.access.token}")
+            assert (status, text[:27]) == (503, "All 2 clients of this serve")
+
+            async with one.socket() as socket:
+                os.kill(first, signal.SIGKILL)
+                closed = await socket.receive(20)
+                assert closed.data == 4000
+                assert "ended unexpectedly" in closed.extra
+            again, state = await one.load()
+            assert again != first
+            assert state == "pulled"
+            assert await other.ask("get") == ""
+
+            folder = next(tmp_path.iterdir())
+            assert folder.stat().st_mode & 0o777 == 0o700
+            assert sum(each.is_dir() for each in folder.iterdir()) == 2
+        assert not is_alive(again)
+        assert not is_alive(second)
+        assert list(tmp_path.iterdir()) == []
+
+    do(story())
+
+
+@ON_LINUX
+def test_a_client_ends_some_time_after_its_page(do, tmp_path):
+    async def story():
+        async with serving(tmp_path, replace(LIMITS, clients=1, keep=1.0)) as (server, visitor):
+            guest, folder = visitor(), next(tmp_path.iterdir())
+            process, _ = await guest.enter()
+            async with guest.socket():
+                await asyncio.sleep(1.6)
+                assert is_alive(process)
+            await until(lambda: not is_alive(process))
+            await until(lambda: [each.name for each in folder.iterdir()] == ["lock"])
+            assert server.clients.is_empty
+            assert (await guest.get(guest.path))[0] == 403
+
+    do(story())
+
+
+@ON_LINUX
+def test_a_process_that_takes_too_much_memory_is_ended_by_name(do, tmp_path):
+    async def story():
+        async with serving(tmp_path, replace(LIMITS, memory=150_000_000)) as (_, visitor):
+            guest = visitor()
+            process, _ = await guest.enter()
+            await guest.ask("set pulled")
+            async with guest.socket() as socket:
+                await socket.send_str("take 200")
+                closed = await socket.receive(20)
+                if closed.data == "take 200":
+                    closed = await socket.receive(20)
+            assert closed.data == 4000
+            assert closed.extra == "The editor took more than 0.15 GB of memory."
+            await until(lambda: not is_alive(process))
+            assert (await guest.load())[1] == "pulled"
+            with pytest.raises(Exception, match=r"payload|disconnected|reset"):
+                await guest.get(f"{guest.path}fail")  # half an answer is not taken for all of it
+
+    do(story())
+
+
+@ON_LINUX
+@pytest.mark.parametrize(
+    ("command", "reason", "tries"),
+    [
+        ([*STANDIN, "broken"], "broken cannot be read.", 2),
+        ([sys.executable, "-c", "import time; time.sleep(1000)"], "The editor did not start", 1),
+        ([sys.executable, "-c", "1 / 0"], "The editor could not be started.", 1),
+        ([sys.executable, "-c", "print('hello')"], "The editor could not be started.", 1),
+        (["/no/such/program"], "The editor could not be started.", 1),
+    ],
+)
+def test_a_process_that_cannot_start_says_why_in_the_page(
+    do, tmp_path, caplog, command, reason, tries
+):
+    async def story():
+        limits = replace(LIMITS, start=10.0 if tries == 2 else 0.5)
+        async with serving(tmp_path, limits, command) as (server, visitor):
+            guest = visitor()
+            _, _, headers = await guest.get(f"/?token={server.access.token}")
+            guest.path, guest.cookie = headers["Location"], headers["Set-Cookie"].split(";")[0]
+            for _ in range(tries):  # a reload tries again
+                assert (await guest.get(guest.path))[0] == 202
+                status, text, _ = await guest.get(guest.path)
+                assert status == 502
+                assert reason in text
+                assert "Reload this page to try again." in text
+            assert (await guest.get(f"{guest.path}headers"))[0] == 502
+            await until(lambda: not children())
+
+    do(story())
+    assert reason in caplog.text
+
+
+def children():
+    """Return the ids of the child processes of this one."""
+    return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+
+
+def memory_used():
+    """Return the resident memory of this process in bytes."""
+    pages = Path("/proc/self/statm").read_text().split()[1]
+    return int(pages) * os.sysconf("SC_PAGE_SIZE")
+
+
+def left_behind():
+    """Return the numbers of child processes, threads and open files, and of tasks."""
+    gc.collect()
+    return (
+        len(children()), threading.active_count(), len(os.listdir("/proc/self/fd")),
+        len(asyncio.all_tasks()),
+    )  # fmt: skip
+
+
+@ON_LINUX
+@pytest.mark.parametrize("visits", [5, pytest.param(50, marks=pytest.mark.campaign)])
+def test_visits_leave_nothing_behind(do, tmp_path, visits):
+    async def story():
+        limits = replace(LIMITS, clients=5, keep=1.0)
+        async with serving(tmp_path, limits) as (server, visitor):
+            (folder,) = tmp_path.iterdir()
+
+            async def visit():
+                guest = visitor()
+                await guest.enter()
+                await guest.ask("set pulled")  # each opens a WebSocket and closes it
+                assert await guest.ask("get") == "pulled"
+
+            await visit()
+            await until(lambda: server.clients.is_empty)
+            await until(lambda: left_behind()[0] == 0)
+            before, memory = left_behind(), 0
+            for _ in range(visits // 5):
+                await asyncio.gather(*[visit() for _ in range(5)])
+                await until(lambda: server.clients.is_empty)
+                memory = memory or memory_used()  # after the first round
+            await until(lambda: all(map(operator.le, left_behind(), before)), 10.0)
+            assert memory_used() - memory < 3e6
+            assert [each.name for each in folder.iterdir()] == ["lock"]
+
+    do(story())
+
+
+def started(folder):
+    """Run the program; return it and the address that it prints."""
+    program = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(folder)], stdout=subprocess.PIPE, text=True
+    )
+    line = program.stdout.readline()
+    return program, re.search(r"http://127\.0\.0\.1:\d+/\?token=\S+", line)[0]
+
+
+@ON_LINUX
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
+def test_however_the_program_ends_its_clients_end(do, tmp_path, how):
+    from types import SimpleNamespace
+
+    import aiohttp
+    from visitors import Visitor
+
+    program, address = started(tmp_path)
+
+    async def story():
+        base, token = address.split("/?token=")
+        access = SimpleNamespace(token=token)
+        server = SimpleNamespace(port=int(base.rpartition(":")[2]), access=access)
+        async with aiohttp.ClientSession(cookie_jar=aiohttp.DummyCookieJar()) as session:
+            guest = Visitor(server, session)
+            process, _ = await guest.enter()
+            async with guest.socket():
+                assert is_alive(process)
+                program.send_signal(how)
+                await until(lambda: not is_alive(process))
+
+    try:
+        do(story())
+        assert program.wait(20) == (-how if how == signal.SIGKILL else 0)
+    finally:
+        program.kill()
+        program.communicate()
+    assert len(list(tmp_path.iterdir())) == (how == signal.SIGKILL)
+    with run_folder(tmp_path) as folder:  # the next server deletes what a killed one left
+        assert list(tmp_path.iterdir()) == [folder]
+
+
+def test_folders_of_others_are_never_deleted(tmp_path):
+    named = [tmp_path / f"segdeform-serve-{digit * 16}" for digit in "0123"]
+    for folder in named[:3]:
+        folder.mkdir()
+    (named[1] / "lock").write_text("another program's\n")
+    (named[2] / "lock").mkdir()
+    work = tmp_path / "work"
+    work.mkdir()
+    (work / "lock").write_bytes(b"vtk_segdeform: private folder of segdeform serve\n")
+    named[3].symlink_to(work)
+    with run_folder(tmp_path) as running, run_folder(tmp_path):  # nor is that of a running server
+        assert running.is_dir()
+    assert sorted(tmp_path.iterdir()) == [*named, work]
+    assert (work / "lock").exists()
+
+
+@ON_LINUX
+def test_the_server_loads_neither_numpy_nor_vtk():
+    code = (
+        "import sys, vtk_segdeform.cli.serving, vtk_segdeform.widgets.web.serving; "
+        "print(*{'numpy', 'vtkmodules', 'pyvista', 'trame'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ""

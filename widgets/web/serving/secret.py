@@ -1,0 +1,71 @@
+"""The client's side of `client`: its secret, its life and its port.
+
+A client process listens on 127.0.0.1, where other users of the machine can connect as well.  So it
+answers only requests that carry a secret, which the server writes to its standard input.  The
+server keeps that pipe open; when the server ends, however it ends, the pipe closes and the client
+process ends with it.
+"""
+
+from __future__ import annotations
+
+import hmac
+import json
+import os
+import signal
+import threading
+
+from aiohttp import web
+from aiohttp.typedefs import Handler, Middleware
+
+HEADER = "X-Segdeform-Secret"
+_INPUT, _OUTPUT = 0, 1  # file descriptors
+
+
+def read_secret() -> str:
+    """Return the first line of the standard input."""
+    line = b""
+    while not line.endswith(b"\n") and (byte := os.read(_INPUT, 1)):
+        line += byte
+    return line.decode("ascii").strip()
+
+
+def end_with_stdin() -> None:
+    """Kill this process, in any state, once its standard input is closed."""
+    threading.Thread(target=_wait_and_end, name="end with stdin", daemon=True).start()
+
+
+def _wait_and_end() -> None:
+    while os.read(_INPUT, 4096):  # not sys.stdin, whose lock would block the interpreter's exit
+        pass
+    os.kill(os.getpid(), getattr(signal, "SIGKILL", signal.SIGTERM))
+
+
+def announce(port: int) -> None:
+    """Tell the server that this process accepts connections on *port* of 127.0.0.1."""
+    _write_line({"port": port})
+
+
+def announce_error(sentence: str) -> None:
+    """Tell the server why this process cannot start; the page shows the sentence."""
+    _write_line({"error": sentence})
+
+
+def _write_line(fields: dict[str, int | str]) -> None:
+    os.write(_OUTPUT, json.dumps(fields).encode() + b"\n")
+
+
+def guard(secret: str) -> Middleware:
+    """Return a middleware that answers 403 to requests without the secret."""
+
+    @web.middleware
+    async def guarded(request: web.Request, handler: Handler) -> web.StreamResponse:
+        given = request.headers.get(HEADER, "")
+        if not secret or not hmac.compare_digest(_bytes(given), _bytes(secret)):
+            return web.Response(status=403, text="This port is internal to segdeform serve.\n")
+        return await handler(request)
+
+    return guarded
+
+
+def _bytes(text: str) -> bytes:
+    return text.encode("utf-8", "surrogateescape")  # headers may contain any bytes
