@@ -26,7 +26,7 @@ ROOMS = [
     "finish", "deformer", "io", "session", "models", "pictures", "filters",
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
     "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.recording",
-    "widgets.editor",
+    "widgets.editor", "widgets.web.drawing",
     "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "benchmarks", "cli", "__main__",
 ]  # fmt: skip
 MOST_FLOORS = 24

@@ -35,11 +35,12 @@ from .projection import Projection
 from .step_budget import StepBudget, observe_steps, prescribe_steps
 from .surface_display import SurfaceDisplay, SurfaceStyle, drawn_triangles
 from .view import Stop, View
-from .viewpoint import VIEWS, Viewpoint
+from .viewpoint import TURN, VIEWS, Viewpoint
 from .widget import Widget
 from .wireframe import Wireframe
 
 __all__ = [
+    "TURN",
     "VIEWS",
     "Draft",
     "Gesture",

@@ -1,0 +1,191 @@
+"""A mesh and its W~ as one message, from which a page computes every pose.
+
+The mesh follows its cages, x = rest + W~ (p - p_rest).  A page that has W~ needs only the motion of
+the cage vertices for a picture, some 155 x 3 numbers, whatever the size of the mesh.
+
+Every row of W~ is sent with all its entries, as whole numbers of 16 bits times a step of its own,
+
+    w_ij = q_ij s_i + e_ij,    s_i = max_j |w_ij| / 32767,    |e_ij| <= s_i / 2
+
+so that a vertex is displaced by no more than ``s_i / 2 * sum_j |p_j - p_rest_j|``, over the cage
+vertices j that move it; at rest by nothing.  On drags by up to 0.9 diagonals of the mesh that is
+4e-5 diagonals and 0.5 degrees of a normal at most, and 4e-6 and 0.02 root mean square.  The 16
+largest entries of each row alone, corrected to reproduce affine maps, err by 4 to 12 % of the
+diagonal and 3 to 15 degrees root mean square, because mean value coordinates fall off slowly; so
+do 16 columns of a factorisation of low rank, by 3 to 21 %.
+
+All lengths in messages are in diagonals of the mesh, from the middle of its bounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vtk_segdeform.arrays import FloatArray, as_points, bounds_of
+from vtk_segdeform.cages import Cage
+from vtk_segdeform.errors import ArgumentError, CageError
+from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.subspace import Subspace
+
+from .messages import Kind, message
+
+MOST_VERTICES = 1 << 17
+"""Vertices of a mesh that a page draws at most."""
+MOST_WEIGHTS = 1 << 24
+"""Entries of W~ that a page receives at most: 32 megabytes."""
+_GROUP = 4  # entries of a row are read four at a time; rows are padded to a multiple
+_LARGEST = 32767
+_ROWS = 1 << 14  # encoded together
+
+
+@dataclass(frozen=True, eq=False)
+class EncodedSurface:
+    """What a page needs to pose and draw a mesh; made by `encode_surface`.
+
+    Parameters
+    ----------
+    centre, scale : (3,) float, float
+        A point u of a message is ``centre + scale * u`` in the scene.
+    rest : (n, 3) float32
+        The vertices at rest, in units of the message.
+    steps : (n,) float32
+        s.
+    sets : (n,) uint16
+        The set of each vertex; vertices of a set are moved by the same cage vertices.
+    columns : sequence of (c,) uint16
+        For each set its cage vertices, c a multiple of four; padding has weight 0.
+    weights : (w,) int16
+        q, row after row.
+    faces : (f, 3) uint32
+        Triangles of the vertices, and from n on of *twice*.
+    twice : (t,) uint32
+        Vertices that are drawn a second time, with the opposite normal.
+    cages : (m, 3) float
+        The cage vertices at rest, in the scene.
+    """
+
+    centre: FloatArray
+    scale: float
+    rest: NDArray[np.float32]
+    steps: NDArray[np.float32]
+    sets: NDArray[np.uint16]
+    columns: Sequence[NDArray[np.uint16]]
+    weights: NDArray[np.int16]
+    faces: NDArray[np.uint32]
+    twice: NDArray[np.uint32]
+    cages: FloatArray
+
+    def message(self, serial: int) -> bytes:
+        """Return the message; *serial* tells this surface from earlier ones."""
+        n, t, f, m = len(self.rest), len(self.twice), len(self.faces), len(self.cages)
+        lengths = np.array([len(each) for each in self.columns], dtype=np.uint32)
+        columns = np.concatenate(self.columns)
+        counts = np.array([n, t, f, m, len(lengths), len(columns), len(self.weights)], np.uint32)
+        return message(
+            Kind.SURFACE, serial, counts, self.rest, self.steps, self.sets, lengths, columns,
+            self.weights, self.faces, self.twice,
+        )  # fmt: skip
+
+    def cage_message(self, serial: int, number: int, cage_vertices: Sequence[ArrayLike]) -> bytes:
+        """Return the message of a pose, (m_r, 3) for each cage; *number* counts the poses."""
+        p = np.concatenate([np.asarray(each, dtype=np.float64) for each in cage_vertices])
+        if p.shape != self.cages.shape:
+            raise CageError(f"the cages must have {len(self.cages)} vertices; got {len(p)}")
+        moves = ((p - self.cages) / self.scale).astype(np.float32)
+        return message(Kind.CAGES, serial, np.array([number], np.uint32), moves)
+
+    def offset_message(self, serial: int, offsets: ArrayLike | None) -> bytes:
+        """Return the message of *offsets* (n, 3), in the scene, that are added to every pose."""
+        if offsets is None:
+            return message(Kind.OFFSETS, serial, np.zeros(1, np.float32))
+        shift = as_points(offsets, "offsets", len(self.rest)) / self.scale
+        step = max(float(np.abs(shift).max()) / _LARGEST, float(np.finfo(np.float32).tiny))
+        rounded = np.rint(shift / step).astype(np.int16)
+        return message(Kind.OFFSETS, serial, np.array([step], np.float32), rounded)
+
+    def colour_message(self, serial: int, colours: NDArray[np.uint8] | None) -> bytes:
+        """Return the message of vertex *colours* (n, 3) uint8, or of none."""
+        if colours is None:
+            return message(Kind.COLOURS, serial)
+        if colours.shape != self.rest.shape or colours.dtype != np.uint8:
+            expected = self.rest.shape
+            raise ArgumentError(
+                f"colours must be uint8 of shape {expected}; got {colours.dtype}, {colours.shape}"
+            )
+        opaque = np.full((len(colours), 4), 255, dtype=np.uint8)
+        opaque[:, :3] = colours
+        return message(Kind.COLOURS, serial, opaque)
+
+
+def is_drawable(mesh: Mesh, subspace: Subspace) -> bool:
+    """Return whether *mesh* and its W~ are small enough for a page."""
+    size = sum(block.size for block in subspace.blocks)
+    return mesh.n_vertices <= MOST_VERTICES and size <= MOST_WEIGHTS
+
+
+def encode_surface(
+    mesh: Mesh, subspace: Subspace, cages: Sequence[Cage], turned: NDArray[np.int64]
+) -> EncodedSurface:
+    """Return *mesh* with its W~ as a page needs them.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        n vertices at rest.
+    subspace : Subspace
+        Its W~.
+    cages : sequence of Cage
+        At rest, in the order of the columns of W~.
+    turned : (k,) int
+        The corners of faces that are drawn with opposite normals, `VertexNormals.turned`.
+
+    Raises
+    ------
+    ArgumentError
+        If the mesh or its W~ is too large; see `is_drawable`.
+    """
+    if not is_drawable(mesh, subspace):
+        raise ArgumentError(
+            f"a page can draw meshes of up to {MOST_VERTICES} vertices whose vertices and cage "
+            f"vertices have up to {MOST_WEIGHTS} pairs; let the server draw this one"
+        )
+    low, high = bounds_of(mesh.vertices)
+    centre, scale = 0.5 * (low + high), float(mesh.diagonal)
+    sets, steps = np.empty(mesh.n_vertices, np.uint16), np.empty(mesh.n_vertices, np.float32)
+    groups = [(ids, subspace.nonzeros(ids[:1])[0]) for ids in subspace.sets_by_cages()]
+    widths = np.empty(mesh.n_vertices, dtype=np.int64)
+    columns = []
+    for number, (ids, own) in enumerate(groups):
+        width = -(-len(own) // _GROUP) * _GROUP
+        columns.append(np.pad(own, (0, width - len(own))).astype(np.uint16))
+        sets[ids], widths[ids] = number, width
+    starts = np.cumsum(widths) - widths
+    weights = np.zeros(int(widths.sum()), dtype=np.int16)
+    for ids, own in groups:
+        for start in range(0, len(ids), _ROWS):
+            some = ids[start : start + _ROWS]
+            w = subspace.nonzeros(some)[1]
+            step = np.abs(w).max(axis=1) / _LARGEST
+            steps[some] = step
+            step[step == 0.0] = 1.0
+            places = starts[some, None] + np.arange(len(own))
+            weights[places] = np.rint(w / step[:, None])
+    twice, second = np.unique(mesh.faces.ravel()[turned], return_inverse=True)
+    faces = mesh.faces.ravel().astype(np.uint32)
+    faces[turned] = mesh.n_vertices + second
+    return EncodedSurface(
+        centre,
+        scale,
+        ((mesh.vertices - centre) / scale).astype(np.float32),
+        steps,
+        sets,
+        columns,
+        weights,
+        faces.reshape(-1, 3),
+        twice.astype(np.uint32),
+        np.concatenate([cage.vertices for cage in cages]),
+    )
