@@ -28,7 +28,7 @@ class Kind(enum.IntEnum):
     """What a message contains; arrays in this order."""
 
     SURFACE = 1
-    """Seven counts, and the arrays of `EncodedSurface`."""
+    """Eight counts, and the arrays of `EncodedSurface`."""
     CAGES = 2
     """The number of the pose, and the moves of the cage vertices (m, 3) float32."""
     OFFSETS = 3
@@ -38,7 +38,7 @@ class Kind(enum.IntEnum):
     LOOK = 5
     """Camera, light and material, float32; see `Look`."""
     MARKS = 6
-    """For each mark six numbers and its points; see `marks_message`."""
+    """For each mark eight numbers and its points, float32; see `Mark`."""
 
 
 def message(kind: Kind, serial: int, *arrays: NDArray[Any]) -> bytes:

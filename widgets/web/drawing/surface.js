@@ -26,6 +26,7 @@
   const LOOK_NUMBERS = 44;
   const MARK_NUMBERS = 8;
   const LIGHTS = 4;
+  const POSITION = 0, DIRECTION = 1, COLOUR = 2; // attributes of the body
 
   const HEAD = `#version 300 es
 precision highp float; precision highp int;
@@ -86,29 +87,28 @@ void main() {
 }`;
 
   const BODY = HEAD + `
-uniform sampler2D positions, normals;
 uniform mat4 view, projection;
-in vec4 colour;
+in vec4 position, direction, colour;
 out vec3 shade, normal;
 void main() {
-  ivec2 at = texel(gl_VertexID);
-  gl_Position = projection * (view * vec4(texelFetch(positions, at, 0).xyz, 1.0));
-  normal = mat3(view) * texelFetch(normals, at, 0).xyz;
+  gl_Position = projection * (view * position);
+  normal = mat3(view) * direction.xyz;
   shade = colour.rgb;
 }`;
 
-  const LIT = HEAD + `
+  // Unrolled, since software draws a loop over lights at half the speed.
+  const lit = (count) => HEAD + `
 uniform vec3 directions[${LIGHTS}], strengths[${LIGHTS}];
-uniform float ambient, diffuse;
+uniform float ambient;
 in vec3 shade, normal;
 out vec4 pixel;
 void main() {
-  float size = length(normal);
-  vec3 n = size > 0.0 ? normal / size : vec3(0.0);
-  if (!gl_FrontFacing) n = -n;
-  vec3 light = vec3(0.0);
-  for (int k = 0; k < ${LIGHTS}; k++) light += max(dot(n, directions[k]), 0.0) * strengths[k];
-  pixel = vec4(min(shade * (ambient + diffuse * light), 1.0), 1.0);
+  float side = gl_FrontFacing ? 1.0 : -1.0;
+  vec3 n = normal * (side * inversesqrt(max(dot(normal, normal), 1e-30)));
+  vec3 light = vec3(ambient);
+${[...Array(count).keys()].map((k) =>
+    `  light += max(dot(n, directions[${k}]), 0.0) * strengths[${k}];`).join("\n")}
+  pixel = vec4(min(shade * light, 1.0), 1.0);
 }`;
 
   // Lines and points of constant size: a quad for each, between start and end.
@@ -275,12 +275,13 @@ void main() { pixel = tint; }`;
       probe.getExtension("WEBGL_lose_context")?.loseContext();
       const gl = canvas.getContext("webgl2", { ...options, antialias: antialias ?? !isSoftware });
       if (!gl || !gl.getExtension("EXT_color_buffer_float")) return null;
-      return new SegdeformSurface(canvas, gl);
+      return new SegdeformSurface(canvas, gl, isSoftware);
     }
 
-    constructor(canvas, gl) {
+    constructor(canvas, gl, isSoftware) {
       this.canvas = canvas;
       this.gl = gl;
+      this.isSoftware = isSoftware;
       this.serial = null; // of the surface in use
       this.pose = null; // number of the pose that the next picture shows
       this.pictures = 0;
@@ -401,7 +402,7 @@ void main() { pixel = tint; }`;
 
     _readSurface(reader, serial) {
       const gl = this.gl;
-      const [n, t, f, m, nSets, nColumns, nWeights] = reader.take(Uint32Array, 7);
+      const [n, t, f, m, nSets, nColumns, nWeights, isClosed] = reader.take(Uint32Array, 8);
       require(n > 0 && f > 0 && n + t < 1 << 22 && f < 1 << 23, "a surface of impossible size");
       const rest = reader.take(Float32Array, 3 * n), steps = reader.take(Float32Array, n);
       const sets = reader.take(Uint16Array, n), lengths = reader.take(Uint32Array, nSets);
@@ -465,11 +466,21 @@ void main() { pixel = tint; }`;
       this._faces = gl.createBuffer();
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this._faces);
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, faces, gl.STATIC_DRAW);
+      [this._places, this._directions] = [POSITION, DIRECTION].map((attribute) => {
+        const buffer = gl.createBuffer();
+        gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+        gl.bufferData(gl.ARRAY_BUFFER, 16 * ROW * height, gl.DYNAMIC_COPY);
+        gl.enableVertexAttribArray(attribute);
+        gl.vertexAttribPointer(attribute, 4, gl.FLOAT, false, 0, 0);
+        return buffer;
+      });
       this._colours = gl.createBuffer();
       gl.bindBuffer(gl.ARRAY_BUFFER, this._colours);
-      gl.vertexAttribPointer(this._drawn.attributes.colour, 4, gl.UNSIGNED_BYTE, true, 0, 0);
+      gl.vertexAttribPointer(COLOUR, 4, gl.UNSIGNED_BYTE, true, 0, 0);
+      this._buffers = [this._faces, this._places, this._directions, this._colours];
       gl.bindVertexArray(null);
       this._corners = 3 * f;
+      this._hidesBacks = this.isSoftware && isClosed === 1;
       this._hasColours = false;
       this.pose = null;
       this._isMoved = true;
@@ -538,13 +549,13 @@ void main() { pixel = tint; }`;
       const directions = new Float32Array(3 * LIGHTS), strengths = new Float32Array(3 * LIGHTS);
       for (let k = 0; k < lights.length / 6; k++) {
         directions.set(lights.subarray(6 * k, 6 * k + 3), 3 * k);
-        strengths.set(lights.subarray(6 * k + 3, 6 * k + 6), 3 * k);
+        strengths.set(scaled(lights.subarray(6 * k + 3, 6 * k + 6), numbers[42]), 3 * k);
       }
       const look = {
         view: numbers.slice(0, 16), projection: numbers.slice(16, 32),
         axis: [...numbers.slice(32, 35)], pivot: [...numbers.slice(35, 38)],
-        colour: [...numbers.slice(38, 41)], ambient: numbers[41], diffuse: numbers[42],
-        turn: numbers[43], directions, strengths,
+        colour: [...numbers.slice(38, 41)], ambient: numbers[41], turn: numbers[43],
+        count: lights.length / 6, directions, strengths,
       };
       if (this._held) this._held = look; // the page turns its own camera
       else this._look = look;
@@ -569,7 +580,7 @@ void main() { pixel = tint; }`;
       const gl = this.gl;
       this._posed = this._program(WHOLE, POSITIONS);
       this._oriented = this._program(WHOLE, NORMALS);
-      this._drawn = this._program(BODY, LIT);
+      this._drawn = [...Array(LIGHTS + 1).keys()].map(() => null); // by the number of lights
       this._marked = this._program(MARK, FLAT);
       this._painted = this._program(PAINTED, PLAIN);
       this._body = gl.createVertexArray();
@@ -577,16 +588,14 @@ void main() { pixel = tint; }`;
       this._lines = gl.createVertexArray();
       this._line = gl.createBuffer();
       this._target = gl.createFramebuffer();
-      this._textures = [];
-      this._faces = this._colours = null;
+      this._textures = this._buffers = [];
     }
 
     _free() {
       const gl = this.gl;
       for (const texture of this._textures) gl.deleteTexture(texture);
-      gl.deleteBuffer(this._faces);
-      gl.deleteBuffer(this._colours);
-      this._textures = [];
+      for (const buffer of this._buffers) gl.deleteBuffer(buffer);
+      this._textures = this._buffers = [];
     }
 
     _program(vertex, fragment) {
@@ -597,6 +606,9 @@ void main() { pixel = tint; }`;
         gl.compileShader(shader);
         gl.attachShader(program, shader);
       }
+      gl.bindAttribLocation(program, POSITION, "position");
+      gl.bindAttribLocation(program, DIRECTION, "direction");
+      gl.bindAttribLocation(program, COLOUR, "colour");
       gl.linkProgram(program);
       if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
         const shaders = gl.getAttachedShaders(program).map((each) => gl.getShaderInfoLog(each));
@@ -655,21 +667,24 @@ void main() { pixel = tint; }`;
       gl.bindVertexArray(this._none);
       gl.viewport(0, 0, ROW, this._height);
       gl.bindFramebuffer(gl.FRAMEBUFFER, this._target);
-      const into = (texture) => {
+      const into = (texture, buffer) => {
         gl.framebufferTexture2D(
           gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
         gl.drawArrays(gl.TRIANGLES, 0, 3);
+        gl.bindBuffer(gl.PIXEL_PACK_BUFFER, buffer);
+        gl.readPixels(0, 0, ROW, this._height, gl.RGBA, gl.FLOAT, 0);
+        gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
       };
       const uniforms = this._use(this._posed, {
         rest: this._rest, rows: this._rows, weights: this._weights, cages: this._cages,
         offsets: this._offsets,
       });
       gl.uniform1f(uniforms.offset_step, this._offsetStep);
-      into(this._positions);
+      into(this._positions, this._places);
       this._use(this._oriented, {
         positions: this._positions, fans: this._fans, neighbours: this._neighbours,
       });
-      into(this._normals);
+      into(this._normals, this._directions);
       this._isMoved = false;
     }
 
@@ -691,26 +706,25 @@ void main() { pixel = tint; }`;
 
     _drawBody(projection) {
       const gl = this.gl, look = this._look;
-      const uniforms = this._use(this._drawn, {
-        positions: this._positions, normals: this._normals,
-      });
+      this._drawn[look.count] ??= this._program(BODY, lit(look.count));
+      const uniforms = this._use(this._drawn[look.count], {});
       gl.uniformMatrix4fv(uniforms.view, false, look.view);
       gl.uniformMatrix4fv(uniforms.projection, false, projection);
       gl.uniform3fv(uniforms.directions, look.directions);
       gl.uniform3fv(uniforms.strengths, look.strengths);
       gl.uniform1f(uniforms.ambient, look.ambient);
-      gl.uniform1f(uniforms.diffuse, look.diffuse);
       gl.enable(gl.DEPTH_TEST);
       gl.disable(gl.BLEND);
       gl.bindVertexArray(this._body);
-      const { colour } = this._drawn.attributes;
       if (this._hasColours) {
-        gl.enableVertexAttribArray(colour);
+        gl.enableVertexAttribArray(COLOUR);
       } else {
-        gl.disableVertexAttribArray(colour);
-        gl.vertexAttrib4f(colour, ...look.colour, 1);
+        gl.disableVertexAttribArray(COLOUR);
+        gl.vertexAttrib4f(COLOUR, ...look.colour, 1);
       }
+      if (this._hidesBacks) gl.enable(gl.CULL_FACE);
       gl.drawElements(gl.TRIANGLES, this._corners, gl.UNSIGNED_INT, 0);
+      gl.disable(gl.CULL_FACE);
     }
 
     _drawMark(mark, projection) {
@@ -749,7 +763,7 @@ void main() { pixel = tint; }`;
   }
 
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  const scaled = (a, s) => a.map((each) => each * s);
+  const scaled = (a, s) => [a[0] * s, a[1] * s, a[2] * s];
 
   function product(a, b) {
     return a.map((row) => [0, 1, 2].map((c) => dot(row, b.map((each) => each[c]))));
