@@ -56,6 +56,11 @@ class SurfaceStream:
         return session.is_bound and is_drawable(session.mesh, session.deformer.subspace)
 
     @property
+    def surface(self) -> EncodedSurface | None:
+        """The mesh as it was encoded last, or None."""
+        return self._surface
+
+    @property
     def is_encoded(self) -> bool:
         """Whether the current mesh and cages are encoded, so that `due` returns messages."""
         is_bound = self._deformer is not None and self.session.is_bound
