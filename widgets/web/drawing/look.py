@@ -55,9 +55,11 @@ class Look:
         """Return the message of this look at *surface*."""
         to_scene = np.diag([surface.scale] * 3 + [1.0])
         to_scene[:3, 3] = surface.centre
+        projection = self.projection.copy()
+        projection[2] = 0.0  # the page chooses its own range of depths
         numbers = [
             (self.view @ to_scene).T.ravel(),
-            self.projection.T.ravel(),
+            projection.T.ravel(),
             self.axis,
             (self.pivot - surface.centre) / surface.scale,
             self.colour,

@@ -403,7 +403,8 @@ void main() { pixel = tint; }`;
     _readSurface(reader, serial) {
       const gl = this.gl;
       const [n, t, f, m, nSets, nColumns, nWeights, isClosed] = reader.take(Uint32Array, 8);
-      require(n > 0 && f > 0 && n + t < 1 << 22 && f < 1 << 23, "a surface of impossible size");
+      require(n > 0 && f > 0 && n + t < 1 << 22 && f < 1 << 23 && m <= 1 << 16 && isClosed <= 1,
+        "a surface of impossible size");
       const rest = reader.take(Float32Array, 3 * n), steps = reader.take(Float32Array, n);
       const sets = reader.take(Uint16Array, n), lengths = reader.take(Uint32Array, nSets);
       const columns = reader.take(Uint16Array, nColumns);
@@ -578,6 +579,7 @@ void main() { pixel = tint; }`;
 
     _begin() {
       const gl = this.gl;
+      gl.getExtension("EXT_color_buffer_float"); // positions are drawn into a texture
       this._posed = this._program(WHOLE, POSITIONS);
       this._oriented = this._program(WHOLE, NORMALS);
       this._drawn = [...Array(LIGHTS + 1).keys()].map(() => null); // by the number of lights
