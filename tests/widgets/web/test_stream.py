@@ -25,7 +25,7 @@ def kinds(messages) -> list[Kind]:
 
 @pytest.fixture
 def stream():
-    """A stream whose page has everything, in a pose."""
+    """Return a stream whose page has everything, in a pose."""
     session = sausage_session()
     session.move_cage(0, random_cages(session, 4, 0.05)[0])
     session.commit()

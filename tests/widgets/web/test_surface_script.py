@@ -97,7 +97,7 @@ class InProcess:
 
 @pytest.fixture(scope="module")
 def scene(page):
-    """A sausage in a pose, that the page has."""
+    """Give the page a sausage in a pose."""
     session = sausage_session()
     session.move_handle("end", session.targets["end"] + [-1.0, 1.0, 0.5])
     session.commit()

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from vtkmodules.util.numpy_support import vtk_to_numpy
 
 from vtk_segdeform.arrays import FloatArray, IntArray
@@ -57,7 +57,7 @@ class Look:
         to_scene[:3, 3] = surface.centre
         projection = self.projection.copy()
         projection[2] = 0.0  # the page chooses its own range of depths
-        numbers = [
+        numbers: list[ArrayLike] = [
             (self.view @ to_scene).T.ravel(),
             projection.T.ravel(),
             self.axis,
@@ -66,7 +66,7 @@ class Look:
             [self.ambient, self.diffuse, TURN],
             self.lights.ravel(),
         ]
-        return message(Kind.LOOK, serial, np.concatenate(numbers).astype(np.float32))
+        return message(Kind.LOOK, serial, np.concatenate([np.asarray(each) for each in numbers]).astype(np.float32))
 
 
 def look_of(renderer: Any, material: Any, axis: FloatArray, pivot: FloatArray) -> Look:
@@ -202,13 +202,13 @@ def _corners(shape: Shape, cells: Any) -> IntArray:
     offsets = vtk_to_numpy(cells.GetOffsetsArray())
     corners = vtk_to_numpy(cells.GetConnectivityArray()).astype(np.int64)
     if shape is Shape.POINTS:
-        return corners
+        return np.asarray(corners)
     last = np.zeros(len(corners), dtype=bool)
     last[offsets[1:] - 1] = True
     first = np.repeat(corners[offsets[:-1]], np.diff(offsets))
     here, after = corners[:-1][~last[:-1]], corners[1:][~last[:-1]]
     if shape is Shape.LINES:
-        return np.stack([here, after], axis=1).ravel()
+        return np.asarray(np.stack([here, after], axis=1).ravel())
     apex = first[:-1][~last[:-1]]
     fan = np.stack([apex, here, after], axis=1)
-    return fan[apex != here].ravel()
+    return np.asarray(fan[apex != here].ravel())

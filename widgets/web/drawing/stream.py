@@ -79,7 +79,7 @@ class SurfaceStream:
         self._look = b""
 
     def encode(self) -> None:
-        """Encode the mesh and its cages, if `is_possible`; the slow part, 0.1 s for 50,000 vertices.
+        """Encode the mesh and its cages, if `is_possible`; 0.1 s for 50,000 vertices.
 
         Raises
         ------
@@ -89,9 +89,7 @@ class SurfaceStream:
         session = self.session
         deformer = session.deformer
         turned = VertexNormals(session.mesh).turned
-        self._surface = encode_surface(
-            session.mesh, deformer.subspace, session.cages, turned
-        )
+        self._surface = encode_surface(session.mesh, deformer.subspace, session.cages, turned)
         self._deformer = deformer
         self._serial += 1
         self.reset()
@@ -161,7 +159,8 @@ class SurfaceStream:
         if before is None and offsets is None:
             return []
         if before is not None and offsets is not None:
-            if np.abs(offsets - before).max() <= _VISIBLE * surface.scale:
+            is_visible = np.abs(offsets - before).max() > _VISIBLE * surface.scale
+            if not is_visible:
                 return []
         self._offsets = offsets
         return [surface.offset_message(self._serial, offsets)]
