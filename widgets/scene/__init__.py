@@ -24,6 +24,7 @@ The files, in reading order:
 """
 
 from .backdrop import set_background, set_lights
+from .decimated_surface import decimated_triangles
 from .draft import Draft
 from .gestures import Gesture, Phase, Pointer
 from .handle_colours import handle_colour
@@ -60,6 +61,7 @@ __all__ = [
     "Viewpoint",
     "Widget",
     "Wireframe",
+    "decimated_triangles",
     "drawn_triangles",
     "handle_colour",
     "observe_steps",

@@ -14,9 +14,9 @@ from posed_scenes import random_cages, sausage_session
 from scenes import sausage
 from sheets import moebius
 
-from vtk_segdeform import Regions, fit_cages
+from vtk_segdeform import Regions, fit_cages, sizes
 from vtk_segdeform.errors import ArgumentError, CageError
-from vtk_segdeform.geometry import VertexNormals
+from vtk_segdeform.geometry import VertexNormals, signed_volume
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.session import Session, State
 from vtk_segdeform.widgets.web.drawing import encode_surface, encoding
@@ -38,17 +38,18 @@ def split(data: bytes, *types: tuple[str, int]) -> list[np.ndarray]:
 
 def read_surface(data: bytes) -> SimpleNamespace:
     """Return the arrays of the message of a surface."""
-    n, t, f, m, sets, columns, weights, closed = np.frombuffer(data, "<u4", 8, 16)
-    rest, steps, of_set, lengths, which, q, faces, twice = split(
-        data, ("<u4", 8), ("<f4", 3 * n), ("<f4", n), ("<u2", n), ("<u4", sets), ("<u2", columns),
-        ("<i2", weights), ("<u4", 3 * f), ("<u4", t),
+    n, t, f, coarse, m, sets, columns, weights, closed = np.frombuffer(data, "<u4", 9, 16)
+    rest, steps, of_set, lengths, which, q, faces, fewer, twice = split(
+        data, ("<u4", 9), ("<f4", 3 * n), ("<f4", n), ("<u2", n), ("<u4", sets), ("<u2", columns),
+        ("<i2", weights), ("<u4", 3 * f), ("<u4", 3 * coarse),
+        ("<u4", t),
     )[1:]  # fmt: skip
     ends = np.cumsum(lengths)
     own = [which[end - length : end] for end, length in zip(ends, lengths, strict=True)]
     rows = np.split(q, np.cumsum(lengths[of_set])[:-1])
     return SimpleNamespace(
         rest=rest.reshape(-1, 3), steps=steps, columns=[own[k] for k in of_set], rows=rows,
-        faces=faces.reshape(-1, 3), twice=twice, closed=closed, m=m,
+        faces=faces.reshape(-1, 3), coarse=fewer.reshape(-1, 3), twice=twice, closed=closed, m=m,
     )  # fmt: skip
 
 
@@ -107,6 +108,17 @@ def test_faces_are_those_of_the_mesh(session):
     assert received.closed == 1
     assert not len(received.twice)
     np.testing.assert_array_equal(np.unique(mine, axis=0), np.unique(theirs, axis=0))
+
+
+def test_a_large_mesh_has_fewer_faces_for_software_close_to_it(session, monkeypatch):
+    monkeypatch.setattr(sizes, "PAGE_DRAFT", 100)
+    monkeypatch.setattr(sizes, "DECIMATED_POINTS", 600)
+    surface = encoded(session)
+    coarse = surface.order[read_surface(surface.message(1)).coarse]
+    mesh = session.mesh
+    assert 0 < len(coarse) < 0.6 * mesh.n_faces
+    volume = signed_volume(mesh.vertices, mesh.faces)
+    assert signed_volume(mesh.vertices, coarse) == pytest.approx(volume, rel=0.03)
 
 
 def test_far_from_the_origin_no_digits_are_lost():

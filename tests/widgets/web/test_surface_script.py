@@ -196,13 +196,13 @@ def test_damaged_messages_are_refused_and_change_nothing(page, scene):
     damaged = [b"", b"SDFM", b"no message at all, but long enough", surface[:-4], surface + b"0000"]
     damaged += [cages[:4] + b"\x09\0" + cages[6:], cages[:12] + b"\x63\0\0\0" + cages[16:]]
     damaged += [cages[:20] + np.full(len(cages) // 4 - 5, np.nan, "<f4").tobytes()]
-    for at in range(16, 44, 4):  # each count of the surface
+    for at in range(16, 48, 4):  # each count of the surface
         for value in (0, 7, 1 << 20, (1 << 32) - 1):
             count = np.uint32(value).astype("<u4").tobytes()
             if count != surface[at : at + 4]:
                 damaged.append(surface[:at] + count + surface[at + 4 :])
     n, faces = np.frombuffer(surface, "<u4", 3, 16)[[0, 2]]
-    damaged.append(surface[: -4 * int(faces)] + b"\xff" * (4 * int(faces)))
+    damaged.append(surface[: -12 * int(faces)] + b"\xff" * (12 * int(faces)))
     answers = send(page, damaged)
     assert all(answers), [k for k, answer in enumerate(answers) if not answer]
     np.testing.assert_array_equal(drawn(page), before)

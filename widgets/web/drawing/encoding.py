@@ -25,12 +25,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vtk_segdeform import sizes
 from vtk_segdeform.arrays import FloatArray, IntArray, as_points, bounds_of
 from vtk_segdeform.cages import Cage
 from vtk_segdeform.errors import ArgumentError, CageError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.subspace import Subspace
 
+from ...scene import decimated_triangles
 from .messages import Kind, message
 
 MOST_VERTICES = 1 << 17
@@ -65,6 +67,8 @@ class EncodedSurface:
         q, row after row.
     faces : (f, 3) uint32
         Triangles of the vertices, and from n on of *twice*.
+    coarse : (c, 3) uint32
+        Fewer triangles between some of the vertices, for software; none for a small mesh.
     twice : (t,) uint32
         Vertices that are drawn a second time, with the opposite normal.
     cages : (m, 3) float
@@ -82,6 +86,7 @@ class EncodedSurface:
     columns: Sequence[NDArray[np.uint16]]
     weights: NDArray[np.int16]
     faces: NDArray[np.uint32]
+    coarse: NDArray[np.uint32]
     twice: NDArray[np.uint32]
     cages: FloatArray
     is_closed: bool
@@ -91,11 +96,11 @@ class EncodedSurface:
         n, t, f, m = len(self.rest), len(self.twice), len(self.faces), len(self.cages)
         lengths = np.array([len(each) for each in self.columns], dtype=np.uint32)
         columns = np.concatenate(self.columns)
-        sizes = n, t, f, m, len(lengths), len(columns), len(self.weights), self.is_closed
-        counts = np.array(sizes, dtype=np.uint32)
+        rows = m, len(lengths), len(columns), len(self.weights)
+        counts = np.array([n, t, f, len(self.coarse), *rows, self.is_closed], dtype=np.uint32)
         return message(
             Kind.SURFACE, serial, counts, self.rest, self.steps, self.sets, lengths, columns,
-            self.weights, self.faces, self.twice,
+            self.weights, self.faces, self.coarse, self.twice,
         )  # fmt: skip
 
     def cage_message(self, serial: int, number: int, cage_vertices: Sequence[ArrayLike]) -> bytes:
@@ -184,8 +189,10 @@ def encode_surface(
     twice, second = np.unique(place[mesh.faces.ravel()[turned]], return_inverse=True)
     faces = place[mesh.faces.ravel()]
     faces[turned] = mesh.n_vertices + second
-    middles = mesh.vertices[mesh.faces].mean(axis=1)
-    faces = faces.reshape(-1, 3)[np.argsort(_along_curve(middles), kind="stable")]
+    coarse = np.empty((0, 3), dtype=np.int64)
+    if mesh.n_vertices > sizes.PAGE_DRAFT:
+        kept, coarse = decimated_triangles(mesh)
+        coarse = kept[coarse]
     return EncodedSurface(
         centre,
         scale,
@@ -195,11 +202,20 @@ def encode_surface(
         np.repeat(np.arange(len(order)), [len(ids) for ids in order]).astype(np.uint16),
         columns,
         np.concatenate(weights),
-        faces.astype(np.uint32),
+        _sorted(faces.reshape(-1, 3), mesh.faces, mesh.vertices),
+        _sorted(place[coarse], coarse, mesh.vertices),
         twice.astype(np.uint32),
         np.concatenate([cage.vertices for cage in cages]),
         mesh.is_closed,
     )
+
+
+def _sorted(numbers: IntArray, faces: IntArray, points: FloatArray) -> NDArray[np.uint32]:
+    """Return *numbers* (f, 3) in the order of the *faces* (f, 3) of *points* along a curve."""
+    if not len(faces):
+        return numbers.astype(np.uint32)
+    middles = points[faces].mean(axis=1)
+    return numbers[np.argsort(_along_curve(middles), kind="stable")].astype(np.uint32)
 
 
 def _along_curve(points: FloatArray) -> IntArray:

@@ -66,7 +66,11 @@ class Look:
             [self.ambient, self.diffuse, TURN],
             self.lights.ravel(),
         ]
-        return message(Kind.LOOK, serial, np.concatenate([np.asarray(each) for each in numbers]).astype(np.float32))
+        return message(
+            Kind.LOOK,
+            serial,
+            np.concatenate([np.asarray(each) for each in numbers]).astype(np.float32),
+        )
 
 
 def look_of(renderer: Any, material: Any, axis: FloatArray, pivot: FloatArray) -> Look:

@@ -28,7 +28,7 @@ class Kind(enum.IntEnum):
     """What a message contains; arrays in this order."""
 
     SURFACE = 1
-    """Eight counts, and the arrays of `EncodedSurface`."""
+    """Nine counts, and the arrays of `EncodedSurface`."""
     CAGES = 2
     """The number of the pose, and the moves of the cage vertices (m, 3) float32."""
     OFFSETS = 3

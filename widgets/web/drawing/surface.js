@@ -402,17 +402,19 @@ void main() { pixel = tint; }`;
 
     _readSurface(reader, serial) {
       const gl = this.gl;
-      const [n, t, f, m, nSets, nColumns, nWeights, isClosed] = reader.take(Uint32Array, 8);
+      const [n, t, f, nCoarse, m, nSets, nColumns, nWeights, isClosed] =
+        reader.take(Uint32Array, 9);
       require(n > 0 && f > 0 && n + t < 1 << 22 && f < 1 << 23 && m <= 1 << 16 && isClosed <= 1,
         "a surface of impossible size");
       const rest = reader.take(Float32Array, 3 * n), steps = reader.take(Float32Array, n);
       const sets = reader.take(Uint16Array, n), lengths = reader.take(Uint32Array, nSets);
       const columns = reader.take(Uint16Array, nColumns);
       const weights = reader.take(Int16Array, nWeights);
-      const faces = reader.take(Uint32Array, 3 * f), twice = reader.take(Uint32Array, t);
+      const faces = reader.take(Uint32Array, 3 * f);
+      const coarse = reader.take(Uint32Array, 3 * nCoarse), twice = reader.take(Uint32Array, t);
       reader.end();
       require(areFinite(rest) && areFinite(steps), "a surface with coordinates that are no numbers");
-      require(largest(faces) < n + t, "a face without its vertices");
+      require(Math.max(largest(faces), largest(coarse)) < n + t, "a face without its vertices");
       require(t === 0 || largest(twice) < n, "a second copy of no vertex");
       require(largest(sets) < nSets, "a vertex in no set");
       require(nColumns === 0 || largest(columns) < m, "a weight of no cage vertex");
@@ -466,7 +468,8 @@ void main() { pixel = tint; }`;
       gl.bindVertexArray(this._body);
       this._faces = gl.createBuffer();
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this._faces);
-      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, faces, gl.STATIC_DRAW);
+      const used = this.isSoftware && nCoarse > 0 ? coarse : faces;
+      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, used, gl.STATIC_DRAW);
       [this._places, this._directions] = [POSITION, DIRECTION].map((attribute) => {
         const buffer = gl.createBuffer();
         gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
@@ -480,7 +483,7 @@ void main() { pixel = tint; }`;
       gl.vertexAttribPointer(COLOUR, 4, gl.UNSIGNED_BYTE, true, 0, 0);
       this._buffers = [this._faces, this._places, this._directions, this._colours];
       gl.bindVertexArray(null);
-      this._corners = 3 * f;
+      this._corners = used.length;
       this._hidesBacks = this.isSoftware && isClosed === 1;
       this._hasColours = false;
       this.pose = null;
