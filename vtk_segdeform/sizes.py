@@ -94,7 +94,7 @@ CACHED_BINDING = 20_000
 A mesh of 22,000 vertices is bound in 1.1 s, and read in 0.05 s."""
 
 PAGE_DRAFT = 20_000
-"""Vertices beyond which a page without a graphics processor draws a mesh decimated.
+"""Vertices beyond which a page without a graphics processor may draw a mesh decimated, if slow.
 
 Of a picture of 50,000 vertices, 47 of 67 ms of processor time are spent on its triangles."""
 

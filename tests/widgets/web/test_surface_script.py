@@ -17,7 +17,7 @@ from sheets import moebius
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
-from vtk_segdeform import Regions, fit_cages
+from vtk_segdeform import Regions, fit_cages, sizes
 from vtk_segdeform.errors import MissingDependencyError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.pictures.canvas import require_offscreen
@@ -158,8 +158,6 @@ def test_a_surface_with_one_side_has_no_crease(page):
     regions = Regions.single(mesh)
     session = Session(mesh, state=State(regions, fit_cages(mesh, regions, 30)))
     here = InProcess(session)
-    here.stream._serial = 8
-    here.stream.encode()
     session.move_cage(0, random_cages(session, 1, 0.05)[0])
     assert set(send(page, here.due())) == {""}
     compare(page, here)
@@ -183,6 +181,25 @@ def test_marks_are_drawn_where_the_view_draws_them(page, scene):
     assert (red[0] & red[1]).sum() > 0.8 * (red[0] | red[1]).sum()
     assert send(page, here.due()) == [""]
     compare(page, here)
+
+
+def test_slow_software_draws_fewer_triangles(page, monkeypatch):
+    monkeypatch.setattr(sizes, "PAGE_DRAFT", 100)
+    monkeypatch.setattr(sizes, "DECIMATED_POINTS", 600)
+    here = InProcess(sausage_session())
+    assert set(send(page, here.due())) == {""}
+    every = page.evaluate("surface._corners")
+    assert every == here.session.mesh.faces.size
+    expected, full = here.picture(), drawn(page)
+    page.evaluate("window.clock = 0, performance.now = () => 1e5 * clock++")  # slow pictures
+    for _ in range(8):
+        page.evaluate("surface.draw()")
+    page.evaluate("delete performance.now")
+    assert 0 < page.evaluate("surface._corners") < 0.6 * every
+    few = drawn(page)
+    mine, theirs = few[..., 3] > 0, (expected < 255).any(axis=2)
+    assert (mine & theirs).sum() > 0.95 * (mine | theirs).sum()
+    assert not np.array_equal(few, full)
 
 
 def test_damaged_messages_are_refused_and_change_nothing(page, scene):

@@ -68,7 +68,7 @@ class EncodedSurface:
     faces : (f, 3) uint32
         Triangles of the vertices, and from n on of *twice*.
     coarse : (c, 3) uint32
-        Fewer triangles between some of the vertices, for software; none for a small mesh.
+        Fewer triangles between some of the vertices, for slow software; none for a small mesh.
     twice : (t,) uint32
         Vertices that are drawn a second time, with the opposite normal.
     cages : (m, 3) float

@@ -26,6 +26,8 @@
   const LOOK_NUMBERS = 44;
   const MARK_NUMBERS = 8;
   const LIGHTS = 4;
+  const SLOW = 60; // milliseconds for a picture, beyond which software draws fewer triangles
+  const MEASURED = 8; // one of so many pictures is timed
   const POSITION = 0, DIRECTION = 1, COLOUR = 2; // attributes of the body
 
   const HEAD = `#version 300 es
@@ -357,6 +359,7 @@ void main() { pixel = tint; }`;
       gl.clearColor(0, 0, 0, 0);
       gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
       if (this.serial === null || !this._look) return;
+      const began = performance.now();
       if (this._isMoved) this._pose();
       gl.bindFramebuffer(gl.FRAMEBUFFER, null);
       gl.viewport(0, 0, this.canvas.width, this.canvas.height);
@@ -365,6 +368,7 @@ void main() { pixel = tint; }`;
       for (const mark of this._marks) if (!mark.isAbove) this._drawMark(mark, projection);
       gl.clear(gl.DEPTH_BUFFER_BIT);
       for (const mark of this._marks) if (mark.isAbove) this._drawMark(mark, projection);
+      this._spareSoftware(began);
       this.pictures++;
       this.ondraw?.(this.pose);
     }
@@ -468,8 +472,9 @@ void main() { pixel = tint; }`;
       gl.bindVertexArray(this._body);
       this._faces = gl.createBuffer();
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this._faces);
-      const used = this.isSoftware && nCoarse > 0 ? coarse : faces;
-      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, used, gl.STATIC_DRAW);
+      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, faces, gl.STATIC_DRAW);
+      this._corners = faces.length;
+      this._coarse = this.isSoftware ? coarse.slice() : coarse.slice(0, 0);
       [this._places, this._directions] = [POSITION, DIRECTION].map((attribute) => {
         const buffer = gl.createBuffer();
         gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
@@ -483,7 +488,6 @@ void main() { pixel = tint; }`;
       gl.vertexAttribPointer(COLOUR, 4, gl.UNSIGNED_BYTE, true, 0, 0);
       this._buffers = [this._faces, this._places, this._directions, this._colours];
       gl.bindVertexArray(null);
-      this._corners = used.length;
       this._hidesBacks = this.isSoftware && isClosed === 1;
       this._hasColours = false;
       this.pose = null;
@@ -691,6 +695,19 @@ void main() { pixel = tint; }`;
       });
       into(this._normals, this._directions);
       this._isMoved = false;
+    }
+
+    // Draw fewer triangles from now on, if pictures take too long without a graphics processor.
+    _spareSoftware(began) {
+      const gl = this.gl;
+      if (!this._coarse.length || this.pictures % MEASURED !== MEASURED - 1) return;
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // waits
+      if (performance.now() - began < SLOW) return;
+      gl.bindVertexArray(this._body);
+      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, this._coarse, gl.STATIC_DRAW);
+      this._corners = this._coarse.length;
+      this._hidesBacks = false; // they may have gaps
+      this._coarse = this._coarse.slice(0, 0);
     }
 
     // Return the server's projection with planes in front of and behind any pose of the surface.
