@@ -88,6 +88,16 @@ def test_a_pose_differs_from_w_p_by_no_more_than_the_bound_and_a_ten_thousandth(
     assert error.max() <= 1e-4
 
 
+def test_every_entry_of_w_is_sent_to_half_a_step(session):
+    surface = encoded(session)
+    received = read_surface(surface.message(1))
+    exact = session.deformer.subspace.at(surface.order)
+    for w, own, q, step in zip(exact, received.columns, received.rows, received.steps, strict=True):
+        assert np.count_nonzero(w) <= len(own)
+        used = q != 0
+        assert np.abs(w[own[used]] - step * q[used].astype(float)).max() <= 0.5001 * step
+
+
 def test_at_rest_the_mesh_is_that_at_rest(session):
     surface = encoded(session)
     received = read_surface(surface.message(1))

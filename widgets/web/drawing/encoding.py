@@ -178,8 +178,8 @@ def encode_surface(
         columns.append(np.pad(own, (0, padding)).astype(np.uint16))
         for start in range(0, len(members), _ROWS):
             w = subspace.nonzeros(members[start : start + _ROWS])[1]
-            step = np.abs(w).max(axis=1) / _LARGEST
-            steps.append(step.astype(np.float32))
+            step = (np.abs(w).max(axis=1) / _LARGEST).astype(np.float32)
+            steps.append(step.copy())
             step[step == 0.0] = 1.0
             q = np.rint(w / step[:, None]).astype(np.int16)
             weights.append(np.pad(q, ((0, 0), (0, padding))).ravel())
