@@ -28,7 +28,7 @@ ROOMS = [
     "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.recording",
     "widgets.editor", "widgets.panel",
     "widgets", "widgets.plugin", "widgets.qt", "widgets.app",
-    "widgets.web.serving", "widgets.web", "benchmarks", "cli", "__main__",
+    "widgets.web.drawing", "widgets.web.serving", "widgets.web", "benchmarks", "cli", "__main__",
 ]  # fmt: skip
 MOST_FLOORS = 24
 MOST_IMPORTS = 335  # pairs of rooms of which one imports from the other

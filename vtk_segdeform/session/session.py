@@ -455,6 +455,14 @@ class Session(Timeline):
         """Bind the cages and constraints in advance, so that the first move does not wait."""
         self._pose_solver.prepare(self._state, progress)
 
+    @property
+    def deformer(self) -> Deformer:
+        """The deformer of the cages, bound first if necessary, without fixed vertices or handles.
+
+        Its `subspace` is W~ of the mesh.  The session solves with copies, so use it to read only.
+        """
+        return self._pose_solver.bind(self._state)
+
     def preparation(self, progress: Progress | None = None) -> Preparation:
         """Return the regions and cages that the session lacks, bound, without changing it.
 

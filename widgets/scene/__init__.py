@@ -24,6 +24,7 @@ The files, in reading order:
 """
 
 from .backdrop import set_background, set_lights
+from .decimated_surface import decimated_triangles
 from .draft import Draft
 from .gestures import Gesture, Phase, Pointer
 from .handle_colours import handle_colour
@@ -35,11 +36,12 @@ from .projection import Projection
 from .step_budget import StepBudget, observe_steps, prescribe_steps
 from .surface_display import SurfaceDisplay, SurfaceStyle, drawn_triangles
 from .view import Stop, View
-from .viewpoint import VIEWS, Viewpoint
+from .viewpoint import TURN, VIEWS, Viewpoint
 from .widget import Widget
 from .wireframe import Wireframe
 
 __all__ = [
+    "TURN",
     "VIEWS",
     "Draft",
     "Gesture",
@@ -59,6 +61,7 @@ __all__ = [
     "Viewpoint",
     "Widget",
     "Wireframe",
+    "decimated_triangles",
     "drawn_triangles",
     "handle_colour",
     "observe_steps",

@@ -25,6 +25,17 @@ from vtk_segdeform.mesh import Mesh
 _PATIENCE = 0.02  # seconds until it is clear that the decimated mesh does not exist yet
 
 
+def decimated_triangles(mesh: Mesh) -> tuple[IntArray, IntArray]:
+    """Return the vertices (k,) of a large *mesh* that are drawn, and faces (f, 3) between them."""
+    coarse, kept, _ = decimated(mesh, sizes.DECIMATED_POINTS)
+    x, normals = mesh.vertices[kept], VertexNormals(mesh).subset(kept)(mesh.vertices)
+    # Clusters may fold a face over, which light would show as a black dot.
+    faces = coarse.faces
+    a, b, c = (x[corner] for corner in faces.T)
+    folded = (np.cross(b - a, c - a) * normals[faces].sum(axis=1)).sum(axis=1) < 0.0
+    return kept, np.where(folded[:, None], faces[:, ::-1], faces)
+
+
 @dataclass(frozen=True, eq=False)
 class _Shape:
     """The vertices (k,) of a mesh that are drawn, faces between them, and their normals."""
@@ -37,14 +48,9 @@ class _Shape:
     @classmethod
     def of(cls, mesh: Mesh) -> _Shape:
         """Return the shape of a large *mesh*."""
-        coarse, kept, _ = decimated(mesh, sizes.DECIMATED_POINTS)
+        kept, faces = decimated_triangles(mesh)
         normals_of = VertexNormals(mesh).subset(kept)
-        x, normals = mesh.vertices[kept], normals_of(mesh.vertices)
-        # Clusters may fold a face over, which light would show as a black dot.
-        faces = coarse.faces
-        a, b, c = (x[corner] for corner in faces.T)
-        folded = (np.cross(b - a, c - a) * normals[faces].sum(axis=1)).sum(axis=1) < 0.0
-        return cls(kept, np.where(folded[:, None], faces[:, ::-1], faces), normals, normals_of)
+        return cls(kept, faces, normals_of(mesh.vertices), normals_of)
 
 
 class DecimatedSurface:

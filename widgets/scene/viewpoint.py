@@ -29,7 +29,8 @@ _ENOUGH = 50_000  # points that are framed, about, with those farthest out along
 _NEAREST, _FARTHEST = 3e-3, 100.0  # distances of the camera, in diagonals of the model
 _MARGIN = 0.86  # share of the view that a framed model fills
 _SMALLEST = 1e-6  # the smallest framed radius, in diagonals
-_TURN = math.pi  # rotation, in radians, of a drag across the height of the view
+TURN = math.pi
+"""Rotation, in radians, of a drag across the height of the view."""
 _LEVEL = 0.35  # sine of the roll above which the camera orbits about its own view-up
 _DURATION = 0.15  # seconds of an animation
 _FRAME = 10  # milliseconds
@@ -171,7 +172,7 @@ class Viewpoint:
     def orbit(self, dx: float, dy: float, pivot: FloatArray, axis: FloatArray) -> None:
         """Turn about *axis* through *pivot* by *dx*, and tilt by *dy* up to the poles."""
         camera = self.view.camera
-        step = _TURN / max(1, self.view.renderer.GetSize()[1])
+        step = TURN / max(1, self.view.renderer.GetSize()[1])
         away, up = -self.view.view_direction, np.array(camera.GetViewUp())
         right = np.cross(up, away)
         if not (is_sound(away, up) and np.linalg.norm(right) > 0.0):

@@ -11,6 +11,7 @@ The files, in reading order:
     transfer    uploads and downloads
     client      a process for one person, for servers
     page/       the page: view.js, panel.js, page.js, page.html, page.css
+    drawing/    the body drawn by the page, from the cages alone
     serving/    ``segdeform serve``: one client process for each page
 
 It needs ``pip install 'vtk-segdeform[web]'``.

@@ -1,0 +1,115 @@
+"""A page is sent what it lacks, and nothing twice."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+from posed_scenes import random_cages, sausage_session
+
+from vtk_segdeform.session import Change
+from vtk_segdeform.widgets.web.drawing import Look, Mark, SurfaceStream
+from vtk_segdeform.widgets.web.drawing.look import Shape
+from vtk_segdeform.widgets.web.drawing.messages import Kind
+
+LOOK = Look(
+    np.eye(4), np.eye(4), np.array([0.0, 0.0, 1.0]), np.zeros(3), np.ones(3), 0.2, 0.8,
+    np.array([[0.0, 0.0, 1.0, 1.0, 1.0, 1.0]]),
+)  # fmt: skip
+
+
+def kinds(messages) -> list[Kind]:
+    return [Kind(struct.unpack_from("<6xH", data)[0]) for data in messages]
+
+
+@pytest.fixture
+def stream():
+    """Return a stream whose page has everything, in a pose."""
+    session = sausage_session()
+    session.move_cage(0, random_cages(session, 4, 0.05)[0])
+    session.commit()
+    stream = SurfaceStream(session)
+    stream.encode()
+    assert kinds(stream.due(LOOK)) == [Kind.SURFACE, Kind.LOOK, Kind.CAGES]
+    assert not stream.due(LOOK)
+    return stream
+
+
+def test_before_it_is_encoded_nothing_is_due():
+    stream = SurfaceStream(sausage_session())
+    assert stream.is_possible
+    assert not stream.is_encoded
+    assert not stream.due(LOOK)
+
+
+def test_a_drag_sends_twelve_bytes_for_each_cage_vertex(stream):
+    session = stream.session
+    for k in range(3):
+        session.move_cage(1, random_cages(session, k, 0.05)[1])
+        (data,) = stream.due(LOOK)
+        assert kinds([data]) == [Kind.CAGES]
+        assert len(data) == 20 + 12 * sum(cage.n_vertices for cage in session.cages)
+    session.undo()
+    assert kinds(stream.due(LOOK)) == [Kind.CAGES]
+
+
+def test_colours_look_and_marks_are_sent_when_they_change(stream):
+    colours = np.zeros((stream.session.mesh.n_vertices, 3), np.uint8)
+    assert kinds(stream.due(LOOK, colours=colours)) == [Kind.COLOURS]
+    assert not stream.due(LOOK, colours=colours)
+    assert kinds(stream.due(LOOK)) == [Kind.COLOURS]
+    turned = Look(**{**vars(LOOK), "view": np.diag([1.0, -1.0, -1.0, 1.0])})
+    assert kinds(stream.due(turned)) == [Kind.LOOK]
+    stream.repeat_look()
+    assert kinds(stream.due(turned)) == [Kind.LOOK]
+    dot = Mark(Shape.POINTS, np.zeros((1, 3)), np.ones(4), 8.0, True)
+    assert kinds(stream.due(turned, marks=[dot])) == [Kind.MARKS]
+    assert not stream.due(turned, marks=[dot])
+    assert kinds(stream.due(turned)) == [Kind.MARKS]
+
+
+def test_a_finished_pose_is_sent_with_its_offsets_and_dragged_on_without(stream):
+    session = stream.session
+    session.undo()
+    session.move_handle("end", session.targets["end"] + [-0.5, 0.8, 0.0])
+    session.commit()
+    assert kinds(stream.due(LOOK)) == [Kind.CAGES]
+    session.finish()
+    (data,) = stream.due(LOOK)
+    assert kinds([data]) == [Kind.OFFSETS]
+    step = np.frombuffer(data, "<f4", 1, 16)
+    n = session.mesh.n_vertices
+    offsets = step * np.frombuffer(data, "<i2", 3 * n, 20).reshape(-1, 3)
+    surface = stream.surface
+    at_cages = session.deformer.surface(session.cage_vertices)[surface.order]
+    shown = at_cages + surface.scale * offsets
+    np.testing.assert_allclose(
+        shown, session.vertices[surface.order], atol=0.51 * surface.scale * float(step[0])
+    )
+    session.move_handle("end", session.targets["end"] + [0.0, 0.01, 0.0])
+    assert kinds(stream.due(LOOK)) == [Kind.CAGES]
+    session.undo()
+    session.undo()
+    assert kinds(stream.due(LOOK)) == [Kind.OFFSETS, Kind.CAGES]  # none any more
+
+
+def test_a_new_page_is_sent_everything(stream):
+    stream.reset()
+    assert kinds(stream.due(LOOK)) == [Kind.SURFACE, Kind.LOOK, Kind.CAGES]
+
+
+def test_after_new_cages_nothing_is_due_until_they_are_encoded(stream):
+    session = stream.session
+    seen = []
+    session.on_change(seen.append)
+    first = session.cages[0]
+    session.set_cages([type(first)(1.01 * first.vertices, first.faces), *session.cages[1:]])
+    assert any(change & Change.CAGES for change in seen)
+    assert not stream.due(LOOK)
+    session.bind()
+    assert not stream.due(LOOK)
+    stream.encode()
+    messages = stream.due(LOOK)
+    assert kinds(messages) == [Kind.SURFACE, Kind.LOOK, Kind.CAGES]
+    assert struct.unpack_from("<12xI", messages[0]) == (2,)

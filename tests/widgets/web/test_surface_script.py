@@ -1,0 +1,255 @@
+"""The page draws what the in-process view draws, in a real browser."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from chromium import Chromium, needs_chromium
+from hands import plain_view
+from PIL import Image
+from posed_scenes import random_cages, sausage_session
+from sheets import moebius
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
+
+from vtk_segdeform import Regions, fit_cages, sizes
+from vtk_segdeform.errors import MissingDependencyError
+from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.pictures.canvas import require_offscreen
+from vtk_segdeform.session import Session, State
+from vtk_segdeform.widgets.scene import SurfaceDisplay, Viewpoint, Wireframe, set_lights
+from vtk_segdeform.widgets.web.drawing import SCRIPT, SurfaceStream, look_of, marks_of
+
+pytestmark = needs_chromium
+
+SIZE = 400
+MOST_DIFFERENT, SELDOM_DIFFERENT = 0.5, 3.0  # of 255: mean and 99 % of the pixels of the body
+HTML = f"data:text/html,<body style='margin:0'><canvas width={SIZE} height={SIZE}></canvas>"
+START = """
+window.surface = SegdeformSurface.create(document.querySelector('canvas'));
+window.bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
+surface !== null
+"""
+
+
+@pytest.fixture(scope="module")
+def page():
+    try:
+        require_offscreen()
+    except MissingDependencyError as error:
+        pytest.skip(str(error))
+    with Chromium(SIZE, SIZE) as browser:
+        page = browser.page(HTML, size=(SIZE, SIZE))
+        assert page.evaluate(SCRIPT.read_text() + START)
+        yield page
+        assert not [text for text in page.messages() if "Context" not in text]
+
+
+def send(page, messages) -> list[str]:
+    """Give messages to the page, and return its answers."""
+    texts = json.dumps([base64.b64encode(each).decode() for each in messages])
+    return page.evaluate(f"{texts}.map((text) => surface.receive(bytes(text)))")
+
+
+def drawn(page) -> np.ndarray:
+    """Return the canvas, (h, w, 4) float."""
+    url = page.evaluate("surface.draw(), surface.canvas.toDataURL()")
+    data = base64.b64decode(url.partition(",")[2])
+    return np.asarray(Image.open(io.BytesIO(data)).convert("RGBA"), dtype=float)
+
+
+class InProcess:
+    """A session in a view of this process, and a stream for the page."""
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.view = plain_view((SIZE, SIZE))
+        set_lights(self.view.renderer)
+        self.surface = SurfaceDisplay(self.view, session)
+        self.viewpoint = Viewpoint(
+            self.view, lambda: session.vertices, lambda: session.mesh.diagonal
+        )
+        self.viewpoint.look_from("home", animate=False)
+        self.stream = SurfaceStream(session)
+        self.stream.encode()
+
+    def picture(self) -> np.ndarray:
+        """Return the picture of the view, (h, w, 3) float."""
+        self.view.render()
+        grabber = vtkWindowToImageFilter()
+        grabber.SetInput(self.view.window)
+        grabber.ReadFrontBufferOff()
+        grabber.Update()
+        pixels = vtk_to_numpy(grabber.GetOutput().GetPointData().GetScalars())
+        return pixels.reshape(SIZE, SIZE, -1)[::-1, :, :3].astype(float)
+
+    def due(self, **more) -> list[bytes]:
+        """Return the messages for the page."""
+        focus = np.array(self.view.camera.GetFocalPoint())
+        material, axis = self.surface.actor.GetProperty(), self.viewpoint.turning_axis()
+        return self.stream.due(look_of(self.view.renderer, material, axis, focus), **more)
+
+
+@pytest.fixture(scope="module")
+def scene(page):
+    """Give the page a sausage in a pose."""
+    session = sausage_session()
+    session.move_handle("end", session.targets["end"] + [-1.0, 1.0, 0.5])
+    session.commit()
+    scene = InProcess(session)
+    assert set(send(page, scene.due())) == {""}
+    return SimpleNamespace(session=session, here=scene)
+
+
+def compare(page, scene: InProcess) -> None:
+    """Compare the silhouettes and the shades of the page with those in process."""
+    expected, got = scene.picture(), drawn(page)
+    mine, theirs = got[..., 3] > 0, (expected < 255).any(axis=2)
+    assert theirs.mean() > 0.05
+    assert (mine & theirs).sum() > 0.99 * (mine | theirs).sum()
+    difference = np.abs(got[..., :3] - expected)[mine & theirs]
+    assert difference.mean() < MOST_DIFFERENT
+    assert np.quantile(difference, 0.99) < SELDOM_DIFFERENT
+
+
+def test_the_page_draws_what_the_view_draws(page, scene):
+    compare(page, scene.here)
+
+
+def test_colours_and_moves_reach_the_page(page, scene):
+    here, session = scene.here, scene.session
+    height = session.vertices[:, 2]
+    colours = np.zeros((session.mesh.n_vertices, 3), np.uint8)
+    colours[:, 0] = 255.0 * (height - height.min()) / np.ptp(height)
+    colours[:, 1] = 80
+    here.surface.set_colours("test", colours)
+    session.move_cage(0, random_cages(session, 5, 0.04)[0])
+    messages = here.due(colours=colours)
+    assert len(messages) == 2
+    assert send(page, messages) == ["", ""]
+    compare(page, here)
+    here.surface.set_colours("test", None)
+    session.undo()
+    assert set(send(page, here.due())) == {""}
+    compare(page, here)
+
+
+def test_a_turn_in_the_page_is_that_of_the_view(page, scene):
+    here = scene.here
+    camera = here.view.camera
+    before = here.viewpoint.settings()
+    for dx, dy in ((90, 35), (-160, 120), (20, -300)):
+        pivot, axis = np.array(camera.GetFocalPoint()), here.viewpoint.turning_axis()
+        page.evaluate(f"surface.turn({dx / SIZE}, {dy / SIZE})")
+        here.viewpoint.orbit(dx, dy, pivot, axis)
+        compare(page, here)
+    assert send(page, here.due()) == [""]  # kept, and not used, until the end of the turn
+    page.evaluate("surface.endTurn()")
+    assert here.viewpoint.restore(before)
+    assert send(page, here.due()) == [""]
+    compare(page, here)
+
+
+def test_a_surface_with_one_side_has_no_crease(page):
+    mesh = Mesh(*moebius())
+    regions = Regions.single(mesh)
+    session = Session(mesh, state=State(regions, fit_cages(mesh, regions, 30)))
+    here = InProcess(session)
+    session.move_cage(0, random_cages(session, 1, 0.05)[0])
+    assert set(send(page, here.due())) == {""}
+    compare(page, here)
+
+
+def test_marks_are_drawn_where_the_view_draws_them(page, scene):
+    here, session = scene.here, scene.session
+    here.stream.reset()
+    frame = Wireframe(
+        session.cages[0].vertices, np.array([[0, 1], [2, 40], [7, 30]]), np.array([5, 9])
+    )
+    frame.set_style(np.array([255, 0, 0]), line_width=6.0, sphere_size=14.0)
+    frame.actor.GetProperty().LightingOff()
+    here.view.foreground.AddActor(frame.actor)
+    marks = marks_of(here.view, [here.surface.actor])
+    assert set(send(page, here.due(marks=marks))) == {""}
+    expected, got = here.picture(), drawn(page)
+    red = [(p[..., 0] > 200) & (p[..., 1] < 60) for p in (expected, got)]
+    here.view.remove_foreground()
+    assert red[0].sum() > 500
+    assert (red[0] & red[1]).sum() > 0.8 * (red[0] | red[1]).sum()
+    assert send(page, here.due()) == [""]
+    compare(page, here)
+
+
+def test_slow_software_draws_fewer_triangles(page, monkeypatch):
+    monkeypatch.setattr(sizes, "PAGE_DRAFT", 100)
+    monkeypatch.setattr(sizes, "DECIMATED_POINTS", 600)
+    here = InProcess(sausage_session())
+    assert set(send(page, here.due())) == {""}
+    every = page.evaluate("surface._corners")
+    assert every == here.session.mesh.faces.size
+    expected, full = here.picture(), drawn(page)
+    page.evaluate("window.clock = 0, performance.now = () => 1e5 * clock++")  # slow pictures
+    for _ in range(8):
+        page.evaluate("surface.draw()")
+    page.evaluate("delete performance.now")
+    assert 0 < page.evaluate("surface._corners") < 0.6 * every
+    few = drawn(page)
+    mine, theirs = few[..., 3] > 0, (expected < 255).any(axis=2)
+    assert (mine & theirs).sum() > 0.95 * (mine | theirs).sum()
+    assert not np.array_equal(few, full)
+
+
+def test_damaged_messages_are_refused_and_change_nothing(page, scene):
+    here = scene.here
+    here.stream.reset()
+    messages = here.due()
+    assert set(send(page, messages)) == {""}
+    before = drawn(page)
+    rng = np.random.default_rng(1)
+    surface, _, cages = messages
+    damaged = [b"", b"SDFM", b"no message at all, but long enough", surface[:-4], surface + b"0000"]
+    damaged += [cages[:4] + b"\x09\0" + cages[6:], cages[:12] + b"\x63\0\0\0" + cages[16:]]
+    damaged += [cages[:20] + np.full(len(cages) // 4 - 5, np.nan, "<f4").tobytes()]
+    for at in range(16, 48, 4):  # each count of the surface
+        for value in (0, 7, 1 << 20, (1 << 32) - 1):
+            count = np.uint32(value).astype("<u4").tobytes()
+            if count != surface[at : at + 4]:
+                damaged.append(surface[:at] + count + surface[at + 4 :])
+    n, faces = np.frombuffer(surface, "<u4", 3, 16)[[0, 2]]
+    damaged.append(surface[: -12 * int(faces)] + b"\xff" * (12 * int(faces)))
+    answers = send(page, damaged)
+    assert all(answers), [k for k, answer in enumerate(answers) if not answer]
+    np.testing.assert_array_equal(drawn(page), before)
+    # Wrong bytes anywhere may mean another surface, but nothing is thrown.
+    for _ in range(20):
+        data = bytearray(surface)
+        for at in rng.integers(0, len(data), 5):
+            data[at] = rng.integers(0, 256)
+        (answer,) = send(page, [bytes(data)])
+        assert isinstance(answer, str)
+    here.stream.reset()
+    assert set(send(page, here.due())) == {""}
+    np.testing.assert_array_equal(drawn(page), before)
+    assert n == scene.session.mesh.n_vertices
+
+
+def test_after_its_graphics_memory_was_lost_the_page_is_sent_everything_again(page, scene):
+    here = scene.here
+    page.evaluate(
+        "window.losses = 0, surface.onlost = () => losses++,"
+        "window.memory = surface.gl.getExtension('WEBGL_lose_context'), memory.loseContext()"
+    )
+    page.wait("surface.gl.isContextLost()")
+    page.wait("surface.serial === null")
+    here.stream.reset()
+    assert "" not in send(page, here.due())
+    page.evaluate("memory.restoreContext()")
+    page.wait("losses === 1")
+    here.stream.reset()
+    assert set(send(page, here.due())) == {""}
+    compare(page, here)

@@ -1,0 +1,32 @@
+"""The body drawn in the page: W~ once, then only the cage vertices of each pose.
+
+The files, in reading order:
+
+    messages    binary messages to the page
+    encoding    a mesh and its W~ as a message, and the messages of its poses
+    look        camera, light, material and marks of a VTK renderer
+    stream      which messages a page still needs
+
+``surface.js`` receives the messages and draws with WebGL 2.
+"""
+
+from pathlib import Path
+
+from .encoding import EncodedSurface, encode_surface, is_drawable
+from .look import Look, Mark, look_of, marks_of
+from .stream import SurfaceStream
+
+SCRIPT = Path(__file__).with_name("surface.js")
+"""The script of the page."""
+
+__all__ = [
+    "SCRIPT",
+    "EncodedSurface",
+    "Look",
+    "Mark",
+    "SurfaceStream",
+    "encode_surface",
+    "is_drawable",
+    "look_of",
+    "marks_of",
+]

@@ -1,0 +1,231 @@
+"""A mesh and its W~ as one message, from which a page computes every pose.
+
+The mesh follows its cages, x = rest + W~ (p - p_rest).  A page that has W~ needs only the motion of
+the cage vertices for a picture, some 155 x 3 numbers, whatever the size of the mesh.
+
+Every row of W~ is sent with all its entries, as whole numbers of 16 bits times a step of its own,
+
+    w_ij = q_ij s_i + e_ij,    s_i = max_j |w_ij| / 32767,    |e_ij| <= s_i / 2
+
+so that a vertex is displaced by no more than ``s_i / 2 * sum_j |p_j - p_rest_j|``, over the cage
+vertices j that move it; at rest by nothing.  On drags by up to 0.9 diagonals of the mesh that is
+4e-5 diagonals and 0.5 degrees of a normal at most, and 4e-6 and 0.02 root mean square.  The 16
+largest entries of each row alone, corrected to reproduce affine maps, err by 4 to 12 % of the
+diagonal and 3 to 15 degrees root mean square, because mean value coordinates fall off slowly; so
+do 16 columns of a factorisation of low rank, by 3 to 21 %.
+
+All lengths in messages are in diagonals of the mesh, from the middle of its bounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vtk_segdeform import sizes
+from vtk_segdeform.arrays import FloatArray, IntArray, as_points, bounds_of
+from vtk_segdeform.cages import Cage
+from vtk_segdeform.errors import ArgumentError, CageError
+from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.subspace import Subspace
+
+from ...scene import decimated_triangles
+from .messages import Kind, message
+
+MOST_VERTICES = 1 << 17
+"""Vertices of a mesh that a page draws at most."""
+MOST_WEIGHTS = 1 << 24
+"""Entries of W~ that a page receives at most: 32 megabytes."""
+_GROUP = 4  # entries of a row are read four at a time; rows are padded to a multiple
+_LARGEST = 32767
+_ROWS = 1 << 14  # encoded together
+_CELLS = 1023  # along an axis, for `_along_curve`
+
+
+@dataclass(frozen=True, eq=False)
+class EncodedSurface:
+    """What a page needs to pose and draw a mesh; made by `encode_surface`.
+
+    Parameters
+    ----------
+    centre, scale : (3,) float, float
+        A point u of a message is ``centre + scale * u`` in the scene.
+    order : (n,) int
+        The vertices of the mesh in the order of the message, set by set.
+    rest : (n, 3) float32
+        The vertices at rest, in units of the message.
+    steps : (n,) float32
+        s.
+    sets : (n,) uint16
+        The set of each vertex; vertices of a set are moved by the same cage vertices.
+    columns : sequence of (c,) uint16
+        For each set its cage vertices, c a multiple of four; padding has weight 0.
+    weights : (w,) int16
+        q, row after row.
+    faces : (f, 3) uint32
+        Triangles of the vertices, and from n on of *twice*.
+    coarse : (c, 3) uint32
+        Fewer triangles between some of the vertices, for slow software; none for a small mesh.
+    twice : (t,) uint32
+        Vertices that are drawn a second time, with the opposite normal.
+    cages : (m, 3) float
+        The cage vertices at rest, in the scene.
+    is_closed : bool
+        Whether the back of every face is inside, so that software need not draw it.
+    """
+
+    centre: FloatArray
+    scale: float
+    order: IntArray
+    rest: NDArray[np.float32]
+    steps: NDArray[np.float32]
+    sets: NDArray[np.uint16]
+    columns: Sequence[NDArray[np.uint16]]
+    weights: NDArray[np.int16]
+    faces: NDArray[np.uint32]
+    coarse: NDArray[np.uint32]
+    twice: NDArray[np.uint32]
+    cages: FloatArray
+    is_closed: bool
+
+    def message(self, serial: int) -> bytes:
+        """Return the message; *serial* tells this surface from earlier ones."""
+        n, t, f, m = len(self.rest), len(self.twice), len(self.faces), len(self.cages)
+        lengths = np.array([len(each) for each in self.columns], dtype=np.uint32)
+        columns = np.concatenate(self.columns)
+        rows = m, len(lengths), len(columns), len(self.weights)
+        counts = np.array([n, t, f, len(self.coarse), *rows, self.is_closed], dtype=np.uint32)
+        return message(
+            Kind.SURFACE, serial, counts, self.rest, self.steps, self.sets, lengths, columns,
+            self.weights, self.faces, self.coarse, self.twice,
+        )  # fmt: skip
+
+    def cage_message(self, serial: int, number: int, cage_vertices: Sequence[ArrayLike]) -> bytes:
+        """Return the message of a pose, (m_r, 3) for each cage; *number* counts the poses."""
+        p = np.concatenate([np.asarray(each, dtype=np.float64) for each in cage_vertices])
+        if p.shape != self.cages.shape:
+            raise CageError(f"the cages must have {len(self.cages)} vertices; got {len(p)}")
+        moves = ((p - self.cages) / self.scale).astype(np.float32)
+        return message(Kind.CAGES, serial, np.array([number], np.uint32), moves)
+
+    def offset_message(self, serial: int, offsets: ArrayLike | None) -> bytes:
+        """Return the message of *offsets* (n, 3), in the scene, that are added to every pose."""
+        if offsets is None:
+            return message(Kind.OFFSETS, serial, np.zeros(1, np.float32))
+        shift = as_points(offsets, "offsets", len(self.rest)) / self.scale
+        step = max(float(np.abs(shift).max()) / _LARGEST, float(np.finfo(np.float32).tiny))
+        rounded = np.rint(shift[self.order] / step).astype(np.int16)
+        return message(Kind.OFFSETS, serial, np.array([step], np.float32), rounded)
+
+    def colour_message(self, serial: int, colours: NDArray[np.uint8] | None) -> bytes:
+        """Return the message of vertex *colours* (n, 3) uint8, or of none."""
+        if colours is None:
+            return message(Kind.COLOURS, serial)
+        if colours.shape != self.rest.shape or colours.dtype != np.uint8:
+            expected = self.rest.shape
+            raise ArgumentError(
+                f"colours must be uint8 of shape {expected}; got {colours.dtype}, {colours.shape}"
+            )
+        opaque = np.full((len(colours), 4), 255, dtype=np.uint8)
+        opaque[:, :3] = colours[self.order]
+        return message(Kind.COLOURS, serial, opaque)
+
+
+def is_drawable(mesh: Mesh, subspace: Subspace) -> bool:
+    """Return whether *mesh* and its W~ are small enough for a page."""
+    size = sum(block.size for block in subspace.blocks)
+    return mesh.n_vertices <= MOST_VERTICES and size <= MOST_WEIGHTS
+
+
+def encode_surface(
+    mesh: Mesh, subspace: Subspace, cages: Sequence[Cage], turned: IntArray
+) -> EncodedSurface:
+    """Return *mesh* with its W~ as a page needs them.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        n vertices at rest.
+    subspace : Subspace
+        Its W~.
+    cages : sequence of Cage
+        At rest, in the order of the columns of W~.
+    turned : (k,) int
+        The corners of faces that are drawn with opposite normals, `VertexNormals.turned`.
+
+    Raises
+    ------
+    ArgumentError
+        If the mesh or its W~ is too large; see `is_drawable`.
+    """
+    if not is_drawable(mesh, subspace):
+        raise ArgumentError(
+            f"a page can draw meshes of up to {MOST_VERTICES} vertices whose vertices and cage "
+            f"vertices have up to {MOST_WEIGHTS} pairs; let the server draw this one"
+        )
+    low, high = bounds_of(mesh.vertices)
+    centre, scale = 0.5 * (low + high), float(mesh.diagonal)
+    near = _along_curve(mesh.vertices)
+    order, columns, steps, weights = [], [], [], []
+    for ids in subspace.sets_by_cages():
+        members = ids[np.argsort(near[ids], kind="stable")]
+        own = subspace.nonzeros(members[:1])[0]
+        padding = -len(own) % _GROUP
+        order.append(members)
+        columns.append(np.pad(own, (0, padding)).astype(np.uint16))
+        for start in range(0, len(members), _ROWS):
+            w = subspace.nonzeros(members[start : start + _ROWS])[1]
+            step = (np.abs(w).max(axis=1) / _LARGEST).astype(np.float32)
+            steps.append(step.copy())
+            step[step == 0.0] = 1.0
+            q = np.rint(w / step[:, None]).astype(np.int16)
+            weights.append(np.pad(q, ((0, 0), (0, padding))).ravel())
+    drawn = np.concatenate(order)
+    place = np.empty(mesh.n_vertices, dtype=np.int64)
+    place[drawn] = np.arange(mesh.n_vertices)
+    twice, second = np.unique(place[mesh.faces.ravel()[turned]], return_inverse=True)
+    faces = place[mesh.faces.ravel()]
+    faces[turned] = mesh.n_vertices + second
+    coarse = np.empty((0, 3), dtype=np.int64)
+    if mesh.n_vertices > sizes.PAGE_DRAFT:
+        kept, coarse = decimated_triangles(mesh)
+        coarse = kept[coarse]
+    return EncodedSurface(
+        centre,
+        scale,
+        drawn,
+        ((mesh.vertices[drawn] - centre) / scale).astype(np.float32),
+        np.concatenate(steps),
+        np.repeat(np.arange(len(order)), [len(ids) for ids in order]).astype(np.uint16),
+        columns,
+        np.concatenate(weights),
+        _sorted(faces.reshape(-1, 3), mesh.faces, mesh.vertices),
+        _sorted(place[coarse], coarse, mesh.vertices),
+        twice.astype(np.uint32),
+        np.concatenate([cage.vertices for cage in cages]),
+        mesh.is_closed,
+    )
+
+
+def _sorted(numbers: IntArray, faces: IntArray, points: FloatArray) -> NDArray[np.uint32]:
+    """Return *numbers* (f, 3) in the order of the *faces* (f, 3) of *points* along a curve."""
+    if not len(faces):
+        return numbers.astype(np.uint32)
+    middles = points[faces].mean(axis=1)
+    return numbers[np.argsort(_along_curve(middles), kind="stable")].astype(np.uint32)
+
+
+def _along_curve(points: FloatArray) -> IntArray:
+    """Return numbers (n,) of *points* (n, 3) along a curve (Morton's); close ones are near.
+
+    Drawn in this order, vertices and faces are found in caches: a third as many are computed.
+    """
+    low = points.min(axis=0)
+    size = max(float(np.ptp(points, axis=0).max()), float(np.finfo(float).tiny))
+    cells = ((points - low) / size * _CELLS).astype(np.int64)
+    for shift, mask in ((16, 0x30000FF), (8, 0x300F00F), (4, 0x30C30C3), (2, 0x9249249)):
+        cells = (cells | cells << shift) & mask
+    return np.asarray(cells @ np.array([1, 2, 4]))
