@@ -1,8 +1,8 @@
 """Surfaces through VTK's own readers and writers, for .vtk, .vtp, .vtu and .vtkhdf.
 
 Reading: the readers of VTK do not validate a file, so they run in a child process (`isolated`);
-afterwards the cells and arrays are checked, and VTK's error messages become a MeshError.  Plain .vtk,
-.vtp and .vtu files are read without VTK (`vtk_legacy`, `vtk_xml`).
+afterwards the cells and arrays are checked, and VTK's error messages become a MeshError.  Plain
+.vtk, .vtp and .vtu files are read without VTK (`vtk_legacy`, `vtk_xml`).
 
 Writing: names that a format cannot store are changed first.  VTK's XML writer does not escape
 names, so that ``<`` makes the file unreadable.  Its HDF writer changes some names, possibly two to

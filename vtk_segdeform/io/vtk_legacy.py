@@ -57,7 +57,8 @@ _TYPES = {
     "char": "i1", "signed_char": "i1", "unsigned_char": "u1", "short": "i2", "unsigned_short": "u2",
     "int": "i4", "unsigned_int": "u4", "vtktypeint64": "i8", "vtktypeuint64": "u8", "float": "f4",
     "double": "f8", "vtkidtype": "i4",
-    _SHARES: "f4", "long": np.dtype("l").str[1:], "unsigned_long": np.dtype("L").str[1:],  # VTK's, of the system
+    "long": np.dtype("l").str[1:], "unsigned_long": np.dtype("L").str[1:],  # those of the system
+    _SHARES: "f4",
 }  # fmt: skip
 _CELLS = {
     "vertices": "SetVerts", "lines": "SetLines", "polygons": "SetPolys",
@@ -285,7 +286,7 @@ def _is_name(name: str) -> bool:
 def _starts(values: IntArray, count: int) -> IntArray:
     """Return where each of *count* cells begins in *values*, its number of points first."""
     length = int(values[0]) + 1
-    if 1 < length and length * count == len(values):
+    if length > 1 and length * count == len(values):
         first = values[::length]
         if (first == length - 1).all():
             return np.arange(0, len(values) + 1, length)

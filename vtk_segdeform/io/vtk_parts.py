@@ -48,7 +48,7 @@ def numbers_of_text(text: bytes, kind: Any) -> Any:
 def set_points(data: pv.DataSet, values: Any) -> None:
     """Give *data* points, (3n,) numbers."""
     demand(values.dtype.kind == "f" and len(values))
-    data.points = np.array(values.reshape(-1, 3))
+    data.points = np.require(values.reshape(-1, 3), requirements="W")
 
 
 def cells_of(starts: IntArray, corners: IntArray, n_points: int) -> pv.CellArray:
