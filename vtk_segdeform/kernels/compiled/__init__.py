@@ -12,7 +12,8 @@
     pairs           `contact.Contact`
     paths           `blending.border_distance`
     beams           `line_of_sight.faces_in_beam`
-    triangles       `faults.Search`, `shells.shell_volumes`, `grouping.first_equal_row`
+    triangles       `faults.Search`, `shells.shell_volumes`, `grouping.first_equal_row`,
+                    `Mesh.face_areas`
     text            `number_lines.numbers_of`, `number_lines.Lines`, `stl.read_stl`
 
 They release the GIL and start no threads; `threads.in_parallel` runs several at a time.  Arguments
@@ -38,7 +39,7 @@ from .paths import distances_inside
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
 from .rotations import rotations
 from .text import corners_of_lines, facet_corners, numbers_of_lines, plain_numbers
-from .triangles import first_equal_points, flat_faces, shell_sums
+from .triangles import face_areas, first_equal_points, flat_faces, shell_sums
 from .volumes import determinants, volume_along_sums, volume_gradient, volume_sums
 
 __all__ = [
@@ -53,6 +54,7 @@ __all__ = [
     "corners_of_lines",
     "determinants",
     "distances_inside",
+    "face_areas",
     "facet_corners",
     "facing_pairs",
     "first_equal_points",
