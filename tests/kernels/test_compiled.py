@@ -501,6 +501,15 @@ def test_texts_of_numbers_are_parsed_alike(twin, monkeypatch, text, dtype):
             assert quick.tobytes() == slow.tobytes()
 
 
+def test_areas_of_faces_are_equal(twin, monkeypatch):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    quick, slow = twin(lambda: Mesh(MESH.vertices, MESH.faces).face_areas)
+    assert_array_equal(quick, slow)
+    corners = MESH.vertices[MESH.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert_allclose(quick, 0.5 * np.linalg.norm(normals, axis=1), rtol=1e-14)
+
+
 @pytest.mark.parametrize(
     ("text", "is_plain"),
     [("v 1 2.5 -3e2\nf 1 2 3\nv\t0 0 0 \r\n", True), ("v 1 2\nv 1 2 3\n", False),

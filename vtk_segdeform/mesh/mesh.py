@@ -141,7 +141,9 @@ class Mesh(Frozen):
         # An edge that is not in the boundary has faces in both directions.
         n, (a, b, c) = self.n_vertices, self.faces.T.copy()
         one, other = self.boundary.T
-        forth = [tail[tail < head] * n + head[tail < head] for tail, head in ((a, b), (b, c), (c, a))]
+        forth = [
+            tail[tail < head] * n + head[tail < head] for tail, head in ((a, b), (b, c), (c, a))
+        ]
         keys = np.concatenate([*forth, edge_keys(one, other, n)])
         keys.sort()
         return read_only(np.stack(np.divmod(keys[begins(keys)], n), axis=1))
