@@ -109,7 +109,7 @@ DAMAGE = {
     "an unknown version": (b"3.0", b"5.0"),
     "an unknown attribute": (b"SCALARS a short", b"EDGE_FLAGS a short"),
     "another number of rows": (b"POINT_DATA 4", b"POINT_DATA 3"),
-    "too few rows of a field": (b"c 1 4", b"c 1 3"),
+    "too few rows of a field": (b"c 1 4 int\n5 6 7 8", b"c 1 3 int\n5 6 7"),
     "too wide an array": (b"c 1 4", b"c 999999999999 4"),
     "five components": (b"short 1", b"short 5"),
     "an array of the same name": (b"c 1 4", b"a 1 4"),

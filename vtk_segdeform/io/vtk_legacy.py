@@ -295,5 +295,4 @@ def _starts(values: IntArray, count: int) -> IntArray:
         demand(at < len(lengths) and lengths[at] > 0)
         at += lengths[at] + 1
         starts.append(at)
-    demand(at == len(lengths))
     return np.array(starts, dtype=np.int64)

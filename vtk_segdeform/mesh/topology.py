@@ -282,10 +282,12 @@ class HalfEdges:
         if len(self.crowded) or len(self.turned):
             turned = self.opposite[self.turned]
             half = self._by_edge(np.concatenate([half, self.crowded, self.turned, turned]))
+        if not len(half):
+            return np.empty((0, 2), dtype=np.int64)
         forth = np.where(self.tail[half] < self.head_of(half), 1, -1)
         keys = self.keys_of(half)
         first = np.flatnonzero(begins(keys))
-        net = np.add.reduceat(forth, first) if len(half) else forth
+        net = np.add.reduceat(forth, first)
         edges = np.stack(np.divmod(keys[first], self.n_vertices), axis=1)
         edges[net < 0] = edges[net < 0, ::-1]
         return np.repeat(edges, np.abs(net), axis=0)
@@ -303,8 +305,9 @@ class HalfEdges:
         same = (a == b) | (b == c) | (c == a)
         some = np.flatnonzero(same & (a != -1) & (b != -1) & (c != -1))
         repeated = np.zeros(len(self.faces), dtype=bool)
-        first = first_equal_row(np.sort(self.faces[some], axis=1))
-        repeated[some] = first != np.arange(len(some))
+        if len(some):
+            first = first_equal_row(np.sort(self.faces[some], axis=1))
+            repeated[some] = first != np.arange(len(some))
         return repeated
 
     def renumbered(self, number: IntArray, n_vertices: int) -> HalfEdges:
